@@ -46,15 +46,10 @@ def printed_by(code: str, *words: object, cwd: Path | None = None, **environment
 def symtop(*words: object, cwd: Path | None = None, **environment: object) -> subprocess.Popen:
     """Start a command; its output is read by `ended`."""
     return subprocess.Popen(
-        [sys.executable, "-m", "symtop.cli", *map(str, words)],
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        text=True,
-        cwd=cwd,
-        start_new_session=True,
+        [sys.executable, "-m", "symtop.cli", *map(str, words)], text=True, cwd=cwd, start_new_session=True,
+        stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         env={**os.environ, **{name: str(value) for name, value in environment.items()}},
-    )
+    )  # fmt: skip
 
 
 def customized(folder: Path, text: str) -> Callable[..., subprocess.CompletedProcess]:

@@ -41,9 +41,9 @@ scripts.install()  # tests import `symtop_studies`
 
 
 LONGEST = (  # files whose tests take longest, begun first: one that begins last keeps a process busy alone
-    "test_blind", "test_adapters", "test_blocks", "test_random_runs", "test_reference", "test_exact", "test_claims",
-    "test_streamed", "test_explore", "test_first_minutes", "test_factors", "test_other_systems", "test_stale",
-    "test_right_hand_side", "test_analyses",
+    "test_blind", "test_adapters", "test_claims", "test_right_hand_side", "test_explore", "test_report", "test_advise",
+    "test_blocks", "test_random_runs", "test_reference", "test_exact", "test_streamed", "test_first_minutes",
+    "test_factors", "test_other_systems", "test_stale", "test_analyses",
 )  # fmt: skip
 STORED = Path(__file__).resolve().parent.parent / "results" / "quick"
 

@@ -29,15 +29,12 @@ def recipe():
     return yaml.safe_load((ROOT / "docs" / "conda" / "recipe.yaml").read_text(encoding="utf-8"))
 
 
-def test_the_recipe_asks_for_what_the_project_asks_for(project, recipe):
+def test_recipe_versions_and_commands_agree_with_the_project(project, recipe):
     ours = {CONDA.get(name, name): least for name, least in _needs(project["project"]["dependencies"]).items()}
     theirs = _needs(recipe["requirements"]["run"])
     assert theirs.pop("python") == "${{ python_min }}"
     assert theirs == ours
     assert project["build-system"]["requires"][0].partition(">")[0] in recipe["requirements"]["host"]
-
-
-def test_versions_and_commands_agree(project, recipe):
     cited = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert recipe["context"]["version"] == cited["version"] == symtop.__version__
     commands = [f"{name} = {target}" for name, target in project["project"]["scripts"].items()]

@@ -176,21 +176,12 @@ def small(tmp_path):
     return read(tmp_path)
 
 
-def test_imports_that_run_upward_are_reported(small):
+def test_imports_upward_circles_and_strangers_are_reported(small):
     assert upward(small) == [
-        "symtop.core.progress:2 imports symtop.model.good",
-        "symtop.core.typed:3 imports symtop.model.good",
-        "symtop.core.up:1 imports symtop.model.good",
-        "symtop.extra lies in no room of ORDER",
-        "symtop.report.page:1 imports symtop_studies.drift.study",
+        *(f"symtop.core.{line} imports symtop.model.good" for line in ("progress:2", "typed:3", "up:1")),
+        "symtop.extra lies in no room of ORDER", "symtop.report.page:1 imports symtop_studies.drift.study",
         "symtop.runner.beside:1 imports symtop.judging",
-    ]
-
-
-def test_a_circle_of_files_is_reported(small):
+    ]  # fmt: skip
     neighbours, study = "symtop.model.left <-> symtop.model.right", "symtop.report.page <-> symtop_studies.drift.study"
     assert circles(small) == [neighbours, study]
-
-
-def test_a_package_that_a_room_does_without_is_reported(small):
     assert strangers(small) == ["symtop.methods.kernel:2 imports matplotlib.pyplot"]

@@ -1,10 +1,16 @@
 """What a type checker sees of the public names: a user's script is typed throughout, and its mistakes are reported."""
 
+import importlib
+import inspect
+import pkgutil
 import subprocess
 import sys
+import types
 from pathlib import Path
 
 import pytest
+
+import symtop
 
 ROOT = Path(__file__).resolve().parents[1]
 
@@ -57,14 +63,24 @@ def checked(tmp_path_factory):
     return {name: [one for one in result.stdout.splitlines() if f"{name}.py:" in one] for name in ("good", "bad")}
 
 
-def test_a_script_is_typed_throughout(checked):
+def test_a_script_is_typed_throughout_and_mistakes_are_reported_where_they_are(checked):
     revealed = [line.split('"')[1] for line in checked["good"] if "Revealed type" in line]
     assert not [line for line in checked["good"] if ": error:" in line]
     assert [kind.replace("builtins.", "").replace("Union[int, None]", "int | None") for kind in revealed] == SEEN
-
-
-def test_mistakes_are_reported_where_they_are(checked):
     errors = {int(line.split(":")[1]): line for line in checked["bad"] if ": error:" in line}
     assert sorted(errors) == sorted(REPORTED)
     for number, word in REPORTED.items():
         assert word in errors[number]
+
+
+def test_every_public_name_is_there_and_none_is_that_of_a_package_beside_it():
+    text = inspect.getsource(symtop)
+    for name in symtop.__all__:
+        assert getattr(symtop, name) is not None
+        assert name == "__version__" or f"{name} as {name}" in text
+    places = {entry.name for entry in pkgutil.iter_modules(symtop.__path__)}
+    assert not places & set(symtop.__all__)
+    for package in ("core", "model", "methods", "run", "measure", "judging"):
+        module = importlib.import_module(f"symtop.{package}")
+        for entry in pkgutil.iter_modules(module.__path__):
+            assert isinstance(importlib.import_module(f"symtop.{package}.{entry.name}"), types.ModuleType)

@@ -20,9 +20,6 @@ FEW = [("stormer-verlet", "angles"), ("takahashi-imada", "attitude"), ("rk4", "a
 needs_gcc = pytest.mark.skipif(twin.compiler() is None, reason="the twins are built with gcc")
 
 
-# ---- C twins ---------------------------------------------------------------------------------------------------------
-
-
 def test_every_compiled_fixed_step_kernel_has_a_twin():
     marches = {inside(methods()[name].solvers[chart]).loop for name, chart in KEYS}
     assert marches <= set(twin.FAMILIES)
@@ -36,15 +33,11 @@ def test_every_twin_returns_the_same_bits(key):
 
 
 @needs_gcc
-def test_the_comparison_sees_one_wrong_rounding():
+def test_the_comparison_sees_one_wrong_rounding_and_a_twin_that_leaves_the_chart():
     kernel = kernels.kernel(("stormer-verlet", "angles"))
     nudged = np.nextafter(kernel.rule.drift[0], 1.0)
     other = twin.Twin(kernel._replace(rule=kernel.rule._replace(drift=(nudged,))), twin.EXACT)
     assert np.any(other.shown(STEPS)[0] != twin.ours(kernel, STEPS)[0])
-
-
-@needs_gcc
-def test_a_twin_that_leaves_the_chart_says_so():
     kernel = kernels.kernel(("stormer-verlet", "angles"))
     with pytest.raises(RuntimeError, match="stopped after"):
         twin.Twin(kernel._replace(state=(0.01, -9.0, 0.0, 0.0)), twin.EXACT)(STEPS)
@@ -68,18 +61,6 @@ def test_a_kernel_takes_at_most_a_quarter_more_than_its_twin(key):
     assert ours.best / theirs.best < kernels.LIMIT
 
 
-@pytest.mark.slow
-def test_an_ensemble_costs_little_around_its_steps():
-    """Ratios within one run: what is around the steps is 5 us on the machine that makes 1000 of them in 4.4."""
-    seconds = {item.name: item.seconds for item in ensemble.measure()}
-    around = seconds["`ensemble`, axis and energy"] - seconds["of it: the steps"]
-    assert around < 1.1 * seconds["of it: the steps"]
-    assert seconds["`simulate`"] > 50.0 * seconds["`ensemble`, axis and energy"]
-
-
-# ---- lanes -----------------------------------------------------------------------------------------------------------
-
-
 def test_the_tops_that_lanes_are_timed_on_stay_in_lanes_and_reach_the_error():
     """A member that is given up would be timed alone; the closed form says how far the others are off."""
     solver, numbers, steps = lanes.solver_of(*lanes.RIVAL), lanes.members(), 45
@@ -93,15 +74,15 @@ def test_the_tops_that_lanes_are_timed_on_stay_in_lanes_and_reach_the_error():
     assert len(np.unique(true, axis=0)) == lanes.MEMBERS  # neighbours, not copies
 
 
-# ---- the closed form -------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
-def test_a_closed_form_is_set_up_and_sampled_in_ten_microseconds():
-    """Half of the calls below 10 us, 99 % below 30 us, in both arithmetics; 40 digits take a thousand times as long.
-
-    Other tests that run beside this one slow both down, alike: then the ratio alone counts.
-    """
+def test_an_ensemble_costs_little_around_its_steps_and_a_closed_form_ten_microseconds():
+    """Ratios within one run: what is around the steps is 5 us on the machine that makes 1000 of them in 4.4."""
+    seconds = {item.name: item.seconds for item in ensemble.measure()}
+    around = seconds["`ensemble`, axis and energy"] - seconds["of it: the steps"]
+    assert around < 1.1 * seconds["of it: the steps"]
+    assert seconds["`simulate`"] > 50.0 * seconds["`ensemble`, axis and energy"]
+    # Half of the calls below 10 us, 99 % below 30 us, in both arithmetics; 40 digits take a thousand times as long.
+    # Other tests that run beside this one slow both down, alike: then the ratio alone counts.
     short, long, digits, *others = truth.measure()
     for row in (short, long):
         assert row.median < 1e-3 * digits.median
@@ -115,9 +96,6 @@ def test_a_closed_form_is_set_up_and_sampled_in_ten_microseconds():
     constants, kept = (row for row in others if row not in samples)
     assert constants.median < 10e-6  # of one top among many
     assert kept.median < 10e-3  # a reference at 1001 times, asked for again
-
-
-# ---- adaptive steps in C ---------------------------------------------------------------------------------------------
 
 
 @needs_gcc

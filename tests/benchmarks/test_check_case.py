@@ -46,16 +46,13 @@ def history(tmp_path):  # type: ignore[no-untyped-def]
     return written
 
 
-def test_a_history_is_judged(history) -> None:  # type: ignore[no-untyped-def]
+def test_a_history_is_judged_and_another_table_refused(history, tmp_path):
     attitude, rate = largest_errors(history())
     assert attitude < 1e-12
     assert rate < 1e-13
     assert largest_errors(history(off=0.01))[0] == pytest.approx(0.01, rel=1e-9)
     # without the Earth's rotation it is off by what that is in 30 s
     assert largest_errors(history(earth=0.0))[0] == pytest.approx(np.degrees(30.0 * EARTH), rel=1e-9)
-
-
-def test_another_table_is_refused(tmp_path) -> None:  # type: ignore[no-untyped-def]
     (tmp_path / "other.csv").write_text("time,yaw\n0,0\n")
     with pytest.raises(SymtopError, match="must be a history with the columns of the check case"):
         largest_errors(tmp_path / "other.csv")

@@ -15,10 +15,7 @@ SCENES = {body_of(symtop.scene(name)).velocity.tobytes(): symtop.scene(name) for
 
 def engine(method, stepped, name="setting"):
     """An engine that steps by a map of the catalogue and is said to have another."""
-
-    def run(body, h, steps):
-        return measure.mapped(SCENES[body.velocity.tobytes()], stepped, h, steps)
-
+    run = lambda body, h, steps: measure.mapped(SCENES[body.velocity.tobytes()], stepped, h, steps)
     return engines.Setting("Engine", "1", name, engines.FREE, method, run)
 
 
@@ -27,25 +24,19 @@ def broken(body, h, steps):
     raise RuntimeError("no such body")
 
 
-@pytest.mark.parametrize(
-    ("method", "stepped", "same"),
-    [
-        ("bullet", "bullet", True), ("bullet", "mujoco-implicit", False), ("rkmk4", "mujoco3-rk4", False),
-        ("jolt-float32", "jolt-float32", True), ("jolt-float32", "jolt", True), ("jolt", "jolt-float32", False),
-        ("no-squish", "no-squish", True),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("method", "stepped", "same"), [
+    ("bullet", "bullet", True), ("bullet", "mujoco-implicit", False), ("rkmk4", "mujoco3-rk4", False),
+    ("jolt-float32", "jolt-float32", True), ("jolt-float32", "jolt", True), ("jolt", "jolt-float32", False),
+    ("no-squish", "no-squish", True),
+])  # fmt: skip
 def test_a_map_is_an_engines_own_if_one_step_agrees(method, stepped, same):
     assert measure.agrees(measure.row(engine(method, stepped))) is same
 
 
-def test_the_axis_error_is_that_of_the_catalogue():
+def test_the_axis_error_is_that_of_the_catalogue_and_an_engine_that_raises_a_row_with_its_reason():
     made = measure.row(engine("mujoco-euler", "mujoco-euler"))
     assert made["goldstein_axis"] == pytest.approx(0.61079, rel=1e-4)
     assert made["goldstein_steps"] == 0.0
-
-
-def test_an_engine_that_raises_is_a_row_with_its_reason():
     made = measure.row(engines.Setting("Engine", "1", "bad", engines.FREE, "ode", broken))
     assert made["failed"] == "RuntimeError: no such body"
     assert not measure.agrees(made)
@@ -55,8 +46,6 @@ def test_an_engine_that_raises_is_a_row_with_its_reason():
     found = study.findings([made], ["Other is not installed here and was skipped: reason."], "today")
     assert found["failures"] == [*found["missing"], "Engine (bad): RuntimeError: no such body"]
 
-
-# ---- programs of other languages -------------------------------------------------------------------------------------
 
 ECHO = """
 import sys

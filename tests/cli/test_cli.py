@@ -1,63 +1,51 @@
-"""The command line: what it prints, its exit codes, and that it starts fast."""
+"""The command line: what it prints and its exit codes, that it starts fast, and `doctor`, which finds each fault."""
 
+import importlib.metadata
 import json
 import os
+import re
+import shutil
 import signal
 import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
+from unittest.mock import Mock
 
 import pytest
 from click.testing import CliRunner
 
+import symtop
+from symtop.cli import doctor, runs
 from symtop.cli.main import main
 from symtop.core import netcdf, parallel
 from symtop.core.errors import SymtopError
+from symtop.core.files import cache_root
+from symtop.measure import published, timing
+from symtop.methods.framework.registry import bibliography, citation_keys, engines, methods
+from symtop.run.ensemble import population
 from tests.commands import call
-
-
-def test_run_prints_the_errors_and_writes_the_dataset(tmp_path):
-    words = ("run", "spheroid", "midpoint", "--step-size", 0.01, "--output", tmp_path / "run.nc")
-    assert "angle between axes" in call(*words).output
-    assert netcdf.read(tmp_path / "run.nc").attrs["integrator"] == "midpoint"
-    report = numbers(call(*words, "--json").stdout)
-    assert report["steps"] == 800
-    assert 1e-3 < report["errors"]["axis"]["largest"] < 2e-2
-    assert report["errors"]["p_psi"]["largest"] < 1e-14
-    once = call("run", "spheroid", "strang", "--step-size", 8, "--no-guard").output
-    assert "\n1 step, 1 force evaluation\n" in once
-
-
-def test_a_run_that_fails_is_written_and_says_so_with_code_3(tmp_path):
-    path = tmp_path / "run.nc"
-    result = call("run", "spheroid", "stormer-verlet", "--step-size", 1.0, "--horizon", 50, "--output", path, code=3)
-    assert "theta left (0, pi)" in result.output
-    assert netcdf.read(path).attrs["outcome"] == "left_chart"
-
 
 OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --body I1,I2,I3 or --plugin FILE)"
 
 
-@pytest.mark.parametrize(
-    ("words", "parts"),
-    [
-        ("run sferoid midpoint --step-size 0.1", ["scene 'sferoid'", "spheroid", "symtop scenes", BODY]),
-        ("run spheroid midpont --step-size 0.1", ["integrator 'midpont'", "midpoint", "symtop integrators", OWN]),
-        ("run midpoint spheroid", ["scene 'midpoint'", "an integrator", "scene comes first"]),
-        ("run spheroid midpoint[attitude] --step-size 0.1", ["chart of midpoint 'attitude'", "angles"]),
-        ("run spheroid midpoint", ["needs --step-size", "0.007"]),
-        ("run spheroid rk45", ["needs a tolerance", "1e-6"]),
-        ("run spheroid taylor --figure no-such/x.png", ["--figure", "folder that is there", "no-such/x.png"]),
-        ("run spheroid taylor --output run.csv", ["--output is written as netCDF", "run.nc", "'run.csv'"]),
-        ("run spheroid rk4 --step-size 0.1 --output a.png --figure ./a.png", ["--output and --figure", "two files"]),
-        ("recommend spheroid", ["--accuracy", "--i-use"]),
-        ("recommend spheroid --accuracy 1 --step-size 1 --per-nutation 9", ["--step-size", "not both"]),
-        ("study convergense", ["'convergense'", "convergence"]),
-        ("study", ["name a study", "--all", "convergence"]),
-        ("study convergence --status --check", ["--status and --check"]),
-    ],
-)
+@pytest.mark.parametrize(("words", "parts"), [
+    ("run sferoid midpoint --step-size 0.1", ["scene 'sferoid'", "spheroid", "symtop scenes", BODY]),
+    ("run spheroid midpont --step-size 0.1", ["integrator 'midpont'", "midpoint", "symtop integrators", OWN]),
+    ("run midpoint spheroid", ["scene 'midpoint'", "an integrator", "scene comes first"]),
+    ("run spheroid midpoint[attitude] --step-size 0.1", ["chart of midpoint 'attitude'", "angles"]),
+    ("run spheroid midpoint", ["needs --step-size", "0.007"]),
+    ("run spheroid rk45", ["needs a tolerance", "1e-6"]),
+    ("run spheroid taylor --figure no-such/x.png", ["--figure", "folder that is there", "no-such/x.png"]),
+    ("run spheroid taylor --output run.csv", ["--output is written as netCDF", "run.nc", "'run.csv'"]),
+    ("run spheroid rk4 --step-size 0.1 --output a.png --figure ./a.png", ["--output and --figure", "two files"]),
+    ("recommend spheroid", ["--accuracy", "--i-use"]),
+    ("recommend spheroid --accuracy 1 --step-size 1 --per-nutation 9", ["--step-size", "not both"]),
+    ("study convergense", ["'convergense'", "convergence"]),
+    ("study", ["name a study", "--all", "convergence"]),
+    ("study convergence --status --check", ["--status and --check"]),
+])  # fmt: skip
 def test_a_refusal_names_the_argument_its_value_and_what_is_allowed(words, parts, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     result = call(*words.split(), code=2)
@@ -77,15 +65,12 @@ def test_a_plugin_that_registers_nothing_is_told_of(tmp_path):
         assert (f"{plugin.name} registers no integrator and no scene" in result.output) is expected
 
 
-@pytest.mark.parametrize(
-    ("words", "computes"),
-    [
-        (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
-        (["long", "spheroid", "strang", "--steps", "10"], "symtop.run.long_run.long_run"),
-        (["ensemble", "strang", "--members", "2", "--step-size", "0.1", "--horizon", "1"],
-         "symtop.run.ensemble.ensemble.ensemble"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("words", "computes"), [
+    (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
+    (["long", "spheroid", "strang", "--steps", "10"], "symtop.run.long_run.long_run"),
+    (["ensemble", "strang", "--members", "2", "--step-size", "0.1", "--horizon", "1"],
+     "symtop.run.ensemble.ensemble.ensemble"),
+])  # fmt: skip
 def test_a_folder_is_no_output_and_nothing_is_computed_for_it(words, computes, tmp_path, monkeypatch):
     call(*words, "--output", tmp_path / "a.nc")
     monkeypatch.setattr(computes, lambda *_, **__: pytest.fail("it computes"))
@@ -95,21 +80,16 @@ def test_a_folder_is_no_output_and_nothing_is_computed_for_it(words, computes, t
         assert f"{option} must be a file, not the folder" in result.output
 
 
-@pytest.mark.parametrize(
-    ("words", "called"),
-    [
-        (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
-        (["recommend", "spheroid", "--accuracy", "1e-3"], "symtop.advise.recommend"),
-        (["claims", "strang", "--quick"], "symtop.judging.judge_step.judge_separately"),
-    ],
-)
+@pytest.mark.parametrize(("words", "called"), [
+    (["run", "spheroid", "strang", "--step-size", "0.01"], "symtop.run.simulation.simulate"),
+    (["recommend", "spheroid", "--accuracy", "1e-3"], "symtop.advise.recommend"),
+    (["claims", "strang", "--quick"], "symtop.judging.judge_step.judge_separately"),
+])  # fmt: skip
 def test_ctrl_c_is_neither_a_failed_case_nor_bad_input(words, called, monkeypatch):
     def interrupts(*_, **__):
         os.kill(os.getpid(), signal.SIGINT)
 
-    def raises(*_, **__):
-        raise SymtopError("of its own")
-
+    raises = Mock(side_effect=SymtopError("of its own"))
     for function, code, message in ((interrupts, 130, "interrupted"), (raises, 2, "of its own")):
         monkeypatch.setattr(called, function)
         assert call(*words, code=code).output.splitlines()[-1] == f"symtop: {message}"
@@ -120,7 +100,20 @@ def numbers(text):
     return json.loads(text, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
 
 
-def test_numbers_that_are_not_finite_are_null_in_json(tmp_path):
+def test_run_prints_the_errors_and_writes_the_dataset_also_of_a_run_that_fails_or_has_nan(tmp_path):
+    words = ("run", "spheroid", "midpoint", "--step-size", 0.01, "--output", tmp_path / "run.nc")
+    assert "angle between axes" in call(*words).output
+    assert netcdf.read(tmp_path / "run.nc").attrs["integrator"] == "midpoint"
+    report = numbers(call(*words, "--json").stdout)
+    assert report["steps"] == 800
+    assert 1e-3 < report["errors"]["axis"]["largest"] < 2e-2
+    assert report["errors"]["p_psi"]["largest"] < 1e-14
+    once = call("run", "spheroid", "strang", "--step-size", 8, "--no-guard").output
+    assert "\n1 step, 1 force evaluation\n" in once
+    path = tmp_path / "run.nc"
+    result = call("run", "spheroid", "stormer-verlet", "--step-size", 1.0, "--horizon", 50, "--output", path, code=3)
+    assert "theta left (0, pi)" in result.output
+    assert netcdf.read(path).attrs["outcome"] == "left_chart"
     with pytest.raises(pytest.fail.Exception):
         numbers("[NaN]")
     result = call("recommend", "spheroid", "--accuracy", "1e-17", "--json", code=1)
@@ -163,14 +156,11 @@ def test_a_variant_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_pa
     assert "NAME[CHART]" in call("integrators").output
 
 
-@pytest.mark.parametrize(
-    ("line", "completion"),
-    [
-        ("symtop run sph", "spheroid"), ("symtop run tennis", "tennis-racket"), ("symtop study cl", "claims"),
-        ("symtop run spheroid midp", "midpoint"), ("symtop run spheroid rk4[", "rk4[axis]"),
-        ("symtop integrators strang[att", "strang[attitude]"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("line", "completion"), [
+    ("symtop run sph", "spheroid"), ("symtop run tennis", "tennis-racket"), ("symtop study cl", "claims"),
+    ("symtop run spheroid midp", "midpoint"), ("symtop run spheroid rk4[", "rk4[axis]"),
+    ("symtop integrators strang[att", "strang[attitude]"),
+])  # fmt: skip
 def test_the_shell_completes_names(line, completion):
     words = line.split()
     environment = {"_SYMTOP_COMPLETE": "bash_complete", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
@@ -206,12 +196,6 @@ def ending(before="", code="3"):
     return subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
 
 
-def test_a_command_ends_with_its_code_and_takes_nothing_apart():
-    result = ending()
-    assert (result.returncode, result.stdout, result.stderr) == (3, "the answer\nwhat was registered\n", "")
-    assert ending(code="None").returncode == 0
-
-
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
 def test_what_cannot_be_printed_is_told_in_a_sentence():
     with Path("/dev/full").open("w") as full:
@@ -222,12 +206,9 @@ def test_what_cannot_be_printed_is_told_in_a_sentence():
 
 
 @pytest.mark.skipif(not Path("/bin/sh").exists(), reason="a shell of Unix")
-@pytest.mark.parametrize(
-    ("words", "closed", "code"),
-    [
-        ("scenes", "1>&-", 0), ("run nowhere", "0<&- 1>&- 2>&-", 2),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("words", "closed", "code"), [
+    ("scenes", "1>&-", 0), ("run nowhere", "0<&- 1>&- 2>&-", 2),
+])  # fmt: skip
 def test_a_stream_that_was_closed_changes_no_exit_code(words, closed, code):
     """Python has None in its place; a refusal (the control) is one all the same."""
     command = ["/bin/sh", "-c", f"{sys.executable} -m symtop.cli {words} {closed}"]
@@ -239,7 +220,7 @@ def test_a_stream_that_was_closed_changes_no_exit_code(words, closed, code):
 @pytest.mark.skipif(not Path("/bin/bash").exists(), reason="a shell with pipefail")
 @pytest.mark.parametrize(
     ("words", "reader", "code"),
-    [("integrators", "head -1", 141), ("scenes", "true", 141), ("scenes", "cat", 0), ("run nowhere", "true", 2)],
+    [("integrators", "true", 141), ("integrators", "cat", 0), ("run nowhere", "true", 2)],
 )
 def test_a_reader_that_leaves_is_no_case_that_has_failed(words, reader, code):
     command = f"set -o pipefail; {sys.executable} -m symtop.cli {words} | {reader}"
@@ -248,7 +229,10 @@ def test_a_reader_that_leaves_is_no_case_that_has_failed(words, reader, code):
     assert "Traceback" not in result.stderr
 
 
-def test_a_command_whose_threads_work_or_whose_code_is_a_text_ends_as_python_does():
+def test_a_command_ends_with_its_code_takes_nothing_apart_and_waits_for_threads():
+    result = ending()
+    assert (result.returncode, result.stdout, result.stderr) == (3, "the answer\nwhat was registered\n", "")
+    assert ending(code="None").returncode == 0
     result = ending(before="threading.Thread(target=work).start()")
     assert result.stdout.splitlines() == ["the answer", "the thread is done", "what was registered", "taken apart"]
     assert result.returncode == 3
@@ -266,3 +250,191 @@ def test_however_it_is_called_linear_algebra_has_one_thread(words, tmp_path):
     command, path = [sys.executable, *words, "scenes"], os.pathsep.join([str(tmp_path), os.environ["PYTHONPATH"]])
     result = subprocess.run(command, capture_output=True, text=True, env=clean | {"PYTHONPATH": path}, check=True)
     assert result.stdout.endswith("threads 1\n")
+
+
+def printed(*words, columns=80):
+    return call(*words, COLUMNS=str(columns)).output
+
+
+@pytest.mark.parametrize(
+    ("command", "entries"),
+    [(["integrators"], methods), (["integrators", "--engines"], engines), (["scenes"], symtop.scenes)],
+)
+def test_a_list_fits_the_terminal_and_names_every_entry(command, entries):
+    for columns in (80, 120):
+        lines = printed(*command, columns=columns).splitlines()
+        assert max(map(len, lines)) <= columns
+        names = {line.split(" ")[0] for line in lines}
+        assert names >= set(entries())
+        assert ("mujoco-euler" in names, "strang" in names) == (entries is engines, entries is methods)
+    assert max(map(len, printed(*command, "--wide").splitlines())) > 80
+
+
+def cited(*arguments):
+    return call("cite", *arguments)
+
+
+@pytest.mark.parametrize("name", ["strang", "gauss-4", "midpoint"])
+def test_a_run_cites_the_sources_of_its_method(tmp_path, name):
+    data = symtop.simulate("spheroid", name, step_size=0.01, horizon=0.1)
+    file = netcdf.write(data, tmp_path / "run.nc")
+    text = cited(file, file).stdout
+    sources = citation_keys(symtop.integrator(name))
+    assert sources
+    for key in sources:
+        assert bibliography()[key] in text
+    assert text.count("\n@") == len(sources)  # once each
+
+
+def test_without_a_file_the_package_is_cited_and_a_method_without_a_known_source_is_said(tmp_path):
+    text = cited().stdout
+    assert re.findall(r"^@(\w+)", text, re.MULTILINE) == ["software"]
+    assert f"version = {{{symtop.__version__}}}" in text
+    data = symtop.simulate("spheroid", "strang", step_size=0.01, horizon=0.1).assign_attrs(integrator="of-a-user")
+    result = cited(netcdf.write(data, tmp_path / "run.nc"))
+    assert "no source is known of of-a-user" in result.stderr
+    assert result.stdout.count("@") == 1
+
+
+SLOW = """\
+import sys, time
+from symtop.cli import clock
+clock.FIRST, clock.EVERY = 0.1, 0.15
+with clock.telling("judge"):
+    time.sleep(float(sys.argv[1]))
+    with clock.ticking("trying methods"):
+        time.sleep(float(sys.argv[1]))
+"""
+
+
+def stderr_of(code, *words):
+    return subprocess.run([sys.executable, "-c", code, *words], capture_output=True, text=True, check=True).stderr
+
+
+def test_a_command_that_waits_says_what_it_does_and_one_that_is_quick_nothing():
+    lines = stderr_of(SLOW, "0.5").splitlines()
+    assert lines[0].startswith("symtop: judge, ")
+    assert lines[-1].startswith("symtop: trying methods, ")
+    assert 3 <= len(lines) <= 8
+    assert all(line.endswith(" s") for line in lines)
+    assert stderr_of(SLOW, "0.01") == ""
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_the_lines_end_with_a_command_that_is_killed():
+    code = SLOW.replace("with clock", "print('on', flush=True)\nwith clock", 1)
+    process = subprocess.Popen([sys.executable, "-c", code, "60"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    process.stdout.readline()
+    time.sleep(0.5)
+    process.kill()
+    assert process.communicate(timeout=10)[1].count(b"symtop: judge") < 20  # the pipe is closed by all who wrote to it
+
+
+def test_a_run_of_many_steps_says_how_long_it_takes(capsys, monkeypatch):
+    """Steps of a microsecond: a million are not timed, five million take five seconds, a billion a quarter hour."""
+    few, now, step = [], [0.0], 1e-6
+    monkeypatch.setattr(timing, "time", SimpleNamespace(perf_counter=lambda: now[0]))
+
+    def run(steps):
+        few.append(steps)
+        now[0] += 0.3 + step * steps  # whatever the steps, as the set-up of a long run does
+
+    runs.estimate(1e6, run)
+    assert not few
+    runs.estimate(5e6, run)
+    assert capsys.readouterr().err == ""
+    runs.estimate(1e9, run)
+    minutes = re.fullmatch(r"symtop: 1e\+09 steps take about (\d+) min\n", capsys.readouterr().err)
+    assert 15 <= int(minutes[1]) <= 25
+    runs.estimate(9e9, run)  # and so many two and a half hours
+    assert re.fullmatch(r"symtop: 9e\+09 steps take about 2.\d h\n", capsys.readouterr().err)
+    assert max(few) < 1.1e6
+    few.clear()
+    step = 1e-4  # in plain Python
+    runs.estimate(3e6, run)
+    assert "take about 5" in capsys.readouterr().err
+    assert sum(few) < 40_000
+
+
+def test_members_that_do_not_fit_into_memory_are_refused_before_they_are_drawn(monkeypatch):
+    monkeypatch.setattr(population, "memory", lambda: 1000.0 * population.BYTES)
+    assert population.population(1000).sizes["member"] == 1000
+    with pytest.raises(symtop.SymtopError, match=r"n must be at most 1e\+03 in the .* GiB of this machine.*, not 1001"):
+        population.population(1001)
+    result = call("ensemble", "strang", "--members", "1001", "--per-nutation", "20", "--nutations", "1", code=2)
+    assert "--members must be at most" in result.stderr
+
+
+def faults(findings):
+    return {finding.topic: finding for finding in findings if not finding.healthy}
+
+
+@pytest.mark.parametrize(("requirement", "result", "healthy"), [
+    ("numpy[some-extra]>=2.0", "2.4.6", True), ("numpy[some-extra]>=3.0", "2.4.6", False),
+    ("numpy~=2.0", "2.4.6", True), ("numpy~=1.26", "2.4.6", False), ("numpy>=2,!=2.4.6", "2.4.6", False),
+    ("no-such-package", "absent", False), ("no-such-package; extra == 'peers'", "absent, an extra", True),
+    ("numpy<2; extra == 'peers'", "2.4.6", False), ("no-such-package; sys_platform == 'amiga'", None, True),
+    ("no-such-package; extra == 'peers' and sys_platform == 'amiga'", None, True),
+    ("no-such-package; python_version >= '3.8'", "absent", False),
+])  # fmt: skip
+def test_every_form_of_a_requirement_is_read(monkeypatch, requirement, result, healthy):
+    real = importlib.metadata.version
+    monkeypatch.setattr(importlib.metadata, "requires", lambda _: [requirement])
+    monkeypatch.setattr(importlib.metadata, "version", lambda name: "2.4.6" if name == "numpy" else real(name))
+    findings = doctor._packages(Path())
+    assert [(finding.result, finding.healthy) for finding in findings] == ([(result, healthy)] if result else [])
+    assert all(finding.healthy or finding.advice for finding in findings)
+
+
+def test_a_cache_that_cannot_be_written_and_a_wrong_number_are_seen(tmp_path, monkeypatch):
+    (tmp_path / "file").touch()
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "file" / "cache"))
+    assert "SYMTOP_CACHE" in faults(doctor._caches(Path()))["cache"].advice
+    assert set(faults(doctor._results(Path("/proc/none")))) == {"results"}
+    wrong = published.Published("somebody", "something", 1.0, 1.1, 1e-3, "printed")
+    monkeypatch.setattr(published, "published_values", lambda: [wrong])
+    findings = faults(doctor._self_check(Path()))
+    assert "not somebody, something" in findings["published values"].result
+    assert set(findings) == {"published values"}
+
+
+def test_a_check_that_fails_is_a_finding_and_the_code_is_1(monkeypatch, tmp_path):
+    def trouble(results):
+        raise OSError("the tools are gone")
+
+    monkeypatch.setitem(doctor.CHECKS, "machine", trouble)
+    monkeypatch.setitem(doctor.CHECKS, "self-check", lambda _: [])
+    result = call("doctor", "--results", tmp_path, code=1)
+    assert "BAD  machine" in result.output
+    assert "OSError: the tools are gone" in result.output
+
+
+def test_all_is_well_here_and_every_compiled_method_is_run_in_each_of_its_charts(tmp_path):
+    result = call("doctor", "--results", tmp_path, "--json")
+    topics = {entry["topic"]: entry["result"] for entry in json.loads(result.output)}
+    expected = {"python", "numba", "cache", "kernels cache", "reference cache", "studies", "published values"}
+    assert expected <= set(topics)
+    assert topics["heyoka quad"] == "33.7 digits"
+    assert topics["numba"] == importlib.metadata.version("numba")
+    count = len(published.published_values())
+    assert topics["published values"] == f"{count} of {count} reproduced"
+    names = doctor.variants()
+    assert len(names) == len(set(names))
+    for method in symtop.integrators().values():
+        variants = {f"{method.name}[{chart}]" for chart in method.charts()}
+        assert variants <= set(names) if method.implementation != "python" else not variants & set(names)
+
+
+@pytest.mark.slow
+def test_all_of_them_are_compiled_once(monkeypatch, tmp_path):
+    """From the kernels that other tests have left, less an eighth: all of them take six minutes."""
+    (cache_root() / "kernels").mkdir(parents=True, exist_ok=True)
+    shutil.copytree(cache_root() / "kernels", tmp_path / "kernels")
+    for folder in sorted((tmp_path / "kernels").iterdir())[::8]:
+        shutil.rmtree(folder)
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
+    result = call("doctor", "--warm", "--results", tmp_path / "r")
+    assert doctor.kernels() > 100
+    assert "not run" not in result.output
+    again = call("doctor", "--warm", "--results", tmp_path / "r")
+    assert "kernels compiled: 0;" in again.output

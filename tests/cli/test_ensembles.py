@@ -39,15 +39,12 @@ def test_the_file_and_the_figure_are_those_of_the_ensemble(tmp_path):
         assert np.asarray(picture.convert("L")).std() > 10.0
 
 
-def test_json_has_outcomes_and_errors_and_a_finer_step_has_smaller_ones():
+def test_json_has_outcomes_and_errors_finer_steps_smaller_ones_and_failures_are_counted():
     words = ("--members", 40, "strang", "--nutations", 2, "--json", "--per-nutation")
     coarse, fine = (json.loads(call(*words, per).output) for per in (30, 300))
     assert coarse["outcomes"] == {"ok": 40}
     assert fine["largest_errors"]["axis"]["0.5"] < 0.02 * coarse["largest_errors"]["axis"]["0.5"]
     assert fine["steps"] == 10 * coarse["steps"]
-
-
-def test_members_that_fail_are_counted():
     assert "left_chart" in call("--members", 60, "stormer-verlet", *STEPS, "--samples", 21).output
     result = call("--members", 20, "--kind", "grazing", "stormer-verlet", *STEPS, "--json", code=3)
     assert json.loads(result.output)["largest_errors"]["axis"] == dict.fromkeys(("0.01", "0.1", "0.5", "0.9", "0.99"))
@@ -76,17 +73,16 @@ def test_bodies_are_run_compared_and_written(tmp_path):
     assert fine["largest_errors"] != others["largest_errors"]
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [(["strang"], "needs --step-size or --per-nutation"),
-     (["strang", "--step-size", 0.1], "give --horizon or --nutations: these members have no"),
-     (["strang", *STEPS, "--budget", 10], "member 0 asks for 60 steps; the limit is 10 (see --budget)"),
-     (["strang", *STEPS, "--variables", "theta", "--figure", "a.png"], "needs axis or energy among --variables"),
-     (["strang", *STEPS, "--bodies", "--kind", "grazing"], "kind 'grazing' is unknown"),
-     (["strang", *STEPS, "--bodies", "--members", 2, "--variables", "axis", "--figure", "a.png"],
-      "needs quaternion or energy among"),
-     (["midpoint[attitude]", *STEPS], "known: angles")],
-)  # fmt: skip
+@pytest.mark.parametrize(("words", "says"), [
+    (["strang"], "needs --step-size or --per-nutation"),
+    (["strang", "--step-size", 0.1], "give --horizon or --nutations: these members have no"),
+    (["strang", *STEPS, "--budget", 10], "member 0 asks for 60 steps; the limit is 10 (see --budget)"),
+    (["strang", *STEPS, "--variables", "theta", "--figure", "a.png"], "needs axis or energy among --variables"),
+    (["strang", *STEPS, "--bodies", "--kind", "grazing"], "kind 'grazing' is unknown"),
+    (["strang", *STEPS, "--bodies", "--members", 2, "--variables", "axis", "--figure", "a.png"],
+     "needs quaternion or energy among"),
+    (["midpoint[attitude]", *STEPS], "known: angles"),
+])  # fmt: skip
 def test_bad_input_is_one_sentence_and_code_2(words, says):
     result = call(*words, code=2)
     assert says in result.output

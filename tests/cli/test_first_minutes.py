@@ -38,16 +38,6 @@ def axis_only(tmp_path_factory):
     return file
 
 
-def test_the_guard_warns_of_what_the_verdict_calls_wrong():
-    assert EXPECTED == ACCURATE
-    wrong = call("run", "spheroid", "midpoint", "--step-size", "0.01")
-    assert "expect an axis error" in wrong.stderr
-    assert "judged against the truth: bounded but wrong, the axis error passed 0.01 rad" in wrong.stdout
-    right = call("run", "spheroid", "midpoint", "--step-size", "0.002")
-    assert right.stderr == ""
-    assert "judged against the truth: accurate to" in right.stdout
-
-
 def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(axis_only, tmp_path):
     words = ["study", "convergence", "--quick", "--only", "on-the-axis", "--results", tmp_path, "--plugin", axis_only]
     result = call(*words)
@@ -78,22 +68,20 @@ def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(axis_only, 
         assert several.stdout.startswith("convergence: ")
 
 
-def test_a_proposed_step_is_of_use():
-    """The error that it leads to is between a tenth and ten times the 1e-3 rad that it is proposed for."""
+def test_a_proposed_step_is_of_use_and_the_guard_warns_of_what_the_verdict_calls_wrong():
+    assert EXPECTED == ACCURATE
+    wrong = call("run", "spheroid", "midpoint", "--step-size", "0.01")
+    assert "expect an axis error" in wrong.stderr
+    assert "judged against the truth: bounded but wrong, the axis error passed 0.01 rad" in wrong.stdout
+    right = call("run", "spheroid", "midpoint", "--step-size", "0.002")
+    assert right.stderr == ""
+    assert "judged against the truth: accurate to" in right.stdout
+    # The error that it leads to is between a tenth and ten times the 1e-3 rad that it is proposed for.
     for name in ("midpoint", "strang", "rk4", "gauss-4"):
         result = call("run", "spheroid", name, code=2)
         step = float(result.stderr.split("for example ")[1])
         error = float(symtop.errors(symtop.simulate("spheroid", name, step_size=step, guard=False))["axis"].max())
         assert 1e-5 < error < 1e-2
-
-
-@pytest.mark.slow  # half a minute: lanes of one method are compiled
-def test_a_cold_ensemble_is_never_silent_for_long(tmp_path):
-    words = "ensemble strang --members 2000 --per-nutation 50 --nutations 2"
-    recording = recorded(words.split(), SYMTOP_CACHE=str(tmp_path))
-    assert recording.code == 0, recording.text
-    assert recording.silence < 2.0
-    assert recording.widest <= 80
 
 
 LOCKED = """
@@ -140,9 +128,14 @@ def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
     assert len(refreshes) == count
 
 
-@pytest.mark.slow
-def test_a_recording_hears_a_silence_and_sees_what_wraps(tmp_path):
-    """Negative control: a plug-in that sleeps while it is loaded, and a table of every column."""
+@pytest.mark.slow  # half a minute: lanes of one method are compiled
+def test_a_cold_ensemble_is_never_silent_for_long_and_a_recording_hears_a_silence(tmp_path):
+    words = "ensemble strang --members 2000 --per-nutation 50 --nutations 2"
+    recording = recorded(words.split(), SYMTOP_CACHE=str(tmp_path))
+    assert recording.code == 0, recording.text
+    assert recording.silence < 2.0
+    assert recording.widest <= 80
+    # Negative control: a plug-in that sleeps while it is loaded, and a table of every column.
     (tmp_path / "sleeps.py").write_text("import time\ntime.sleep(2.1)\n")
     recording = recorded(["scenes", "--wide", "--plugin", str(tmp_path / "sleeps.py")])
     assert recording.silence > 2.0

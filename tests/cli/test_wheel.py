@@ -72,10 +72,7 @@ def test_a_wheel_brings_the_kernels_of_first_runs(tmp_path):
     """The commands of the README compile nothing with an empty cache; bits are those of kernels compiled here."""
     wheels, site = tmp_path / "made", tmp_path / "site"
     environment = {**os.environ, "SYMTOP_COMPILE_WITH": sys.executable, "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
-
-    def here(*command, **more):
-        return run(*command, cwd=tmp_path, env={**environment, **more})
-
+    here = lambda *command, **more: run(*command, cwd=tmp_path, env={**environment, **more})
     here(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", wheels, ROOT)
     (wheel,) = wheels.glob("symtop-*.whl")
     zipfile.ZipFile(wheel).extractall(site)

@@ -54,20 +54,8 @@ def test_a_script_counts_by_the_functions_and_globals_that_are_reached(tmp_path)
     assert changes(before, Code().reasons("measure", module.measure)) == ["code script.py"]
 
 
-def test_changes_name_what_differs():
-    before, now = {"file a": "1", "file b": "2", "scene x": "3"}, {"file a": "1", "file b": "9", "package n": "4"}
-    assert changes(before, now) == ["file b", "scene x (no longer counts)", "package n (did not count before)"]
-    assert changes(now, now) == []
-    assert digest(before) == digest(dict(reversed(before.items())))
-    assert digest(before) != digest(now)
-    assert merged([{"a": "1"}, {"a": "1", "b": "2"}]) == {"a": "1", "b": "2"}
-    assert merged([{"a": "1"}, {"a": "2"}])["a"] not in ("1", "2")
-
-
 def test_words_do_not_count_and_numbers_do():
-    def reasons_of(thing):
-        return Code().reasons("thing", thing)
-
+    reasons_of = lambda thing: Code().reasons("thing", thing)
     scene = symtop.scene("spheroid")
     assert reasons_of(dataclasses.replace(scene, purpose="said otherwise", units="")) == reasons_of(scene)
     assert reasons_of(dataclasses.replace(scene, horizon=9.0)) != reasons_of(scene)
@@ -108,7 +96,7 @@ def measure():
 """
 
 
-def test_a_script_counts_by_code_with_its_classes_and_their_bases_and_without_comments():
+def test_an_import_inside_a_function_is_followed_and_a_script_counts_by_code_with_its_classes():
     def reasons_of(*numbers):
         text = CLASSES.format(*numbers)
         space = {"__name__": "few", "__package__": "unknown"}
@@ -119,9 +107,6 @@ def test_a_script_counts_by_code_with_its_classes_and_their_bases_and_without_co
     assert reasons_of(2, 1, "other words", "another comment") == plain
     assert changes(plain, reasons_of(2, 3, "words", "comment")) == ["code <string>"]
     assert reasons_of(4, 1, "words", "comment") != plain
-
-
-def test_an_import_inside_a_function_is_followed_at_every_level():
     space = {"__name__": "symtop.measure.made", "__package__": "symtop.measure"}
     exec(
         "def measure():\n    from . import errors\n    from ..methods.runge_kutta.gauss import farthest\n"
@@ -131,9 +116,6 @@ def test_an_import_inside_a_function_is_followed_at_every_level():
     labels = {part.label for part in Code().reached("measure", space["measure"])}
     for name in ("measure/errors.py:error_bound", "methods/runge_kutta/gauss.py:farthest"):
         assert f"function symtop/{name}" in labels
-
-
-# ---- kernels ---------------------------------------------------------------------------------------------------------
 
 
 def kernels_of(root: Path, store: Path) -> dict[str, int]:
@@ -258,7 +240,14 @@ def test_the_cache_keeps_what_was_used_last(tmp_path):
     files.prune(tmp_path / "nothing", 100)
 
 
-def test_versions_of_packages_are_reasons():
+def test_changes_name_what_differs_and_versions_of_packages_are_reasons():
+    before, now = {"file a": "1", "file b": "2", "scene x": "3"}, {"file a": "1", "file b": "9", "package n": "4"}
+    assert changes(before, now) == ["file b", "scene x (no longer counts)", "package n (did not count before)"]
+    assert changes(now, now) == []
+    assert digest(before) == digest(dict(reversed(before.items())))
+    assert digest(before) != digest(now)
+    assert merged([{"a": "1"}, {"a": "1", "b": "2"}]) == {"a": "1", "b": "2"}
+    assert merged([{"a": "1"}, {"a": "2"}])["a"] not in ("1", "2")
     assert code_hash.packages("numpy", "no-such-package") == {
         "package numpy": importlib.metadata.version("numpy"),
         "package no-such-package": "absent",

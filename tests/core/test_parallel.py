@@ -22,9 +22,7 @@ def test_results_come_in_the_order_of_the_pieces(threads):
 
 
 def test_one_thread_is_the_callers_and_several_are_not():
-    def who(_):
-        return threading.current_thread() is threading.main_thread()
-
+    who = lambda _: threading.current_thread() is threading.main_thread()
     assert list(in_threads(who, range(3), 1)) == [True] * 3
     assert list(in_threads(who, range(3), 2)) == [False] * 3
 
@@ -96,14 +94,11 @@ def unset(monkeypatch):
         monkeypatch.delenv(name, raising=False)
 
 
-def test_a_process_has_one_thread_and_this_one_keeps_its_environment():
+def test_a_process_has_one_thread_and_what_the_user_has_set_is_obeyed(monkeypatch):
     before = dict(os.environ)
     assert seen_by(OneThreadEach()) == ["1"] * len(VARIABLES)
     assert dict(os.environ) == before
     assert seen_by(multiprocessing.get_context("spawn")) == [None] * len(VARIABLES), "nobody else is told"
-
-
-def test_what_the_user_has_set_is_obeyed(monkeypatch):
     monkeypatch.setenv(VARIABLES[0], "3")
     assert seen_by(OneThreadEach()) == ["3", "1", "1"]
     assert os.environ[VARIABLES[0]] == "3"

@@ -78,14 +78,11 @@ def default_handlers():
     signal.signal(signal.SIGHUP, before)
 
 
-@pytest.mark.parametrize(
-    ("number", "hearing", "kind"),
-    [
-        (signal.SIGTERM, ending_on_sigterm, TerminatedError),
-        (signal.SIGHUP, ending_on_sigterm, TerminatedError),
-        (signal.SIGINT, told_apart, InterruptedByUser),
-    ],
-)
+@pytest.mark.parametrize(("number", "hearing", "kind"), [
+    (signal.SIGTERM, ending_on_sigterm, TerminatedError),
+    (signal.SIGHUP, ending_on_sigterm, TerminatedError),
+    (signal.SIGINT, told_apart, InterruptedByUser),
+])  # fmt: skip
 def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, hearing, kind, default_handlers):
     events = []
     with hearing(), pytest.raises(kind):  # noqa: PT012 (the moment at which it is raised is what is tested)
@@ -100,9 +97,7 @@ def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, heari
 
 
 def test_handlers_are_left_as_they_were_and_threads_are_left_alone():
-    def handlers():
-        return [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
-
+    handlers = lambda: [signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM)]
     before, inside = handlers(), []
 
     def other():

@@ -127,17 +127,13 @@ def test_every_public_name_and_every_derivation_is_on_a_page():
 
 
 @pytest.mark.slow
-def test_every_derivation_and_every_public_name_is_there(site):
+def test_derivations_public_names_figures_studies_and_commands_are_on_the_site(site):
     api = (site / "reference" / "api.html").read_text(encoding="utf-8")
     for name in set(symtop.__all__) - {"__version__"}:
         assert f'id="symtop.{name}"' in api, name
     theory = "".join(path.read_text(encoding="utf-8") for path in (site / "theory").glob("*.html"))
     for method in symtop.integrators().values():
         assert f'id="{method.name}"' in theory, method.name
-
-
-@pytest.mark.slow
-def test_every_figure_has_its_study_and_command(site):
     page = (site / "reference" / "gallery.html").read_text(encoding="utf-8")
     files = (ROOT / "docs" / "snapshot" / "figures").iterdir()
     figures = {path.name for path in files if path.suffix in {".png", ".gif"}}
@@ -149,14 +145,11 @@ def test_every_figure_has_its_study_and_command(site):
         assert f"Made by symtop study {study} ;" in spoken, study
 
 
-@pytest.mark.parametrize(
-    ("report", "tracked"),
-    [
-        (SMALL, {"convergence-a.png", "drift-b.png"}),  # a figure that the report does not show
-        (SMALL, set()),  # one that is not there
-        (SMALL.replace("convergence-a", "nobody-a"), {"nobody-a.png"}),  # one that nothing makes
-    ],
-)
+@pytest.mark.parametrize(("report", "tracked"), [
+    (SMALL, {"convergence-a.png", "drift-b.png"}),  # a figure that the report does not show
+    (SMALL, set()),  # one that is not there
+    (SMALL.replace("convergence-a", "nobody-a"), {"nobody-a.png"}),  # one that nothing makes
+])  # fmt: skip
 def test_a_figure_out_of_place_ends_the_build(report, tracked):
     with pytest.raises(gallery.ExtensionError, match="gallery"):
         gallery.markdown(report, tracked)
@@ -167,10 +160,7 @@ def test_a_docstring_says_the_same_in_restructured_text():
 
     text = "Of |a x b|, u_.\n\nWith `code`, ``more``,\na* b* and *this*:\n\n    x_1 = |L| *a\n\n    y\n\nThe end <h>."
     tree = publish_doctree("\n".join(docstrings.restructured(text)), settings_overrides={"report_level": 1})
-
-    def shown(kind):
-        return [node.astext() for node in tree.findall(lambda node: node.tagname == kind)]
-
+    shown = lambda kind: [node.astext() for node in tree.findall(lambda node: node.tagname == kind)]
     assert not shown("system_message")
     assert not shown("problematic")
     assert shown("literal") == ["code", "more"]

@@ -1,13 +1,14 @@
-"""The snapshot holds the report and its figures, and what the studies write is not tracked."""
+"""The pages say what the code says, and the snapshot holds the report; what studies write is not tracked."""
 
 import importlib.util
 import json
+import re
 import subprocess
-from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).resolve().parents[2]
+from tests.commands import call
+from tests.pages import ROOT, pages
 
 
 def _taker():
@@ -26,15 +27,6 @@ def results(tmp_path):
     return tmp_path / "results"
 
 
-def test_what_the_report_shows_is_copied_and_what_it_shows_no_more_goes(results, tmp_path):
-    snapshot = tmp_path / "snapshot"
-    (snapshot / "figures").mkdir(parents=True)
-    (snapshot / "figures" / "old.png").touch()
-    assert _taker().take(results, snapshot) == ["a.png", "b.gif"]
-    assert sorted(path.name for path in (snapshot / "figures").iterdir()) == ["a.png", "b.gif"]
-    assert (snapshot / "report.md").read_text() == (results / "report.md").read_text()
-
-
 def test_a_report_that_is_not_whole_is_not_taken(results, tmp_path):
     (results / "figures" / "a.png").unlink()
     with pytest.raises(SystemExit, match=r"figures of the report are missing: a\.png"):
@@ -42,12 +34,6 @@ def test_a_report_that_is_not_whole_is_not_taken(results, tmp_path):
     with pytest.raises(SystemExit, match="run make studies first"):
         _taker().take(tmp_path, tmp_path / "snapshot")
     assert not (tmp_path / "snapshot").exists()
-
-
-def test_the_stored_snapshot_is_whole():
-    folder = ROOT / "docs" / "snapshot"
-    shown = set(_taker().SHOWN.findall((folder / "report.md").read_text(encoding="utf-8")))
-    assert shown == {path.name for path in (folder / "figures").iterdir()}
 
 
 REPORT = """# T
@@ -62,7 +48,13 @@ Data: [a.nc](a.nc).
 """
 
 
-def test_what_is_not_tracked_is_not_linked(results, tmp_path):
+def test_a_whole_report_is_taken_without_links_to_what_is_not_tracked(results, tmp_path):
+    snapshot = tmp_path / "snapshot"
+    (snapshot / "figures").mkdir(parents=True)
+    (snapshot / "figures" / "old.png").touch()
+    assert _taker().take(results, snapshot) == ["a.png", "b.gif"]
+    assert sorted(path.name for path in (snapshot / "figures").iterdir()) == ["a.png", "b.gif"]
+    assert (snapshot / "report.md").read_text() == (results / "report.md").read_text()
     (results / "report.md").write_text(REPORT)
     _taker().take(results, tmp_path / "snapshot")
     text = (tmp_path / "snapshot" / "report.md").read_text()
@@ -70,8 +62,11 @@ def test_what_is_not_tracked_is_not_linked(results, tmp_path):
     assert "![A](figures/a.png)" in text
 
 
-def test_what_pages_quote_is_what_the_stored_report_says():
-    report = (ROOT / "docs" / "snapshot" / "report.md").read_text(encoding="utf-8")
+def test_the_stored_snapshot_is_whole_and_pages_quote_what_it_says():
+    folder = ROOT / "docs" / "snapshot"
+    report = (folder / "report.md").read_text(encoding="utf-8")
+    shown = set(_taker().SHOWN.findall(report))
+    assert shown == {path.name for path in (folder / "figures").iterdir()}
     for name, said in _taker().quoted(report).items():
         page = (ROOT / name).read_text(encoding="utf-8")
         assert _taker().quote(said, page) == page, name
@@ -106,3 +101,20 @@ def test_what_a_run_of_the_studies_writes_is_not_tracked():
     ]
     assert shown  # without them `make studies` on a fresh checkout would end without its report
     assert {*shown} <= set(kept.stdout.split())
+
+
+PAGES = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in pages()}
+
+
+def test_the_table_of_integrators_is_generated_studies_are_explained_and_links_lead_somewhere():
+    shown = re.search(r"<!-- integrators -->\n(.*?)\n<!-- /integrators -->", PAGES["docs/integrators.md"], re.DOTALL)
+    assert shown is not None
+    today = call("integrators", "--markdown").output.splitlines()
+    assert set(shown.group(1).splitlines()) <= set(today), "regenerate: symtop integrators --markdown"
+    for script in (ROOT / "studies").glob("*/study.py"):
+        assert f"| `{script.parent.name}` |" in PAGES["docs/studies.md"]
+    for page, text in PAGES.items():
+        for link in re.findall(r"\]\((?!https?://)([^)#]+)\)", text):
+            assert (ROOT / page).parent.joinpath(link).is_file(), (page, link)
+    files = {path.name for path in (ROOT / "docs").glob("*.md")} - {"index.md"}  # which begins with the README
+    assert files == set(re.findall(r"\(docs/([\w-]+\.md)\)", PAGES["README.md"]))

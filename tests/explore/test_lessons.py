@@ -116,13 +116,10 @@ def answer_to(story, second=False, **changes):
     return answers.answer(answers.setup(fields(scene, methods[second], **{"step_size": float(step)} | changes)))
 
 
-@pytest.mark.parametrize(
-    ("story", "changes", "first"),
-    [
-        ("cusp", {}, True), ("cusp", {"step_size": 0.45}, False), ("pole jump", {}, False),
-        ("resonance", {}, True), ("resonance", {"step_size": 0.21}, False),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("story", "changes", "first"), [
+    ("cusp", {}, True), ("cusp", {"step_size": 0.45}, False), ("pole jump", {}, False),
+    ("resonance", {}, True), ("resonance", {"step_size": 0.21}, False),
+])  # fmt: skip
 def test_the_second_method_of_a_story_reaches_the_end_and_the_first_where_it_says_so(story, changes, first):
     assert [answer_to(story, second, **changes)["outcome"] == "ok" for second in (False, True)] == [first, True]
 

@@ -135,67 +135,43 @@ def forwards_only(top, start, plan):
     return midpoint(top, start, plan)
 
 
+def each(field, **changes):
+    """Good runs but for one field, by its name and that of the change."""
+    return {f"{field}-{name}".replace("_", "-"): changed(**{field: change}) for name, change in changes.items()}
+
+
 REFUSED = {
-    "returns-none": returning(None),
-    "returns-unprintable": returning(Unprintable()),
+    **each("states", text=lambda states: [["x"] * 4] * len(states), turned=lambda states: states.T,
+           ragged=lambda states: [[1.0]] * (len(states) - 1) + [[1.0, 2.0]], complex=lambda states: states + 0j,
+           objects=lambda states: np.full(states.shape, None), short=lambda states: states[:-1],
+           dates=lambda states: np.zeros(states.shape, "datetime64[s]"), unprintable=lambda _: Unprintable()),
+    **each("p_phi", text=lambda values: ["x"] * len(values), complex=lambda values: values + 1j,
+           scalar=lambda values: float(values[0])),
+    **each("outcome", unknown=lambda _: "splendid", number=lambda _: 0, list=lambda _: ["ok"],
+           unprintable=lambda _: UnprintableOutcome("ok")),
+    **each("p_psi", dict=lambda _: {"p_psi": 1.0}), **each("reached", text=lambda _: "the end"),
+    **each("steps", text=lambda _: "many"), **each("force_evaluations", complex=lambda _: 1j),
+    **each("newton_iterations", object=lambda _: object()),
+    "returns-none": returning(None), "returns-unprintable": returning(Unprintable()), "returns-class": returning(Run),
     "returns-plain-tuple": lambda top, start, plan: tuple(midpoint(top, start, plan)),
-    "returns-class": returning(Run),
-    "states-list-of-text": changed(states=lambda states: [["x"] * 4] * len(states)),
-    "states-ragged": changed(states=lambda states: [[1.0]] * (len(states) - 1) + [[1.0, 2.0]]),
-    "states-complex": changed(states=lambda states: states + 0j),
-    "states-objects": changed(states=lambda states: np.full(states.shape, None)),
-    "states-dates": changed(states=lambda states: np.zeros(states.shape, "datetime64[s]")),
-    "states-short": changed(states=lambda states: states[:-1]),
-    "states-turned": changed(states=lambda states: states.T),
-    "states-unprintable": changed(states=lambda _: Unprintable()),
-    "p-phi-text": changed(p_phi=lambda values: ["x"] * len(values)),
-    "p-phi-complex": changed(p_phi=lambda values: values + 1j),
-    "p-phi-scalar": changed(p_phi=lambda values: float(values[0])),
-    "p-psi-dict": changed(p_psi=lambda _: {"p_psi": 1.0}),
-    "outcome-unknown": changed(outcome=lambda _: "splendid"),
-    "outcome-number": changed(outcome=lambda _: 0),
-    "outcome-list": changed(outcome=lambda _: ["ok"]),
-    "outcome-unprintable": changed(outcome=lambda _: UnprintableOutcome("ok")),
-    "reached-text": changed(reached=lambda _: "the end"),
-    "steps-text": changed(steps=lambda _: "many"),
-    "evaluations-complex": changed(force_evaluations=lambda _: 1j),
-    "iterations-object": changed(newton_iterations=lambda _: object()),
-    "raises-value-error": raising(ValueError("one\ntwo")),
-    "raises-memory-error": raising(MemoryError()),
-    "raises-generator-exit": raising(GeneratorExit()),
-    "raises-unprintable": raising(UnprintableError()),
-    "raises-base": raising(OwnBaseError("of its own")),
-    "raises-system-exit": leaves_early,
-    "raises-interrupt": interrupts,
-    "recurses": recurses,
-    "takes-two": lambda top, start: None,
-    "changes-arguments": changes_arguments,
-    "changes-and-raises": changes_and_raises,
-}  # each must end in one sentence and code 2
+    "raises-value-error": raising(ValueError("one\ntwo")), "raises-memory-error": raising(MemoryError()),
+    "raises-generator-exit": raising(GeneratorExit()), "raises-unprintable": raising(UnprintableError()),
+    "raises-base": raising(OwnBaseError("of its own")), "raises-system-exit": leaves_early,
+    "raises-interrupt": interrupts, "recurses": recurses, "takes-two": lambda top, start: None,
+    "changes-arguments": changes_arguments, "changes-and-raises": changes_and_raises,
+}  # fmt: skip  # each must end in one sentence and code 2
 TOLERATED = {
-    "states-float32": changed(states=lambda states: states.astype(np.float32)),
-    "states-long-double": changed(states=lambda states: states.astype(np.longdouble)),
-    "states-nested-list": changed(states=lambda states: states.tolist()),
-    "states-fortran": changed(states=np.asfortranarray),
-    "states-read-only": changed(states=lambda states: np.broadcast_to(states, states.shape)),
-    "states-masked": changed(states=np.ma.masked_invalid),
-    "p-phi-list": changed(p_phi=lambda values: values.tolist()),
-    "steps-float": changed(steps=float),
-    "keeps-its-array": keeps_its_array,
-    "drops-errstate": drops_errstate,
-    "warns": warns,
-}  # each is a run like another
+    **each("states", float32=lambda states: states.astype(np.float32), nested_list=lambda states: states.tolist(),
+           long_double=lambda states: states.astype(np.longdouble), fortran=np.asfortranarray,
+           read_only=lambda states: np.broadcast_to(states, states.shape), masked=np.ma.masked_invalid),
+    **each("p_phi", list=lambda values: values.tolist()), **each("steps", float=float),
+    "keeps-its-array": keeps_its_array, "drops-errstate": drops_errstate, "warns": warns,
+}  # fmt: skip  # each is a run like another
 BROKEN = {
-    "states-nan": changed(states=lambda states: states * np.nan),
-    "states-infinite": changed(states=lambda states: states + np.inf),
+    **each("states", nan=lambda states: states * np.nan, infinite=lambda states: states + np.inf),
     "reached-nan": changed(outcome=lambda _: "not_finite", reached=lambda _: np.nan),
 }  # each is a run that failed, exit code 3
 
-for name, solve in {
-    **REFUSED,
-    **TOLERATED,
-    **BROKEN,
-    "signals-itself": signals_itself,
-    "forwards-only": forwards_only,
-}.items():
+OTHERS = {"signals-itself": signals_itself, "forwards-only": forwards_only}
+for name, solve in (REFUSED | TOLERATED | BROKEN | OTHERS).items():
     symtop.register(symtop.Integrator(name, "other", "misbehaves", {"angles": solve}, implementation="python"))

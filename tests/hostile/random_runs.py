@@ -69,9 +69,6 @@ class Outcome(NamedTuple):
         return Scene(f"{self.kind}-{self.k}", SymmetricTop(*self.top), Angles(*self.start), self.horizon)
 
 
-# ---- scenes ----------------------------------------------------------------------------------------------------------
-
-
 def _top(draw, ratio=None, weight=None):
     I1 = 10.0 ** draw.uniform(-0.7, 0.7)
     mgl = weight or draw.choice([1.0, 1.0, 1.0, -1.0]) * 10.0 ** draw.uniform(-1.0, 1.2)
@@ -198,9 +195,6 @@ HOSTILE = {  # drawn from by seeds below zero
     "scaled": lambda draw: _scaled(draw, 12.0),
     "at-pole": _at_pole,
 }
-
-
-# ---- runs ------------------------------------------------------------------------------------------------------------
 
 
 def draw_run(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outcome:

@@ -51,27 +51,21 @@ def planted(cache, tmp_path, monkeypatch):
     return root, next(root.rglob("*.bitcode"))
 
 
-def test_what_is_made_is_the_users_alone(planted):
+def test_what_is_made_is_the_users_alone_no_pickle_and_ours_to_run(planted):
     root, _ = planted
     modes = {path.is_dir(): stat.S_IMODE(path.stat().st_mode) for path in (root.parent, root, *root.rglob("*"))}
     assert modes == {True: 0o700, False: 0o600}
     assert not [finding for finding in doctor._caches(root) if not finding.healthy]
-
-
-def test_a_program_in_a_cache_of_our_own_is_ours_to_run_and_so_is_its_machine_code(planted):
-    """The control: this is what is refused below."""
+    # Reading it runs nothing: a line of JSON, and bitcode or machine code.
+    head, _, bitcode = planted[1].read_bytes()[jit.HASH :].partition(b"\n")
+    assert json.loads(head)["returned"] == "float64"
+    assert zlib.decompress(bitcode).startswith(b"BC\xc0\xde")
+    # The control: this is what is refused below.
     assert compile_kernel(_doubled)(2.0) == 8.0
     (code,) = planted[0].rglob("*.code")
     before = code.stat().st_mtime_ns
     assert compile_kernel(_doubled)(2.0) == 8.0
     assert code.stat().st_mtime_ns == before
-
-
-def test_what_is_kept_of_a_kernel_is_no_pickle(planted):
-    """Reading it runs nothing: a line of JSON, and bitcode or machine code."""
-    head, _, bitcode = planted[1].read_bytes()[jit.HASH :].partition(b"\n")
-    assert json.loads(head)["returned"] == "float64"
-    assert zlib.decompress(bitcode).startswith(b"BC\xc0\xde")
 
 
 @pytest.mark.parametrize("at", ["root", "kernels", "kernel", "file"])

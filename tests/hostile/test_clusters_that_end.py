@@ -16,7 +16,6 @@ from tests.commands import PROBE, ended, leftovers, same, stop, symtop
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("processes_with_dask")]
 
 SECONDS = 30.0  # from what happens to the cluster to the end of the command
-STARTS = 10.0  # s that a command may take to import and to connect, on a machine with other work
 
 
 class Cluster:

@@ -35,15 +35,11 @@ def output_of(words):
 
 
 @pytest.mark.parametrize("guard", ["--guard", "--no-guard"])
-def test_every_refused_run_is_one_sentence(misbehaving, guard):
+def test_every_refused_run_is_one_sentence_and_what_can_be_used_is_used(misbehaving, guard):
     for name in misbehaving.REFUSED:
         code, lines = output_of(["run", "spheroid", name, *RUN, guard])
         assert (code, len(lines)) == (2, 1), (name, lines)
         assert lines[0].startswith(f"symtop: integrator {name} "), lines
-
-
-@pytest.mark.parametrize("guard", ["--guard", "--no-guard"])
-def test_what_can_be_used_is_used(misbehaving, guard):
     _, (_, *expected) = output_of(["run", "spheroid", "midpoint[angles]", *RUN, guard])
     for name in misbehaving.TOLERATED:
         code, (_, *lines) = output_of(["run", "spheroid", name, *RUN, guard])
@@ -70,7 +66,7 @@ def test_the_claims_of_all_of_them_are_judged(misbehaving):
         assert output_of(["claims", name, "--quick"])[0] in (0, 1), name
 
 
-def test_a_solver_does_not_reach_the_plan_or_an_earlier_run(misbehaving):
+def test_a_solver_does_not_reach_the_plan_or_an_earlier_run_and_its_interrupt_is_not_the_users(misbehaving):
     scene, plan = symtop.scene("spheroid"), Plan.steps(0.01, np.arange(5))
     before = scene.top.I1, scene.start.theta
     for name in ("changes-arguments", "changes-and-raises"):
@@ -82,10 +78,6 @@ def test_a_solver_does_not_reach_the_plan_or_an_earlier_run(misbehaving):
     first = solve(keeper, "angles", scene.top, scene.start, plan)
     solve(keeper, "angles", scene.top, scene.start, plan)
     assert np.isfinite(first.states).all()
-
-
-def test_an_interrupt_of_the_user_is_not_that_of_a_plugin(misbehaving):
-    scene, plan = symtop.scene("spheroid"), Plan.steps(0.01, np.arange(5))
     for name, error in (("signals-itself", InterruptedByUser), ("raises-interrupt", symtop.SymtopError)):
         with told_apart(), pytest.raises(error):
             solve(symtop.integrator(name), "angles", scene.top, scene.start, plan)
@@ -105,17 +97,14 @@ symtop.register(
 """
 
 
-@pytest.mark.parametrize(
-    ("returns", "says"),
-    [
-        ("(0.0,) * 4, carry, 1, 0", None),
-        ("(0.0, 0.0), carry, 1, 0",
-         "TypingError: Cannot unify UniTuple(float64 x 4) and UniTuple(float64 x 2) for 'dstate.3'"),
-        ("unknown(state)", "TypingError: NameError: name 'unknown' is not defined"),
-        ("(0.0,) * 4, carry, 1, 9", "must return an outcome from 0 to 6, not 9"),
-        ("(0.0,) * 4, carry, 1, -1", "must return an outcome from 0 to 6, not -1"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("returns", "says"), [
+    ("(0.0,) * 4, carry, 1, 0", None),
+    ("(0.0, 0.0), carry, 1, 0",
+     "TypingError: Cannot unify UniTuple(float64 x 4) and UniTuple(float64 x 2) for 'dstate.3'"),
+    ("unknown(state)", "TypingError: NameError: name 'unknown' is not defined"),
+    ("(0.0,) * 4, carry, 1, 9", "must return an outcome from 0 to 6, not 9"),
+    ("(0.0,) * 4, carry, 1, -1", "must return an outcome from 0 to 6, not -1"),
+])  # fmt: skip
 def test_a_kernel_that_does_not_compile_or_returns_no_outcome_is_one_sentence(returns, says, tmp_path):
     file = tmp_path / "own.py"
     file.write_text(KERNEL.format(returns=returns))
@@ -133,9 +122,7 @@ def test_a_kernel_that_does_not_compile_or_returns_no_outcome_is_one_sentence(re
 
 @pytest.mark.parametrize("count", [math.nan, math.inf, 1e30])
 def test_a_number_of_steps_that_is_none_is_refused(count, misbehaving):
-    def solve(top, start, plan):
-        return misbehaving.midpoint(top, start, plan)._replace(steps=count)
-
+    solve = lambda top, start, plan: misbehaving.midpoint(top, start, plan)._replace(steps=count)
     counted = symtop.Integrator(name="counted", family="other", summary="", solvers={"angles": solve})
     with pytest.raises(symtop.SymtopError, match="must return a finite number of steps, not"):
         symtop.simulate("spheroid", counted, step_size=0.01, horizon=0.5, guard=False)

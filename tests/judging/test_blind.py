@@ -47,9 +47,6 @@ def confirmed(ledger, *claims):
     assert {ledger[claim].verdict for claim in claims} <= {"confirmed"}, str(ledger)
 
 
-# ---- what is right ---------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("name", right.CLAIMS)
 def test_a_correct_method_is_not_refuted(name):
@@ -99,25 +96,22 @@ def slowly(*values):
 
 
 @needs_compiler
-@pytest.mark.parametrize(
-    ("source", "options", "claims", "refuted"),
-    [
-        ("strang.c", (), {"order": 2, **SPLIT}, ""),
-        slowly(EXAMPLES / "judged.c", (), {"order": 1, "symplectic": True, "conserves": ["p_phi", "p_psi"]}, ""),
-        slowly("strang.c", ("-DYOSHIDA",), {"order": 4, **SPLIT}, ""),
-        slowly("strang.c", ("-DMCLACHLAN",), {"order": 4, **SPLIT}, ""),
-        slowly("tricks.c", ("-DKIND=3",), {"order": 2, "symplectic": False}, ""),
-        slowly("strang.c", (), {"order": 2, **SPLIT, **PROGRAM}, ""),
-        ("wrong.c", ("-DKIND=0",), {"order": 3}, "order"),
-        slowly("wrong.c", ("-DKIND=1",), {"order": 4}, "order"),
-        slowly("wrong.c", ("-DKIND=2",), {"order": 4}, "order"),
-        slowly("wrong.c", ("-DKIND=3",), {"order": 2}, "order"),
-        slowly("tricks.c", ("-DKIND=0",), {"order": 2}, "order"),
-        slowly("tricks.c", ("-DKIND=1",), {"order": 2}, "calls"),
-        slowly("tricks.c", ("-DKIND=2",), {"order": 1, "symplectic": True}, "symplectic"),
-        slowly("wrong.c", ("-DKIND=9",), {"order": 2, **PROGRAM}, "calls"),  # time is summed in single precision
-    ],
-)
+@pytest.mark.parametrize(("source", "options", "claims", "refuted"), [
+    ("strang.c", (), {"order": 2, **SPLIT}, ""),
+    slowly(EXAMPLES / "judged.c", (), {"order": 1, "symplectic": True, "conserves": ["p_phi", "p_psi"]}, ""),
+    slowly("strang.c", ("-DYOSHIDA",), {"order": 4, **SPLIT}, ""),
+    slowly("strang.c", ("-DMCLACHLAN",), {"order": 4, **SPLIT}, ""),
+    slowly("tricks.c", ("-DKIND=3",), {"order": 2, "symplectic": False}, ""),
+    slowly("strang.c", (), {"order": 2, **SPLIT, **PROGRAM}, ""),
+    ("wrong.c", ("-DKIND=0",), {"order": 3}, "order"),
+    slowly("wrong.c", ("-DKIND=1",), {"order": 4}, "order"),
+    slowly("wrong.c", ("-DKIND=2",), {"order": 4}, "order"),
+    slowly("wrong.c", ("-DKIND=3",), {"order": 2}, "order"),
+    slowly("tricks.c", ("-DKIND=0",), {"order": 2}, "order"),
+    slowly("tricks.c", ("-DKIND=1",), {"order": 2}, "calls"),
+    slowly("tricks.c", ("-DKIND=2",), {"order": 1, "symplectic": True}, "symplectic"),
+    slowly("wrong.c", ("-DKIND=9",), {"order": 2, **PROGRAM}, "calls"),  # time is summed in single precision
+])  # fmt: skip
 def test_what_is_written_in_c(tmp_path, source, options, claims, refuted):
     target = compiled(tmp_path, source, *options, program="form" in claims)
     ledger = symtop.judge(target, quick=True, **claims)
@@ -158,8 +152,6 @@ def test_the_stages_of_an_implicit_class_are_solved_and_newton_is_left_as_it_was
     assert radau.NEWTON_MAXITER == 6
 
 
-# ---- what is wrong ---------------------------------------------------------------------------------------------------
-
 QUICKLY = (
     "stale_force", "symplectic_euler", "half_symmetric", "adams_from_memory", "edits_the_judge",
     "euler_in_a_spot", "WrongSum", "separable_stale", "separable_damped",
@@ -190,9 +182,6 @@ def test_a_step_that_tires_after_a_hundred_thousand_is_found_in_full(monkeypatch
     assert "calls" in symtop.judge(wrong.tires, order=4).refuted
 
 
-# ---- what is said ----------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ["noisy", "sometimes_noisy"])
 def test_random_noise_is_no_memory(name, only):
     only("calls")
@@ -213,7 +202,7 @@ def test_what_knows_every_state_again_is_caught_by_its_last_bit(only, monkeypatc
     assert symtop.judge(remembers, quick=True, order=2).refuted == ["calls"]
 
 
-def test_without_a_claim_it_says_the_order_that_a_step_has_and_not_the_slope(only):
+def test_a_seed_draws_the_same_and_without_a_claim_the_order_is_said_and_not_the_slope(only):
     only("order")
     ledger = symtop.judge(wrong.rounded_triple, quick=True)
     assert ledger.refuted == []
@@ -221,9 +210,6 @@ def test_without_a_claim_it_says_the_order_that_a_step_has_and_not_the_slope(onl
     assert text == "2: in one step the term in h^3 is the first that is wrong, by 1e-07"
     assert 0.0 < float(doubt.removesuffix(" of it")) < 1e-9
     assert description(ledger.findings) == "order 2"
-
-
-def test_the_same_seed_draws_the_same(only):
     only("order")
     first, again = (symtop.judge(wrong.late_euler, quick=True, order=4, seed=7) for _ in range(2))
     assert first["order"].why == again["order"].why
@@ -233,9 +219,7 @@ def test_the_same_seed_draws_the_same(only):
 
 
 def test_a_step_written_for_f_of_y_may_say_so(only):
-    def wrong_times(f, t, y, h):
-        return y + h * f(t, y + h / 2 * f(t + 0.3 * h, y))
-
+    wrong_times = lambda f, t, y, h: y + h * f(t, y + h / 2 * f(t + 0.3 * h, y))
     only("time")
     assert symtop.judge(wrong_times, quick=True, order=2).refuted == ["time"]
     ledger = symtop.judge(wrong_times, quick=True, order=2, autonomous=True)

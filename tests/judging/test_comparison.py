@@ -36,7 +36,10 @@ def least(data, target, variable="force_evaluations"):
     }
 
 
-def test_each_run_is_that_of_simulate(data):
+def test_each_run_is_that_of_simulate_and_every_variable_has_words_and_units(data):
+    assert [fault for fault in lacking(data) if fault != "long_name of variant"] == []
+    assert (data["error"].attrs["units"], data.attrs["timed"]) == ("rad", "nothing")
+    assert np.isnan(data["seconds"]).all()
     charts = ["midpoint[angles]", "stormer-verlet[angles]", "rk4[axis]", "taylor[axis]"]
     assert data["variant"].values.tolist() == charts
     scene = symtop.scene("goldstein")
@@ -51,7 +54,7 @@ def test_each_run_is_that_of_simulate(data):
     assert cell["steps_per_nutation"].values[place] == pytest.approx(scene.nutation_period / row["step_size"])
 
 
-def test_what_theory_says_of_the_costs(data):
+def test_what_theory_says_of_the_costs_and_why_some_are_not_reached(data):
     coarse, fine = least(data, 1e-3), least(data, 1e-6)
     assert fine["taylor[axis]"] < fine["rk4[axis]"] < fine["stormer-verlet[angles]"] < fine["midpoint[angles]"]
     assert all(coarse[name] <= fine[name] for name in coarse)
@@ -61,9 +64,6 @@ def test_what_theory_says_of_the_costs(data):
     for name in ("rk4[axis]", "taylor[axis]"):
         cell = data.sel(variant=name)
         assert (np.diff(cell["force_evaluations"].values[cell["outcome"].values == "ok"]) >= 0.0).all()
-
-
-def test_what_is_not_reached_says_why(data):
     reached = data["reached"].sel(variant="midpoint[angles]").values.tolist()
     assert reached[0] == "met"
     assert reached[-1] == "budget"
@@ -88,13 +88,6 @@ def test_failed_settings_stay_with_their_outcome_and_are_drawn(data):
     assert f"stormer-verlet[angles]: {words}" in labels
     assert len({text.split(":")[0] for text in labels} & set(data["variant"].values)) == data.sizes["variant"]
     plt.close(ax.figure)
-
-
-def test_every_variable_has_words_and_units(data):
-    assert [fault for fault in lacking(data) if fault != "long_name of variant"] == []
-    assert data["error"].attrs["units"] == "rad"
-    assert data.attrs["timed"] == "nothing"
-    assert np.isnan(data["seconds"]).all()
 
 
 def refusing(top, start, plan):
@@ -139,15 +132,12 @@ def test_another_quantity_takes_the_chart_that_shows_it(quantity):
     assert (data["reached"].sel(target=1e-6) == "met").all()
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        ({"methods": ["rk4", "rk4[axis]"]}, "one or more, each once"),
-        ({"methods": ["rk4[axis]"], "quantity": "attitude"}, "cannot show the attitude"),
-        ({"scene": "tennis-racket", "methods": "gauss-4", "quantity": "p_psi"}, "quantity 'p_psi' is unknown"),
-        ({"horizon": 1.0, "nutations": 2.0}, "not both"),
-    ],
-)
+@pytest.mark.parametrize(("words", "sentence"), [
+    ({"methods": ["rk4", "rk4[axis]"]}, "one or more, each once"),
+    ({"methods": ["rk4[axis]"], "quantity": "attitude"}, "cannot show the attitude"),
+    ({"scene": "tennis-racket", "methods": "gauss-4", "quantity": "p_psi"}, "quantity 'p_psi' is unknown"),
+    ({"horizon": 1.0, "nutations": 2.0}, "not both"),
+])  # fmt: skip
 def test_bad_input_is_one_sentence(words, sentence):
     with pytest.raises(symtop.SymtopError, match=sentence.replace("[", r"\[")):
         symtop.compare(**{"scene": "spheroid", "methods": "strang", "quiet": True} | words)
@@ -199,7 +189,7 @@ def test_times_are_those_of_timeit_by_hand():
     pytest.fail(f"off by {statistics.median(gaps):.0%}")
 
 
-def test_a_step_that_is_called_as_a_method_of_ours_is_told_apart(tmp_path, monkeypatch):
+def test_a_step_called_as_a_method_of_ours_is_told_apart_and_a_library_needs_no_folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for name in ("rk4", "mine"):
         (tmp_path / f"{name}.py").write_text("def step(f, t, y, h):\n    return y + h * f(t, y)\n", encoding="utf-8")
@@ -208,9 +198,6 @@ def test_a_step_that_is_called_as_a_method_of_ours_is_told_apart(tmp_path, monke
     assert data["variant"].values.tolist() == ["own-rk4[axis]", "rk4[axis]", "mine[axis]"]
     error = data["error"].isel(setting=-1).values
     assert error[0] == error[2] != error[1]
-
-
-def test_a_library_needs_no_folder_in_its_name(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     for target in ("my.so", "my.so:other", "./my.so"):
         with pytest.raises(symtop.SymtopError, match="a shared object must be a file that is there"):

@@ -34,21 +34,7 @@ def text(table, head="time,ex,ey,ez,Lx,Ly,Lz"):
     return head + "\n" + "\n".join(",".join(map(repr, row)) for row in table.tolist()) + "\n"
 
 
-def test_a_csv_file_has_the_errors_and_the_drift_of_its_states(table, tmp_path):
-    file = tmp_path / "run.csv"
-    file.write_text(text(table), encoding="utf-8")
-    ledger = symtop.judge(file, conserves=["p_phi", "p_psi"], energy="bounded")
-    truth = symtop.errors({"time": table[:, 0], "axis": table[:, 1:4]}, SPHEROID)
-    assert ledger["axis_error"].value == pytest.approx(float(truth["axis"].max()), rel=1e-6)
-    L, e, top = table[:, 4:], table[:, 1:4], SPHEROID.top
-    energy = (L**2).sum(1) / (2 * top.I1) + (L * e).sum(1) ** 2 * (1 / top.I3 - 1 / top.I1) / 2 + top.mgl * e[:, 2]
-    assert ledger["energy"].value == pytest.approx(np.abs(energy - energy[0]).max() / SPHEROID.energy_scale, rel=1e-6)
-    assert ledger["energy"].measured.kind == "drift"
-    assert (ledger["p_phi"].verdict, ledger["energy"].verdict) == ("confirmed", "refuted")
-    assert str(ledger).startswith("run on spheroid\n")
-
-
-def test_an_energy_that_blows_up_is_said_to(table):
+def test_reported_constants_do_not_hide_those_of_the_states_nor_an_energy_that_blows_up(table):
     """Euler's method gains energy; that of `table` drifts, and friction that takes all of it is no blow-up."""
     stepper, columns = open_target(euler, None, "axis"), {"time": table[:101, 0], "axis": table[:101, 1:4]}
     par, state = FORMULATIONS["axis"].prepare(SPHEROID.top, SPHEROID.start)
@@ -60,21 +46,6 @@ def test_an_energy_that_blows_up_is_said_to(table):
     assert "energy         blows up at t = " in str(ledger)
     damped = symtop.judge(columns | {"momentum": np.exp(-columns["time"])[:, None] * table[:101, 4:]}, energy="bounded")
     assert damped["energy"].measured.kind != "blows up"
-
-
-def test_a_netcdf_file_a_mapping_and_blanks_are_the_same(table, tmp_path):
-    columns = {"time": table[:, 0], "axis": table[:, 1:4], "momentum": table[:, 4:]}
-    plain = symtop.judge(columns)
-    (tmp_path / "run.txt").write_text("# " + text(table).replace(",", "  "), encoding="utf-8")
-    names = {"axis": ("time", "component"), "momentum": ("time", "component")}
-    data = xr.Dataset({name: (names[name], columns[name]) for name in names}, {"time": columns["time"]})
-    netcdf.write(data, tmp_path / "run.nc")
-    for file in ("run.txt", "run.nc"):
-        ledger = symtop.judge(str(tmp_path / file))
-        assert [one.value for one in ledger.findings] == [one.value for one in plain.findings]
-
-
-def test_reported_constants_do_not_hide_those_of_the_states(table):
     copied = {"time": table[:, 0], "axis": table[:, 1:4], "momentum": table[:, 4:], "p_psi": np.full(SAMPLES, 0.1)}
     assert symtop.judge(copied, conserves=["p_psi"])["p_psi"].verdict == "refuted"
     del copied["momentum"]
@@ -113,16 +84,6 @@ def test_an_unknown_claim_about_a_trajectory_is_refused_and_one_that_a_ledger_ha
         ledger["order"]
 
 
-def test_the_true_motion_keeps_everything():
-    truth = symtop.reference(SPHEROID, np.linspace(0.0, 60.0, 801))
-    names = ("axis", "quaternion", "energy", "p_phi", "p_psi")
-    columns = {"time": truth["time"].values} | {name: truth[name].values for name in names}
-    ledger = symtop.judge(columns, conserves=["p_phi", "p_psi"], energy="kept")
-    assert ledger.refuted == []
-    assert {ledger[name].verdict for name in ("energy", "p_phi", "p_psi")} == {"confirmed"}
-    assert max(ledger[f"{name}_error"].value for name in ("axis", "attitude", "theta")) < 1e-13
-
-
 def test_the_command_takes_a_file(table, tmp_path):
     file = tmp_path / "run.csv"
     file.write_text(text(table), encoding="utf-8")
@@ -135,22 +96,19 @@ def test_the_command_takes_a_file(table, tmp_path):
     call("judge", file, "--output", tmp_path / "a.nc", "--badge", tmp_path / "a.svg")
 
 
-@pytest.mark.parametrize(
-    ("content", "words"),
-    [
-        ("time,x\n0,1\n", "must begin with a line of names, .*, but of 'time x' x is none of them$"),
-        ("ex,ey,ez\n0,0,1\n", "must begin with a line of names, .*, but of 'ex ey ez' there is no time$"),
-        ("time,ex,ey,ez,mass,note\n0,0,0,1,2,3\n", "mass is none of them, note is none of them$"),
-        ("time,theta,theta\n0,1,1\n", "theta is there twice$"),
-        ("0,0.1,0.2,0.3,0.4\n", r"0 is none of them, 0.1 is none of them, 0.2 is none of them \.\.\.$"),
-        ("time,theta\n0,0.4\n1\n", "2 numbers in each line: the number of columns changed from 2 to 1"),
-        ("time,theta\n0,high\n", "numbers in each line: could not convert string 'high' to float64"),
-        ("time,theta\n\n", "run.csv must have a line of numbers below its names, and has none"),
-        ("time,theta,energy\n0,0.4\n1,0.4\n", "3 numbers in each line, not 2$"),
-        ("time,theta,Lx,Ly\n0,0.4,1,1\n", "run.csv must have all of Lx, Ly, Lz, and lacks Lz"),
-        ("", "cannot be read: it is empty"),
-    ],
-)
+@pytest.mark.parametrize(("content", "words"), [
+    ("time,x\n0,1\n", "must begin with a line of names, .*, but of 'time x' x is none of them$"),
+    ("ex,ey,ez\n0,0,1\n", "must begin with a line of names, .*, but of 'ex ey ez' there is no time$"),
+    ("time,ex,ey,ez,mass,note\n0,0,0,1,2,3\n", "mass is none of them, note is none of them$"),
+    ("time,theta,theta\n0,1,1\n", "theta is there twice$"),
+    ("0,0.1,0.2,0.3,0.4\n", r"0 is none of them, 0.1 is none of them, 0.2 is none of them \.\.\.$"),
+    ("time,theta\n0,0.4\n1\n", "2 numbers in each line: the number of columns changed from 2 to 1"),
+    ("time,theta\n0,high\n", "numbers in each line: could not convert string 'high' to float64"),
+    ("time,theta\n\n", "run.csv must have a line of numbers below its names, and has none"),
+    ("time,theta,energy\n0,0.4\n1,0.4\n", "3 numbers in each line, not 2$"),
+    ("time,theta,Lx,Ly\n0,0.4,1,1\n", "run.csv must have all of Lx, Ly, Lz, and lacks Lz"),
+    ("", "cannot be read: it is empty"),
+])  # fmt: skip
 def test_what_is_no_trajectory_is_told(tmp_path, content, words):
     (tmp_path / "run.csv").write_text(content, encoding="utf-8")
     with pytest.raises(symtop.SymtopError, match=words):
@@ -161,7 +119,27 @@ def test_what_is_no_trajectory_is_told(tmp_path, content, words):
         symtop.judge("nothing.csv")
 
 
-def test_a_file_in_utf_16_is_told_its_encoding_and_one_in_utf_8_is_read(table, tmp_path):
+def test_csv_netcdf_mappings_and_blanks_are_the_same_and_utf_16_is_told(table, tmp_path):
+    file = tmp_path / "run.csv"
+    file.write_text(text(table), encoding="utf-8")
+    ledger = symtop.judge(file, conserves=["p_phi", "p_psi"], energy="bounded")
+    truth = symtop.errors({"time": table[:, 0], "axis": table[:, 1:4]}, SPHEROID)
+    assert ledger["axis_error"].value == pytest.approx(float(truth["axis"].max()), rel=1e-6)
+    L, e, top = table[:, 4:], table[:, 1:4], SPHEROID.top
+    energy = (L**2).sum(1) / (2 * top.I1) + (L * e).sum(1) ** 2 * (1 / top.I3 - 1 / top.I1) / 2 + top.mgl * e[:, 2]
+    assert ledger["energy"].value == pytest.approx(np.abs(energy - energy[0]).max() / SPHEROID.energy_scale, rel=1e-6)
+    assert ledger["energy"].measured.kind == "drift"
+    assert (ledger["p_phi"].verdict, ledger["energy"].verdict) == ("confirmed", "refuted")
+    assert str(ledger).startswith("run on spheroid\n")
+    columns = {"time": table[:, 0], "axis": table[:, 1:4], "momentum": table[:, 4:]}
+    plain = symtop.judge(columns)
+    (tmp_path / "run.txt").write_text("# " + text(table).replace(",", "  "), encoding="utf-8")
+    names = {"axis": ("time", "component"), "momentum": ("time", "component")}
+    data = xr.Dataset({name: (names[name], columns[name]) for name in names}, {"time": columns["time"]})
+    netcdf.write(data, tmp_path / "run.nc")
+    for file in ("run.txt", "run.nc"):
+        ledger = symtop.judge(str(tmp_path / file))
+        assert [one.value for one in ledger.findings] == [one.value for one in plain.findings]
     for encoding in ("utf-8", "utf-8-sig"):
         (tmp_path / "run.csv").write_text(text(table), encoding=encoding)
         assert symtop.judge(tmp_path / "run.csv")["axis_error"].value > 0.0
@@ -244,7 +222,14 @@ def test_a_conjugate_attitude_of_a_body_is_refused_although_it_starts_right(tmp_
             symtop.judge(str(file), scene="check-case-2")
 
 
-def test_rates_of_a_top_are_its_momentum():
+def test_the_true_motion_keeps_everything_and_rates_of_a_top_are_its_momentum():
+    truth = symtop.reference(SPHEROID, np.linspace(0.0, 60.0, 801))
+    names = ("axis", "quaternion", "energy", "p_phi", "p_psi")
+    columns = {"time": truth["time"].values} | {name: truth[name].values for name in names}
+    ledger = symtop.judge(columns, conserves=["p_phi", "p_psi"], energy="kept")
+    assert ledger.refuted == []
+    assert {ledger[name].verdict for name in ("energy", "p_phi", "p_psi")} == {"confirmed"}
+    assert max(ledger[f"{name}_error"].value for name in ("axis", "attitude", "theta")) < 1e-13
     top = SPHEROID.top
     run = symtop.simulate(SPHEROID, "strang[attitude]", step_size=1e-3, horizon=3.0, samples=31)
     q, axis = run["quaternion"].values, run["axis"].values
@@ -255,17 +240,14 @@ def test_rates_of_a_top_are_its_momentum():
     assert energy.value == pytest.approx(np.abs(moving - moving[0]).max() / SPHEROID.energy_scale, rel=1e-9)
 
 
-@pytest.mark.parametrize("time", [0.0, 0.5])
-def test_one_sample_is_judged(time, tmp_path):
-    theta = symtop.reference(SPHEROID, [time])["theta"].item() + 0.05
-    (tmp_path / "one.csv").write_text(f"time,theta,energy\n{time},{theta!r},1\n", encoding="utf-8")
-    ledger = symtop.judge(tmp_path / "one.csv", energy="bounded")
-    assert ledger["theta_error"].value == pytest.approx(0.05)
-    assert (ledger["energy"].value, ledger["energy"].verdict) == (0.0, "confirmed")
-
-
-def test_the_first_nutation_of_a_bounded_energy_is_no_growth():
+def test_one_sample_is_judged_and_the_first_nutation_of_a_bounded_energy_is_no_growth(tmp_path):
     """Some nutations of a splitting do not refute its bounded energy; those of a method that gains energy do."""
+    for time in (0.0, 0.5):
+        theta = symtop.reference(SPHEROID, [time])["theta"].item() + 0.05
+        (tmp_path / "one.csv").write_text(f"time,theta,energy\n{time},{theta!r},1\n", encoding="utf-8")
+        ledger = symtop.judge(tmp_path / "one.csv", energy="bounded")
+        assert ledger["theta_error"].value == pytest.approx(0.05)
+        assert (ledger["energy"].value, ledger["energy"].verdict) == (0.0, "confirmed")
     verdicts = {}
     for name in ("strang", "rkmk-se3-2"):
         run = symtop.simulate("spheroid", name, step_size=0.01, guard=False)  # over 6.8 nutations

@@ -29,18 +29,6 @@ def table_of(**attributes: dict[str, str]) -> xr.Dataset:
     return data
 
 
-def test_an_error_table_says_of_what_and_against_what():
-    assert ERRORS.keys() == (QUANTITIES | OF_BODY).keys()
-    data = columns.described(table_of(), "SI")
-    words = "largest angle between the axis and the true axis over the run"
-    assert data["axis"].attrs == {"long_name": words, "units": "rad"}
-    assert data["energy"].attrs["units"] == "1"
-    assert "relative to E0 - min V" in data["energy"].attrs["long_name"]
-    assert data["gap"].attrs == {}
-    run = columns.described(table_of().drop_vars("axis_bound"), "SI")
-    assert (run["energy"].attrs["long_name"], run["energy"].attrs["units"]) == ("total energy", "kg m2 s-2")
-
-
 def test_a_study_of_ones_own_keeps_its_names_or_declares_them_beside_it(tmp_path):
     given = {"long_name": "a gap", "units": "m"}
     data = netcdf.describe(columns.described(table_of(gap=given, energy=given)), "Mine")
@@ -62,7 +50,16 @@ def test_a_line_that_declares_no_column_is_refused(tmp_path, line):
         netcdf.read_columns(file)
 
 
-def test_flags_are_numbers_with_meanings():
+def test_an_error_table_says_of_what_and_against_what_and_flags_have_meanings():
+    assert ERRORS.keys() == (QUANTITIES | OF_BODY).keys()
+    data = columns.described(table_of(), "SI")
+    words = "largest angle between the axis and the true axis over the run"
+    assert data["axis"].attrs == {"long_name": words, "units": "rad"}
+    assert data["energy"].attrs["units"] == "1"
+    assert "relative to E0 - min V" in data["energy"].attrs["long_name"]
+    assert data["gap"].attrs == {}
+    run = columns.described(table_of().drop_vars("axis_bound"), "SI")
+    assert (run["energy"].attrs["long_name"], run["energy"].attrs["units"]) == ("total energy", "kg m2 s-2")
     outcomes = xr.Dataset({"outcome": ("setting", np.array([0, 254], np.uint8)), "broken": ("setting", [0.0, 1.0])})
     data = columns.described(outcomes, own=OWN["stability"])
     for name in ("outcome", "broken"):

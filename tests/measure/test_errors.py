@@ -94,34 +94,6 @@ def test_a_member_of_fewer_steps_than_samples_has_the_errors_of_its_run():
         symtop.errors(runs.isel(member=0).drop_attrs(), "spheroid")
 
 
-def test_samples_after_a_failure_stay_nan():
-    run = symtop.simulate("grazing", "midpoint", step_size=0.2, guard=False)
-    assert run.attrs["outcome"] != "ok"
-    axis = symtop.errors(run)["axis"].values
-    np.testing.assert_array_equal(np.isnan(axis), np.isnan(run["axis"].values).any(axis=1))
-    assert np.isnan(axis[-1])
-    assert np.isfinite(axis[0])
-
-
-def test_three_lines_compare_a_foreign_trajectory(truth):
-    mine = quaternion(truth)
-    for factor in (1.0, -1.0, 1.0002):  # either sign, and a length that single precision would be ashamed of
-        shown = symtop.errors({**mine, "quaternion": factor * mine["quaternion"]}, "spheroid")
-        assert set(shown.data_vars) == {
-            f"{name}{end}" for name in ("axis", "attitude", "theta") for end in ("", "_bound")
-        }
-        for name in ("axis", "attitude", "theta"):
-            assert np.all(shown[name].values <= shown[f"{name}_bound"].values)
-
-
-def test_a_trajectory_that_is_turned_by_a_thousandth_shows_a_thousandth(truth):
-    moved = {"time": TIMES, "quaternion": turned_about_the_vertical(truth["quaternion"].values, TURN)}
-    shown = symtop.errors(moved, symtop.scene("spheroid"))
-    assert shown["attitude"].values == pytest.approx(TURN, rel=1e-9)
-    assert shown["axis"].values == pytest.approx(TURN * np.sin(truth["theta"].values), rel=1e-6)
-    assert np.max(shown["theta"].values) < 1e-14
-
-
 @pytest.mark.parametrize("name", ["axis", "theta"])
 def test_an_axis_or_theta_alone_is_enough(truth, name):
     shown = symtop.errors(xr.Dataset({name: truth[name]}), "spheroid")
@@ -131,16 +103,26 @@ def test_an_axis_or_theta_alone_is_enough(truth, name):
     assert moved["theta"].values == pytest.approx(TURN, rel=1e-9)
 
 
-def test_euler_angles_show_the_attitude_and_the_axis(truth):
+def test_a_foreign_trajectory_is_compared_and_one_turned_by_a_thousandth_shows_a_thousandth(truth):
+    mine = quaternion(truth)
+    for factor in (1.0, -1.0, 1.0002):  # either sign, and a length that single precision would be ashamed of
+        shown = symtop.errors({**mine, "quaternion": factor * mine["quaternion"]}, "spheroid")
+        assert set(shown.data_vars) == {
+            f"{name}{end}" for name in ("axis", "attitude", "theta") for end in ("", "_bound")
+        }
+        for name in ("axis", "attitude", "theta"):
+            assert np.all(shown[name].values <= shown[f"{name}_bound"].values)
+    moved = {"time": TIMES, "quaternion": turned_about_the_vertical(truth["quaternion"].values, TURN)}
+    shown = symtop.errors(moved, symtop.scene("spheroid"))
+    assert shown["attitude"].values == pytest.approx(TURN, rel=1e-9)
+    assert shown["axis"].values == pytest.approx(TURN * np.sin(truth["theta"].values), rel=1e-6)
+    assert np.max(shown["theta"].values) < 1e-14
     mine = {"time": TIMES, **{name: truth[name].values for name in ("theta", "phi", "psi")}}
     shown = symtop.errors(mine, "spheroid")
     assert float(shown["attitude"].max()) < 1e-13
     mine["psi"] = mine["psi"] + TURN
     assert symtop.errors(mine, "spheroid")["attitude"].values == pytest.approx(TURN, rel=1e-9)
     assert float(symtop.errors(mine, "spheroid")["axis"].max()) < 1e-13
-
-
-def test_constants_that_the_data_hold_are_judged(truth):
     scene = symtop.scene("spheroid")
     mine = {**quaternion(truth), "energy": truth["energy"].values + 1e-3 * scene.energy_scale}
     shown = symtop.errors(mine, scene)
@@ -148,14 +130,11 @@ def test_constants_that_the_data_hold_are_judged(truth):
     assert "p_phi" not in shown
 
 
-def test_a_wrong_scene_is_seen(truth):
+def test_a_wrong_scene_and_another_order_of_a_quaternion_are_seen(truth):
     run = symtop.simulate("goldstein", "exact", horizon=8.0, samples=41)
     with pytest.warns(symtop.SymtopWarning, match=r"the first sample, at t = 0, is \S+ rad from the true axis"):
         assert float(symtop.errors({"time": TIMES, "axis": run["axis"].values}, "spheroid")["axis"].max()) > 0.5
     assert float(symtop.errors({"time": TIMES, "axis": truth["axis"].values}, "spheroid")["axis"].max()) < 1e-14
-
-
-def test_a_quaternion_in_another_order_is_refused_with_its_reason(truth):
     with pytest.raises(symtop.SymtopError, match="order w, x, y, z"):
         symtop.errors({"time": TIMES, "quaternion": np.roll(truth["quaternion"].values, -1, axis=1)}, "spheroid")
     inverse = truth["quaternion"].values * [1.0, -1.0, -1.0, -1.0]
@@ -197,7 +176,13 @@ def test_a_part_of_a_run_is_judged_by_what_it_shows_and_no_other_shape_is_taken(
             symtop.errors(wrong)
 
 
-def test_single_precision_may_round_beyond_the_pole():
+def test_samples_after_a_failure_stay_nan_and_single_precision_may_round_beyond_the_pole():
+    run = symtop.simulate("grazing", "midpoint", step_size=0.2, guard=False)
+    assert run.attrs["outcome"] != "ok"
+    axis = symtop.errors(run)["axis"].values
+    np.testing.assert_array_equal(np.isnan(axis), np.isnan(run["axis"].values).any(axis=1))
+    assert np.isnan(axis[-1])
+    assert np.isfinite(axis[0])
     hanging = symtop.Scene("hanging", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(np.pi), 5.0)
     single = {"time": [0.0, 1.0], "theta": np.full(2, np.pi, dtype=np.float32)}
     assert float(symtop.errors(single, hanging)["theta"].max()) == pytest.approx(8.7e-8, rel=0.01)
@@ -208,23 +193,20 @@ def test_single_precision_may_round_beyond_the_pole():
 AXIS = np.tile([0.0, 0.0, 1.0], (41, 1))
 
 
-@pytest.mark.parametrize(
-    ("data", "scene", "words"),
-    [
-        ({"axis": AXIS}, "spheroid", "must hold time"),
-        ({"time": np.where(TIMES > 7.0, np.nan, TIMES), "axis": AXIS}, "spheroid", "time must be finite"),
-        ({"time": TIMES.astype("timedelta64[s]"), "axis": AXIS}, "spheroid", "time must be an array of real numbers"),
-        ({"time": TIMES, "axis": AXIS.T}, "spheroid", r"shape \(41, 3\)"),
-        ({"time": TIMES, "quaternion": AXIS}, "spheroid", r"shape \(41, 4\)"),
-        ({"time": TIMES, "axis": AXIS, "energy": TIMES[:5]}, "spheroid", r"energy must have the shape \(41,\)"),
-        ({"time": TIMES, "axis": 2.0 * AXIS}, "spheroid", "length 1 within 0.001"),
-        ({"time": TIMES, "theta": 50.0 + TIMES}, "spheroid", r"radians from the vertical"),
-        ({"time": TIMES, "axis": AXIS}, None, r"give errors\(data, scene\)"),
-        (xr.Dataset({"axis": (("time", "c"), AXIS)}, {"time": TIMES}), None, r"give errors\(data, scene\)"),
-        (AXIS, "spheroid", "Dataset or a mapping"),
-        (None, None, "scene is missing"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("data", "scene", "words"), [
+    ({"axis": AXIS}, "spheroid", "must hold time"),
+    ({"time": np.where(TIMES > 7.0, np.nan, TIMES), "axis": AXIS}, "spheroid", "time must be finite"),
+    ({"time": TIMES.astype("timedelta64[s]"), "axis": AXIS}, "spheroid", "time must be an array of real numbers"),
+    ({"time": TIMES, "axis": AXIS.T}, "spheroid", r"shape \(41, 3\)"),
+    ({"time": TIMES, "quaternion": AXIS}, "spheroid", r"shape \(41, 4\)"),
+    ({"time": TIMES, "axis": AXIS, "energy": TIMES[:5]}, "spheroid", r"energy must have the shape \(41,\)"),
+    ({"time": TIMES, "axis": 2.0 * AXIS}, "spheroid", "length 1 within 0.001"),
+    ({"time": TIMES, "theta": 50.0 + TIMES}, "spheroid", r"radians from the vertical"),
+    ({"time": TIMES, "axis": AXIS}, None, r"give errors\(data, scene\)"),
+    (xr.Dataset({"axis": (("time", "c"), AXIS)}, {"time": TIMES}), None, r"give errors\(data, scene\)"),
+    (AXIS, "spheroid", "Dataset or a mapping"),
+    (None, None, "scene is missing"),
+])  # fmt: skip
 def test_bad_data_are_refused_in_one_sentence(data, scene, words):
     with pytest.raises(symtop.SymtopError, match=words) as caught:
         symtop.errors(data, scene)
@@ -243,7 +225,7 @@ def test_another_unit_of_time_is_asked_about():
         assert [("are they in the scene's unit of time" in one) for one in sentences] == [True] * doubtful
 
 
-def test_errors_of_an_ensemble_are_those_of_its_members_alone():
+def test_errors_of_an_ensemble_are_those_of_its_members_and_other_members_are_refused():
     names, settings = ["spheroid", "goldstein"], {"step_size": 0.5, "horizon": [4.0, 8.0], "samples": 30}
     runs = symtop.ensemble(names, "rk4[attitude]", **settings, observe="attitude", quiet=True)
     wrong = symtop.errors(runs, names)
@@ -253,9 +235,6 @@ def test_errors_of_an_ensemble_are_those_of_its_members_alone():
         alone = symtop.errors(runs.isel(member=i), name)
         for quantity in ("axis", "attitude", "energy", "p_phi"):
             np.testing.assert_array_equal(wrong[quantity][i].values[: alone.sizes["time"]], alone[quantity].values)
-
-
-def test_an_ensemble_and_other_members_are_refused():
     runs = symtop.ensemble(["spheroid", "goldstein"], "strang", step_size=0.05, horizon=1.0, samples=5, quiet=True)
     with pytest.raises(symtop.SymtopError, match="members must be the 2 of the ensemble, not 3"):
         symtop.errors(runs, ["spheroid", "goldstein", "fast"])
@@ -277,13 +256,10 @@ def test_an_ensemble_and_other_members_are_refused():
         symtop.errors(many, drawn)
 
 
-@pytest.mark.parametrize(
-    ("top", "start", "integrator"),
-    [
-        (symtop.RigidBody(1.0, 1.2, 0.6, mgl=1.0, centre=(0.1, 0.0, 1.0)), symtop.Attitude(), "vern9-fixed"),
-        (symtop.SymmetricTop(1.0, 0.5, mgl=1.0), symtop.Angles(theta=1.0, phi=0.3), "rkmk-se3-4"),
-    ],
-)
+@pytest.mark.parametrize(("top", "start", "integrator"), [
+    (symtop.RigidBody(1.0, 1.2, 0.6, mgl=1.0, centre=(0.1, 0.0, 1.0)), symtop.Attitude(), "vern9-fixed"),
+    (symtop.SymmetricTop(1.0, 0.5, mgl=1.0), symtop.Angles(theta=1.0, phi=0.3), "rkmk-se3-4"),
+])  # fmt: skip
 def test_momenta_of_what_is_let_go_at_rest_are_measured_by_what_the_weight_gives(top, start, integrator):
     scene = symtop.Scene("at-rest", top, start, horizon=5.0)
     assert scene.momentum_scale == pytest.approx(1.0)  # sqrt(mgl I1)

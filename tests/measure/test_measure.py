@@ -1,5 +1,6 @@
 """The measures themselves, on data whose answer is known: orders, trends, scales, counts, ladders."""
 
+import dataclasses
 import itertools
 import math
 
@@ -10,16 +11,23 @@ import xarray as xr
 import symtop
 from symtop.measure import datasets
 from symtop.measure.accuracy import error_table
-from symtop.measure.conservation import trend
+from symtop.measure.conservation import from_increments, growth, momenta_of, residuals, trend
 from symtop.measure.order import order
+from symtop.measure.published import OTHER_BODY, START, TRAJECTORY, published_values
 from symtop.measure.settings import ladder
 from symtop.measure.timing import Timing, agree, timings
+from symtop.methods.framework.angles import on_angles
+from symtop.methods.framework.plan import Plan
+from symtop.methods.lagrangian import discrete_lagrangian, galerkin
+from symtop.model.scenes import closed_form
+from symtop.run.simulation import integrate
 from symtop.runner.study import Case
+from tests.conftest import random_scenes
 
 STEPS = 0.1 / 1.5 ** np.arange(16)
 
 
-def test_an_exact_power_is_found_and_points_near_the_bound_are_left_out():
+def test_an_exact_power_is_found_and_stray_points_are_left_out():
     fit = order(STEPS, 3.0 * STEPS**2, 1e-16, 1.0)
     assert fit.slope == pytest.approx(2.0, abs=1e-12)
     assert fit.constant == pytest.approx(3.0, rel=1e-12)
@@ -29,9 +37,6 @@ def test_an_exact_power_is_found_and_points_near_the_bound_are_left_out():
     assert masked.slope == pytest.approx(2.0, abs=0.03)
     assert np.all(noisy[masked.used] > 10.0 * floor)
     assert not masked.used[-1]
-
-
-def test_one_stray_point_does_not_take_the_finer_ones_with_it():
     error = 0.1 * STEPS**2
     error[5] *= 0.2
     fit = order(STEPS, error, 1e-16, 1.0)
@@ -39,16 +44,13 @@ def test_one_stray_point_does_not_take_the_finer_ones_with_it():
     assert fit.used[6:].all()
 
 
-@pytest.mark.parametrize(
-    ("error", "reason"),
-    [
-        (np.full(16, 3e-3), "does not fall"),
-        (np.full(16, 0.5), "does not fall"),
-        (1e-4 + STEPS**2, "does not fall"),
-        (np.full(16, np.nan), "every run failed"),
-        (np.full(16, 3e-15), "fewer than five points"),
-    ],
-)
+@pytest.mark.parametrize(("error", "reason"), [
+    (np.full(16, 3e-3), "does not fall"),
+    (np.full(16, 0.5), "does not fall"),
+    (1e-4 + STEPS**2, "does not fall"),
+    (np.full(16, np.nan), "every run failed"),
+    (np.full(16, 3e-15), "fewer than five points"),
+])  # fmt: skip
 def test_what_is_not_a_power_of_the_step_is_not_judged_and_says_why(error, reason):
     fit = order(STEPS, error, 1e-15, 1.0)
     assert math.isnan(fit.slope)
@@ -69,22 +71,11 @@ def test_false_alarms_of_the_trend_are_as_rare_as_it_says():
     assert drifting.rise == pytest.approx(1.0, rel=0.3)
 
 
-def test_errors_of_momenta_and_energy_are_relative_to_their_documented_scales():
-    scene = symtop.scene("goldstein")
-    run = symtop.simulate(scene, "exact", samples=5)
-    errors = symtop.errors(run.assign(p_phi=run["p_phi"] + 0.5, energy=run["energy"] + 0.16))
-    assert errors["p_phi"].values == pytest.approx(0.5 / 5.0, rel=1e-12)  # the larger momentum is p_psi = 5
-    assert errors["energy"].values == pytest.approx(0.16 / 0.24705927, rel=1e-6)  # E0 - p_psi^2/2 I3 - min V
-
-
-def test_a_table_stops_for_good_once_a_run_took_too_much_work():
+def test_a_table_stops_after_too_much_work_and_ladders_end():
     scene = symtop.scene("spheroid")
     method = symtop.integrator("rk45")
     table = error_table(scene, method, [1e-3, 1e-12, 1e-13, 1e-4], 12.0)
     assert list(table["outcome"].values) == ["ok", "ok", "not_run", "not_run"]
-
-
-def test_ladders_end_at_the_largest_number_of_steps_and_the_least_tolerance():
     scene = symtop.scene("spheroid")
     for name in ("midpoint", "kahan-li-8", "gauss-12"):
         steps = ladder(symtop.integrator(name), scene, 8.0, 6, most=1e4)
@@ -124,14 +115,11 @@ def taking(clock, each):
     return call
 
 
-def test_a_function_that_has_taken_long_is_asked_no_more_but_so_often_at_least(clock):
+def test_a_function_is_asked_no_more_once_it_took_long_or_its_least_samples_agree(clock):
     for patience, least, counts in ((math.inf, 2, [4, 4, 4]), (0.05, 2, [4, 3, 2]), (0.05, 1, [4, 3, 1])):
         naps = [taking(clock, itertools.repeat(seconds)) for seconds in (1e-3, 0.02, 0.06)]
         results = timings(naps, 4, 5e-3, warm=True, patience=patience, least=least, exact=False)
         assert [len(timing.samples) for timing in results] == counts
-
-
-def test_a_function_whose_three_least_samples_agree_is_asked_no_more(clock):
     for close, count in ((0.5, 6), (0.0, 8)):
         calls = taking(clock, (0.01, 0.011, 0.03, 0.03, 0.03, 0.012, 0.03, 0.03))
         (timing,) = timings([calls], 8, 2e-3, warm=True, close=close, exact=False)
@@ -140,10 +128,7 @@ def test_a_function_whose_three_least_samples_agree_is_asked_no_more(clock):
     assert not agree([1.0, 3.0, 1.005, 3.0, 1.02], 0.01)
     assert not agree([1.0, 1.0, 1.0, 1.0], 0.01)
 
-
-def test_a_slow_minute_is_no_slow_function_among_those_that_are_timed_together(clock):
-    """The machine is half as fast in its first second; of functions that are timed one by one the first look so."""
-
+    # The machine is half as fast in its first second; of functions that are timed one by one the first look so.
     def work():
         clock[0] += 0.02 if clock[0] < 1.0 else 0.01
 
@@ -154,9 +139,88 @@ def test_a_slow_minute_is_no_slow_function_among_those_that_are_timed_together(c
     assert alone == pytest.approx([0.02] * 5 + [0.01] * 5)
 
 
-def test_timings_know_when_they_are_noisy():
+def test_timings_know_when_they_are_noisy_and_errors_are_relative_to_their_scales():
+    scene = symtop.scene("goldstein")
+    run = symtop.simulate(scene, "exact", samples=5)
+    errors = symtop.errors(run.assign(p_phi=run["p_phi"] + 0.5, energy=run["energy"] + 0.16))
+    assert errors["p_phi"].values == pytest.approx(0.5 / 5.0, rel=1e-12)  # the larger momentum is p_psi = 5
+    assert errors["energy"].values == pytest.approx(0.16 / 0.24705927, rel=1e-6)  # E0 - p_psi^2/2 I3 - min V
     assert Timing((1.0, 1.01, 1.02), 1.0).reliable
     assert not Timing((1.0, 1.9, 2.0), 1.0).reliable
     quick, slow = timings([lambda: sum(range(100)), lambda: sum(range(20_000))], batches=3, batch=0.002)
     assert slow.best > 20.0 * quick.best
     assert len(quick.samples) == 3
+
+
+def test_every_published_value_is_reproduced_and_one_off_by_its_last_digit_is_not():
+    values = published_values()
+    assert [(one.source, one.quantity) for one in values if not one.reproduced] == []
+    printed = [one.tests for one in values if one.kind == "printed"]
+    assert [printed.count(what) for what in (TRAJECTORY, START, OTHER_BODY)] == [3, 1, 3]
+    assert len(values) - len(printed) == 6
+    for one in published_values():
+        assert not one._replace(published=one.published + 1.01 * one.unit).reproduced
+
+
+SPHEROID = symtop.scene("spheroid")
+DISCRETE = {"midpoint": 1e-11, "trapezoidal": 1e-11, "stormer-verlet": 1e-11, "galerkin-simpson": 1e-13}  # of momenta
+
+
+@pytest.mark.parametrize("name", DISCRETE)
+def test_a_million_steps_keep_recomputed_momenta_and_bound_the_energy_without_a_trend(name):
+    run = integrate(SPHEROID, name, step_size=0.01, horizon=10_000.0, samples=4001, observe="nutation")
+    assert run.steps == 1_000_000
+    changes = residuals(SPHEROID, run)
+    assert not any(trend(run.time, changes[quantity]).significant for quantity in ("p_phi", "p_psi", "energy"))
+    assert max(np.max(np.abs(changes[quantity])) for quantity in ("p_phi", "p_psi")) < DISCRETE[name]
+    assert abs(growth(run.time, changes["energy"]).slope) < 0.05
+    # of second order in the step: bounded, not small; or of fourth
+    assert (1e-11 if name == "galerkin-simpson" else 1e-6) < np.max(np.abs(changes["energy"])) < 1e-3
+
+
+@pytest.mark.parametrize(
+    ("family", "rule"),
+    [(discrete_lagrangian, discrete_lagrangian.Quadrature((0.5,), (1.0,))), (galerkin, galerkin.Iteration())],
+    ids=["midpoint", "galerkin"],
+)
+def test_momenta_are_recomputed_and_not_copied(family, rule):
+    """A phi that moves 1e-10 too far shows in p_phi."""
+    par, state = on_angles(SPHEROID.top, SPHEROID.start)
+    step, *_ = family.increment(par, rule, state, family.begin(par, rule, state, 0.01), 0.01)
+    right = family.observe(par, rule, state, step, 0.01)
+    assert right == pytest.approx(SPHEROID.top.momenta(SPHEROID.start)[:2], rel=1e-14)
+    moved = (step[0], step[1], step[2] + 1e-10, step[3])
+    assert abs(family.observe(par, rule, state, moved, 0.01)[0] - right[0]) > 1e-9
+
+
+PLAN = Plan.steps(SPHEROID.nutation_period / 118.02, [0, 40_000])
+
+
+@pytest.mark.parametrize("scene", random_scenes(3, seed=77), ids=lambda s: s.name)
+def test_nine_states_of_the_motion_have_its_momenta(scene):
+    h = scene.time_scale() / 118.0
+    motion = closed_form(scene)(np.arange(9) * h)
+    states = np.stack([motion.theta, scene.top.I1 * motion.theta_dot, motion.phi, motion.psi], axis=-1)
+    momenta = scene.top.momenta(scene.start)
+    p_phi, p_psi = momenta_of(scene.top, states[None], h)
+    assert abs(p_phi[0] - momenta.p_phi) < 1e-7 * scene.momentum_scale
+    assert abs(p_psi[0] - momenta.p_psi) < 1e-7 * scene.momentum_scale
+
+
+@pytest.mark.parametrize("name", ["midpoint", "stormer-verlet", "rk4", "trapezoidal"])
+def test_an_honest_run_reports_the_momenta_of_its_increments(name):
+    assert from_increments(symtop.integrator(name), SPHEROID, PLAN).size == 0.0
+
+
+def test_a_run_that_hides_its_drift_is_seen_and_one_of_few_steps_says_nothing():
+    rk4 = symtop.integrator("rk4")
+
+    def solve(top, start, plan):
+        run = rk4.solvers["angles"](top, start, plan)
+        momenta = top.momenta(start)
+        same = np.ones(plan.times.size)
+        return run._replace(p_phi=momenta.p_phi * same, p_psi=momenta.p_psi * same)
+
+    difference = from_increments(dataclasses.replace(rk4, name="copied", solvers={"angles": solve}), SPHEROID, PLAN)
+    assert difference.size > 100.0 * difference.floor
+    assert from_increments(symtop.integrator("rk4"), SPHEROID, Plan.steps(0.01, [0, 500])) is None

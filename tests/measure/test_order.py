@@ -1,11 +1,32 @@
 """The order of a method: what its interval covers, what is left out, and the one rule that confirms it."""
 
+import dataclasses
 import math
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 
+import symtop
 from symtop.measure.order import BESIDE, CLEARLY, Fit, order, order_verdict, power_law
+from symtop.measure.order_conditions import (
+    commutator,
+    conditions,
+    density,
+    element,
+    exponential,
+    logarithm,
+    product,
+    size,
+    splitting_conditions,
+    trees,
+    triangle,
+    vanishing,
+)
+from symtop.measure.step_map import generic_start, one_step
+from symtop.measure.step_series import compared, step_series
+from symtop.methods.runge_kutta.pair_tables import DORMAND_PRINCE
+from tests.judging.blind.right import CLASSICAL
 
 CURVES = 500
 
@@ -57,33 +78,27 @@ def fit(slope, interval):
     return Fit(slope, interval, 1.0, np.ones(8, dtype=bool))
 
 
-@pytest.mark.parametrize(
-    ("claim", "main", "others", "word"),
-    [
-        (2, fit(2.001, 0.002), [], "confirmed"),
-        (12, fit(11.966, 0.055), [], "confirmed"),
-        (5, fit(4.604, 0.092), [], "undecided"),  # neither 5 nor clearly another order
-        (4, fit(3.0, 0.1), [], "refuted"),
-        (2, fit(1.0, 0.001), [], "refuted"),
-        (4, fit(4.0, 0.01), [fit(3.0, 0.1)], "refuted"),  # theta shows less than is declared
-        (4, fit(4.0, 0.01), [fit(5.0, 0.1)], "confirmed"),  # and more by chance
-        (4, fit(math.nan, math.nan), [], "undecided"),
-        (None, fit(2.0, 0.01), [], "measured"),
-    ],
-)
+@pytest.mark.parametrize(("claim", "main", "others", "word"), [
+    (2, fit(2.001, 0.002), [], "confirmed"),
+    (12, fit(11.966, 0.055), [], "confirmed"),
+    (5, fit(4.604, 0.092), [], "undecided"),  # neither 5 nor clearly another order
+    (4, fit(3.0, 0.1), [], "refuted"),
+    (2, fit(1.0, 0.001), [], "refuted"),
+    (4, fit(4.0, 0.01), [fit(3.0, 0.1)], "refuted"),  # theta shows less than is declared
+    (4, fit(4.0, 0.01), [fit(5.0, 0.1)], "confirmed"),  # and more by chance
+    (4, fit(math.nan, math.nan), [], "undecided"),
+    (None, fit(2.0, 0.01), [], "measured"),
+])  # fmt: skip
 def test_one_rule_says_what_a_slope_says_of_a_declared_order(claim, main, others, word):
     assert order_verdict(claim, main, others) == word
 
 
-def test_no_slope_confirms_two_orders():
+def test_no_slope_confirms_two_orders_and_a_step_taken_twice_is_one_point():
     for slope in np.linspace(1.0, 3.0, 201):
         words = [order_verdict(claim, fit(slope, 0.2)) for claim in (1, 2, 3)]
         assert words.count("confirmed") <= 1
     assert 0.2 + BESIDE < 0.5 <= 0.1 + CLEARLY
-
-
-def test_a_step_that_was_taken_twice_is_one_point():
-    """Two points of the same step say nothing of the scatter: counted twice they made 8.9 +- 0.1 of order 10."""
+    # Two points of the same step say nothing of the scatter: counted twice they made 8.9 +- 0.1 of order 10.
     rng = np.random.default_rng(3)
     steps = np.geomspace(0.6, 0.8, 6)
     errors = 1e-11 * steps**10.0 * (1.0 + 0.3 * steps**2) * np.exp(0.01 * rng.standard_normal(6))
@@ -96,3 +111,109 @@ def test_a_step_that_was_taken_twice_is_one_point():
     fits = [order(np.repeat(dense, n), np.repeat(dense**2.0, n), 1e-16, 1.0, 2, symmetric=True) for n in (1, 2)]
     assert fits[0].slope == fits[1].slope == pytest.approx(2.0, abs=1e-3)
     assert fits[0].used.sum() == fits[1].used.sum()
+
+
+SPHEROID = symtop.scene("spheroid")
+
+
+def series(method, chart, scene=SPHEROID):
+    return step_series(one_step(method, chart, scene, 0.01), generic_start(scene), scene.time_scale())
+
+
+@pytest.mark.parametrize("off", [3e-8, 1e-9])
+def test_a_coefficient_that_is_slightly_off_shows_in_the_term_that_it_spoils(off):
+    outer = 1.3512071919596577 + off
+    inner = 1.0 - 2.0 * outer
+    kick = (outer / 2, (outer + inner) / 2, (outer + inner) / 2, outer / 2)
+    result = series(symtop.composition("off", (outer, inner, outer), kick, chart="space", order=4), "axis")
+    assert result.order == 2
+    assert 0.05 * off < result.defect[3] < 20.0 * off
+    assert result.noise[3] < 0.01 * off
+
+
+def test_the_terms_of_known_functions_are_found():
+    motion = lambda h: np.array([np.exp(h), np.cos(h)])
+    step = lambda h: motion(h) + np.array([1e-6 * h**2, 0.25 * h**5])
+    result = compared(step, motion, 4.0)
+    assert result.order == 1
+    assert result.defect[2] == pytest.approx(2e-6, rel=1e-3)  # beside 1/2
+    assert result.defect[5] == pytest.approx(30.0, rel=1e-3)  # beside 1/120
+    assert np.all(result.defect[[0, 1, 3, 4]] < 10.0 * result.noise[[0, 1, 3, 4]])
+    assert compared(motion, motion, 4.0).order == compared(motion, motion, 4.0).resolved >= 6
+
+
+def test_a_solver_without_steps_backwards_is_seen_forwards_and_one_without_any_is_refused():
+    rk4 = symtop.integrator("rk4")
+
+    def solve(top, start, plan):
+        if plan.step_size < 0.0:
+            raise symtop.SymtopError("forward only")
+        return rk4.solvers["axis"](top, start, plan)
+
+    result = series(dataclasses.replace(rk4, name="forward", solvers={"axis": solve}), "axis")
+    assert (result.order, result.backward) == (4, False)
+    assert result.resolved >= 4
+    step = Mock(side_effect=symtop.SymtopError("no luck"))
+    with pytest.raises(symtop.SymtopError, match="no luck"):
+        compared(step, np.cos, 1.0)
+
+
+def square(rows):
+    return triangle([x for row in rows for x in row], len(rows))
+
+
+def test_there_are_as_many_trees_as_there_are_and_known_tables_have_their_orders():
+    assert [len(trees(n)) for n in range(1, 8)] == [1, 1, 2, 4, 9, 20, 48]
+    assert all(size(tree) == 6 for tree in trees(6))
+    # tall tree: n!; bush: n
+    assert sorted(density(tree) for tree in trees(4)) == [4, 8, 12, 24]
+    assert conditions(square(CLASSICAL[0]), CLASSICAL[1]).order == 4
+    assert conditions(square(((), *DORMAND_PRINCE.a)), DORMAND_PRINCE.b).order == 5
+    r = 3**0.5 / 6
+    assert conditions([[0.25, 0.25 - r], [0.25 + r, 0.25]], [0.5, 0.5]).order == 4
+    assert conditions([[0.5]], [1.0]).order == 2
+    assert conditions([[0.0]], [1.0]).order == 1
+    assert conditions([[0.0]], [0.9]).order == 0
+
+
+@pytest.mark.parametrize(("off", "order"), [(1e-9, 2), (1e-13, 4)])
+def test_a_coefficient_that_is_off_shows_beyond_rounding(off, order):
+    # the same nodes; b4 off c3 = off/12 in the tall tree of order 3
+    rows = ((), (0.5,), (0.0, 0.5), (off, 0.0, 1.0 - off))
+    table = conditions(square(rows), CLASSICAL[1])
+    assert table.order == order
+    assert table.defect[2] == pytest.approx(off / 12, rel=0.01, abs=1e-16)
+
+
+FREE = [2, 1, 2, 3, 6, 9, 18, 30, 56, 99]  # dimensions of the free Lie algebra of two letters: Witt's formula
+
+
+@pytest.mark.parametrize("longest", [9, pytest.param(10, marks=pytest.mark.slow)])
+def test_there_are_as_many_conditions_as_there_are(longest):
+    """McLachlan and Quispel, Acta Numerica 11 (2002) 341, of Runge-Kutta-Nystrom methods."""
+    count = [free - vanishing(length).shape[1] for length, free in enumerate(FREE[:longest], start=1)]
+    assert count == [2, 1, 2, 2, 4, 5, 10, 14, 25, 39][:longest]
+
+
+def test_log_undoes_exp_and_begins_as_baker_campbell_and_hausdorff_say():
+    t, v = element(4, t=1.0), element(4, v=1.0)
+    words = logarithm(product(exponential(t), exponential(v)))
+    np.testing.assert_allclose(words[1], [1.0, 1.0])
+    np.testing.assert_allclose(words[2], 0.5 * commutator(t, v)[2])
+    third = [a - b for a, b in zip(commutator(t, commutator(t, v)), commutator(v, commutator(t, v)), strict=True)]
+    np.testing.assert_allclose(words[3], third[3] / 12.0, atol=1e-16)
+    for row in logarithm(exponential(t))[2:]:
+        np.testing.assert_allclose(row, 0.0, atol=1e-15)
+
+
+def test_known_splittings_have_their_orders_gradients_and_processors_counted():
+    assert splitting_conditions((1.0,), (1.0, 0.0)).order == 1
+    assert splitting_conditions((1.0,), (0.5, 0.5)).order == 2
+    assert splitting_conditions((1.0,), (0.5, 0.4)).order == 0
+    a, b = (1.0, -2 / 3, 2 / 3), (-1 / 24, 3 / 4, 7 / 24)
+    assert splitting_conditions(a, (0.0, *b)).order == 3  # Ruth 1983
+    assert splitting_conditions(a, (0.0, *reversed(b))).order < 3
+    assert splitting_conditions((0.5, 0.5), (1 / 6, 2 / 3, 1 / 6), (0.0, -1 / 72, 0.0)).order == 4
+    assert splitting_conditions((0.5, 0.5), (1 / 6, 2 / 3, 1 / 6), (0.0, 1 / 72, 0.0)).order == 2
+    assert splitting_conditions((1.0,), (0.5, 0.5), (-1 / 48, -1 / 48), 1 / 12).order == 4
+    assert splitting_conditions((1.0,), (0.5, 0.5), (-1 / 48, -1 / 48)).order == 2

@@ -43,15 +43,12 @@ def test_a_motion_that_is_early_and_turned_has_the_right_shape(name):
     assert rates.precession_rate < 1e-10
 
 
-def test_lags_may_be_longer_than_a_nutation_and_a_turn():
+def test_lags_of_more_than_a_turn_and_wrong_frequencies_are_found():
     scene, run, _ = moved("goldstein", early=0.3, faster=0.1, turned=9.0)
     parts = split(scene, run)
     assert np.max(np.abs(parts.lag - (0.3 + 0.1 * run.time))) < 1e-11
     assert np.max(np.abs(parts.turn - 9.0)) < 1e-10
     assert parts.shape.max() < 1e-12
-
-
-def test_wrong_frequencies_are_found_one_by_one():
     scene, run, truth = moved("spheroid", faster=1e-5)
     parts = phase(scene, run, truth)
     assert parts.nutation_period == pytest.approx(1e-5, rel=1e-4)
@@ -62,25 +59,19 @@ def test_wrong_frequencies_are_found_one_by_one():
     assert parts.precession_rate == pytest.approx(1e-5 * form.nutation_period / form.phi_per_period, rel=1e-9)
 
 
-def test_a_motion_of_another_shape_is_not_called_late():
+def test_another_shape_a_pole_passed_otherwise_and_a_steady_precession_are_not_late():
     scene, run, truth = moved("spheroid", lifted=1e-4)
     parts = split(scene, run)
     lag = np.abs(parts.lag).max()
     assert 3e-5 < parts.shape.max() < 2e-4
     assert lag * 2.0 * math.pi / scene.nutation_period < 1e-3
     assert phase(scene, run, truth).nutation_period < 3.0 * lag / run.time[-1]  # a bounded lag
-
-
-def test_a_pole_that_is_passed_on_the_other_side_is_not_a_turn():
     scene = symtop.scene("bruls-cardona-arnold")
     period = scene.nutation_period
     run = integrate(scene, "strang", step_size=period / 40.37, horizon=400.0 * period, samples=331, observe="axis")
     truth = reference(scene, run.time, precision="closed-form")
     distance = charts.axis_distance(run.axis, truth["axis"].values).max()
     assert largest_turn(run, split(scene, run)) < 2.0 * distance
-
-
-def test_a_steady_precession_has_no_nutation_to_be_late():
     scene, run, truth = moved("steady", turned=1e-6)
     parts = split(scene, run)
     assert np.isnan(parts.lag).all()

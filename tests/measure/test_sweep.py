@@ -21,16 +21,13 @@ def data():
     return symtop.sweep(["spheroid", "goldstein"], METHODS, **ARGUMENTS)
 
 
-def test_each_entry_is_that_of_one_run(data):
+def test_each_entry_is_that_of_one_run_whose_settings_are_its_own(data):
     assert dict(data.sizes) == {"scene": 2, "variant": 4, "setting": 3}
     for scene in ("spheroid", "goldstein"):
         row = error_row(symtop.scene(scene), symtop.integrator("strang"), 0.01, 2.0)
         cell = data.sel(scene=scene, variant="strang").isel(setting=1)
         for name in ("axis", "attitude_end", "energy_bound", "force_evaluations", "step_size", "outcome"):
             assert cell[name].values == row[name]
-
-
-def test_settings_belong_to_those_who_have_them(data):
     adaptive, formula = (data.sel(variant=name, scene="spheroid") for name in ("rk45-compiled", "exact"))
     assert adaptive["outcome"].values.tolist() == ["ok", "ok", "not_run"]
     assert adaptive["tolerance"].values[:2].tolist() == [1e-4, 1e-6]
@@ -130,11 +127,8 @@ def test_a_cell_that_raised_is_tried_again_and_one_that_ended_early_is_not(tmp_p
 
     monkeypatch.setattr(module, "_table", lambda cell: ran.append(cell.method.name) or table(cell))
     method = symtop.Integrator(name="moody", family="other", summary="raises once", solvers={"axis": moody})
-    for outcomes, again in (
-        (["raised", "ok"], ["stormer-verlet", "moody"]),
-        (["ok", "ok"], ["moody"]),
-        (["ok"] * 2, []),
-    ):
+    expected = (["raised", "ok"], ["stormer-verlet", "moody"]), (["ok", "ok"], ["moody"]), (["ok", "ok"], [])
+    for outcomes, again in expected:
         arguments = {"step_size": [1.0, 0.02], "path": file, "threads": 1, "quiet": True}
         data = symtop.sweep("spheroid", ["stormer-verlet", method], **arguments)
         assert data["outcome"].sel(variant="moody").values[0].tolist() == outcomes
@@ -144,30 +138,24 @@ def test_a_cell_that_raised_is_tried_again_and_one_that_ended_early_is_not(tmp_p
         xr.testing.assert_identical(netcdf.read(file).drop_attrs(), data.drop_attrs())
 
 
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        ({}, "strang has a fixed step: give step_size or per_nutation"),
-        ({"step_size": 0.1, "integrators": "rk45"}, "rk45 is adaptive: give tolerance"),
-        ({"step_size": 0.1, "scenes": ["spheroid", "spheroid"]}, "scenes must be one or more, each once"),
-        ({"step_size": 0.1, "scenes": {"I1": [1.0]}}, "for a dataset of tops there is ensemble"),
-    ],
-)
+@pytest.mark.parametrize(("words", "says"), [
+    ({}, "strang has a fixed step: give step_size or per_nutation"),
+    ({"step_size": 0.1, "integrators": "rk45"}, "rk45 is adaptive: give tolerance"),
+    ({"step_size": 0.1, "scenes": ["spheroid", "spheroid"]}, "scenes must be one or more, each once"),
+    ({"step_size": 0.1, "scenes": {"I1": [1.0]}}, "for a dataset of tops there is ensemble"),
+])  # fmt: skip
 def test_bad_input_is_one_sentence(words, says):
     with pytest.raises(symtop.SymtopError, match=says):
         symtop.sweep(**{"scenes": "spheroid", "integrators": "strang", **words})
 
 
-def test_a_file_of_something_else_is_refused(tmp_path):
+def test_steps_a_nutation_are_those_of_each_scene_and_a_file_of_something_else_is_refused(tmp_path):
     file = tmp_path / "run.nc"
     symtop.simulate("spheroid", "strang", step_size=0.01).to_netcdf(file)
     before = file.read_bytes()
     with pytest.raises(symtop.SymtopError, match="path must be a new file or that of a sweep"):
         symtop.sweep("spheroid", "strang", step_size=0.01, path=file)
     assert file.read_bytes() == before
-
-
-def test_steps_a_nutation_are_those_of_each_scene():
     data = symtop.sweep(["spheroid", "goldstein"], "strang", per_nutation=[50], horizon=2.0, quiet=True)
     for name in ("spheroid", "goldstein"):
         steps = 2.0 / round(2.0 * 50 / symtop.scene(name).nutation_period)

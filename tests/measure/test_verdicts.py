@@ -19,16 +19,13 @@ def judged(scene, name, **controls):
     return judgement(scene, run, error)
 
 
-@pytest.mark.parametrize(
-    ("scene", "name", "controls", "word", "says"),
-    [
-        ("goldstein", "strang", {"step_size": 0.01}, "accurate", "accurate to"),
-        ("goldstein", "strang", {"step_size": 0.3}, "bounded_but_wrong", "while the energy stayed within"),
-        ("goldstein", "rk4", {"step_size": 1.0, "horizon": 400.0, "observe": "axis"}, "drifting", "grew on"),
-        ("sleeping", "strang", {"step_size": 2.55, "horizon": 400.0}, "wrong_regime", "never goes"),
-        ("spheroid", "stormer-verlet", {"step_size": 1.0, "horizon": 50.0}, "left_chart", "stopped at"),
-    ],
-)
+@pytest.mark.parametrize(("scene", "name", "controls", "word", "says"), [
+    ("goldstein", "strang", {"step_size": 0.01}, "accurate", "accurate to"),
+    ("goldstein", "strang", {"step_size": 0.3}, "bounded_but_wrong", "while the energy stayed within"),
+    ("goldstein", "rk4", {"step_size": 1.0, "horizon": 400.0, "observe": "axis"}, "drifting", "grew on"),
+    ("sleeping", "strang", {"step_size": 2.55, "horizon": 400.0}, "wrong_regime", "never goes"),
+    ("spheroid", "stormer-verlet", {"step_size": 1.0, "horizon": 50.0}, "left_chart", "stopped at"),
+])  # fmt: skip
 def test_each_fate_is_judged_with_its_time_and_cause(scene, name, controls, word, says):
     result = judged(scene, name, **controls)
     assert result.verdict == word, result
@@ -46,13 +43,10 @@ def test_a_pole_passed_on_the_wrong_side_is_a_wrong_regime():
     assert "passed a pole" in judgement(scene, beyond, error).sentence
 
 
-def test_the_command_line_judges_a_run():
+def test_the_command_line_judges_a_run_against_the_width_of_the_nutation():
     few = call("run", "goldstein", "strang", "--step-size", "0.3", "--samples", "2", "--json")
     assert json.loads(few.stdout)["judgement"]["verdict"] == "bounded_but_wrong"
-
-
-def test_accurate_is_measured_against_the_width_of_the_nutation():
-    """`fast` nutates over 4e-4 rad: half a thousandth of a radian is not accurate there."""
+    # `fast` nutates over 4e-4 rad: half a thousandth of a radian is not accurate there.
     scene = symtop.scene("fast")
     run = symtop.simulate(scene, "exact", samples=101)
     assert judgement(scene, run, np.full(101, 1e-5)).verdict == "accurate"

@@ -50,49 +50,6 @@ def one_step(name, scene, h, chart="attitude"):
     return solve(symtop.integrator(name), chart, scene.top, scene.start, Plan.steps(h, [1])).states[-1]
 
 
-# ---- formulas --------------------------------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("name", AXIS_ERROR)
-def test_a_step_is_the_engines_formula_in_body_axes(name):
-    """Kernels on the axis, with equations solved by hand, against matrices in body axes: the same to rounding."""
-    formula = getattr(engine_formulas, name.replace("-", "_"))
-    for scene in (GOLDSTEIN, *random_scenes(6, seed=3)):
-        top, h = scene.top, 0.013
-        state = charts.space_state("attitude", top, scene.start)
-        attitude, inertia = Rotation.from_quat(np.roll(state[:4], -1)), np.diag([top.I1, top.I1, top.I3])
-        w = attitude.apply(np.linalg.solve(inertia, attitude.inv().apply(state[4:])))
-
-        def tau(at, mgl=top.mgl):
-            return mgl * np.cross([0.0, 0.0, 1.0], at.as_matrix()[:, 2])
-
-        new, w = formula(attitude, w, h, inertia, tau)
-        L = new.apply(inertia @ new.inv().apply(w))
-        done = one_step(name, scene, h)
-        assert charts.attitude_distance(done[:4], np.roll(new.as_quat(), 1)) < 1e-13
-        np.testing.assert_allclose(done[4:], L, rtol=0.0, atol=2e-14 * np.linalg.norm(L) + 1e-14)
-        if "axis" in symtop.integrator(name).charts():
-            np.testing.assert_allclose(
-                one_step(name, scene, h, "axis"), [*new.as_matrix()[:, 2], *L], atol=2e-14 * (1.0 + np.linalg.norm(L))
-            )
-
-
-@pytest.mark.parametrize("name", AXIS_ERROR)
-def test_a_step_of_a_body_without_symmetry_is_the_formula(name):
-    quaternion = np.array([0.8, 0.4, -0.3, 0.2]) / math.sqrt(0.93)
-    at, h = Attitude(tuple(quaternion), (0.7, -1.1, 2.0)), 0.013
-    for moments in ((0.5, 0.9, 1.3), (1.3, 0.5, 0.9)):
-        body = RigidBody(*moments, 1.7, (0.3, -0.2, 1.0))
-        attitude, inertia = Rotation.from_quat(np.roll(quaternion, -1)), np.diag(body.moments)
-        rates = attitude.apply(at.omega_body)
-        new, w = getattr(engine_formulas, name.replace("-", "_"))(
-            attitude, rates, h, inertia, lambda there, c=body.torque: np.cross([0.0, 0.0, 1.0], there.apply(c))
-        )
-        done = solve(symtop.integrator(name), "body", body, at, Plan.steps(h, [1])).states[-1]
-        assert charts.attitude_distance(done[:4], np.roll(new.as_quat(), 1)) < 1e-14
-        np.testing.assert_allclose(done[4:], inertia @ new.inv().apply(w), rtol=0.0, atol=2e-14)
-
-
 @pytest.mark.parametrize(("name", "value"), AXIS_ERROR.items())
 def test_the_reference_values(name, value):
     """Five digits tell an exponential from a linear rotation: the latter has 1.5716 without a gyroscopic term."""
@@ -115,10 +72,7 @@ def test_explicit_maps_fly_apart(name, time):
     assert run["time"].values[np.argmax(np.abs(energy) > 1e6)] == pytest.approx(time, abs=0.2)
 
 
-# ---- without the gyroscopic term -------------------------------------------------------------------------------------
-
-
-def test_without_the_gyroscopic_term_an_engine_follows_the_spherical_top():
+def test_without_the_gyroscopic_term_an_engine_follows_the_spherical_top_and_conservation_does_not_show_it():
     """Agreement of order h with the closed form of the top with I3 := I1, none with its own."""
     top = GOLDSTEIN.top
     spherical = symtop.ClosedForm(symtop.SymmetricTop(top.I1, top.I1, top.mgl), GOLDSTEIN.start)
@@ -130,9 +84,6 @@ def test_without_the_gyroscopic_term_an_engine_follows_the_spherical_top():
     assert min(axis_error("no-gyro[axis]", steps) for steps in counts) > 1.5
     with_term = [axis_error("mujoco-euler[axis]", steps, against=spherical) for steps in counts]
     assert min(with_term) > 1.0
-
-
-def test_no_test_of_conservation_sees_that_it_is_another_top():
     run = symtop.simulate(GOLDSTEIN, "no-gyro", step_size=0.0025, horizon=100.0, samples=2001, guard=False)
     scale = abs(float(run["energy"][0])) + GOLDSTEIN.top.mgl
     assert float(abs(run["energy"] - run["energy"][0]).max()) < 1e-4 * scale
@@ -140,9 +91,6 @@ def test_no_test_of_conservation_sees_that_it_is_another_top():
     assert float(symtop.errors(run)["axis"].max()) > 1.5
     wobble = float(abs(run["p_phi"] - run["p_phi"][0]).max()) / 5.0
     assert wobble == pytest.approx(0.10, abs=0.01)  # L_z alone shows it, and nobody looks
-
-
-# ---- at rest ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", registry.engines())
@@ -157,16 +105,45 @@ def test_a_top_that_starts_at_rest_falls_and_a_free_one_stays(name):
             assert float(symtop.errors(run)["axis"].max()) < (0.02 if mgl else 1e-6)
 
 
-# ---- charts and momenta ----------------------------------------------------------------------------------------------
-
-
 def _spun(scene, psi):
     return symtop.Scene("spun", scene.top, dataclasses.replace(scene.start, psi=psi), scene.horizon)
 
 
 @pytest.mark.parametrize("name", AXIS_ERROR)
-def test_a_turn_about_the_axis_changes_no_map_on_the_axis_and_one_that_has_no_such_map(name):
-    """No-squish depends on where the transverse axes are put."""
+def test_a_step_is_the_engines_formula_in_body_axes_and_a_turn_about_the_axis_changes_no_map_on_it(name):
+    """Kernels on the axis, with equations solved by hand, against matrices in body axes: the same to rounding."""
+    formula = getattr(engine_formulas, name.replace("-", "_"))
+    for scene in (GOLDSTEIN, *random_scenes(6, seed=3)):
+        top, h = scene.top, 0.013
+        state = charts.space_state("attitude", top, scene.start)
+        attitude, inertia = Rotation.from_quat(np.roll(state[:4], -1)), np.diag([top.I1, top.I1, top.I3])
+        w = attitude.apply(np.linalg.solve(inertia, attitude.inv().apply(state[4:])))
+
+        def tau(at, mgl=top.mgl):
+            return mgl * np.cross([0.0, 0.0, 1.0], at.as_matrix()[:, 2])
+
+        new, w = formula(attitude, w, h, inertia, tau)
+        L = new.apply(inertia @ new.inv().apply(w))
+        done = one_step(name, scene, h)
+        assert charts.attitude_distance(done[:4], np.roll(new.as_quat(), 1)) < 1e-13
+        np.testing.assert_allclose(done[4:], L, rtol=0.0, atol=2e-14 * np.linalg.norm(L) + 1e-14)
+        if "axis" in symtop.integrator(name).charts():
+            np.testing.assert_allclose(
+                one_step(name, scene, h, "axis"), [*new.as_matrix()[:, 2], *L], atol=2e-14 * (1.0 + np.linalg.norm(L))
+            )
+    quaternion = np.array([0.8, 0.4, -0.3, 0.2]) / math.sqrt(0.93)
+    at, h = Attitude(tuple(quaternion), (0.7, -1.1, 2.0)), 0.013
+    for moments in ((0.5, 0.9, 1.3), (1.3, 0.5, 0.9)):
+        body = RigidBody(*moments, 1.7, (0.3, -0.2, 1.0))
+        attitude, inertia = Rotation.from_quat(np.roll(quaternion, -1)), np.diag(body.moments)
+        rates = attitude.apply(at.omega_body)
+        new, w = getattr(engine_formulas, name.replace("-", "_"))(
+            attitude, rates, h, inertia, lambda there, c=body.torque: np.cross([0.0, 0.0, 1.0], there.apply(c))
+        )
+        done = solve(symtop.integrator(name), "body", body, at, Plan.steps(h, [1])).states[-1]
+        assert charts.attitude_distance(done[:4], np.roll(new.as_quat(), 1)) < 1e-14
+        np.testing.assert_allclose(done[4:], inertia @ new.inv().apply(w), rtol=0.0, atol=2e-14)
+    # No-squish depends on where the transverse axes are put.
     axes = [charts.axis_from_quaternion(one_step(name, _spun(GOLDSTEIN, psi), 0.02)[:4]) for psi in (0.0, 0.7)]
     gap = np.abs(axes[0] - axes[1]).max()
     assert gap > 1e-8 if name == "no-squish" else gap < 1e-15
@@ -198,9 +175,6 @@ def test_a_member_of_an_ensemble_has_the_bits_of_the_run_alone(name):
     assert_runs_alone(solver, numbers, h, marks, solver.many(numbers, h, marks))
 
 
-# ---- single precision ------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ROUNDED)
 def test_in_single_precision_a_step_is_the_same_but_for_rounding(name):
     exact, rounded = (one_step(one, GOLDSTEIN, 0.01) for one in (name, name + "-float32"))
@@ -223,9 +197,6 @@ def test_in_single_precision_there_is_a_best_step(name, best, error):
     assert finest > 1.5 * fine
     if name == "rapier":  # the control: in double it goes on
         assert axis_error(f"{name}[attitude]", counts[2]) < 0.2 * finest
-
-
-# ---- among the other integrators -------------------------------------------------------------------------------------
 
 
 def test_comparisons_and_recommendations_leave_engines_out():

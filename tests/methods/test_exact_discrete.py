@@ -35,9 +35,6 @@ def true_orbit(scene, h, steps):
     return rule, [value * np.exp(0.5j * par.twist * times) * turn for value, turn in zip(chi, turns, strict=True)]
 
 
-# ---- exactness -------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", PERIODIC)
 @pytest.mark.parametrize("steps", [100, 20, 4.37, 2.3, 2.0, 0.61, 2.0 / 3.0])
 def test_the_step_is_the_motion_whatever_its_size(name, steps):
@@ -69,7 +66,7 @@ def test_random_tops_follow_the_closed_form_at_every_step():
     assert worst < 2e-12
 
 
-def test_a_step_agrees_with_fifty_digits():
+def test_a_step_agrees_with_fifty_digits_and_a_neighbour_of_the_map_is_no_motion():
     scene = symtop.scene("spheroid")
     precise = PreciseForm(scene.top, scene.start, digits=50)
     h = scene.nutation_period / 3.1
@@ -77,9 +74,6 @@ def test_a_step_agrees_with_fifty_digits():
     for k in range(1, 4):
         quaternion = charts.quaternion_from_angles(*(float(value) for value in precise(k * h)[:3]))
         assert charts.attitude_distance(done.states[k, :4], quaternion) < 5e-15
-
-
-def test_a_neighbour_of_the_map_is_no_motion():
     scene = symtop.scene("spheroid")
     h = scene.nutation_period / 20.0
     kernel = inside(METHOD.solvers["axis"])
@@ -96,7 +90,7 @@ def test_a_neighbour_of_the_map_is_no_motion():
     assert gaps[1] > 1e-3
 
 
-def test_a_free_top_and_a_step_back():
+def test_a_free_top_a_step_back_and_the_separatrix_where_large_steps_are_divided():
     top, start = symtop.SymmetricTop(2.0, 1.0, 0.0), symtop.Angles(0.7, 0.2, 0.1, 0.3, -0.8, 1.1)
     form = symtop.model.exact.closed_form.ClosedForm(top, start)
     done = run(top, start, 0.7, 30)
@@ -107,9 +101,6 @@ def test_a_free_top_and_a_step_back():
     back = run(scene.top, scene.start, -0.3, 20)
     truth = closed_form(scene).quaternion(-0.3 * np.arange(21))
     assert charts.attitude_distance(back.states[:, :4], truth).max() < 1e-13
-
-
-def test_the_separatrix_is_climbed_and_large_steps_are_divided_there():
     scene = symtop.scene("separatrix")
     h = scene.horizon / 4.0
     done = run(scene.top, scene.start, h, 4)
@@ -118,9 +109,6 @@ def test_the_separatrix_is_climbed_and_large_steps_are_divided_there():
     assert done.force_evaluations > done.steps
     ordinary = symtop.scene("spheroid")
     assert run(ordinary.top, ordinary.start, ordinary.nutation_period / 2.3, 8).force_evaluations == 8
-
-
-# ---- the discrete Lagrangian -----------------------------------------------------------------------------------------
 
 
 def lagrangian(A, B, r, q0, q1):
@@ -196,32 +184,13 @@ def test_the_discrete_routhians_of_both_oscillators_are_one_map_of_the_height(na
         assert min(gaps) > 1e-8 if wrong else max(gaps) < 1e-12
 
 
-# ---- long runs and rounding ------------------------------------------------------------------------------------------
-
-
-def test_constants_stay_where_they_are_over_long_runs():
+def test_constants_stay_over_long_runs_and_edges_are_met_to_rounding():
     marks = np.arange(20_000, 2_000_001, 20_000)
     changes = np.abs(exactness.constants_of(4.37, marks)).max(axis=1)
     assert changes[0] < 2e-14
     assert changes[1:].max() < 1e-14
     lost = np.abs(exactness.constants_of(4.37, marks, exactness.forgetful())).max(axis=1)
     assert lost[:3].min() > 2e-14  # with sums of one double they walk
-
-
-@pytest.mark.slow
-def test_a_thousand_random_tops_and_a_million_nutations():
-    """`python -m benchmarks.exactness` takes ten thousand."""
-    errors = exactness.of_random_tops(1000)
-    assert errors.shape == (1000, 4)
-    assert np.median(errors) < 1e-15
-    assert errors.max() < 1e-12
-    for line in exactness.of_scenes():
-        name, *_, one, thousand, million = line.split()
-        bounds = (1e-11, 1e-9, 1e-4) if name in UNSTABLE else (3e-13, 3e-10, 1e-4)
-        assert all(float(error) < bound for error, bound in zip((one, thousand, million), bounds, strict=True)), line
-
-
-def test_no_step_is_refused_and_edges_are_met_to_rounding():
     for line in exactness.of_edges():
         assert float(line.split()[-3]) < (1e-5 if "separatrix" in line else 1e-12), line
 
@@ -234,8 +203,17 @@ def stay(marks, errors):
 
 
 @pytest.mark.slow
-def test_energy_and_momenta_stay_over_a_hundred_million_steps():
-    """A walk, which sums of one double make, or a drift of 1e-21 a step would be seen: the negative controls."""
+def test_a_thousand_random_tops_and_long_runs_keep_energy_and_momenta():
+    """`python -m benchmarks.exactness` takes ten thousand."""
+    errors = exactness.of_random_tops(1000)
+    assert errors.shape == (1000, 4)
+    assert np.median(errors) < 1e-15
+    assert errors.max() < 1e-12
+    for line in exactness.of_scenes():
+        name, *_, one, thousand, million = line.split()
+        bounds = (1e-11, 1e-9, 1e-4) if name in UNSTABLE else (3e-13, 3e-10, 1e-4)
+        assert all(float(error) < bound for error, bound in zip((one, thousand, million), bounds, strict=True)), line
+    # A walk, which sums of one double make, or a drift of 1e-21 a step would be seen: the negative controls.
     marks = np.unique(np.geomspace(1e6, 1e8, 9).astype(np.int64))
     errors = exactness.walkers(marks)
     assert np.abs(errors[:, 3]).max() < 1e-14

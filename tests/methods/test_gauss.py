@@ -46,23 +46,6 @@ def test_order(scene, order):
     assert_order(scene, integrator(f"gauss-{order}"), order, 0.05 if order <= 6 else 0.3, WINDOWS[order])
 
 
-def test_a_wrong_table_loses_the_order():
-    with pytest.raises(AssertionError, match="order"):
-        assert_order("spheroid", nudged(3, 1e-3, mirrored=True), 6, 0.05, WINDOWS[6])
-
-
-@pytest.mark.parametrize("stages", STAGES)
-def test_the_table(stages):
-    mu, b = gauss_rule(stages)[:2]
-    assert np.all(mu + mu.T == 1.0)  # to the last bit: this is what conserves
-    c = mu @ b
-    for k in range(1, 2 * stages + 1):
-        assert abs(np.sum(b * c ** (k - 1)) - 1.0 / k) < 4e-16
-    assert abs(np.sum(b * c ** (2 * stages)) - 1.0 / (2 * stages + 1)) > 1e-8  # no quadrature does better
-    if stages == 2:
-        np.testing.assert_allclose(mu[1, 0], 0.5 + 1.0 / np.sqrt(3.0), rtol=2e-16)
-
-
 def assert_keeps_everything(method, scene, observe, nutation_steps, limit=1e-13, steps=100_000):
     """|e|, L.e, L_z and the energy together, over so many steps, relative."""
     h = symtop.scene(scene).nutation_period / nutation_steps
@@ -73,16 +56,15 @@ def assert_keeps_everything(method, scene, observe, nutation_steps, limit=1e-13,
     assert np.max(np.abs(np.linalg.norm(run["axis"], axis=1) - 1.0)) < limit, "length"
 
 
-def test_a_table_that_is_not_antisymmetric_keeps_nothing():
+def test_a_wrong_table_loses_the_order_or_the_constants_and_no_gauss_method_is_poisson():
+    with pytest.raises(AssertionError, match="order"):
+        assert_order("spheroid", nudged(3, 1e-3, mirrored=True), 6, 0.05, WINDOWS[6])
     # 1e-12 is 4500 rounding units of one coefficient
     with pytest.raises(AssertionError, match=r"energy|p_psi"):
         assert_keeps_everything(nudged(3, 1e-12, mirrored=False), "spheroid", "axis", 30.3)
     # the order is lost but not the constants: they need only mu + mu^T = 1
     assert_keeps_everything(nudged(3, 1e-3, mirrored=True), "spheroid", "axis", 30.3)
-
-
-def test_gauss_methods_are_not_poisson():
-    """Why `symplectic` is false: the bracket is missed by the method's own local error, of order 2s + 1."""
+    # Why `symplectic` is false: the bracket is missed by the method's own local error, of order 2s + 1.
     scene = symtop.scene("spheroid")
 
     def defect(order, h):
@@ -93,8 +75,6 @@ def test_gauss_methods_are_not_poisson():
         assert abs(np.log2(coarse / fine) - (order + 1)) < 0.5, (order, coarse, fine)
     assert defect(12, 0.2) < 1e-9  # the exact map, as far as differences see
 
-
-# ---- any step is stable ----------------------------------------------------------------------------------------------
 
 LARGE = (2.0, 5.0, 10.0)  # h omega; sweeps converge up to about 1.6 with one stage
 STEADY = symtop.scene("steady-fast")
@@ -130,22 +110,6 @@ def test_a_step_next_to_a_vertical_top_is_the_stability_function(stages, phase, 
     np.testing.assert_allclose(measured / tilt, pade(stages, h * slope), rtol=0, atol=1e-8)
     np.testing.assert_allclose(np.abs(np.linalg.eigvals(measured / tilt)), 1.0, rtol=0, atol=1e-8)
     assert abs(abs(pade(stages, 1.0 + 1j * phase)) - 1.0) > 1e-3  # off the imaginary axis it is not one
-
-
-@pytest.mark.parametrize("stages", STAGES)
-def test_small_nutations_are_stable_at_any_step(stages):
-    method = integrator(f"gauss-{2 * stages}")
-    assert math.isnan(linear_limits(method, STEADY, np.linspace(0.02, 10.0, 200) / OMEGA)[0])
-    for phase in LARGE:
-        at = trace(method, STEADY, phase / OMEGA)
-        assert abs(at.trace) < 2.0
-        assert abs(at.theta - STEADY.start.theta) < 1e-12  # where the reduced energy is least, whatever the step
-        gap = abs(at.trace - 2.0 * pade(stages, 1j * phase).real)
-        faster = steady(200.0)  # precesses 10 times slower, and a nutation turns 10 times faster
-        omega = faster.top.nutation_frequency(faster.top.momenta(faster.start))
-        gap_faster = abs(trace(method, faster, phase / omega).trace - 2.0 * pade(stages, 1j * phase).real)
-        assert gap < 0.15
-        assert gap_faster < max(0.02 * gap, 1e-6)  # theory holds as precession / nutation goes to nothing, squared
 
 
 @pytest.mark.parametrize(
@@ -187,9 +151,6 @@ def test_the_frame_turns_with_the_body():
     attitude = frame_to_attitude(par, h * marks, states)
     exact = symtop.ClosedForm(top, start).quaternion(h * marks)
     assert np.max(charts.attitude_distance(attitude[:, :4], exact)) < 1e-13
-
-
-# ---- Newton for the stages ------------------------------------------------------------------------------------------
 
 
 def jacobian(par, y):
@@ -259,25 +220,17 @@ def test_a_step_is_what_newton_finds_and_sweeps_do_not(stages, scene):
     assert not sweep_step(par, stages, y, h)[1] < 1e3  # diverges
 
 
-def test_a_sweep_ends_at_its_own_limit_and_the_step_goes_on():
+def test_a_sweep_ends_at_its_own_limit_and_a_step_beyond_newtons_reach_is_grown():
     """In `steady-fast` sweeps of one stage contract up to h omega = 1.9; the step there and beyond is one function."""
-    scene = symtop.scene("steady-fast")
-    omega = scene.top.nutation_frequency(scene.top.momenta(scene.start))
-    par, state = on_axis(scene.top, scene.start)
+    par, state = on_axis(STEADY.top, STEADY.start)
     y = np.array(state) + 1e-3
-    assert sweep_step(par, 1, y, 1.6 / omega, 400)[1] < 1e-12
-    assert not sweep_step(par, 1, y, 2.2 / omega, 400)[1] < 1e-2
+    assert sweep_step(par, 1, y, 1.6 / OMEGA, 400)[1] < 1e-12
+    assert not sweep_step(par, 1, y, 2.2 / OMEGA, 400)[1] < 1e-2
     for phase in np.linspace(1.2, 2.4, 49):
-        done = march_axis(par, gauss_rule(1), tuple(y), phase / omega, ONE)
-        np.testing.assert_allclose(done.states[0], newton_step(par, 1, y, phase / omega)[0], rtol=0, atol=1e-13)
-
-
-def test_a_step_beyond_newtons_reach_is_found_by_growing_it():
+        done = march_axis(par, gauss_rule(1), tuple(y), phase / OMEGA, ONE)
+        np.testing.assert_allclose(done.states[0], newton_step(par, 1, y, phase / OMEGA)[0], rtol=0, atol=1e-13)
     par, y, h = started("spheroid", 10.0)
-
-    def constants(z):
-        return z[:3] @ z[:3], z[:3] @ z[3:], z[5], z[3:] @ z[3:] + 2.0 * par.I1 * par.mgl * z[2]
-
+    constants = lambda z: (z[:3] @ z[:3], z[:3] @ z[3:], z[5], z[3:] @ z[3:] + 2.0 * par.I1 * par.mgl * z[2])
     for stages in STAGES:
         done = march_axis(par, gauss_rule(stages), tuple(y), h, ONE)
         assert done.outcome == 0
@@ -286,8 +239,28 @@ def test_a_step_beyond_newtons_reach_is_found_by_growing_it():
 
 
 @pytest.mark.parametrize("stages", STAGES)
-def test_the_frame_stays_orthonormal_and_follows_its_axis(stages):
-    """At large steps a' = L x a / I1 is solved too: the frame's axis is that of the run on (e, L)."""
+def test_the_table_keeps_small_nutations_stable_at_any_step_and_the_frame_orthonormal(stages):
+    mu, b = gauss_rule(stages)[:2]
+    assert np.all(mu + mu.T == 1.0)  # to the last bit: this is what conserves
+    c = mu @ b
+    for k in range(1, 2 * stages + 1):
+        assert abs(np.sum(b * c ** (k - 1)) - 1.0 / k) < 4e-16
+    assert abs(np.sum(b * c ** (2 * stages)) - 1.0 / (2 * stages + 1)) > 1e-8  # no quadrature does better
+    if stages == 2:
+        np.testing.assert_allclose(mu[1, 0], 0.5 + 1.0 / np.sqrt(3.0), rtol=2e-16)
+    method = integrator(f"gauss-{2 * stages}")
+    assert math.isnan(linear_limits(method, STEADY, np.linspace(0.02, 10.0, 200) / OMEGA)[0])
+    for phase in LARGE:
+        at = trace(method, STEADY, phase / OMEGA)
+        assert abs(at.trace) < 2.0
+        assert abs(at.theta - STEADY.start.theta) < 1e-12  # where the reduced energy is least, whatever the step
+        gap = abs(at.trace - 2.0 * pade(stages, 1j * phase).real)
+        faster = steady(200.0)  # precesses 10 times slower, and a nutation turns 10 times faster
+        omega = faster.top.nutation_frequency(faster.top.momenta(faster.start))
+        gap_faster = abs(trace(method, faster, phase / omega).trace - 2.0 * pade(stages, 1j * phase).real)
+        assert gap < 0.15
+        assert gap_faster < max(0.02 * gap, 1e-6)  # theory holds as precession / nutation goes to nothing, squared
+    # At large steps a' = L x a / I1 is solved too: the frame's axis is that of the run on (e, L).
     scene = symtop.scene("goldstein")
     par, state = on_frame(scene.top, scene.start)
     marks = np.arange(0, 201, 20)

@@ -1,19 +1,24 @@
 """Discrete Lagrangians: exact values, orders, structure, failures; a wrong twin beside each right one."""
 
 import math
+import random
 
 import numpy as np
 import pytest
+from scipy.optimize import root
 
 import symtop
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import order
-from symtop.measure.step_map import one_step, return_miss
-from symtop.methods.framework.angles import on_angles
-from symtop.methods.framework.loop import FixedStep
+from symtop.measure.step_map import StepMap, angles_at, one_step, return_miss, symplectic_defect
+from symtop.methods.framework.angles import chart_outcome, on_angles
+from symtop.methods.framework.loop import FixedStep, inside
+from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK
 from symtop.methods.framework.registry import Integrator
+from symtop.methods.lagrangian import discrete_lagrangian, galerkin, galerkin as kernel
 from symtop.methods.lagrangian.discrete_lagrangian import Quadrature, forces, march, node_sums, opening
 from symtop.methods.lagrangian.unreduced import unreduced
+from symtop.model.top import Angles, SymmetricTop
 from tests.conftest import random_scenes
 
 
@@ -62,7 +67,150 @@ def test_a_rule_that_is_not_symmetric_misses_the_start(form):
     assert return_miss(one_step(lopsided, "angles", scene, 0.02), scene.start) > 5e-9  # of the largest coordinate
 
 
-def test_midpoint_is_the_implicit_midpoint_rule_of_the_reduced_hamiltonian_to_rounding():
+IN_ANGLES = [
+    (name, method) for name, method in symtop.integrators().items() if inside(method.solvers.get("angles")) is not None
+]
+
+
+def violent(count, seed):
+    """Random tops with steps that turn theta by up to a hundred radians, or by 1e20."""
+    draw = random.Random(seed)
+    for k in range(count):
+        top = SymmetricTop(1.0, draw.uniform(0.05, 1.95), draw.uniform(-3.0, 3.0))
+        theta = draw.choice([draw.uniform(0.0, math.pi), 10.0 ** draw.uniform(-6.0, -1.0)])
+        at = Angles(theta, theta_dot=draw.gauss(0.0, 2.0), phi_dot=draw.gauss(0.0, 3.0), psi_dot=draw.gauss(0.0, 30.0))
+        yield top, at, 10.0 ** (draw.uniform(-3.0, 1.5) if k % 8 else draw.uniform(10.0, 20.0))
+
+
+@pytest.mark.parametrize("theta", [0.0, -1e-300, math.pi, 4.0, 1e300])
+def test_the_chart_ends_at_its_poles(theta):
+    assert chart_outcome(theta) == LEFT_CHART
+    assert chart_outcome(1.0) == chart_outcome(5e-324) == chart_outcome(math.nextafter(math.pi, 0.0)) == OK
+    assert chart_outcome(math.nan) == chart_outcome(math.inf) == chart_outcome(-math.inf) == NOT_FINITE
+
+
+@pytest.mark.parametrize("family", [discrete_lagrangian, galerkin], ids=lambda family: family.__name__)
+def test_an_iteration_that_wanders_off_ends_as_with_the_sines_of_the_library(family):
+    """One step in Python, whose sines are the library's, and compiled; where roots compete, a rounding may decide."""
+    name = {discrete_lagrangian: "trapezoidal", galerkin: "galerkin-simpson"}[family]
+    loop, rule = family.march, inside(symtop.integrator(name).solvers["angles"]).rule
+    ends = []
+    for top, at, h in violent(400, seed=3):
+        par, state = on_angles(top, at)
+        interpreted = family.increment(par, rule, state, family.begin(par, rule, state, h), h)[3]
+        ends.append((interpreted, loop(par, rule, state, h, np.array([1])).outcome))
+    assert {OK, LEFT_CHART} < {outcome for outcome, _ in ends}  # and not converged
+    assert sum(one != other for one, other in ends) <= 4
+
+
+@pytest.mark.parametrize("name", [name for name, _ in IN_ANGLES])
+def test_a_nan_stays_one(name):
+    solver = inside(symtop.integrator(name).solvers["angles"])
+    scene = symtop.scene("spheroid")
+    par, rule, state = solver.setup(scene.top, scene.start, 0.01)
+    assert solver.loop(par, rule, state, 0.01, np.array([3])).outcome == OK
+    broken = solver.loop(par, rule, (math.nan, *state[1:]), 0.01, np.array([3]))
+    assert broken.outcome != OK
+    assert broken.steps == 0
+
+
+SCENES = ("spheroid", "goldstein")
+NAME = "galerkin-simpson"
+SIMPSON = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+
+
+def derivatives(top, theta, rate):
+    """dL/dq' and dL/dq of the Lagrangian in three angles."""
+    s, c = np.sin(theta), np.cos(theta)
+    spin = top.I3 * (rate[2] + rate[1] * c)
+    momentum = np.array([top.I1 * rate[0], top.I1 * rate[1] * s * s + spin * c, spin])
+    force = np.array([s * (top.I1 * rate[1] ** 2 * c - spin * rate[1] + top.mgl), 0.0, 0.0])
+    return momentum, force
+
+
+def independent_step(top, point, h, weights=SIMPSON):
+    """One step from the stationary parabola itself: six equations in (qm, q1), nothing eliminated, SciPy's solver."""
+    q0, p0 = point[:3], point[3:]
+    # rates at the nodes are linear in q0, qm, q1: these are their coefficients, times h
+    shape = np.array([[-3.0, 4.0, -1.0], [-1.0, 0.0, 1.0], [1.0, -4.0, 3.0]])
+
+    def slopes(unknown):
+        q = np.stack([q0, unknown[:3], unknown[3:]])
+        parts = [derivatives(top, q[i, 0], shape[i] @ q / h) for i in range(3)]
+        return [
+            h * weights[j] * parts[j][1] + sum(weights[i] * shape[i, j] * parts[i][0] for i in range(3))
+            for j in range(3)
+        ]
+
+    def equations(unknown):
+        first, middle, _ = slopes(unknown)
+        return np.concatenate([p0 + first, middle])
+
+    at = angles_at(top, point)
+    rate = np.array([at.theta_dot, at.phi_dot, at.psi_dot])
+    solution = root(equations, np.concatenate([q0 + 0.5 * h * rate, q0 + h * rate]), tol=1e-14)
+    assert np.max(np.abs(solution.fun)) < 1e-12
+    return np.concatenate([solution.x[3:], slopes(solution.x)[2]])
+
+
+@pytest.mark.parametrize("scene", random_scenes(8, seed=21), ids=lambda s: s.name)
+def test_one_step_is_the_stationary_parabola(scene):
+    """The reduction to two unknowns, and all six results of a step, against six equations solved as they stand."""
+    for h in (0.1, 0.02):
+        step = StepMap(symtop.integrator(NAME), "angles", scene.top, 1.0, h)
+        point = step.point(scene.start)
+        assert np.max(np.abs(step.image(point) - independent_step(scene.top, point, h))) < 2e-12
+        if h == 0.1 and scene.name == "random-0":  # the control: other weights are another method
+            wrong = independent_step(scene.top, point, h, weights=(0.17, 0.66, 0.17))
+            assert not np.max(np.abs(step.image(point) - wrong)) < 2e-12
+
+
+def test_a_step_without_its_last_force_is_neither_symplectic_nor_symmetric():
+    """The negative control of both: p_theta moved by the forces of the first two nodes only."""
+    good = symtop.integrator(NAME)
+
+    def solve(top, start, plan):
+        run = good.solvers["angles"](top, start, plan)
+        states = run.states.copy()
+        states[:, 1] += plan.step_size / 6.0 * top.potential_slope(states[:, 0], top.momenta(start))
+        return run._replace(states=states)
+
+    wrong = symtop.Integrator(name="wrong", family="other", summary="", solvers={"angles": solve})
+    scene = random_scenes(1, seed=22)[0]
+    assert symplectic_defect(one_step(wrong, "angles", scene, 0.02), scene.start).size > 1e-5
+    assert return_miss(one_step(wrong, "angles", scene, 0.02), scene.start) > 1e-5
+
+
+@pytest.mark.parametrize("scene", random_scenes(4, seed=25), ids=lambda s: s.name)
+def test_every_derivative_of_a_trial_is_right(scene):
+    """The analytic Jacobian against central differences; one that is off by a thousandth is seen."""
+    par, (theta, *_) = on_angles(scene.top, scene.start)
+    start, m, d, e = kernel._node(par, theta), 0.03, 0.07, 1e-5
+    trial = lambda shift_m, shift_1: kernel._evaluate(par, start, theta + m + shift_m, theta + d + shift_1)
+
+    def agree(factor):
+        here = trial(0.0, 0.0)
+        by_m = [(a.value - b.value) / (2 * e) for a, b in zip(trial(e, 0.0), trial(-e, 0.0), strict=True)]
+        by_1 = [(a.value - b.value) / (2 * e) for a, b in zip(trial(0.0, e), trial(0.0, -e), strict=True)]
+        pairs = [(jet.by_m, value) for jet, value in zip(here, by_m, strict=True)]
+        pairs += [(jet.by_1, value) for jet, value in zip(here, by_1, strict=True)]
+        scale = max(abs(value) for _, value in pairs)
+        return max(abs(factor * exact - value) for exact, value in pairs) < 1e-6 * scale
+
+    assert agree(1.0)
+    assert not agree(1.001)
+
+
+@pytest.mark.parametrize("scene_name", SCENES)
+def test_the_iteration_ends_soon(scene_name):
+    """At 200 steps a nutation the cubic predictor leaves two iterations; at 2000, one."""
+    scene = symtop.scene(scene_name)
+    for resolution, most in ((200.0, 2.1), (2000.0, 1.3)):
+        run = symtop.simulate(scene, NAME, step_size=scene.nutation_period / resolution)
+        assert run.attrs["newton_iterations"] / run.attrs["steps"] < most
+
+
+def test_midpoint_is_the_implicit_midpoint_rule_to_rounding_also_near_a_pole():
     """theta1 - theta0 = h p_mid/I1, p1 - p0 = -h V'(theta_mid); a loose stop rule shows as an error."""
     scene = symtop.scene("spheroid")
     par, state = on_angles(scene.top, scene.start)
@@ -77,3 +225,12 @@ def test_midpoint_is_the_implicit_midpoint_rule_of_the_reduced_hamiltonian_to_ro
 
     assert residual(1e-8) < 5e-14
     assert residual(1e3) > 1e-9
+    # theta swings through 1e-4 of the pole: the momenta of every step are still those of the start.
+    top = symtop.SymmetricTop(1.0, 1.0, 1.0)
+    point = (1e-4, 0.0, 0.0, 1e-4, 1.0 + 1e-8, 1.0)
+    scene = symtop.Scene("grazing", top, angles_at(top, point), 1.0)
+    run = symtop.simulate(scene, NAME, step_size=0.01, samples=101)
+    assert run.attrs["outcome"] == "ok"
+    momenta = top.momenta(scene.start)
+    drift = np.abs((run["p_phi"] - run["p_psi"]).values - momenta.north)
+    assert np.max(drift) < 4e-16

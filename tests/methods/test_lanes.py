@@ -117,18 +117,6 @@ def test_methods_that_have_lanes():
     assert not any(name.startswith(without) or "unreduced" in name for name in IN_LANES)
 
 
-def test_lanes_finish_what_needs_no_branch_and_give_back_the_others():
-    numbers, h, marks = members()
-    far, lost = (set(range(1000)[part]) for part in (FAR, LOST))
-    left = left_alone(SOLVERS["strang[axis]"], numbers, h, marks).tolist()
-    assert len(left) == len(set(left)) < 200
-    assert lost < set(left)
-    assert len(far & set(left)) > 0.8 * len(far)
-    cayley = left_alone(SOLVERS["cayley[axis]"], numbers, h, marks).tolist()
-    assert lost - set(cayley) <= set(np.flatnonzero(numbers[:, 2] == 0.0))
-    assert len(cayley) < 60  # a Cayley drift may turn as far as it likes
-
-
 @pytest.mark.parametrize("count", [1, LEAST - 1, LEAST, W - 1, W, W + 1, 2 * W + LEAST])
 def test_blocks_that_are_not_full(count):
     given = members(count, seed=3)
@@ -150,8 +138,17 @@ def test_arrays_that_cannot_be_written_to_compile_nothing_again(name):
     assert (len(kernels.signatures), len(run.signatures)) == before
 
 
-def test_a_member_does_not_see_its_neighbours():
-    """Bits of the members that were not touched; the one that was differs (the negative control)."""
+def test_lanes_finish_what_needs_no_branch_and_a_member_does_not_see_its_neighbours():
+    numbers, h, marks = members()
+    far, lost = (set(range(1000)[part]) for part in (FAR, LOST))
+    left = left_alone(SOLVERS["strang[axis]"], numbers, h, marks).tolist()
+    assert len(left) == len(set(left)) < 200
+    assert lost < set(left)
+    assert len(far & set(left)) > 0.8 * len(far)
+    cayley = left_alone(SOLVERS["cayley[axis]"], numbers, h, marks).tolist()
+    assert lost - set(cayley) <= set(np.flatnonzero(numbers[:, 2] == 0.0))
+    assert len(cayley) < 60  # a Cayley drift may turn as far as it likes
+    # Bits of the members that were not touched; the one that was differs (the negative control).
     numbers, h, marks = members(200)
     solver = SOLVERS["srkn-14-6[attitude]"]
     before = solver.many(numbers, h, marks)
@@ -190,16 +187,6 @@ def test_a_lane_that_takes_more_iterations_changes_no_other(name, longer):
     assert_runs_alone(solver, numbers, h, marks, after)
 
 
-def test_kicks_that_a_table_leaves_out_change_no_bit():
-    """Lanes carry out a kick by 0, alone it is skipped: inside a table, at its ends, and all of them for a free top."""
-    method = composition("gaps", (0.25, 0.25, 0.5), (0.0, 0.5, 0.0, 0.5), chart="space")
-    numbers, h, marks = members(200)
-    numbers[::3, 2], numbers[::7, 5:] = 0.0, -0.0  # and some that stand still
-    for chart in ("axis", "attitude"):
-        solver = method.solvers[chart]
-        assert_runs_alone(solver, numbers, h, marks, solver.many(numbers, h, marks))
-
-
 @pytest.mark.parametrize(("name", "steps"), [("takahashi-imada[attitude]", 250), ("kahan[axis]", 15)])
 def test_runs_of_a_few_steps_at_a_time_are_the_same(monkeypatch, name, steps):
     given = members(300)
@@ -211,25 +198,7 @@ def test_runs_of_a_few_steps_at_a_time_are_the_same(monkeypatch, name, steps):
         np.testing.assert_array_equal(one, other)
 
 
-def test_groups_hold_every_member_once_and_no_more_steps_than_asked():
-    steps = np.random.default_rng(1).integers(1, 50, 200)
-    chosen = np.flatnonzero(steps != 7)
-    parts = groups(chosen, steps, 300)
-    np.testing.assert_array_equal(np.concatenate(parts), chosen)
-    assert max(int(steps[part].sum()) for part in parts) < 350
-    assert len(parts) > 10
-    assert groups(chosen[:0], steps, 300) == []
-    assert all(a[-1] < b[0] for a, b in pairwise(parts))
-
-
-def test_a_long_run_in_which_lanes_are_given_up_between_samples():
-    """The marks lie further apart than the steps after which a block looks for lanes that were given up."""
-    numbers, h, _ = members(W, seed=4)
-    marks = np.tile([0, 2 * lanes.STRETCH + 7], (W, 1)) + np.arange(W)[:, None]
-    assert_runs_alone(SOLVERS["strang[axis]"], numbers, h, marks, SOLVERS["strang[axis]"].many(numbers, h, marks))
-
-
-def test_members_stand_in_the_order_of_their_steps_and_uneven_blocks_are_left():
+def test_members_stand_in_the_order_of_their_steps_and_of_their_turns_and_uneven_blocks_are_left():
     steps = np.concatenate([np.full(40, 100), [1000, 10_000], np.arange(1, 30)])
     chosen, left = divided(np.arange(len(steps)), steps)
     assert sorted((*chosen, *left)) == list(range(len(steps)))
@@ -239,10 +208,7 @@ def test_members_stand_in_the_order_of_their_steps_and_uneven_blocks_are_left():
     assert [part.size for part in divided(np.arange(0), steps)] == [0, 0]
     assert divided(np.arange(LEAST - 1), np.full(9, 7))[0].size == 0
     assert divided(np.arange(LEAST), np.full(9, 7))[1].size == 0
-
-
-def test_members_with_as_many_steps_stand_in_the_order_of_their_turns():
-    """Without turns they stand as they came (the negative control); with them, unlike steps still stand apart."""
+    # Without turns they stand as they came (the negative control); with them, unlike steps still stand apart.
     count, draw = 8 * W, np.random.default_rng(0)
     turn, everybody = draw.uniform(size=count), np.arange(count)
     turn[7] = np.nan  # a member whose step overflows: beside the largest
@@ -260,7 +226,15 @@ def test_members_with_as_many_steps_stand_in_the_order_of_their_turns():
     assert divided(np.arange(LEAST), np.zeros(9, dtype=int), turn)[0].size == LEAST  # no step at all
 
 
-def test_turns_are_those_of_a_sleeping_top_and_of_a_pendulum():
+def test_groups_hold_every_member_once_and_turns_are_those_of_the_motion():
+    steps = np.random.default_rng(1).integers(1, 50, 200)
+    chosen = np.flatnonzero(steps != 7)
+    parts = groups(chosen, steps, 300)
+    np.testing.assert_array_equal(np.concatenate(parts), chosen)
+    assert max(int(steps[part].sum()) for part in parts) < 350
+    assert len(parts) > 10
+    assert groups(chosen[:0], steps, 300) == []
+    assert all(a[-1] < b[0] for a, b in pairwise(parts))
     still, spinning, far = np.zeros((3, 9))
     still[:3], spinning[:3], far[:3] = (2.0, 1.0, 18.0), (2.0, 1.0, 0.0), (2.0, 1.0, 1.0)
     spinning[8], far[6] = 4.0, 1e200
@@ -269,8 +243,12 @@ def test_turns_are_those_of_a_sleeping_top_and_of_a_pendulum():
     assert angle[2] == np.inf
 
 
-def test_an_exact_step_of_several_parts_is_run_alone():
-    """Next to a separatrix a long step is divided; its neighbours in the block are not."""
+def test_lanes_given_up_between_samples_and_exact_steps_of_several_parts_are_run_alone():
+    """The marks lie further apart than the steps after which a block looks for lanes that were given up."""
+    numbers, h, _ = members(W, seed=4)
+    marks = np.tile([0, 2 * lanes.STRETCH + 7], (W, 1)) + np.arange(W)[:, None]
+    assert_runs_alone(SOLVERS["strang[axis]"], numbers, h, marks, SOLVERS["strang[axis]"].many(numbers, h, marks))
+    # Next to a separatrix a long step is divided; its neighbours in the block are not.
     scene, solver = symtop.scene("separatrix"), SOLVERS["exact-discrete[axis]"]
     numbers, h, marks = members(2 * W, seed=8)
     numbers[7], h[7] = flat(scene.top, scene.start), scene.horizon / 4.0
@@ -281,8 +259,15 @@ def test_an_exact_step_of_several_parts_is_run_alone():
     assert_runs_alone(solver, numbers, h, marks, done)
 
 
-def test_a_rule_that_is_a_table_of_stages_runs_in_lanes():
-    """Stages that are multiplied out by hand, as a script has them."""
+def test_tables_of_stages_run_in_lanes_and_kicks_left_out_change_no_bit():
+    """Lanes carry out a kick by 0, alone it is skipped: inside a table, at its ends, and all of them for a free top."""
+    method = composition("gaps", (0.25, 0.25, 0.5), (0.0, 0.5, 0.0, 0.5), chart="space")
+    numbers, h, marks = members(200)
+    numbers[::3, 2], numbers[::7, 5:] = 0.0, -0.0  # and some that stand still
+    for chart in ("axis", "attitude"):
+        solver = method.solvers[chart]
+        assert_runs_alone(solver, numbers, h, marks, solver.many(numbers, h, marks))
+    # Stages that are multiplied out by hand, as a script has them.
     scene, strang = symtop.scene("spheroid"), SOLVERS["strang[axis]"]
     h = scene.nutation_period / 100
     solver = FixedStep(march_axis, strang.rule(scene.top, scene.start, h), on_axis, 1, implicit=False)
@@ -292,8 +277,6 @@ def test_a_rule_that_is_a_table_of_stages_runs_in_lanes():
     for one, other in zip(solver.many(numbers, steps, marks), strang.many(numbers, steps, marks), strict=True):
         np.testing.assert_array_equal(one, other)
 
-
-# ---- methods on Lie groups -------------------------------------------------------------------------------------------
 
 CHARTS = ("axis", "attitude")
 
@@ -322,33 +305,19 @@ def of_table(*rows, bent=False):
     return lie_runge_kutta("any", rows, 1, "", "", bent=bent).solvers["attitude"]
 
 
-@pytest.mark.parametrize(
-    "solver",
-    [
-        of_table(((1.0,),)),
-        of_table(((1.0,),), ((0.5, 0.5), (0.0, 0.0)), bent=True),
-        lie_variational("any", Variational(EULER_POINCARE, SUZUKI_4.drift), 4, "", "").solvers["axis"],
-        generalised_alpha("any", 0.0).solvers["axis"],
-        dataclasses.replace(SOLVERS["rkmk-se3-2[attitude]"], rule=LieTable((0.0,), (1.0,))),
-        with_shares("rkmk-se3-2[attitude]", (0.25, 0.75)),
-        with_shares("generalised-alpha[axis]", (0.25, 0.5, 0.25)),
-        runge_kutta("any", ((),), (1.0,)).solvers["axis"],
-        runge_kutta("any", ((), (1 / 3,), (0.0, 2 / 3)), (0.25, 0.0, 0.75)).solvers["axis"],
-        discrete_lagrangian("mixed", (0.0, 0.0, 0.3, 1.0), (0.1, 0.2, 0.3, 0.4)).solvers["angles"],
-    ],
-    ids=[
-        "euler",
-        "heun",
-        "euler-poincare-4",
-        "alpha-0",
-        "zeros",
-        "rkmk-twice",
-        "alpha-thrice",
-        "rk-1",
-        "rk-3",
-        "weights",
-    ],
-)
+@pytest.mark.parametrize("solver", [
+    of_table(((1.0,),)),
+    of_table(((1.0,),), ((0.5, 0.5), (0.0, 0.0)), bent=True),
+    lie_variational("any", Variational(EULER_POINCARE, SUZUKI_4.drift), 4, "", "").solvers["axis"],
+    generalised_alpha("any", 0.0).solvers["axis"],
+    dataclasses.replace(SOLVERS["rkmk-se3-2[attitude]"], rule=LieTable((0.0,), (1.0,))),
+    with_shares("rkmk-se3-2[attitude]", (0.25, 0.75)),
+    with_shares("generalised-alpha[axis]", (0.25, 0.5, 0.25)),
+    runge_kutta("any", ((),), (1.0,)).solvers["axis"],
+    runge_kutta("any", ((), (1 / 3,), (0.0, 2 / 3)), (0.25, 0.0, 0.75)).solvers["axis"],
+    discrete_lagrangian("mixed", (0.0, 0.0, 0.3, 1.0), (0.1, 0.2, 0.3, 0.4)).solvers["angles"],
+], ids=["euler", "heun", "euler-poincare-4", "alpha-0", "zeros", "rkmk-twice", "alpha-thrice", "rk-1", "rk-3",
+        "weights"])  # fmt: skip
 def test_tables_and_compositions_of_ones_own_have_the_bits_of_runs_alone(solver):
     """A weight of 0 is carried out like any other, and each share of generalised-alpha goes on from the last one."""
     given = members(200, seed=12)

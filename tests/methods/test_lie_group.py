@@ -53,9 +53,6 @@ def energies(scene, rows):
     return 0.5 * np.sum(rows[:, 3:] ** 2, axis=1) / scene.top.I1 + scene.top.mgl * rows[:, 2]
 
 
-# ---- what is kept ----------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", [*LIE_TABLES, *COLLECTIVE, *VARIATIONAL])
 def test_casimirs_are_exact_where_rk4_loses_them(name):
     scene = symtop.scene("spheroid")
@@ -63,9 +60,6 @@ def test_casimirs_are_exact_where_rk4_loses_them(name):
         done = states(method, scene, scene.nutation_period / 40.0, 400, "axis")
         lost = np.abs(np.sum(done[:, :3] * done[:, 3:], axis=1) / (done[0, :3] @ done[0, 3:]) - 1.0).max()
         assert bool(lost < 3e-14) is exact
-
-
-# ---- variational methods ---------------------------------------------------------------------------------------------
 
 
 def kicked(scene, rows, h):
@@ -141,14 +135,11 @@ def test_rattle_on_directors_is_the_lie_group_variational_integrator():
     )
 
 
-def test_the_discrete_rigid_body_ends_at_a_right_angle_and_the_cayley_retraction_nowhere():
+def test_the_scalar_equations_are_solved_and_the_discrete_rigid_body_ends_at_a_right_angle():
     top, start = symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0, theta_dot=1.0, phi_dot=1.0)
     for name, outcome in (("lie-variational", "not_converged"), ("euler-poincare", "ok")):
         assert solve(integrator(name), "axis", top, start, Plan.steps(0.2, [1])).outcome == "ok"
         assert solve(integrator(name), "axis", top, start, Plan.steps(3.0, [1])).outcome == outcome
-
-
-def test_the_scalar_equations_are_solved_for_every_shape_and_size():
     random = np.random.default_rng(3)
     for _ in range(2000):
         top = Body(1.0, random.uniform(0.02, 1.98), 1.0)
@@ -163,9 +154,6 @@ def test_the_scalar_equations_are_solved_for_every_shape_and_size():
         _, i, x = rates(top, A, unknown)
         k, bent = i - top.I1, (top.I3 - top.I1) * x
         assert k == pytest.approx(top.I1 * square / (i * i + bent**2) + top.I3 * x * x, rel=1e-9, abs=1e-14)
-
-
-# ---- energy and momentum ---------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("scene", random_scenes(4, seed=13), ids=lambda scene: scene.name)
@@ -236,9 +224,6 @@ def test_the_discrete_gradients_are_the_midpoint_rule_and_the_mean_field_loses_t
     assert abs(energy.value(mean_field) / energy.value(before) - 1.0) > 1e-8
 
 
-# ---- Kahan -----------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("scene", random_scenes(4, seed=14), ids=lambda scene: scene.name)
 def test_kahan_is_its_runge_kutta_form(scene):
     """y_1 = y_0 + h (2 f((y_0 + y_1)/2) - (f(y_0) + f(y_1))/2)."""
@@ -248,9 +233,6 @@ def test_kahan_is_its_runge_kutta_form(scene):
     for before, after in itertools.pairwise(rows):
         f0, fm, f1 = (np.array(field_axis(par, y)) for y in (before, 0.5 * (before + after), after))
         np.testing.assert_allclose(after - before, h * (2.0 * fm - 0.5 * f0 - 0.5 * f1), atol=2e-14)
-
-
-# ---- collective methods ----------------------------------------------------------------------------------------------
 
 
 def flipped(q):
@@ -293,13 +275,13 @@ def test_collective_methods_bound_the_energy_that_gauss_keeps_to_rounding():
     assert lost["commutator-free-4"][-1] > 5.0 * lost["commutator-free-4"][2000]
 
 
-# ---- generalised-alpha -----------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("scene", random_scenes(3, seed=15), ids=lambda scene: scene.name)
 @pytest.mark.parametrize("radius", [0.0, 0.6, 1.0])
 def test_two_steps_are_those_of_the_generalised_alpha_method(radius, scene):
     """The definition in body axes with matrices, its equation solved by a general solver."""
+    for wrong in (-0.1, 1.1, math.nan):
+        with pytest.raises(symtop.SymtopError, match="spectral_radius"):
+            generalised_alpha("alpha", wrong)
     method, h, J = generalised_alpha("alpha", radius), 0.01, moments(scene.top)
     done = solve(method, "attitude", scene.top, scene.start, Plan.steps(h, [0, 1, 2])).states
     am, af = (2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0)
@@ -307,10 +289,7 @@ def test_two_steps_are_those_of_the_generalised_alpha_method(radius, scene):
     beta = 0.25 * (gamma + 0.5) ** 2
     R = matrices(done)[0]
     W = np.linalg.solve(J, R.T @ done[0, 4:])
-
-    def change(R, W):
-        return np.linalg.solve(J, R.T @ (scene.top.mgl * np.cross(K, R[:, 2])) - np.cross(W, J @ W))
-
+    change = lambda R, W: np.linalg.solve(J, R.T @ (scene.top.mgl * np.cross(K, R[:, 2])) - np.cross(W, J @ W))
     slope = a = change(R, W)
     for k in (1, 2):
 
@@ -324,15 +303,6 @@ def test_two_steps_are_those_of_the_generalised_alpha_method(radius, scene):
         slope = new
         np.testing.assert_allclose(matrices(done)[k], R, atol=3e-13)
         np.testing.assert_allclose(done[k, 4:], R @ J @ W, rtol=1e-11, atol=1e-11)
-
-
-@pytest.mark.parametrize("radius", [-0.1, 1.1, math.nan])
-def test_a_spectral_radius_out_of_range_is_refused(radius):
-    with pytest.raises(symtop.SymtopError, match="spectral_radius"):
-        generalised_alpha("alpha", radius)
-
-
-# ---- published values ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("name", "steps", "band"), [("simo-wong", 128000, 1e-5), ("collective-gauss-6", 2000, 6e-6)])

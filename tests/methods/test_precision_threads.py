@@ -61,10 +61,6 @@ def test_coefficients_and_starts_are_those_computed_alone_while_others_change_th
     assert all(np.array_equal(values, alone[0]) for values in rule)
     assert set(first) == {alone[1]}
     assert set(second) == {alone[2]}
-
-
-def test_the_precision_of_mpmath_itself_is_neither_used_nor_changed():
-    alone = coefficients(), numbers("spheroid")
     with mpmath.workdps(5):
         assert np.array_equal(coefficients(), alone[0])
         assert numbers("spheroid") == alone[1]
@@ -72,9 +68,7 @@ def test_the_precision_of_mpmath_itself_is_neither_used_nor_changed():
 
 
 def test_taylor_runs_of_one_kind_at_once_do_not_share_a_stepper():
-    def runs(name):
-        return [symtop.simulate(name, "taylor", horizon=50.0, samples=200)["axis"].values for _ in range(20)]
-
+    runs = lambda name: [symtop.simulate(name, "taylor", horizon=50.0, samples=200)["axis"].values for _ in range(20)]
     alone = [runs(name)[0] for name in SCENES]
     for expected, states in zip(alone, together(*(lambda name=name: runs(name) for name in SCENES)), strict=True):
         assert all(np.array_equal(expected, one) for one in states)

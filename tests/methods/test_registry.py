@@ -1,4 +1,4 @@
-"""What notebooks show of the registry, fields of an integrator that make no sense, and what each method needs."""
+"""The registry: what notebooks show of it, fields that make no sense, a paragraph and sources of every method."""
 
 import re
 import time
@@ -11,7 +11,8 @@ import pytest
 import symtop
 from symtop.core.errors import SymtopError
 from symtop.methods.framework import registry
-from symtop.methods.framework.registry import ENGINE, NEEDS, Integrator
+from symtop.methods.framework.loop import inside
+from symtop.methods.framework.registry import ENGINE, NEEDS, Integrator, bibliography, paragraphs
 from symtop.methods.runge_kutta import gauss
 
 
@@ -44,17 +45,14 @@ def test_two_threads_that_make_the_very_first_call_together_see_every_integrator
     assert results == [shipped] * 4
 
 
-@pytest.mark.parametrize(
-    ("fields", "says"),
-    [
-        ({"symplectic": "yes"}, "symplectic must be True, False or None, not 'yes'"),
-        ({"exact_steps": "no"}, "exact_steps must be True or False, not 'no'"),
-        ({"default_tolerance": -1}, "default_tolerance must be above zero"),
-        ({"default_tolerance": 1e-9, "least_tolerance": 1e-6}, "default_tolerance must be above zero, at least 1e-06"),
-        ({"least_tolerance": -1.0}, "least_tolerance must be at least 0"),
-        ({"reference": 5}, "reference must be text, not 5"),
-    ],
-)
+@pytest.mark.parametrize(("fields", "says"), [
+    ({"symplectic": "yes"}, "symplectic must be True, False or None, not 'yes'"),
+    ({"exact_steps": "no"}, "exact_steps must be True or False, not 'no'"),
+    ({"default_tolerance": -1}, "default_tolerance must be above zero"),
+    ({"default_tolerance": 1e-9, "least_tolerance": 1e-6}, "default_tolerance must be above zero, at least 1e-06"),
+    ({"least_tolerance": -1.0}, "least_tolerance must be at least 0"),
+    ({"reference": 5}, "reference must be text, not 5"),
+])  # fmt: skip
 def test_a_field_that_makes_no_sense_is_refused_and_one_that_does_is_not(fields, says):
     right = {"name": "mine", "family": "other", "summary": "", "solvers": {"angles": print}}
     with pytest.raises(SymtopError, match=f"^{re.escape(says)}"):
@@ -81,18 +79,7 @@ def test_well_known_methods_need_what_the_literature_gives_them(needs):
     assert {EVERY[name].needs for name in NAMED[needs]} == {needs}
 
 
-def test_what_is_made_for_this_top_exists_for_no_other_body_and_is_said_beside_nothing_else():
-    for method in EVERY.values():
-        if method.needs in ("this-top", "solution"):
-            assert not method.general
-        if method.needs in ("derivative", "expression", "group"):
-            assert method.general
-    assert not EVERY["takahashi-imada"].general  # its processor has no elementary flow without symmetry
-    assert EVERY["chin-4a"].general
-    assert not EVERY["stormer-verlet"].general  # T(p_theta) + V(theta) takes two cyclic angles
-
-
-def test_claims_agree_with_needs():
+def test_claims_agree_with_needs_and_what_is_made_for_this_top_exists_for_no_other_body():
     """f alone, in coordinates that are not canonical, makes nothing symplectic; kicks and an action do."""
     for method in EVERY.values():
         assert method.needs in NEEDS
@@ -105,6 +92,14 @@ def test_claims_agree_with_needs():
             assert method.symplectic  # of those two one composes with adaptive steps, one is no composition at all
         if method.family == ENGINE:
             assert method.needs == ("kicks" if method.symplectic else "group")
+    for method in EVERY.values():
+        if method.needs in ("this-top", "solution"):
+            assert not method.general
+        if method.needs in ("derivative", "expression", "group"):
+            assert method.general
+    assert not EVERY["takahashi-imada"].general  # its processor has no elementary flow without symmetry
+    assert EVERY["chin-4a"].general
+    assert not EVERY["stormer-verlet"].general  # T(p_theta) + V(theta) takes two cyclic angles
 
 
 def test_tables_of_ones_own_have_the_needs_of_their_family_and_a_plug_in_has_none():
@@ -115,3 +110,66 @@ def test_tables_of_ones_own_have_the_needs_of_their_family_and_a_plug_in_has_non
     assert mine.record()["needs"] == mine.record()["general"] == "unknown"
     with pytest.raises(SymtopError, match="needs must be 'derivative'"):
         Integrator(name="mine", family="other", summary="", solvers={"axis": print}, needs="luck")
+
+
+NAMES = tuple(symtop.integrators())
+DESCRIBED = tuple(paragraphs())
+COUNTED = """zero one two three four five six seven eight nine ten eleven twelve thirteen fourteen fifteen sixteen
+seventeen"""
+NUMBERS = {word: value for value, word in enumerate(COUNTED.split())} | {"nineteen": 19, "thirty-five": 35}
+COST = re.compile(r"(\S+) force evaluations? (a step|an iteration|a sweep)")
+
+
+def cost_in_words(text):
+    """What a paragraph says of the force evaluations: number and unit, the first time that it says so."""
+    word, unit = COST.search(text).groups()
+    return NUMBERS[word], unit
+
+
+@pytest.mark.parametrize("name", DESCRIBED)
+def test_no_paragraph_names_another_order_or_another_property_than_the_record(name):
+    method, about = symtop.integrator(name), symtop.integrator(name).about
+    orders = {int(number) for number in re.findall(r"\bOrder (\d+)", about)}
+    assert orders == (set() if method.order is None else {method.order})
+    assert ("not symplectic" in about) == (not method.symplectic)
+    assert "symplectic" in about
+    assert ("not symmetric" in about) == (not method.symmetric)
+    assert "symmetric" in about
+    for quantity in method.conserves & {"p_phi", "p_psi", "energy"}:
+        assert quantity in about
+
+
+@pytest.mark.parametrize("name", [name for name in DESCRIBED if symtop.integrator(name).control == "step_size"])
+def test_no_paragraph_names_another_cost_than_the_one_that_is_counted(name):
+    method = symtop.integrator(name)
+    number, unit = cost_in_words(method.about)
+    run = symtop.simulate("spheroid", method, step_size=0.01, horizon=1.0, guard=False)
+    forces, steps, iterations = (run.attrs[key] for key in ("force_evaluations", "steps", "newton_iterations"))
+    if method.explicit:
+        assert unit == "a step"
+        assert forces == number * steps
+    else:
+        assert unit in ("an iteration", "a sweep")
+        each_step = inside(next(iter(method.solvers.values()))).each_step
+        assert ("one more at the start of a step" in method.about) == (each_step == 1)
+        assert forces == number * iterations + each_step * steps
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_integrator_names_sources_that_are_known_and_its_paragraph_their_years(name):
+    method = symtop.integrator(name)
+    keys = method.reference.split()
+    assert keys
+    assert set(keys) <= set(bibliography())
+    for key in keys:
+        year = re.search(r"^  year = \{(\d{4})\},$", bibliography()[key], re.MULTILINE)[1]
+        assert f"({year})" in method.about or name not in DESCRIBED
+        assert symtop.citation(name).count(bibliography()[key]) == 1
+
+
+def test_other_integrators_that_a_paragraph_names_exist_and_one_of_ones_own_cites_nobody():
+    for text in paragraphs().values():
+        for name in re.findall(r"`([a-z0-9-]+)`", text):
+            assert name in (*NAMES, *symtop.scenes()), name
+    with pytest.raises(symtop.SymtopError, match="names no source that is known here"):
+        symtop.citation(symtop.composition("mine", (1.0,), (0.5, 0.5)))

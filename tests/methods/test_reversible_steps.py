@@ -33,9 +33,6 @@ def energies(scene, states):
     return 0.5 * states[:, 1] ** 2 / par.I1 + height
 
 
-# ---- the steps -------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ["spheroid", "goldstein"])
 @pytest.mark.parametrize("quantity", ["attitude", "energy"])
 def test_the_error_falls_with_the_square_of_the_step(name, quantity):
@@ -75,7 +72,7 @@ def test_the_grid_is_that_of_the_formulas(k):
     assert np.abs(other.states[:, :2] - points[:, 1:]).max() > 1e-6
 
 
-def test_samples_move_no_step_and_are_counted():
+def test_samples_and_blocks_move_no_step(monkeypatch):
     scene, h = symtop.scene("goldstein"), 0.05
     few, many = run(scene, h, [400, 800]), run(scene, h, np.arange(801))
     assert np.array_equal(few.states, many.states[[400, 800]])
@@ -84,26 +81,12 @@ def test_samples_move_no_step_and_are_counted():
         assert done.force_evaluations == done.steps
         assert done.newton_iterations == 0
     assert many.steps == few.steps + 798  # the start costs nothing
-
-
-def test_blocks_of_steps_join_without_a_seam(monkeypatch):
     scene = symtop.scene("grazing")
     whole = run(scene, 0.02, [50, 200])
     monkeypatch.setattr(reversible, "BLOCK", 7)
     parts = run(scene, 0.02, [50, 200])
     assert np.array_equal(whole.states, parts.states)
     assert whole.steps == parts.steps > 200
-
-
-def test_both_momenta_stay():
-    for name in ("spheroid", "goldstein", "grazing"):
-        scene = symtop.scene(name)
-        done, momenta = run(scene, 0.003, np.arange(0, 100_001, 500)), scene.top.momenta(scene.start)
-        for values, first in ((done.p_phi, momenta.p_phi), (done.p_psi, momenta.p_psi)):
-            assert np.abs(values / first - 1.0).max() < 1e-12
-
-
-# ---- structure -------------------------------------------------------------------------------------------------------
 
 
 def read_off(scene, eps, marks):
@@ -144,7 +127,12 @@ def test_the_way_back_has_the_same_steps(scene):
     assert np.abs(read_off(scene, 0.01, [500])[1] - state[:2]).max() > 1e-6
 
 
-def test_the_energy_stays_bounded_where_that_of_steps_read_off_drifts():
+def test_momenta_stay_and_the_energy_is_bounded_where_that_of_steps_read_off_drifts():
+    for name in ("spheroid", "goldstein", "grazing"):
+        scene = symtop.scene(name)
+        done, momenta = run(scene, 0.003, np.arange(0, 100_001, 500)), scene.top.momenta(scene.start)
+        for values, first in ((done.p_phi, momenta.p_phi), (done.p_psi, momenta.p_psi)):
+            assert np.abs(values / first - 1.0).max() < 1e-12
     scene, eps = grazing(0.1), 0.05
     marks = np.arange(0, 400_001, 200)
     done = run(scene, eps, marks)
@@ -155,9 +143,6 @@ def test_the_energy_stays_bounded_where_that_of_steps_read_off_drifts():
     assert np.abs(errors).max() < 1.1 * np.abs(errors[:200]).max()
     assert abs(trend(marks, errors).rise) < 0.01 * np.abs(errors).max()
     assert trend(marks, lost).rise > 100.0 * np.abs(errors).max()
-
-
-# ---- poles -----------------------------------------------------------------------------------------------------------
 
 
 def forces_for(scene, method, error):

@@ -18,20 +18,17 @@ from symtop.model.scenes import closed_form
 from symtop.run.simulation import make_plan
 from tests.conftest import random_scenes
 from tests.judging.blind.right import CLASSICAL, explicit
-from tests.measure.test_step_series import series
+from tests.measure.test_order import series
 
 KUTTA_A, KUTTA_B, _ = CLASSICAL
 
 
-@pytest.mark.parametrize(
-    ("a", "b", "order"),
-    [
-        (KUTTA_A, KUTTA_B, 4),
-        (((),), (1.0,), 1),
-        (((0.0, 0.0), (0.5, 0.0)), (0.0, 1.0), 2),
-        (((), (1 / 3,), (0.0, 2 / 3)), (1 / 4, 0.0, 3 / 4), 3),
-    ],
-)
+@pytest.mark.parametrize(("a", "b", "order"), [
+    (KUTTA_A, KUTTA_B, 4),
+    (((),), (1.0,), 1),
+    (((0.0, 0.0), (0.5, 0.0)), (0.0, 1.0), 2),
+    (((), (1 / 3,), (0.0, 2 / 3)), (1 / 4, 0.0, 3 / 4), 3),
+])  # fmt: skip
 def test_a_step_of_a_users_tableau_is_the_definition_and_has_its_order(a, b, order):
     scene, method, h = symtop.scene("spheroid"), runge_kutta("mine", a, b), 0.01
     par, state = with_rates(scene.top, scene.start)
@@ -41,34 +38,21 @@ def test_a_step_of_a_users_tableau_is_the_definition_and_has_its_order(a, b, ord
     assert series(method, "axis").order == order
 
 
-def test_a_tableau_may_be_made_of_arrays():
-    heun = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([0.5, 0.5]), np.array([0.0, 1.0])
-    rules = [runge_kutta("heun", *tableau).solvers["axis"].rule for tableau in (heun, [part.tolist() for part in heun])]
-    assert rules[0] == rules[1]
-    rows = [np.array([]), np.array([1.0])]
-    assert runge_kutta("heun", rows, heun[1]).solvers["axis"].rule == rules[0]
-
-
-@pytest.mark.parametrize(
-    ("a", "b", "c", "words"),
-    [
-        (KUTTA_A, (1 / 6, 1 / 3, 1 / 3, 1 / 3), None, "b must sum to 1"),
-        (KUTTA_A, KUTTA_B, (0.0, 0.5, 0.5, 0.9), "c must be the row sums"),
-        (KUTTA_A[:3], KUTTA_B, None, "a must have one row for each"),
-        (((0.5,),), (1.0,), None, "row 1 of a"),
-        (((), (0.5, 0.1, 0.0), (0.0, 0.5, 0.5)), (0.2, 0.3, 0.5), None, "row 2 of a"),
-        (np.zeros((2, 3)), np.array([0.5, 0.5]), None, "row 1 of a must have 0 entries"),
-        (np.array([[0.0, 1.0], [1.0, 0.0]]), (0.5, 0.5), None, "row 1 of a must have 0 entries"),
-        (np.zeros((3, 3)), (0.5, 0.5), None, "a must have one row for each of the 2"),
-        (np.zeros((2, 2, 2)), (0.5, 0.5), None, "an entry of a must be a finite number"),
-    ],
-)
+@pytest.mark.parametrize(("a", "b", "c", "words"), [
+    (KUTTA_A, (1 / 6, 1 / 3, 1 / 3, 1 / 3), None, "b must sum to 1"),
+    (KUTTA_A, KUTTA_B, (0.0, 0.5, 0.5, 0.9), "c must be the row sums"),
+    (KUTTA_A[:3], KUTTA_B, None, "a must have one row for each"),
+    (((0.5,),), (1.0,), None, "row 1 of a"),
+    (((), (0.5, 0.1, 0.0), (0.0, 0.5, 0.5)), (0.2, 0.3, 0.5), None, "row 2 of a"),
+    (np.zeros((2, 3)), np.array([0.5, 0.5]), None, "row 1 of a must have 0 entries"),
+    (np.array([[0.0, 1.0], [1.0, 0.0]]), (0.5, 0.5), None, "row 1 of a must have 0 entries"),
+    (np.zeros((3, 3)), (0.5, 0.5), None, "a must have one row for each of the 2"),
+    (np.zeros((2, 2, 2)), (0.5, 0.5), None, "an entry of a must be a finite number"),
+])  # fmt: skip
 def test_bad_tableaux_are_refused(a, b, c, words):
     with pytest.raises(symtop.SymtopError, match=words):
         runge_kutta("bad", a, b, c)
 
-
-# --- one right-hand side a chart ------------------------------------------------------------------------------------
 
 ADAPTIVE = ("rk45", "rk45-compiled", "dop853", "lsoda", "radau")
 
@@ -129,7 +113,7 @@ def test_numpy_and_compiled_are_one_function(chart):
         assert y.shape == ((7,) if chart == "attitude" else (6,))
 
 
-def test_the_attitude_takes_its_spin_from_the_state():
+def test_the_attitude_takes_its_spin_from_the_state_and_a_pole_is_nan_in_angles_alone():
     """A field of one top serves every start: the kernels' own holds the spin of one."""
     scene = symtop.scene("spheroid")
     f = symtop.field("attitude", scene.top)
@@ -138,9 +122,6 @@ def test_the_attitude_takes_its_spin_from_the_state():
         y, h = f.state(start), 1e-6
         truth = symtop.ClosedForm(scene.top, start).quaternion([h])[0]
         assert np.abs(truth - (y[:4] + h * f(0.0, y)[:4])).max() < 1e-8
-
-
-def test_a_pole_of_the_angles_is_nan_and_no_other_chart_has_one():
     top = symtop.SymmetricTop(2.0, 1.0, 1.0)
     start = symtop.Angles(theta=0.0, theta_dot=1.0, psi_dot=2.0)
     for chart in ("axis", "attitude"):
@@ -167,26 +148,9 @@ def test_a_state_of_another_shape_is_refused(chart, compiled):
         np.testing.assert_array_equal(f(0.0, same), f(0.0, y))
 
 
-# --- Dormand-Prince -------------------------------------------------------------------------------------------------
-
-
 def _walk(scene, tolerance, pair=pairs.RK45, **limits):
     plan, _ = make_plan(scene, integrator("rk45-compiled"), None, tolerance, horizon=8.0, samples=301)
     return plan, replace(pairs.solver(FORMULATIONS["angles"], pair, pair.rows), **limits)(scene.top, scene.start, plan)
-
-
-def test_adaptive_outcomes():
-    scene, pair = symtop.scene("spheroid"), pairs.RK45
-    for error in (math.inf, math.nan):
-        hopeless = _walk(scene, 1e-6, pair._replace(table=DORMAND_PRINCE._replace(error=(error,) * 7)))[1]
-        assert (hopeless.outcome, hopeless.steps) == ("step_too_small", 0)
-    plan, run = _walk(scene, 1e-9, block=500, most=1000)
-    assert run.outcome == "out_of_budget"
-    assert 0.0 < run.reached < 8.0
-    assert np.array_equal(np.isfinite(run.states[:, 0]), plan.times <= run.reached)
-
-
-# --- libraries ------------------------------------------------------------------------------------------------------
 
 
 def _error(name, tolerance, quantity="axis", **controls):
@@ -214,7 +178,12 @@ def test_scipys_solvers_are_solve_ivp(name):
         assert rhs.calls == done.nfev
 
 
-def test_taylor_in_three_precisions():
+def test_a_tableau_may_be_made_of_arrays_and_taylor_runs_in_three_precisions():
+    heun = np.array([[0.0, 0.0], [1.0, 0.0]]), np.array([0.5, 0.5]), np.array([0.0, 1.0])
+    rules = [runge_kutta("heun", *tableau).solvers["axis"].rule for tableau in (heun, [part.tolist() for part in heun])]
+    assert rules[0] == rules[1]
+    rows = [np.array([]), np.array([1.0])]
+    assert runge_kutta("heun", rows, heun[1]).solvers["axis"].rule == rules[0]
     pytest.importorskip("heyoka")
     result = {}
     for name in ("taylor", "taylor-longdouble", "taylor-quad"):
@@ -242,7 +211,15 @@ def test_extended_precision_is_not_lost_on_the_way():
         assert abs(float(constant[1] - constant[0])) < 1e-30
 
 
-def test_tolerances_stop_at_the_arithmetic():
+def test_adaptive_outcomes_and_tolerances_that_stop_at_the_arithmetic():
+    scene, pair = symtop.scene("spheroid"), pairs.RK45
+    for error in (math.inf, math.nan):
+        hopeless = _walk(scene, 1e-6, pair._replace(table=DORMAND_PRINCE._replace(error=(error,) * 7)))[1]
+        assert (hopeless.outcome, hopeless.steps) == ("step_too_small", 0)
+    plan, run = _walk(scene, 1e-9, block=500, most=1000)
+    assert run.outcome == "out_of_budget"
+    assert 0.0 < run.reached < 8.0
+    assert np.array_equal(np.isfinite(run.states[:, 0]), plan.times <= run.reached)
     pytest.importorskip("heyoka")
     integrator("taylor-quad").check_tolerance(1e-36)
     for name, tolerance in (("taylor", 1e-20), ("taylor-quad", 1e-40), ("rk45-compiled", 1e-15), ("radau", 1e-15)):

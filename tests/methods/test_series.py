@@ -43,14 +43,8 @@ def worst_gap(chart, method, scene, per_nutation, nutations=10.0):
 
 def called(function, *arguments):
     """What an intrinsic returns, which only compiled code can call."""
-
-    def call(given):
-        return function(*given)
-
+    call = lambda given: function(*given)
     return njit(call)(arguments)
-
-
-# ---- vectors ---------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("of_order", "size"), [(axis_sum, 6), (attitude_sum, 7)])
@@ -62,11 +56,8 @@ def test_components_compute_what_vectors_compute(of_order, size):
     assert result != called(of_order(12), state, 0.1, 0.2)
 
 
-# ---- coefficients ----------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("order", ORDERS)
-def test_the_sum_of_the_axis_is_that_of_the_first_terms_of_the_equations(order):
+def test_the_sums_are_those_of_the_first_terms_of_the_equations_and_agree_on_the_axis(order):
     """The coefficients by the plain recurrence of e' = L x e/I1, L' = mgl z x e, in NumPy."""
     scene = symtop.scene("spheroid")
     h, (I1, mgl) = 0.2, (scene.top.I1, scene.top.mgl)
@@ -82,10 +73,6 @@ def test_the_sum_of_the_axis_is_that_of_the_first_terms_of_the_equations(order):
     for n, square in ((order, result[5]), (order - 1, result[6])):
         assert math.sqrt(square) == pytest.approx(np.linalg.norm([*e[n - 1][:2], e[n][2]]), rel=1e-9)
     assert result[:3] != pytest.approx(sum(e[1:order]), rel=1e-10)
-
-
-@pytest.mark.parametrize("order", ORDERS)
-def test_the_attitudes_sum_shows_the_axis_of_the_axis_sum(order):
     scene = symtop.scene("hairer-lubich-wanner")
     h, (I1, mgl) = 0.02, (scene.top.I1, scene.top.mgl)
     state = charts.space_state("attitude", scene.top, scene.start)
@@ -96,9 +83,6 @@ def test_the_attitudes_sum_shows_the_axis_of_the_axis_sum(order):
     assert charts.axis_from_quaternion(moved) == pytest.approx(axis[:3] + np.array(theirs[:3]), abs=1e-13)
     assert result[4:6] == pytest.approx(theirs[3:5], rel=1e-12)
     assert np.linalg.norm(moved) == pytest.approx(1.0, abs=1e-13)
-
-
-# ---- orders ----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("chart", CHARTS)
@@ -122,25 +106,6 @@ def test_long_runs_are_right_to_rounding_where_the_truncation_is_below_it(chart,
     assert worst_gap(chart, series("trial", 8), scene, per_nutation / 4.0) > 1e-9
 
 
-def test_constants_of_the_present_state_keep_a_long_run_at_rounding():
-    scene = symtop.scene("spheroid")
-    method = symtop.integrator("series")
-    h = scene.nutation_period / 30.1
-    done = method.solvers["axis"](scene.top, scene.start, Plan.steps(h, np.arange(0, 1_000_001, 10_000)))
-    e, L = done.states[:, :3], done.states[:, 3:]
-    energy = 0.5 * (L * L).sum(axis=1) / scene.top.I1 + scene.top.mgl * e[:, 2]
-    assert np.abs(energy / energy[0] - 1.0).max() < 3e-12
-    assert np.ptp(done.p_phi) == 0.0
-    assert np.abs(done.p_psi / done.p_psi[0] - 1.0).max() < 3e-12
-
-
-# ---- tolerance -------------------------------------------------------------------------------------------------------
-
-
-def test_the_order_follows_from_the_tolerance():
-    assert [order_for(tolerance) for tolerance in (1e-3, 1e-6, 1e-9, 1e-12, 1e-16)] == [8, 12, 16, 20, 20]
-
-
 @pytest.mark.parametrize(("chart", "method"), ADAPTIVE)
 @pytest.mark.parametrize("name", ["spheroid", "fast", "grazing", "sleeping", "separatrix", "steady"])
 def test_the_error_follows_the_tolerance(chart, method, name):
@@ -160,6 +125,7 @@ def test_the_error_follows_the_tolerance(chart, method, name):
 
 
 def test_a_free_top_and_one_at_rest_and_bad_input():
+    assert [order_for(tolerance) for tolerance in (1e-3, 1e-6, 1e-9, 1e-12, 1e-16)] == [8, 12, 16, 20, 20]
     with pytest.raises(SymtopError, match="order"):
         series("trial", 10)
     for chart, method in ADAPTIVE:
@@ -186,8 +152,6 @@ def test_a_hyphen_before_a_chart_names_a_row_too():
     with pytest.raises(KeyError):
         symtop.integrators()["serious-axis"]
 
-
-# ---- by recurrence, of any equations ---------------------------------------------------------------------------------
 
 GENERAL = series_general.CHARTS
 OF_TOPS = [chart for chart in GENERAL if chart != "body"]
@@ -246,8 +210,17 @@ def test_fixed_steps_have_order_sixteen(chart):
     assert_order("spheroid", integrator(f"series-general[{chart}]"), 16, 1.0, (12, 18), quantity)
 
 
-def test_a_motion_without_end_of_steps_is_one_step():
-    """At rest on its axis every coefficient but the first is zero."""
+def test_a_motion_without_end_of_steps_is_one_step_and_constants_stay_at_rounding():
+    scene = symtop.scene("spheroid")
+    method = symtop.integrator("series")
+    h = scene.nutation_period / 30.1
+    done = method.solvers["axis"](scene.top, scene.start, Plan.steps(h, np.arange(0, 1_000_001, 10_000)))
+    e, L = done.states[:, :3], done.states[:, 3:]
+    energy = 0.5 * (L * L).sum(axis=1) / scene.top.I1 + scene.top.mgl * e[:, 2]
+    assert np.abs(energy / energy[0] - 1.0).max() < 3e-12
+    assert np.ptp(done.p_phi) == 0.0
+    assert np.abs(done.p_psi / done.p_psi[0] - 1.0).max() < 3e-12
+    # At rest on its axis every coefficient but the first is zero.
     rest = symtop.Scene("rest", symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(1.0), 5.0, observes="axis")
     run = symtop.simulate(rest, "series-general-adaptive[axis]", tolerance=1e-9, guard=False)
     assert (run.attrs["outcome"], run.attrs["steps"]) == ("ok", 1)

@@ -23,9 +23,6 @@ def run(method, scene, h, marks, chart="attitude"):
     return method.solvers[chart](scene.top, scene.start, Plan.steps(h, marks))
 
 
-# ---- coefficients ----------------------------------------------------------------------------------------------------
-
-
 def quadrature_defect(table, order):
     """Largest |sum b t^k - 1/(k+1)| for k < order, t the time at each kick."""
     times = np.array([math.fsum(table.drift[:i]) for i in range(len(table.kick))])
@@ -47,28 +44,9 @@ def test_tables_sum_to_one_read_the_same_from_both_ends_and_integrate_polynomial
     assert quadrature_defect(wrong, order) > 1e-10
 
 
-# ---- structure -------------------------------------------------------------------------------------------------------
-
 TOP = symtop.SymmetricTop(2.0, 0.7, 3.0)
 START = symtop.Angles(theta=0.7, phi=0.3, psi=-0.2, theta_dot=0.4, phi_dot=0.9, psi_dot=2.0)
 MAP = symtop.Scene("map", TOP, START, 1.0)
-
-
-def test_the_tuned_step_is_symplectic_but_for_the_number_it_takes_from_the_start():
-    defect = symplectic_defect(one_step(METHODS["cayley-tuned"], "attitude", MAP, 0.2), START)
-    assert defect.size > 1e-4
-    assert defect.rest < 1e-10
-    other = symplectic_defect(one_step(symtop.integrator("gauss-4"), "attitude", MAP, 0.2), START)
-    assert other.rest > 1e-7  # a number of the start explains nothing here
-
-
-def test_an_unsymmetric_table_is_left_as_it_is_and_its_step_does_not_come_back():
-    euler = composition("euler", (1.0,), (1.0, 0.0), chart="space", order=1)
-    assert not euler.symmetric
-    assert return_miss(one_step(euler, "attitude", MAP, 0.1), START) > 1e-3
-    assert tables.exact_sum((1.0, 0.0)) == (1.0, 0.0)
-    closed = tables.exact_sum((0.7, 0.2, 0.1 - 1e-10, 0.0))
-    assert closed == pytest.approx((0.7, 0.2 + 5e-11, 0.1 - 5e-11, 0.0), abs=1e-15)
 
 
 @pytest.mark.parametrize("chart", ["space", "angles"])
@@ -81,9 +59,6 @@ def test_a_table_without_a_last_kick_kicks_with_the_newest_axis(chart):
         errors[kick] = abs(float(once["energy"][-1] - once["energy"][0]))
         assert once.attrs["force_evaluations"] == once.attrs["steps"]
     assert 0.5 < errors[1.0, 0.0] / errors[0.0, 1.0] < 2.0  # adjoint methods: errors of one size
-
-
-# ---- constants -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("name", ["strang", "cayley", "yoshida-4", "srkn-14-6"])
@@ -146,14 +121,22 @@ def test_the_mean_square_momentum_is_that_of_the_closed_form(name):
     assert space.mean_square_momentum(scene.top, scene.start) == pytest.approx(mean, rel=1e-13)
 
 
-# ---- what each is good at --------------------------------------------------------------------------------------------
-
-
 def largest_error(name, scene, h, horizon):
     return float(error_table(scene, METHODS[name], [h], horizon, observe="attitude")["axis"][0])
 
 
-def test_in_the_fast_top_strang_is_far_more_accurate_than_verlet():
+def test_the_tuned_step_is_symplectic_but_for_its_number_and_strang_accurate_in_the_fast_top():
+    defect = symplectic_defect(one_step(METHODS["cayley-tuned"], "attitude", MAP, 0.2), START)
+    assert defect.size > 1e-4
+    assert defect.rest < 1e-10
+    other = symplectic_defect(one_step(symtop.integrator("gauss-4"), "attitude", MAP, 0.2), START)
+    assert other.rest > 1e-7  # a number of the start explains nothing here
+    euler = composition("euler", (1.0,), (1.0, 0.0), chart="space", order=1)
+    assert not euler.symmetric
+    assert return_miss(one_step(euler, "attitude", MAP, 0.1), START) > 1e-3
+    assert tables.exact_sum((1.0, 0.0)) == (1.0, 0.0)
+    closed = tables.exact_sum((0.7, 0.2, 0.1 - 1e-10, 0.0))
+    assert closed == pytest.approx((0.7, 0.2 + 5e-11, 0.1 - 5e-11, 0.0), abs=1e-15)
     for name, far in (("fast", True), ("goldstein", False)):
         scene = symtop.scene(name)
         verlet, strang = (
@@ -179,9 +162,6 @@ def test_generalised_orders_remove_the_first_power_of_gravity(name):
     assert spin_power("suzuki-4") < 2.2  # order 4 too, but its error is of the first power
 
 
-# ---- use -------------------------------------------------------------------------------------------------------------
-
-
 def test_a_new_composition_compiles_nothing():
     """One kernel takes tables of any length, but for those of one and two drifts, which are compiled for it."""
     scene = symtop.scene("spheroid")
@@ -196,17 +176,14 @@ def test_a_new_composition_compiles_nothing():
     assert METHODS["strang"].solvers["axis"]._whole.alone[0] is not march
 
 
-@pytest.mark.parametrize(
-    ("words", "arguments", "more"),
-    [
-        ("kick must have one coefficient more", ((1.0,), (1.0,)), {}),
-        ("drift coefficients must sum to 1", ((0.9,), (0.5, 0.5)), {}),
-        ("gradient must have as many", ((1.0,), (0.5, 0.5), (0.0,)), {"chart": "space"}),
-        ("gradient must be zero where kick is", ((0.5, 0.5), (0.0, 1.0, 0.0), (0.1, 0.0, 0.0)), {"chart": "space"}),
-        ("chart must be 'space'", ((1.0,), (0.5, 0.5), (0.1, 0.1)), {}),
-        ("rotation 'caley' is unknown; did you mean cayley", ((1.0,), (0.5, 0.5)), {"rotation": "caley"}),
-    ],
-)
+@pytest.mark.parametrize(("words", "arguments", "more"), [
+    ("kick must have one coefficient more", ((1.0,), (1.0,)), {}),
+    ("drift coefficients must sum to 1", ((0.9,), (0.5, 0.5)), {}),
+    ("gradient must have as many", ((1.0,), (0.5, 0.5), (0.0,)), {"chart": "space"}),
+    ("gradient must be zero where kick is", ((0.5, 0.5), (0.0, 1.0, 0.0), (0.1, 0.0, 0.0)), {"chart": "space"}),
+    ("chart must be 'space'", ((1.0,), (0.5, 0.5), (0.1, 0.1)), {}),
+    ("rotation 'caley' is unknown; did you mean cayley", ((1.0,), (0.5, 0.5)), {"rotation": "caley"}),
+])  # fmt: skip
 def test_bad_tables_are_refused_in_one_sentence(words, arguments, more):
     with pytest.raises(symtop.SymtopError, match=words):
         composition("bad", *arguments, **more)

@@ -6,7 +6,7 @@ import symtop
 from symtop.measure.step_map import generic_start, one_step, restart_gap, return_miss, step_map, symplectic_defect
 from symtop.methods.lie_group.runge_kutta import lie_runge_kutta
 from tests.conftest import random_scenes
-from tests.measure.test_step_series import series
+from tests.measure.test_order import series
 from tests.slopes import assert_order
 
 SPHEROID = symtop.scene("spheroid")

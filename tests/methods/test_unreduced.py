@@ -30,12 +30,8 @@ def largest_gap(scene_name, first, second, steps=10_000):
 def test_the_reduced_kernel_assumed_nothing(scene_name, name):
     """Ten thousand steps: rounding grows as n^1.5 and stays below 1e-11 rad (measured 7e-13)."""
     assert largest_gap(scene_name, name, name + TWIN) < 1e-11
-
-
-@pytest.mark.parametrize("scene_name", SCENES)
-def test_another_rule_is_another_trajectory(scene_name):
-    """The negative control: two methods of order 2 are nowhere near each other on that scale."""
-    assert largest_gap(scene_name, "midpoint", "trapezoidal" + TWIN) > 1e-7
+    if name == "midpoint":  # the control: another rule of order 2 is another trajectory
+        assert largest_gap(scene_name, "midpoint", "trapezoidal" + TWIN) > 1e-7
 
 
 def test_the_study_finds_rounding_between_the_forms_and_iterations_that_end_soon():
@@ -45,20 +41,6 @@ def test_the_study_finds_rounding_between_the_forms_and_iterations_that_end_soon
     assert float(history["p_phi_drift"].max()) < 1e-13
     iterations = unreduced_cost(scene, "midpoint", [scene.nutation_period / 300.0], batches=1)["iterations_per_step"]
     assert ((iterations >= 1.0) & (iterations < 5.0)).all()
-
-
-def test_a_map_that_invents_its_momenta_is_not_symplectic():
-    """The negative control: a p_phi moved by 1e-4 sin(theta) after an otherwise right step is seen."""
-    good = symtop.integrator("midpoint" + TWIN)
-
-    def solve(top, start, plan):
-        run = good.solvers["angles"](top, start, plan)
-        return run._replace(p_phi=run.p_phi + 1e-4 * np.sin(run.states[:, 0]))
-
-    wrong = symtop.Integrator(name="wrong", family="other", summary="", solvers={"angles": solve})
-    scene = random_scenes(1, seed=11)[0]
-    step = one_step(wrong, "angles", scene, 0.02)
-    assert symplectic_defect(step, scene.start).size * step.unit > 1e-5
 
 
 def momentum_walk(scene_name, loop, steps=1_000_000):
@@ -92,8 +74,19 @@ def one_iteration(par, rule, state, carry, h):
     return step, ((w, v, u), carry[0], carry[1]), 1, 0
 
 
-def test_one_iteration_a_step_lets_the_momenta_go():
-    """The negative control: equations that are not solved show in p_phi, which no parameter holds."""
+def test_maps_that_invent_or_let_go_of_their_momenta_are_seen():
+    """The negative control: a p_phi moved by 1e-4 sin(theta) after an otherwise right step is seen."""
+    good = symtop.integrator("midpoint" + TWIN)
+
+    def solve(top, start, plan):
+        run = good.solvers["angles"](top, start, plan)
+        return run._replace(p_phi=run.p_phi + 1e-4 * np.sin(run.states[:, 0]))
+
+    wrong = symtop.Integrator(name="wrong", family="other", summary="", solvers={"angles": solve})
+    scene = random_scenes(1, seed=11)[0]
+    step = one_step(wrong, "angles", scene, 0.02)
+    assert symplectic_defect(step, scene.start).size * step.unit > 1e-5
+    # The negative control: equations that are not solved show in p_phi, which no parameter holds.
     largest, _ = momentum_walk("goldstein", kernel_loop(kernel.begin, one_iteration, kernel.observe), steps=50_000)
     assert not largest < 1e-11
 

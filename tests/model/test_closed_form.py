@@ -32,13 +32,10 @@ SEPARATRIX = SymmetricTop(1.0, 0.5, -1.0), Angles(0.0, theta_dot=2.0)
 def _double(monkeypatch):
     """Double arithmetic in place of double-double."""
     short = {
-        "add": lambda a, b: (a[0] + b[0], 0.0),
-        "sub": lambda a, b: (a[0] - b[0], 0.0),
-        "mul": lambda a, b: (a[0] * b[0], 0.0),
-        "div": lambda a, b: (a[0] / b[0], 0.0),
-        "square": lambda a: (a[0] * a[0], 0.0),
-        "root": lambda a: (math.sqrt(max(a[0], 0.0)), 0.0),
-    }
+        "add": lambda a, b: (a[0] + b[0], 0.0), "sub": lambda a, b: (a[0] - b[0], 0.0),
+        "mul": lambda a, b: (a[0] * b[0], 0.0), "div": lambda a, b: (a[0] / b[0], 0.0),
+        "square": lambda a: (a[0] * a[0], 0.0), "root": lambda a: (math.sqrt(max(a[0], 0.0)), 0.0),
+    }  # fmt: skip
     for module in (turning_points, elliptic, constants, double_double):
         for name, function in short.items():
             if hasattr(module, name):
@@ -114,9 +111,6 @@ def test_the_last_resort_gives_the_same_motion(named, monkeypatch):
     np.testing.assert_allclose(ours.axis(times), digits.axis(times), rtol=0, atol=2 * EPS)
 
 
-# --------------------------------------------------------------------------------------------------- compiled
-
-
 def test_compiled_and_interpreted_functions_give_the_same_bits():
     closed_form.compile_now()
     times = np.array([0.0, 0.3, -17.1, 1e3, 1e6, 1e17])
@@ -142,17 +136,14 @@ def test_compiled_and_interpreted_functions_give_the_same_bits():
         assert ours.tobytes() == theirs.tobytes()
 
 
-@pytest.mark.parametrize(
-    "numbers",
-    [
-        (1.0, 0.5, 1.0, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0),
-        (1.0, 0.5, 1e-70, 1.0, 0.0, 0.0, 0.1, 0.2, 0.3),
-        (1e-40, 1e-40, 1e40, 1.0, 0.0, 0.0, 1e40, -1e40, 1e40),
-        (1.0, 0.5, 1.0, 1e-130, 0.0, 0.0, 0.0, 1e-59, 1e-59),
-        (1.0, 0.5, 1e40, 3.0, 0.0, 0.0, 1e-59, 0.0, 0.0),
-        (1e40, 1e40, 1e-59, 1.0, 0.0, 0.0, 1e-59, 1e40, 1e-59),
-    ],
-)
+@pytest.mark.parametrize("numbers", [
+    (1.0, 0.5, 1.0, math.nan, 0.0, 0.0, 0.0, 0.0, 0.0),
+    (1.0, 0.5, 1e-70, 1.0, 0.0, 0.0, 0.1, 0.2, 0.3),
+    (1e-40, 1e-40, 1e40, 1.0, 0.0, 0.0, 1e40, -1e40, 1e40),
+    (1.0, 0.5, 1.0, 1e-130, 0.0, 0.0, 0.0, 1e-59, 1e-59),
+    (1.0, 0.5, 1e40, 3.0, 0.0, 0.0, 1e-59, 0.0, 0.0),
+    (1e40, 1e40, 1e-59, 1.0, 0.0, 0.0, 1e-59, 1e40, 1e-59),
+])  # fmt: skip
 def test_values_at_the_ends_of_the_range_end_in_a_status(numbers):
     """Neither way raises, and both say the same."""
     closed_form.compile_now()
@@ -164,25 +155,19 @@ def test_values_at_the_ends_of_the_range_end_in_a_status(numbers):
     assert status in closed_form.REASONS
 
 
-def test_a_few_forms_import_no_slow_library():
+def test_a_few_forms_import_no_slow_library_and_many_samples_are_worth_compiling(monkeypatch):
     code = (
         "import sys, symtop\n"
         "for scene in symtop.scenes().values(): symtop.ClosedForm(scene.top, scene.start).axis([0.0, 1.0])\n"
         "print(*({'numba', 'mpmath', 'scipy', 'heyoka'} & set(sys.modules)))"
     )
     assert printed_by(code, cwd=ROOT).strip() == ""
-
-
-def test_many_samples_are_worth_compiling(monkeypatch):
     kernel = closed_form.LazyKernel(samples.all_samples, closed_form._fill.arguments, patience=0.2)
     monkeypatch.setattr(kernel, "_worth", lambda: kernel.patience)
     assert not kernel.ready(0.1)
     monkeypatch.setattr(kernel, "compile", lambda: setattr(kernel, "compiled", True))
     assert kernel.ready(0.11)
     assert kernel.ready(0.0)
-
-
-# --------------------------------------------------------------------------------------------------- separatrix
 
 
 @pytest.mark.parametrize("rate", [2.0, -2.0])
@@ -212,9 +197,10 @@ def test_the_exact_separatrix_climbs_for_ever(rate):
 
 
 def test_a_scene_on_the_separatrix_is_simulated_and_has_a_reference(monkeypatch, tmp_path):
-    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
     climbing = symtop.Scene("climbing", *SEPARATRIX, 5.0)
     run = symtop.simulate(climbing, "strang", step_size=0.01)
+    closed_form.compile_now()
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))  # it holds no reference
     assert run.attrs["outcome"] == "ok"
     true = 4.0 * np.arctan(np.tanh(0.5 * run["time"].values))
     assert np.abs(np.arccos(run["axis"].values[:, 2]) - true).max() < 1e-3
@@ -232,9 +218,6 @@ def test_next_to_the_separatrix_the_motion_is_periodic():
         assert 30.0 < form.nutation_period < 100.0
         assert abs(form(1.0).theta - ClosedForm(top, start)(1.0).theta) < 1e-15
     assert ClosedForm(top, Angles(0.0, theta_dot=2.0, psi_dot=1e-9)).nutation_period < 100.0
-
-
-# ---------------------------------------------------------------------------------------------- against 50 digits
 
 
 @pytest.mark.parametrize("count", [1, pytest.param(40, marks=pytest.mark.slow)])
@@ -258,9 +241,6 @@ def test_a_form_that_is_wrong_in_the_fifteenth_digit_breaks_the_claim(monkeypatc
 
     monkeypatch.setattr(accuracy, "ClosedForm", wrong)
     assert accuracy.examine("generic", 2, 0).broken
-
-
-# ------------------------------------------------------------------------------------------------------ many tops
 
 
 TIMES = np.array([0.0, 0.3, -17.1, 1e3, 1e6])
@@ -305,16 +285,13 @@ def test_a_member_has_the_bits_of_its_own_form(implementation):
     assert forms.arithmetic[-2:] == ["double", "40 digits"]
 
 
-def test_the_mean_precession_is_that_of_a_period():
+def test_the_mean_precession_is_that_of_a_period_and_each_member_may_have_times_of_its_own():
     forms = ClosedForms([flat(*pair) for pair in _pairs(1) if math.isfinite(ClosedForm(*pair).nutation_period)])
     period = forms.nutation_period
     np.testing.assert_allclose(forms.precession_rate * period, forms.phi_per_period, rtol=1e-14, atol=1e-300)
     grown = np.diff(forms(np.stack([0.21 * period, 1.21 * period], axis=1)).phi, axis=1)[:, 0]
     gap = (grown - forms.phi_per_period) / math.pi  # phi jumps by pi where the axis passes through a pole
     assert np.abs(gap - np.rint(gap)).max() < 1e-12
-
-
-def test_each_member_may_have_times_of_its_own():
     forms = ClosedForms([flat(*pair) for pair in _pairs(1)])
     times = np.random.default_rng(5).uniform(-10.0, 10.0, (len(forms), 7))
     each, strided = forms.axis(times), forms.axis(np.repeat(times, 2, axis=1)[:, ::2])
@@ -322,9 +299,6 @@ def test_each_member_may_have_times_of_its_own():
     for i in (0, len(forms) - 1):
         assert each[i].tobytes() == forms.axis(times[i])[i].tobytes()
     assert forms(times).theta.shape == (len(forms), 7)
-
-
-def test_one_row_of_times_does_not_pass_for_a_row_of_each_member():
     forms = ClosedForms([flat(*SEPARATRIX), flat(*ASLEEP)])
     for bad in ([[0.0, 1.0]], [[0.0], [1.0], [2.0]], [[[0.0]]]):
         with pytest.raises(SymtopError, match=r"shape \(2, samples\)"):
@@ -344,16 +318,13 @@ def test_a_member_without_a_form_fails_alone():
         assert np.isfinite(values[[0, 2]]).all()
 
 
-@pytest.mark.parametrize(
-    ("column", "value", "words"),
-    [
-        ("I1", -1.0, "member 1: I1 must be above zero, not -1.0"),
-        ("I3", 2.5, "member 1: I3 must be at most 2 I1"),
-        ("mgl", math.nan, "member 1: mgl must be a finite number"),
-        ("theta", 3.2, "member 1: theta must lie in"),
-        ("psi_dot", 1e41, "member 1: psi_dot must be between"),
-    ],
-)
+@pytest.mark.parametrize(("column", "value", "words"), [
+    ("I1", -1.0, "member 1: I1 must be above zero, not -1.0"),
+    ("I3", 2.5, "member 1: I3 must be at most 2 I1"),
+    ("mgl", math.nan, "member 1: mgl must be a finite number"),
+    ("theta", 3.2, "member 1: theta must lie in"),
+    ("psi_dot", 1e41, "member 1: psi_dot must be between"),
+])  # fmt: skip
 def test_a_row_that_is_no_top_is_named(column, value, words):
     rows = np.array([flat(*ASLEEP)] * 3)
     rows[1, NUMBERS.index(column)] = value
@@ -366,24 +337,6 @@ def test_a_row_that_is_no_top_is_named(column, value, words):
 def test_no_members_and_no_times_are_no_trouble(implementation):
     assert ClosedForms(np.empty((0, 9))).axis(TIMES).shape == (0, 5, 3)
     assert ClosedForms([flat(*ASLEEP)]).state([]).shape == (1, 0, 7)
-
-
-def test_threads_share_forms_and_kernels():
-    """A kernel that several threads ask for at once is made once, and none of them sees half of it."""
-    rows = np.array([flat(*pair) for pair in _pairs(1)])
-    alone = ClosedForms(rows).state(TIMES).tobytes()
-    forms, begin = ClosedForms(rows), threading.Barrier(8)
-    kernel = LazyKernel(samples.all_samples, closed_form._fill.arguments, patience=1e9)
-
-    def work(_):
-        begin.wait()
-        kernel.compile()
-        assert kernel.compiled is not None
-        return forms.state(TIMES).tobytes(), ClosedForms(rows).state(TIMES).tobytes()
-
-    with ThreadPoolExecutor(8) as pool:
-        for result in pool.map(work, range(8)):
-            assert result == (alone, alone)
 
 
 def test_distances_from_an_axis_are_those_of_the_chart(implementation):
@@ -402,7 +355,22 @@ def test_distances_from_an_axis_are_those_of_the_chart(implementation):
     assert alone.tobytes() == gap[0].tobytes()
 
 
-def test_momenta_of_a_run_are_read_off_its_states():
+def test_members_momenta_and_threads():
+    """A kernel that several threads ask for at once is made once, and none of them sees half of it."""
+    rows = np.array([flat(*pair) for pair in _pairs(1)])
+    alone = ClosedForms(rows).state(TIMES).tobytes()
+    forms, begin = ClosedForms(rows), threading.Barrier(8)
+    kernel = LazyKernel(samples.all_samples, closed_form._fill.arguments, patience=1e9)
+
+    def work(_):
+        begin.wait()
+        kernel.compile()
+        assert kernel.compiled is not None
+        return forms.state(TIMES).tobytes(), ClosedForms(rows).state(TIMES).tobytes()
+
+    with ThreadPoolExecutor(8) as pool:
+        for result in pool.map(work, range(8)):
+            assert result == (alone, alone)
     forms = ClosedForms([flat(*pair) for pair in _pairs(1)])
     states, momenta = forms.run(TIMES)
     assert states.tobytes() == forms.state(TIMES).tobytes()

@@ -38,9 +38,6 @@ def _digits():
         yield
 
 
-# ------------------------------------------------------------------------------------------------ published digits
-
-
 CONSTANTS = {name: name for name in ("p_phi", "p_psi", "a", "b", "alpha", "beta", "m", "Omega", "K", "nutation_period")}
 CONSTANTS |= {"E": "energy", "dphi_per_period": "phi_per_period", "dpsi_per_period": "psi_per_period"}
 
@@ -61,9 +58,6 @@ def test_thirty_digits_of_the_published_states(name):
     last = [mp.mpf(10) ** Decimal(y).as_tuple().exponent for _, y in printed]  # units of the last digits
     assert all(abs(x - mp.mpf(y)) <= unit for (x, y), unit in zip(printed, last, strict=True))
     assert all(abs(x - mp.mpf(y)) < 1e-12 for x, y in pairs)
-
-
-# ----------------------------------------------------------------------------------------- double against 50 digits
 
 
 def _times(form, random):
@@ -114,25 +108,10 @@ def test_a_parameter_wrong_in_the_thirteenth_digit_is_seen(field):
     assert _excess(SymmetricTop(**values), start, precise, times).max() > 20.0
 
 
-@pytest.mark.parametrize("kind", REGIMES)
-def test_theta_functions_and_elliptic_integrals_give_the_same_attitude(kind):
-    random = np.random.default_rng([3, REGIMES.index(kind)])
-    top, start = random_top(kind, random)
-    form = PreciseForm(top, start, digits=50)
-    for time in _times(form, random)[[1, 4]]:
-        gap = max(abs(x - y) for x, y in zip(form.quaternion(time), theta_quaternion(form, time), strict=True))
-        assert gap < mp.mpf(10) ** -50
-    backwards = PreciseForm(top, dataclasses.replace(start, theta_dot=-start.theta_dot))
-    if form.curve.swing > 1e-3 and start.theta_dot:
-        gap = max(abs(x - y) for x, y in zip(form.quaternion(1.7), theta_quaternion(backwards, 1.7), strict=True))
-        assert gap > 1e-10
-
-
-@pytest.mark.parametrize(
-    "kind",
-    ["generic", "fast", "nearly steady", "near the separatrix", "threshold of sleep", "grazes the top", "asleep",
-     "pendulum to the top"],
-)  # fmt: skip
+@pytest.mark.parametrize("kind", [
+    "generic", "fast", "nearly steady", "near the separatrix", "threshold of sleep", "grazes the top", "asleep",
+    "pendulum to the top",
+])  # fmt: skip
 def test_as_many_digits_are_right_as_are_asked_for(kind):
     random = np.random.default_rng([4, REGIMES.index(kind)])
     top, start = random_top(kind, random)
@@ -142,18 +121,14 @@ def test_as_many_digits_are_right_as_are_asked_for(kind):
         assert all(abs(x - y) <= mp.mpf(10) ** -30 * max(1, abs(y)) for x, y in zip(short, long, strict=True))
 
 
-# ----------------------------------------------------------------------------------------- the equations of motion
-
-
 def _momentum(top, start):
     return space_state("axis", top, start)[3:]
 
 
-@pytest.mark.parametrize(
-    "kind",
-    ["generic", "turning point", "cusp", "plane pendulum", "grazes the top", "grazes the bottom", "through the top",
-     "through the bottom", "flat body", "free", "hanging", "from the top", "asleep below", "nearly steady", "fast"],
-)  # fmt: skip
+@pytest.mark.parametrize("kind", [
+    "generic", "turning point", "cusp", "plane pendulum", "grazes the top", "grazes the bottom", "through the top",
+    "through the bottom", "flat body", "free", "hanging", "from the top", "asleep below", "nearly steady", "fast",
+])  # fmt: skip
 def test_an_integration_of_the_attitude_ends_where_the_closed_form_says(kind):
     pytest.importorskip("heyoka")
     top, start = random_top(kind, np.random.default_rng([6, REGIMES.index(kind)]))
@@ -164,9 +139,6 @@ def test_an_integration_of_the_attitude_ends_where_the_closed_form_says(kind):
     assert np.abs(form.momentum(times) - states[:, 4:]).max() < 3e-13 * reach
     late = attitude_distance(form.quaternion(times + 1e-9), states[:, :4]).max()
     assert late > 1e-10
-
-
-# --------------------------------------------------------------------------------------------- particular solutions
 
 
 def _woodhouse(I1, I3, mgl):
@@ -252,14 +224,6 @@ def test_a_top_without_motion(mgl, theta):
     assert np.isinf(form.nutation_period) == (mgl == 0.0 or (mgl > 0.0 and theta == 0.0))
 
 
-def test_free_top_precesses_about_its_momentum():
-    top, start = SymmetricTop(2.0, 1.3, 0.0), Angles(1.0, 0.2, 0.3, 0.4, 0.5, 3.0)
-    form, times = ClosedForm(top, start), np.linspace(0.0, 1e4, 11)
-    momentum = _momentum(top, start)
-    np.testing.assert_allclose(form.momentum(times), [momentum] * 11, atol=8 * EPS * np.linalg.norm(momentum))
-    assert form.nutation_period == pytest.approx(2.0 * math.pi * top.I1 / np.linalg.norm(momentum), rel=2 * EPS)
-
-
 @pytest.mark.parametrize("kind", [ClosedForm, PreciseForm])
 @pytest.mark.parametrize("facing", [1.0, -1.0])
 @pytest.mark.parametrize("rate", [2.0, -2.0])
@@ -270,11 +234,18 @@ def test_a_start_at_the_pole_moves_the_way_it_is_pushed(facing, rate, kind):
     assert [float(value) for value in form(0.0)[:4]] == pytest.approx([0.0, 0.3, 0.0, rate], rel=2 * EPS)
 
 
-# ---------------------------------------------------------------------------------------- consistency of one motion
-
-
 @pytest.mark.parametrize("kind", REGIMES)
-def test_views_of_one_motion_agree(kind):
+def test_views_of_one_motion_and_theta_functions_agree(kind):
+    random = np.random.default_rng([3, REGIMES.index(kind)])
+    top, start = random_top(kind, random)
+    form = PreciseForm(top, start, digits=50)
+    for time in _times(form, random)[[1, 4]]:
+        gap = max(abs(x - y) for x, y in zip(form.quaternion(time), theta_quaternion(form, time), strict=True))
+        assert gap < mp.mpf(10) ** -50
+    backwards = PreciseForm(top, dataclasses.replace(start, theta_dot=-start.theta_dot))
+    if form.curve.swing > 1e-3 and start.theta_dot:
+        gap = max(abs(x - y) for x, y in zip(form.quaternion(1.7), theta_quaternion(backwards, 1.7), strict=True))
+        assert gap > 1e-10
     top, start = random_top(kind, np.random.default_rng([7, REGIMES.index(kind)]))
     form, times = ClosedForm(top, start), np.linspace(-3.0, 9.0, 401)
     motion, attitude, axis, momentum = form(times), form.quaternion(times), form.axis(times), form.momentum(times)
@@ -292,7 +263,12 @@ def test_views_of_one_motion_agree(kind):
     assert motion.theta.max() <= form.theta_range[1] + 4 * EPS
 
 
-def test_one_period_adds_the_precession_and_the_spin():
+def test_a_free_top_precesses_about_its_momentum_and_one_period_adds_the_precession_and_the_spin():
+    top, start = SymmetricTop(2.0, 1.3, 0.0), Angles(1.0, 0.2, 0.3, 0.4, 0.5, 3.0)
+    form, times = ClosedForm(top, start), np.linspace(0.0, 1e4, 11)
+    momentum = _momentum(top, start)
+    np.testing.assert_allclose(form.momentum(times), [momentum] * 11, atol=8 * EPS * np.linalg.norm(momentum))
+    assert form.nutation_period == pytest.approx(2.0 * math.pi * top.I1 / np.linalg.norm(momentum), rel=2 * EPS)
     form = PreciseForm(*SPHEROID, digits=40)
     first, second = form("0.4"), form(mp.mpf("0.4") + form.nutation_period)
     assert abs(second.theta - first.theta) < 1e-38
@@ -303,31 +279,25 @@ def test_one_period_adds_the_precession_and_the_spin():
     assert (double.phi_per_period, double.psi_per_period) == (float(form.phi_per_period), float(form.psi_per_period))
 
 
-@pytest.mark.parametrize(
-    ("body", "state", "words"),
-    [
-        (("1", "1"), ("1", 0, 0, 0, 0, 0), "numbers"),
-        (("1", "x", "1"), ("1", 0, 0, 0, 0, 0), "I3 must be a finite number"),
-        (("1", "1", math.nan), ("1", 0, 0, 0, 0, 0), "mgl must be a finite number"),
-        (("1", "2.1", "1"), ("1", 0, 0, 0, 0, 0), "I3 must be at most"),
-        (("1", "1", "1"), ("3.2", 0, 0, 0, 0, 0), "theta must lie in"),
-        (("-1", "1", "1"), ("1", 0, 0, 0, 0, 0), "I1 must be above zero"),
-    ],
-)
+@pytest.mark.parametrize(("body", "state", "words"), [
+    (("1", "1"), ("1", 0, 0, 0, 0, 0), "numbers"),
+    (("1", "x", "1"), ("1", 0, 0, 0, 0, 0), "I3 must be a finite number"),
+    (("1", "1", math.nan), ("1", 0, 0, 0, 0, 0), "mgl must be a finite number"),
+    (("1", "2.1", "1"), ("1", 0, 0, 0, 0, 0), "I3 must be at most"),
+    (("1", "1", "1"), ("3.2", 0, 0, 0, 0, 0), "theta must lie in"),
+    (("-1", "1", "1"), ("1", 0, 0, 0, 0, 0), "I1 must be above zero"),
+])  # fmt: skip
 def test_values_outside_the_model_are_refused(body, state, words):
     with pytest.raises(SymtopError, match=words):
         PreciseForm(body, state)
 
 
-def test_kinds_of_numbers_that_mean_the_same_give_the_same():
+def test_kinds_of_numbers_and_the_working_precision_of_the_caller_do_not_matter():
     mixed = PreciseForm((mp.mpf(2), 1, "26.5"), ("0.5", 0.125, mp.mpf("0.25"), "0", 10, -0.5))
     floats = PreciseForm(SymmetricTop(2.0, 1.0, 26.5), Angles(0.5, 0.125, 0.25, 0.0, 10.0, -0.5))
     assert mixed("1.5") == floats(mp.mpf(1.5)) == floats(1.5)
     decimal, double = (PreciseForm((2, 1, "26.5"), (theta, 0, 0, 0, 10, 0)) for theta in ("0.1", 0.1))
     assert decimal(1) != double(1)
-
-
-def test_working_precision_of_the_caller_does_not_matter():
     with mp.workdps(5):
         low = PreciseForm(*SPHEROID, digits=40)(8)
         assert mp.mp.dps == 5

@@ -11,15 +11,6 @@ from symtop.model.top import newton_between
 from tests.conftest import random_scenes
 
 
-def test_spheroid_has_the_notebooks_inertia_and_a_physical_reading():
-    top = SymmetricTop.from_spheroid(mass=1, polar_radius=2.7386127875258306, equatorial_radius=1.5811388300841898)
-    assert pytest.approx((2.0, 1.0), rel=1e-15) == (top.I1, top.I3)
-    assert top.mgl == pytest.approx(26.86579, abs=5e-6)
-    hung = SymmetricTop.from_spheroid(2.0, 2.0, 1.0, gravity=10.0, pivot_distance=0.5)
-    assert pytest.approx(2.0 * 5.0 / 5.0 + 2.0 * 0.25) == hung.I1  # Huygens-Steiner
-    assert hung.mgl == pytest.approx(2.0 * 10.0 * 0.5)
-
-
 @pytest.mark.parametrize("chosen", random_scenes(8, seed=1), ids=lambda s: s.name)
 def test_slope_and_curvature_are_the_derivatives_of_the_potential(chosen):
     top, momenta = chosen.top, chosen.top.momenta(chosen.start)
@@ -63,7 +54,7 @@ def test_the_potential_keeps_its_digits_at_a_pole_where_the_textbook_form_does_n
     assert abs(naive / float(exact_rate) - 1.0) > 1e-10
 
 
-def test_nutation_frequency_is_the_limit_of_small_nutations():
+def test_nutation_frequency_is_the_limit_of_small_nutations_and_has_the_classical_threshold():
     chosen = scene("steady")
     momenta = chosen.top.momenta(chosen.start)
     assert chosen.top.steady_theta(momenta) == pytest.approx(math.pi / 3, abs=1e-8)
@@ -72,10 +63,7 @@ def test_nutation_frequency_is_the_limit_of_small_nutations():
     nudged = Angles(theta=chosen.start.theta + 1e-4, phi_dot=chosen.start.phi_dot, psi_dot=chosen.start.psi_dot)
     period = chosen.top.nutation_period(nudged)
     assert 2.0 * math.pi / period == pytest.approx(chosen.top.nutation_frequency(chosen.top.momenta(nudged)), rel=1e-6)
-
-
-def test_nutation_frequency_of_sleeping_tops_has_the_classical_threshold():
-    """Stable for I3 w3 > 2 sqrt(I1 mgl): omega^2 = p_psi^2/4 I1^2 - mgl/I1 at theta = 0."""
+    # Stable for I3 w3 > 2 sqrt(I1 mgl): omega^2 = p_psi^2/4 I1^2 - mgl/I1 at theta = 0.
     asleep = SymmetricTop(1.0, 1.0, 1.0)
     awake = asleep.momenta(Angles(theta=0.0, psi_dot=2.5))
     assert asleep.steady_theta(awake) == 0.0
@@ -92,7 +80,13 @@ def test_a_free_top_at_rest_keeps_its_inclination(theta, psi_dot):
     assert SymmetricTop(1.0, 0.5, 0.0).turning_cosines(Angles(theta, psi_dot=psi_dot)) == (cosine, cosine)
 
 
-def test_a_top_that_moves_or_falls_from_rest_does_not():
+def test_spheroids_have_the_notebooks_inertia_and_a_top_that_falls_from_rest_moves():
+    top = SymmetricTop.from_spheroid(mass=1, polar_radius=2.7386127875258306, equatorial_radius=1.5811388300841898)
+    assert pytest.approx((2.0, 1.0), rel=1e-15) == (top.I1, top.I3)
+    assert top.mgl == pytest.approx(26.86579, abs=5e-6)
+    hung = SymmetricTop.from_spheroid(2.0, 2.0, 1.0, gravity=10.0, pivot_distance=0.5)
+    assert pytest.approx(2.0 * 5.0 / 5.0 + 2.0 * 0.25) == hung.I1  # Huygens-Steiner
+    assert hung.mgl == pytest.approx(2.0 * 10.0 * 0.5)
     free = SymmetricTop(1.0, 0.5, 0.0)
     for swing in (0.2, 1e-200):  # a great circle through both poles, however slowly
         assert free.turning_cosines(Angles(1.0, theta_dot=swing)) == (-1.0, 1.0)

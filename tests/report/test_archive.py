@@ -71,7 +71,7 @@ def bundled(results, scenes):
         return {name.removeprefix(f"{archive.NAME}/"): file.read(name) for name in file.namelist()}
 
 
-def test_it_holds_what_the_report_is_made_of_and_no_more(bundled):
+def test_it_holds_what_the_report_is_made_of_each_with_its_sum_and_its_words(bundled):
     assert bundled.keys() == {
         "README.md", "SHA256SUMS", "citations.bib", "machine.txt", "versions.txt", "results/small.nc",
         "results/peers.json", "results/report.html", "results/report.md", "results/reference.md",
@@ -79,15 +79,9 @@ def test_it_holds_what_the_report_is_made_of_and_no_more(bundled):
         "results/tables/small-one.csv",
         "scenes/scenes.csv", "scenes/states.csv", "scenes/states.nc",
     }  # fmt: skip
-
-
-def test_every_file_has_its_sum(bundled):
     sums = dict(reversed(line.split("  ")) for line in bundled["SHA256SUMS"].decode().splitlines())
     assert sums.keys() == bundled.keys() - {"SHA256SUMS"}
     assert all(hashlib.sha256(bundled[name]).hexdigest() == digest for name, digest in sums.items())
-
-
-def test_the_readme_names_every_file_and_describes_every_variable(bundled):
     readme = bundled["README.md"].decode()
     assert all(f"| {name} |" in readme for name in bundled.keys() - {"README.md", "SHA256SUMS"})
     assert "| x | scene (1) x variant (1) x step_size (2) | rad | a number |" in readme
@@ -97,15 +91,12 @@ def test_the_readme_names_every_file_and_describes_every_variable(bundled):
     assert max(map(len, readme.partition("## Files")[0].splitlines())) <= 120
 
 
-def test_the_states_can_be_read_from_the_bundle(bundled, scenes, tmp_path):
+def test_its_states_can_be_read_and_the_same_results_make_the_same_bundle(bundled, scenes, tmp_path, results):
     (tmp_path / "states.nc").write_bytes(bundled["scenes/states.nc"])
     states = netcdf.read(tmp_path / "states.nc")
     assert list(states["scene"].values) == list(scenes)
     assert states["quaternion_lo"].dims == ("scene", "sample", "part")
     assert lacking(states) == []
-
-
-def test_the_same_results_make_the_same_bundle(results, bundled, tmp_path):
     with zipfile.ZipFile(archive.bundle(results, tmp_path / "again.zip")) as file:
         again = {name.removeprefix(f"{archive.NAME}/"): file.read(name) for name in file.namelist()}
     dated = {"results/report.html", "SHA256SUMS"}  # the page says the day

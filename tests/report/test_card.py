@@ -31,7 +31,7 @@ ORDER = Finding("order", "4", Measured(), "undecided", "no <luck>")
 NOTHING = handmade(ORDER, Finding("energy", "", Measured(), "undecided", "it stopped"))
 
 
-def test_the_card_is_one_page_with_two_figures_and_every_verdict(ledger, tmp_path):
+def test_the_card_is_one_page_with_every_verdict_and_the_energy_of_the_long_run(ledger, tmp_path):
     page = card(ledger, tmp_path / "folder" / "card.html").read_text(encoding="utf-8")
     assert not re.search(r'(src|href)="http', page.replace('xmlns:xlink="http', ""))
     assert page.count("<svg") == 3  # the badge, two drawings
@@ -42,19 +42,9 @@ def test_the_card_is_one_page_with_two_figures_and_every_verdict(ledger, tmp_pat
     titles = [figure.axes[0].get_title() for figure in figures(ledger)]
     assert titles[0] == f"order: {ledger['order'].measured}"
     assert titles[1].startswith("energy: drift, ")
-
-
-def test_the_energy_of_the_card_is_that_of_the_long_run(ledger):
     data = ledger.dataset()
     assert float(data["energy_change"].max()) == pytest.approx(ledger["energy"].value, rel=0.02)
     assert float(data["long_nutations"].max()) == pytest.approx(float(data["nutations_run"]), rel=0.05)
-
-
-def test_a_card_without_measurements_says_why(tmp_path):
-    page = card(NOTHING, tmp_path / "card.html").read_text(encoding="utf-8")
-    assert "no &lt;luck&gt;" in page
-    assert "<luck>" not in page
-    assert [figure.axes[0].texts[0].get_text() for figure in figures(NOTHING)] == ["no <luck>", "it stopped"]
 
 
 @pytest.mark.parametrize(
@@ -85,7 +75,11 @@ def test_the_badge_says_what_is_refuted_or_what_the_method_is(ledger, tmp_path):
     assert root.get("width").isdigit()
 
 
-def test_a_card_that_cannot_be_written_is_told(tmp_path):
+def test_a_card_without_measurements_says_why_and_one_that_cannot_be_written_is_told(tmp_path):
+    page = card(NOTHING, tmp_path / "card.html").read_text(encoding="utf-8")
+    assert "no &lt;luck&gt;" in page
+    assert "<luck>" not in page
+    assert [figure.axes[0].texts[0].get_text() for figure in figures(NOTHING)] == ["no <luck>", "it stopped"]
     with pytest.raises(symtop.SymtopError, match="it is a folder"):
         card(NOTHING, tmp_path)
     with pytest.raises(symtop.SymtopError, match="path must be the name of a file, not 3"):

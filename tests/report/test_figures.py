@@ -1,11 +1,14 @@
-"""Every figure of every study can be read in print: letters, colours, lines and names; and the instruments of that."""
+"""Every figure can be read in print: letters, colours, lines and names; a file has the pixels of savefig."""
 
+import dataclasses
 import math
 
 import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
+from matplotlib.figure import Figure
 from matplotlib.text import Text
+from PIL import Image
 
 import symtop
 from symtop.core import netcdf
@@ -105,11 +108,10 @@ def test_labels_keep_their_order_and_their_distance(places):
     assert figures.spread([0.1, 0.5], 0.05) == [0.1, 0.5]
 
 
-@pytest.mark.parametrize(
-    ("value", "text"),
-    [(1e-6, "10⁻⁶"), (1.4e-13, "1.4 × 10⁻¹³"), (0.0123, "0.012"), (185.3, "185"), (1093.0, "1093"),
-     (30012.0, "3 × 10⁴"), (7.0, "7"), (99.4, "99"), (99.6, "100"), (-99.6, "-100"), (9999.7, "10⁴")],
-)  # fmt: skip
+@pytest.mark.parametrize(("value", "text"), [
+    (1e-6, "10⁻⁶"), (1.4e-13, "1.4 × 10⁻¹³"), (0.0123, "0.012"), (185.3, "185"), (1093.0, "1093"),
+    (30012.0, "3 × 10⁴"), (7.0, "7"), (99.4, "99"), (99.6, "100"), (-99.6, "-100"), (9999.7, "10⁴"),
+])  # fmt: skip
 def test_a_number_of_a_title(value, text):
     assert formats.number(value).replace(formats.FIRM, " ") == text
     assert " " not in formats.number(value)
@@ -126,3 +128,50 @@ def test_a_published_figure_has_a_vector_beside_it_and_the_same_bytes_again(tmp_
     assert files[0][1].startswith(b"%PDF")
     with_pixels = np.frombuffer(files[0][0][16:24], ">u4")
     assert with_pixels[0] == round(style.WIDTH * style.DPI)
+
+
+def test_no_two_integrators_look_alike_and_a_formula_has_one_colour():
+    looks = [(style.look(name).color, style.look(name).marker) for name in symtop.integrators()]
+    assert len(set(looks)) == len(looks)
+    colors = {}
+    for name in symtop.integrators():
+        colors.setdefault(name.replace("-compiled", "").removesuffix("-fixed"), set()).add(style.look(name).color)
+    assert [formula for formula, several in colors.items() if len(several) > 1] == []
+    assert len({*colors["vern9"], *colors["tsit5"], *colors["rk45"], *colors["dop853"], *colors["rk4"]}) == 5
+
+
+@pytest.mark.parametrize("model", ["rk4", "strang", "midpoint", "rk45", "taylor", "exact"])
+def test_an_added_integrator_has_a_look_of_its_own_and_changes_nobodys(clean_registry, model):
+    before = {name: style.look(name) for name in symtop.integrators()}
+    for name in ("heun-3", "ralston"):
+        symtop.register(dataclasses.replace(symtop.integrator(model), name=name))
+        assert style.look(name)[:2] not in {look[:2] for look in before.values()}
+        before[name] = style.look(name)
+    assert {name: style.look(name) for name in before} == before
+    assert model != "rk4" or before["heun-3"].color in style.ORANGES
+
+
+def sample_figure() -> Figure:
+    """A figure with a layout, a legend, a shared axis and a formula."""
+    figure, axes = style.panels(1, 2, sharey=True)
+    for k, axis in enumerate(axes.flat):
+        axis.loglog([1.0, 10.0, 100.0], [1e-3, 1e-5, 10.0 ** -(k + 6)], **style.line("rk4"), label=rf"$x^{k}$")
+        axis.set(title=f"panel {k}", ylabel="error")
+    style.few_ticks(*axes.flat)
+    style.legend_below(figure, axes)
+    style.headline(figure, "A message above all panels that is long enough for a second line of letters " * 2)
+    return figure
+
+
+def pixels(path, mode: str) -> np.ndarray:
+    with Image.open(path) as picture:
+        return np.asarray(picture.convert(mode))
+
+
+@pytest.mark.parametrize(
+    ("write", "dpi"), [(style.sketch, style.SKETCHED), pytest.param(style.publish, style.DPI, marks=pytest.mark.slow)]
+)
+def test_a_picture_has_the_pixels_of_savefig(tmp_path, write, dpi):
+    write(sample_figure(), tmp_path / "a.png")
+    sample_figure().savefig(tmp_path / "b.png", dpi=dpi)
+    assert np.array_equal(pixels(tmp_path / "a.png", "RGBA"), pixels(tmp_path / "b.png", "RGBA"))

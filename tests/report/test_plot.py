@@ -1,4 +1,4 @@
-"""plot() of the errors of a run, and of a trajectory that no integrator here has made, and of ensembles."""
+"""plot() of the errors of a run, of a foreign trajectory and of ensembles, whose errors are those of each member."""
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -6,6 +6,7 @@ import pytest
 
 import symtop
 from symtop.core.errors import SymtopError
+from symtop.report.spread import LEVELS, at_places, largest, member_errors, spread
 from symtop.report.style import save
 from tests.commands import call
 
@@ -15,7 +16,7 @@ def run():
     return symtop.simulate("goldstein", "midpoint", step_size=0.02, horizon=10.0, samples=51, guard=False)
 
 
-def test_errors_are_drawn_as_the_run_itself_is_with_what_can_be_seen(run):
+def test_errors_are_drawn_as_the_run_and_a_trajectory_of_no_integrator_and_without_time_refused(run):
     wrong = symtop.errors(run)
     ax = symtop.plot(wrong)
     line, bound = ax.get_lines()
@@ -24,17 +25,11 @@ def test_errors_are_drawn_as_the_run_itself_is_with_what_can_be_seen(run):
     assert line.get_color() == symtop.plot(run).get_lines()[0].get_color()
     assert bound.get_ydata().max() < 1e-9 < line.get_ydata().max()
     assert symtop.plot(wrong, quantity="energy").get_ylabel() == "energy error / (E0 - min V)"
-
-
-def test_a_trajectory_of_no_integrator_is_drawn_too(run):
     theirs = {"time": run["time"].values, "axis": run["axis"].values}
     wrong = symtop.errors(theirs, "goldstein")
     assert np.array_equal(symtop.plot(wrong).get_lines()[0].get_ydata(), wrong["axis"].values[1:])
     with pytest.raises(SymtopError, match="does not show the attitude; it shows axis"):
         symtop.plot(wrong, quantity="attitude")
-
-
-def test_what_has_no_time_is_refused():
     with pytest.raises(SymtopError, match="must have the dimension time"):
         symtop.plot(symtop.reference("goldstein", [1.0]).isel(time=0, drop=True))
 
@@ -48,17 +43,6 @@ def test_an_ensemble_of_short_runs_is_drawn_over_time(n, per_nutation):
     times = ax.get_lines()[0].get_xdata()
     assert times.size == per_nutation
     ax.figure.canvas.draw()
-    plt.close(ax.figure)
-
-
-def test_runs_of_different_lengths_are_drawn_forwards():
-    tops = symtop.population(40, seed=3)
-    runs = symtop.ensemble(tops, "strang", per_nutation=[2] * 20 + [100] * 20, nutations=2, samples=50, quiet=True)
-    ax = symtop.plot(runs, members=tops)
-    times = ax.get_lines()[0].get_xdata()
-    assert (np.diff(times) > 0.0).all()
-    assert times[0] == pytest.approx(0.25, abs=0.03)  # not before all have made a step
-    assert times[-1] == pytest.approx(1.0)
     plt.close(ax.figure)
 
 
@@ -120,10 +104,91 @@ def test_a_single_sample_is_a_point(samples, marker, tmp_path, monkeypatch):
     plt.close("all")
 
 
-def test_what_is_no_ensemble_over_members_is_refused():
+def test_runs_of_different_lengths_are_drawn_forwards_and_what_is_no_ensemble_is_refused():
+    tops = symtop.population(40, seed=3)
+    runs = symtop.ensemble(tops, "strang", per_nutation=[2] * 20 + [100] * 20, nutations=2, samples=50, quiet=True)
+    ax = symtop.plot(runs, members=tops)
+    times = ax.get_lines()[0].get_xdata()
+    assert (np.diff(times) > 0.0).all()
+    assert times[0] == pytest.approx(0.25, abs=0.03)  # not before all have made a step
+    assert times[-1] == pytest.approx(1.0)
+    plt.close(ax.figure)
     tops = symtop.population(3, seed=1)
     runs = symtop.ensemble(tops, "strang", per_nutation=20, nutations=1, samples=5, quiet=True)
     for data in (tops, symtop.errors(runs, tops), runs.drop_attrs(), runs.drop_vars("horizon")):
         with pytest.raises(SymtopError, match="data over member must be a dataset of ensemble"):
             symtop.plot(data, members=tops)
     plt.close(symtop.plot(runs, members=tops).figure)
+
+
+SOME = symtop.population(30, seed=7)
+ASKED = {"per_nutation": 30, "nutations": 2, "samples": 41, "quiet": True}
+
+
+def test_quantiles_are_members_failed_ones_infinitely_wrong_and_samples_a_run_has_not_no_errors():
+    data = symtop.ensemble(symtop.population(200, seed=3), "stormer-verlet", **ASKED)
+    errors = member_errors(symtop.population(200, seed=3), data, "axis")
+    failed = data.outcome.values != "ok"
+    assert 0 < failed.sum() < 100
+    np.testing.assert_array_equal(np.isinf(largest(errors)), failed)
+    quantiles = spread(errors)
+    assert quantiles.shape == (len(LEVELS), 41)
+    assert np.isfinite(quantiles[2]).all()
+    assert np.isinf(quantiles[4, -1])  # more than 1 % have failed
+    assert np.isin(quantiles[:, -1], errors[:, -1]).all()
+    np.testing.assert_array_equal(np.sort(quantiles, axis=0), quantiles)
+    errors = np.array([[0.0, 1.0, np.nan], [0.0, 3.0, 5.0], [0.0, 2.0, np.nan]])
+    np.testing.assert_array_equal(spread(errors, (0.0, 0.5, 1.0)), [[0.0, 1.0, 5.0], [0.0, 2.0, 5.0], [0.0, 3.0, 5.0]])
+    assert np.isnan(spread(np.full((2, 1), np.nan))).all()
+    assert largest(errors).tolist() == [1.0, 5.0, 2.0]
+
+
+def test_errors_at_a_place_are_those_of_the_same_time():
+    """Runs of 4, 5 and 40 steps: at each place the latest sample of each, from where all of them have stepped."""
+    some = SOME.isel(member=slice(3))
+    data = symtop.ensemble(some, "strang[axis]", per_nutation=[4, 5, 40], nutations=1, samples=101, quiet=True)
+    errors = member_errors(some, data, "axis")
+    places, latest = at_places(data, errors)
+    np.testing.assert_allclose(places, np.arange(10, 41) / 40.0, atol=1e-12)
+    assert np.isfinite(latest).all()
+    np.testing.assert_array_equal(latest[2], errors[2, 10:41])
+    for i, steps in enumerate((4, 5)):
+        ranks = np.floor(places * steps + 1e-6).astype(int)
+        np.testing.assert_array_equal(latest[i], errors[i, ranks])
+    assert not np.array_equal(latest[0], errors[0, 10:41])  # as samples of the same index would be
+
+
+def test_errors_are_those_of_the_ensemble_and_runs_of_all_samples_are_compared_by_index():
+    data = symtop.ensemble(SOME, "strang[axis]", **ASKED)
+    wrong = symtop.errors(data, SOME)
+    np.testing.assert_allclose(member_errors(SOME, data, "axis"), wrong["axis"], rtol=1e-6, atol=1e-14)
+    some = slice(None, None, 7)  # none of them begins beside a pole, where the start's own energy is rounded
+    changed = np.abs(wrong["energy"].values[some])
+    np.testing.assert_allclose(member_errors(SOME, data, "energy")[some], changed, rtol=1e-6, atol=1e-13)
+    data = symtop.ensemble(SOME, "strang[axis]", **ASKED)
+    errors = member_errors(SOME, data, "axis")
+    places, same = at_places(data, errors)
+    assert same is errors
+    np.testing.assert_allclose(places, np.arange(41) / 40.0, atol=0.013)  # half an interval
+    short = symtop.ensemble(SOME, "strang[axis]", **ASKED | {"per_nutation": 2, "nutations": 2})
+    places, few = at_places(short, member_errors(SOME, short, "axis"))
+    np.testing.assert_allclose(places, [0.25, 0.5, 0.75, 1.0], atol=1e-12)
+    np.testing.assert_array_equal(few, member_errors(SOME, short, "axis")[:, 1:5])
+
+
+def test_members_of_other_labels_are_refused():
+    one, other = (SOME.assign_coords(member=labels) for labels in (range(30), range(30, 60)))
+    data = symtop.ensemble(one, "strang[axis]", **ASKED)
+    assert np.array_equal(member_errors(SOME, data, "axis"), member_errors(one, data, "axis"))
+    with pytest.raises(symtop.SymtopError, match="their labels are others"):
+        member_errors(other, data, "axis")
+
+
+@pytest.mark.parametrize(("members", "quantity", "reason"), [
+    (SOME, "phi", "quantity 'phi' is unknown"), (SOME.isel(member=slice(3)), "axis", "members must be the 30"),
+    (SOME, "energy", "without the variable energy"),
+])  # fmt: skip
+def test_what_cannot_be_compared_is_refused(members, quantity, reason):
+    data = symtop.ensemble(SOME, "strang[axis]", variables=["axis"], **ASKED)
+    with pytest.raises(symtop.SymtopError, match=reason):
+        member_errors(members, data, quantity)

@@ -73,7 +73,7 @@ def test_nothing_overflows_and_every_figure_is_there(browser, scheme, width):
     assert browser.problems == []
 
 
-def test_every_text_has_the_contrast_of_wcag_aa(browser, scheme):
+def test_every_text_has_the_contrast_of_wcag_aa_in_both_schemes(browser, scheme):
     browser.resize(1280, 900)
     assert browser.evaluate(FAINT) == []
     shown = browser.evaluate("getComputedStyle(document.body).backgroundColor")
@@ -96,7 +96,7 @@ def test_the_reader_chooses_the_colours(browser):
     browser.prefer("")
 
 
-def test_headings_figures_and_tables_have_addresses_of_their_own(browser):
+def test_headings_figures_and_tables_have_addresses_and_the_contents_follow_the_reader(browser):
     titles = "[...document.querySelectorAll('main h2, main h3, figcaption')]"
     assert browser.evaluate(f"{titles}.filter(one => !one.querySelector('a.anchor')).length") <= 1  # of the registry
     ids = browser.evaluate("[...document.querySelectorAll('[id]')].map(one => one.id)")
@@ -104,9 +104,6 @@ def test_headings_figures_and_tables_have_addresses_of_their_own(browser):
     local = browser.evaluate("[...document.querySelectorAll('a[href^=\"#\"]')].map(one => one.hash.slice(1))")
     assert set(local) <= set(ids)
     assert len(local) > 10
-
-
-def test_the_contents_follow_the_reader(browser):
     browser.resize(1280, 900)
     here = "document.querySelector('nav a[aria-current]')?.hash"
     for name in ("part-provenance", "part-equations", "part-measured", "part-convergence"):
@@ -185,15 +182,12 @@ def test_it_prints_with_every_figure_and_in_black_on_white(browser, scheme, resu
     assert browser.evaluate("matchMedia('print').matches") is False
 
 
-def test_it_paints_within_a_second_is_small_and_asks_for_nothing_from_elsewhere(browser, results):
+def test_it_paints_within_a_second_asks_for_nothing_and_can_be_sent_alone(browser, results, tmp_path):
     browser.open((results / "report.html").as_uri())
     first = browser.wait_for("performance.getEntriesByName('first-contentful-paint')[0]?.startTime")
     assert first < 1000.0  # ms
     assert all(address.startswith(("file:", "data:")) for address in browser.requests)
     assert (results / "report.html").stat().st_size < 5e6
-
-
-def test_the_page_can_be_sent_alone(results, tmp_path):
     for folder in ("figures", "tables"):
         shutil.copytree(results / folder, tmp_path / folder)
     for name in ("convergence", "speed", "pitfalls"):
@@ -210,15 +204,6 @@ POINT = """(() => {
     const tip = document.querySelector('.chart .tip');
     return tip.hidden ? '' : tip.textContent;
 })()"""
-
-
-def test_pointing_at_a_run_shows_what_it_was(browser, results):
-    browser.resize(1280, 900)
-    tip = browser.evaluate(POINT % (0, 0))
-    name, step = re.fullmatch(r"(\S+) \(\S+\): step (\S+) s", tip).groups()
-    cell = xr.load_dataset(results / "speed.nc").sel(scene="goldstein", variant=name).isel(nutations=0)
-    assert any(f"{value:.3g}" == step for value in cell["step_size"].values)
-    assert browser.evaluate(POINT % (0, 100_000)) == ""  # far from every run: nothing
 
 
 def test_methods_cost_error_and_run_length_are_chosen(browser, results):
@@ -252,14 +237,20 @@ def test_methods_cost_error_and_run_length_are_chosen(browser, results):
         assert browser.evaluate(lines) == before
 
 
-def test_the_chart_takes_the_place_of_its_figure_on_the_screen_and_not_in_print(browser):
+def test_the_chart_takes_the_place_of_its_figure_and_pointing_at_a_run_shows_what_it_was(browser, results):
+    browser.resize(1280, 900)
+    tip = browser.evaluate(POINT % (0, 0))
+    name, step = re.fullmatch(r"(\S+) \(\S+\): step (\S+) s", tip).groups()
+    cell = xr.load_dataset(results / "speed.nc").sel(scene="goldstein", variant=name).isel(nutations=0)
+    assert any(f"{value:.3g}" == step for value in cell["step_size"].values)
+    assert browser.evaluate(POINT % (0, 100_000)) == ""  # far from every run: nothing
     place = "document.querySelector('#speed-error-against-time .scroll').checkVisibility()"
     assert browser.evaluate(place) is False
     assert browser.evaluate("document.querySelector('#speed-error-against-time .chart svg').checkVisibility()")
     assert browser.evaluate("document.querySelector('#pitfalls-three .scroll').checkVisibility()")
 
 
-def test_words_follow_from_the_stored_data_and_from_nothing_else(results, tmp_path):
+def test_words_follow_from_the_stored_data_and_findings_that_are_not_whole_are_told(results, tmp_path):
     study, stored = runner.load("convergence"), xr.load_dataset(results / "convergence.nc")
     findings = json.loads((results / "convergence.json").read_text(encoding="utf-8"))
     text = re.sub(r"<[^>]+>", "", html.unescape((results / "report.html").read_text(encoding="utf-8")))
@@ -269,9 +260,6 @@ def test_words_follow_from_the_stored_data_and_from_nothing_else(results, tmp_pa
         assert template.answer(findings, results) in one
     later = stored.assign(force_evaluations=2.0 * stored["force_evaluations"])
     assert study.facts(later) != findings["facts"]  # they read the data, they do not remember it
-
-
-def test_findings_that_are_not_whole_are_told_of(results, tmp_path):
     shutil.copytree(results, tmp_path, dirs_exist_ok=True)
     (tmp_path / "tables" / "convergence-costs.csv").unlink()
     with pytest.raises(symtop.SymtopError, match=r"convergence-costs.csv is missing\); run it again: symtop study"):

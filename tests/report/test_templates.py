@@ -3,17 +3,21 @@
 import json
 import math
 import re
+from xml.etree import ElementTree as ET
 
 import pytest
+from latex2mathml.converter import convert
 
+import symtop
 from symtop.core.errors import SymtopError
-from symtop.report import template
+from symtop.report import page, template
+from symtop.report.html import slug
 from symtop.report.page import TEMPLATES, gather, prepared
 from symtop.runner import run as runner
 
 OTHERS = {name: TEMPLATES / f"{name}.md" for name in ("front", "measured", "equations")}
-PAGES = {name: page for name in runner.names() if (page := runner.file_beside(name, "page.md")) is not None}
-TEXTS = {name: page.read_text(encoding="utf-8") for name, page in {**OTHERS, **PAGES}.items()}
+PAGES = {name: path for name in runner.names() if (path := runner.file_beside(name, "page.md")) is not None}
+TEXTS = {name: path.read_text(encoding="utf-8") for name, path in {**OTHERS, **PAGES}.items()}
 CALL = re.compile(r"{% call figure\((.*?)\) %}(.*?){% endcall %}", re.DOTALL)
 
 
@@ -62,7 +66,7 @@ It is {{ f.a }}. It is not {{ f.b }}. So it ends.
 """
 
 
-def test_a_sentence_about_what_was_not_measured_is_left_out_and_the_page_says_so_once(tmp_path):
+def test_a_page_without_what_was_not_measured_says_so_once_and_points_without_a_number_are_null(tmp_path):
     findings = {"study": "mine", "question": "Q?", "page": PAGE, "facts": {"a": 1, "b": None}, "tables": [],
                 "pictures": [{"name": "drawn", "file": "a.png"}], "failures": [], "cases": 1}  # fmt: skip
     text = template.filled(findings, tmp_path)
@@ -75,15 +79,9 @@ def test_a_sentence_about_what_was_not_measured_is_left_out_and_the_page_says_so
     assert "- two 2 and more" in whole
     with pytest.raises(SymtopError, match="page of mine"):
         template.filled(findings | {"facts": {"a": 1}}, tmp_path)
-
-
-def test_points_of_a_chart_without_a_number_are_null_and_others_stay():
     chart = {"title": "c", "panels": {"one": [("rk4", [(1.0, math.nan, 1e-3, "w"), (2.0, math.inf, 1e-4, "v")])]}}
     points = json.loads(prepared(chart))["panels"]["one"][0]["points"]
     assert points == [[1.0, None, 1e-3, "w"], [2.0, None, 1e-4, "v"]]
-
-
-def test_findings_of_another_kind_are_none(tmp_path):
     (tmp_path / "drift.json").write_text("[]", encoding="utf-8")
     with pytest.raises(SymtopError, match="no study has left findings"):
         gather(tmp_path)
@@ -102,3 +100,35 @@ def test_a_damaged_file_is_named_and_one_of_another_kind_is_left_out(name, comma
     (tmp_path / f"{name}.json").write_text("{", encoding="utf-8")
     with pytest.raises(SymtopError, match=rf"{name}\.json is damaged .*; run it again: {command}, or remove the file"):
         gather(tmp_path)
+
+
+def lines(table):
+    """Cells of a table in Markdown, line by line, below its header."""
+    return [[cell.strip() for cell in line.strip("|").split("|")] for line in table.splitlines()[2:]]
+
+
+def test_the_tables_of_scenes_give_every_scene_back_to_the_last_bit():
+    known = page.scene_tables()
+    uses, starts = lines(known["uses"]), lines(known["starts"])
+    assert [row[0] for row in uses] == [row[0] for row in starts] == list(symtop.scenes())
+    for row, numbers in zip(uses, starts, strict=True):
+        scene, values = symtop.scene(row[0]), [float(cell) for cell in numbers[1:]]
+        assert symtop.SymmetricTop(*values[:3]) == scene.top
+        assert symtop.Angles(*values[3:]) == scene.start
+        assert float(row[2].replace("infinite", "inf")) == pytest.approx(scene.nutation_period, rel=1e-8)
+        bound = float(symtop.reference(scene, [scene.horizon])["axis_error_bound"].max())
+        assert float(row[4]) == pytest.approx(bound, rel=0.05)
+
+
+def test_every_formula_is_shown_in_full_and_links_lead_to_the_page():
+    text = (TEMPLATES / "equations.md").read_text(encoding="utf-8")
+    assert text.startswith(f"## {page.EQUATIONS}\n")
+    assert slug(page.EQUATIONS) == "the-equations-the-scenes-and-the-exact-motion"
+    formulas = re.findall(r"^\$\$(.+)\$\$$", text, re.MULTILINE)
+    assert len(formulas) == 12
+    for formula in formulas:
+        tree = ET.fromstring(convert(formula))
+        letters = "".join(tree.itertext())
+        assert "=" in letters
+        assert "\\" not in letters  # of a command that is not known
+        assert len(tree.findall(".//{*}mfrac")) == formula.count("\\frac")

@@ -1,4 +1,4 @@
-"""Runs of a body without symmetry: orders, conserved quantities, errors against the truth, and what is refused."""
+"""Runs of bodies without symmetry, alone and many: orders, constants, errors, the same bits, and what is refused."""
 
 import dataclasses
 import functools
@@ -8,16 +8,20 @@ import math
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import symtop
 from symtop.core import netcdf
 from symtop.methods.framework.registry import engines
 from symtop.methods.splitting import body as splitting_body
 from symtop.methods.splitting.coefficients import STRANG
-from symtop.model.body import Attitude, RigidBody, product, rotated
+from symtop.model.body import Attitude, RigidBody, from_flat, product, rotated
 from symtop.model.charts import BODY, attitude_distance
 from symtop.model.scenes import body_scenes
+from symtop.run.ensemble import chunks
+from symtop.run.ensemble.bodies import scenes_of
 from tests.commands import call
+from tests.run.test_ensemble import assert_alone
 
 BODIES = ("check-case-2", "heavy-brick")
 # every method that steps a body and claims an order, and the longest steps of its runs, by the order
@@ -134,13 +138,6 @@ def test_five_rotations_are_of_order_four_on_one_free_body_in_one_order(moments:
     assert abs(math.log2(coarse / fine) - (4 if special else 2)) < 0.1
 
 
-def test_a_variational_step_that_has_no_solution_ends_the_run() -> None:
-    methods = ("lie-variational", "euler-poincare")
-    ended, whole = (symtop.simulate("check-case-2", name, step_size=6.0, guard=False) for name in methods)
-    assert ended.outcome == "not_converged"
-    assert symtop.errors(whole)["momentum"].max() < 2e-14
-
-
 def gap(method: str, second: float, step: float) -> float:
     """The largest angle between a symmetric top and a body whose second moment is `second`."""
     quaternion, rates = (0.8, 0.6, 0.0, 0.0), (0.2, 0.3, 3.0)
@@ -166,7 +163,7 @@ def test_another_method_comes_to_the_symmetric_top_by_its_order(method: str, ord
     assert abs(math.log2(coarse / fine) - order) < 0.3
 
 
-def test_energy_and_momentum_of_a_run_are_those_of_its_states() -> None:
+def test_energy_and_momentum_are_those_of_its_states_and_a_trajectory_of_another_program_is_judged():
     run = symtop.simulate("heavy-brick", "rk4", step_size=0.2, samples=11, guard=False)
     truth, errors = symtop.reference("heavy-brick", run.time.values), symtop.errors(run)
     assert {*errors.data_vars} >= {"attitude", "axis", "theta", "momentum", "energy", "p_phi", "attitude_bound"}
@@ -174,9 +171,6 @@ def test_energy_and_momentum_of_a_run_are_those_of_its_states() -> None:
     np.testing.assert_allclose(run["p_phi"], run["momentum"][:, 2], rtol=1e-13)
     assert abs(run["energy"][0] - truth["energy"][0]) < 1e-15
     assert 1e-6 < abs(run["energy"] - run["energy"][0]).max() < 1e-1
-
-
-def test_a_trajectory_of_another_program_is_judged() -> None:
     times = np.linspace(0.0, 30.0, 31)
     truth = symtop.reference("check-case-2", times)
     exact = symtop.errors({"time": times, "quaternion": truth["quaternion"].values}, "check-case-2")
@@ -184,12 +178,6 @@ def test_a_trajectory_of_another_program_is_judged() -> None:
     turned = [product(q, (math.cos(ANGLE / 2), math.sin(ANGLE / 2), 0.0, 0.0)) for q in truth["quaternion"].values]
     off = symtop.errors({"time": times, "quaternion": np.array(turned)}, "check-case-2")["attitude"].values
     np.testing.assert_allclose(off, ANGLE, rtol=1e-9)
-
-
-def test_chaos_ends_the_reference() -> None:
-    with pytest.raises(symtop.SymtopError, match=r"times must be below \d+.* on heavy-chaotic, not 400"):
-        symtop.reference("heavy-chaotic", [0.0, 20.0, 100.0, 200.0, 400.0])
-    assert float(symtop.reference("heavy-chaotic", [20.0])["attitude_error_bound"][0]) < 1e-12
 
 
 def test_a_sweep_and_a_comparison_take_a_body(tmp_path) -> None:  # type: ignore[no-untyped-def]
@@ -209,16 +197,13 @@ def test_a_sweep_and_a_comparison_take_a_body(tmp_path) -> None:  # type: ignore
 OWN = ["--body", "1,2,3", "--rates", "0.01,1,0"]
 
 
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (["run", "body", "rk4", "--step-size", "0.1", "--mgl", "3"], "--mgl must come with --body I1,I2,I3 on the sce"),
-        (["run", "spheroid", "rk4", *OWN], "--body, --rates must come with --body I1,I2,I3 on the scene body, not sph"),
-        (["scenes", "body", "--body", "1,2"], "--body must be 3 numbers with commas between, not '1,2'"),
-        (["scenes", "body", "--body", "1,2,3"], "--body without a weight needs --rates"),
-        (["scenes", "body", "--body", "1,2,4", "--mgl", "1"], "I3 must be at most the sum of the other moments"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("words", "sentence"), [
+    (["run", "body", "rk4", "--step-size", "0.1", "--mgl", "3"], "--mgl must come with --body I1,I2,I3 on the sce"),
+    (["run", "spheroid", "rk4", *OWN], "--body, --rates must come with --body I1,I2,I3 on the scene body, not sph"),
+    (["scenes", "body", "--body", "1,2"], "--body must be 3 numbers with commas between, not '1,2'"),
+    (["scenes", "body", "--body", "1,2,3"], "--body without a weight needs --rates"),
+    (["scenes", "body", "--body", "1,2,4", "--mgl", "1"], "I3 must be at most the sum of the other moments"),
+])  # fmt: skip
 def test_a_body_of_ones_own_that_is_none(words: list[str], sentence: str) -> None:
     assert sentence in call(*words, code=2).stderr
 
@@ -235,11 +220,18 @@ def test_a_body_of_ones_own_on_the_command_line() -> None:
     assert own["errors"] == named["errors"]
 
 
-def test_a_long_run_of_a_body_at_rest_changes_its_momentum_by_nothing() -> None:
+def test_chaos_ends_the_reference_and_a_body_at_rest_stays():
+    methods = ("lie-variational", "euler-poincare")
+    ended, whole = (symtop.simulate("check-case-2", name, step_size=6.0, guard=False) for name in methods)
+    assert ended.outcome == "not_converged"
+    assert symtop.errors(whole)["momentum"].max() < 2e-14
     still = symtop.Scene("still", RigidBody(1.0, 2.0, 2.5), Attitude(), 1.0)
     data = symtop.long_run(still, "rk4", step_size=0.1, steps=20, quiet=True)
     assert not data["momentum_least"].values.any()
     assert not data["momentum_largest"].values.any()
+    with pytest.raises(symtop.SymtopError, match=r"times must be below \d+.* on heavy-chaotic, not 400"):
+        symtop.reference("heavy-chaotic", [0.0, 20.0, 100.0, 200.0, 400.0])
+    assert float(symtop.reference("heavy-chaotic", [20.0])["attitude_error_bound"][0]) < 1e-12
 
 
 def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
@@ -264,20 +256,17 @@ def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
     assert sorted(points.moments) == pytest.approx([15.0, 30.0, 39.0])
 
 
-@pytest.mark.parametrize(
-    ("make", "words"),
-    [
-        (lambda: RigidBody(1.0, 1.0, 2.1), "I3 must be at most the sum of the other moments"),
-        (lambda: RigidBody(1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0)), "centre must be a direction and of a length"),
-        (lambda: RigidBody.from_inertia([[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]), "matrix must be symmetric"),
-        (lambda: Attitude((0.0, 0.0, 0.0, 0.0)), "quaternion must have unit length, not 0"),
-        (lambda: symtop.Scene("x", RigidBody(1.0, 1.0, 1.0), symtop.Angles(0.3), 1.0), "must be Attitude, not Angles"),
-        (lambda: symtop.simulate("heavy-brick", "stormer-verlet", step_size=1), "integrator must have the chart body"),
-        (lambda: symtop.simulate("heavy-brick", "rk4", step_size=1, observe="nutation"), "known: axis, attitude"),
-        (lambda: symtop.long_run("heavy-brick", "vern9", step_size=0.1, steps=9), "no compiled loop of fixed steps"),
-        (lambda: symtop.reference("heavy-brick", [1.0], certify="digits"), "certify must be None on heavy-brick"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("make", "words"), [
+    (lambda: RigidBody(1.0, 1.0, 2.1), "I3 must be at most the sum of the other moments"),
+    (lambda: RigidBody(1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0)), "centre must be a direction and of a length"),
+    (lambda: RigidBody.from_inertia([[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]), "matrix must be symmetric"),
+    (lambda: Attitude((0.0, 0.0, 0.0, 0.0)), "quaternion must have unit length, not 0"),
+    (lambda: symtop.Scene("x", RigidBody(1.0, 1.0, 1.0), symtop.Angles(0.3), 1.0), "must be Attitude, not Angles"),
+    (lambda: symtop.simulate("heavy-brick", "stormer-verlet", step_size=1), "integrator must have the chart body"),
+    (lambda: symtop.simulate("heavy-brick", "rk4", step_size=1, observe="nutation"), "known: axis, attitude"),
+    (lambda: symtop.long_run("heavy-brick", "vern9", step_size=0.1, steps=9), "no compiled loop of fixed steps"),
+    (lambda: symtop.reference("heavy-brick", [1.0], certify="digits"), "certify must be None on heavy-brick"),
+])  # fmt: skip
 def test_what_is_no_body_or_takes_none_is_refused(make, words: str) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(symtop.SymtopError) as refused:
         make()
@@ -299,3 +288,78 @@ def test_a_stored_body_is_read_back_to_the_bit(tmp_path):  # type: ignore[no-unt
         start = symtop.Attitude(np.array([w, x, y, z]) / np.linalg.norm([w, x, y, z]))
         assert (dataclasses.replace(body), dataclasses.replace(start)) == (body, start)
     assert symtop.RigidBody(1.0, 1.2, 0.9, 1.0, (0.0, 0.0, 1.0 + 1e-15)).centre == (0.0, 0.0, 1.0)
+
+
+@functools.cache
+def bodies():
+    return symtop.body_population(40, seed=4)
+
+
+@functools.cache
+def scenes():
+    return scenes_of(bodies())
+
+
+@pytest.mark.parametrize(("name", "execution"), [
+    ("rk4", chunks.IN_LANES), ("strang", chunks.IN_LANES), ("suzuki-4", chunks.IN_LANES),
+    ("chin-4a", chunks.IN_LANES), ("five-rotations", chunks.IN_LANES), ("gauss-4", chunks.IN_TURN),
+])  # fmt: skip
+@pytest.mark.parametrize("per_nutation", [4, 30])  # a turn of more than a radian leaves its lane
+def test_a_member_is_the_run_of_simulate_to_the_last_bit(name, execution, per_nutation):
+    data = symtop.ensemble(bodies(), name, per_nutation=per_nutation, nutations=12, samples=6, quiet=True)
+    assert data.attrs["execution"] == execution
+    assert_alone(scenes(), name, data, 6)
+
+
+def test_scenes_and_a_population_are_the_same_members_and_threads_change_nothing(monkeypatch, tmp_path):
+    settings = {"step_size": 0.05, "horizon": 3.0, "samples": 5, "quiet": True}
+    data = symtop.ensemble(bodies(), "strang", **settings)
+    others = symtop.ensemble(scenes(), "strang", **settings)
+    xr.testing.assert_identical(data.drop_vars("stratum").drop_attrs(), others.drop_vars("scene").drop_attrs())
+    monkeypatch.setattr(chunks, "LEAST_STEPS", 100)
+    xr.testing.assert_identical(symtop.ensemble(bodies(), "strang", threads=3, **settings), data)
+    with symtop.ensemble(bodies(), "strang", path=tmp_path / "runs.nc", **settings) as written:
+        xr.testing.assert_equal(written.load(), data)
+
+
+def test_errors_are_those_of_each_member_against_its_own_truth():
+    some = [scenes()[i] for i in (0, 2, 4, 12)]  # free
+    settings = {"nutations": 3, "samples": 5, "quiet": True}
+    data = symtop.ensemble(some, "strang", per_nutation=[100, 100, 100, 20], **settings)
+    errors = symtop.errors(data, some)
+    for i, scene in enumerate(some):
+        run = symtop.simulate(scene, "strang", step_size=float(data.step_size[i]), horizon=float(data.horizon[i]),
+                              samples=5, guard=False)  # fmt: skip
+        np.testing.assert_array_equal(errors.attitude[i], symtop.errors(run).attitude)
+    fine = symtop.errors(symtop.ensemble(some, "strang", per_nutation=100, **settings), some).attitude.max("time")
+    ratio = errors.attitude.max("time") / fine
+    assert ratio[:3].values.tolist() == [1.0] * 3
+    assert 20.0 < ratio[3] < 30.0  # five times the step: order 2
+    with pytest.warns(symtop.SymtopWarning, match="is this the start of the scene"):  # of other members: the control
+        assert symtop.errors(data.drop_vars("scene"), some[::-1]).attitude.max() > 1.0
+
+
+def test_plain_numbers_are_a_body_to_the_bit():
+    scene = symtop.scene("heavy-chaotic", bodies=True)
+    assert from_flat(list(scene.top.flat(scene.start))) == (scene.top, scene.start)
+
+
+@pytest.mark.parametrize(("change", "words"), [
+    (lambda data: data.assign(I3=data.I3 + 9.0), "member 0: I3 must be at most the sum of the other moments"),
+    (lambda data: data.drop_vars("omega_body"), "members must have the variables I1, I2, I3, omega_body, not lack"),
+    (lambda data: data.assign(centre=data.I1), "centre of members must be rows of 3 numbers over member"),
+    (lambda data: data.assign(quaternion=2.0 * data.quaternion), "member 0: quaternion must have unit length"),
+    (lambda data: data.rename(mgl="MGL"), "members have no variable 'MGL'; did you mean mgl?"),
+    (lambda data: [*scenes()[:2], "spheroid"], "members must be all tops or all bodies without symmetry"),
+])  # fmt: skip
+def test_bad_bodies_are_refused_in_one_sentence(change, words):
+    with pytest.raises(symtop.SymtopError) as refused:
+        symtop.ensemble(change(bodies()), "rk4", step_size=0.1, horizon=1.0)
+    assert words in str(refused.value)
+
+
+def test_methods_that_choose_their_steps_run_as_well_and_one_without_the_chart_is_refused():
+    data = symtop.ensemble(scenes()[:8], "vern9", tolerance=1e-8, samples=6, quiet=True)
+    assert_alone(scenes()[:8], "vern9", data, 6, tolerance=1e-8)
+    with pytest.raises(symtop.SymtopError, match="must have the chart body, of a RigidBody, not stormer-verlet"):
+        symtop.ensemble(scenes(), "stormer-verlet", step_size=0.1)

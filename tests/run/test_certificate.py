@@ -27,12 +27,11 @@ def test_views_and_integrals_agree_in_every_regime():
         assert apart.max() < 1e-2 * SUSPICIOUS, chosen
 
 
-@pytest.mark.parametrize(
-    ("place", "share"),
-    [(at.PHI_LINE + 2, 1e-9), (at.PHI_TURNS + 2, 1e-9), (at.DOWN_TURNS + 2, 1e-9), (at.UP_TURNS, 1e-9),
-     (at.P_PSI, 1e-9), (at.ENERGY, 1e-9), (at.P_PHI, 1e-9), (at.FLOOR + at.STEEPNESS, 1e-9), (at.BEND, 1e-9),
-     (at.TWIST_UP, 1e-9), (at.FLOOR + at.FAR_REAL, 1e-9), (at.CROWN + at.NEAR_IMAG, 1e-9)],
-)  # fmt: skip
+@pytest.mark.parametrize(("place", "share"), [
+    (at.PHI_LINE + 2, 1e-9), (at.PHI_TURNS + 2, 1e-9), (at.DOWN_TURNS + 2, 1e-9), (at.UP_TURNS, 1e-9),
+    (at.P_PSI, 1e-9), (at.ENERGY, 1e-9), (at.P_PHI, 1e-9), (at.FLOOR + at.STEEPNESS, 1e-9), (at.BEND, 1e-9),
+    (at.TWIST_UP, 1e-9), (at.FLOOR + at.FAR_REAL, 1e-9), (at.CROWN + at.NEAR_IMAG, 1e-9),
+])  # fmt: skip
 def test_a_wrong_constant_is_noticed_at_the_times_asked_for(monkeypatch, place, share):
     chosen = Scene("wrong", scene("spheroid").top, scene("spheroid").start, 8.0)
     form = ClosedForm(chosen.top, chosen.start)

@@ -44,26 +44,24 @@ def assert_alone(members, name, data, samples, **setting):
         assert bool(one.dithered) == (run.attrs["sampling"] == "dithered")
 
 
-@pytest.mark.parametrize(
-    ("name", "settings", "samples"),
-    [("strang[axis]", {"per_nutation": 40, "nutations": 10}, 101),
-     ("strang[attitude]", {"per_nutation": 40.5, "nutations": 10.3}, 33),
-     ("strang[axis]", {"step_size": 0.02, "horizon": 2.0}, 60),
-     ("midpoint[angles]", {"per_nutation": 12, "nutations": 20}, 45),
-     ("cayley-tuned[axis]", {"per_nutation": 12, "nutations": 3}, 20),
-     ("gauss-4[attitude]", {"per_nutation": 12, "nutations": 5.5}, 50)],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "settings", "samples"), [
+    ("strang[axis]", {"per_nutation": 40, "nutations": 10}, 101),
+    ("strang[attitude]", {"per_nutation": 40.5, "nutations": 10.3}, 33),
+    ("strang[axis]", {"step_size": 0.02, "horizon": 2.0}, 60),
+    ("midpoint[angles]", {"per_nutation": 12, "nutations": 20}, 45),
+    ("cayley-tuned[axis]", {"per_nutation": 12, "nutations": 3}, 20),
+    ("gauss-4[attitude]", {"per_nutation": 12, "nutations": 5.5}, 50),
+])  # fmt: skip
 def test_a_member_is_the_run_of_simulate_to_the_last_bit(name, settings, samples):
     data = symtop.ensemble(SOME, name, samples=samples, quiet=True, **settings)
     assert_alone(SOME, name, data, samples)
     assert data.sizes["time"] == samples
 
 
-@pytest.mark.parametrize(
-    ("name", "setting"),
-    [("rk45-compiled[axis]", {"tolerance": 1e-8}), ("rk45-compiled[angles]", {"tolerance": 1e-6}),
-     ("rk45", {"tolerance": 1e-4}), ("exact", {})],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "setting"), [
+    ("rk45-compiled[axis]", {"tolerance": 1e-8}), ("rk45-compiled[angles]", {"tolerance": 1e-6}),
+    ("rk45", {"tolerance": 1e-4}), ("exact", {}),
+])  # fmt: skip
 def test_methods_that_choose_their_steps_run_as_well(name, setting):
     some = SOME.isel(member=slice(0, 8))
     data = symtop.ensemble(some, name, nutations=2.7, samples=20, quiet=True, **setting)
@@ -93,11 +91,10 @@ def test_threads_and_pieces_change_nothing(monkeypatch):
     assert symtop.ensemble(SOME, "strang[axis]", threads=2, **settings).identical(one)
 
 
-@pytest.mark.parametrize(
-    ("n", "steps", "most"),
-    [(10_000, 1000, 0.1), (10_000, np.geomspace(10, 4000, 10_000).astype(int), 0.1), (10_000, None, 0.1),
-     (40, 10, 1.0), (1, 10**9, 1.0), (3, 10**7, 0.4)],
-)  # fmt: skip
+@pytest.mark.parametrize(("n", "steps", "most"), [
+    (10_000, 1000, 0.1), (10_000, np.geomspace(10, 4000, 10_000).astype(int), 0.1), (10_000, None, 0.1),
+    (40, 10, 1.0), (1, 10**9, 1.0), (3, 10**7, 0.4),
+])  # fmt: skip
 def test_pieces_are_shares_of_the_work_and_whole_blocks(n, steps, most):
     """What is worth more than a millisecond is shared evenly; a few short runs stay in one piece."""
     counts = None if steps is None else np.broadcast_to(steps, n)
@@ -112,18 +109,7 @@ def test_pieces_are_shares_of_the_work_and_whole_blocks(n, steps, most):
     assert all((piece.stop - piece.start) % W == 0 for piece in cut[:-1] if piece.stop - piece.start > 4 * W)
 
 
-def test_scenes_are_members_with_horizons_and_units_of_their_own():
-    data = symtop.ensemble(["spheroid", symtop.scene("kinon-betsch")], "strang", per_nutation=50, quiet=True)
-    assert data.scene.values.tolist() == ["spheroid", "kinon-betsch"]
-    assert data.horizon.values.tolist() == [8.0, 2.0]
-    assert data["time"].dims == ("member", "time")
-    assert "psi" in data  # as the scenes are watched for
-    assert data.energy.attrs["units"] == "kg m2 s-2"
-    run = symtop.simulate("kinon-betsch", "strang", step_size=float(data.step_size[1]), samples=101, guard=False)
-    np.testing.assert_array_equal(data.isel(member=1).phi, run.phi)
-
-
-def test_scalars_count_for_all_members_and_times_that_all_share_are_one_row():
+def test_scalars_count_for_all_members_and_steps_and_horizons_may_differ():
     members = xr.Dataset({"I1": 2.0, "I3": 1.0, "mgl": 2.0, "theta": ("member", [0.3, 0.8, 1.2]), "psi_dot": 5.0})
     settings = {"horizon": 2.0, "samples": 31, "quiet": True}
     for step in (0.05, 0.5):  # more steps than samples, and fewer
@@ -135,9 +121,6 @@ def test_scalars_count_for_all_members_and_times_that_all_share_are_one_row():
     np.testing.assert_array_equal(data["time"], [0.0, 0.5, 1.0, 1.5, 2.0, *[np.nan] * 26])
     other = symtop.ensemble(members, "strang[axis]", step_size=[0.5, 0.5, 0.4], **settings)
     assert other["time"].dims == ("member", "time")
-
-
-def test_steps_and_horizons_may_differ_by_member():
     members = SOME.isel(member=slice(0, 3))
     period = nutation_periods(numbers_of(members))
     steps, ends = period / [10.0, 20.0, 35.0], period * [1.0, 2.0, 3.0]
@@ -168,12 +151,11 @@ def test_a_member_that_fails_fails_alone():
         assert np.isnan(other.theta[4]).all()
 
 
-@pytest.mark.parametrize(
-    ("spoilt", "reason"),
-    [({"I3": 5.0}, "member 2: I3 must be at most 2 I1"), ({"theta": np.nan}, "member 2: theta must be a finite number"),
-     ({"theta": -0.1}, r"member 2: theta must lie in \[0, pi\]"), ({"I1": 0.0}, "member 2: I1 must be"),
-     ({"mgl": np.inf}, "member 2: mgl"), ({"I1": 1e308, "I3": 1e308}, "member 2: I1 must be between")],
-)  # fmt: skip
+@pytest.mark.parametrize(("spoilt", "reason"), [
+    ({"I3": 5.0}, "member 2: I3 must be at most 2 I1"), ({"theta": np.nan}, "member 2: theta must be a finite number"),
+    ({"theta": -0.1}, r"member 2: theta must lie in \[0, pi\]"), ({"I1": 0.0}, "member 2: I1 must be"),
+    ({"mgl": np.inf}, "member 2: mgl"), ({"I1": 1e308, "I3": 1e308}, "member 2: I1 must be between"),
+])  # fmt: skip
 def test_bad_members_are_refused_by_number_and_reason(spoilt, reason):
     members = xr.Dataset({name: ("member", np.array([1.0] * 4)) for name in ("I1", "I3", "mgl", "theta")})
     for name, value in spoilt.items():
@@ -186,35 +168,26 @@ STRANG, RK45 = "strang[axis]", "rk45-compiled"
 FIXED = {"step_size": 0.1, "horizon": 2.0}
 
 
-@pytest.mark.parametrize(
-    ("name", "settings", "reason"),
-    [(STRANG, {"horizon": 2.0}, "needs step_size or per_nutation"), (STRANG, FIXED | {"per_nutation": 9}, "not both"),
-     (STRANG, FIXED | {"tolerance": 1e-6}, "fixed step"),
-     (STRANG, FIXED | {"step_size": [0.1, 0.2]}, "one for each of 36 members"),
-     (STRANG, FIXED | {"step_size": [0.1] * 35 + [np.nan]}, "step_size of member 35 must be a finite number"),
-     (STRANG, FIXED | {"step_size": 1e-12}, "member 0 asks for"),
-     (STRANG, FIXED | {"samples": 10_000_000}, "give a path to stream them"),
-     (STRANG, FIXED | {"variables": ["psi"]}, "variables in the axis chart are theta, .* not 'psi'"),
-     (STRANG, FIXED | {"variables": "axis"}, "a list of names"), (STRANG, FIXED | {"budget": 5}, "limit is 5"),
-     (STRANG, {"nutations": 2, "per_nutation": 0.3}, "per_nutation must be at least 0.5.* not 0.3 as of member 0"),
-     (STRANG, {"nutations": 1e308, "per_nutation": 20}, "nutations must be fewer"),
-     (RK45, FIXED, "chooses its own steps"), (RK45, {"horizon": 2.0, "tolerance": 2.0}, "below 1"),
-     (RK45, {"horizon": 2.0, "tolerance": [1e-6] * 35 + [3.0]}, "below 1"),
-     (RK45, {"horizon": 1e14, "tolerance": 1e-6}, "swings"),
-     ("exact", {"horizon": 2.0, "tolerance": 0.1}, "nothing to tune: leave out tolerance = 0.1"),
-     ("strong", FIXED, "did you mean strang")],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "settings", "reason"), [
+    (STRANG, {"horizon": 2.0}, "needs step_size or per_nutation"), (STRANG, FIXED | {"per_nutation": 9}, "not both"),
+    (STRANG, FIXED | {"tolerance": 1e-6}, "fixed step"),
+    (STRANG, FIXED | {"step_size": [0.1, 0.2]}, "one for each of 36 members"),
+    (STRANG, FIXED | {"step_size": [0.1] * 35 + [np.nan]}, "step_size of member 35 must be a finite number"),
+    (STRANG, FIXED | {"step_size": 1e-12}, "member 0 asks for"),
+    (STRANG, FIXED | {"samples": 10_000_000}, "give a path to stream them"),
+    (STRANG, FIXED | {"variables": ["psi"]}, "variables in the axis chart are theta, .* not 'psi'"),
+    (STRANG, FIXED | {"variables": "axis"}, "a list of names"), (STRANG, FIXED | {"budget": 5}, "limit is 5"),
+    (STRANG, {"nutations": 2, "per_nutation": 0.3}, "per_nutation must be at least 0.5.* not 0.3 as of member 0"),
+    (STRANG, {"nutations": 1e308, "per_nutation": 20}, "nutations must be fewer"),
+    (RK45, FIXED, "chooses its own steps"), (RK45, {"horizon": 2.0, "tolerance": 2.0}, "below 1"),
+    (RK45, {"horizon": 2.0, "tolerance": [1e-6] * 35 + [3.0]}, "below 1"),
+    (RK45, {"horizon": 1e14, "tolerance": 1e-6}, "swings"),
+    ("exact", {"horizon": 2.0, "tolerance": 0.1}, "nothing to tune: leave out tolerance = 0.1"),
+    ("strong", FIXED, "did you mean strang"),
+])  # fmt: skip
 def test_settings_that_make_no_sense_are_refused_as_they_were_given(name, settings, reason):
     with pytest.raises(symtop.SymtopError, match=reason):
         symtop.ensemble(SOME, name, quiet=True, **settings)
-
-
-def test_a_member_without_a_nutation_has_no_steps_per_nutation():
-    hanging = {"I1": 1.0, "I3": 0.5, "mgl": -1.0, "theta": 0.0, "theta_dot": ("member", [1.9, 2.0])}
-    with pytest.raises(symtop.SymtopError, match="member 1 is endless"):
-        symtop.ensemble(xr.Dataset(hanging), "strang", per_nutation=20, horizon=8.0)
-    data = symtop.ensemble(xr.Dataset(hanging), "strang", step_size=0.1, horizon=8.0, quiet=True)
-    assert data.outcome.values.tolist() == ["ok", "ok"]
 
 
 @pytest.mark.parametrize("steps", [None, 7, 40, 1000, 12_347])
@@ -238,7 +211,12 @@ def test_a_schedule_has_the_rows_of_sample_times(steps, samples):
             np.testing.assert_array_equal(rows.marks[i, : rows.counts[i]], marks)
 
 
-def test_periods_are_those_of_one_top_and_of_the_closed_form():
+def test_periods_are_those_of_one_top_and_one_without_a_nutation_has_no_steps_per_nutation():
+    hanging = {"I1": 1.0, "I3": 0.5, "mgl": -1.0, "theta": 0.0, "theta_dot": ("member", [1.9, 2.0])}
+    with pytest.raises(symtop.SymtopError, match="member 1 is endless"):
+        symtop.ensemble(xr.Dataset(hanging), "strang", per_nutation=20, horizon=8.0)
+    data = symtop.ensemble(xr.Dataset(hanging), "strang", step_size=0.1, horizon=8.0, quiet=True)
+    assert data.outcome.values.tolist() == ["ok", "ok"]
     numbers = numbers_of(symtop.population(300, seed=4))
     numbers[::7, 2] = 0.0  # some are free
     period = nutation_periods(numbers)
@@ -349,19 +327,10 @@ def test_a_member_on_which_a_solver_raises_is_lost_alone_and_told(path, tmp_path
         xr.testing.assert_identical(one.isel(member=rest).drop_attrs(), bare.isel(member=rest).drop_attrs())
 
 
-def test_a_solver_that_raises_on_every_member_is_refused_and_leaves_nothing(tmp_path):
-    every = raising(TypeError, *range(36))
-    for more in ({}, {"path": tmp_path / "runs.nc"}):
-        with pytest.raises(symtop.SymtopError, match=r"on member 0 failed: TypeError: a reason"):
-            symtop.ensemble(SOME, every, step_size=0.1, horizon=2.0, quiet=True, **more)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("name", "meant"),
-    [("thetadot", "theta_dot"), ("dphi_dt", "phi_dot"), ("psi_rate", "psi_dot"), ("Phi", "phi"), ("theta0", "theta"),
-     ("phi_dto", "phi_dot")],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "meant"), [
+    ("thetadot", "theta_dot"), ("dphi_dt", "phi_dot"), ("psi_rate", "psi_dot"), ("Phi", "phi"), ("theta0", "theta"),
+    ("phi_dto", "phi_dot"),
+])  # fmt: skip
 def test_a_misspelled_variable_of_members_is_refused(name, meant):
     settings = {"per_nutation": 20, "nutations": 2, "quiet": True}
     for members in (SOME.rename({meant: name}), SOME.assign({name: 1.0}), SOME.assign_coords({name: SOME.theta})):
@@ -371,15 +340,12 @@ def test_a_misspelled_variable_of_members_is_refused(name, meant):
             symtop.ensemble(members, "strang[axis]", **settings)
 
 
-def test_members_may_have_labels_of_any_other_name():
+def test_members_may_have_labels_of_any_other_name_and_rows_are_taken_by_label():
     settings = {"per_nutation": 20, "nutations": 2, "quiet": True}
     names = ("period", "weight", "phase", "p_phi", "theta_max", "group", "steps")
     members = SOME.assign(dict.fromkeys(names, SOME.I1)).assign(curve=("place", [1.0, 2.0]))
     plain = symtop.ensemble(SOME, "strang[axis]", **settings)
     assert symtop.ensemble(members, "strang[axis]", **settings).identical(plain)
-
-
-def test_rows_are_taken_by_label_and_labels_are_kept():
     counts, settings = np.linspace(10.0, 45.0, 36), {"nutations": 2, "quiet": True}
     plain = symtop.ensemble(SOME, "strang[axis]", per_nutation=counts, **settings)
     for labels in ([f"m{i}" for i in range(36)], list(range(100, 136))):
@@ -413,7 +379,12 @@ def test_rows_of_others_are_refused(name):
             symtop.ensemble(members, "strang[axis]", quiet=True, **rest, **{name: row})
 
 
-def test_an_ensemble_for_a_cluster_is_refused_before_it_is_sent(tmp_path):
+def test_a_solver_that_raises_on_every_member_is_refused_and_an_ensemble_for_a_cluster_before_it_is_sent(tmp_path):
+    every = raising(TypeError, *range(36))
+    for more in ({}, {"path": tmp_path / "runs.nc"}):
+        with pytest.raises(symtop.SymtopError, match=r"on member 0 failed: TypeError: a reason"):
+            symtop.ensemble(SOME, every, step_size=0.1, horizon=2.0, quiet=True, **more)
+    assert list(tmp_path.iterdir()) == []
     settings = {"step_size": 0.1, "horizon": 2.0, "quiet": True, "path": tmp_path / "runs.nc"}
     with pytest.raises(symtop.SymtopError, match=r"scheduler must be the address of a dask scheduler.* not 5"):
         symtop.ensemble(SOME, "strang", scheduler=5, **settings)
@@ -423,8 +394,16 @@ def test_an_ensemble_for_a_cluster_is_refused_before_it_is_sent(tmp_path):
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_fast_top_has_as_many_swings_as_simulate_says():
-    """Its nutations count, where gravity alone would let it run."""
+def test_scenes_are_members_with_horizons_of_their_own_and_swings_as_simulate_says():
+    data = symtop.ensemble(["spheroid", symtop.scene("kinon-betsch")], "strang", per_nutation=50, quiet=True)
+    assert data.scene.values.tolist() == ["spheroid", "kinon-betsch"]
+    assert data.horizon.values.tolist() == [8.0, 2.0]
+    assert data["time"].dims == ("member", "time")
+    assert "psi" in data  # as the scenes are watched for
+    assert data.energy.attrs["units"] == "kg m2 s-2"
+    run = symtop.simulate("kinon-betsch", "strang", step_size=float(data.step_size[1]), samples=101, guard=False)
+    np.testing.assert_array_equal(data.isel(member=1).phi, run.phi)
+    # Its nutations count, where gravity alone would let it run.
     fast = symtop.Scene("fast-one", symtop.SymmetricTop(1.0, 0.5, 1e-6), symtop.Angles(0.5, psi_dot=200.0), 2e7)
     for run in (symtop.simulate, lambda one, name, **settings: symtop.ensemble([one], name, quiet=True, **settings)):
         with pytest.raises(symtop.SymtopError, match=r"3\.18e\+08 swings"):

@@ -33,22 +33,16 @@ def caution(scene, name, **controls):
     return sentences[0] if sentences else ""
 
 
-# ---- silence, and the run untouched ----------------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("name", "control"),
-    [
-        ("stormer-verlet", {"step_size": 2e-3}),
-        ("midpoint", {"step_size": 2e-3}),
-        ("strang", {"step_size": 2e-3}),
-        ("gauss-4", {"step_size": 1e-2}),
-        ("rk4", {"step_size": 1e-6, "horizon": 0.5}),  # so fine that rounding hides growth
-        ("rk45-compiled", {"tolerance": 1e-8}),
-        ("taylor", {}),
-        ("exact", {}),
-    ],
-)
+@pytest.mark.parametrize(("name", "control"), [
+    ("stormer-verlet", {"step_size": 2e-3}),
+    ("midpoint", {"step_size": 2e-3}),
+    ("strang", {"step_size": 2e-3}),
+    ("gauss-4", {"step_size": 1e-2}),
+    ("rk4", {"step_size": 1e-6, "horizon": 0.5}),  # so fine that rounding hides growth
+    ("rk45-compiled", {"tolerance": 1e-8}),
+    ("taylor", {}),
+    ("exact", {}),
+])  # fmt: skip
 def test_a_good_run_is_met_with_silence_and_any_run_with_the_same_bits(name, control):
     assert caution("spheroid", name, **control) == ""
     quiet, watched = (symtop.simulate("spheroid", name, samples=41, guard=guard, **control) for guard in (False, True))
@@ -70,9 +64,6 @@ def test_a_bad_run_is_the_same_run_with_a_warning():
         quiet = symtop.simulate("spheroid", "midpoint", guard=False, **controls)
     del quiet.attrs["guard"]
     assert watched.identical(quiet)
-
-
-# ---- the numbers behind it -------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("law", "straight"), [(lambda t: 3e-6 * t, True), (lambda t: 1e-6 * t + 4e-7 * t * t, False)])
@@ -124,20 +115,6 @@ def test_the_limits_of_verlet_and_rk4_are_found():
             assert "grow" not in caution(scene, name, step_size=phase / frequency, observe="nutation")
 
 
-def test_landmarks_are_those_of_the_closed_form():
-    marks = landmarks(grazing(1e-4))
-    assert marks.pole == "upper"
-    assert marks.gap == pytest.approx(1.105e-4, rel=1e-2)
-    motion = closed_form(grazing(1e-4))(np.linspace(0.0, 4.23, 2_000_001))
-    assert marks.rate == pytest.approx(np.abs(motion.phi_dot).max(), rel=1e-3)
-    lower = landmarks(symtop.scene("bruls-cardona-arnold"))
-    assert lower.pole == "lower"
-    assert math.degrees(lower.gap) == pytest.approx(4.15e-5, rel=1e-2)
-
-
-# ---- causes and remedies ---------------------------------------------------------------------------------------------
-
-
 def test_each_cause_is_named():
     fast = steady(20.0)
     frequency = landmarks(fast).frequency
@@ -155,14 +132,11 @@ def test_each_cause_is_named():
     assert "a step is 1/2.36 of a nutation" in caution("spheroid", "gauss-2", step_size=0.5, observe="axis")  # goes on
 
 
-@pytest.mark.parametrize(
-    ("scene", "name", "control", "horizon"),
-    [
-        ("spheroid", "midpoint", {"step_size": 0.05}, 40.0),
-        ("spheroid", "rk45-compiled", {"tolerance": 1e-4}, 100.0),
-        ("cusp", "gauss-4", {"step_size": 0.3}, 300.0),
-    ],
-)
+@pytest.mark.parametrize(("scene", "name", "control", "horizon"), [
+    ("spheroid", "midpoint", {"step_size": 0.05}, 40.0),
+    ("spheroid", "rk45-compiled", {"tolerance": 1e-4}, 100.0),
+    ("cusp", "gauss-4", {"step_size": 0.3}, 300.0),
+])  # fmt: skip
 def test_a_remedy_is_a_remedy(scene, name, control, horizon):
     """What the sentence advises silences the guard and makes the run right, and is not ten times too careful."""
     warned = caution(scene, name, horizon=horizon, **control)
@@ -205,8 +179,16 @@ def test_the_step_that_is_advised_works_whatever_the_cause():
     assert np.mean(before > EXPECTED) > 0.9  # the warnings were right, too
 
 
-def test_no_step_is_advised_that_a_run_may_not_have():
-    """Past a pole at 1e-12 rad a step that follows the axis is 1e-13: more steps than `simulate` takes."""
+def test_landmarks_are_those_of_the_closed_form_and_no_step_is_advised_that_a_run_may_not_have():
+    marks = landmarks(grazing(1e-4))
+    assert marks.pole == "upper"
+    assert marks.gap == pytest.approx(1.105e-4, rel=1e-2)
+    motion = closed_form(grazing(1e-4))(np.linspace(0.0, 4.23, 2_000_001))
+    assert marks.rate == pytest.approx(np.abs(motion.phi_dot).max(), rel=1e-3)
+    lower = landmarks(symtop.scene("bruls-cardona-arnold"))
+    assert lower.pole == "lower"
+    assert math.degrees(lower.gap) == pytest.approx(4.15e-5, rel=1e-2)
+    # Past a pole at 1e-12 rad a step that follows the axis is 1e-13: more steps than `simulate` takes.
     for gap, steps in ((1e-4, True), (1e-12, False)):
         sentence = caution(grazing(gap), "stormer-verlet", step_size=0.02)
         assert ("take a step of about" in sentence) is steps
@@ -246,15 +228,6 @@ def test_nutations_that_grow_out_of_single_precision_are_announced(step, grows):
     assert ("small nutations" in caution(scene, "jolt-float32", step_size=step)) is grows
 
 
-def test_what_passages_of_a_pole_add_is_seen_over_many_of_them():
-    """At 206 steps a nutation the errors of 20 passages nearly cancel, and the run is lost."""
-    scene, name = needle(), "stormer-verlet-blanes-moan-6"
-    for step, lost in ((0.004708058490997893, True), (0.0015, False)):
-        run = symtop.simulate(scene, name, step_size=step, guard=False)
-        assert (float(symtop.errors(run)["axis"].max()) > EXPECTED) is lost
-        assert bool(caution(scene, name, step_size=step)) is lost
-
-
 def test_an_end_at_a_pole_after_many_passages_is_announced(monkeypatch):
     """The axis passes the pole at 2e-16 rad, and Adams' method ends there after 17 nutations, vern9 at none of 96."""
     top = symtop.SymmetricTop(0.34197641538075246, 0.3742372339233947, 0.037042027632846225)
@@ -290,9 +263,6 @@ def test_the_end_of_a_run_at_the_limit_of_its_work_is_announced():
             assert float(re.search(r"stopped at t = ([\d.]+) of", warned)[1]) == pytest.approx(2361.6, rel=0.01)
         else:
             assert warned == ""
-
-
-# ---- without a closed form -------------------------------------------------------------------------------------------
 
 
 BODIES = [
@@ -333,29 +303,23 @@ def test_the_guard_without_the_truth_is_asked_for_by_its_name():
         symtop.simulate("heavy-brick", "rk4", **controls | {"guard": "exact"})
 
 
-def test_a_free_top_without_spin_which_has_no_small_nutations_is_judged_like_any():
+def test_a_run_far_longer_than_is_watched_is_warned_of_and_a_free_top_judged_like_any():
     for spin in (0.0, 0.5):
         free = symtop.Scene(
             "free", symtop.SymmetricTop(2.0, 1.0, 0.0), symtop.Angles(1.0, 0.0, 0.0, 1.0, 0.0, spin), 20.0
         )
         assert "expect an axis error" in caution(free, "rk4[axis]", step_size=1.5)
         assert caution(free, "rk4[axis]", step_size=1e-3) == ""
-
-
-def test_a_run_that_is_far_longer_than_is_watched_is_warned_of():
     body = symtop.Scene("far", symtop.RigidBody(1.0, 2.0, 3.0), symtop.Attitude(omega_body=(1e-6, 1.0, 1e-6)), 1e22)
     assert "rounding alone decides" in caution(body, "rk4", step_size=1e15)
 
 
-def test_an_unstable_motion_is_warned_of_beyond_the_errors_of_its_piece():
+def test_changes_tell_chaos_from_order_and_unstable_motions_are_warned_of_beyond_their_piece():
     """What a method commits later than its piece may exceed it; a stable motion has no such margin."""
     for name, margin in (("heavy-chaotic", 30.0), ("heavy-brick", 1.0)):
         motion = Integrated(symtop.model.scenes.scene(name, bodies=True))
         grown = motion.amplification(50.0, 50.0) / motion.amplification(5.0, 50.0)
         assert motion.amplified(1e-12, 5.0, 50.0) == pytest.approx(1e-12 * grown * margin)
-
-
-def test_what_a_motion_makes_of_a_change_tells_chaos_from_order():
     scenes = (symtop.model.scenes.scene(name, bodies=True) for name in ("heavy-chaotic", "heavy-brick"))
     grown = [Integrated(one).amplification(50.0, 50.0) for one in scenes]
     assert grown[0] > 1e4
@@ -367,17 +331,6 @@ def fastest(scene, periods=40.0):
     motion = Integrated(symtop.Scene("body", scene.top, scene.start, periods * scene.nutation_period))
     states = motion.states(np.linspace(0.0, motion.scene.horizon, 2001)[1:], 1e-12)
     return float(np.linalg.norm(states[:, 4:] / np.array(scene.top.moments), axis=1).max())
-
-
-def test_no_body_turns_much_faster_than_the_watch_takes_it_to():
-    """By what the start says alone, the natural period and its own rate, some turn a fifth faster or more."""
-    drawn = [one for one in scenes_of(body_population(48, seed=29)) if math.isfinite(one.nutation_period)]
-    rates = np.array([fastest(one) for one in drawn])
-    bounds = np.array([Integrated(one).fast for one in drawn])
-    starts = [math.hypot(2.0 * math.pi / one.nutation_period, *one.start.omega_body) for one in drawn]
-    assert (rates / bounds).max() < 1.1
-    assert np.median(rates / bounds) > 0.8
-    assert (rates / np.array(starts)).max() > 1.2  # the control
 
 
 def test_a_body_at_rest_that_falls_into_chaos_is_watched_with_steps_short_enough(monkeypatch):
@@ -400,10 +353,27 @@ def test_a_body_at_rest_that_falls_into_chaos_is_watched_with_steps_short_enough
     assert Integrated(scene).amplification(scene.horizon, scene.horizon) < 1e11  # the control
 
 
-def test_two_motions_of_which_one_is_lost_are_not_compared():
+def test_passages_of_a_pole_add_up_and_what_was_lost_is_not_compared():
+    """At 206 steps a nutation the errors of 20 passages nearly cancel, and the run is lost."""
+    scene, name = needle(), "stormer-verlet-blanes-moan-6"
+    for step, lost in ((0.004708058490997893, True), (0.0015, False)):
+        run = symtop.simulate(scene, name, step_size=step, guard=False)
+        assert (float(symtop.errors(run)["axis"].max()) > EXPECTED) is lost
+        assert bool(caution(scene, name, step_size=step)) is lost
     whole, units = (1.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0), (1.0, 1.0)
     for lost in ((math.nan, *whole[1:]), (1.002, *whole[1:]), (*whole[:6], math.inf)):
         assert math.isnan(_apart(whole, lost, units))
         assert math.isnan(_apart(lost, whole, units))
     assert _apart(whole, (*whole[:6], 3.5), units) == 0.5
     assert _apart(whole[1:], (1.002, *whole[2:]), units) == 1.002  # an axis
+
+
+def test_no_body_turns_much_faster_than_the_watch_takes_it_to():
+    """By what the start says alone, the natural period and its own rate, some turn a fifth faster or more."""
+    drawn = [one for one in scenes_of(body_population(48, seed=29)) if math.isfinite(one.nutation_period)]
+    rates = np.array([fastest(one) for one in drawn])
+    bounds = np.array([Integrated(one).fast for one in drawn])
+    starts = [math.hypot(2.0 * math.pi / one.nutation_period, *one.start.omega_body) for one in drawn]
+    assert (rates / bounds).max() < 1.1
+    assert np.median(rates / bounds) > 0.8
+    assert (rates / np.array(starts)).max() > 1.2  # the control

@@ -45,16 +45,13 @@ def test_the_energy_is_that_of_simulate_whether_or_not_the_momenta_are_kept(name
         assert np.ptp(dense["p_psi"].values) > 1e-6  # the control: it does not keep this one
 
 
-@pytest.mark.parametrize(
-    ("files", "words"),
-    [
-        ({"output": "keep.py"}, "no netCDF file"),
-        ({"output": ""}, "output must be a file, not the folder"),
-        ({"checkpoint": ""}, "checkpoint must be a file, not the folder"),
-        ({"output": "a.nc", "checkpoint": "a.nc"}, "output and checkpoint must be two files"),
-        ({"output": "a.nc", "checkpoint": "b/../a.nc"}, "output and checkpoint must be two files"),
-    ],
-)
+@pytest.mark.parametrize(("files", "words"), [
+    ({"output": "keep.py"}, "no netCDF file"),
+    ({"output": ""}, "output must be a file, not the folder"),
+    ({"checkpoint": ""}, "checkpoint must be a file, not the folder"),
+    ({"output": "a.nc", "checkpoint": "a.nc"}, "output and checkpoint must be two files"),
+    ({"output": "a.nc", "checkpoint": "b/../a.nc"}, "output and checkpoint must be two files"),
+])  # fmt: skip
 def test_a_file_that_would_replace_something_else_is_refused_before_a_step(tmp_path, monkeypatch, files, words):
     (tmp_path / "keep.py").write_text("x = 1\n")
     settings = {"steps": 10, "step_size": H, "quiet": True}
@@ -79,14 +76,13 @@ def test_windows_and_samples_cover_a_run_once(steps):
         assert np.unique(np.diff(marks)).size > 1  # no fixed stride
 
 
-@pytest.mark.parametrize(
-    ("name", "h"),
-    [*((name, H) for name in ("stormer-verlet", "midpoint", "galerkin-simpson", "takahashi-imada", "gauss-4", "rk4",
-                              "jsbsim-buss2", "jolt-float32", "no-squish", "lammps-rigid")),
-     ("exact-discrete", SCENE.nutation_period / 4.37),
-     *((f"gauss-{order}", phase * SCENE.nutation_period / (2.0 * np.pi)) for order in (2, 4, 12)
-       for phase in (1.3, 5.0, 10.0))],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "h"), [
+    *((name, H) for name in ("stormer-verlet", "midpoint", "galerkin-simpson", "takahashi-imada", "gauss-4", "rk4",
+                             "jsbsim-buss2", "jolt-float32", "no-squish", "lammps-rigid")),
+    ("exact-discrete", SCENE.nutation_period / 4.37),
+    *((f"gauss-{order}", phase * SCENE.nutation_period / (2.0 * np.pi)) for order in (2, 4, 12)
+      for phase in (1.3, 5.0, 10.0)),
+])  # fmt: skip
 def test_a_run_in_stretches_has_the_bits_of_one_in_one_piece(name, h):
     """With large steps some of a Gauss method are swept and others are solved by Newton."""
     solver = chart_of(symtop.integrator(name))[1]
@@ -161,9 +157,7 @@ def test_a_checkpoint_knows_a_method_by_what_it_holds_and_not_by_its_name():
     def triple(x):
         return symtop.composition("triple", (x, 1.0 - 2.0 * x, x), (x / 2, (1 - x) / 2, (1 - x) / 2, x / 2), order=2)
 
-    def identity(method):
-        return longrun._identity(SCENE, method, h, 500, True)
-
+    identity = lambda method: longrun._identity(SCENE, method, h, 500, True)
     assert identity(triple(0.3)) == identity(triple(0.3))  # the control: made twice, it is the same
     assert identity(triple(0.3)) != identity(triple(0.3000001))
     plain = symtop.integrator("stormer-verlet")
@@ -216,31 +210,17 @@ def test_a_result_that_cannot_be_written_leaves_the_checkpoint(tmp_path, monkeyp
     assert data.identical(long_run(SCENE, "rk4", steps=50_000, step_size=H, quiet=True))
 
 
-def test_a_checkpoint_of_another_run_is_refused(tmp_path):
+def test_checkpoints_of_other_runs_are_refused_and_a_failed_run_shows_the_windows_it_had(tmp_path):
     file = tmp_path / "run.nc"
     book = longrun._Checkpoint(file, "another")
     book.note(drive.Position((1.0,), (0.0,), (), 7), [[0.0]])
     book.save()
     with pytest.raises(SymtopError, match="belongs to another run"):
         long_run(SCENE, "cayley", steps=1000, step_size=H, checkpoint=file, quiet=True)
-
-
-def test_a_failed_run_shows_the_windows_it_had():
     scene = symtop.scene("bruls-cardona-arnold")
     data = long_run(scene, "stormer-verlet", steps=10**6, step_size=2e-3, quiet=True)
     assert data.attrs["outcome"] == "left_chart"
     assert "stopped at" in data.attrs["outcome_message"]
-
-
-def test_memory_does_not_grow_with_the_steps():
-    peaks = []
-    for steps in (100_000, 1_000_000):
-        long_run(SCENE, "stormer-verlet", steps=steps, step_size=H, quiet=True)
-        tracemalloc.start()
-        long_run(SCENE, "stormer-verlet", steps=steps, step_size=H, quiet=True)
-        peaks.append(tracemalloc.get_traced_memory()[1])
-        tracemalloc.stop()
-    assert peaks[1] < peaks[0] + 1_000_000
 
 
 @pytest.mark.parametrize("name", ["stormer-verlet", "midpoint", "strang", "cayley"])
@@ -251,15 +231,7 @@ def test_compensated_sums_drift_less_than_plain_ones(name):
     assert max(float(data["p_phi"]), float(data["p_psi"])) < 2e-14
 
 
-@pytest.mark.slow
-def test_a_small_correction_is_not_rounded_to_one_side():
-    """This start lost 1.5e-14 of its energy in 5e7 steps while midpoint rounded its last correction by itself."""
-    start = members(SCENE, 15)[14]
-    run = long_run(start, "midpoint", steps=50_000_000, step_size=start.nutation_period / 1000.37, quiet=True)
-    assert abs(float(run["modified_energy_mean"][-1])) / start.energy_grain < 5e-15
-
-
-def test_a_fused_sum_is_rounded_once_and_a_plain_one_twice():
+def test_a_fused_sum_is_rounded_once_and_memory_does_not_grow_with_the_steps():
     tiny = 2.0**-30
 
     @njit
@@ -269,6 +241,14 @@ def test_a_fused_sum_is_rounded_once_and_a_plain_one_twice():
     assert compiled(1.0 + tiny, 1.0 - tiny, -1.0) == -(tiny**2)
     assert (1.0 + tiny) * (1.0 - tiny) - 1.0 == 0.0
     assert fused(Fraction(1, 3), Fraction(3), Fraction(1)) == 2
+    peaks = []
+    for steps in (100_000, 1_000_000):
+        long_run(SCENE, "stormer-verlet", steps=steps, step_size=H, quiet=True)
+        tracemalloc.start()
+        long_run(SCENE, "stormer-verlet", steps=steps, step_size=H, quiet=True)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+    assert peaks[1] < peaks[0] + 1_000_000
 
 
 def test_the_command_runs_and_says_what_changed(tmp_path):
@@ -311,8 +291,12 @@ def test_what_a_free_body_keeps_grows_as_rounding_and_what_it_does_not_keep_as_t
 
 
 @pytest.mark.slow
-def test_a_checkpoint_does_not_depend_on_what_its_process_has_run():
-    """Told before and after other work by a new process, and by this one."""
+def test_a_small_correction_is_not_rounded_to_one_side_and_no_checkpoint_depends_on_earlier_runs():
+    """This start lost 1.5e-14 of its energy in 5e7 steps while midpoint rounded its last correction by itself."""
+    start = members(SCENE, 15)[14]
+    run = long_run(start, "midpoint", steps=50_000_000, step_size=start.nutation_period / 1000.37, quiet=True)
+    assert abs(float(run["modified_energy_mean"][-1])) / start.energy_grain < 5e-15
+    # Told before and after other work by a new process, and by this one.
     script = """
 import symtop
 from symtop.run import long_run

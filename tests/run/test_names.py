@@ -57,7 +57,7 @@ def test_closed_forms_belong_to_the_four_methods_they_are_of():
     assert symtop.discrete_lagrangian("other", (0.0, 1.0), (0.5, 0.5)).modified_energy is None
 
 
-def test_a_slow_solver_is_forecast_by_its_compiled_twin_whatever_its_name():
+def test_slow_solvers_and_software_arithmetic_are_known_by_traits_and_rules_by_numbers():
     own = symtop.integrator("rk45")
     other = dataclasses.replace(own, name="renamed")
     plain = dataclasses.replace(own, name="renamed", same_steps_as=None)
@@ -66,18 +66,12 @@ def test_a_slow_solver_is_forecast_by_its_compiled_twin_whatever_its_name():
     np.testing.assert_equal(tuple(forecast(SCENE, other, "angles", plan)), tuple(expected))  # some are nan
     slow = forecast(SCENE, plain, "angles", plan)  # without it a tenth of the run is all that is probed
     assert slow.axis_error != expected.axis_error
-
-
-def test_software_arithmetic_is_judged_over_fewer_steps_whatever_its_name():
     assert symtop.integrator("taylor-quad").speed == 0.002
     assert symtop.integrator("taylor").speed == 1.0
     strang = symtop.integrator("strang")
     slow = dataclasses.replace(strang, name="renamed", speed=0.02)
     steps = [constants.long_run(method, SCENE, "axis", quick=True).steps for method in (strang, slow)]
     assert steps[1] == pytest.approx(0.02 * steps[0], rel=0.01)
-
-
-def test_other_ways_to_step_a_rule_know_it_by_its_numbers():
     assert is_midpoint(symtop.discrete_lagrangian("mine", (0.5,), (1.0,)))
     assert not is_midpoint(symtop.integrator("trapezoidal"))
     assert not is_midpoint(symtop.integrator("midpoint-unreduced"))
@@ -90,16 +84,13 @@ def test_what_a_method_may_claim_to_conserve_is_known(conserves):
     assert dataclasses.replace(symtop.integrator("strang"), conserves=["energy"]).conserves == {"energy"}
 
 
-def test_a_chart_is_chosen_by_what_it_shows_and_a_row_has_one():
+def test_charts_are_chosen_by_what_they_show_and_a_row_is_a_method_in_one():
     strang = symtop.integrator("strang")
     assert [strang.chart_for(what) for what in ("nutation", "axis", "attitude")] == ["axis", "axis", "attitude"]
     assert strang.chart_for("axis", among=["attitude"]) == "attitude"
     assert strang.variant("attitude").charts() == ("attitude",)
     with pytest.raises(symtop.SymtopError, match="cannot show the attitude"):
         strang.variant("axis").chart_for("attitude")
-
-
-def test_a_row_is_a_method_in_one_chart_and_every_table_can_name_it():
     in_angles, on_axis = symtop.integrator("rk4[angles]"), symtop.integrator("rk4[axis]")
     assert (on_axis.name, on_axis.method, on_axis.charts()) == ("rk4[axis]", "rk4", ("axis",))
     runs = {row.name: symtop.simulate("spheroid", row, step_size=0.01, guard=False) for row in (in_angles, on_axis)}

@@ -31,25 +31,7 @@ class Motion:
         self.gap = np.minimum(self.low, np.pi - self.high)
 
 
-def test_a_slow_top_is_below_the_sleeping_threshold_at_any_energy():
-    slow = Motion("slow")
-    assert slow.sigma.max() < 1.0
-    assert (slow.sigma < 0.05).mean() > 0.2
-    assert slow.kinetic.max() < 8.001
-    assert (slow.kinetic < 0.1).mean() > 0.05
-    assert (slow.kinetic > 4.0).mean() > 0.2
-
-
-def test_a_fast_top_nutates_little_and_at_the_rate_of_its_spin():
-    fast = Motion("fast")
-    assert fast.sigma.min() >= 1.99
-    assert ((fast.high - fast.low) * fast.a**2).max() < 10.0
-    assert np.abs(2.0 * np.pi / (fast.period * np.abs(fast.a)) - 1.0).max() < 0.2
-    slowest = 2.0 * np.pi / Motion("slow").period
-    assert (slowest > 1.5 * np.abs(Motion("slow").a)).mean() > 0.5  # the negative control
-
-
-def test_a_grazing_top_passes_one_of_the_poles_as_near_as_it_says_and_fast():
+def test_grazing_tops_pass_a_pole_as_near_as_they_say_and_those_near_the_separatrix_hover_at_one():
     grazing = Motion("grazing")
     assert grazing.gap.min() > 2.0**-15
     assert grazing.gap.max() < 2.0**-4
@@ -58,10 +40,7 @@ def test_a_grazing_top_passes_one_of_the_poles_as_near_as_it_says_and_fast():
     assert 0.45 < upper.mean() < 0.55
     assert grazing.period.max() < 8.0
     assert (Motion("slow").gap > 2.0**-4).mean() > 0.7  # the negative control
-
-
-def test_a_top_near_the_separatrix_hovers_at_the_upper_pole():
-    """Its period grows as the logarithm of the gap: 2 ln(1/gap)/r and some, r the rate at which it leaves the pole."""
+    # Its period grows as the logarithm of the gap: 2 ln(1/gap)/r and some, r the rate at which it leaves the pole.
     near = Motion("near-separatrix")
     assert near.low.min() > 2.0**-17
     assert near.low.max() < 2.0**-5.9
@@ -71,15 +50,24 @@ def test_a_top_near_the_separatrix_hovers_at_the_upper_pole():
     assert near.period.min() > 1.5 * Motion("grazing").period.max()
 
 
-def test_a_hanging_top_stays_below_the_horizontal():
+def test_slow_fast_hanging_and_sleeping_tops_are_what_they_are_called():
+    slow = Motion("slow")
+    assert slow.sigma.max() < 1.0
+    assert (slow.sigma < 0.05).mean() > 0.2
+    assert slow.kinetic.max() < 8.001
+    assert (slow.kinetic < 0.1).mean() > 0.05
+    assert (slow.kinetic > 4.0).mean() > 0.2
+    fast = Motion("fast")
+    assert fast.sigma.min() >= 1.99
+    assert ((fast.high - fast.low) * fast.a**2).max() < 10.0
+    assert np.abs(2.0 * np.pi / (fast.period * np.abs(fast.a)) - 1.0).max() < 0.2
+    slowest = 2.0 * np.pi / Motion("slow").period
+    assert (slowest > 1.5 * np.abs(Motion("slow").a)).mean() > 0.5  # the negative control
     hanging = Motion("hanging")
     assert (hanging.data.mgl < 0.0).all()
     assert hanging.high.max() < np.pi / 2.0
     assert (hanging.high > 1.3).mean() > 0.01
     assert all((population(200, kind=kind).mgl > 0.0).all() for kind in STRATA if kind != "hanging")
-
-
-def test_a_sleeping_top_stays_where_it_was_let_go():
     sleeping = Motion("sleeping")
     assert sleeping.sigma.min() >= 1.0 + 2.0**-5 - 1e-12
     assert sleeping.theta.max() < 2.0**-4 + 1e-12
@@ -107,11 +95,6 @@ def test_a_population_is_the_beginning_of_a_larger_one(monkeypatch):
     assert [population(1, seed=2**53 + k).attrs["seed"] - 2**53 for k in range(3)] == [0, 1, 2]  # more than a double
     monkeypatch.setattr(populations, "BLOCK", 128)
     assert population(3000, seed=7).identical(large)
-
-
-def test_the_same_seed_is_the_same_population_everywhere():
-    """A hash that was written down: nothing hangs on the machine's sine, its vectors or NumPy's distributions."""
-    assert content_hash(population(1000, seed=1)) == HASH
 
 
 @pytest.mark.parametrize("draw", [population, body_population])
@@ -212,6 +195,8 @@ def test_a_population_is_the_beginning_of_a_larger_one_and_the_same_everywhere()
     assert body_population(21, seed=1).drop_attrs().identical(large.isel(member=slice(0, 21)).drop_attrs())
     assert not np.array_equal(body_population(9, seed=2).omega_body, large.omega_body[:9])
     assert content_hash(large) == BODY_HASH
+    # A hash that was written down: nothing hangs on the machine's sine, its vectors or NumPy's distributions.
+    assert content_hash(population(1000, seed=1)) == HASH
 
 
 def test_members_that_make_no_sense_are_refused_in_a_sentence():

@@ -71,11 +71,10 @@ def check_bounds(count, precision, seed):
     return float(np.median(ratios))
 
 
-@pytest.mark.parametrize(
-    ("precision", "count", "seed"),
-    [("longdouble", 1, 11), ("double", 1, 11), ("closed-form", 1, 11),
-     *(pytest.param(precision, 56, 2026, marks=pytest.mark.slow) for precision in ("longdouble", "closed-form"))],
-)  # fmt: skip
+@pytest.mark.parametrize(("precision", "count", "seed"), [
+    ("longdouble", 1, 11), ("double", 1, 11), ("closed-form", 1, 11),
+    *(pytest.param(precision, 56, 2026, marks=pytest.mark.slow) for precision in ("longdouble", "closed-form")),
+])  # fmt: skip
 def test_bounds_hold_on_random_tops_and_are_tight(precision, count, seed):
     assert check_bounds(count, precision, seed) < 100.0
 
@@ -98,14 +97,6 @@ def test_the_bound_of_the_closed_form_holds_the_rounding_and_the_rates(name):
     assert min(bounds["phi"][0], bounds["psi"][0]) >= 2.0 * 4.8e-16
 
 
-def test_a_bound_that_is_too_small_would_be_seen():
-    """The negative control: the same check with the bound of a method a thousand times better fails."""
-    scene = symtop.scene("spheroid")
-    data = symtop.reference(scene, [3.0, 500.0, 1000.0], "longdouble")
-    errors = true_errors(scene, data)
-    assert not np.all(errors[0] <= data["attitude_error_bound"].values / 1000.0)
-
-
 def test_an_integration_that_differs_from_the_closed_form_has_the_distance_as_its_bound(monkeypatch):
     module = sys.modules["symtop.run.reference.truth"]
     scene, times = symtop.scene("goldstein"), np.array([1.0, 2.0, 3.0])
@@ -121,8 +112,13 @@ def test_an_integration_that_differs_from_the_closed_form_has_the_distance_as_it
     assert np.all(module._integration(scene, times, "longdouble")["theta_error_bound"] < 1e-15)
 
 
-def test_the_times_at_which_an_integration_is_read_change_no_bit():
-    """The study of the truth reads an error and its bound off one integration."""
+def test_a_bound_too_small_would_be_seen_and_times_at_which_it_is_read_change_no_bit():
+    """The negative control: the same check with the bound of a method a thousand times better fails."""
+    scene = symtop.scene("spheroid")
+    data = symtop.reference(scene, [3.0, 500.0, 1000.0], "longdouble")
+    errors = true_errors(scene, data)
+    assert not np.all(errors[0] <= data["attitude_error_bound"].values / 1000.0)
+    # The study of the truth reads an error and its bound off one integration.
     run = symtop.scene("goldstein")
     for precision in ("double", "longdouble", "quad"):
         times = np.array([3.0, 11.0, 20.0])
@@ -274,16 +270,13 @@ def test_without_heyoka_the_closed_form_stands_in_and_says_so(monkeypatch, cache
     assert "integration" not in data.attrs["certificate"]
 
 
-def test_checks_reach_the_horizon_and_the_fastest_moments():
+def test_checks_reach_the_horizon_and_a_certificate_is_of_a_known_kind_and_of_the_closed_form():
     scene = symtop.scene("spheroid")
     checks, form = check_times(scene, 17.0), scenes.closed_form(scene)
     assert checks[-1] == 17.0
     assert np.all(np.diff(checks) > 0.0)
     speed = np.abs(form(np.linspace(0.0, 1.2, 500)).theta_dot).max()
     assert np.abs(form(checks).theta_dot).max() > 0.98 * speed
-
-
-def test_a_certificate_is_of_a_kind_that_is_known_and_of_the_closed_form():
     with pytest.raises(symtop.SymtopError, match="certify 'twice' is unknown"):
         symtop.reference("spheroid", [1.0], certify="twice")
     with pytest.raises(symtop.SymtopError, match="certify is for the closed form"):

@@ -75,9 +75,9 @@ def decay(rate):
 
 
 @pytest.mark.parametrize(("rate", "horizon", "name", "control"), [
-    (1.0, 10.0, "rk4", {"step_size": 0.1}), (1000.0, 10.0, "rk4", {"step_size": 0.002}),
-    (30.0, 10.0, "rk4", {"step_size": 0.1}), (1000.0, 10.0, "radau", {"tolerance": 1e-4}),
-    (1000.0, 10.0, "bdf", {"tolerance": 1e-4}), (1000.0, 10.0, "lsoda", {"tolerance": 1e-4}),
+    (1.0, 10.0, "rk4", {"step_size": 0.1}), (1000.0, 5.0, "rk4", {"step_size": 0.002}),
+    (30.0, 10.0, "rk4", {"step_size": 0.1}), (1000.0, 5.0, "radau", {"tolerance": 1e-4}),
+    (1000.0, 5.0, "bdf", {"tolerance": 1e-4}), (1000.0, 5.0, "lsoda", {"tolerance": 1e-4}),
 ])  # fmt: skip
 def test_an_error_in_a_transient_counts_and_one_that_grows_beyond_the_motion_goes_on(rate, horizon, name, control):
     """Of exp(-1000 t) nothing is left at the first of even times; exp(-30 t) ends at 7e13 where h = 0.1."""
@@ -103,14 +103,11 @@ def test_a_run_of_few_steps_is_forecast_as_any_other(horizon, step):
     assert expected.cause == ""
 
 
-def test_what_was_not_watched_to_the_end_says_so():
+def test_chaos_is_told_from_order_and_what_was_not_watched_says_so():
     said = str(symtop.guard(prothero_robinson(1e6), 0.0, [1.0], 10.0, "radau", tolerance=1e-6))
     assert "; the motion was watched to t = 0.0" in said
-    assert "watched" not in str(symtop.guard(swing, 0.0, [1.0, 0.0], 3000.0, "rk4", step_size=0.1))
-
-
-def test_chaos_is_told_from_order():
-    y0, horizon = of_energy(1.0 / 6.0, -0.1), 200.0
+    assert "watched" not in str(symtop.guard(swing, 0.0, [1.0, 0.0], 1500.0, "rk4", step_size=0.1))
+    y0, horizon = of_energy(1.0 / 6.0, -0.1), 120.0
     chaotic = symtop.guard(henon_heiles, 0.0, y0, horizon, "rk45", tolerance=1e-6)
     assert chaotic.cause == "instability"
     assert "the motion multiplies a small change" in str(chaotic)
@@ -119,16 +116,13 @@ def test_chaos_is_told_from_order():
     assert chaotic.amplification > 100.0 * regular.amplification
 
 
-@pytest.mark.parametrize(
-    ("f", "y0", "horizon", "name", "control", "cause"),
-    [
-        (prothero_robinson(1e3), [1.0], 1.5, "rk4", {"step_size": 0.01}, "stiffness"),
-        (prothero_robinson(1e3), [1.0], 1.5, "radau", {"tolerance": 1e-8}, ""),
-        (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 3.0}, "instability"),
-        (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 0.5}, "step"),
-        (swing, [1.0, 0.0], 30.0, "vern9-fixed", {"step_size": 0.1, "accuracy": 1e-15}, "rounding"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("f", "y0", "horizon", "name", "control", "cause"), [
+    (prothero_robinson(1e3), [1.0], 0.5, "rk4", {"step_size": 0.01}, "stiffness"),
+    (prothero_robinson(1e3), [1.0], 0.5, "radau", {"tolerance": 1e-8}, ""),
+    (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 3.0}, "instability"),
+    (swing, [1.0, 0.0], 100.0, "rk4", {"step_size": 0.5}, "step"),
+    (swing, [1.0, 0.0], 30.0, "vern9-fixed", {"step_size": 0.1, "accuracy": 1e-15}, "rounding"),
+])  # fmt: skip
 def test_each_cause_is_named(f, y0, horizon, name, control, cause):
     expected = symtop.guard(f, 0.0, y0, horizon, name, **control)
     assert expected.cause == cause, str(expected)
@@ -139,10 +133,7 @@ def test_each_cause_is_named(f, y0, horizon, name, control, cause):
 def test_a_motion_may_begin_at_zero():
     """Its size is that of what drives it: z'' = c sin t - 2 z is c (sin t - sin(t sqrt 2)/sqrt 2)."""
     c, h, z = 1e-9, 0.1, np.zeros(2)
-
-    def driven(t, y):
-        return np.array([y[1], c * math.sin(t) - 2.0 * y[0]])
-
+    driven = lambda t, y: np.array([y[1], c * math.sin(t) - 2.0 * y[0]])
     error = 0.0
     for k in range(200):
         z, t = rk4(driven, k * h, z, h), (k + 1) * h
@@ -152,12 +143,12 @@ def test_a_motion_may_begin_at_zero():
         )
     expected = symtop.guard(driven, 0.0, [0.0, 0.0], 20.0, step_size=h, accuracy=1e-12)
     assert 1.0 / 3.0 < expected.error / error < 3.0
-    assert symtop.guard(prothero_robinson(1e3), 0.0, [0.0], 1.5, step_size=0.01).cause == "stiffness"
+    assert symtop.guard(prothero_robinson(1e3), 0.0, [0.0], 0.5, step_size=0.01).cause == "stiffness"
     still = symtop.guard(lambda _t, y: 0.0 * y, 0.0, [0.0], 10.0, step_size=0.1)
     assert (still.error, still.setting) == (0.0, 10.0)  # no step is longer than the run
 
 
-def test_f_may_return_one_array_again_and_write_to_its_argument():
+def test_f_may_return_one_array_again_and_a_horizon_beyond_the_end_is_refused():
     one = np.empty(2)
 
     def swing_in_place(_, y):
@@ -168,10 +159,7 @@ def test_f_may_return_one_array_again_and_write_to_its_argument():
     for name, control in (("rk4", {"step_size": 0.1}), ("rk45", {"tolerance": 1e-4})):
         expected = symtop.guard(swing, 0.0, [1.0, 0.0], 30.0, name, **control)
         assert symtop.guard(swing_in_place, 0.0, [1.0, 0.0], 30.0, name, **control) == expected
-
-
-def test_a_horizon_beyond_the_end_of_a_motion_is_refused():
-    """y' = y^2 from 1 is 1/(1 - t)."""
+    # y' = y^2 from 1 is 1/(1 - t).
     with pytest.raises(symtop.SymtopError, match=r"horizon must be below 1, not 2\.0: the motion goes beyond"):
         symtop.guard(lambda _t, y: y * y, 0.0, [1.0], 2.0, step_size=0.01)
     assert symtop.guard(lambda _t, y: y * y, 0.0, [1.0], 0.9, step_size=0.01).error < 1e-3
@@ -179,15 +167,12 @@ def test_a_horizon_beyond_the_end_of_a_motion_is_refused():
         assert symtop.guard(swing, start, [1.0, 0.0], 0.6, step_size=0.1).error < 1e-3
 
 
-def test_the_step_that_is_advised_keeps_the_accuracy():
+def test_the_step_that_is_advised_keeps_the_accuracy_also_where_the_piece_itself_fails():
     horizon = 20.0 * math.pi
     expected = symtop.guard(kepler, 0.0, at_pericentre(0.3), horizon, step_size=0.1, accuracy=1e-3)
     assert expected.error > 1e-3
     assert 3e-4 < measured(kepler, at_pericentre(0.3), horizon, "rk4", step_size=expected.setting) < 2e-3
     assert f"take a step of about {expected.setting!r}" in str(expected)
-
-
-def test_a_step_is_advised_where_the_piece_itself_fails():
     step, stiffening = 0.8, lambda t, y: [y[1], -(y[0] ** 3)]
     expected = symtop.guard(stiffening, 0.0, [3.0, 0.0], 30.0, step_size=step)
     assert math.isinf(expected.error)
@@ -196,20 +181,17 @@ def test_a_step_is_advised_where_the_piece_itself_fails():
     assert math.isfinite(symtop.guard(stiffening, 0.0, [3.0, 0.0], 30.0, step_size=expected.setting).error)
 
 
-@pytest.mark.parametrize(
-    ("f", "y0", "control", "words"),
-    [
-        (swing, [1.0, 0.0], {"step_size": 0.1, "tolerance": 1.0}, "rk4 takes step_size, not tolerance"),
-        (swing, [1.0, 0.0], {"method": "taylor", "tolerance": 1e-9}, "method 'taylor' is unknown"),
-        (swing, [1.0, 0.0], {"step_size": 1.5}, "step_size must be at most the horizon 1.0, not 1.5"),
-        (swing, [1.0, 0.0], {"method": "bdf", "tolerance": 1e-20}, "tolerance must be at least 2.3e-14 and below 1"),
-        (swing, [1.0, 0.0], {"step_size": 0.1, "t0": 1e20}, "horizon must be longer than what t0 = 1e+20 is"),
-        (swing, [1.0, 0.0, 2.0], {"step_size": 0.1}, "f must return 3 numbers, not an array of shape (2,)"),
-        (lambda _t, _y: 1 / 0, [1.0], {"step_size": 0.1}, "f failed: ZeroDivisionError"),
-        (lambda _t, _y: [math.nan], [1.0], {"step_size": 0.1}, "f must be finite, not [nan] at t = 0.0"),
-        (lambda t, y: y if t < 0.5 else y * math.nan, [1.0], {"step_size": 0.1}, "not [nan] at t = 0."),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("f", "y0", "control", "words"), [
+    (swing, [1.0, 0.0], {"step_size": 0.1, "tolerance": 1.0}, "rk4 takes step_size, not tolerance"),
+    (swing, [1.0, 0.0], {"method": "taylor", "tolerance": 1e-9}, "method 'taylor' is unknown"),
+    (swing, [1.0, 0.0], {"step_size": 1.5}, "step_size must be at most the horizon 1.0, not 1.5"),
+    (swing, [1.0, 0.0], {"method": "bdf", "tolerance": 1e-20}, "tolerance must be at least 2.3e-14 and below 1"),
+    (swing, [1.0, 0.0], {"step_size": 0.1, "t0": 1e20}, "horizon must be longer than what t0 = 1e+20 is"),
+    (swing, [1.0, 0.0, 2.0], {"step_size": 0.1}, "f must return 3 numbers, not an array of shape (2,)"),
+    (lambda _t, _y: 1 / 0, [1.0], {"step_size": 0.1}, "f failed: ZeroDivisionError"),
+    (lambda _t, _y: [math.nan], [1.0], {"step_size": 0.1}, "f must be finite, not [nan] at t = 0.0"),
+    (lambda t, y: y if t < 0.5 else y * math.nan, [1.0], {"step_size": 0.1}, "not [nan] at t = 0."),
+])  # fmt: skip
 def test_what_makes_no_sense_is_refused_in_one_sentence(f, y0, control, words):
     with pytest.raises(symtop.SymtopError) as refused:
         symtop.guard(f, control.pop("t0", 0.0), y0, 1.0, **control)

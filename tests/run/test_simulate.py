@@ -1,7 +1,9 @@
-"""simulate(): the dataset it promises, its sampling, and what it refuses."""
+"""simulate(): the dataset it promises, its sampling, what it refuses, and how runs end."""
 
 import json
 import math
+import re
+import time
 from unittest.mock import Mock
 
 import numpy as np
@@ -11,12 +13,14 @@ import xarray as xr
 import symtop
 from symtop.core import netcdf
 from symtop.core.numbers import GOLDEN
+from symtop.model import charts
+from symtop.model.scenes import grazing, steady
 from symtop.run import trajectory as trajectories
 from symtop.run.simulation import WIDEST_GAP, integrate, sample_times
 from symtop.run.trajectory import Trajectory, dataset
 
 
-def test_the_dataset_is_the_one_that_is_promised():
+def test_the_dataset_is_the_one_that_is_promised_and_begins_with_exact_values():
     run = symtop.simulate("spheroid", "midpoint", step_size=0.013, samples=51, guard=False)
     assert list(run["component"].values) == ["x", "y", "z"]
     for name in ("theta", "phi", "psi", "energy", "p_phi", "p_psi", "p_theta"):
@@ -28,30 +32,12 @@ def test_the_dataset_is_the_one_that_is_promised():
     assert {"integrator", "scene", "force_evaluations", "newton_iterations", "symtop_version"} <= attrs.keys()
     steps = run["time"].values / attrs["step_size"]
     assert steps == pytest.approx(np.rint(steps), abs=1e-9)
-
-
-def test_energy_and_momenta_start_at_their_exact_values():
     scene = symtop.scene("goldstein-rising")
     for name, control in (("midpoint", {"step_size": 0.1}), ("rk45", {"tolerance": 1e-6}), ("taylor", {})):
         run = symtop.simulate(scene, name, horizon=1.0, **control)
         assert float(run["energy"][0]) == pytest.approx(14.1, rel=1e-15)
         assert float(run["p_phi"][0]) == pytest.approx(3.4, rel=1e-15)
         assert float(run["p_psi"][0]) == pytest.approx(5.0, rel=1e-15)
-
-
-def test_samples_commensurate_with_the_nutation_are_dithered_and_said_to_be():
-    """F11: sampled at multiples of the nutation period, Verlet's energy error reads a thousand times too small."""
-    scene = symtop.scene("spheroid")
-    period = scene.nutation_period
-    run = symtop.simulate(scene, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=51)
-    assert run.attrs["sampling"] == "dithered"
-    honest = float(np.max(np.abs(run["energy"] - run["energy"][0])))
-    dense = symtop.simulate(scene, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=10_001)
-    assert dense.attrs["sampling"] == "uniform"
-    every = np.abs(dense["energy"].values - dense["energy"].values[0])
-    assert honest > 0.3 * every.max()
-    blind = every[::200]  # what uniform samples would have shown
-    assert blind.max() < 0.01 * every.max()
 
 
 def sorted_times(horizon, samples, period, steps):
@@ -71,7 +57,19 @@ def sorted_times(horizon, samples, period, steps):
     return times, marks, dithered
 
 
-def test_samples_are_those_of_a_sort_whether_it_was_needed_or_not():
+def test_samples_are_dithered_where_commensurate_and_those_of_a_sort():
+    """F11: sampled at multiples of the nutation period, Verlet's energy error reads a thousand times too small."""
+    scene = symtop.scene("spheroid")
+    period = scene.nutation_period
+    run = symtop.simulate(scene, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=51)
+    assert run.attrs["sampling"] == "dithered"
+    honest = float(np.max(np.abs(run["energy"] - run["energy"][0])))
+    dense = symtop.simulate(scene, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=10_001)
+    assert dense.attrs["sampling"] == "uniform"
+    every = np.abs(dense["energy"].values - dense["energy"].values[0])
+    assert honest > 0.3 * every.max()
+    blind = every[::200]  # what uniform samples would have shown
+    assert blind.max() < 0.01 * every.max()
     draw, dithered = np.random.default_rng(4), 0
     for k in range(4000):
         samples, period = int(draw.integers(2, 300)), float(10.0 ** draw.uniform(-1, 1))
@@ -106,7 +104,7 @@ def test_the_dataset_is_the_one_of_xarray_itself(scene, row, monkeypatch, tmp_pa
         assert quick.attrs[record] == json.dumps(numbers, sort_keys=True)
 
 
-def test_two_datasets_share_nothing_that_can_be_written_to():
+def test_two_datasets_share_nothing_and_a_trajectory_has_the_numbers_of_its_dataset():
     trajectory = integrate("spheroid", "strang[attitude]", step_size=0.1)
     first, second = (dataset(trajectory.time, trajectory.columns) for _ in range(2))
     for name in ("time", "component", "part", "theta"):
@@ -115,9 +113,6 @@ def test_two_datasets_share_nothing_that_can_be_written_to():
         assert "mark" not in second[name].attrs
         assert "mark" not in second[name].encoding
     assert not np.shares_memory(first["time"].values, trajectory.time)
-
-
-def test_a_trajectory_has_the_numbers_of_the_dataset():
     settings = {"step_size": 0.01, "observe": "attitude", "horizon": 1.0}
     data = symtop.simulate("spheroid", "midpoint", guard=False, **settings)
     trajectory = integrate("spheroid", "midpoint", **settings)
@@ -127,28 +122,20 @@ def test_a_trajectory_has_the_numbers_of_the_dataset():
     }
 
 
-def test_files_are_whole_reproducible_and_readable(tmp_path):
+def test_files_are_whole_and_a_failed_write_leaves_the_old_one(tmp_path, monkeypatch):
     run = symtop.simulate("spheroid", "stormer-verlet", step_size=0.01)
     first = netcdf.write(run, tmp_path / "a" / "run.nc")
     second = netcdf.write(symtop.simulate("spheroid", "stormer-verlet", step_size=0.01), tmp_path / "b.nc")
     assert first.read_bytes() == second.read_bytes()
-    back = netcdf.read(first)
-    assert back.identical(run)
-    assert sorted(path.name for path in tmp_path.rglob("*") if path.is_file()) == ["b.nc", "run.nc"]
-
-
-def test_a_failed_write_leaves_the_old_file_and_no_scraps(tmp_path, monkeypatch):
-    run = symtop.simulate("spheroid", "stormer-verlet", step_size=0.01)
-    path = netcdf.write(run, tmp_path / "run.nc")
-    before = path.read_bytes()
+    assert netcdf.read(first).identical(run)
+    before = second.read_bytes()
     with pytest.raises(symtop.SymtopError, match="it is a folder"):
         netcdf.write(run, tmp_path)
-
     monkeypatch.setattr(type(run), "to_netcdf", Mock(side_effect=OSError(28, "No space left on device")))
     with pytest.raises(symtop.SymtopError, match="No space left"):
-        netcdf.write(run, path)
-    assert path.read_bytes() == before
-    assert [item.name for item in tmp_path.iterdir()] == ["run.nc"]
+        netcdf.write(run, second)
+    assert second.read_bytes() == before
+    assert sorted(path.name for path in tmp_path.rglob("*") if path.is_file()) == ["b.nc", "run.nc"]
 
 
 @pytest.mark.parametrize("theta", [0.0, math.pi])
@@ -167,3 +154,160 @@ def test_the_three_kinds_of_nutation_are_what_they_are_called():
         motion = symtop.ClosedForm(scene.top, scene.start)(np.linspace(0.0, scene.nutation_period, 2001))
         assert np.sign(np.round(motion.phi_dot.min(), 9)) == sign
         assert motion.phi_dot.max() > 0.0
+
+
+HUGE = symtop.Scene("huge", symtop.SymmetricTop(1.0, 1.0, 1e30), symtop.Angles(theta=1.0, psi_dot=1.0), 8.0)
+
+
+@pytest.mark.parametrize(("scene", "name", "controls", "outcome"), [
+    ("spheroid", "stormer-verlet", {"step_size": 1.0, "horizon": 50.0}, "left_chart"),
+    ("spheroid", "rk4", {"step_size": 0.4, "horizon": 40.0}, "left_chart"),
+    ("bruls-cardona-arnold", "rk45", {"tolerance": 0.5}, "left_chart"),
+    ("spheroid", "gauss-2", {"step_size": 10.0, "horizon": 200.0, "observe": "axis"}, "not_converged"),
+    ("sleeping", "trapezoidal", {"step_size": 2.0, "horizon": 4000.0}, "not_converged"),
+    ("simo-wong", "rk4", {"step_size": 1.0, "observe": "axis"}, "not_finite"),
+    (grazing(1e-14), "rk45-compiled", {"tolerance": 1e-12}, "step_too_small"),
+    ("spheroid", "rk45-compiled", {"tolerance": 1e-9, "budget": 100}, "out_of_budget"),
+    ("spheroid", "dop853", {"tolerance": 1e-9, "budget": 100}, "out_of_budget"),
+    ("spheroid", "taylor", {"budget": 3}, "out_of_budget"),
+    ("spheroid", "taylor", {"tolerance": 1e-9, "budget": 40, "samples": 2}, "out_of_budget"),
+    ("spheroid", "rk45-compiled", {"tolerance": 1e-9, "budget": 40, "samples": 2}, "out_of_budget"),
+    ("spheroid", "rk4[attitude]", {"step_size": 0.2}, "not_normalised"),
+])  # fmt: skip
+def test_every_outcome_is_produced_said_and_timed(scene, name, controls, outcome):
+    run = symtop.simulate(scene, name, guard=False, **{"samples": 201, **controls})
+    reached, unit = run.attrs["reached_time"], symtop.scene(scene).second
+    assert run.attrs["outcome"] == outcome
+    assert re.fullmatch(rf"stopped at t = {reached:.6g} of [\d.e+-]+{unit}: .+; .+", run.attrs["outcome_message"])
+    assert 0.0 <= reached < run.attrs["horizon"]
+    assert reached > 0.0 or outcome != "out_of_budget"
+    known = np.isfinite(run["axis"].values).all(axis=1)
+    after = run["time"].values > reached * (1.0 + 1e-9)
+    assert known[0]
+    assert not known[after].any()  # nothing is made up
+
+
+def test_an_early_end_is_announced_and_a_budget_that_was_kept_is_no_failure():
+    for gap, tolerance, outcome in ((1e-14, 1e-9, "step_too_small"), (1e-6, 1e-6, "ok")):
+        sentences, controls = [], {"observe": "nutation", "samples": 11}
+        run = symtop.simulate(grazing(gap), "radau", tolerance=tolerance, guard=sentences.append, **controls)
+        assert run.attrs["outcome"] == outcome
+        assert len(sentences) == (outcome != "ok")
+        reached = f"expect the run to be stopped at t = {run.attrs['reached_time']:.6g} "
+        assert all(reached in sentence and "step size fell below" in sentence for sentence in sentences)
+    free = symtop.simulate("spheroid", "rk45-compiled", tolerance=1e-6)
+    count = free.attrs["force_evaluations"]
+    assert symtop.simulate("spheroid", "rk45-compiled", tolerance=1e-6, budget=count).equals(free)
+    assert symtop.simulate("spheroid", "rk45", tolerance=1e-6, budget=count + 2).attrs["outcome"] == "ok"
+    assert symtop.simulate("spheroid", "taylor", budget=1e4).attrs["outcome"] == "ok"
+    with pytest.raises(symtop.SymtopError, match="the limit is 700"):
+        symtop.simulate("spheroid", "midpoint", step_size=0.01, budget=700)
+    assert symtop.simulate("spheroid", "midpoint", step_size=0.01, budget=800, guard=False).attrs["outcome"] == "ok"
+
+
+@pytest.mark.parametrize("name", ["midpoint", "trapezoidal", "simpson-linear", "galerkin-simpson"])
+@pytest.mark.parametrize("turn", [0.3, 1.0, 1.9])
+def test_implicit_steps_are_solved_where_nothing_moves_but_rounding(name, turn):
+    """On a steady precession the increment of theta is rounding, and no correction is small beside it."""
+    for scene in (steady(20.0), symtop.scene("steady")):
+        frequency = scene.top.nutation_frequency(scene.top.momenta(scene.start))
+        h = turn / frequency
+        run = symtop.simulate(scene, name, step_size=h, horizon=1000 * h, samples=101, guard=False)
+        assert run.attrs["outcome"] == "ok"
+        assert run.attrs["newton_iterations"] < 7 * run.attrs["steps"]
+        assert float(np.abs(run["theta"] - math.pi / 3.0).max()) < 1e-11
+
+
+@pytest.mark.parametrize(("scene", "name", "controls"), [
+    ("spheroid", "midpoint", {"step_size": 1e-300}),
+    ("spheroid", "midpoint", {"step_size": 0.01, "horizon": 1e300}),
+    ("spheroid", "strang", {"step_size": 1e299, "horizon": 1e300}),
+    ("spheroid", "rk45", {"tolerance": 1e-6, "horizon": 1e300}),
+    ("separatrix", "rk45-compiled", {"tolerance": 1e-6, "horizon": 1e300}),
+    ("spheroid", "taylor", {"horizon": 1e300}),
+    ("spheroid", "exact", {"horizon": 1e300}),
+    ("spheroid", "dop853", {"tolerance": 1e300}),
+    *((HUGE, name, {"step_size": 0.01}) for name in ("midpoint", "galerkin-simpson", "stormer-verlet", "strang")),
+    *((HUGE, name, {"step_size": 0.01}) for name in ("gauss-8", "rk4")),
+    *((HUGE, name, {"tolerance": 1e-6}) for name in ("rk45", "rk45-compiled", "taylor")),
+])  # fmt: skip
+def test_absurd_runs_end_at_once_with_a_sentence(scene, name, controls):
+    usual = {None: {}, "step_size": {"step_size": 0.1}, "tolerance": {"tolerance": 1e-3}}
+    symtop.simulate("spheroid", name, guard=False, **usual[symtop.integrator(name).control])
+    start, sentences = time.process_time(), []  # of this process: others may be busy
+    try:
+        run = symtop.simulate(scene, name, guard=sentences.append, **controls)
+        sentence = run.attrs["outcome_message"] if run.attrs["outcome"] != "ok" else sentences[0]
+    except symtop.SymtopError as error:
+        sentence = str(error)
+    assert time.process_time() - start < 2.0
+    assert len(sentence) > 20
+    assert "\n" not in sentence
+
+
+@pytest.mark.parametrize(("name", "step_size"), [("rk4[attitude]", 0.2), ("series[attitude]", 0.5)])
+def test_a_quaternion_that_leaves_length_one_has_failed_alone_and_in_an_ensemble(name, step_size):
+    options = {"step_size": step_size, "horizon": 8.0, "samples": 41}
+    run = symtop.simulate("spheroid", name, **options, guard=False)
+    assert run.attrs["outcome"] == "not_normalised"
+    assert "0.1 %" in run.attrs["outcome_message"]
+    shown = np.isfinite(run["quaternion"].values).all(axis=1)
+    assert 0 < shown.sum() < shown.size
+    assert (np.diff(shown.astype(int)) <= 0).all()  # nothing after the failure
+    lengths = np.linalg.norm(run["quaternion"].values[shown], axis=1)
+    assert np.abs(lengths - 1.0).max() <= 1e-3
+    assert run.attrs["reached_time"] == run["time"].values[shown][-1]
+    assert np.isnan(run["p_phi"].values[~shown]).all()
+    assert np.nanmax(symtop.errors(run)["attitude"].values) <= np.pi
+    many = symtop.ensemble(["spheroid", "goldstein"], name, **options, observe="attitude", quiet=True).isel(member=0)
+    assert many["outcome"].item() == "not_normalised"
+    assert many["reached_time"].item() == run.attrs["reached_time"]
+    np.testing.assert_array_equal(many["quaternion"].values[: shown.size], run["quaternion"].values)
+
+
+DOUBTFUL = symtop.Scene(
+    "doubtful", symtop.SymmetricTop(0.1862, 0.2285, 0.1828), symtop.Angles(0.00337, psi_dot=-1.61), 87.0
+)
+
+
+def test_a_quaternion_that_keeps_its_length_has_not_failed_and_a_state_whose_squares_overflow_is_not_finite():
+    run = symtop.simulate("spheroid", "strang[attitude]", step_size=0.5, guard=False)
+    assert run.attrs["outcome"] == "ok"
+    near = symtop.simulate("spheroid", "rk4[attitude]", step_size=0.05, guard=False)
+    assert near.attrs["outcome"] == "ok"
+    assert np.abs(np.linalg.norm(near["quaternion"].values, axis=1) - 1.0).max() > 5e-4
+    far = charts.attitude_distance(np.array([3e116, 0.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0, 0.0]))
+    assert far == np.pi
+    # L is finite, about 1e160; the energy is the square of it.
+    run = symtop.simulate(DOUBTFUL, "rk4[axis]", step_size=43.5, horizon=130.5, guard=False)
+    assert np.isfinite(run["axis"].values).all()
+    assert not np.isfinite(run["energy"].values).all()
+    assert (run.attrs["outcome"], run.attrs["reached_time"]) == ("not_finite", 87.0)
+    both = symtop.ensemble([DOUBTFUL] * 2, "rk4[axis]", step_size=43.5, horizon=130.5, quiet=True)
+    assert both["outcome"].values.tolist() == ["not_finite"] * 2
+    assert both["reached_time"].values.tolist() == [87.0] * 2
+    good = symtop.simulate(DOUBTFUL, "rk4[axis]", step_size=0.5, guard=False)  # the control
+    assert good.attrs["outcome"] == "ok"
+
+
+@pytest.mark.parametrize("count", [2, pytest.param(4, marks=pytest.mark.slow)])
+def test_every_variant_shows_finite_numbers_or_says_that_it_does_not(count):
+    draw, ended = np.random.default_rng(50), set()
+    for row in (method.variant(chart) for method in symtop.integrators().values() for chart in method.charts()):
+        for _ in range(count):
+            I1, mgl, rate = 10.0 ** draw.uniform(-2.0, 2.0, 3)
+            top = symtop.SymmetricTop(I1, I1 * draw.uniform(0.05, 1.95), mgl * draw.choice([-1.0, 1.0]))
+            start = symtop.Angles(
+                draw.choice([1e-3, 1.0, 3.0]), theta_dot=rate, psi_dot=draw.choice([-1.0, 1.0]) * rate
+            )
+            h = 10.0 ** draw.uniform(0.0, 4.0) / rate
+            scene, control = symtop.Scene("drawn", top, start, 4.0 * h if row.fixed_step else 20.0 / rate), {}
+            if row.control == "step_size":
+                control = {"step_size": h}
+            elif row.control == "tolerance":
+                control = {"tolerance": max(10.0 ** draw.uniform(-6.0, -0.1), row.least_tolerance), "budget": 2000}
+            run = symtop.simulate(scene, row, **control, guard=False)
+            finite = all(np.isfinite(values).all() for values in run.data_vars.values())
+            assert finite or run.attrs["outcome"] != "ok", (row.name, scene, control)
+            ended.add(run.attrs["outcome"])
+    assert {"ok", "not_finite", "left_chart"} <= ended

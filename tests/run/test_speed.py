@@ -44,7 +44,7 @@ def test_a_run_costs_what_it_computes(name):
 
 
 @pytest.mark.slow
-def test_a_run_of_one_step_costs_less_than_a_hundred_and_fifty_steps():
+def test_a_run_of_one_step_costs_little_and_two_samples_no_more_than_501():
     """In steps of Stormer-Verlet: 80, and 175 with a table of 35 stages. It was 370, and 600."""
     chosen = symtop.scene("spheroid")
     verlet = symtop.integrator("stormer-verlet")
@@ -56,11 +56,7 @@ def test_a_run_of_one_step_costs_less_than_a_hundred_and_fifty_steps():
     labels = [(one.name, chart) for one in methods for chart in one.charts()]
     for (name, chart), seconds in zip(labels, singles, strict=True):
         assert seconds / (base / 20_000) < (300.0 if name == "sofroniou-spaletta-10" else 150.0), (name, chart)
-
-
-@pytest.mark.slow
-def test_two_samples_cost_no_more_than_501():
-    """They did once: phases were sorted that are always too few, and twice."""
+    # They did once: phases were sorted that are always too few, and twice.
     ask = functools.partial(symtop.simulate, symtop.scene("spheroid"), "takahashi-imada", step_size=8 / 400)
     for guard in (False, True):
         calls = [functools.partial(ask, samples=count, observe="axis", guard=guard) for count in (2, 501)]

@@ -34,12 +34,11 @@ def small_pieces(monkeypatch):
     monkeypatch.setattr(chunks, "CHUNK", 21 * 7)
 
 
-@pytest.mark.parametrize(
-    ("name", "settings"),
-    [("strang[attitude]", {}), ("stormer-verlet", {}), ("strang[axis]", {"variables": ["energy", "p_phi"]}),
-     ("midpoint", {"nutations": None, "horizon": 0.7, "per_nutation": None, "step_size": 0.01}),
-     ("exact", {"per_nutation": None, "nutations": None, "horizon": 2.0})],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "settings"), [
+    ("strang[attitude]", {}), ("stormer-verlet", {}), ("strang[axis]", {"variables": ["energy", "p_phi"]}),
+    ("midpoint", {"nutations": None, "horizon": 0.7, "per_nutation": None, "step_size": 0.01}),
+    ("exact", {"per_nutation": None, "nutations": None, "horizon": 2.0}),
+])  # fmt: skip
 def test_the_file_holds_the_ensemble_in_memory(tmp_path, small_pieces, name, settings):
     whole = symtop.ensemble(SOME, name, **SETTINGS | settings)
     with symtop.ensemble(SOME, name, path=tmp_path / "runs.nc", **SETTINGS | settings) as data:
@@ -259,15 +258,12 @@ except KeyboardInterrupt:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("name", "setting", "long", "threads"),
-    [
-        ("strang[axis]", "per_nutation=200", 20_000, 1),
-        ("strang[axis]", "per_nutation=200", 20_000, 2),
-        ("gauss-12[attitude]", "per_nutation=50", 2000, 2),
-        ("rk45-compiled[axis]", "tolerance=1e-9", 10_000, 2),
-    ],
-)
+@pytest.mark.parametrize(("name", "setting", "long", "threads"), [
+    ("strang[axis]", "per_nutation=200", 20_000, 1),
+    ("strang[axis]", "per_nutation=200", 20_000, 2),
+    ("gauss-12[attitude]", "per_nutation=50", 2000, 2),
+    ("rk45-compiled[axis]", "tolerance=1e-9", 10_000, 2),
+])  # fmt: skip
 def test_an_interrupt_is_heard_within_a_second(name, setting, long, threads):
     code = INTERRUPTED.replace("NAME", repr(name)).replace("THREADS", str(threads))
     code = code.replace("SETTING", setting).replace("LONG", str(long))

@@ -102,19 +102,6 @@ def test_a_process_that_is_killed_is_done_without(script, tmp_path):
     assert not leftovers(tmp_path / "r")
 
 
-def test_a_case_whose_file_is_gone_has_failed(script, tmp_path, pool):
-    """The study is not taken for whole without it, and the next run computes it again."""
-    study, results = runner.load(script("first")), tmp_path / "r"
-    answer = runner.start(study, results, pool, quiet=True, beside=True)
-    missing, other = sorted((results / "cases" / "first").glob("*.npz"))
-    missing.unlink()
-    (failure,) = answer.result()["failures"]
-    assert missing.name in failure
-    assert other.name not in failure
-    again = runner.start(study, results, pool, quiet=True).result()
-    assert (again["failures"], again["computed"]) == ([], 1)
-
-
 def test_a_study_that_is_edited_before_it_is_concluded_is_drawn_again(script, tmp_path):
     files = {"first": script("first"), "second": script("second")}  # the second one, the control, is left as it is
     for name, file in files.items():
@@ -158,7 +145,25 @@ def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
     assert all(file.is_file() for file in others)
 
 
-def test_timed_cases_wait_for_the_analysis_of_the_study_before(script, tmp_path, pool):
+def test_a_case_whose_file_is_gone_has_failed_and_timed_cases_wait_for_the_analysis_before(
+    script, tmp_path, pool, monkeypatch
+):  # fmt: skip
+    """The study is not taken for whole without it, and the next run computes it again."""
+    study, results, analyse, gone = runner.load(script("first")), tmp_path / "r", pool.analyse, []
+
+    def lose(*task):
+        gone.append(min((results / "cases" / "first").glob("*.npz")))
+        gone[0].unlink()
+        return analyse(*task)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(pool, "analyse", lose)
+        (failure,) = runner.start(study, results, pool, quiet=True, beside=True).result()["failures"]
+    (other,) = (results / "cases" / "first").glob("*.npz")
+    assert gone[0].name in failure
+    assert other.name not in failure
+    again = runner.start(study, results, pool, quiet=True).result()
+    assert (again["failures"], again["computed"]) == ([], 1)
     states = []
     future = pool.analyse(time.sleep, 0.3)
 

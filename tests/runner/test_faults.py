@@ -11,6 +11,7 @@ import sys
 import threading
 import time
 from pathlib import Path
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -39,9 +40,6 @@ def refused(results, says):
     assert not leftovers(Path(results)) if Path(results).is_dir() else True
 
 
-# ---- the place -------------------------------------------------------------------------------------------------------
-
-
 def test_a_full_disk_ends_the_run_and_what_was_computed_is_kept(tmp_path, monkeypatch):
     real, count = np.savez, []
 
@@ -61,17 +59,12 @@ def test_a_full_disk_ends_the_run_and_what_was_computed_is_kept(tmp_path, monkey
     assert "2 of 4 cases computed" in output
 
 
-@pytest.mark.parametrize(
-    ("place", "name", "error", "says"),
-    [
-        (xr.Dataset, "to_netcdf", RuntimeError("NetCDF: HDF error"), "NetCDF: HDF error"),
-        (store.tempfile, "TemporaryFile", OSError(errno.EROFS, os.strerror(errno.EROFS)), "Read-only file system"),
-    ],
-)
+@pytest.mark.parametrize(("place", "name", "error", "says"), [
+    (xr.Dataset, "to_netcdf", RuntimeError("NetCDF: HDF error"), "NetCDF: HDF error"),
+    (store.tempfile, "TemporaryFile", OSError(errno.EROFS, os.strerror(errno.EROFS)), "Read-only file system"),
+])  # fmt: skip
 def test_what_the_netcdf_library_or_the_system_refuses_to_write(tmp_path, monkeypatch, place, name, error, says):
-    def refuse(*arguments, **options):
-        raise error
-
+    refuse = Mock(side_effect=error)
     monkeypatch.setattr(place, name, refuse)
     refused(tmp_path, says)
     if place is xr.Dataset:
@@ -91,7 +84,6 @@ def test_a_real_limit_on_the_size_of_files(tmp_path):
     code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192)); "
     code += "from symtop.cli.main import main; sys.argv[0] = 'symtop'; main()"
     words = ["study", str(PROBE), "--results", str(tmp_path / "small")]
-
     command = [sys.executable, "-c", code, *words]
     result = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert result.returncode == 2, result.stderr
@@ -109,15 +101,12 @@ def test_a_file_where_a_folder_should_be(tmp_path, place):
     assert (tmp_path / place).read_text() == "I was here first"
 
 
-def test_results_that_are_a_file_or_cannot_be_made(tmp_path):
+def test_files_where_folders_should_be_and_folders_where_files(tmp_path):
     (tmp_path / "file").touch()
     code, output = probe(tmp_path / "file")
     assert code == 2
     assert "is a file" in output
     refused("/proc/nowhere", "/proc/nowhere")
-
-
-def test_a_folder_where_a_file_should_be(tmp_path):
     assert probe(tmp_path)[0] == 0
     for name in ("probe.nc", "probe.json", "figures/probe-energy.png"):
         target = tmp_path / "quick" / name
@@ -130,9 +119,6 @@ def test_a_folder_where_a_file_should_be(tmp_path):
     case.unlink()
     case.mkdir()
     refused(tmp_path, "it is a folder")
-
-
-# ---- what is on disk -------------------------------------------------------------------------------------------------
 
 
 def test_truncated_damaged_and_foreign_files_are_computed_again(tmp_path):
@@ -153,18 +139,6 @@ def test_truncated_damaged_and_foreign_files_are_computed_again(tmp_path):
     about = str(arrays["about"]).replace('"made_of": {', '"made_of": {"code nothing.py": "0", ')
     np.savez(cases[1], **arrays | {"about": about})  # the numbers are right, and what is said of them is not
     assert "1 of 4 cases computed" in probe(tmp_path)[1]
-
-
-def test_damaged_findings_are_made_again(tmp_path):
-    assert probe(tmp_path)[0] == 0
-    path = tmp_path / "quick" / "probe.json"
-    good = json.loads(path.read_text())
-    for damage in ("", "{", "[1, 2]", '{"stamp": 3}', "\0\0\0"):
-        path.write_text(damage)
-        code, output = probe(tmp_path)
-        assert code == 0, damage
-        assert "0 of 4 cases computed" in output
-        assert json.loads(path.read_text()) == good
 
 
 def test_a_lock_keeps_others_out_and_ends_with_its_holder(tmp_path):
@@ -208,7 +182,16 @@ def test_two_runs_at_once_share_the_work_and_agree(tmp_path):
     assert not leftovers(tmp_path / "shared")
 
 
-def test_what_a_killed_worker_left_beside_a_case_goes_when_it_is_computed_here(tmp_path):
+def test_damaged_findings_and_what_a_killed_worker_left_are_made_again(tmp_path):
+    assert probe(tmp_path)[0] == 0
+    path = tmp_path / "quick" / "probe.json"
+    good = json.loads(path.read_text())
+    for damage in ("", "{", "[1, 2]", '{"stamp": 3}', "\0\0\0"):
+        path.write_text(damage)
+        code, output = probe(tmp_path)
+        assert code == 0, damage
+        assert "0 of 4 cases computed" in output
+        assert json.loads(path.read_text()) == good
     code, output = probe(tmp_path)
     assert code == 0, output
     (case,) = tmp_path.rglob("cases/probe/goldstein--midpoint--*.npz")
@@ -219,9 +202,6 @@ def test_what_a_killed_worker_left_beside_a_case_goes_when_it_is_computed_here(t
     code, output = probe(tmp_path)
     assert "1 of 4 cases computed" in output
     assert not leftovers(tmp_path)
-
-
-# ---- signals ---------------------------------------------------------------------------------------------------------
 
 
 def wait_for_cases(log: Path, count: int, process) -> None:
@@ -287,8 +267,6 @@ def test_a_worker_that_is_killed_costs_no_more_than_what_it_was_computing(tmp_pa
     assert len(names) - len(set(names)) <= 2  # one case a worker
 
 
-# ---- methods ---------------------------------------------------------------------------------------------------------
-
 BAD = """
 import itertools, os, time
 import numpy as np
@@ -332,12 +310,9 @@ def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
     assert code == 1
     assert "2 of 24 cases computed" in out  # those that return NaN: a result like any other
     says = {
-        "raises": "RuntimeError: no luck",
-        "hangs": "it was not done after 3 s",
-        "deaf": "it was not done after 3 s and did not answer",
-        "exits": "its process was ended",
-        "shape": "must return a Run with real states",
-    }
+        "raises": "RuntimeError: no luck", "hangs": "it was not done after 3 s", "exits": "its process was ended",
+        "deaf": "it was not done after 3 s and did not answer", "shape": "must return a Run with real states",
+    }  # fmt: skip
     lines = sentences(err)
     assert len(lines) == 2 * len(says)
     for name, sentence in says.items():
@@ -361,16 +336,13 @@ def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
     assert states.count("done") == 14
 
 
-def test_a_case_has_its_time_and_a_call_that_ends_in_time_is_left_alone():
+def test_a_case_has_its_time_and_the_limit_is_heard_by_the_runner(tmp_path, monkeypatch):
     with pytest.raises(TimeoutError, match="not done after"), at_most(0.05, processor=False):
         time.sleep(60.0)
     with at_most(0.2, processor=False):
         pass
     time.sleep(0.3)  # nothing comes later
     assert signal.getitimer(signal.ITIMER_REAL)[0] == 0.0
-
-
-def test_the_limit_is_heard_by_the_runner(tmp_path, monkeypatch):
     monkeypatch.setenv("PROBE_PAUSE", "1.0")
     code, output = probe(tmp_path, "--limit", 0.05)
     assert code == 2  # not one case could be measured
@@ -378,7 +350,12 @@ def test_the_limit_is_heard_by_the_runner(tmp_path, monkeypatch):
     assert probe(tmp_path, "--limit", -1)[0] == 2
 
 
-# ---- surroundings ----------------------------------------------------------------------------------------------------
+def test_paths_that_are_not_ascii(tmp_path):
+    place = tmp_path / "Ergebnisse für θ – 結果"
+    plugin = tmp_path / "méthode_à_moi.py"
+    plugin.write_text("import symtop\n")
+    assert probe(place, "--plugin", plugin)[0] == 0
+    assert len(contents(place)) == 5
 
 
 def test_a_clock_that_jumps(tmp_path, monkeypatch):
@@ -390,18 +367,9 @@ def test_a_clock_that_jumps(tmp_path, monkeypatch):
     same(tmp_path / "calm", tmp_path / "r")
 
 
-def test_paths_that_are_not_ascii(tmp_path):
-    place = tmp_path / "Ergebnisse für θ – 結果"
-    plugin = tmp_path / "méthode_à_moi.py"
-    plugin.write_text("import symtop\n")
-    assert probe(place, "--plugin", plugin)[0] == 0
-    assert len(contents(place)) == 5
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize("closed", ["0", "1", "2", "012"])
 def test_no_terminal_and_closed_streams(tmp_path, closed):
-
     words = f"{sys.executable} -m symtop.cli study {PROBE} --results {tmp_path / 'r'} --jobs 2"
     words += "".join(f" {n}>&-" if n != "0" else " 0<&-" for n in closed)
     result = subprocess.run(["/bin/sh", "-c", words], timeout=240, check=False)

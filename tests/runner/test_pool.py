@@ -62,15 +62,6 @@ def at_once(cases):
     return sum(float(one["end"]) > float(other["begin"]) for one, other in itertools.pairwise(cases))
 
 
-def test_methods_of_one_family_do_not_begin_side_by_side(tmp_path):
-    names = ["midpoint", "trapezoidal", "strang", "cayley", "rk4", "together"]
-    tasks = [Task("", Case("spheroid", name), tmp_path / name, (), 1.0) for name in names]
-    assert [task.case.integrator for task in in_order(tasks)] == [
-        "midpoint", "strang", "rk4", "together", "trapezoidal", "cayley",
-    ]  # fmt: skip
-    assert in_order([]) == []
-
-
 @pytest.mark.slow
 def test_a_trial_decides_whether_timed_cases_run_at_once_in_workers_that_are_there(tmp_path, monkeypatch, pool):
     """After all others; few of them, too: workers have the kernels, this process has not."""
@@ -94,7 +85,13 @@ def test_a_trial_decides_whether_timed_cases_run_at_once_in_workers_that_are_the
         assert sizes == [2]  # once for all studies of a command
 
 
-def test_where_all_workers_disturb_each_other_half_as_many_may_not(monkeypatch):
+def test_families_do_not_begin_side_by_side_and_half_as_many_workers_may_not_disturb_each_other(tmp_path, monkeypatch):
+    names = ["midpoint", "trapezoidal", "strang", "cayley", "rk4", "together"]
+    tasks = [Task("", Case("spheroid", name), tmp_path / name, (), 1.0) for name in names]
+    assert [task.case.integrator for task in in_order(tasks)] == [
+        "midpoint", "strang", "rk4", "together", "trapezoidal", "cayley",
+    ]  # fmt: skip
+    assert in_order([]) == []
     monkeypatch.setattr(pools, "slowdown", lambda _, size: 0.3 * size)
     with Pool(1) as pool:
         assert pool.at_once(8) == (2, 0.6)

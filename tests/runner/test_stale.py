@@ -79,28 +79,24 @@ STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear"}
 METHODS = "symtop.methods"
 
 
-@pytest.mark.parametrize(
-    ("place", "stale"),
-    [
-        (f"{METHODS}.runge_kutta.gauss:solve_stages", GAUSS),
-        (f"{METHODS}.lagrangian.discrete_lagrangian:increment", STRAIGHT),
-        (f"{METHODS}.library.scipy_ivp:compiled_field", SCIPY),
-        (f"{METHODS}.runge_kutta.explicit:later_stages", {"rk4"}),  # the guard's watch reaches what pairs are made of
-        (f"{METHODS}.lie_group.generalised_alpha:_corrected", {"generalised-alpha"}),
-        (f"{METHODS}.taylor.heyoka:propagate", {"taylor", "taylor-longdouble", "taylor-quad"}),
-        ("symtop.cli.common:as_text symtop.report.page:write symtop.measure.accuracy:error_row", set()),
-    ],
-)
+@pytest.mark.parametrize(("place", "stale"), [
+    (f"{METHODS}.runge_kutta.gauss:solve_stages", GAUSS),
+    (f"{METHODS}.lagrangian.discrete_lagrangian:increment", STRAIGHT),
+    (f"{METHODS}.library.scipy_ivp:compiled_field", SCIPY),
+    (f"{METHODS}.runge_kutta.explicit:later_stages", {"rk4"}),  # the guard's watch reaches what pairs are made of
+    (f"{METHODS}.lie_group.generalised_alpha:_corrected", {"generalised-alpha"}),
+    (f"{METHODS}.taylor.heyoka:propagate", {"taylor", "taylor-longdouble", "taylor-quad"}),
+    ("symtop.cli.common:as_text symtop.report.page:write symtop.measure.accuracy:error_row", set()),
+])  # fmt: skip
 def test_an_edited_kernel_makes_the_cases_that_use_it_stale_and_no_others(everyone, place, stale):
     """In a study that runs every integrator and compares with no reference."""
     assert {name for name in stale_after(place, *everyone) if is_built_in(name)} == stale
 
 
-@pytest.mark.parametrize(
-    "place",
-    ["symtop.model.top:SymmetricTop.potential", "symtop.run.simulation:simulate",
-     "symtop.model.exact.constants:all_constants", "symtop.methods.framework.calling:solve"],
-)  # fmt: skip
+@pytest.mark.parametrize("place", [
+    "symtop.model.top:SymmetricTop.potential", "symtop.run.simulation:simulate",
+    "symtop.model.exact.constants:all_constants", "symtop.methods.framework.calling:solve",
+])  # fmt: skip
 def test_an_edit_of_what_all_cases_reach_makes_all_stale(everyone, place):
     assert stale_after(place, *everyone) == set(symtop.integrators())
 
@@ -115,14 +111,11 @@ def test_measure_code_and_the_reference_make_the_cases_of_their_study_stale():
     assert digests(convergence) == before
 
 
-@pytest.mark.parametrize(
-    ("place", "again"),
-    [
-        ("symtop_studies.cost.cells:winners", True), ("symtop_studies.cost.facts:facts", True),
-        ("symtop.measure.datasets:_dense", True), ("symtop.cli.common:as_text", False),
-        ("symtop_studies.drift.facts:facts", False),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("place", "again"), [
+    ("symtop_studies.cost.cells:winners", True), ("symtop_studies.cost.facts:facts", True),
+    ("symtop.measure.datasets:_dense", True), ("symtop.cli.common:as_text", False),
+    ("symtop_studies.drift.facts:facts", False),
+])  # fmt: skip
 def test_findings_are_made_again_when_what_draws_or_judges_them_is_edited(place, again):
     study = runner.load("cost")
     before = drawing_digest(study, style.save)
@@ -159,7 +152,7 @@ def test_a_case_depends_on_the_integrators_that_its_study_says_it_runs():
     assert fingerprint.uses(of_everyone(), starred) == sorted(symtop.integrators())
 
 
-def test_all_digests_of_all_studies_are_the_same_whatever_the_process_has_run():
+def test_digests_are_the_same_whatever_the_process_has_run_or_registered():
     """Values that calls have left in modules are state and count for nothing."""
     studies = [runner.load(name) for name in ("convergence", "cost", "notebook")]
     cases = [(study, case) for study in studies for case in study.cases(True)[:20]]
@@ -171,8 +164,6 @@ def test_all_digests_of_all_studies_are_the_same_whatever_the_process_has_run():
     forget()
     assert [fingerprint.digest(*one) for one in cases] == before
 
-
-def test_a_function_counts_alike_before_and_after_a_kernel_registers_it():
     def part(x):
         return 2.0 * x
 

@@ -48,29 +48,24 @@ def run_study(folder, change, *words):
     return answer("study", script, "--jobs", 1, "--results", folder / "results", *words)
 
 
-def test_the_study_itself_is_right(tmp_path):
+def test_the_study_itself_is_right_and_none_that_ships_is_replaced(tmp_path, monkeypatch):
     code, output = run_study(tmp_path, "")
     assert code == 0, output
     assert "2 of 2 cases computed, 1 figure" in output
     assert "  worst: 0.25\n" in output
-
-
-def test_a_study_that_ships_is_not_replaced_by_one_of_its_name(tmp_path, monkeypatch):
     monkeypatch.setattr(sys.modules[__name__], "SCRIPT", SCRIPT.replace('name="mine"', 'name="convergence"'))
-    code, output = run_study(tmp_path, "")
+    (tmp_path / "other").mkdir()
+    code, output = run_study(tmp_path / "other", "")
     assert (code, output) == (2, "symtop: study mine.py must have a name that is not taken, not 'convergence'\n")
-    assert not (tmp_path / "results").exists()
+    assert not (tmp_path / "other" / "results").exists()
 
 
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ("cases = lambda quick: None", "cases must return a list of Case, not None"),
-        ("cases = lambda quick: 1 / 0", "cases failed: ZeroDivisionError"),
-        ("cases = lambda quick: [Case('spheroid', 'rk4', {'a': np.arange(3.0)})]", "setting 'a' must be numbers"),
-        ("more = {'uses': lambda case: 1 / 0}", "uses failed: ZeroDivisionError"),
-    ],
-)
+@pytest.mark.parametrize(("change", "says"), [
+    ("cases = lambda quick: None", "cases must return a list of Case, not None"),
+    ("cases = lambda quick: 1 / 0", "cases failed: ZeroDivisionError"),
+    ("cases = lambda quick: [Case('spheroid', 'rk4', {'a': np.arange(3.0)})]", "setting 'a' must be numbers"),
+    ("more = {'uses': lambda case: 1 / 0}", "uses failed: ZeroDivisionError"),
+])  # fmt: skip
 def test_a_grid_that_is_none_is_refused(tmp_path, change, says):
     for words in [(), ("--status",), ("--only", "rk4")][: 3 if "uses" in change else 1]:  # by whichever command
         code, output = run_study(tmp_path, change, *words)
@@ -80,22 +75,19 @@ def test_a_grid_that_is_none_is_refused(tmp_path, change, says):
         assert says in output
 
 
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ("facts = lambda data: None", "facts must return numbers by name, not None"),
-        ("facts = lambda data: {'a b': 1}", "a fact's name must be a word of letters, digits and _, not 'a b'"),
-        ("facts = lambda data: [symtop.simulate('spheroid', 'rk4', step_size=np.nan).title]",
-         "facts failed: step_size must be a finite number"),
-        ("pictures = lambda data: iter([Figure()])", "pictures must return or yield Pictures; an entry is a Figure"),
-        ("pictures = lambda data: [Picture('a', Figure()), Picture('b', Figure()), Picture('a', Figure())]",
-         "pictures must have a name each, and two are called a"),
-        ("pictures = lambda data: (1 / 0 for _ in 'x')", "pictures failed: ZeroDivisionError"),
-        ("tables = lambda data: pd.DataFrame()", "tables must return tables by name, not"),
-        ("tables = lambda data: {'../a': pd.DataFrame()}", "name of a table must be"),
-        ("more = {'charts': lambda data: None}", "charts must return a list of Chart, not None"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("change", "says"), [
+    ("facts = lambda data: None", "facts must return numbers by name, not None"),
+    ("facts = lambda data: {'a b': 1}", "a fact's name must be a word of letters, digits and _, not 'a b'"),
+    ("facts = lambda data: [symtop.simulate('spheroid', 'rk4', step_size=np.nan).title]",
+     "facts failed: step_size must be a finite number"),
+    ("pictures = lambda data: iter([Figure()])", "pictures must return or yield Pictures; an entry is a Figure"),
+    ("pictures = lambda data: [Picture('a', Figure()), Picture('b', Figure()), Picture('a', Figure())]",
+     "pictures must have a name each, and two are called a"),
+    ("pictures = lambda data: (1 / 0 for _ in 'x')", "pictures failed: ZeroDivisionError"),
+    ("tables = lambda data: pd.DataFrame()", "tables must return tables by name, not"),
+    ("tables = lambda data: {'../a': pd.DataFrame()}", "name of a table must be"),
+    ("more = {'charts': lambda data: None}", "charts must return a list of Chart, not None"),
+])  # fmt: skip
 def test_an_answer_of_the_wrong_kind_is_refused_and_the_cases_are_kept(tmp_path, change, says):
     code, output = run_study(tmp_path, change)
     assert code == 2, output
@@ -103,13 +95,6 @@ def test_an_answer_of_the_wrong_kind_is_refused_and_the_cases_are_kept(tmp_path,
     assert output.count("\n") == 1
     assert says in output
     assert len(list(tmp_path.rglob("cases/mine/*.npz"))) == 2
-
-
-def test_a_step_that_is_nan_in_a_measure_is_no_option_of_the_command(tmp_path):
-    change = "measure = lambda case: symtop.simulate(case.scene, case.integrator, step_size=float('nan'))"
-    code, output = run_study(tmp_path, change)
-    assert code == 2
-    assert "study mine: no case could be measured; rk4 on spheroid failed: step_size must be a finite" in output
 
 
 def test_an_answer_may_come_in_any_order_of_things():
@@ -156,7 +141,11 @@ def test_an_edited_list_of_a_study_of_ones_own_is_computed_again(name, tmp_path)
         assert float(xr.load_dataset(tmp_path / "results" / "mine.nc")["err"].max()) == size
 
 
-def test_a_limit_holds_for_cases_that_are_checked_too(tmp_path):
+def test_a_step_that_is_nan_is_no_option_and_a_limit_holds_for_checked_cases_too(tmp_path):
+    change = "measure = lambda case: symtop.simulate(case.scene, case.integrator, step_size=float('nan'))"
+    code, output = run_study(tmp_path, change)
+    assert code == 2
+    assert "study mine: no case could be measured; rk4 on spheroid failed: step_size must be a finite" in output
     slow = "import os, time\ndef measure(case):\n    time.sleep(float(os.environ.get('LATE', '0')))\n"
     slow += "    return xr.Dataset({'err': 1.0})"
     assert run_study(tmp_path, slow)[0] == 0

@@ -4,13 +4,21 @@ import dataclasses
 import json
 
 import numpy as np
+import pytest
 import xarray as xr
+from symtop_studies.grid import grid_scenes
 
 import symtop
 from symtop.core import netcdf
+from symtop.core.errors import SymtopError
+from symtop.measure import datasets
 from symtop.measure.datasets import differences
 from symtop.methods.framework.registry import Integrator
+from symtop.model import scenes as catalogue
+from symtop.model.scenes import TAGS
 from symtop.runner import run as runner, store
+from symtop.runner.run import load
+from symtop.runner.study import Case
 from tests.commands import PROBE, call, contents
 
 
@@ -33,25 +41,8 @@ def test_every_study_leaves_figures_and_findings_that_follow_from_its_dataset(qu
             assert (tmp_path / file).read_bytes() == (quick_results / file).read_bytes(), file
 
 
-# ---- status, fresh, check --------------------------------------------------------------------------------------------
-
-
 def probe(results, *words):
     return call("study", PROBE, "--quick", "--results", results, *words, code=None)
-
-
-def test_status_says_what_is_missing_done_and_stale(tmp_path):
-    assert probe(tmp_path, "--status").output.startswith("probe: 4 missing\n")
-    assert not (tmp_path / "quick").exists()  # looking leaves nothing behind
-    assert probe(tmp_path).exit_code == 0
-    assert probe(tmp_path, "--status").output == "probe: 4 done\n"
-    case = next((tmp_path / "quick" / "cases" / "probe").glob("loop--midpoint*.npz"))
-    older = case.with_name(f"{store.identity_of(case)}--{'0' * 20}.npz")
-    case.rename(older)
-    rows = json.loads(probe(tmp_path, "--status", "--json").output)["probe"]
-    assert [row["state"] for row in rows] == ["done", "done", "stale", "done"]
-    assert "1 of 4 cases computed" in probe(tmp_path).output
-    assert not older.exists()
 
 
 def test_fresh_computes_everything_and_the_files_are_the_same_to_the_byte(tmp_path):
@@ -69,7 +60,18 @@ def test_fresh_computes_everything_and_the_files_are_the_same_to_the_byte(tmp_pa
     assert before == bytes_of()
 
 
-def test_every_file_says_where_it_comes_from(tmp_path):
+def test_status_says_what_is_missing_and_every_file_where_it_comes_from(tmp_path):
+    assert probe(tmp_path, "--status").output.startswith("probe: 4 missing\n")
+    assert not (tmp_path / "quick").exists()  # looking leaves nothing behind
+    assert probe(tmp_path).exit_code == 0
+    assert probe(tmp_path, "--status").output == "probe: 4 done\n"
+    case = next((tmp_path / "quick" / "cases" / "probe").glob("loop--midpoint*.npz"))
+    older = case.with_name(f"{store.identity_of(case)}--{'0' * 20}.npz")
+    case.rename(older)
+    rows = json.loads(probe(tmp_path, "--status", "--json").output)["probe"]
+    assert [row["state"] for row in rows] == ["done", "done", "stale", "done"]
+    assert "1 of 4 cases computed" in probe(tmp_path).output
+    assert not older.exists()
     assert probe(tmp_path).exit_code == 0
     for name, data in contents(tmp_path / "quick", provenance=True).items():
         expected = set(netcdf.provenance())
@@ -140,9 +142,6 @@ def test_the_full_grid_and_the_ordinary_one_keep_each_others_cases(tmp_path):
     assert [row["state"] for row in computed("--status")["grids"]] == ["done", "done"]
 
 
-# ---- failures --------------------------------------------------------------------------------------------------------
-
-
 def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path, clean_registry):
     def solve(top, start, plan):
         raise RuntimeError("no luck")
@@ -158,3 +157,115 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path, clean_registr
     assert failure == "unlucky[angles] on goldstein failed: integrator unlucky[angles] failed: RuntimeError: no luck"
     assert list(netcdf.read(tmp_path / "stability.nc")["variant"].values) == ["midpoint[angles]"]
     assert runner.run(small, tmp_path, quick=True, quiet=True)["failures"]  # tried again, not forgotten
+
+
+BUILT_IN = ("convergence", "drift", "claims")
+
+
+def scenes_of(study: str, *, quick: bool = False) -> list[str]:
+    return list(dict.fromkeys(case.scene for case in load(study).cases(quick)))
+
+
+@pytest.fixture
+def new_scene(monkeypatch):
+    """A scene that somebody has added to the catalogue of the package."""
+    scene = dataclasses.replace(symtop.scene("loop"), name="brand-new", tags=())
+    known = catalogue._catalogue()
+    monkeypatch.setattr(catalogue, "_catalogue", lambda: {**known, scene.name: scene})
+    return scene
+
+
+@pytest.mark.parametrize("study", BUILT_IN)
+@pytest.mark.parametrize("quick", [False, True])
+def test_a_scene_that_joins_the_catalogue_is_in_every_study(study, quick, new_scene):
+    assert scenes_of(study, quick=quick)[-1] == new_scene.name
+
+
+def test_scenes_are_left_out_by_the_question_and_by_their_tags():
+    assert "separatrix" not in grid_scenes({}, lambda scene: scene.nutation_period < 70.0)
+    assert "separatrix" in grid_scenes({})
+    assert grid_scenes(TAGS) == ["spheroid"]
+    assert "loop" in grid_scenes({"steady": "no nutation"})
+    assert "steady" not in grid_scenes({"steady": "no nutation"})
+    with pytest.raises(symtop.SymtopError, match="left_out 'staedy' is unknown; did you mean steady"):
+        grid_scenes({"staedy": "no nutation"})
+
+
+LONG = xr.Dataset({"energy": ("window", [1.0, 2.0, 3.0]), "outcome": "ok", "steps": 3})
+SHORT = xr.Dataset({"energy": ("window", [4.0]), "outcome": "ok", "steps": 1})
+PHASE = xr.Dataset({"energy": ("sample", np.arange(4, dtype=np.uint8))})
+
+
+def tree(phase: xr.Dataset = PHASE) -> xr.DataTree:
+    return datasets.combine([
+        (Case("spheroid", "midpoint", group="windows"), LONG),
+        (Case("goldstein", "midpoint", group="windows"), SHORT),
+        (Case("spheroid", "strang", group="phases"), phase),
+    ])  # fmt: skip
+
+
+def test_single_precision_stays_and_is_stored_in_little_space(tmp_path):
+    """Ten bits of each number; the same in double precision, which is not compressed, for comparison."""
+    size, power = np.frexp(np.random.default_rng(1).lognormal(size=(3, 40_000)))
+    rounded = np.ldexp(np.rint(np.ldexp(size, 10)), power - 10)
+    sizes = {}
+    for kind in (np.float32, np.float64):
+        cases = [(Case("spheroid", name), xr.Dataset({"cost": ("member", row.astype(kind)[: 40_000 - (k == 2)])}))
+                 for k, (name, row) in enumerate(zip(("rk4", "strang", "midpoint"), rounded, strict=True))]  # fmt: skip
+        data = datasets.combine(cases)
+        path = netcdf.write(data, tmp_path / f"{kind.__name__}.nc")
+        again = netcdf.read(path)["cost"].sel(scene="spheroid")
+        assert again.dtype == kind
+        np.testing.assert_array_equal(again.values[:2], rounded[:2])
+        assert np.isnan(again.values[2, -1])  # what a shorter case does not fill
+        sizes[kind] = path.stat().st_size
+    assert sizes[np.float32] < 0.25 * sizes[np.float64]
+
+
+def test_a_tree_is_read_as_it_was_written_and_a_check_names_the_group_that_differs(tmp_path):
+    data = netcdf.describe(tree(), "Groups", question="Does it come back?")
+    path = netcdf.write(data, tmp_path / "groups.nc")
+    again = netcdf.read_any(path)
+    assert differences(data, again) == []
+    assert again["phases/energy"].dtype == np.uint8
+    assert again.attrs["question"] == "Does it come back?"
+    assert again["windows/energy"].attrs["long_name"] == "total energy"
+    assert differences(tree(), tree()) == []
+    (difference,) = differences(tree(), tree(PHASE + np.uint8(1)))
+    assert difference.startswith("phases: energy differs")
+    partial = tree()
+    del partial["phases"]
+    assert differences(tree(), partial) == ["group phases is in one of them only"]
+    assert differences(LONG, LONG) == []
+
+
+def test_cases_that_would_replace_each_other_or_have_no_group_are_refused():
+    """A study of three steps of each method, say, whose cases differ in their settings alone."""
+    steps = [(Case("spheroid", "rk4", {"n": n}), LONG) for n in (6, 3)]
+    with pytest.raises(SymtopError, match="two cases of rk4 on spheroid measure energy, and one would replace the"):
+        datasets.combine(steps)
+    other = LONG.rename(energy="seconds", outcome="told", steps="calls")
+    both = datasets.combine([steps[0], (steps[1][0], other)])  # the control: a round that measures something else
+    assert {"energy", "seconds"} <= set(both.data_vars)
+    separate = datasets.combine([(Case("spheroid", "rk4", {"n": n}, group=f"n-{n}"), LONG) for n in (6, 3)])
+    assert set(separate.children) == {"n-6", "n-3"}
+    cases = [(Case("spheroid", "midpoint"), LONG), (Case("spheroid", "strang", group="windows"), LONG)]
+    with pytest.raises(SymtopError, match="case spheroid--midpoint has no group"):
+        datasets.combine(cases)
+
+
+def test_cases_that_differ_in_their_group_alone_have_files_and_scenes_of_their_own(tmp_path):
+    data = tree()
+    assert isinstance(data, xr.DataTree)
+    assert not data.to_dataset().variables
+    assert dict(data["windows"].sizes) == {"scene": 2, "variant": 1, "window": 3}
+    assert dict(data["phases"].sizes) == {"scene": 1, "variant": 1, "sample": 4}
+    short = data["windows/energy"].sel(scene="goldstein", variant="midpoint").values
+    np.testing.assert_array_equal(short, [4.0, np.nan, np.nan])
+    from symtop.runner.run import load
+
+    study = load("drift")
+    cases = [Case("spheroid", "strang", {"steps": 1}, group=group) for group in ("windows", "rounding")]
+    paths = [store.case_path(tmp_path, study, case) for case in cases]
+    assert len({store.identity_of(path) for path in paths}) == 2
+    assert len({store.digest_of(path) for path in paths}) == 2

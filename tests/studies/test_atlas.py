@@ -80,16 +80,6 @@ def test_columns_that_are_run_together_have_the_bits_of_runs_one_by_one(name, mo
         np.testing.assert_array_equal(values, others)
 
 
-def test_errors_are_followed_where_they_are_asked_for():
-    """A column that is not followed has the same verdicts, and an error that is too large where the run is wrong."""
-    spins, method = [0.3, 1.0, 8.0], integrator("strang")
-    whole, one = (outcome_map("cusp", spins, method, STEPS, 12.0, followed) for followed in (None, [3]))
-    np.testing.assert_array_equal(whole.verdict, one.verdict)
-    np.testing.assert_array_equal(whole.axis_error[:, 3], one.axis_error[:, 3])
-    np.testing.assert_array_equal(whole.axis_error[whole.verdict == 0], one.axis_error[whole.verdict == 0])
-    assert (one.axis_error < whole.axis_error).any()
-
-
 SETTLING = {"strang": np.geomspace(0.01, 2.0, 40), "gauss-4": np.geomspace(0.02, 2.0, 30),
             "stormer-verlet": np.geomspace(0.01, 0.5, 30), "rk45-compiled": np.geomspace(1e-9, 0.1, 30)}  # fmt: skip
 
@@ -134,16 +124,14 @@ def test_a_top_that_had_settled_and_is_not_accurate_is_run_at_every_setting(monk
     assert (after.verdict[1] == VERDICTS.index("drifting")).sum() == 2
 
 
-def test_adaptive_methods_are_mapped_over_their_tolerance():
-    runs = outcome_map("cusp", [1.0], integrator("rk45-compiled"), [1e-10, 1e-6, 0.3], 12.0)
-    assert [VERDICTS[k] for k in runs.verdict[0][:2]] == ["accurate", "accurate"]
-    assert VERDICTS[runs.verdict[0][2]] != "accurate"
-    assert runs.axis_error[0, 0] < 1e-6 < runs.axis_error[0, 1]
-    exact = outcome_map("cusp", [0.3, 3.0], integrator("exact"), [math.nan], 12.0)
-    assert (exact.verdict == 0).all()
-
-
-def test_rows_share_phases_and_are_not_commensurate_with_the_nutation():
+def test_rows_share_phases_and_errors_are_followed_where_they_are_asked_for():
+    """A column that is not followed has the same verdicts, and an error that is too large where the run is wrong."""
+    spins, method = [0.3, 1.0, 8.0], integrator("strang")
+    whole, one = (outcome_map("cusp", spins, method, STEPS, 12.0, followed) for followed in (None, [3]))
+    np.testing.assert_array_equal(whole.verdict, one.verdict)
+    np.testing.assert_array_equal(whole.axis_error[:, 3], one.axis_error[:, 3])
+    np.testing.assert_array_equal(whole.axis_error[whole.verdict == 0], one.axis_error[whole.verdict == 0])
+    assert (one.axis_error < whole.axis_error).any()
     runs = row_plan(integrator("strang"), [0.01, 0.25, 2.0], 12.0)
     assert [marks[-1] for marks in runs.marks] == [1200, 48, 6]
     assert np.isnan(runs.phases[2]).sum() == 49 - 7
@@ -155,7 +143,7 @@ def test_rows_share_phases_and_are_not_commensurate_with_the_nutation():
     assert [piece.stop - piece.start for piece in together_in(near, 1, alone={1, 2})] == [2, 1, 1, 1, 1, 1]
 
 
-def test_the_families_are_what_they_say():
+def test_the_families_are_what_they_say_and_limits_end_at_verlets_and_rk4s():
     for ratio in (0.1, 1.0, 30.0):
         spun = with_spin(scene("cusp"), ratio)
         assert spun.start.spin * spun.top.I3 / (2.0 * math.sqrt(spun.top.I1 * spun.top.mgl)) == pytest.approx(ratio)
@@ -163,10 +151,7 @@ def test_the_families_are_what_they_say():
     free = symtop.Scene("free", symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(theta=1.0, psi_dot=2.0), 1.0)
     assert spin_unit(free) == 1.0
     assert closed_form(family("grazing")(1e-3)).theta_range[0] == pytest.approx(1.1e-3, rel=0.05)
-
-
-def test_limits_over_a_family_end_at_verlets_and_rk4s():
-    """A fast top's nutation is harmonic: h omega = 2 is 1/pi of a nutation, 2 sqrt 2 of one for rk4."""
+    # A fast top's nutation is harmonic: h omega = 2 is 1/pi of a nutation, 2 sqrt 2 of one for rk4.
     limit, third = family_limits("cusp", integrator("stormer-verlet"), 30.0, 2.0)
     assert limit == pytest.approx(1.0 / math.pi, rel=1e-3)
     assert third == pytest.approx(math.sqrt(3.0) / (2.0 * math.pi), rel=1e-3)
@@ -197,7 +182,15 @@ def hand_made(
 A, B, L = "accurate", "bounded_but_wrong", "left_chart"
 
 
-def test_reach_and_failures_are_read_off_the_map():
+def failing(*shares, starts=20, word="drifting"):
+    """From which step on a map fails of which these shares of the starts do, step by step."""
+    columns = [[word] * round(share * starts) + [A] * (starts - round(share * starts)) for share in shares]
+    control, parameter = np.geomspace(0.01, 1.0, len(shares)), np.geomspace(0.1, 30.0, starts)
+    data = hand_made(np.array(columns).T.tolist(), control, parameter)
+    return atlas.maps(data, "cusp")["midpoint"].failure.setting
+
+
+def test_thresholds_hold_at_every_larger_step_and_reach_and_failures_are_read_off():
     data = hand_made([[A, B, L, L, L], [A, B, L, L, L], [A, A, L, L, L], [A, A, B, B, B]], (0.01, 0.1, 1.0, 1.5, 2.0))
     one = atlas.maps(data, "cusp")["midpoint"]
     assert one.usual_reach == {"fast": 0.1, "slow": 0.01}
@@ -207,18 +200,7 @@ def test_reach_and_failures_are_read_off_the_map():
     row = facts.tables(data)["atlas"].iloc[0]
     assert (row["accurate up to, fast tops"], row["fails from"], row["fails mostly by"]) == (0.1, 1.0, "left chart")
     assert row["accurate (%)"] == pytest.approx(30.0)
-
-
-def failing(*shares, starts=20, word="drifting"):
-    """From which step on a map fails of which these shares of the starts do, step by step."""
-    columns = [[word] * round(share * starts) + [A] * (starts - round(share * starts)) for share in shares]
-    control, parameter = np.geomspace(0.01, 1.0, len(shares)), np.geomspace(0.1, 30.0, starts)
-    data = hand_made(np.array(columns).T.tolist(), control, parameter)
-    return atlas.maps(data, "cusp")["midpoint"].failure.setting
-
-
-def test_a_threshold_holds_at_every_larger_step():
-    """Five steps from 0.01 to 1: 0.01, 0.032, 0.1, 0.32, 1."""
+    # Five steps from 0.01 to 1: 0.01, 0.032, 0.1, 0.32, 1.
     assert failing(0.0, 0.9, 0.6, 0.7, 1.0) == pytest.approx(10.0**-1.5)
     assert failing(0.7, 0.4, 0.6, 0.7, 1.0) == pytest.approx(0.1)
     for none in ((0.05, 0.0, 0.0), (0.6, 0.0, 0.2), (0.0, 0.1, 0.2, 0.4, 0.6), (0.0, 0.0, 0.0)):
@@ -237,15 +219,40 @@ def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
     assert shapes == {"strang": (2, 2), "midpoint": (3, 3)}
 
 
-def test_a_pole_that_halves_the_reach_is_told_from_one_that_does_not():
+def spins(**made):
+    """Maps over three slow and three fast tops, at three settings, by variant."""
+    cells = []
+    for name, (control, lines) in made.items():
+        data = hand_made(lines, parameter=(0.2, 0.5, 0.8, 4.0, 8.0, 16.0), knob_name=control)
+        chart = "angles" if name.startswith("angles_") else "axis"
+        case = Case("cusp", f"{name.removeprefix('angles_')}[{chart}]")
+        cells.append((case, data.sel(scene="cusp", variant="midpoint", drop=True)))
+    return datasets.combine(cells)
+
+
+SLOW_FINER, FAST_FINER = [[A, L, L]] * 3 + [[A, A, L]] * 3, [[A, A, L]] * 3 + [[A, L, L]] * 3
+
+
+def test_a_pole_that_halves_the_reach_is_told_and_variants_that_reach_equally_far_are_all_named():
     gaps = (1e-6, 1e-5, 1e-2, 0.2)
     near = hand_made([[L, L, L], [L, L, L], [A, L, L], [A, A, L]], parameter=gaps, scene_name="grazing")
     assert atlas.halved_by_pole(atlas.maps(near, "grazing")["midpoint"]) is True
     unspoiled = hand_made([[A, A, L]] * 4, parameter=gaps, scene_name="grazing")
     assert atlas.halved_by_pole(atlas.maps(unspoiled, "grazing")["midpoint"]) is False
+    data = spins(rk4=("step_size", SLOW_FINER), strang=("step_size", SLOW_FINER), rk45=("tolerance", FAST_FINER),
+                 angles_rk45=("tolerance", SLOW_FINER), angles_dop853=("tolerance", FAST_FINER))  # fmt: skip
+    answers = facts.atlas_facts(data, "cusp")
+    assert [answers[name] for name in ("slow_shorter", "stepped", "slow_finer", "in_angles")] == [2, 2, 1, 2]
+    assert (answers["fast_finer"], answers["not_angles"]) == (1, 1)
+    data = spins(rk4=("step_size", SLOW_FINER), strang=("step_size", SLOW_FINER), cayley=("step_size", [[A, L, L]] * 6))
+    answers = facts.atlas_facts(data, "cusp")
+    assert answers["fast_variant"] == "`rk4[axis]` and `strang[axis]`"
+    assert answers["slow_variant"].count("`") == 6
+    no_fast_tops = hand_made([[A, L, L]] * 2, parameter=(0.2, 0.5))
+    assert "fast_reach" not in facts.atlas_facts(no_fast_tops, "cusp")
 
 
-def test_runs_that_outlast_the_law_of_the_separatrix_are_not_counted():
+def test_runs_that_outlast_the_law_are_not_counted_nor_floors_of_ratios_and_windows_count_without_a_limit():
     columns = {
         "early_error": (("variant", "setting"), [[1e-6, 1e-8], [1e-6, 1e-8]]),
         "predicted_horizon": (("variant", "setting"), [[29.0, 38.2], [29.0, 38.2]]),
@@ -263,48 +270,11 @@ def test_runs_that_outlast_the_law_of_the_separatrix_are_not_counted():
     assert mechanisms.misses(part) == pytest.approx([0.5])
     answers = facts.separatrix_facts(part)
     assert (answers["law_runs"], answers["law_early"]) == (1, 1)
-
-
-def test_a_window_of_growth_is_counted_where_there_is_no_limit_beyond_it():
     columns = {"limit_phase": ("variant", [math.nan, 5.9, 2.0, math.nan]),
                "window_start": ("variant", [6.28, 3.14, math.nan, math.nan])}  # fmt: skip
     names = ["srkn-11-6[axis]", "strang[axis]", "stormer-verlet[angles]", "cayley[axis]"]
     known = dict(zip(names, (6.28, 3.14, 2.0), strict=False))
     assert mechanisms.limits(xr.Dataset(columns, coords={"variant": names})) == known
-
-
-def spins(**made):
-    """Maps over three slow and three fast tops, at three settings, by variant."""
-    cells = []
-    for name, (control, lines) in made.items():
-        data = hand_made(lines, parameter=(0.2, 0.5, 0.8, 4.0, 8.0, 16.0), knob_name=control)
-        chart = "angles" if name.startswith("angles_") else "axis"
-        case = Case("cusp", f"{name.removeprefix('angles_')}[{chart}]")
-        cells.append((case, data.sel(scene="cusp", variant="midpoint", drop=True)))
-    return datasets.combine(cells)
-
-
-SLOW_FINER, FAST_FINER = [[A, L, L]] * 3 + [[A, A, L]] * 3, [[A, A, L]] * 3 + [[A, L, L]] * 3
-
-
-def test_it_is_counted_which_tops_need_the_finer_setting():
-    data = spins(rk4=("step_size", SLOW_FINER), strang=("step_size", SLOW_FINER), rk45=("tolerance", FAST_FINER),
-                 angles_rk45=("tolerance", SLOW_FINER), angles_dop853=("tolerance", FAST_FINER))  # fmt: skip
-    answers = facts.atlas_facts(data, "cusp")
-    assert [answers[name] for name in ("slow_shorter", "stepped", "slow_finer", "in_angles")] == [2, 2, 1, 2]
-    assert (answers["fast_finer"], answers["not_angles"]) == (1, 1)
-
-
-def test_variants_that_reach_equally_far_are_all_named():
-    data = spins(rk4=("step_size", SLOW_FINER), strang=("step_size", SLOW_FINER), cayley=("step_size", [[A, L, L]] * 6))
-    answers = facts.atlas_facts(data, "cusp")
-    assert answers["fast_variant"] == "`rk4[axis]` and `strang[axis]`"
-    assert answers["slow_variant"].count("`") == 6
-    no_fast_tops = hand_made([[A, L, L]] * 2, parameter=(0.2, 0.5))
-    assert "fast_reach" not in facts.atlas_facts(no_fast_tops, "cusp")
-
-
-def test_an_energy_error_that_no_sample_sees_is_no_ratio_of_a_floor():
     columns = {"energy_once": ("variant", [0.0, 5e-9, 2e-5, 1e-16]),
                "energy_every": ("variant", [4.2e-8, 2.5e-4, 3e-5, 1e-15])}  # fmt: skip
     part = xr.Dataset(columns, coords={"variant": ["yoshida-4", "stormer-verlet", "rkmk-se3-2", "gauss-4"]})
@@ -322,9 +292,6 @@ def test_the_midpoint_rule_is_known_by_its_nodes_and_not_by_its_name():
     assert "plain_energy" in one
     xr.testing.assert_identical(one, other)
     assert "plain_energy" not in sampling_table("goldstein", integrator("trapezoidal"), settings)
-
-
-# ---- the page --------------------------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
@@ -359,19 +326,22 @@ def test_facts_are_those_of_the_mechanisms(measured):
     assert table["accurate (%)"].is_monotonic_decreasing
 
 
-def test_what_was_not_measured_is_none_and_not_a_number():
+def test_the_page_says_what_was_measured_and_what_was_not_is_none(measured, tmp_path):
     answers = facts.facts(hand_made([[A, B, L]] * 4))
     assert (answers["settled"], answers["cells"], answers["resonant"], answers["others"]) == (0.0, 12, None, None)
     assert facts.tables(hand_made([[A, B, L]] * 4))["limits"].empty
-
-
-def test_the_page_says_what_was_measured(measured, tmp_path):
     text = checked("stability", measured, tmp_path)
     answers = facts.facts(measured)
     assert f"{answers['angles_halved']} of 2 variants in Euler's angles" in text
 
 
-def test_a_run_whose_steps_shrink_until_they_vanish_ends_at_the_budget():
+def test_adaptive_methods_are_mapped_over_their_tolerance_to_their_budget():
+    runs = outcome_map("cusp", [1.0], integrator("rk45-compiled"), [1e-10, 1e-6, 0.3], 12.0)
+    assert [VERDICTS[k] for k in runs.verdict[0][:2]] == ["accurate", "accurate"]
+    assert VERDICTS[runs.verdict[0][2]] != "accurate"
+    assert runs.axis_error[0, 0] < 1e-6 < runs.axis_error[0, 1]
+    exact = outcome_map("cusp", [0.3, 3.0], integrator("exact"), [math.nan], 12.0)
+    assert (exact.verdict == 0).all()
     loose = np.geomspace(1e-10, 0.5, 25)[[12, 22]].tolist()
     top = family("cusp")(float(np.geomspace(0.1, 30.0, 120)[23]))
     made = outcome_maps.one_by_one(row_plan(integrator("adams[axis]"), loose, 10.0), "axis", top)

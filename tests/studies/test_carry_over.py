@@ -1,21 +1,25 @@
 """What carries over: errors and truth of bodies by other ways, planted differences that are seen, verdicts."""
 
 import re
+from dataclasses import dataclass
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 import xarray as xr
-from scipy.stats import kendalltau
-from symtop_studies.carry_over import comparison as by, facts, figures, measures
+from scipy.linalg import expm
+from symtop_studies.carry_over import comparison as by, facts, figures, limits as of, measures
 from symtop_studies.carry_over.bodies import FAMILIES, FREE, SYMMETRIC, Bodies, as_tops, bodies_of, run_level
 from symtop_studies.carry_over.measures import ASYMPTOTE, growth_table, observed_order, own_table, table, verdicts
 from symtop_studies.cost.ladder import LEVELS, Climb, one_by_one, setting_of
 from symtop_studies.cost.tops import FIRST, MOMENTA
+from symtop_studies.stability.linear_limits import sign_changes, sleep_margin
 
 import symtop
 from symtop.methods.framework.plan import NOT_CONVERGED, NOT_NORMALISED, OK, Plan
 from symtop.methods.framework.registry import integrator
-from symtop.model.charts import attitude_distance
+from symtop.model.charts import BODY, attitude_distance
 
 COUNT, PERIODS = 4, 5.0
 
@@ -100,7 +104,7 @@ def test_a_setting_that_meets_a_target_meets_it():
     assert (ratio < 5.0).all()
 
 
-def test_wrong_runs_are_told_by_whether_something_shows_it():
+def test_wrong_runs_are_told_by_what_shows_them_and_orders_and_exponents_read_off():
     errors = {"axis": [0.01, 1.0, 1.0, np.inf], "energy": [0.0, 1e-3, 0.5, 0.0], MOMENTA: [0.0, 0.0, 0.0, 0.0]}
     blank = np.full((LEVELS, 4), np.nan)
     work, each = blank.copy(), {name: blank.copy() for name in errors}
@@ -112,9 +116,6 @@ def test_wrong_runs_are_told_by_whether_something_shows_it():
     done = Climb(work, each, ended, np.array([True, False, False, False]))
     assert verdicts(done)[0].tolist() == [1.0, 3.0, 2.0, 2.0]
     assert verdicts(done)[1].tolist() == [1.0, 0.0, 0.0, 0.0]
-
-
-def test_orders_and_exponents_are_read_off():
     low, high = ASYMPTOTE
     errors = np.full((LEVELS, 3), np.nan)
     errors[:6] = 1e-2 * 2.0 ** (-4.0 * np.arange(6))[:, np.newaxis]
@@ -152,17 +153,7 @@ def costs_of(medians, bodies=60, seed=0):
                     np.full(len(medians), 0.02))  # fmt: skip
 
 
-def test_tau_is_kendalls_with_ties():
-    generator = np.random.default_rng(1)
-    for _ in range(20):
-        first, second = (generator.integers(0, 8, 15).astype(float) for _ in range(2))
-        assert by.tau_of(first, second) == pytest.approx(kendalltau(first, second).statistic)
-    reached = np.array([1.0, 2.0, 3.0, 1e300, 1e300])
-    assert by.tau_of(reached, reached) == 1.0  # those that nobody reaches say nothing
-    assert np.isnan(by.tau_of(reached[3:], reached[3:]))
-
-
-def test_a_planted_difference_of_rankings_is_seen_and_scatter_is_none():
+def test_a_planted_difference_of_rankings_is_seen_and_scatter_is_none_nor_prices_of_what_is_not_reached():
     medians, rows = 1e-6 * 1.6 ** np.arange(20), ([*range(20)],) * 2
     same = by.bootstrap_tau(costs_of(medians), costs_of(3.0 * medians, seed=1), rows, paired=False)
     assert by.ranking_verdict(same) == by.YES
@@ -173,9 +164,6 @@ def test_a_planted_difference_of_rankings_is_seen_and_scatter_is_none():
     assert partly.low <= partly.value <= partly.high < same.low
     turned = by.bootstrap_tau(costs_of(medians), costs_of(medians[::-1], seed=1), rows, paired=True)
     assert turned.value < -0.9
-
-
-def test_prices_do_not_rank_methods_that_reach_nothing():
     half, rows = 1e-6 * 1.6 ** np.arange(20), ([*range(20)],) * 2
     half[10:] = np.inf
     first, second = costs_of(half), costs_of(np.roll(half, 5), seed=1)
@@ -193,7 +181,16 @@ def test_steps_beyond_the_budget_are_no_steps_that_carry_over(beyond, verdict):
     assert facts.pooled([each]).verdict == verdict
 
 
-def test_verdicts_follow_the_limits_that_were_fixed_before():
+def test_tau_is_kendalls_with_ties_and_verdicts_follow_limits_fixed_before():
+    from scipy.stats import kendalltau  # a second to import
+
+    generator = np.random.default_rng(1)
+    for _ in range(20):
+        first, second = (generator.integers(0, 8, 15).astype(float) for _ in range(2))
+        assert by.tau_of(first, second) == pytest.approx(kendalltau(first, second).statistic)
+    reached = np.array([1.0, 2.0, 3.0, 1e300, 1e300])
+    assert by.tau_of(reached, reached) == 1.0  # those that nobody reaches say nothing
+    assert np.isnan(by.tau_of(reached[3:], reached[3:]))
     for ends, verdict in (((0.91, 0.99), by.YES), ((0.7, 0.95), by.PARTLY), ((0.6, 0.79), by.NO)):
         assert by.ranking_verdict(by.Interval(0.85, *ends)) == verdict
     assert [by.factor_verdict(one) for one in (1.05, 1.0 / 1.05, 1.8, 0.6, 2.5, 0.3)] == [
@@ -243,11 +240,10 @@ def planted(factor):
     return xr.DataTree.from_dict({"/short": short, "/prices": prices, "/bodies": about})
 
 
-@pytest.mark.parametrize(
-    ("gap", "verdict", "words"),
-    [(0.2503, by.NO, "1 of 2 exponents within 0.25, all within 0.26"), (0.2497, by.YES, "2 of 2 .*, all within 0.25"),
-     (0.5, by.NO, "1 of 2 .*, all within 0.5$")],
-)  # fmt: skip
+@pytest.mark.parametrize(("gap", "verdict", "words"), [
+    (0.2503, by.NO, "1 of 2 exponents within 0.25, all within 0.26"), (0.2497, by.YES, "2 of 2 .*, all within 0.25"),
+    (0.5, by.NO, "1 of 2 .*, all within 0.5$"),
+])  # fmt: skip
 def test_a_gap_that_is_shown_is_no_smaller_than_the_gap(gap, verdict, words, monkeypatch):
     """0.2503 is not within 0.25."""
     monkeypatch.setattr(facts, "exponent_gaps", lambda *_: {"rk4, attitude": gap, "rk4, energy": 0.01})
@@ -290,3 +286,117 @@ def test_a_method_that_no_step_within_the_budget_makes_safe_is_counted(unserved,
     assert drawn_texts == ({"+1"} if unserved else set())
     everyone_beyond = facts.pooled([{"strang[body]": np.inf}])
     assert everyone_beyond.words == "1 of 1 beyond the budget"
+
+
+GRID = 0.1
+
+
+@dataclass
+class Longer:
+    """A solver whose steps are longer than it says: a planted lower limit."""
+
+    solver: Any
+    factor: float
+
+    def many(self, rows, h, marks):
+        return self.solver.many(rows, self.factor * h, marks)
+
+
+def stretched(name, factor):
+    return SimpleNamespace(solvers={BODY: Longer(integrator(f"{name}[{BODY}]").solvers[BODY], factor)})
+
+
+def tilted(n, size=0.05):
+    return np.tile([size, 0.0, 0.0, 0.0], (n, 1))
+
+
+def limit(variant, bodies):
+    omega, _, stable = of.reach(bodies, tilted(len(bodies.spin)))
+    assert stable.all()
+    return of.limits(variant, bodies, omega, GRID)
+
+
+@pytest.mark.parametrize("spin", [2.5, 3.0, 4.0])
+def test_a_body_that_is_a_top_has_the_limit_that_the_study_of_stability_finds(spin):
+    bodies = of.Upright(np.ones((1, 3)), np.ones(1), np.array([spin]))
+    omega = of.reach(bodies, tilted(1))[0]
+    ends = sign_changes(lambda h: sleep_margin(integrator("strang"), spin, h), np.linspace(0.05, 8.0 / spin, 300))
+    assert limit(integrator("strang[body]"), bodies) / omega == pytest.approx(ends[:1], rel=1e-5)
+    assert limit(stretched("strang", 1.05), bodies) / omega == pytest.approx([ends[0] / 1.05], rel=1e-5)
+
+
+def test_a_body_that_hangs_has_the_limits_of_the_oscillator_and_a_planted_one_is_seen():
+    """rk4 2 sqrt 2, the splitting of kicks and free motion 2, whatever the moments; tops have 2.83 in angles too."""
+    bodies = of.Upright(np.array([[1.0, 1.3, 0.5], [1.0, 1.0, 0.5]]), -np.ones(2), np.zeros(2))
+    for name, known in (("rk4", np.sqrt(8.0)), ("strang", 2.0)):
+        assert limit(integrator(f"{name}[{BODY}]"), bodies) == pytest.approx([known] * 2, rel=1e-4)
+        assert limit(stretched(name, 1.25), bodies) == pytest.approx([known / 1.25] * 2, rel=1e-4)
+
+
+@pytest.mark.parametrize("family", ["0.3", FREE])
+def test_small_motions_are_those_of_the_matrix(family):
+    bodies, time = of.upright(family, 4, 3), 1.7
+    y = np.tile([3e-6, -2e-6, 1e-6, 4e-6], (4, 1))
+    out = of.displaced(integrator("kahan-li-8[body]"), bodies.rows(y[:, None])[:, 0], np.full(4, time / 400),
+                       np.array([400]))[:, 0]  # fmt: skip
+    right = np.stack([expm(time * slopes) @ one for slopes, one in zip(bodies.slopes, y, strict=True)])
+    np.testing.assert_allclose(out, right, atol=1e-11)
+    wrong = of.upright(SYMMETRIC, 4, 3)
+    far = np.stack([expm(time * slopes) @ one for slopes, one in zip(wrong.slopes, y, strict=True)])
+    assert np.abs(out - far).max(axis=1).min() > 1e-8
+
+
+def test_a_tilt_grows_beyond_the_limit_alone_and_an_unstable_rotation_has_no_limit(monkeypatch):
+    variant, bodies = integrator("strang[body]"), of.upright("0.3", 6, 1)
+    omega, most, _ = of.reach(bodies, tilted(6))
+    ends = of.limits(variant, bodies, omega, GRID)
+    h = ends[:, None] * np.array([0.05, 0.2, 1.02]) / omega[:, None]
+    far = of.radius(variant, bodies, h)[:, 2] > 1.05  # one body has left a narrow window by then
+    assert far.sum() == 5
+    assert of.grown(variant, bodies, h, tilted(6), most).tolist() == [[False, False, grows] for grows in far]
+    falls = of.Upright(np.array([[1.0, 1.1, 0.5], [1.0, 1.3, 1.15]]), np.array([1.0, 0.0]), np.array([0.5, 3.0]))
+    assert not of.reach(falls, tilted(2))[2].any()  # too slow to sleep; about the middle axis
+    monkeypatch.setattr(of, "upright", lambda family, count, seed: falls)
+    table = of.steady_table(variant, 2, 1, 1.0, 2)
+    assert (table["limit"] == 0.0).all()
+    assert table["grown"].isnull().all()
+
+
+def test_engines_that_leave_out_a_term_lose_bodies_and_those_of_order_four_do_not():
+    drawn = {name: bodies_of(name, 6, 1, 10.0) for name in (SYMMETRIC, "0.3")}
+    bad, good = (of.engine_table(integrator(f"{name}[{BODY}]"), drawn) for name in ("no-gyro", "rkmk4"))
+    assert not good["lost"].any()
+    assert bad["lost"].mean() > 0.3
+    ratio = (good["error"].isel(steps=0) / good["error"].isel(steps=1)).median("member")
+    assert (ratio > 4.0**3).all()  # of order four, two halvings of the step
+    assert (ratio < 4.0**5).all()
+
+
+def dataset(limits, grown, errors):
+    """Two methods and six maps on ten bodies of each family: numbers by family, a row of errors by map."""
+    steady = {name: (("variant", "family", "member"), np.broadcast_to(
+        np.array([given[one] for one in of.STEADY])[None, :, None], (2, len(of.STEADY), 10)))
+        for name, given in (("limit", limits), ("grown", grown))}  # fmt: skip
+    error = np.array([errors[name] for name in FAMILIES]).T[:, :, None, None] * np.ones((1, 1, 2, 10))
+    over = ("variant", "family", "steps", "member")
+    engines = xr.Dataset({"error": (over, error), "lost": (over, 1.0 * (error > 3.0))},
+                         {"variant": [f"map-{k}[body]" for k in range(6)], "family": [*FAMILIES]})  # fmt: skip
+    first = xr.Dataset(steady, {"variant": ["strang[body]", "rk4[body]"], "family": list(of.STEADY)})
+    return xr.DataTree.from_dict({"/steady": first.expand_dims("scene"), "/engines": engines.expand_dims("scene")})
+
+
+def test_planted_limits_resonances_and_rankings_of_engines_are_found():
+    row = 2.0 ** np.arange(-3.0, 3.0)
+    errors = dict.fromkeys(FAMILIES, row) | {FREE: row[::-1], "0.1": 0.99 * row}
+    limits = dict.fromkeys(of.STEADY, 2.0) | {"0.1": 1.2, "0.3": 0.8, FREE: np.nan}
+    grown = dict.fromkeys(of.STEADY, 0.02) | {"0.1": 0.05, "0.3": 0.2}
+    data = dataset(limits, grown, errors)
+    told = {family: [cell(data, family)[1] for cell in (facts.limit_cell, facts.resonance_cell, facts.engine_cell)]
+            for family in ("0.01", "0.1", "0.3", FREE)}  # fmt: skip
+    assert told["0.01"] == [by.YES] * 3
+    assert told["0.1"] == [by.FACTOR, by.FACTOR, by.YES]
+    assert told["0.3"] == [by.NO, by.NO, by.YES]
+    assert told[FREE] == [by.YES, by.YES, by.NO]
+    assert by.limit_factors(data, FREE) == pytest.approx(of.MOST / 2.0)  # a limit that is not found is no lower
+    assert np.isnan(by.limit_factors(dataset(limits | {"0.3": 0.0}, grown, errors), "0.3")).all()
+    assert len(facts.limit_table(data)) == 2 + 2 + 4 * 6

@@ -47,13 +47,9 @@ def test_rules_of_several_nodes_do_not_commute_and_the_difference_falls_as_h_squ
 
 
 @pytest.mark.parametrize("scene_name", SCENES)
-def test_the_galerkin_integrator_does_not_commute_and_the_difference_falls_as_h_to_the_fourth(scene_name):
+def test_the_galerkin_integrator_does_not_commute_and_the_trapezoidal_routhian_is_stormer_verlet(scene_name):
     assert not commutes(symtop.scene(scene_name), symtop.integrator("galerkin-simpson"))
     assert slope(scene_name, "galerkin-simpson") == pytest.approx(4.0, abs=0.05)
-
-
-@pytest.mark.parametrize("scene_name", SCENES)
-def test_the_trapezoidal_routhian_is_stormer_verlet(scene_name):
     scene = symtop.scene(scene_name)
     verlet = symtop.integrator("stormer-verlet")
     for rule, same in ((Quadrature((0.0, 1.0), (0.5, 0.5)), True), (Quadrature((0.0, 1.0), (0.4, 0.6)), False)):
@@ -66,10 +62,9 @@ def lobatto_step(top, point, h):
     IIIB = np.array([[1 / 6, -1 / 6, 0.0], [1 / 6, 1 / 3, 0.0], [1 / 6, 5 / 6, 0.0]])
     weights = IIIA[2]
     theta, _, _, p_theta, p_phi, p_psi = point
-    # the force on phi and psi is zero, so that their stage momenta are p_phi and p_psi
 
-    def slopes(stages):
-        return np.array([top.potential_slope(t, top.momenta(start_with(t))) for t in stages])
+    # the force on phi and psi is zero, so that their stage momenta are p_phi and p_psi
+    slopes = lambda stages: np.array([top.potential_slope(t, top.momenta(start_with(t))) for t in stages])
 
     def start_with(t):
         rate = (p_phi - p_psi * np.cos(t)) / (top.I1 * np.sin(t) ** 2)
@@ -96,18 +91,6 @@ def test_lobatto_on_the_whole_top_is_galerkin_on_the_routhian_and_not_on_the_top
     assert first == pytest.approx(lobatto, abs=1e-13)
     assert not np.allclose(last, lobatto, rtol=0.0, atol=1e-12)
     assert np.max(np.abs(last - lobatto)) < 1e-3 * np.max(np.abs(np.array(lobatto) - start))
-
-
-def test_an_unreduced_form_steps_the_same_rule_whatever_it_is_called(monkeypatch):
-    known = dict(registry.integrators())
-    known["whole"] = dataclasses.replace(known.pop("midpoint-unreduced"), name="whole")
-    monkeypatch.setattr(registry, "_registry", known)
-    assert unreduced_forms() == {"midpoint": "whole", "trapezoidal": "trapezoidal-unreduced"}
-
-
-def test_a_method_that_has_no_reduced_twin_is_refused_in_one_sentence():
-    with pytest.raises(symtop.SymtopError, match="must be a reduced discrete Lagrangian, not 'rk45'"):
-        commutation_table(symtop.scene("spheroid"), symtop.integrator("rk45"), 1.0, (10,))
 
 
 def test_what_a_reduced_kernel_saves_is_split_into_iterations_and_the_time_of_one():
@@ -138,7 +121,7 @@ def measured():
     return datasets.combine(parts)
 
 
-def test_facts_are_those_of_the_rules_and_charts(measured):
+def test_facts_and_page_are_those_of_the_rules_and_charts(measured, tmp_path):
     answers = facts.facts(measured)
     assert answers["commuting"] == "midpoint"
     assert answers["commuting_gap"] < 1e-13
@@ -151,9 +134,6 @@ def test_facts_are_those_of_the_rules_and_charts(measured):
     assert facts.facts(two)["others"] == answers["others"]
     assert np.isnan(facts.facts(two)["power_least"])
     assert len(figures.pictures(two)) == 1
-
-
-def test_the_page_says_what_was_measured(measured, tmp_path):
     text = checked("reduction", measured, tmp_path)
     assert "With midpoint it makes no difference" in text
     assert "With trapezoidal, simpson-linear, galerkin-simpson it does." in text
@@ -170,6 +150,12 @@ def test_a_run_that_failed_has_no_part_in_the_time_of_a_chart(failed, ratio):
     assert (one.chart, one.base, one.time) == ("attitude", "axis", ratio)
 
 
-def test_a_kernel_is_known_under_any_name():
+def test_a_kernel_is_known_under_any_name_and_a_method_without_a_twin_refused(monkeypatch):
+    with pytest.raises(symtop.SymtopError, match="must be a reduced discrete Lagrangian, not 'rk45'"):
+        commutation_table(symtop.scene("spheroid"), symtop.integrator("rk45"), 1.0, (10,))
+    known = dict(registry.integrators())
+    known["whole"] = dataclasses.replace(known.pop("midpoint-unreduced"), name="whole")
+    monkeypatch.setattr(registry, "_registry", known)
+    assert unreduced_forms() == {"midpoint": "whole", "trapezoidal": "trapezoidal-unreduced"}
     assert commutation.is_galerkin(dataclasses.replace(symtop.integrator("galerkin-simpson"), name="mine"))
     assert not commutation.is_galerkin(symtop.integrator("midpoint"))

@@ -36,14 +36,7 @@ def test_every_chart_of_every_method_is_a_row_and_a_formula_is_none():
     assert not any(split_name(name)[0] == "exact" for name in names)
 
 
-def test_every_row_shows_the_axis_and_the_attitude_where_its_chart_does(data):
-    for name in ROWS:
-        cell = data.sel(scene="goldstein", variant=name)
-        assert np.isfinite(cell["axis"]).any()
-        assert bool(np.isfinite(cell["attitude"]).any()) is (split_name(name)[1] != "axis")
-
-
-def test_verdicts_are_those_of_the_one_rule_and_no_interval_misses_the_order(data):
+def test_verdicts_are_those_of_the_one_rule_and_a_wrong_declaration_is_refuted(data, monkeypatch):
     results = measures.judged(data)
     assert {name for _, name in results} == {name for name in ROWS if integrator(name).fixed_step}
     for (_, name), (word, slopes) in results.items():
@@ -53,19 +46,8 @@ def test_verdicts_are_those_of_the_one_rule_and_no_interval_misses_the_order(dat
         if math.isfinite(main.slope):
             assert abs(main.slope - declared) <= main.interval + BESIDE, name
     assert sum(word == "confirmed" for word, _ in results.values()) >= 7
-
-
-def test_a_wrong_declaration_is_refuted(data, monkeypatch):
     monkeypatch.setattr(measures, "declared_order", lambda name: 3)
     assert {measures.judged(data)["goldstein", name].verdict for name in ("strang[axis]", "rk4[axis]")} == {"refuted"}
-
-
-def test_rows_with_the_same_errors_are_drawn_as_one(data):
-    labels = measures.merged(measures.stepping(data), "axis")
-    assert labels["strang[axis]"] == "strang[axis, attitude]"
-    assert "strang[attitude]" not in labels
-    assert labels["rk4[angles]"] == "rk4[angles]"  # another chart, other errors
-    assert labels["rk4[axis]"] == "rk4[axis]"
 
 
 def test_a_median_over_few_scenes_is_not_ranked(data, monkeypatch):
@@ -93,7 +75,7 @@ def test_the_energy_over_time_is_that_of_the_run_that_it_names():
     assert float(taylor["history_tolerance"]) > 0.0
 
 
-def test_the_work_of_an_error_constant_is_the_work_of_a_run_with_that_error(data):
+def test_work_follows_from_runs_beside_it_or_from_its_error_constant(data):
     """error = C h^p: a target that some run met costs what that run cost; four times less error, twice the work."""
     pair = "goldstein", "stormer-verlet[angles]"
     cell, fit = data.sel(scene=pair[0], variant=pair[1]), measures.fits(data, "axis")[pair]
@@ -106,10 +88,7 @@ def test_the_work_of_an_error_constant_is_the_work_of_a_run_with_that_error(data
     assert far.foreseen
     assert beyond.work == pytest.approx(2.0 * far.work, rel=1e-6)
     assert ("goldstein", "rk45[angles]") not in measures.efficiencies(data, error)  # it has no step to choose
-
-
-def test_work_next_to_which_runs_were_made_is_theirs_and_not_that_of_a_law(data):
-    """An implicit method iterates more at longer steps: the evaluations of other steps say nothing of these."""
+    # An implicit method iterates more at longer steps: the evaluations of other steps say nothing of these.
     pair = "goldstein", "midpoint[angles]"
     cell = data.sel(scene=pair[0], variant=pair[1])
     k = int(np.flatnonzero(measures.fits(data, "axis")[pair].used)[-1])
@@ -131,7 +110,16 @@ def test_a_variant_whose_order_cannot_be_judged_has_the_work_of_its_runs(data, m
     assert facts.facts(data)["unknown"] == measures.stepping(data).sizes["variant"] - 1
 
 
-def test_work_is_counted_per_nutation(data):
+def test_rows_show_the_axis_the_attitude_where_they_can_and_work_a_nutation_and_equal_ones_are_drawn_as_one(data):
+    for name in ROWS:
+        cell = data.sel(scene="goldstein", variant=name)
+        assert np.isfinite(cell["axis"]).any()
+        assert bool(np.isfinite(cell["attitude"]).any()) is (split_name(name)[1] != "axis")
+    labels = measures.merged(measures.stepping(data), "axis")
+    assert labels["strang[axis]"] == "strang[axis, attitude]"
+    assert "strang[attitude]" not in labels
+    assert labels["rk4[angles]"] == "rk4[angles]"  # another chart, other errors
+    assert labels["rk4[axis]"] == "rk4[axis]"
     cell = data.sel(scene="goldstein", variant="stormer-verlet[angles]")
     work = measures.evaluations_a_nutation(cell, "goldstein")
     period = symtop.scene("goldstein").nutation_period
@@ -139,13 +127,10 @@ def test_work_is_counted_per_nutation(data):
     assert work[good] == pytest.approx(period / cell["step_size"].values[good], rel=0.05)
 
 
-def test_errors_of_adaptive_methods_follow_their_tolerance(data):
+def test_the_page_says_what_was_measured_and_adaptive_errors_follow_their_tolerance(data, tmp_path):
     fitted = measures.tolerance_fits(data)
     assert {name for _, name in fitted} == {name for name in ROWS if integrator(name).adaptive}
     assert fitted["goldstein", "rk45[angles]"].slope == pytest.approx(1.0, abs=0.15)
-
-
-def test_the_page_says_what_was_measured(data, tmp_path):
     text, answers = checked("convergence", data, tmp_path), facts.facts(data)
     assert f"{answers['confirmed']} show the order" in text
     assert answers["pairs"] == answers["confirmed"] + answers["refuted"] + answers["undecided"]

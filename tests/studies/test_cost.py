@@ -36,47 +36,33 @@ def scene_of(tops, member):
     return Scene(f"m{member}", SymmetricTop(*numbers[:3]), Angles(*numbers[3:]), horizon=float(tops.times[member, -1]))
 
 
-# ---- the arithmetic of costs -----------------------------------------------------------------------------------------
-
-
-def test_a_cost_lies_on_the_line_between_the_last_miss_and_the_first_hit():
-    work = np.array([[10.0], [20.0], [40.0]])
-    errors = np.array([[1e-2], [1e-4], [1e-6]])  # two decades for each doubling
-    reached = cost_to_reach(work, errors, [1e-2, 1e-3, 1e-4, 1e-5, 1e-7])
-    assert reached[:, 0] == pytest.approx([10.0, 10.0 * math.sqrt(2.0), 20.0, 20.0 * math.sqrt(2.0), INF])
-
-
-@pytest.mark.parametrize(
-    ("errors", "cost"),
-    [
-        ([1e-5, 1e-1, 1e-2, 1e-4], 20.0 * 2.0**1.5),  # the first was luck
-        ([INF, INF, 1e-4, 1e-6], 40.0),  # nothing to interpolate from: the hit itself
-        ([1e-2, 1e-4, 1e-2, 1e-2], INF),  # the hit is missed again
-        ([1e-1, 1e-2, NAN, NAN], INF),  # it left before
-        ([1e-4, NAN, NAN, NAN], 10.0),  # the coarsest run is enough
-        ([NAN, NAN, NAN, NAN], INF),
-        ([1e-2, 0.0, NAN, NAN], 10.0),  # an error of zero: close to the miss, and never below it
-    ],
-)
+@pytest.mark.parametrize(("errors", "cost"), [
+    ([1e-5, 1e-1, 1e-2, 1e-4], 20.0 * 2.0**1.5),  # the first was luck
+    ([INF, INF, 1e-4, 1e-6], 40.0),  # nothing to interpolate from: the hit itself
+    ([1e-2, 1e-4, 1e-2, 1e-2], INF),  # the hit is missed again
+    ([1e-1, 1e-2, NAN, NAN], INF),  # it left before
+    ([1e-4, NAN, NAN, NAN], 10.0),  # the coarsest run is enough
+    ([NAN, NAN, NAN, NAN], INF),
+    ([1e-2, 0.0, NAN, NAN], 10.0),  # an error of zero: close to the miss, and never below it
+])  # fmt: skip
 def test_what_counts_as_a_hit(errors, cost):
     work = np.where(np.isnan(errors), NAN, [10.0, 20.0, 40.0, 80.0])[:, np.newaxis]
     assert cost_to_reach(work, np.array(errors)[:, np.newaxis], [1e-3])[0, 0] == pytest.approx(cost, rel=0.01)
 
 
-def test_a_slowdown_is_over_the_cheapest_on_the_same_top_and_a_win_is_beyond_ties():
+def test_a_cost_lies_between_miss_and_hit_and_slowdowns_wins_and_run_lengths_follow():
+    work = np.array([[10.0], [20.0], [40.0]])
+    errors = np.array([[1e-2], [1e-4], [1e-6]])  # two decades for each doubling
+    reached = cost_to_reach(work, errors, [1e-2, 1e-3, 1e-4, 1e-5, 1e-7])
+    assert reached[:, 0] == pytest.approx([10.0, 10.0 * math.sqrt(2.0), 20.0, 20.0 * math.sqrt(2.0), INF])
     table = np.array([[1.0, 4.0, INF], [2.0, 2.0, INF]])
     assert np.array_equal(slowdowns(table), [[1.0, 2.0, NAN], [2.0, 1.0, NAN]], equal_nan=True)
     won, level = wins(np.array([[1.0, 1.0, 1.0], [1.05, 2.0, 0.5], [3.0, 1.2, INF]]))
     assert won.tolist() == [[False, True, False], [False, False, True], [False, False, False]]
     assert level.tolist() == [[True, True, False], [True, False, True], [False, False, False]]
-
-
-def test_run_lengths_are_shares_of_the_tops_that_were_asked():
     budgets = np.array([0.5, 1.0, 2.0, 10.0])
     assert run_lengths(np.array([1.0, 2.0, 3.0, INF, NAN]), budgets).tolist() == [0.0, 0.25, 0.5, 0.75]
 
-
-# ---- winners with intervals ------------------------------------------------------------------------------------------
 
 QUIET = np.array([0.01, 0.01])
 
@@ -92,17 +78,7 @@ def test_wins_and_what_is_met_have_one_denominator_each():
     assert hindsight(["a", "b"], np.full((2, 4), INF), QUIET).first is None
 
 
-def test_a_lead_is_called_if_neither_the_tops_nor_the_prices_can_turn_it():
-    draw = np.random.default_rng(0)
-    fair, ahead = draw.random((2, 2000)), draw.random((2, 2000)) * [[0.7], [1.0]]
-    assert not hindsight("ab", fair, QUIET).called
-    assert hindsight("ab", ahead, QUIET).called
-    assert not hindsight("ab", ahead[:, :12], QUIET).called  # too few tops
-    assert not hindsight("ab", ahead, QUIET * 40.0).called  # the same tops, with prices that are hardly known
-    assert not hindsight("ab", ahead, QUIET, marked=["a"]).called
-
-
-def test_the_interval_of_a_share_covers_it_as_often_as_it_says():
+def test_noise_of_a_price_widens_the_interval_of_a_share_which_covers_it_as_often_as_it_says():
     """Tops from a known distribution: a wins where its cost is 1/1.1 of b's, on a share that can be worked out."""
     draw, inside = np.random.default_rng(5), 0
     true = 1.0 / (2.0 * 1.1)  # of a/b uniform in (0, 2): a wins where a/b < 1/1.1
@@ -111,9 +87,6 @@ def test_the_interval_of_a_share_covers_it_as_often_as_it_says():
         one = next(standing for standing in first if standing.name == "a")
         inside += one.low <= true <= one.high
     assert 51 <= inside <= 60
-
-
-def test_noise_of_a_price_widens_the_interval_of_a_share():
     draw = np.random.default_rng(2)
     table = np.stack([np.exp(0.1 * draw.standard_normal(3000)), np.full(3000, 1.1)])
     narrow, wide = (hindsight("ab", table, np.array([error, error])).standings[0] for error in (0.0, 0.06))
@@ -141,23 +114,24 @@ def test_a_safe_setting_serves_95_of_100_tops():
     assert tight.setting == pytest.approx(10.0 ** -(2.0 + 4.0 * 94 / 99), rel=1e-6)
 
 
-def test_hindsight_and_safe_may_have_other_winners():
-    """A step that suits most tops and fails on one in five, against one that costs a little more on all of them."""
+def test_a_lead_is_called_if_neither_tops_nor_prices_can_turn_it_and_hindsight_may_differ():
+    draw = np.random.default_rng(0)
+    fair, ahead = draw.random((2, 2000)), draw.random((2, 2000)) * [[0.7], [1.0]]
+    assert not hindsight("ab", fair, QUIET).called
+    assert hindsight("ab", ahead, QUIET).called
+    assert not hindsight("ab", ahead[:, :12], QUIET).called  # too few tops
+    assert not hindsight("ab", ahead, QUIET * 40.0).called  # the same tops, with prices that are hardly known
+    assert not hindsight("ab", ahead, QUIET, marked=["a"]).called
+    # A step that suits most tops and fails on one in five, against one that costs a little more on all of them.
     met = np.full(200, 4.0)
     met[::5] = 100.0
     choices, called = safe([steps("spoilt", met), steps("even", np.full(200, 6.0))])
     assert called
     assert [one.name for one in choices] == ["even", "spoilt"]
     assert hindsight(["spoilt", "even"], np.stack([met, np.full(200, 6.0)]), QUIET).first.name == "spoilt"
-
-
-def test_a_safe_lead_inside_the_prices_is_not_called():
     met = np.full(200, 4.0)
     for error, called in ((0.005, True), (0.10, False)):
         assert safe([steps("a", met, 1.0, error), steps("b", met, 1.08, error)])[1] is called
-
-
-# ---- prices ----------------------------------------------------------------------------------------------------------
 
 
 def tree_of(price, names=("a", "b", "c"), **others):
@@ -174,7 +148,7 @@ def tree_of(price, names=("a", "b", "c"), **others):
     return xr.DataTree.from_dict({"prices": group} | others)
 
 
-def test_a_price_is_the_median_and_slow_or_negative_slopes_do_not_move_it():
+def test_a_price_is_the_median_and_a_process_that_is_slower_at_everything_no_spread():
     quiet = np.array([[5e-9, 6e-9, 7e-9]] * 5)
     planted = quiet.copy()
     planted[0, 0], planted[1, 1] = 4e-10, -3e-9  # below what the arithmetic can take, and negative
@@ -183,9 +157,6 @@ def test_a_price_is_the_median_and_slow_or_negative_slopes_do_not_move_it():
     assert spoilt.price == pytest.approx(plain.price)
     assert spoilt.marked == []
     assert np.min(planted, axis=0)[0] == 4e-10  # the control: the least of them would be that
-
-
-def test_a_process_that_is_slower_at_everything_is_no_spread():
     quiet = np.array([[5e-9, 6e-9, 7e-9]] * 5)
     quiet, names = np.tile(quiet, 4), "abcdefghijkl"
     together = quiet * np.array([1.0, 1.3, 1.1, 0.8, 1.0])[:, np.newaxis]
@@ -221,18 +192,6 @@ def test_prices_of_fresh_processes_agree_with_a_run_timed_by_hand():
         assert evaluations * price + rest == pytest.approx(by_hand, rel=0.5)
 
 
-def test_variants_whose_order_follows_the_tolerance_have_a_price_at_each():
-    assert pricing.tolerances_of(integrator("series-adaptive[axis]")) == pricing.TOLERANCES
-    assert pricing.tolerances_of(integrator("rk45-compiled[axis]")) == (pricing.TOLERANCE,)
-    known = pricing.Prices(["a"], np.array([8.0 / 4.0 ** np.arange(7)]), np.zeros((1, 7)), np.zeros(1), np.zeros(1), [],
-                           NAN)  # fmt: skip
-    price, _ = known.at("a", np.array([1e-2, 1e-3, 1e-4, NAN]))
-    assert price[:3] == pytest.approx([8.0, 4.0, 2.0])
-
-
-# ---- many tops against one -------------------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def tops():
     return tops_of(60, 20, 3, 10.0)
@@ -246,17 +205,13 @@ def regime(scene):
     return [low, high, psi, phi] if top.mgl > 0.0 else [-high, -low, -psi, phi]
 
 
-def test_scales_of_many_tops_are_those_of_scenes(tops):
-    scenes = [scene_of(tops, k) for k in range(80)]
-    assert tops.energy_scale[:80] == pytest.approx([one.energy_scale for one in scenes], rel=1e-6)
-    assert tops.period[:80] == pytest.approx([one.nutation_period for one in scenes], rel=1e-6)
-    assert tops.regime[:80] == pytest.approx(np.array([regime(one) for one in scenes]), abs=1e-6)
-    ends = [barriers(one) for one in scenes]
-    wide = tops.width[:80] > 1e-3
-    assert tops.width[:80][wide] == pytest.approx(np.array([one.lowest - one.highest for one in ends])[wide], abs=1e-6)
-
-
-def test_the_natural_tops_are_those_that_are_written_down():
+def test_the_natural_tops_are_written_down_and_variants_of_variable_order_have_prices():
+    assert pricing.tolerances_of(integrator("series-adaptive[axis]")) == pricing.TOLERANCES
+    assert pricing.tolerances_of(integrator("rk45-compiled[axis]")) == (pricing.TOLERANCE,)
+    known = pricing.Prices(["a"], np.array([8.0 / 4.0 ** np.arange(7)]), np.zeros((1, 7)), np.zeros(1), np.zeros(1), [],
+                           NAN)  # fmt: skip
+    price, _ = known.at("a", np.array([1e-2, 1e-3, 1e-4, NAN]))
+    assert price[:3] == pytest.approx([8.0, 4.0, 2.0])
     tops = natural(20_000, 1)
     I1, I3, mgl, theta, _, _, theta_dot, phi_dot, psi_dot = tops.T
     assert (natural(50, 1) == tops[:50]).all()
@@ -278,7 +233,14 @@ def test_the_named_scenes_are_tops_among_the_others(tops):
     assert np.array_equal([flat(*one) for one in members], tops.numbers[[3, 0, 11]])
 
 
-def test_samples_fall_on_the_same_times_at_every_step(tops):
+def test_scales_of_many_tops_are_those_of_scenes_and_samples_fall_on_the_same_times_at_every_step(tops):
+    scenes = [scene_of(tops, k) for k in range(80)]
+    assert tops.energy_scale[:80] == pytest.approx([one.energy_scale for one in scenes], rel=1e-6)
+    assert tops.period[:80] == pytest.approx([one.nutation_period for one in scenes], rel=1e-6)
+    assert tops.regime[:80] == pytest.approx(np.array([regime(one) for one in scenes]), abs=1e-6)
+    ends = [barriers(one) for one in scenes]
+    wide = tops.width[:80] > 1e-3
+    assert tops.width[:80][wide] == pytest.approx(np.array([one.lowest - one.highest for one in ends])[wide], abs=1e-6)
     for level in (0, 3, 9):
         h = tops.period / FIRST * 0.5**level
         assert np.array_equal((tops.marks << level) * h[:, np.newaxis], tops.times, equal_nan=True)
@@ -316,7 +278,7 @@ def test_coarse_runs_end_in_the_ladder_as_they_end_alone(tops, name):
     assert (tops.errors("attitude", shown, chosen)["axis"][lost] == INF).all()
 
 
-def test_a_failed_run_has_an_infinite_error(tops):
+def test_a_failed_run_has_an_infinite_error_and_targets_are_asked_where_they_mean_something(tops):
     class Shown:
         states = np.full((1, tops.marks.size, 6), NAN)
         momenta = np.full((1, tops.marks.size, 2), NAN)
@@ -324,9 +286,6 @@ def test_a_failed_run_has_an_infinite_error(tops):
     errors = tops.errors("axis", Shown, np.array([4]))
     assert set(errors) == {"axis", "energy", MOMENTA}
     assert all(value == INF for values in errors.values() for value in values)
-
-
-def test_targets_are_asked_where_they_mean_something(tops):
     asked, bounds = tops.asked(TARGETS), tops.bounds()
     for place, target in enumerate(TARGETS):
         for name in ASKED:
@@ -335,21 +294,9 @@ def test_targets_are_asked_where_they_mean_something(tops):
     assert not asked["axis"][0].all()  # sleeping tops nutate less than 1e-3
 
 
-# ---- a method on the tops --------------------------------------------------------------------------------------------
-
-
 @pytest.fixture(scope="module")
 def strang(tops):
     return ladder.table(integrator("strang[axis]"), tops, 2e4, twin=False, guarded=4)
-
-
-def test_finer_targets_cost_more_and_never_more_than_the_budget(strang):
-    cost = strang["cost"].transpose("quantity", "target", "member").values
-    for values in cost:
-        both = ~np.isnan(values[0]) & ~np.isnan(values[1])
-        assert (values[0, both] <= values[1, both]).all()
-    assert cost[np.isfinite(cost)].max() <= 2e4 * 1.001
-    assert np.isnan(strang["cost"].sel(quantity="attitude").values).all()
 
 
 @pytest.mark.parametrize("name", ["strang[axis]", "series-adaptive[axis]"])
@@ -367,7 +314,13 @@ def test_the_stored_setting_meets_the_target_at_the_stored_cost(tops, strang, na
         assert alone["force_evaluations"] == pytest.approx(float(one["cost"][member]), rel=0.1)
 
 
-def test_every_top_that_is_drawn_is_judged_or_dropped_and_silent_runs_are_wrong(strang):
+def test_finer_targets_cost_more_within_the_budget_and_every_top_drawn_is_judged_or_dropped(strang):
+    cost = strang["cost"].transpose("quantity", "target", "member").values
+    for values in cost:
+        both = ~np.isnan(values[0]) & ~np.isnan(values[1])
+        assert (values[0, both] <= values[1, both]).all()
+    assert cost[np.isfinite(cost)].max() <= 2e4 * 1.001
+    assert np.isnan(strang["cost"].sel(quantity="attitude").values).all()
     runs, wrong, silent = (strang[name].values for name in ("runs", "wrong", "silent"))
     assert (runs[0] == strang["drawn"].values).all()
     assert (runs <= strang["drawn"].values).all()
@@ -382,25 +335,16 @@ def test_every_top_that_is_drawn_is_judged_or_dropped_and_silent_runs_are_wrong(
     asked = np.isfinite(strang["foretold"].values).sum()
     assert rows[["wrong", "between", "right"]].to_numpy().sum() == asked > 0
     assert rows["wrong"][rows["whole"]].sum() > 0  # its trial covers coarse runs whole, and says so
-
-
-def test_a_variant_is_asked_for_what_it_shows_and_does_not_keep_anyway():
-    assert ladder.quantities_of(integrator("strang[axis]"), twin=False) == ("axis", "energy")
-    assert ladder.quantities_of(integrator("strang[attitude]"), twin=True) == ("attitude",)
-    assert ladder.quantities_of(integrator("midpoint[angles]"), twin=False) == ASKED
-    assert ladder.quantities_of(integrator("gauss-4[axis]"), twin=False) == ("axis",)
-
-
-def test_the_work_of_the_typical_top_grows_with_the_setting(strang):
     work = strang["work"].values[:, KINDS.index(NATURAL)]
     assert (np.diff(work) > 0.0).all()
     assert work[5] == pytest.approx(10.0 * FIRST * 2.0**5, rel=0.15)  # one evaluation a step over ten nutations
 
 
-# ---- what is said ----------------------------------------------------------------------------------------------------
-
-
-def test_no_method_of_this_top_takes_part_in_a_contest_for_any_body():
+def test_no_method_of_this_top_takes_part_for_any_body_and_variants_are_asked_for_what_they_show():
+    assert ladder.quantities_of(integrator("strang[axis]"), twin=False) == ("axis", "energy")
+    assert ladder.quantities_of(integrator("strang[attitude]"), twin=True) == ("attitude",)
+    assert ladder.quantities_of(integrator("midpoint[angles]"), twin=False) == ASKED
+    assert ladder.quantities_of(integrator("gauss-4[axis]"), twin=False) == ("axis",)
     assert cells.of_class("kicks", True, GENERAL)
     assert cells.of_class("kicks", False, "kicks")
     assert not cells.of_class("kicks", False, GENERAL)  # it exists for symmetric bodies alone
@@ -409,47 +353,9 @@ def test_no_method_of_this_top_takes_part_in_a_contest_for_any_body():
     assert all(integrator(name).general for name in study.far.candidates())
 
 
-def test_the_old_names_answer_with_the_new_one():
-    for name in ("population", "work_precision", "phase_diagram"):
-        with pytest.raises(symtop.SymtopError, match="is now cost"):
-            load(name)
-
-
-def test_the_grid_has_every_compiled_variant_and_says_what_it_leaves_out():
-    names = {case.integrator for case in study.STUDY.cases(True) if case.group == "short"}
-    assert {"strang[axis]", "strang[attitude]", "midpoint[angles]", "rk45-compiled[angles]", "taylor[axis]"} <= names
-    assert not {name for name in names if "unreduced" in name or name.startswith("exact")}
-    assert sum(case.timed for case in study.STUDY.cases(False)) == 5
-
-
 @pytest.fixture(scope="module")
 def data(quick_results):
     return netcdf.read_any(quick_results / "cost.nc")
-
-
-def test_quick_results_hold_every_verdict(data):
-    assert {"short", "long", "tops", "prices", "far"} <= set(data.children)
-    winners = cells.winners(data)
-    assert len(winners) == 2 * len(cells.CLASSES) * 2 * len(TARGETS)
-    for one in winners:
-        for best in filter(None, (one["safe"], one["hindsight"])):
-            method = integrator(best.name)
-            assert cells.of_class(method.needs, method.general, one["needs"])
-            assert best.low <= best.high
-        if one["hindsight"]:
-            assert one["solved"] <= one["asked"]
-    taken = cells.costs(data, Cell("short", "axis", 1e-3, NATURAL))
-    assert not any("[attitude]" in name for name in taken.names if f"{name.split('[')[0]}[axis]" in taken.names)
-
-
-def test_a_cost_holds_the_call(data):
-    cell = Cell("short", "axis", 1e-3, NATURAL)
-    seconds, counted = cells.costs(data, cell), cells.costs(data, cell, cells.EVALUATIONS)
-    row = seconds.names.index("rk4[axis]")
-    price, call = pricing.prices(data).at("rk4[axis]", np.array([NAN]))
-    good = np.isfinite(counted.values[row])
-    assert call[0] > 2e-7
-    assert seconds.values[row, good] == pytest.approx(counted.values[row, good] * price[0] + call[0])
 
 
 @pytest.fixture(scope="module")
@@ -486,14 +392,14 @@ def test_facts_and_tables_are_those_of_the_cells(small):
     assert tables["have"]["1e-3 rad"][0].endswith(f" {number(rk4.seconds / best.seconds)} times")
 
 
-def test_a_share_of_silent_runs_is_that_of_its_kind(small):
-    rows = facts.tables(small)["silent"].set_index(["variant", "kind of top"]).loc[("rk4[axis]", "near-separatrix")]
-    health, kind = cells.health(small, "rk4[axis]"), KINDS.index("near-separatrix")
-    at = [int(np.argmin(np.abs(health.setting - steps))) for steps in facts.STEPS]
-    assert np.array_equal(rows["wrong"], health.wrong[at, kind] / health.drawn[kind])
-
-
-def test_what_is_kept_is_declared_or_linear_in_the_state():
+def test_the_grid_has_every_compiled_variant_and_what_is_kept_is_declared_or_linear():
+    for name in ("population", "work_precision", "phase_diagram"):
+        with pytest.raises(symtop.SymtopError, match="is now cost"):
+            load(name)
+    names = {case.integrator for case in study.STUDY.cases(True) if case.group == "short"}
+    assert {"strang[axis]", "strang[attitude]", "midpoint[angles]", "rk45-compiled[angles]", "taylor[axis]"} <= names
+    assert not {name for name in names if "unreduced" in name or name.startswith("exact")}
+    assert sum(case.timed for case in study.STUDY.cases(False)) == 5
     kept = {
         "rk4[axis]": "p_phi", "rk4[angles]": "nothing exactly", "rkmk-se3-4[axis]": "p_psi, |e|",
         "gauss-8[axis]": "p_phi, p_psi, |e|, energy", "takahashi-imada[axis]": "p_phi, p_psi, energy bounded",
@@ -501,13 +407,36 @@ def test_what_is_kept_is_declared_or_linear_in_the_state():
     assert {name: facts.keeps(name) for name in kept} == kept
 
 
-def test_only_methods_that_keep_energy_and_momenta_answer_who_must_keep_them(data):
+def test_quick_results_hold_every_verdict_and_a_cost_holds_the_call(data):
+    assert {"short", "long", "tops", "prices", "far"} <= set(data.children)
+    winners = cells.winners(data)
+    assert len(winners) == 2 * len(cells.CLASSES) * 2 * len(TARGETS)
+    for one in winners:
+        for best in filter(None, (one["safe"], one["hindsight"])):
+            method = integrator(best.name)
+            assert cells.of_class(method.needs, method.general, one["needs"])
+            assert best.low <= best.high
+        if one["hindsight"]:
+            assert one["solved"] <= one["asked"]
+    taken = cells.costs(data, Cell("short", "axis", 1e-3, NATURAL))
+    assert not any("[attitude]" in name for name in taken.names if f"{name.split('[')[0]}[axis]" in taken.names)
+    cell = Cell("short", "axis", 1e-3, NATURAL)
+    seconds, counted = cells.costs(data, cell), cells.costs(data, cell, cells.EVALUATIONS)
+    row = seconds.names.index("rk4[axis]")
+    price, call = pricing.prices(data).at("rk4[axis]", np.array([NAN]))
+    good = np.isfinite(counted.values[row])
+    assert call[0] > 2e-7
+    assert seconds.values[row, good] == pytest.approx(counted.values[row, good] * price[0] + call[0])
     cell = Cell("short", "axis", 1e-3, NATURAL, "derivative")
     every, keeping = ({one.name for one in cells.safest(data, cell, only)[0]} for only in (False, True))
     assert keeping == {name for name in every if name.startswith("gauss-")} < every
 
 
-def test_the_page_says_what_was_measured(small, tmp_path):
+def test_the_page_says_what_was_measured_and_shares_of_silent_runs_are_of_their_kind(small, tmp_path):
+    rows = facts.tables(small)["silent"].set_index(["variant", "kind of top"]).loc[("rk4[axis]", "near-separatrix")]
+    health, kind = cells.health(small, "rk4[axis]"), KINDS.index("near-separatrix")
+    at = [int(np.argmin(np.abs(health.setting - steps))) for steps in facts.STEPS]
+    assert np.array_equal(rows["wrong"], health.wrong[at, kind] / health.drawn[kind])
     text = checked("cost", small, tmp_path, elsewhere={"use", "have"})
     named = {one.get_text() for one in figures.draw_accuracy(small).axes[0].texts}
     assert {"takahashi-imada[axis] (symmetric)", "rk4[axis]"} <= named

@@ -45,28 +45,6 @@ def test_a_power_is_found_and_continued_over_six_decades(power):
     np.testing.assert_allclose(found.at(FAR)[0], 1e-9 * FAR**power, rtol=1e-9)
 
 
-def test_a_drift_below_an_oscillation_is_found_and_noise_is_no_second_power():
-    drift = 1e-6 + 4e-9 * FAR
-    rough = 1e-6 * (1.0 + 0.05 * np.sin(40.0 * np.arange(FAR.size)))
-    found = laws.fit(FAR, np.where(SHORT, np.stack([drift, rough]), np.nan))
-    np.testing.assert_allclose(found.at(FAR)[0], drift, rtol=1e-6)
-    assert found.leading.tolist() == [1.0, 0.0]
-    assert np.isnan(found.powers[1, 1])
-
-
-def test_too_few_points_and_saturated_ones_have_no_law():
-    errors = np.full((2, FAR.size), np.nan)
-    errors[0, :3] = 1e-5
-    errors[1, :8] = 2.0
-    assert np.isnan(laws.fit(FAR, errors).at(FAR)).all()
-
-
-def test_rounding_adds_a_walk_and_its_phase():
-    walked = laws.rounding("energy", 1e-16, FAR, 100.0 * FAR)
-    np.testing.assert_allclose(walked, 1e-15 * np.sqrt(FAR))
-    np.testing.assert_allclose(laws.rounding("axis", 1e-16, FAR, 100.0 * FAR) / walked, 2 * np.pi * FAR / np.sqrt(3))
-
-
 @pytest.mark.parametrize("name", ["strang[axis]", "srkn-14-6[axis]", "rk4[axis]", "series[axis]", "midpoint[angles]"])
 def test_a_law_predicts_a_measured_horizon_that_was_left_out_of_the_fit(name):
     row, tops = integrator(name), one_top()
@@ -99,27 +77,25 @@ def test_rounding_is_not_predicted_above_what_the_run_has_shown():
     assert alone[end] > 1e3 * seen[0, end, 0]  # the control: without the limit
 
 
-def test_a_wrong_law_would_not_predict_it():
+def test_a_drift_below_an_oscillation_is_found_and_a_wrong_law_would_not_predict():
+    drift = 1e-6 + 4e-9 * FAR
+    rough = 1e-6 * (1.0 + 0.05 * np.sin(40.0 * np.arange(FAR.size)))
+    found = laws.fit(FAR, np.where(SHORT, np.stack([drift, rough]), np.nan))
+    np.testing.assert_allclose(found.at(FAR)[0], drift, rtol=1e-6)
+    assert found.leading.tolist() == [1.0, 0.0]
+    assert np.isnan(found.powers[1, 1])
+    errors = np.full((2, FAR.size), np.nan)
+    errors[0, :3] = 1e-5
+    errors[1, :8] = 2.0
+    assert np.isnan(laws.fit(FAR, errors).at(FAR)).all()
+    walked = laws.rounding("energy", 1e-16, FAR, 100.0 * FAR)
+    np.testing.assert_allclose(walked, 1e-15 * np.sqrt(FAR))
+    np.testing.assert_allclose(laws.rounding("axis", 1e-16, FAR, 100.0 * FAR) / walked, 2 * np.pi * FAR / np.sqrt(3))
     tops = one_top()
     asked = runs.Asked(140.0, FAR[FAR <= 1.0001e4], np.inf)
     ((seen, _),) = runs.measured(integrator("rk4[axis]"), tops, [asked])
     energy = seen[1, :, 0]
     assert energy[-1] > 5.0 * energy[8]  # what a bounded law says at 10^3 is off by that at 10^4
-
-
-def test_the_shape_is_the_distance_from_the_true_orbit_whatever_the_delay():
-    on = scene("spheroid")
-    tops, h = one_top(), on.nutation_period / 40.0
-    run = symtop.simulate(on, "strang", step_size=h, horizon=400 * h, samples=101, observe="nutation", guard=False)
-    u = np.cos(run["theta"].values)
-    rate = -np.sin(run["theta"].values) * run["p_theta"].values / on.top.I1
-    mine = runs.shape(tops, u[np.newaxis], rate[np.newaxis])[0]
-    theirs = split(on, Trajectory.of_data(run)).shape
-    big = theirs > 0.2 * theirs.max()
-    np.testing.assert_allclose(mine[big], theirs[big], rtol=0.05)
-    late = closed_form(on)(run["time"].values + 0.3)  # the truth, early: no error of shape, but one of phase
-    u, rate = np.cos(late.theta), -np.sin(late.theta) * late.theta_dot
-    assert runs.shape(tops, u[np.newaxis], rate[np.newaxis]).max() < 1e-13
 
 
 @pytest.mark.parametrize("name", ["strang[axis]", "gauss-4[axis]", "rk45-compiled[axis]"])
@@ -136,24 +112,26 @@ def test_settings_side_by_side_show_what_each_shows_by_itself(name):
     assert runs.measured(row, tops, []) == []
 
 
-def test_step_times_number_is_exact():
+def test_a_shape_is_the_distance_from_the_true_orbit_and_steps_add_up_exactly():
+    on = scene("spheroid")
+    tops, h = one_top(), on.nutation_period / 40.0
+    run = symtop.simulate(on, "strang", step_size=h, horizon=400 * h, samples=101, observe="nutation", guard=False)
+    u = np.cos(run["theta"].values)
+    rate = -np.sin(run["theta"].values) * run["p_theta"].values / on.top.I1
+    mine = runs.shape(tops, u[np.newaxis], rate[np.newaxis])[0]
+    theirs = split(on, Trajectory.of_data(run)).shape
+    big = theirs > 0.2 * theirs.max()
+    np.testing.assert_allclose(mine[big], theirs[big], rtol=0.05)
+    late = closed_form(on)(run["time"].values + 0.3)  # the truth, early: no error of shape, but one of phase
+    u, rate = np.cos(late.theta), -np.sin(late.theta) * late.theta_dot
+    assert runs.shape(tops, u[np.newaxis], rate[np.newaxis]).max() < 1e-13
     tops = runs.tops_of(8, 1)
     h = runs.steps_of(tops, 17.48)
     assert all(float(step).as_integer_ratio()[0].bit_length() <= runs.BITS for step in h)
     np.testing.assert_allclose(h * 17.48, tops.period, rtol=1e-7)
 
 
-def test_costs_rise_with_the_horizon_and_with_the_accuracy(data):
-    for quantity in runs.QUANTITIES:
-        panel = diagram(data, quantity)
-        cheapest = panel.costs.min(axis=0)
-        finite = np.isfinite(cheapest)
-        assert finite.any()
-        assert (finite[:, 1:] <= finite[:, :-1]).all()
-        assert ((panel.winner >= 0) == finite).all()
-
-
-def test_a_variant_whose_energy_drifts_loses_the_energy_at_long_horizons(data):
+def test_a_variant_whose_energy_drifts_loses_it_late_and_one_that_keeps_it_takes_no_part(data):
     panel = diagram(data, "energy")
     late = panel.horizons > 1e7
     assert not DRIFTING & {panel.names[k] for k in panel.winner[:, late].ravel() if k >= 0}
@@ -161,32 +139,24 @@ def test_a_variant_whose_energy_drifts_loses_the_energy_at_long_horizons(data):
     row = panel.names.index("rk4[axis]")
     behind = panel.costs[row, t] / panel.costs[:, t].min(axis=0)
     assert behind[h] > 5.0 * behind[0]  # by much more than at ten nutations
-
-
-def test_variants_that_conserve_the_energy_take_no_part_in_energy_and_shape(data):
     assert "gauss-8[axis]" in runs.variants_of(data, "axis")
     assert not any("gauss" in name for name in runs.variants_of(data, "shape"))
 
 
-def test_what_is_within_reach_is_measured_and_the_rest_predicted(data):
+def test_costs_rise_with_horizon_and_accuracy_and_what_is_within_reach_is_measured(data):
+    for quantity in runs.QUANTITIES:
+        panel = diagram(data, quantity)
+        cheapest = panel.costs.min(axis=0)
+        finite = np.isfinite(cheapest)
+        assert finite.any()
+        assert (finite[:, 1:] <= finite[:, :-1]).all()
+        assert ((panel.winner >= 0) == finite).all()
     reach = float(data["far"]["reach"].max())
     for quantity in runs.QUANTITIES:
         panel = diagram(data, quantity)
         beyond = (panel.horizons > 1.001 * reach) & (panel.winner >= 0)
         assert panel.predicted[beyond].all()
         assert not panel.predicted[:, 0].any()
-
-
-def test_what_is_checked_was_predicted_and_a_prediction_that_fails_is_told(data):
-    for one in runs.chosen(data, 3e6):
-        assert json.loads(json.dumps(one)) == one  # settings of a case
-        panel = diagram(data, one["quantity"])
-        at = panel.place(one["target"], one["horizon"])
-        assert panel.predicted[at]
-        assert one["integrators"][0] == panel.names[panel.winner[at]]
-    ran = runs.checks(data)
-    assert (ran["horizon"] >= 1e5).all()
-    assert (ran.groupby(["quantity", "target", "horizon"]).size() == 4 * runs.CHECKED_TOPS).all()
 
 
 @pytest.mark.parametrize(("errors", "told"), [([1e-7, 1e-4, 3e-7, np.inf], 4), ([1e-5, 1e-4, 3e-7, 1e-7], 2)])
@@ -218,6 +188,18 @@ def test_a_run_is_counted_by_whether_it_meets_the_error_as_predicted(errors, tol
     assert runs.checks(tree)["told"].sum() == 2 * (4 + told)
     (row,) = facts.checked(tree).to_dict("records")
     assert (row["runs"], row["meet or miss it as predicted"]) == (16, 2 * (4 + told))
+
+
+def test_what_is_checked_was_predicted_and_a_prediction_that_fails_is_told(data):
+    for one in runs.chosen(data, 3e6):
+        assert json.loads(json.dumps(one)) == one  # settings of a case
+        panel = diagram(data, one["quantity"])
+        at = panel.place(one["target"], one["horizon"])
+        assert panel.predicted[at]
+        assert one["integrators"][0] == panel.names[panel.winner[at]]
+    ran = runs.checks(data)
+    assert (ran["horizon"] >= 1e5).all()
+    assert (ran.groupby(["quantity", "target", "horizon"]).size() == 4 * runs.CHECKED_TOPS).all()
 
 
 def test_a_check_measures_the_error_of_each_run():

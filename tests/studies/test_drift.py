@@ -7,31 +7,32 @@ import numpy as np
 import pytest
 import xarray as xr
 from symtop_studies.drift import facts, figures, measures, study
+from symtop_studies.drift.growth import ensemble_growth, history, horizon, lost_at
 from symtop_studies.drift.measures import ROUNDINGS
-from symtop_studies.drift.runs import gauges_of, members, run_history, side_by_side
+from symtop_studies.drift.phase_loss import phase_loss
+from symtop_studies.drift.runs import elapsed_steps, gauges_of, members, run_history, side_by_side
 from symtop_studies.drift.study import TOLERANCE, cases
 
 import symtop
 from symtop.judging.claims.constants import KEPT, Constant
 from symtop.measure import datasets
-from symtop.measure.conservation import CONSTANTS, Changed
+from symtop.measure.conservation import CONSTANTS, Changed, growth, law
+from symtop.measure.phase import nutation_phase
 from symtop.methods.framework.lanes import LEAST
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import scene
-from symtop.run.long_run import QUANTITIES, long_run
+from symtop.run import modified_energy as shadow
+from symtop.run.long_run import QUANTITIES, chart_of, long_run, scattered, watch
 from tests.templates import checked
 
 
-@pytest.mark.parametrize(
-    ("sizes", "exponents", "interval", "word"),
-    [
-        ((1e-13, 2e-13), (0.5, 1.0), 0.1, "kept"),
-        ((1e-4, 1e-4), (0.0, 0.1), 0.1, "bounded"),
-        ((1e-4, 1e-4), (0.0, 0.1), 0.6, "growing"),  # the interval does not exclude a walk
-        ((1e-4, 1e-4), (0.0, 1.0), 0.1, "drift"),  # the worse of two scenes
-        ((1e-12, 1e-13), (0.5, 0.5), 0.1, "random walk"),
-    ],
-)
+@pytest.mark.parametrize(("sizes", "exponents", "interval", "word"), [
+    ((1e-13, 2e-13), (0.5, 1.0), 0.1, "kept"),
+    ((1e-4, 1e-4), (0.0, 0.1), 0.1, "bounded"),
+    ((1e-4, 1e-4), (0.0, 0.1), 0.6, "growing"),  # the interval does not exclude a walk
+    ((1e-4, 1e-4), (0.0, 1.0), 0.1, "drift"),  # the worse of two scenes
+    ((1e-12, 1e-13), (0.5, 0.5), 0.1, "random walk"),
+])  # fmt: skip
 def test_the_behaviour_of_a_quantity_is_that_on_its_worst_scene(sizes, exponents, interval, word):
     cell = xr.Dataset({
         "outcome": ("scene", ["ok", "ok"]),
@@ -43,22 +44,7 @@ def test_the_behaviour_of_a_quantity_is_that_on_its_worst_scene(sizes, exponents
     assert measures.worst_behaviour(cell.assign(outcome=("scene", ["ok", "left_chart"])), "energy") == "failed"
 
 
-def test_adaptive_methods_drift_at_one_tolerance():
-    """One value for all of them, except for those that have a default of their own and keep it."""
-    asked = [case for case in cases(quick=False) if case.group == measures.HISTORIES]
-    given = {case.settings["tolerance"] for case in asked if "tolerance" in case.settings}
-    assert given == {TOLERANCE}
-    for case in asked:
-        method = symtop.integrator(case.integrator)
-        assert len(method.charts()) == 1, case
-        own = method.adaptive and method.default_tolerance is not None
-        assert ("tolerance" in case.settings) == (method.adaptive and not own), case
-    names = {case.integrator for case in asked}
-    assert {"rk4[angles]", "rk4[axis]", "strang[axis]", "five-rotations[attitude]"} <= names
-    assert "strang[attitude]" not in names
-
-
-def test_a_history_says_with_what_it_ran():
+def test_a_history_says_with_what_it_ran_and_has_one_behaviour_in_every_study():
     on = symtop.scene("spheroid")
     short = {"horizon": 20.0 * on.nutation_period, "samples": 101}
     step = run_history(on, symtop.integrator("rk4[axis]"), step_size=on.nutation_period / 50.0, **short)
@@ -71,10 +57,7 @@ def test_a_history_says_with_what_it_ran():
     assert float(step["p_phi_largest"]) == 0.0
     other = run_history(on, symtop.integrator("rk4[angles]"), step_size=on.nutation_period / 50.0, **short)
     assert float(other["p_phi_largest"]) > 1e-9
-
-
-def test_the_same_run_has_one_behaviour_in_every_study():
-    """kahan-li-6 changes the energy by 9e-13 of the spin's and has an exponent of 0: an error of the step, bounded."""
+    # kahan-li-6 changes the energy by 9e-13 of the spin's and has an exponent of 0: an error of the step, bounded.
     for size, exponent, interval in ((9e-12, 0.0, 0.001), (1e-15, 0.9, 0.1), (1e-4, 1.0, 0.1), (1e-4, 0.0, 0.01)):
         measured = {"energy_largest": size, "energy_exponent": exponent, "energy_exponent_interval": interval}
         columns = {"outcome": ("scene", ["ok"]), **{name: ("scene", [value]) for name, value in measured.items()}}
@@ -83,14 +66,6 @@ def test_the_same_run_has_one_behaviour_in_every_study():
         changed = Changed(size, 0.0, 1.0, 0.0, exponent, interval, "")
         ledger = Constant(changed, 0.0, KEPT * grain, grain)
         assert measures.worst_behaviour(cell, "energy") == ledger.kind
-
-
-def test_the_shift_of_the_mean_energy_is_relative_to_its_band():
-    means = xr.DataArray([[0.0, 1e-5, 3e-5, np.nan]], dims=("variant", "window"))
-    cells = xr.Dataset({"energy_mean": means.copy(data=[[0.0, 4e-5, 1e-6, np.nan]]),
-                        "energy_largest": means + 5e-5, "energy_least": means - 5e-5})  # fmt: skip
-    moves = np.abs(measures.shifts(cells))
-    assert (float(moves.isel(window=-1).max()), float(moves.max())) == pytest.approx((0.01, 0.4))
 
 
 NAMES = ["strang[axis]", "gauss-4[axis]", "rk4[axis]", "rk4[angles]", "radau[angles]"]
@@ -161,20 +136,11 @@ def test_a_group_alone_has_the_same_facts_and_none_of_the_others(data, group):
     assert len(figures.pictures(alone)) == (group in (measures.HISTORIES, measures.ROUNDINGS))
 
 
-def test_growth_as_time_is_told_from_faster_growth():
-    slopes = np.array([0.91, 1.0, 1.09, 0.88, 1.12, 2.0])
-    assert measures.as_time(slopes).tolist() == [True, True, True, False, False, False]
-    assert measures.faster(slopes).tolist() == [False, False, False, False, True, True]
-
-
-def test_phases_are_grouped_by_what_the_energy_does(histories):
+def test_phases_are_grouped_by_the_energy_and_a_run_that_keeps_it_is_none_of_those_that_lose_it(histories):
     groups = measures.phases_by_energy(histories)
     assert sorted(groups["bounded"]) == [1.0, 1.0, 1.04, 2.0]
     assert sorted(groups["lost"]) == [1.9, 2.0, 2.0, 2.2]
-
-
-def test_a_run_that_keeps_its_energy_is_none_of_those_that_lose_it(histories):
-    """Of a variant that loses the energy on one scene only."""
+    # Of a variant that loses the energy on one scene only.
     place = {"variant": "rk4[angles]", "scene": "goldstein"}
     for name, value in (("energy_largest", 1e-14), ("phase_exponent", 0.5)):
         histories = histories.assign({name: histories[name].copy()})
@@ -216,11 +182,171 @@ def test_each_has_the_bits_of_a_long_run(name, compensated):
     assert not any(np.array_equal(one, other) for one, other in pairwise(others))  # each is a run of its own
 
 
-def test_the_ordinary_ensemble_goes_in_lanes():
-    """Fewer members, or another sum, would run one after another, 8 times slower."""
+def test_adaptive_methods_drift_at_one_tolerance_and_the_ordinary_ensemble_goes_in_lanes():
+    """One value for all of them, except for those that have a default of their own and keep it."""
+    asked = [case for case in cases(quick=False) if case.group == measures.HISTORIES]
+    given = {case.settings["tolerance"] for case in asked if "tolerance" in case.settings}
+    assert given == {TOLERANCE}
+    for case in asked:
+        method = symtop.integrator(case.integrator)
+        assert len(method.charts()) == 1, case
+        own = method.adaptive and method.default_tolerance is not None
+        assert ("tolerance" in case.settings) == (method.adaptive and not own), case
+    names = {case.integrator for case in asked}
+    assert {"rk4[angles]", "rk4[axis]", "strang[axis]", "five-rotations[attitude]"} <= names
+    assert "strang[attitude]" not in names
+    # Fewer members, or another sum, would run one after another, 8 times slower.
     ensembles = [case for case in study.cases(False) if case.group == ROUNDINGS]
     assert len(ensembles) == 4
     for case in ensembles:
         row = integrator(case.integrator)
         assert case.settings["count"] >= LEAST
         assert row.solvers[row.charts()[0]].in_lanes
+
+
+TIME = np.linspace(0.0, 1000.0, 4001) + 0.3 * np.sin(np.arange(4001))
+
+
+@pytest.mark.parametrize("exponent", [1.0, 1.5, 2.0])
+def test_a_planted_exponent_is_found_under_an_oscillation(exponent):
+    fit = growth(TIME, 1e-6 * np.abs(TIME) ** exponent + 1e-6 * np.sin(5.3 * TIME))
+    assert fit.slope == pytest.approx(exponent, abs=0.05)
+    assert law(fit) == {1.0: "linear", 1.5: "t^3/2", 2.0: "quadratic"}[exponent]
+
+
+def test_a_law_is_named_where_the_interval_holds_one_and_growth_as_time_is_told():
+    means = xr.DataArray([[0.0, 1e-5, 3e-5, np.nan]], dims=("variant", "window"))
+    cells = xr.Dataset({"energy_mean": means.copy(data=[[0.0, 4e-5, 1e-6, np.nan]]),
+                        "energy_largest": means + 5e-5, "energy_least": means - 5e-5})  # fmt: skip
+    moves = np.abs(measures.shifts(cells))
+    assert (float(moves.isel(window=-1).max()), float(moves.max())) == pytest.approx((0.01, 0.4))
+    slopes = np.array([0.91, 1.0, 1.09, 0.88, 1.12, 2.0])
+    assert measures.as_time(slopes).tolist() == [True, True, True, False, False, False]
+    assert measures.faster(slopes).tolist() == [False, False, False, False, True, True]
+    assert law(growth(TIME, np.sin(5.3 * TIME))) == "bounded"
+    assert law(growth(TIME, np.abs(TIME) ** 0.75)) == "t^0.75"
+    fit = growth(TIME, np.abs(TIME))
+    assert law(fit) == "linear"
+    assert law(fit._replace(slope=0.8, interval=0.4)) == "undecided"
+
+
+def test_an_ensemble_tells_a_walk_from_a_drift_and_means_of_a_walk_vary_with_the_steps_between():
+    draw = np.random.default_rng(3)
+    steps = np.unique(np.rint(np.geomspace(10, 100_000, 40)).astype(int))
+    walks = np.cumsum(draw.standard_normal((8, 100_000)), axis=1)[:, steps - 1]
+    walk, drift = ensemble_growth(steps, walks, 20.0), ensemble_growth(steps, walks + 0.2 * steps, 20.0)
+    assert abs(walk.fit.slope - 0.5) < walk.fit.interval < 0.3
+    assert drift.fit.slope - drift.fit.interval > 0.65
+    ends = np.array([100, 130, 200, 400, 1000])
+    walks = np.cumsum(np.random.default_rng(4).standard_normal((20_000, 1000)), axis=1)
+    means = np.stack([part.mean(axis=1) for part in np.split(walks, ends[:-1], axis=1)])
+    variance = np.mean((means[1:] - means[0]) ** 2, axis=1)
+    assert np.isnan(elapsed_steps(ends)[0])
+    assert variance == pytest.approx(elapsed_steps(ends)[1:], rel=0.05)
+    assert abs(variance[0] / ends[1] - 1.0) > 0.5  # the control: counted from the start
+
+
+@pytest.mark.parametrize("name", ["stormer-verlet", "midpoint", "strang", "cayley"])
+def test_the_mean_of_a_window_is_known_far_better_than_the_energy_has_digits(name):
+    """Rounded to one double, the level of the modified energy would put 3.5e-17 of |E| into every window."""
+    where, method = symtop.scene("spheroid"), symtop.integrator(name)
+    found = []
+    for one in members(where, 6):
+        h = one.nutation_period / 1000.37
+        solver = chart_of(method)[1]
+        par, rule, state = solver.setup(one.top, one.start, h)
+        done = solver.loop(par, rule, state, h, scattered(0, 5000))
+        level = watch(one, method, h)(done.states, done.momenta)["modified_energy"].mean()
+        found.append(level / one.energy_grain)  # relative to |E|, whose rounding it is
+    assert np.sqrt(np.mean(np.square(found))) < 1.2e-17
+
+
+@pytest.mark.parametrize("bend", [0.0, 3e-9])
+def test_a_horizon_is_predicted_from_a_tenth_of_it(bend):
+    t = np.linspace(0.0, 10_000.0, 20_001)
+    error = 2e-6 + 1e-6 * t + bend * t * t + 1e-6 * np.sin(5.3 * t)
+    short = t < 1000.0
+    tolerance = abs(float(error[-1])) * 0.8
+    true = lost_at(t, error, tolerance)
+    assert horizon(t[short], error[short], tolerance).time == pytest.approx(true, rel=0.02)
+    assert horizon(t[short], -error[short], tolerance).time == pytest.approx(true, rel=0.02)
+
+
+def test_a_horizon_is_the_first_crossing_and_a_phase_that_is_not_lost_has_none():
+    t = np.linspace(0.0, 100.0, 5001)
+    bump = 1e-3 * t + np.exp(-(((t - 30.0) / 3.0) ** 2))
+    assert 25.0 < lost_at(t, bump, 0.5) < 30.0
+    error = 1e-6 * np.sin(5.3 * TIME)
+    assert np.isnan(lost_at(TIME, error, 1e-2))
+    assert horizon(TIME, error, 1e-2).time > 1e3 * TIME[-1]
+
+
+@pytest.mark.parametrize("name", ["spheroid", "goldstein", "cusp", "fast", "hairer-lubich-wanner"])
+def test_the_truth_is_never_late_and_a_shift_is_measured(name):
+    where = symtop.scene(name)
+    exact = symtop.ClosedForm(where.top, where.start)
+    times = np.linspace(0.0, 300.7 * where.nutation_period, 3001)
+    motion = exact(times)
+    assert np.max(np.abs(nutation_phase(where, times, motion.theta, motion.theta_dot))) < 1e-9
+    ahead = exact(times * (1.0 + 1e-4))
+    expected = 2.0 * np.pi * 1e-4 * times / where.nutation_period
+    assert nutation_phase(where, times, ahead.theta, ahead.theta_dot) == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_steady_precession_and_a_failed_sample_have_no_phase():
+    steady, spheroid = symtop.scene("steady"), symtop.scene("spheroid")
+    times = np.linspace(0.0, 9.0, 101)
+    for where, phased in ((steady, 0), (spheroid, 60)):
+        motion = symtop.ClosedForm(where.top, where.start)(times)
+        theta = np.where(np.arange(101) < 60, motion.theta, np.nan)
+        phase = nutation_phase(where, times, theta, motion.theta_dot)
+        assert np.isfinite(phase).sum() == phased
+        assert not np.isfinite(phase[60:]).any()
+
+
+def test_laws_of_growth_of_a_symplectic_method_and_of_runge_kutta():
+    where = symtop.scene("spheroid")
+    period = where.nutation_period
+    found = {
+        name: history(where, symtop.integrator(name), horizon=6000.0 * period, samples=3001, **control)
+        for name, control in {
+            "stormer-verlet": {"step_size": period / 60.37},
+            "strang": {"step_size": period / 60.37},
+            "rk4": {"step_size": period / 60.37},  # a wrong frequency rules for the first 75 nutations, energy then
+            "rk45-compiled": {"tolerance": 1e-8},
+        }.items()
+    }
+    for name, energy, phase in (("stormer-verlet", 0.0, 1.0), ("strang", 0.0, 1.0), ("rk4", 1.0, 2.0),
+                                ("rk45-compiled", 1.0, 2.0)):  # fmt: skip
+        assert float(found[name]["energy_exponent"]) == pytest.approx(energy, abs=0.1), name
+        assert float(found[name]["phase_exponent"]) == pytest.approx(phase, abs=0.2), name
+        assert float(found[name]["phase_exponent_interval"]) < 0.2
+
+
+@pytest.mark.parametrize("name", ["gauss-8", "kahan-li-6", "rk4"])
+def test_a_lost_phase_is_predicted(name):
+    found = phase_loss(symtop.scene("spheroid"), symtop.integrator(name), short=100.0, target=250.0)
+    assert float(found["measured"]) > 150.0
+    assert float(found["ratio"]) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("name", ["stormer-verlet", "midpoint", "strang", "cayley"])
+def test_a_modified_energy_oscillates_with_the_fourth_power_of_the_step(name):
+    where = symtop.scene("spheroid")
+    chart, solver = chart_of(symtop.integrator(name))
+    plain, modified, rest = [], [], []
+    for steps in (100.37, 200.37):
+        h = where.nutation_period / steps
+        par, rule, state = solver.setup(where.top, where.start, h)
+        states = solver.loop(par, rule, state, h, scattered(0, 4000, 2000)).states
+        values = shadow.modified_energy(where, name, chart, states, h)
+        on = shadow.section(chart, states)
+        plain.append(np.ptp(shadow.energy(where, chart, states)))
+        modified.append(np.ptp(values))
+        rest.append(np.ptp(shadow.oscillation(*on, values)(*on, values)))
+    assert plain[0] / plain[1] == pytest.approx(4.0, rel=0.1)  # the control: H itself, of second order
+    if name == "cayley":
+        assert max(modified) < 1e-12
+    else:
+        assert modified[0] / modified[1] == pytest.approx(16.0, rel=0.1)
+    assert max(rest) < 1e-12

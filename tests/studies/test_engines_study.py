@@ -42,59 +42,25 @@ def measured(bodies):
     return xr.DataTree.from_dict({"tops": tops, "population": drawn, "bodies": bodies})
 
 
-def test_every_map_of_an_engine_has_a_row_that_shows_the_axis():
-    names = study.variant_names()
-    assert {integrator(name).method for name in names} == {*engines(), *(row.split("[")[0] for row in study.COMPARED)}
-    assert not any(name.endswith("[angles]") for name in names)
-
-
 @pytest.mark.parametrize(("name", "value"), [("mujoco-euler[axis]", 0.61079), ("rkmk4[axis]", 8.1624e-6)])
 def test_the_error_of_a_run_is_the_reference_value(name, value):
     made = measures.judged(GOLDSTEIN, integrator(name), 0.025, 10.0)
     assert made["axis"] == pytest.approx(value, rel=1e-4)
 
 
-def test_energy_and_spin_are_those_of_simulate():
+def test_every_map_has_a_row_whose_energy_and_spin_are_those_of_simulate():
+    names = study.variant_names()
+    assert {integrator(name).method for name in names} == {*engines(), *(row.split("[")[0] for row in study.COMPARED)}
+    assert not any(name.endswith("[angles]") for name in names)
     made = measures.judged(GOLDSTEIN, integrator("yade[axis]"), 0.025, 10.0)
     run = symtop.simulate(GOLDSTEIN, "yade[axis]", step_size=0.025, horizon=10.0, guard=False, observe="axis")
     scale = abs(float(run["energy"][0])) + GOLDSTEIN.top.mgl
     assert made["energy"] == pytest.approx(float(run["energy"][-1] - run["energy"][0]) / scale, rel=1e-9)
     largest = max(abs(float(run[name][0])) for name in ("p_phi", "p_psi"))
     assert made["spin"] == pytest.approx(float(run["p_psi"][-1] - run["p_psi"][0]) / largest, rel=1e-9)
-
-
-def test_a_run_that_ended_is_as_far_off_as_can_be():
     made = measures.judged(symtop.scene("fast"), integrator("mujoco-euler[axis]"), 1.0 / 60.0, 100.0)
     assert made["axis"] == math.pi
     assert not math.isfinite(made["energy"])
-
-
-def test_orders_walls_and_floors_are_read_off(measured):
-    """A method whose error is rounding alone has no order; one without the term is counted to order 0."""
-    known = facts.lines(measured)
-    assert known["order"]["mujoco-euler[axis]"] == pytest.approx(1.0, abs=0.15)
-    assert known["order"]["strang[axis]"] == pytest.approx(2.0, abs=0.05)
-    assert abs(known["order"]["no-gyro[axis]"]) < 0.05
-    assert dict(known["group"]) == {
-        "mujoco-euler[axis]": 1.0, "rapier-float32[attitude]": 1.0, "no-gyro[axis]": 0.0, "strang[axis]": 2.0,
-    }  # fmt: skip
-    tops = measured["tops"].to_dataset()
-    rounded = xr.DataTree.from_dict({"tops": tops.assign(axis=tops["axis"].where(tops["axis"].isnull(), 1e-15))})
-    assert facts.lines(rounded)["order"].isna().all()
-
-
-def test_facts_are_those_of_the_runs(measured):
-    """The wall of a map without the term, its distance from the spherical top, and the ends of the field."""
-    answers = facts.facts(measured)
-    tops = measured["tops"].to_dataset().sel(scene="goldstein")
-    assert answers["wall"] == float(tops["axis"].sel(variant="no-gyro[axis]").min()) > 1.5
-    usual = tops.sel(rate=240.0, horizon=10.0)
-    assert answers["spherical"] == float(usual["frame_spherical"].sel(variant="no-gyro[axis]")) < 0.01
-    assert float(usual["frame_spherical"].sel(variant="mujoco-euler[axis]")) > 0.1
-    assert answers["best"] == answers["worst"] == float(usual["frame_axis"].sel(variant="mujoco-euler[axis]"))
-    assert (answers["maps"], answers["turned"], answers["singles"], answers["members"]) == (2, 1, 1, 20)
-    assert answers["lost"] == 1  # mujoco-euler flies apart on the fast top
-    assert answers["single_best"] > 1e-3
 
 
 def test_what_was_not_measured_is_none(measured):
@@ -141,16 +107,13 @@ def test_the_azimuth_is_counted_over_whole_turns_and_in_both_directions(rate):
     assert math.isnan(measures.azimuth(np.vstack([e, np.full(3, np.nan)])))
 
 
-def test_a_fast_top_without_the_gyroscopic_term_precesses_at_the_rate_of_a_spherical_one():
+def test_a_fast_top_precesses_as_a_spherical_one_without_the_term_and_four_evaluations_cost_a_quarter_of_the_steps():
     """mgl/(I3 w3) becomes mgl/(I1 w3): half of it, as I1 = 2 I3; with the term it is the rate of the top."""
     fast = symtop.scene("fast")
     ratio = fast.top.I3 / fast.top.I1 - 1.0
     without, whole = (measures.judged(fast, integrator(name), 1e-3, 10.0) for name in ("no-gyro[axis]", "strang[axis]"))
     assert without["precession"] == pytest.approx(ratio, abs=2e-3)
     assert abs(whole["precession"]) < 1e-4
-
-
-def test_at_the_same_cost_a_method_of_four_evaluations_takes_a_quarter_of_the_steps():
     made = measures.frames(GOLDSTEIN, integrator("rkmk4[axis]"), (10.0, 11.0))
     alone = measures.frames(GOLDSTEIN, integrator("mujoco-implicit[axis]"), (10.0, 11.0))
     assert float(made["forces_a_step"]) == 4.0
@@ -160,7 +123,18 @@ def test_at_the_same_cost_a_method_of_four_evaluations_takes_a_quarter_of_the_st
     assert alone["level_axis"].values.tolist() == alone["frame_axis"].values.tolist()
 
 
-def test_shares_count_tops_within_five_degrees(measured):
+def test_orders_walls_and_floors_are_read_off_and_shares_count_tops_within_five_degrees(measured):
+    """A method whose error is rounding alone has no order; one without the term is counted to order 0."""
+    known = facts.lines(measured)
+    assert known["order"]["mujoco-euler[axis]"] == pytest.approx(1.0, abs=0.15)
+    assert known["order"]["strang[axis]"] == pytest.approx(2.0, abs=0.05)
+    assert abs(known["order"]["no-gyro[axis]"]) < 0.05
+    assert dict(known["group"]) == {
+        "mujoco-euler[axis]": 1.0, "rapier-float32[attitude]": 1.0, "no-gyro[axis]": 0.0, "strang[axis]": 2.0,
+    }  # fmt: skip
+    tops = measured["tops"].to_dataset()
+    rounded = xr.DataTree.from_dict({"tops": tops.assign(axis=tops["axis"].where(tops["axis"].isnull(), 1e-15))})
+    assert facts.lines(rounded)["order"].isna().all()
     tables = facts.tables(measured)
     assert [*zip(tables["orders"]["order"], tables["orders"]["maps"], strict=True)] == [(0.0, 1), (1.0, 1)]  # in double
     off = measured["population"]["off"].sel(scene="population", variant="strang[axis]").values
@@ -169,5 +143,16 @@ def test_shares_count_tops_within_five_degrees(measured):
     assert share["strang[axis]"] > share["no-gyro[axis]"]
 
 
-def test_the_page_is_rendered_with_numbers_and_without(measured, tmp_path):
+def test_facts_are_those_of_the_runs_and_the_page_has_them(measured, tmp_path):
+    """The wall of a map without the term, its distance from the spherical top, and the ends of the field."""
+    answers = facts.facts(measured)
+    tops = measured["tops"].to_dataset().sel(scene="goldstein")
+    assert answers["wall"] == float(tops["axis"].sel(variant="no-gyro[axis]").min()) > 1.5
+    usual = tops.sel(rate=240.0, horizon=10.0)
+    assert answers["spherical"] == float(usual["frame_spherical"].sel(variant="no-gyro[axis]")) < 0.01
+    assert float(usual["frame_spherical"].sel(variant="mujoco-euler[axis]")) > 0.1
+    assert answers["best"] == answers["worst"] == float(usual["frame_axis"].sel(variant="mujoco-euler[axis]"))
+    assert (answers["maps"], answers["turned"], answers["singles"], answers["members"]) == (2, 1, 1, 20)
+    assert answers["lost"] == 1  # mujoco-euler flies apart on the fast top
+    assert answers["single_best"] > 1e-3
     assert PARTIAL not in checked("engines", measured, tmp_path)

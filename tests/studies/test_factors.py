@@ -69,9 +69,6 @@ def rows(measured):
     return timed(measured)
 
 
-# ---- the cells -------------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize(("plain", "name"), [(plain_numpy.RK4, "rk4"), (plain_numpy.STRANG, "strang")])
 def test_the_loops_in_numpy_return_the_trajectory_of_the_compiled_ones(plain, name):
     for chart in plain.charts():
@@ -85,7 +82,15 @@ def test_the_loops_in_numpy_return_the_trajectory_of_the_compiled_ones(plain, na
         assert gap > 1e-9  # the control: another step is another trajectory
 
 
-def test_taylor_in_angles_solves_the_same_equations():
+def test_a_cell_is_named_once_and_taylor_in_angles_solves_the_same_equations():
+    every = cells()
+    assert len({cell.name for cell in every}) == len({cell.key for cell in every}) == len(every)
+    for cell in every:
+        assert cell.method.charts() == (cell.chart,)
+        assert (cell.method.implementation == "compiled") == (cell.language == COMPILED)
+    schemes = {cell.scheme for cell in every}
+    compiled = {cell.scheme for cell in every if cell.language == COMPILED}
+    assert {scheme for members in FAMILIES.values() for scheme in members} == compiled == schemes - {"DOP853"}
     hy = pytest.importorskip("heyoka")
     from symtop.methods.taylor.heyoka import equations
 
@@ -100,40 +105,11 @@ def test_taylor_in_angles_solves_the_same_equations():
     assert 0.0 < float(np.ptp(run["p_phi"].values)) < 1e-12  # free to drift, by rounding
 
 
-def test_a_cell_is_named_once_and_is_one_method_in_one_chart():
-    every = cells()
-    assert len({cell.name for cell in every}) == len({cell.key for cell in every}) == len(every)
-    for cell in every:
-        assert cell.method.charts() == (cell.chart,)
-        assert (cell.method.implementation == "compiled") == (cell.language == COMPILED)
-    schemes = {cell.scheme for cell in every}
-    compiled = {cell.scheme for cell in every if cell.language == COMPILED}
-    assert {scheme for members in FAMILIES.values() for scheme in members} == compiled == schemes - {"DOP853"}
-
-
-# ---- equal accuracy --------------------------------------------------------------------------------------------------
-
-
-def test_every_timed_run_meets_its_target_when_it_is_run_again(rows):
-    known = {cell.name: cell for cell in cells()}
-    assert ((rows["axis"] > 0.0) & (rows["axis"] <= SHORT.target)).all()
-    for name in ("rk45-compiled[attitude]", "takahashi-imada[axis]", "rk45-numba[axis]"):
-        mine = rows[rows["variant"] == name]
-        (row,) = set(zip(mine["axis"], mine["force_evaluations"], strict=True))
-        met = settle(SCENE, [known[name]], SHORT)[known[name]]
-        assert met.error <= SHORT.target
-        if known[name].language == COMPILED:  # it was searched for by itself
-            assert (met.error, met.evaluations) == row
-
-
-def test_the_search_ends_closer_to_the_target_if_asked():
+def test_the_search_ends_closer_if_asked_and_languages_of_one_method_have_the_same_setting_and_work(measured):
     horizon = 10.0 * SCENE.nutation_period
     for name in ("rk4[axis]", "rk4[attitude]", "strang[axis]"):
         answers = settings.search(SCENE, symtop.integrator(name), 1e-5, "axis", horizon, least=LEAST)
         assert LEAST * 1e-5 <= answers.error <= 1e-5
-
-
-def test_languages_of_one_method_have_the_same_setting_and_the_same_work(measured):
     part = measured.isel(scene=0, horizon=0, target=0)
     for chart in ("angles", "axis", "attitude"):
         trio = [part.sel(variant=f"{name}[{chart}]") for name in ("rk45-compiled", "rk45", "rk45-numba")]
@@ -155,10 +131,16 @@ def test_what_is_not_within_the_budget_has_a_reason_and_no_time(monkeypatch):
     assert (str(fast["reason"].values), bool(np.isnan(fast["seconds"]))) == ("", False)
 
 
-# ---- measured times --------------------------------------------------------------------------------------------------
-
-
-def test_every_time_is_the_median_of_its_processes(measured, rows):
+def test_every_timed_run_meets_its_target_and_its_time_is_the_median_of_its_processes(rows, measured):
+    known = {cell.name: cell for cell in cells()}
+    assert ((rows["axis"] > 0.0) & (rows["axis"] <= SHORT.target)).all()
+    for name in ("rk45-compiled[attitude]", "takahashi-imada[axis]", "rk45-numba[axis]"):
+        mine = rows[rows["variant"] == name]
+        (row,) = set(zip(mine["axis"], mine["force_evaluations"], strict=True))
+        met = settle(SCENE, [known[name]], SHORT)[known[name]]
+        assert met.error <= SHORT.target
+        if known[name].language == COMPILED:  # it was searched for by itself
+            assert (met.error, met.evaluations) == row
     samples, seconds = measured["seconds_samples"], measured["seconds"]
     assert samples.sizes["process"] == 2
     assert np.array_equal(np.isfinite(seconds), np.isfinite(samples).all("process"))
@@ -201,22 +183,16 @@ def test_times_of_a_busy_machine_are_not_compared(quiet, share, busy):
     assert {one.name for one in figures.pictures(data)} == (set() if busy else {"waterfall"})
 
 
-def test_where_nothing_was_timed_nothing_is_said(quiet):
+def test_where_nothing_was_timed_nothing_is_said_and_the_page_has_numbers_and_none(quiet, tmp_path):
     nothing = quiet.assign({name: quiet[name] * np.nan for name in ("seconds", "spread")})
     answers = facts.facts(nothing)
     assert answers["whole"] is answers["busy"] is None
     assert answers["times"] == 0
     assert np.isnan(answers["near_share"])
     assert list(figures.pictures(nothing)) == []
-
-
-def test_the_page_is_rendered_with_numbers_and_without(quiet, tmp_path):
     text = checked("factors", quiet, tmp_path)
     assert f"becomes {number(facts.facts(quiet)['whole'], 3)} times faster" in text
     assert "busy" not in text
-
-
-# ---- one factor at a time --------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("call_first", [False, True])
@@ -234,16 +210,13 @@ def test_neighbours_in_the_waterfall_differ_in_exactly_the_factor_they_name(rows
         assert bar["time (s)"] == seconds
 
 
-def test_the_product_of_the_ratios_is_the_total(quiet, rows):
+def test_the_product_of_the_ratios_is_the_total_and_a_waterfall_with_a_missing_step_is_not_drawn(quiet, rows):
     part = first_goal(rows)
     total = facts.facts(quiet)["whole"]
     for order in (waterfall(part), waterfall(part, call_first=True)):
         seconds = order["time (s)"].to_numpy()
         assert total == pytest.approx(seconds[0] / seconds[-1], rel=1e-12)
         assert math.prod(order["times faster"].iloc[1:]) == pytest.approx(total, rel=1e-12)
-
-
-def test_a_waterfall_with_a_missing_step_is_not_drawn(rows):
     bars = waterfall(rows)
     assert len(bars)
     for bar in bars.iloc[:-1].to_dict("records"):
@@ -268,25 +241,19 @@ def synthetic(interaction=1.0):
     return pd.DataFrame(grid, columns=[*GOAL, *FACTORS, "variant", "seconds"])
 
 
-def test_the_effect_of_a_factor_is_found_where_effects_multiply_and_spread_where_they_do_not():
+def test_effects_that_multiply_are_found_and_scipy_and_charts_compared_by_the_fastest():
     for pair in pairs(synthetic()).to_dict("records"):
         assert pair["ratio"] == pytest.approx(EFFECT[pair["before"]] / EFFECT[pair["after"]], rel=1e-12)
     table = effects(synthetic(interaction=4.0)).set_index(["factor", "before", "after"])
     answers = table.loc["chart", "angles", "axis"]
     assert (answers["min"], answers["max"]) == (pytest.approx(3.0), pytest.approx(12.0))
     assert answers["count"] == 3 * len(LANGUAGES) * len(CALLS)
-
-
-def test_scipy_is_compared_in_its_fastest_chart_with_the_fastest_compiled_variant():
-    """As called: 8 x 100 x 2.5 over 2; kernels: 8 x 100 over 1."""
+    # As called: 8 x 100 x 2.5 over 2; kernels: 8 x 100 over 1.
     (row,) = facts.against_scipy(synthetic()).to_dict("records")
     assert (row["times, as called"], row["times, kernels"]) == (pytest.approx(1000.0), pytest.approx(800.0))
     assert (row["SciPy's"], row["fastest compiled"]) == (
         f"{DORMAND_PRINCE}-axis-{SCIPY_PYTHON}-{SOLVE_IVP}", f"Takahashi-Imada-axis-{COMPILED}-{SIMULATE}",
     )  # fmt: skip
-
-
-def test_charts_are_compared_by_compiled_kernels():
     table = charts(synthetic(interaction=4.0))
     assert list(table["family"]) == ["Dormand-Prince", "rk4", "splitting"]
     np.testing.assert_allclose(table["angles / axis"], 12.0)

@@ -49,19 +49,6 @@ def axis_errors(name, scene, h, steps, marks=None):
     return charts.axis_distance(axis_of(chart, done.states), closed_form(scene).axis(marks * h)), done.outcome
 
 
-# ---- the linear limit ------------------------------------------------------------------------------------------------
-
-
-def test_verlet_is_stable_up_to_h_omega_2():
-    limit, _ = linear_limits(integrator("stormer-verlet"), STEADY, np.linspace(0.05, 4.0, 80) / OMEGA)
-    assert limit * OMEGA == pytest.approx(2.0, abs=1e-8)
-    for phase, stays in ((1.9995, True), (2.0005, False)):
-        momenta = STEADY.top.momenta(STEADY.start)
-        start = with_momenta(STEADY.top, STEADY.start.theta + 1e-9, momenta)
-        _, done = run("stormer-verlet", STEADY, phase / OMEGA, 400, start=start)
-        assert bool(np.max(np.abs(done.states[:, 0] - STEADY.start.theta)) < 1e-7) is stays
-
-
 def trapezoidal_limit(top, precession, theta):
     """The step beyond which `trapezoidal` is unstable at a steady precession; infinite for I3 >= I1."""
     if top.I3 >= top.I1:
@@ -76,25 +63,6 @@ def test_a_start_next_to_a_pole_has_the_momenta_that_were_asked_for(theta):
     assert with_momenta(top, theta, momenta).phi_dot == pytest.approx(rate, rel=1e-13)
     naive = (momenta.p_phi - momenta.p_psi * math.cos(theta)) / (top.I1 * math.sin(theta) ** 2)
     assert theta == 0.7 or abs(naive / rate - 1.0) > 1e-10  # the control
-
-
-def test_the_trapezoidal_rule_has_its_own_limit_and_the_midpoint_rule_none():
-    trapezoidal, midpoint = integrator("trapezoidal"), integrator("midpoint")
-    limit = trapezoidal_limit(STEADY.top, STEADY.start.phi_dot, STEADY.start.theta)
-    assert linear_limits(trapezoidal, STEADY, np.linspace(0.02, 1.2, 60) * limit)[0] == pytest.approx(limit, rel=1e-6)
-    assert math.isnan(linear_limits(midpoint, STEADY, np.linspace(0.02, 1.2, 60) * limit)[0])
-    for place in (0.5, 0.99, 1.01, 2.0):
-        assert (abs(trace(trapezoidal, STEADY, place * limit).trace) < 2.0) is (place < 1.0)
-        assert abs(trace(midpoint, STEADY, place * limit).trace) < 2.0
-    assert trapezoidal_limit(SymmetricTop(1.0, 1.5, 2.0), 1.0, 1.0) == math.inf
-
-
-def test_the_triple_jump_is_unstable_on_the_other_side():
-    """Yoshida's three Verlet steps leave |t| <= 2 upwards, at the known h omega = 1.573, long before t = -2."""
-    method = integrator("stormer-verlet-yoshida-4")
-    limit, _ = linear_limits(method, STEADY, np.linspace(0.05, 3.0, 60) / OMEGA)
-    assert limit * OMEGA == pytest.approx(1.573, abs=2e-3)
-    assert trace(method, STEADY, 1.02 * limit).trace > 2.0
 
 
 @pytest.mark.parametrize(("name", "turn"), [("stormer-verlet", math.asin), ("midpoint", math.atan)])
@@ -145,8 +113,20 @@ def test_a_method_that_damps_has_a_limit_where_its_nutations_begin_to_grow(name)
         assert (late < 0.1 * early) is not grows
 
 
-def test_a_method_that_cannot_be_followed_has_no_limit():
-    """Its precession drifts so far in a step that its nutations change as much: no growth is told from that."""
+def test_limits_are_those_of_linear_theory_but_for_methods_that_cannot_be_followed():
+    limit, _ = linear_limits(integrator("stormer-verlet"), STEADY, np.linspace(0.05, 4.0, 80) / OMEGA)
+    assert limit * OMEGA == pytest.approx(2.0, abs=1e-8)
+    for phase, stays in ((1.9995, True), (2.0005, False)):
+        momenta = STEADY.top.momenta(STEADY.start)
+        start = with_momenta(STEADY.top, STEADY.start.theta + 1e-9, momenta)
+        _, done = run("stormer-verlet", STEADY, phase / OMEGA, 400, start=start)
+        assert bool(np.max(np.abs(done.states[:, 0] - STEADY.start.theta)) < 1e-7) is stays
+    # Yoshida's three Verlet steps leave |t| <= 2 upwards, at the known h omega = 1.573, long before t = -2.
+    method = integrator("stormer-verlet-yoshida-4")
+    limit, _ = linear_limits(method, STEADY, np.linspace(0.05, 3.0, 60) / OMEGA)
+    assert limit * OMEGA == pytest.approx(1.573, abs=2e-3)
+    assert trace(method, STEADY, 1.02 * limit).trace > 2.0
+    # Its precession drifts so far in a step that its nutations change as much: no growth is told from that.
     grid = np.linspace(0.02, 10.0, 300) / OMEGA
     for name in ("crouch-grossman-3", "rkmk-se3-2", "commutator-free-4", "generalised-alpha"):
         assert math.isnan(linear_limits(integrator(name), STEADY, grid)[0])
@@ -175,9 +155,6 @@ def test_a_window_between_two_steps_of_the_grid_is_seen(name, phase, unstable):
         assert swings(name, phase, 20_000, 1e-6, centre)[-1] > 1e-4
     elif phase > 6.0:  # a whole nutation a step, and nothing is driven away
         assert swings(name, phase, 20_000, 1e-6)[-1] < 1e-5
-
-
-# ---- a pole next to the path -----------------------------------------------------------------------------------------
 
 
 def test_angles_fail_where_a_step_passes_the_pole_and_splitting_does_not_notice():
@@ -215,9 +192,6 @@ def test_the_benchmark_of_bruls_cardona_arnold_is_no_place_for_angles():
     assert ladder[1] < 1e-3
 
 
-# ---- the sleeping top ------------------------------------------------------------------------------------------------
-
-
 @pytest.mark.parametrize("name", ["strang", "cayley"])
 @pytest.mark.parametrize("h", [0.1, 0.5, 1.0])
 def test_the_sleeping_threshold_shifts_as_theory_says(name, h):
@@ -230,15 +204,15 @@ def test_methods_without_a_shift_keep_the_threshold(name):
         assert sleeping_threshold(integrator(name), h) == pytest.approx(2.0, abs=1e-6)
 
 
-def test_every_row_of_fixed_step_is_scanned_for_sleep_but_those_that_are_left_out():
-    left = {name for names in study.NOT_SLEEPING.values() for name in names}
-    fixed = {row.name for row in grid_variants("axis") if row.fixed_step}
-    assert left < fixed  # a name that no variant has would leave nothing out
-    for quick in (True, False):
-        assert {case.integrator for case in study.cases(quick) if case.scene == "sleeping"} == fixed - left
-
-
-def test_long_runs_fall_on_one_side_of_the_threshold_only():
+def test_the_trapezoidal_rule_has_its_own_limit_and_long_runs_fall_on_one_side_of_it():
+    trapezoidal, midpoint = integrator("trapezoidal"), integrator("midpoint")
+    limit = trapezoidal_limit(STEADY.top, STEADY.start.phi_dot, STEADY.start.theta)
+    assert linear_limits(trapezoidal, STEADY, np.linspace(0.02, 1.2, 60) * limit)[0] == pytest.approx(limit, rel=1e-6)
+    assert math.isnan(linear_limits(midpoint, STEADY, np.linspace(0.02, 1.2, 60) * limit)[0])
+    for place in (0.5, 0.99, 1.01, 2.0):
+        assert (abs(trace(trapezoidal, STEADY, place * limit).trace) < 2.0) is (place < 1.0)
+        assert abs(trace(midpoint, STEADY, place * limit).trace) < 2.0
+    assert trapezoidal_limit(SymmetricTop(1.0, 1.5, 2.0), 1.0, 1.0) == math.inf
     h = 0.5
     for name in ("strang", "cayley"):
         edge = integrator(name).sleeps_from(h)
@@ -266,10 +240,7 @@ def test_the_splitting_window():
     assert not sign_changes(lambda h: sleep_margin(integrator("cayley"), 6.0, h), np.linspace(0.5, 1.5, 201) * unit)
 
 
-# ---- the separatrix --------------------------------------------------------------------------------------------------
-
-
-def test_errors_grow_by_half_of_g_and_the_horizon_is_their_logarithm():
+def test_the_separatrix_costs_half_of_g_and_a_run_that_leaves_its_chart_is_told_apart():
     """Negative control: elsewhere they do not grow like that."""
     scene, h = scenes.scene("separatrix"), 0.0125
     g = math.sqrt(scene.top.mgl / scene.top.I1)
@@ -286,9 +257,6 @@ def test_errors_grow_by_half_of_g_and_the_horizon_is_their_logarithm():
     assert gained == pytest.approx(2.0 * math.log(4.0) / g, abs=0.2)  # (2/g) ln 4: a quarter of the error
     best = separatrix_horizon(integrator("gauss-12"), scene, 0.1)
     assert best.reached == pytest.approx(2.0 / g * math.log(1e16), abs=5.0)
-
-
-def test_a_run_that_leaves_its_chart_before_it_is_wrong_is_told_from_one_that_is_wrong():
     scene = scenes.scene("separatrix")
     broken = separatrix_horizon(integrator("galerkin-simpson"), scene, 0.1)
     assert broken.broken == 1.0
@@ -297,10 +265,7 @@ def test_a_run_that_leaves_its_chart_before_it_is_wrong_is_told_from_one_that_is
     assert separatrix_horizon(integrator("strang"), scene, 0.1).broken == 0.0
 
 
-# ---- the solver ------------------------------------------------------------------------------------------------------
-
-
-def test_one_newton_iteration_drifts_to_3e_2_and_beyond():
+def test_solvers_of_one_iteration_drift_and_tight_ones_leave_the_method():
     scene = scenes.scene("goldstein")
     one = [textbook_midpoint(scene, 0.1, steps, 0.0, 1) for steps in (10_000, 100_000, 1_000_000)]
     two = [textbook_midpoint(scene, 0.1, steps, 0.0, 2) for steps in (10_000, 100_000, 1_000_000)]
@@ -308,17 +273,11 @@ def test_one_newton_iteration_drifts_to_3e_2_and_beyond():
     assert one[0] == pytest.approx(0.1 * one[1], rel=0.2)
     assert one[2] > 1.0
     assert two == pytest.approx([3.434e-4] * 3, rel=1e-2)
-
-
-def test_a_loose_tolerance_is_one_iteration_and_a_tight_one_leaves_the_method():
     scene = scenes.scene("goldstein")
     loose = textbook_midpoint(scene, 0.1, 100_000, 1e-1)
     assert loose == pytest.approx(3.1e-2, rel=0.05)
     for tolerance in (1e-6, 1e-10):
         assert textbook_midpoint(scene, 0.1, 100_000, tolerance) == pytest.approx(3.434e-4, rel=1e-2)
-
-
-def test_the_kernels_momenta_drift_as_the_solver_and_not_as_the_method():
     scene, midpoint = scenes.scene("goldstein"), rule_of(integrator("midpoint"))
     measured = [solver_sweep(midpoint, scene, 0.1, 20_000, tolerance) for tolerance in (math.inf, 1e-4, 1e-8)]
     assert measured[0].iterations == 1.0
@@ -326,9 +285,6 @@ def test_the_kernels_momenta_drift_as_the_solver_and_not_as_the_method():
     assert measured[2].momentum < 1e-14
     coarse = solver_sweep(midpoint, scene, 0.3, 100_000, math.inf).energy
     assert coarse > 0.05 > 10.0 * solver_sweep(midpoint, scene, 0.3, 100_000, 1e-8).energy
-
-
-# ---- resonance -------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("name", "place"), [("stormer-verlet", math.sqrt(3.0)), ("midpoint", math.sqrt(12.0))])
@@ -364,10 +320,7 @@ def test_what_is_measured_is_the_first_displacement_that_is_lost_and_larger_ones
     assert not survives(verlet, STEADY, STEADY.start.theta, [0.03, 0.1, 0.2], math.sqrt(3.0) / OMEGA, 3000).any()
 
 
-# ---- adaptive Runge-Kutta --------------------------------------------------------------------------------------------
-
-
-def test_rk45_loses_energy_and_momenta_linearly():
+def test_rk45_loses_constants_linearly_and_errors_sampled_once_a_nutation_read_some_1e_9():
     rk45 = symtop.simulate("spheroid", "rk45", tolerance=1e-6, horizon=200.0, samples=401, guard=False)
     lost = {name: rk45[name].values - rk45[name].values[0] for name in ("energy", "p_phi", "p_psi")}
     assert -6e-3 < lost["energy"][-1] < -5e-3
@@ -375,12 +328,6 @@ def test_rk45_loses_energy_and_momenta_linearly():
         assert 3e-5 < abs(lost[name][-1]) < 7e-4
     for values in lost.values():
         assert values[200] / values[-1] == pytest.approx(0.5, abs=0.1)
-
-
-# ---- sampling --------------------------------------------------------------------------------------------------------
-
-
-def test_sampled_once_a_nutation_an_error_of_2_5e_4_reads_some_1e_9():
     once, every = sampled_energy_error(integrator("stormer-verlet"), scenes.scene("goldstein"), 100, 3)
     assert every == pytest.approx(2.5e-4, rel=0.03)
     assert 1e-9 < once < 1e-8
@@ -390,9 +337,6 @@ def test_sampled_once_a_nutation_an_error_of_2_5e_4_reads_some_1e_9():
     assert once > 0.3 * every
 
 
-# ---- the tools -------------------------------------------------------------------------------------------------------
-
-
 NOT_ONE_MAP = {  # of theta and p_theta, so that its samples are no iterates
     "generalised-alpha",  # accelerations are a second state of it
     "stormer-verlet-reversible",  # a sample is a step aside, of another length each time
@@ -400,8 +344,13 @@ NOT_ONE_MAP = {  # of theta and p_theta, so that its samples are no iterates
 }
 
 
-def test_every_fixed_step_method_shows_its_trace():
-    """Consistency: at small steps each turns by h omega, in whatever chart it works."""
+def test_every_fixed_step_method_shows_its_trace_and_is_scanned_but_those_left_out():
+    left = {name for names in study.NOT_SLEEPING.values() for name in names}
+    fixed = {row.name for row in grid_variants("axis") if row.fixed_step}
+    assert left < fixed  # a name that no variant has would leave nothing out
+    for quick in (True, False):
+        assert {case.integrator for case in study.cases(quick) if case.scene == "sleeping"} == fixed - left
+    # Consistency: at small steps each turns by h omega, in whatever chart it works.
     turn = 0.03  # more, and the error of rkmk-se3-2 shows, which grows with the spin; less, and that of the differences
     for name, method in methods().items():
         if method.control == "step_size" and name not in NOT_ONE_MAP:
@@ -410,13 +359,10 @@ def test_every_fixed_step_method_shows_its_trace():
             assert turned == pytest.approx(turn, rel=2e-3), name
 
 
-def test_sign_changes_finds_roots_and_skips_what_is_not_a_number():
+def test_sign_changes_are_found_and_a_precession_next_to_a_pole_has_no_trace():
     assert sign_changes(math.cos, np.linspace(0.0, 6.0, 13)) == pytest.approx([math.pi / 2, 3 * math.pi / 2])
     holed = lambda x: math.nan if 1.0 < x < 2.0 else math.cos(x)
     assert sign_changes(holed, np.linspace(0.0, 6.0, 13)) == pytest.approx([3 * math.pi / 2])
     assert sign_changes(lambda x: 1.0 + x * x, np.linspace(-1.0, 1.0, 5)) == []
-
-
-def test_a_precession_next_to_a_pole_has_no_trace():
     tall = Scene("tall", SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(theta=1e-4, psi_dot=3.0), 1.0)
     assert math.isnan(trace(integrator("stormer-verlet"), tall, 0.1).trace)

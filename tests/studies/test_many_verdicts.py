@@ -40,15 +40,12 @@ def padded(values):
     return np.concatenate([values, np.full((SAMPLES - len(values), *values.shape[1:]), math.nan)])
 
 
-@pytest.mark.parametrize(
-    ("name", "chart", "step", "word"),
-    [
-        ("strang", "axis", 0.03, "accurate"), ("strang", "axis", 0.12, "bounded_but_wrong"),
-        ("stormer-verlet", "angles", 0.03, "accurate"), ("stormer-verlet", "angles", 0.1, "bounded_but_wrong"),
-        ("rk4", "axis", 0.1, "drifting"), ("rk4", "axis", 0.5, "wrong_regime"), ("rk4", "attitude", 0.03, "accurate"),
-        ("commutator-free-4", "attitude", 0.3, "wrong_regime"), ("rk4", "angles", 0.15, "drifting"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "chart", "step", "word"), [
+    ("strang", "axis", 0.03, "accurate"), ("strang", "axis", 0.12, "bounded_but_wrong"),
+    ("stormer-verlet", "angles", 0.03, "accurate"), ("stormer-verlet", "angles", 0.1, "bounded_but_wrong"),
+    ("rk4", "axis", 0.1, "drifting"), ("rk4", "axis", 0.5, "wrong_regime"), ("rk4", "attitude", 0.03, "accurate"),
+    ("commutator-free-4", "attitude", 0.3, "wrong_regime"), ("rk4", "angles", 0.15, "drifting"),
+])  # fmt: skip
 def test_one_pass_says_what_judgement_says(name, chart, step, word):
     cusp = scene("cusp")
     times, run, seen, shown = run_of(cusp, name, chart, step, 400)

@@ -62,16 +62,7 @@ def points():
     return np.column_stack([draw.uniform(0.3, 2.8, 200), draw.uniform(-3, 3, (200, 5))])
 
 
-def test_the_lagrangian_is_the_same_in_three_forms(symbols, points):
-    lagrangians = symbols.values(symbols.ways, points)
-    assert np.ptp(lagrangians, axis=0).max() < 1e-13
-    assert np.std(lagrangians[0]) > 1.0
-    for coordinate in symbols.q[1:]:  # phi and psi are cyclic, psi although two of the three forms contain it
-        for way in symbols.ways:
-            assert np.abs(symbols.values([symbols.hy.diff(way, coordinate)], points)).max() < 1e-13
-
-
-def test_the_kernels_accelerations_solve_the_symbolic_euler_lagrange_equations(symbols, points):
+def test_accelerations_and_momenta_of_the_kernels_are_those_of_the_symbolic_lagrangian(symbols, points):
     """d/dt dL/dv - dL/dq = 0 by differentiation, solved for the accelerations, against the kernels' formula."""
     hy, L = symbols.hy, symbols.ways[1]
     mass = [[hy.diff(hy.diff(L, a), b) for b in symbols.v] for a in symbols.v]
@@ -84,9 +75,6 @@ def test_the_kernels_accelerations_solve_the_symbolic_euler_lagrange_equations(s
     true = np.linalg.solve(M, F[..., None])[..., 0]
     for point, expected in zip(points, true, strict=True):
         assert accelerations(*NUMBERS, point[0], *point[3:]) == pytest.approx(expected, rel=1e-11, abs=1e-11)
-
-
-def test_the_kernels_momenta_are_the_derivatives_of_the_symbolic_lagrangian(symbols, points):
     top = symtop.SymmetricTop(*NUMBERS)
     slopes = symbols.values([symbols.hy.diff(symbols.ways[0], v) for v in symbols.v[1:]], points)
     for k, point in enumerate(points):
@@ -114,20 +102,6 @@ def test_a_step_of_the_kernels_is_the_discrete_legendre_transform(symbols, metho
     assert -ends[:3] == pytest.approx([run.states[0, 1], run.p_phi[0], run.p_psi[0]], abs=1e-11)
     assert ends[3:] == pytest.approx([run.states[1, 1], run.p_phi[1], run.p_psi[1]], abs=1e-11)
     assert -ends[1:3] == pytest.approx(ends[4:], abs=1e-11)  # Noether, one step
-
-
-def test_the_spheroids_radii_give_its_inertia_and_the_inertia_its_radii():
-    top, radii = notebook_top()
-    assert radii == pytest.approx((2.73861, 1.58114), abs=5e-6)
-    assert pytest.approx((2.0, 1.0), rel=1e-15) == (top.I1, top.I3)
-    assert round(top.mgl, 4) == 26.8658
-    for mass, polar, equatorial in ((1.0, 2.0, 1.0), (0.3, 0.1, 0.7)):
-        body = symtop.SymmetricTop.from_spheroid(mass, polar, equatorial)
-        assert body.spheroid_radii(mass) == pytest.approx((polar, equatorial), rel=1e-13)
-    with pytest.raises(SymtopError, match="no spheroid"):
-        symtop.SymmetricTop(1.0, 2.0, 1.0).spheroid_radii(1.0)
-    with pytest.raises(SymtopError, match="mass"):
-        top.spheroid_radii(0.0)
 
 
 def test_its_solver_keeps_five_figures_of_energy_and_six_of_momentum_and_no_more():
@@ -161,7 +135,18 @@ def test_the_hard_way_and_the_easy_way_agree(name):
     assert float(both["hard_gap"].max()) < 1e-10
 
 
-def test_alpha_contradicts_a_release_at_rest():
+def test_radii_give_the_inertia_and_alpha_contradicts_a_release_at_rest():
+    top, radii = notebook_top()
+    assert radii == pytest.approx((2.73861, 1.58114), abs=5e-6)
+    assert pytest.approx((2.0, 1.0), rel=1e-15) == (top.I1, top.I3)
+    assert round(top.mgl, 4) == 26.8658
+    for mass, polar, equatorial in ((1.0, 2.0, 1.0), (0.3, 0.1, 0.7)):
+        body = symtop.SymmetricTop.from_spheroid(mass, polar, equatorial)
+        assert body.spheroid_radii(mass) == pytest.approx((polar, equatorial), rel=1e-13)
+    with pytest.raises(SymtopError, match="no spheroid"):
+        symtop.SymmetricTop(1.0, 2.0, 1.0).spheroid_radii(1.0)
+    with pytest.raises(SymtopError, match="mass"):
+        top.spheroid_radii(0.0)
     scene = symtop.scene("goldstein")
     cubic = nutation_cubic(scene)
     assert cubic == pytest.approx((1.4981443962885, 2.0, 2.5, 1.7), abs=1e-13)
@@ -176,7 +161,13 @@ def test_alpha_contradicts_a_release_at_rest():
         with_alpha(scene, 1.4, 1.0)
 
 
-def test_the_modified_energy_of_another_method_is_not_conserved():
+def test_the_lagrangian_is_the_same_in_three_forms_and_another_modified_energy_is_not_conserved(symbols, points):
+    lagrangians = symbols.values(symbols.ways, points)
+    assert np.ptp(lagrangians, axis=0).max() < 1e-13
+    assert np.std(lagrangians[0]) > 1.0
+    for coordinate in symbols.q[1:]:  # phi and psi are cyclic, psi although two of the three forms contain it
+        for way in symbols.ways:
+            assert np.abs(symbols.values([symbols.hy.diff(way, coordinate)], points)).max() < 1e-13
     scene = symtop.scene("spheroid")
     run = symtop.simulate(scene, "midpoint", step_size=0.01, guard=False)
     states, h = np.stack([run["theta"].values, run["p_theta"].values], axis=1), run.attrs["step_size"]
@@ -208,16 +199,6 @@ def test_the_page_says_what_the_notebook_and_the_discrete_methods_keep(data, tmp
     assert (answers["second_behind"], answers["second_ahead"]) == (2, 3)  # the other two get ahead after 100 s
 
 
-def test_the_momenta_beside_those_of_the_solver_are_those_of_the_methods_that_are_compared(data):
-    other = data.sel(variant=["cayley[axis]"]).assign_coords(variant=["five-rotations[attitude]"])
-    loses = other.assign(p_psi_largest=other["p_psi_largest"] + 1e-3)
-    answers = facts.facts(xr.concat([data, loses], "variant"))
-    assert (answers["compared"], answers["discrete"], answers["momenta_kept"]) == (5, 6, 5)
-    assert answers["momenta"] == facts.facts(data)["momenta"]
-    leaks = data.assign(p_psi_largest=data["p_psi_largest"] + 1e-3)  # the control
-    assert facts.facts(leaks)["momenta"] > 9e-4
-
-
 @pytest.mark.parametrize("name", ["midpoint[angles]", "strang[axis]", SOLVER])
 def test_one_method_alone_has_the_facts_and_figures_that_are_its_own(data, name, tmp_path):
     alone = data.sel(variant=[name])
@@ -240,7 +221,14 @@ def long_runs(level, slope):
     }, coords=coords)  # fmt: skip
 
 
-def test_the_notebooks_question_is_answered_and_the_time_from_which_its_hope_is_true_is_measured():
+def test_momenta_beside_the_solvers_are_those_compared_and_the_notebooks_question_is_answered(data):
+    other = data.sel(variant=["cayley[axis]"]).assign_coords(variant=["five-rotations[attitude]"])
+    loses = other.assign(p_psi_largest=other["p_psi_largest"] + 1e-3)
+    answers = facts.facts(xr.concat([data, loses], "variant"))
+    assert (answers["compared"], answers["discrete"], answers["momenta_kept"]) == (5, 6, 5)
+    assert answers["momenta"] == facts.facts(data)["momenta"]
+    leaks = data.assign(p_psi_largest=data["p_psi_largest"] + 1e-3)  # the control
+    assert facts.facts(leaks)["momenta"] > 9e-4
     late = long_runs(3e-5, 1e-7)
     assert better_from(late, "spheroid", "midpoint[angles]") == pytest.approx(300.0, rel=0.03)
     never, always = long_runs(3e-5, 1e-9), long_runs(1e-9, 1e-7)

@@ -14,28 +14,19 @@ def data():
     return datasets.combine([(case, study.measure(case)) for case in study.cases(True)])
 
 
-def test_no_step_is_short_enough_without_the_gyroscopic_term_and_with_it_one_is(data):
+def test_the_pitfalls_are_there_and_the_page_says_what_was_measured(data, tmp_path):
     largest = {name: study.run_of(data, study.TERM, name)["axis"].max("sample").values
                for name in (study.WITHOUT, study.WITH, study.RIGHT)}  # fmt: skip
     assert np.ptp(largest[study.WITHOUT]) < 0.01 * largest[study.WITHOUT].mean()
     assert largest[study.WITH][-1] < 0.2 * largest[study.WITH][0]
     assert largest[study.RIGHT][-1] < 1e-4
-
-
-def test_the_energy_is_kept_where_the_axis_is_wrong(data):
     answers = study.facts(data)
     assert answers["falling_energy"] < 0.01
     assert answers["falling"] > 0.5
-
-
-def test_the_run_in_angles_ends_and_that_on_the_axis_does_not(data):
     answers = study.facts(data)
     assert answers["ended"] < 1.0
     through = study.run_of(data, study.POLE, study.AXIS).isel(setting=0)
     assert float(through["axis"].max()) < 1e-3
     assert float(through["time"].max()) == pytest.approx(2.0)
     assert (np.isfinite(through["axis"]) == np.isfinite(through["time"])).all()  # the rest is padding
-
-
-def test_the_page_says_what_was_measured(data, tmp_path):
     assert "left_chart" in checked("pitfalls", data, tmp_path, elsewhere={"three"})

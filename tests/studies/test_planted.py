@@ -20,7 +20,7 @@ def data():
     return combine([(case, study.measure(case)) for case in cases])
 
 
-def test_a_liar_is_judged_beside_the_honest_and_registered_nowhere(data):
+def test_a_liar_is_judged_beside_the_honest_and_claims_on_a_free_body_by_themselves(data):
     said = facts.facts(data)
     assert (said["integrators"], said["refuted"]) == (1, 0)
     assert (said["planted"], said["caught"]) == (1, 1)
@@ -29,9 +29,6 @@ def test_a_liar_is_judged_beside_the_honest_and_registered_nowhere(data):
     assert (row["integrator"], row["claim"], row["verdict"]) == (LIAR, "symmetric", "refuted")
     shown = {text.get_text() for picture in figures.pictures(data) for text in picture.figure.axes[0].texts}
     assert "1 of 1" in shown
-
-
-def test_claims_on_a_free_body_are_counted_by_themselves(data):
     said, table = facts.facts(data), facts.tables(data)["body"]
     assert (said["free_methods"], said["free_declared"], said["free_confirmed"]) == (1, 3, 3)
     assert [*table["claim"]] == ["order", "energy", "momentum"]
@@ -41,7 +38,7 @@ def test_claims_on_a_free_body_are_counted_by_themselves(data):
     assert (refuted["free_refuted"], refuted["refuted"]) == (1, said["refuted"])
 
 
-def test_a_property_that_could_not_be_decided_is_one_that_was_declared(data):
+def test_a_property_that_could_not_be_decided_was_declared_and_a_part_without_them_says_nothing(data):
     said = facts.facts(data)
     for on, counted in ((SCENE, "undecided"), (facts.FREE, "free_undecided")):
         one = (data["scene"] == on) & (data["variant"] == "strang") & (data["claim"] == "order")
@@ -50,18 +47,6 @@ def test_a_property_that_could_not_be_decided_is_one_that_was_declared(data):
         unsaid = open_.assign(declared=xr.where(one, "", data["declared"]))
         assert facts.facts(unsaid)[counted] == said[counted]
         assert facts.facts(unsaid)["unsaid"] == said["unsaid"] + (on == SCENE)
-
-
-def test_one_that_escapes_is_named_and_one_refuted_for_another_claim_is_not_caught(data):
-    liar = (data["variant"] == LIAR) & (data["scene"] == SCENE)
-    verdict = xr.where(liar & (data["claim"] == "symmetric"), "confirmed", data["verdict"])
-    fooled = data.assign(verdict=xr.where(liar & (data["claim"] == "order"), "refuted", verdict))
-    said = facts.facts(fooled)
-    assert (said["planted"], said["caught"]) == (1, 0)
-    assert "0 of 1" in {text.get_text() for text in next(figures.pictures(fooled)).figure.axes[0].texts}
-
-
-def test_a_part_of_the_study_without_them_says_nothing_of_them(data):
     part = data.sel(variant=["strang"])
     said = facts.facts(part)
     assert (said["planted"], said["caught"]) == (None, 0)
@@ -69,7 +54,13 @@ def test_a_part_of_the_study_without_them_says_nothing_of_them(data):
     assert not any(" of " in text.get_text() for text in next(figures.pictures(part)).figure.axes[0].texts)
 
 
-def test_a_refuted_claim_is_counted_and_comes_first(data):
+def test_one_that_escapes_is_named_and_a_refuted_claim_comes_first(data):
+    liar = (data["variant"] == LIAR) & (data["scene"] == SCENE)
+    verdict = xr.where(liar & (data["claim"] == "symmetric"), "confirmed", data["verdict"])
+    fooled = data.assign(verdict=xr.where(liar & (data["claim"] == "order"), "refuted", verdict))
+    said = facts.facts(fooled)
+    assert (said["planted"], said["caught"]) == (1, 0)
+    assert "0 of 1" in {text.get_text() for text in next(figures.pictures(fooled)).figure.axes[0].texts}
     wrong = (data["variant"] == "strang") & (data["claim"] == "symmetric") & (data["scene"] == SCENE)
     refuted = data.assign(verdict=xr.where(wrong, "refuted", data["verdict"]))
     said, row = facts.facts(refuted), facts.tables(refuted)["ledger"].iloc[0]

@@ -23,7 +23,21 @@ def data():
     return datasets.combine([(case, study.measure(case)) for case in cases])
 
 
-def test_a_run_is_that_of_its_setting(data):
+def test_a_cost_lies_between_the_runs_and_one_of_the_coarsest_setting_is_an_upper_bound(data):
+    cell = facts.shown(data).sel(variant="strang[axis]")
+    error, seconds = cell["axis"].values, cell["force_evaluations"].values
+    middle = math.sqrt(error[1] * error[2])
+    assert facts.cost(cell, middle, "force_evaluations") == pytest.approx(math.sqrt(seconds[1] * seconds[2]))
+    assert facts.cost(cell, error[2], "force_evaluations") == pytest.approx(seconds[2])
+    assert facts.cost(cell, 1e-3 * error.min(), "force_evaluations") == math.inf
+    assert facts.tables(data)["times"].set_index("variant")["at most (rad)"].eq("").all()  # the control
+    finer = data.assign(axis=data["axis"] * xr.where(data["variant"] == "strang[axis]", 1e-3, 1.0))
+    column = facts.tables(finer)["times"].set_index("variant")["at most (rad)"]
+    assert column["strang[axis]"] == "1e-03"
+    assert column.drop("strang[axis]").eq("").all()
+
+
+def test_a_run_is_that_of_its_setting_and_the_page_says_what_was_measured(data, tmp_path):
     cell = facts.shown(data).sel(variant="rk4[axis]")
     scene, step = symtop.scene("goldstein"), float(cell["step_size"][2])
     run = symtop.simulate(scene, "rk4[axis]", step_size=step, horizon=10.0 * scene.nutation_period, guard=False)
@@ -36,34 +50,6 @@ def test_a_run_is_that_of_its_setting(data):
     assert not np.isfinite(attitude[["attitude", "seconds"]].isel(setting=0).to_array()).any()
     assert np.isfinite(attitude[["attitude", "seconds"]].isel(setting=slice(1, None)).to_array()).all()
     assert not np.isfinite(facts.shown(data)["axis"].sel(variant="rk4[attitude]")).any()
-
-
-def test_all_methods_on_a_scene_are_timed_in_one_case():
-    cases = study.cases(False)
-    for place in study.SCENES:
-        (together,) = [case for case in cases if case.scene == place and study.STUDY.is_timed(case)]
-        alone = [case.integrator for case in cases if case.scene == place and case is not together]
-        assert sorted(together.settings["integrators"]) == sorted(alone)
-
-
-def test_a_cost_lies_between_the_runs_that_miss_and_meet_the_error(data):
-    cell = facts.shown(data).sel(variant="strang[axis]")
-    error, seconds = cell["axis"].values, cell["force_evaluations"].values
-    middle = math.sqrt(error[1] * error[2])
-    assert facts.cost(cell, middle, "force_evaluations") == pytest.approx(math.sqrt(seconds[1] * seconds[2]))
-    assert facts.cost(cell, error[2], "force_evaluations") == pytest.approx(seconds[2])
-    assert facts.cost(cell, 1e-3 * error.min(), "force_evaluations") == math.inf
-
-
-def test_a_time_that_the_coarsest_setting_takes_is_an_upper_bound(data):
-    assert facts.tables(data)["times"].set_index("variant")["at most (rad)"].eq("").all()  # the control
-    finer = data.assign(axis=data["axis"] * xr.where(data["variant"] == "strang[axis]", 1e-3, 1.0))
-    column = facts.tables(finer)["times"].set_index("variant")["at most (rad)"]
-    assert column["strang[axis]"] == "1e-03"
-    assert column.drop("strang[axis]").eq("").all()
-
-
-def test_the_page_says_what_was_measured(data, tmp_path):
     text = checked("speed", data, tmp_path, elsewhere={"error-against-time"})
     assert "`takahashi" not in text
     answers = facts.facts(data)
@@ -71,7 +57,12 @@ def test_the_page_says_what_was_measured(data, tmp_path):
     assert answers["scipy"] is None
 
 
-def test_a_method_for_symmetric_bodies_is_not_called_one_for_any_body():
+def test_methods_on_a_scene_are_timed_in_one_case_and_those_for_symmetric_bodies_told():
+    cases = study.cases(False)
+    for place in study.SCENES:
+        (together,) = [case for case in cases if case.scene == place and study.STUDY.is_timed(case)]
+        alone = [case.integrator for case in cases if case.scene == place and case is not together]
+        assert sorted(together.settings["integrators"]) == sorted(alone)
     assert facts.for_any_body("rk4[axis]")
     assert not facts.for_any_body("takahashi-imada[axis]")
     assert not facts.for_any_body("series[axis]")

@@ -17,7 +17,7 @@ def data():
     return datasets.combine([(case, study.measure(case)) for case in cases])
 
 
-def test_facts_follow_from_the_errors_and_a_bound_that_is_broken_is_counted(data):
+def test_facts_and_page_follow_from_the_errors_and_a_broken_bound_is_counted(data, tmp_path):
     answers = facts.facts(data)
     assert answers["closed_form"] == float(data[ERROR].sel(variant="closed form").max()) < 1e-14
     assert answers["integrated"] > answers["closed_form"]
@@ -26,9 +26,6 @@ def test_facts_follow_from_the_errors_and_a_bound_that_is_broken_is_counted(data
     worse = data.assign({ERROR: data[ERROR].where(data["horizon"] < 10.0, 2.0 * data[BOUND])})
     assert facts.facts(worse)["bounds_held"] == 2
     assert facts.tables(data)["sources"]["time (s)"].tolist() == [20.0, 20.0]  # each at its longest
-
-
-def test_the_page_says_what_was_measured(data, tmp_path):
     text = checked("truth", data, tmp_path)
     assert "4 of 4 bounds" in text
     assert "quadruple precision, which" not in text  # there was none

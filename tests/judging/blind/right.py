@@ -142,10 +142,7 @@ class Leaping(HeunSolver):
 
 def radau_iia(f, t, y, h):
     """Of order 3, two stages; its equations are iterated until they stand still."""
-
-    def slopes(k):
-        return np.array([f(t + h / 3, y + h * (5 * k[0] - k[1]) / 12), f(t + h, y + h * (3 * k[0] + k[1]) / 4)])
-
+    slopes = lambda k: np.array([f(t + h / 3, y + h * (5 * k[0] - k[1]) / 12), f(t + h, y + h * (3 * k[0] + k[1]) / 4)])
     k = solved(slopes, np.array([f(t, y)] * 2))
     return y + h * (3 * k[0] + k[1]) / 4
 
@@ -244,10 +241,7 @@ def tr_bdf2(f, t, y, h):
 def newmark(f, t, y, h):
     """beta = 1/4, gamma = 1/2, in angles: q'' = a(q, q'). Newmark, J. Eng. Mech. 85 (1959) 67."""
     q, v, before = y[:3], y[3:], f(t, y)[3:]
-
-    def end(after):
-        return np.concatenate([q + h * v + h * h / 4 * (before + after), v + h / 2 * (before + after)])
-
+    end = lambda after: np.concatenate([q + h * v + h * h / 4 * (before + after), v + h / 2 * (before + after)])
     return end(solved(lambda after: f(t + h, end(after))[3:], before))
 
 

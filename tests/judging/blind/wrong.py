@@ -288,9 +288,6 @@ def separable_damped(state, h, dT, dV):
     return theta, p * (1 - 1e-9 * h)
 
 
-# ---- right at the start of the scene ---------------------------------------------------------------------------------
-
-
 def where(condition, worse=euler, good=rk4):
     """The worse method where the condition holds of t, y and h."""
     return lambda f, t, y, h: (worse if condition(t, y, h) else good)(f, t, y, h)
