@@ -219,8 +219,7 @@ def test_a_stream_that_was_closed_changes_no_exit_code(words, closed, code):
 
 @pytest.mark.skipif(not Path("/bin/bash").exists(), reason="a shell with pipefail")
 @pytest.mark.parametrize(
-    ("words", "reader", "code"),
-    [("integrators", "true", 141), ("integrators", "cat", 0), ("run nowhere", "true", 2)],
+    ("words", "reader", "code"), [("integrators", "true", 141), ("integrators", "cat", 0), ("run nowhere", "true", 2)]
 )
 def test_a_reader_that_leaves_is_no_case_that_has_failed(words, reader, code):
     command = f"set -o pipefail; {sys.executable} -m symtop.cli {words} | {reader}"
