@@ -91,11 +91,11 @@ def test_an_ensemble_costs_little_around_its_steps_and_a_closed_form_ten_microse
             assert row.slow < 30e-6
     assert digits.median > 1e-3
     samples = [row for row in others if row.name.startswith("one sample")]
-    assert len(samples) == 5
+    assert len(samples) == 6
     assert all(row.median < 1e-6 for row in samples)
-    constants, kept = (row for row in others if row not in samples)
-    assert constants.median < 10e-6  # of one top among many
-    assert kept.median < 10e-3  # a reference at 1001 times, asked for again
+    constants, again, of_body = (row for row in others if row not in samples)
+    assert max(constants.median, of_body.median) < 10e-6  # of one among many
+    assert again.median < 10e-3  # a reference at 1001 times, asked for again
 
 
 @needs_gcc

@@ -1,6 +1,6 @@
-"""Every method of `blind` judged quickly: a line for each kind of claim, with what it resolves and what it costs.
+"""Every method of `tests/judging/blind` judged quickly: a line for each kind of claim, what it resolves and its cost.
 
-    python -m tests.judging.table          or with --full, of judging without --quick
+    python -m benchmarks.judging          or with --full, of judging without --quick
 
 A wrong method is caught if the line that names its defect is refuted, and a right one passes if nothing is. Time is of
 the processor, of this process and those that it starts.
