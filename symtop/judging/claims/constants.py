@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 from symtop.core.errors import SymtopError
 from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import AdapterSolver
-from symtop.judging.claims.subject import CONSTANTS, PLANE, STEPS_A_NUTATION, Subject, declared, hidden_by_single
+from symtop.judging.claims.subject import CONSTANTS, PLANE, STEPS_A_NUTATION, Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided, yes_no
 from symtop.measure.conservation import Changed, Difference, behaviour, constant_of, from_increments, residuals, tops
 from symtop.measure.step_map import one_step
@@ -312,7 +312,7 @@ def measure(subject: Subject) -> list[Finding]:
     for chart in charts:
         try:
             runs.append(long_run(method, scene, chart, **options))
-            findings = [_above_single(subject, runs[-1].steps, one) for one in of_run(method, runs[-1])]
+            findings = of_run(method, runs[-1])
         except SymtopError as error:
             every = (*OF_A_RUN, "momentum")
             findings = [undecided(claim, declared(method, claim), str(error)) for claim in every]
@@ -328,14 +328,6 @@ def of_run(method: Integrator, run: LongRun) -> list[Finding]:
     """What one long run shows of each claim of `OF_A_RUN`."""
     motion = [_constant(method, one, declared(method, one), run, run.constants.get(one)) for one in OF_MOTION]
     return [*motion, _of_states(run), _invariant(method, run), *_costs(method, run)]
-
-
-def _above_single(subject: Subject, steps: int, finding: Finding) -> Finding:
-    """The finding, but undecided where a change is refuted that rounding to single precision can make."""
-    hidden = subject.rounding(steps) * (subject.scene.energy_grain if finding.claim == "energy" else 1.0)
-    if finding.claim not in (*OF_MOTION, "invariant") or finding.verdict != "refuted" or finding.value > hidden:
-        return finding
-    return finding._replace(verdict="undecided", why=hidden_by_single(hidden, finding.why))
 
 
 def _with_chart(finding: Finding, chart: str) -> Finding:
