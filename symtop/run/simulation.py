@@ -92,6 +92,8 @@ def chart_of(method: Integrator, watched: str, observe: str | None = None) -> st
             able = ", ".join(name for name, entry in methods().items() if BODY in entry.solvers)
             raise SymtopError(f"integrator must have the chart body, of a RigidBody, not {method.name}: {able}")
         return BODY
+    if observe == "theta":
+        raise SymtopError("observe must be nutation, which shows theta, axis or attitude, not 'theta'", "observe")
     if observe is not None:
         return method.chart_for(one_of("observe", observe, OBSERVABLES))
     return method.chart_for(watched if watched != "attitude" or {"angles", "attitude"} & {*method.charts()} else "axis")
