@@ -116,7 +116,8 @@ def test_numpy_and_compiled_are_one_function(chart):
 def test_the_attitude_takes_its_spin_from_the_state_and_a_pole_is_nan_in_angles_alone():
     """A field of one top serves every start: the kernels' own holds the spin of one."""
     scene = symtop.scene("spheroid")
-    f = symtop.field("attitude", scene.top)
+    f = symtop.field("attitude", scene)
+    assert f.top == symtop.field("attitude", "spheroid").top == scene.top
     for spin in (0.0, 3.0, 80.0):
         start = symtop.Angles(theta=0.7, psi_dot=spin)
         y, h = f.state(start), 1e-6
