@@ -9,7 +9,7 @@ import xarray as xr
 from symtop_studies.cost.tops import FIRST
 
 from symtop.methods.framework.registry import NEEDS, integrator
-from symtop.report.formats import duration, number, percent
+from symtop.report.formats import at_most, duration, number, percent
 
 from . import comparison as by
 from .bodies import ASKED, CHAOTIC, FAMILIES, FREE, SYMMETRIC
@@ -157,9 +157,8 @@ def order_gap(data: xr.DataTree, family: str) -> tuple[float, str]:
 def growth_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
     """Exponents of growth beside those of tops: how many are as near as they may be, and how near all of them are."""
     (within, known), gap = exponents_within(data, family), exponent_gap(data, family)[0]
-    most = float(np.ceil(100.0 * gap)) / 100.0  # 0.2503 is not within 0.25
     verdict = YES if gap <= by.EXPONENT else NO
-    return f"{within} of {known} exponents within {by.EXPONENT}, all within {number(most, 2)}", verdict
+    return f"{within} of {known} exponents within {by.EXPONENT}, all within {at_most(gap)}", verdict
 
 
 def limit_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
@@ -209,7 +208,7 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
         "own ranking": (f"tau {number(own_tau.value, 2)}", by.ranking_verdict(own_tau)),
         "winner": (f"costs {number(best.value, 3)} times the best", by.factor_verdict(best.value)),
         "steps": (taken.words, taken.verdict), "own": (own.words + but, own.verdict),
-        "first": (("beyond the budget" if first == math.inf else f"up to {number(first, 3)} times") +
+        "first": (("beyond the budget" if first == math.inf else f"up to {at_most(first, 3)} times") +
                   ", without needles" * (family == FREE), by.factor_verdict(first)),
         "silent": (silent_words(data, family), by.factor_verdict(over(share, before), SEVERAL)),
         "growth": growth_cell(data, family),

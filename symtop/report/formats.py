@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from decimal import ROUND_CEILING, Context, Decimal
 from typing import Any
 
 FIRM = "\N{NO-BREAK SPACE}"
@@ -20,6 +21,13 @@ def number(value: float, digits: int = 2, unit: str = "") -> str:
     ten = f"10{str(int(power or 0)).translate(RAISED)}"
     printed = text if not mark else ten if mantissa == "1" else f"{mantissa}{FIRM}×{FIRM}{ten}"
     return f"{printed}{FIRM}{unit}" if unit else printed
+
+
+def at_most(value: float, digits: int = 2, unit: str = "") -> str:
+    """The same, rounded up: what is at most 1.249 is at most ``1.3``, and not 1.2."""
+    exact = Decimal(repr(float(value)))
+    whole = exact.adjusted() + 1 if abs(value) < LARGEST_PLAIN else 0  # digits before the point, which are all shown
+    return number(float(Context(prec=max(digits, whole), rounding=ROUND_CEILING).plus(exact)), digits, unit)
 
 
 def count(value: float) -> str:
@@ -84,7 +92,7 @@ def cell(value: Any, digits: int = 3) -> str:
     return str(value)
 
 
-FILTERS = (number, count, percent, power, fixed, duration, microseconds, code, by_name, cell)
+FILTERS = (number, at_most, count, percent, power, fixed, duration, microseconds, code, by_name, cell)
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
