@@ -37,6 +37,13 @@ def worst_tau(data: xr.DataTree, family: str, span: str = "short") -> by.Interva
     return least([by.tau(data, family, target, span=span) for target in ASKED])
 
 
+def long_tau(data: xr.DataTree, family: str) -> tuple[float, int]:
+    """Tau over the long runs, of the target with the least, and how many bodies it is of."""
+    each = {target: by.tau(data, family, target, span="long").value for target in ASKED}
+    target = min(ASKED, key=lambda one: float(np.nan_to_num(each[one], nan=math.inf)))
+    return each[target], by.judged_bodies(by.costs(data, family, target, span="long")).size
+
+
 def least(each: list[by.Interval]) -> by.Interval:
     """The interval with the least number."""
     return min((one for one in each if not math.isnan(one.value)), key=lambda one: one.value, default=each[0])
@@ -263,7 +270,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
         "off_bound": float(about["off_bound"].max()),
         "truth_bound": float(np.nanmedian(about["truth_bound"].values[: len(FAMILIES) - 1])),
         "judged_chaotic": float(about["judged"].sel(family=CHAOTIC)),
-        "ceiling_6": by.ceiling(data, 1e-6).value,
+        "ceiling_3": by.ceiling(data, 1e-3).value, "ceiling_6": by.ceiling(data, 1e-6).value,
     }  # fmt: skip
     for family in ("0.1", "0.3"):
         growth = about["growth"].sel(family=family).dropna("member").values
@@ -324,7 +331,7 @@ def _of_family(data: xr.DataTree, family: str) -> dict[str, Any]:
             answers |= {f"order_{place}_seen": seen, f"order_{place}_top": first}
             answers[f"order_{place}_declared"] = integrator(name).order
     if "long" in data.children:
-        answers[f"long_tau_{place}"] = worst_tau(data, family, "long").value
+        answers[f"long_tau_{place}"], answers[f"long_of_{place}"] = long_tau(data, family)
     return answers
 
 
