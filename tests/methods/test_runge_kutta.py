@@ -24,9 +24,7 @@ KUTTA_A, KUTTA_B, _ = CLASSICAL
 
 
 @pytest.mark.parametrize(("a", "b", "order"), [
-    (KUTTA_A, KUTTA_B, 4),
-    (((),), (1.0,), 1),
-    (((0.0, 0.0), (0.5, 0.0)), (0.0, 1.0), 2),
+    (KUTTA_A, KUTTA_B, 4), (((),), (1.0,), 1), (((0.0, 0.0), (0.5, 0.0)), (0.0, 1.0), 2),
     (((), (1 / 3,), (0.0, 2 / 3)), (1 / 4, 0.0, 3 / 4), 3),
 ])  # fmt: skip
 def test_a_step_of_a_users_tableau_is_the_definition_and_has_its_order(a, b, order):
