@@ -135,17 +135,13 @@ def ensemble(
                 stream.forget(chunks)  # there is nothing to resume
                 raise SymtopError(first)
             data = stream.finish(chunks)
-    _warn(n, raised, first, [] if silent else data["outcome"].values.tolist())
+    early = Counter(() if silent else data["outcome"].values.tolist())
+    del early["ok"], early[RAISED]
+    counts = ", ".join(map("{0[1]} {0[0]}".format, early.most_common()))
+    told = {f"raised an exception, the first: {first}": raised, f"ended early: {counts}": early.total()}
+    for end in filter(told.get, told):
+        warnings.warn(f"{told[end]} of {n} members {end}", SymtopWarning, stacklevel=2)
     return data
-
-
-def _warn(n: int, raised: int, first: str, outcomes: list[str]) -> None:
-    """Say on how many of n members a solver raised an exception, and how many ended early otherwise, and how."""
-    early = [how for how in outcomes if how not in ("ok", RAISED)]
-    counts = ", ".join(f"{count} {how}" for how, count in Counter(early).most_common())
-    for count, words in ((raised, f"raised an exception, the first: {first}"), (len(early), f"ended early: {counts}")):
-        if count:
-            warnings.warn(f"{count} of {n} members {words}", SymtopWarning, stacklevel=3)
 
 
 def _computed(job: Job, chunks: list[slice], threads: int, scheduler: str | None) -> Generator[Any, None, None]:
