@@ -15,6 +15,7 @@ from benchmarks import measured, pages
 from benchmarks.pages import Table
 from symtop.core import netcdf
 from symtop.methods.framework.registry import integrator
+from symtop.report.formats import counted, listed
 from symtop.runner import scripts
 
 NAME, STEPS, TOPS, SEED = "takahashi-imada[axis]", 8.74, 8, 1
@@ -44,27 +45,31 @@ def main() -> None:
     seen[:, 1, : fine.shape[1]], drifts = fine, far.drifts_of(integrator(NAME))
     prediction = far.predicted(seen, np.stack([work, more]), every, far.grain_of(tops), drifts=drifts)["error"][:, 0]
     later = [horizon for horizon in 10.0 ** np.arange(5, 9) if horizon <= 1.0001 * ends[-1]]
-    lines, ratios = [], []
+    lines, ratios, parts = [], [], []
     for place, quantity in enumerate(far.QUANTITIES):
         largest = np.maximum.accumulate(errors[place], axis=0)
         lines.append([quantity])
+        judged = []
         for horizon in later:
             mine = largest[int(np.argmin(np.abs(ends - horizon)))]
             ratio = mine / prediction.sel(quantity=quantity).sel(horizon=horizon, method="nearest").values
             good = ratio[(mine < laws.SATURATED) & np.isfinite(ratio)]
             ratios += good.tolist()
+            judged.append(str(good.size))
             lines[-1].append(
-                f"{np.median(good):.3g} ({good.min():.3g} to {good.max():.3g}), {good.size} tops"
+                f"{np.median(good):.3g} ({good.min():.3g} to {good.max():.3g}), {counted(good.size, 'top')}"
                 if good.size
                 else "none"
             )
+        parts.append(f"of the {quantity} on {listed(judged if len({*judged}) > 1 else judged[:1])}")
     title = f"Measured over predicted error of {NAME}, median (least to most) of the tops whose motion is not lost"
     table = Table(title, ["quantity", *(f"{horizon:.0e} nutations" for horizon in later)], lines)
     print("\n".join(" | ".join(line) for line in [table.header, *lines]))
+    places = listed([f"{horizon:.0e}" for horizon in later])
     sentence = (
         f"Errors of {NAME} at {STEPS} steps a nutation on {TOPS} random tops were predicted from runs of up to "
-        f"{FITTED:.0e} nutations and measured up to {later[-1]:.0e}: they are {min(ratios):.2g} to {max(ratios):.2g} "
-        "times the prediction."
+        f"{FITTED:.0e} nutations and measured at {places}: they are {min(ratios):.2g} to {max(ratios):.2g} "
+        f"times the prediction, on the tops whose motion is not lost by then: {', '.join(parts)}."
     )
     options.results.mkdir(exist_ok=True)
     page = pages.findings(

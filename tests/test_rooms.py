@@ -19,20 +19,14 @@ from scipy.sparse.csgraph import connected_components
 
 ROOT = Path(__file__).resolve().parents[1]
 ORDER = (  # from the ground up
-    ("core",),
-    ("model",),
-    ("methods",),
-    ("run",),
-    ("measure",),
-    ("judging", "runner"),
-    ("report",),
+    ("core",), ("model",), ("methods",), ("run",), ("measure",), ("judging", "runner"), ("report",),
     ("advise",),  # a module in the root, as it is part of the public face
     ("explore",),
     ("cli",),
     ("__main__",),  # python -m symtop
     ("face",),  # symtop/__init__.py: imports every public name, and no other file imports it
     ("studies",),
-)
+)  # fmt: skip
 FLOOR = {room: floor for floor, row in enumerate(ORDER) for room in row}
 STATEMENTS = (ast.stmt, ast.excepthandler, ast.match_case)  # which hold others: an expression imports nothing
 STRANGERS = {"methods": {"xarray", "matplotlib"}}  # packages that a room does not import

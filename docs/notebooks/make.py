@@ -41,7 +41,7 @@ run = symtop.simulate(scene, "strang", step_size=0.01)
 wrong = symtop.errors(run)
 print(run.attrs["outcome_message"], "-", run.attrs["force_evaluations"], "force evaluations")
 for name in ("axis", "attitude", "energy"):
-    print(f"{name:<9} largest error {float(wrong[name].max()):.0e}")
+    print(f"{name:<9} largest error {float(wrong[name].max(skipna=False)):.0e}")
 ```
 
 ```python
@@ -80,7 +80,7 @@ import symtop
 
 ralston = symtop.runge_kutta("ralston-3", ((), (1 / 2,), (0, 3 / 4)), (2 / 9, 1 / 3, 4 / 9), order=3)
 run = symtop.simulate("spheroid", ralston, step_size=0.005)
-print(f"largest axis error {float(symtop.errors(run)['axis'].max()):.0e} rad")
+print(f"largest axis error {float(symtop.errors(run)['axis'].max(skipna=False)):.0e} rad")
 ```
 
 Beside the methods that are here, at the same steps:
@@ -108,7 +108,7 @@ times, states = np.linspace(0.0, 2.0, 2001), [f.state(scene.start)]
 for t in times[:-1]:
     states.append(heun(f, t, states[-1], times[1]))
 wrong = symtop.errors({"time": times, "axis": np.array(states)[:, :3]}, scene)
-print(f"largest axis error {float(wrong['axis'].max()):.0e} rad")
+print(f"largest axis error {float(wrong['axis'].max(skipna=False)):.0e} rad")
 ```
 
 `symtop judge my.py:heun --order 2` on the command line, or `symtop.judge` with a function from a file,

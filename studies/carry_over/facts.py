@@ -9,7 +9,7 @@ import xarray as xr
 from symtop_studies.cost.tops import FIRST
 
 from symtop.methods.framework.registry import NEEDS, integrator
-from symtop.report.formats import duration, number, percent
+from symtop.report.formats import at_most, duration, number, percent
 
 from . import comparison as by
 from .bodies import ASKED, CHAOTIC, FAMILIES, FREE, SYMMETRIC
@@ -35,6 +35,13 @@ def decades(target: float) -> int:
 def worst_tau(data: xr.DataTree, family: str, span: str = "short") -> by.Interval:
     """Tau of the target with the least."""
     return least([by.tau(data, family, target, span=span) for target in ASKED])
+
+
+def long_tau(data: xr.DataTree, family: str) -> tuple[float, int]:
+    """Tau over the long runs, of the target with the least, and how many bodies it is of."""
+    each = {target: by.tau(data, family, target, span="long").value for target in ASKED}
+    target = min(ASKED, key=lambda one: float(np.nan_to_num(each[one], nan=math.inf)))
+    return each[target], by.judged_bodies(by.costs(data, family, target, span="long")).size
 
 
 def least(each: list[by.Interval]) -> by.Interval:
@@ -157,9 +164,8 @@ def order_gap(data: xr.DataTree, family: str) -> tuple[float, str]:
 def growth_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
     """Exponents of growth beside those of tops: how many are as near as they may be, and how near all of them are."""
     (within, known), gap = exponents_within(data, family), exponent_gap(data, family)[0]
-    most = float(np.ceil(100.0 * gap)) / 100.0  # 0.2503 is not within 0.25
     verdict = YES if gap <= by.EXPONENT else NO
-    return f"{within} of {known} exponents within {by.EXPONENT}, all within {number(most, 2)}", verdict
+    return f"{within} of {known} exponents within {by.EXPONENT}, all within {at_most(gap)}", verdict
 
 
 def limit_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
@@ -209,7 +215,7 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
         "own ranking": (f"tau {number(own_tau.value, 2)}", by.ranking_verdict(own_tau)),
         "winner": (f"costs {number(best.value, 3)} times the best", by.factor_verdict(best.value)),
         "steps": (taken.words, taken.verdict), "own": (own.words + but, own.verdict),
-        "first": (("beyond the budget" if first == math.inf else f"up to {number(first, 3)} times") +
+        "first": (("beyond the budget" if first == math.inf else f"up to {at_most(first, 3)} times") +
                   ", without needles" * (family == FREE), by.factor_verdict(first)),
         "silent": (silent_words(data, family), by.factor_verdict(over(share, before), SEVERAL)),
         "growth": growth_cell(data, family),
@@ -264,7 +270,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
         "off_bound": float(about["off_bound"].max()),
         "truth_bound": float(np.nanmedian(about["truth_bound"].values[: len(FAMILIES) - 1])),
         "judged_chaotic": float(about["judged"].sel(family=CHAOTIC)),
-        "ceiling_6": by.ceiling(data, 1e-6).value,
+        "ceiling_3": by.ceiling(data, 1e-3).value, "ceiling_6": by.ceiling(data, 1e-6).value,
     }  # fmt: skip
     for family in ("0.1", "0.3"):
         growth = about["growth"].sel(family=family).dropna("member").values
@@ -325,7 +331,7 @@ def _of_family(data: xr.DataTree, family: str) -> dict[str, Any]:
             answers |= {f"order_{place}_seen": seen, f"order_{place}_top": first}
             answers[f"order_{place}_declared"] = integrator(name).order
     if "long" in data.children:
-        answers[f"long_tau_{place}"] = worst_tau(data, family, "long").value
+        answers[f"long_tau_{place}"], answers[f"long_of_{place}"] = long_tau(data, family)
     return answers
 
 

@@ -250,6 +250,7 @@ def _in_options(error: SymtopError, command: click.Command | None) -> str:
 def _warnings_as_lines() -> Iterator[None]:
     with warnings.catch_warnings():
         warnings.simplefilter("always", SymtopWarning)
+        warnings.filterwarnings("ignore", r"\d+ of \d+ members ended early: ")  # `symtop ensemble` counts them anyway
         others: Any = warnings.showwarning
         warnings.showwarning = lambda message, category, *rest: (
             warn(str(message)) if issubclass(category, SymtopWarning) else others(message, category, *rest)

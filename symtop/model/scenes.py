@@ -380,6 +380,9 @@ def scene(name: "str | Scene", *, bodies: bool = False) -> Scene:
     """The scene of that name; a Scene is returned as it is. One of a body is refused unless `bodies` is true."""
     chosen = name
     if not isinstance(chosen, Scene):
+        if isinstance(name, (SymmetricTop, RigidBody)):
+            words = f"not a {type(name).__name__}: symtop.Scene(name, top, start, horizon) makes one of it"
+            raise SymtopError(f"scene must be a Scene or the name of one, {words}", "scene")
         catalogue = all_scenes()
         chosen = catalogue[one_of("scene", name, catalogue)]
     if chosen.of_body and not bodies:

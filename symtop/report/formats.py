@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
+from decimal import ROUND_CEILING, Context
 from typing import Any
 
 FIRM = "\N{NO-BREAK SPACE}"
@@ -20,6 +21,12 @@ def number(value: float, digits: int = 2, unit: str = "") -> str:
     ten = f"10{str(int(power or 0)).translate(RAISED)}"
     printed = text if not mark else ten if mantissa == "1" else f"{mantissa}{FIRM}×{FIRM}{ten}"
     return f"{printed}{FIRM}{unit}" if unit else printed
+
+
+def at_most(value: float, digits: int = 2, unit: str = "") -> str:
+    """The same, rounded up: what is at most 1.249 is at most ``1.3``, and not 1.2."""
+    upward = Context(prec=digits, rounding=ROUND_CEILING).create_decimal(repr(float(value)))
+    return number(float(upward), digits, unit)
 
 
 def count(value: float) -> str:
@@ -46,11 +53,6 @@ def duration(seconds: float, digits: int = 2) -> str:
     """A time, given in seconds, in the unit that suits it: ``5.4 µs``, ``176 µs``, ``4.8 ms``, ``2 h``."""
     size, unit = next((one for one in reversed(UNITS) if abs(seconds) >= one[0]), UNITS[0])
     return number(seconds / size, digits, unit)
-
-
-def microseconds(seconds: float, digits: int = 2) -> str:
-    """A time, given in seconds, in microseconds."""
-    return number(seconds * 1e6, digits, "µs")
 
 
 def code(name: str) -> str:
@@ -84,7 +86,7 @@ def cell(value: Any, digits: int = 3) -> str:
     return str(value)
 
 
-FILTERS = (number, count, percent, power, fixed, duration, microseconds, code, by_name, cell)
+FILTERS = (number, at_most, count, percent, power, fixed, duration, code, by_name, cell)
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

@@ -1,8 +1,9 @@
 """simulate(): one scene, one integrator, one step or tolerance -> one dataset.
 
 Samples never bend the step: a fixed-step run has h = T/N exactly and is sampled at whole steps, t = k h. Samples are
-uniform unless they would fall on the same few phases of the nutation again and again (where an energy error may read
-1e5 times too small); then they are dithered by the golden ratio, and the dataset says so.
+uniform, or at the steps nearest to uniform times, unless they would fall on the same few phases of the nutation again
+and again (where an energy error may read 1e5 times too small); then they are dithered by the golden ratio. The
+attribute ``sampling`` says which.
 """
 
 import functools
@@ -91,6 +92,8 @@ def chart_of(method: Integrator, watched: str, observe: str | None = None) -> st
             able = ", ".join(name for name, entry in methods().items() if BODY in entry.solvers)
             raise SymtopError(f"integrator must have the chart body, of a RigidBody, not {method.name}: {able}")
         return BODY
+    if observe == "theta":
+        raise SymtopError("observe must be nutation, which shows theta, axis or attitude, not 'theta'", "observe")
     if observe is not None:
         return method.chart_for(one_of("observe", observe, OBSERVABLES))
     return method.chart_for(watched if watched != "attitude" or {"angles", "attitude"} & {*method.charts()} else "axis")
@@ -161,6 +164,7 @@ def simulate(
     default: what the scene is watched for) picks the smallest chart of the integrator that shows it; a variant, such as
     ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` shows every step. A whole number of
     steps fills the horizon, the one nearest to horizon/step_size: the attribute ``step_size`` is the step made.
+    ``sampling`` is "uniform", "nearest steps" (to uniform times), or "dithered", so that all of a nutation is seen.
 
     Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a large
     error is expected; the run is the same either way. It compares a piece of the run with the closed form ("exact", of
@@ -177,6 +181,8 @@ def simulate(
     if isinstance(guard, str) and one_of("guard", guard, ("exact", "series")) == "exact" and chosen.of_body:
         raise SymtopError(f"guard must be series on {chosen.name}, a body without symmetry, not 'exact'", "guard")
     trajectory, caution = _guarded(chosen, method, chart, plan, report, series=guard == "series")
+    uneven = plan.marks.size and plan.marks[-1] % (plan.marks.size - 1)  # steps to a sample are no whole number
+    sampling = "dithered" if dithered else "nearest steps" if uneven else "uniform"
     data = dataset(trajectory.time, trajectory.columns, chosen.units)
     data.attrs = netcdf.attributes_of(
         f"{method.name} on {chosen.name}", integrator=method.name, scene=chosen.name, chart=chart,
@@ -184,7 +190,7 @@ def simulate(
         steps=trajectory.steps, force_evaluations=trajectory.force_evaluations,
         newton_iterations=trajectory.newton_iterations, outcome=trajectory.outcome,
         outcome_message=sentence(trajectory.outcome, trajectory.reached_time, plan.horizon, chosen.second),
-        reached_time=trajectory.reached_time, guard=caution, sampling="dithered" if dithered else "uniform",
+        reached_time=trajectory.reached_time, guard=caution, sampling=sampling,
         top=_json(chosen.top), start=_json(chosen.start),
     )  # fmt: skip
     return data

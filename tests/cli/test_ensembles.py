@@ -45,7 +45,7 @@ def test_json_has_outcomes_and_errors_finer_steps_smaller_ones_and_failures_are_
     assert coarse["outcomes"] == {"ok": 40}
     assert fine["largest_errors"]["axis"]["0.5"] < 0.02 * coarse["largest_errors"]["axis"]["0.5"]
     assert fine["steps"] == 10 * coarse["steps"]
-    assert "left_chart" in call("--members", 60, "stormer-verlet", *STEPS, "--samples", 21).output
+    assert call("--members", 60, "stormer-verlet", *STEPS, "--samples", 21).output.count("left_chart") == 1
     result = call("--members", 20, "--kind", "grazing", "stormer-verlet", *STEPS, "--json", code=3)
     assert json.loads(result.output)["largest_errors"]["axis"] == dict.fromkeys(("0.01", "0.1", "0.5", "0.9", "0.99"))
 

@@ -7,6 +7,8 @@ import subprocess
 
 import pytest
 
+import symtop
+from symtop.run.ensemble.chunks import IN_LANES, IN_PYTHON, IN_TURN, Job
 from tests.commands import call
 from tests.pages import ROOT, pages
 
@@ -118,3 +120,17 @@ def test_the_table_of_integrators_is_generated_studies_are_explained_and_links_l
             assert (ROOT / page).parent.joinpath(link).is_file(), (page, link)
     files = {path.name for path in (ROOT / "docs").glob("*.md")} - {"index.md"}  # which begins with the README
     assert files == set(re.findall(r"\(docs/([\w-]+\.md)\)", PAGES["README.md"]))
+
+
+def test_the_page_of_ensembles_says_how_the_members_of_each_method_are_run():
+    rows = re.findall(r'^\| "(.+?)".*? \| (.*) \|$', PAGES["docs/ensembles.md"], re.MULTILINE)
+    named = {how: {*re.findall("`(.+?)`", row)} for how, row in rows}
+    assert all(map(symtop.integrator, set().union(*named.values())))
+    for method in symtop.integrators().values():
+        for chart in method.solvers:
+            in_python, in_turn = ({f"{method.name}[{chart}]", method.name} & named[how] for how in (IN_PYTHON, IN_TURN))
+            lanes = method.fixed_step and not in_turn and method.family != "engine"
+            if chart == "body":
+                lanes = method.family == "splitting" or method.name in named[IN_LANES]
+            expected = IN_PYTHON if in_python else IN_LANES if lanes else IN_TURN
+            assert Job(method, chart, *[None] * 7).execution == expected, (method.name, chart)

@@ -163,23 +163,17 @@ def _scaled(draw, decades):
 
 
 KINDS = {
-    "anything": lambda draw: _any_start(draw, _top(draw)),
-    "ball": lambda draw: _any_start(draw, _top(draw, 1.0)),
+    "anything": lambda draw: _any_start(draw, _top(draw)), "ball": lambda draw: _any_start(draw, _top(draw, 1.0)),
     "disc": lambda draw: _any_start(draw, _top(draw, 2.0)),
     "needle": lambda draw: _any_start(draw, _top(draw, 10.0 ** draw.uniform(-12.0, -2.0))),
     "weightless": lambda draw: _any_start(draw, _top(draw, weight=10.0 ** draw.uniform(-12.0, -3.0))),
     "heavy": lambda draw: _any_start(draw, _top(draw, weight=10.0 ** draw.uniform(2.0, 6.0))),
-    "units": lambda draw: _scaled(draw, 9.0),
-    "fast": lambda draw: _fast(draw, 0.0, 1.7),
-    "very-fast": lambda draw: _fast(draw, 2.0, 6.0),
-    "upright": _upright,
-    "sleeper": _sleeper,
+    "units": lambda draw: _scaled(draw, 9.0), "fast": lambda draw: _fast(draw, 0.0, 1.7),
+    "very-fast": lambda draw: _fast(draw, 2.0, 6.0), "upright": _upright, "sleeper": _sleeper,
     "separatrix": lambda draw: _through_upright(draw, draw.uniform(0.0, 0.99), _excess(draw, -1.0)),
-    "pendulum": lambda draw: _through_upright(draw, 0.0, _excess(draw, 0.0)),
-    "aimed": _aimed,
-    "hanging": _hanging,
+    "pendulum": lambda draw: _through_upright(draw, 0.0, _excess(draw, 0.0)), "aimed": _aimed, "hanging": _hanging,
     "steady": _steady,
-}
+}  # fmt: skip
 
 
 def _at_pole(draw):

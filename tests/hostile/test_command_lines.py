@@ -11,22 +11,15 @@ from symtop.cli.main import main
 from tests.commands import call
 
 GOOD = {
-    "archive": [],
-    "cite": [],
-    "claims": ["strang", "--quick"],
-    "doctor": [],
+    "archive": [], "cite": [], "claims": ["strang", "--quick"], "doctor": [],
     "ensemble": ["strang", "--members", "2", "--step-size", "0.1", "--horizon", "0.2", "--samples", "2"],
-    "explore": ["--no-browser"],
-    "integrators": ["strang"],
-    "judge": ["own.py:step", "--order", "4", "--quick"],
+    "explore": ["--no-browser"], "integrators": ["strang"], "judge": ["own.py:step", "--order", "4", "--quick"],
     "long": ["spheroid", "strang", "--steps", "10", "--step-size", "0.01"],
     "compare": ["spheroid", "strang", "--nutations", "1", "--cost", "evaluations", "--budget", "1e3"],
-    "recommend": ["spheroid", "--accuracy", "1e-3", "--horizon", "1"],
-    "report": [],
-    "run": ["spheroid", "strang", "--step-size", "0.02", "--horizon", "0.2", "--samples", "2"],
-    "scenes": ["spheroid"],
+    "recommend": ["spheroid", "--accuracy", "1e-3", "--horizon", "1"], "report": [],
+    "run": ["spheroid", "strang", "--step-size", "0.02", "--horizon", "0.2", "--samples", "2"], "scenes": ["spheroid"],
     "study": ["notebook", "--quick", "--status"],
-}
+}  # fmt: skip
 NO_NUMBERS = ["", " ", "x", "nano", "None", "\0", "é", "½", "'1'"]
 NOT_NUMBERS = [*NO_NUMBERS, "1,5", "0x10", "1e", "--", "1+2j", "[1]", "1 2", "0.1.2"]
 NOT_FINITE = ["nan", "inf", "-inf", "1e999", "-1e999"]

@@ -45,11 +45,8 @@ def test_an_exact_power_is_found_and_stray_points_are_left_out():
 
 
 @pytest.mark.parametrize(("error", "reason"), [
-    (np.full(16, 3e-3), "does not fall"),
-    (np.full(16, 0.5), "does not fall"),
-    (1e-4 + STEPS**2, "does not fall"),
-    (np.full(16, np.nan), "every run failed"),
-    (np.full(16, 3e-15), "fewer than five points"),
+    (np.full(16, 3e-3), "does not fall"), (np.full(16, 0.5), "does not fall"), (1e-4 + STEPS**2, "does not fall"),
+    (np.full(16, np.nan), "every run failed"), (np.full(16, 3e-15), "fewer than five points"),
 ])  # fmt: skip
 def test_what_is_not_a_power_of_the_step_is_not_judged_and_says_why(error, reason):
     fit = order(STEPS, error, 1e-15, 1.0)

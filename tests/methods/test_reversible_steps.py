@@ -194,7 +194,7 @@ def test_a_budget_ends_a_run_whose_steps_become_too_many_alone_and_as_a_member()
     needed = symtop.simulate(scene, METHOD, **setting, guard=False).attrs["steps"]
     for budget, outcome, steps in ((needed, "ok", needed), (300.5, "out_of_budget", 301), (100, "out_of_budget", 100)):
         alone = symtop.simulate(scene, METHOD, **setting, guard=False, budget=budget).attrs
-        member = symtop.ensemble([scene], METHOD, **setting, budget=budget).isel(member=0)
+        member = symtop.ensemble([scene], METHOD, **setting, budget=budget, quiet=True).isel(member=0)
         assert (alone["outcome"], alone["steps"]) == (str(member.outcome.values), int(member.steps)) == (outcome, steps)
     sentences = []
     symtop.simulate(scene, METHOD, **setting, guard=sentences.append, budget=100)

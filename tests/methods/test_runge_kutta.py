@@ -24,9 +24,7 @@ KUTTA_A, KUTTA_B, _ = CLASSICAL
 
 
 @pytest.mark.parametrize(("a", "b", "order"), [
-    (KUTTA_A, KUTTA_B, 4),
-    (((),), (1.0,), 1),
-    (((0.0, 0.0), (0.5, 0.0)), (0.0, 1.0), 2),
+    (KUTTA_A, KUTTA_B, 4), (((),), (1.0,), 1), (((0.0, 0.0), (0.5, 0.0)), (0.0, 1.0), 2),
     (((), (1 / 3,), (0.0, 2 / 3)), (1 / 4, 0.0, 3 / 4), 3),
 ])  # fmt: skip
 def test_a_step_of_a_users_tableau_is_the_definition_and_has_its_order(a, b, order):
@@ -116,7 +114,8 @@ def test_numpy_and_compiled_are_one_function(chart):
 def test_the_attitude_takes_its_spin_from_the_state_and_a_pole_is_nan_in_angles_alone():
     """A field of one top serves every start: the kernels' own holds the spin of one."""
     scene = symtop.scene("spheroid")
-    f = symtop.field("attitude", scene.top)
+    f = symtop.field("attitude", scene)
+    assert f.top == symtop.field("attitude", "spheroid").top == scene.top
     for spin in (0.0, 3.0, 80.0):
         start = symtop.Angles(theta=0.7, psi_dot=spin)
         y, h = f.state(start), 1e-6

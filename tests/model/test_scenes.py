@@ -192,6 +192,8 @@ def test_a_body_from_its_moments_about_the_centre_is_the_spheroid():
     (lambda: symtop.RigidBody.from_points([2.0], 1.0), "places must be rows of 3 numbers, not 1.0"),
     (lambda: symtop.RigidBody.from_inertia(np.eye(3), mass=2.0), "needs mgl, which is mass times gravity times"),
     (lambda: symtop.SymmetricTop.from_inertia(1, 1, 1, 1, gravity=-9.81), "gravity must be at least 0"),
+    (lambda: symtop.simulate(symtop.SymmetricTop(1, 1, 1), "rk4"), r"a SymmetricTop: symtop.Scene\(name, top, start,"),
+    (lambda: symtop.simulate("spheroid", "rk4", step_size=0.1, observe="theta"), "nutation, which shows theta"),
 ])  # fmt: skip
 def test_bad_input_is_one_sentence(call, words):
     with pytest.raises(symtop.SymtopError, match=words):

@@ -165,7 +165,6 @@ def test_errors_are_those_of_the_ensemble_and_runs_of_all_samples_are_compared_b
     some = slice(None, None, 7)  # none of them begins beside a pole, where the start's own energy is rounded
     changed = np.abs(wrong["energy"].values[some])
     np.testing.assert_allclose(member_errors(SOME, data, "energy")[some], changed, rtol=1e-6, atol=1e-13)
-    data = symtop.ensemble(SOME, "strang[axis]", **ASKED)
     errors = member_errors(SOME, data, "axis")
     places, same = at_places(data, errors)
     assert same is errors

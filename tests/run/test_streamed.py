@@ -259,10 +259,8 @@ except KeyboardInterrupt:
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("name", "setting", "long", "threads"), [
-    ("strang[axis]", "per_nutation=200", 20_000, 1),
-    ("strang[axis]", "per_nutation=200", 20_000, 2),
-    ("gauss-12[attitude]", "per_nutation=50", 2000, 2),
-    ("rk45-compiled[axis]", "tolerance=1e-9", 10_000, 2),
+    ("strang[axis]", "per_nutation=200", 20_000, 1), ("strang[axis]", "per_nutation=200", 20_000, 2),
+    ("gauss-12[attitude]", "per_nutation=50", 2000, 2), ("rk45-compiled[axis]", "tolerance=1e-9", 10_000, 2),
 ])  # fmt: skip
 def test_an_interrupt_is_heard_within_a_second(name, setting, long, threads):
     code = INTERRUPTED.replace("NAME", repr(name)).replace("THREADS", str(threads))

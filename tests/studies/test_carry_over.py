@@ -252,6 +252,17 @@ def test_a_gap_that_is_shown_is_no_smaller_than_the_gap(gap, verdict, words, mon
     assert re.match(words, why)
 
 
+def test_the_least_tau_over_long_runs_is_told_with_the_bodies_it_is_of():
+    """Free bodies are judged at 1e-3 alone, four of them, and two of three methods have changed places."""
+    data = planted(1.0)
+    cost, free = data["short"]["cost"].copy(), {"family": [*FAMILIES].index(FREE)}
+    cost[free] = cost[free].values[:, [1, 0, 2]]
+    cost[{**free, "target": [1, 2]}] = cost[{**free, "target": 0, "member": slice(4, None)}] = np.nan
+    data["long"] = data["short"].to_dataset().assign(cost=cost)
+    assert facts.long_tau(data, FREE) == (pytest.approx(1.0 / 3.0), 4)
+    assert facts.long_tau(data, "0.1") == (1.0, 40)
+
+
 def test_planted_factors_of_steps_and_of_silent_runs_are_found():
     for factor in (1.0, 3.0):
         data = planted(factor)

@@ -35,10 +35,8 @@ from tests.templates import checked
 ])  # fmt: skip
 def test_the_behaviour_of_a_quantity_is_that_on_its_worst_scene(sizes, exponents, interval, word):
     cell = xr.Dataset({
-        "outcome": ("scene", ["ok", "ok"]),
-        "energy_largest": ("scene", list(sizes)),
-        "energy_exponent": ("scene", list(exponents)),
-        "energy_exponent_interval": ("scene", [interval] * 2),
+        "outcome": ("scene", ["ok", "ok"]), "energy_largest": ("scene", list(sizes)),
+        "energy_exponent": ("scene", list(exponents)), "energy_exponent_interval": ("scene", [interval] * 2),
     })  # fmt: skip
     assert measures.worst_behaviour(cell, "energy") == word
     assert measures.worst_behaviour(cell.assign(outcome=("scene", ["ok", "left_chart"])), "energy") == "failed"

@@ -25,7 +25,7 @@ from symtop.judging.adapters.python_step import REDUCED, PythonStep, RotationSte
 from symtop.judging.findings import yes_no
 from symtop.measure.conservation import CONSTANTS as MOTION
 from symtop.measure.step_map import drawn, generic_start
-from symtop.methods.framework.registry import ENGINE, Integrator
+from symtop.methods.framework.registry import ENGINE, Integrator, methods
 from symtop.model.charts import BODY, CHARTS
 from symtop.model.scenes import Scene
 from symtop.run.plugins import execute, python_file
@@ -251,7 +251,9 @@ def _thing(target: Any) -> tuple[Any, str]:
     path, _, name = str(target).partition(":")
     if not path.endswith(".py"):
         words = "a step must be FILE.py:NAME or FILE.so, or a command with form program"
-        raise SymtopError(f"{words}, not {str(target)!r}")
+        known = (method := path.partition("[")[0]) in methods()
+        own = f", an integrator, whose claims `symtop claims {method}` measures" * known
+        raise SymtopError(f"{words}, not {str(target)!r}{own}")
     file = python_file(path, "a step", "FILE.py:NAME with a file that is there (a command needs form program)")
     with foreign_code(f"the file {file.name}"):
         sys.path.insert(0, str(file.parent))  # what stands beside it, as Python has it for a script

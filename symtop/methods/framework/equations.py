@@ -27,6 +27,7 @@ from symtop.methods.framework.space import SpaceTop, axis_of, field_attitude, fi
 from symtop.methods.vectors import dot
 from symtop.model import charts
 from symtop.model.charts import BODY, CHARTS, space_momenta
+from symtop.model.scenes import Scene, scene
 from symtop.model.top import Angles, SymmetricTop
 
 
@@ -127,8 +128,8 @@ class Field:
         return np.array(FORMULATIONS[self.chart].prepare(self.top, start)[1], dtype=float)
 
 
-def field(chart: str, top: SymmetricTop, *, compiled: bool = False) -> Field:
-    """The equations of a top as a function f(t, y) -> y', for ``solve_ivp`` or a solver of one's own.
+def field(chart: str, top: SymmetricTop | Scene | str, *, compiled: bool = False) -> Field:
+    """The equations of a top, or of a scene's, as a function f(t, y) -> y', for ``solve_ivp`` or one's own solver.
 
     `chart` says what y is, an array of floats:
 
@@ -141,6 +142,7 @@ def field(chart: str, top: SymmetricTop, *, compiled: bool = False) -> Field:
 
     Raises SymtopError for another chart and for what is no top; so does a call for a y of another shape.
     """
+    top = scene(top).top if isinstance(top, (Scene, str)) else top
     if not isinstance(top, SymmetricTop):
-        raise SymtopError(f"top must be a SymmetricTop, not {type(top).__name__}")
+        raise SymtopError(f"top must be a SymmetricTop, a scene or its name, not {type(top).__name__}")
     return Field(one_of("chart", chart, CHARTS), top, compiled=compiled)

@@ -7,6 +7,7 @@ Members are computed in chunks (`symtop.run.ensemble.chunks`), on threads or on 
 import contextlib
 import warnings
 import zipfile
+from collections import Counter
 from collections.abc import Callable, Generator, Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -69,11 +70,12 @@ def ensemble(
     of its row is NaN. Labels of members, a coordinate ``member``, are kept, and what is given for each as a DataArray
     with such labels is taken by label.
 
-    A member that fails fails alone: its samples are NaN from there, ``outcome`` says why. One that starts on a pole has
-    left the angles chart at once, and one on which somebody's solver raises an exception has "raised": a warning
-    (`SymtopWarning`), and the attribute ``raised`` of a dataset in memory, tells the first such exception. If all
-    members raise, SymtopError does. `observe` picks the chart as in `simulate` (default: what the scenes are watched
-    for, the axis of a dataset). `budget` is that of one member. There is no guard.
+    A member that fails fails alone: its samples are NaN from there, ``outcome`` says why, and one `SymtopWarning` how
+    many have (not if `quiet`, which shows no progress either). One that starts on a pole has left the angles chart at
+    once, and one on which somebody's solver raises an exception has "raised": a warning, and the attribute ``raised``
+    of a dataset in memory, tells the first such exception. If all members raise, SymtopError does. `observe` picks the
+    chart as in `simulate` (default: what the scenes are watched for, the axis of a dataset). `budget` is that of one
+    member. There is no guard.
 
     Work is done on as many `threads` as there are cores, or by the workers of the dask cluster at the address
     `scheduler`. The attribute ``execution`` says how members were run: in "lanes", 32 side by side, where the method
@@ -133,9 +135,12 @@ def ensemble(
                 stream.forget(chunks)  # there is nothing to resume
                 raise SymtopError(first)
             data = stream.finish(chunks)
-    if raised:
-        sentence = f"{raised} of {n} members raised an exception, the first: {first}"
-        warnings.warn(sentence, SymtopWarning, stacklevel=2)
+    early = Counter(() if silent else data["outcome"].values.tolist())
+    del early["ok"], early[RAISED]
+    counts = ", ".join(map("{0[1]} {0[0]}".format, early.most_common()))
+    told = {f"raised an exception, the first: {first}": raised, f"ended early: {counts}": early.total()}
+    for end in filter(told.get, told):
+        warnings.warn(f"{told[end]} of {n} members {end}", SymtopWarning, stacklevel=2)
     return data
 
 

@@ -52,15 +52,13 @@ def read_members(members: "xr.Dataset | Iterable[str | Scene]") -> Members:
     """
     if isinstance(members, xr.Dataset):
         return _from_dataset(members)
-    if isinstance(members, (str, bytes, Scene)) or not isinstance(members, Iterable):
+    several = isinstance(members, Iterable) and getattr(members, "shape", True) != ()
+    if isinstance(members, (str, bytes, Scene)) or not several:
         raise SymtopError(f"members must be a dataset or a list of scenes, not {shown(members)}")
     tables = type(members).__module__.startswith("pandas")
     if tables or isinstance(members, (dict, xr.DataArray)):  # which go through their names or numbers
         raise SymtopError(f"members must be an xarray.Dataset or a list of scenes, not a {type(members).__name__}")
-    try:
-        scenes = [scene(entry, bodies=True) for entry in members]
-    except TypeError:  # an array without dimensions
-        raise SymtopError(f"members must be a dataset or a list of scenes, not {shown(members)}") from None
+    scenes = [scene(entry, bodies=True) for entry in members]
     if not scenes:
         raise SymtopError("members must be at least one")
     if len({entry.of_body for entry in scenes}) > 1:
