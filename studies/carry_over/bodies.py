@@ -20,9 +20,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from symtop_studies.cost.ladder import Level, one_by_one, setting_of, stepped
-from symtop_studies.cost.tops import CLEAR, FIRST, MOMENTA, SAMPLES, Tops
+from symtop_studies.cost.tops import CLEAR, FIRST, MOMENTA, Tops, sample_marks
 
-from symtop.core.numbers import EPSILON, GOLDEN
+from symtop.core.numbers import EPSILON
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator
 from symtop.model.body import Attitude, RigidBody, rotated, vertical
@@ -49,9 +49,7 @@ class Bodies:
     def __init__(self, scenes: list[Scene], strata: list[str], periods: float) -> None:
         self.scenes, self.strata, self.periods = scenes, strata, periods
         self.period = np.array([one.top.nutation_period(one.start) for one in scenes])
-        self.steps = math.ceil(periods * FIRST)  # of the coarsest run
-        places = np.arange(1.0, SAMPLES + 1.0) + np.append(np.mod(GOLDEN * np.arange(1.0, SAMPLES), 1.0) - 0.5, 0.0)
-        self.marks = np.unique(np.maximum(np.rint(places * self.steps / SAMPLES).astype(np.int64), 1))
+        self.marks = sample_marks(math.ceil(periods * FIRST))
         self.times = self.marks * (self.period / FIRST)[:, np.newaxis]
         self.kinds = np.zeros(len(scenes), dtype=np.int64)  # one kind
 

@@ -1,16 +1,18 @@
 """What the study's dataset says: costs of all variants on all tops, contests, safe settings, silent failures.
 
 The dataset is a tree. Groups "short" and "long" hold the variants over the two horizons (see `ladder`), "tops" what is
-known of the tops, "prices" the seconds of an evaluation and of a call (see `prices`), "far" and "checks" the phase
-diagram (see `far`). A cost is in seconds, force evaluations x price at the tolerance that meets the error + call, or
-in force evaluations. Variants are compared where they show the same quantity: the axis in every chart but the attitude
-chart of a method that has the axis chart, which steps the same axis, and the attitude in the charts that show it.
+known of the tops, "prices" the seconds of an evaluation and of a call (see `prices`), "confirmed" the safe settings on
+other tops (see `confirm`), "far" and "checks" the phase diagram (see `far`). A cost is in seconds, force evaluations x
+price at the tolerance that meets the error + call, or in force evaluations. Variants are compared where they show the
+same quantity: the axis in every chart but the attitude chart of a method that has the axis chart, which steps the same
+axis, and the attitude in the charts that show it.
 
 Each contest is between the variants of one class of `needs`, or of all that exist for a body without symmetry
 (`Integrator.general`). A method of this very top, by its equations or its constants, is in a class of its own.
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,6 +39,7 @@ SECONDS, EVALUATIONS = "seconds", "evaluations"
 WITHIN = 2.5  # times the least cost of a class over ten nutations: who comes as close runs over a thousand
 CLOSER = 1.25  # the same of an attitude chart, which has no part but in contests of the attitude
 OFTEN = 0.1  # of the tops
+CONFIRMED = "confirmed"  # the group of safe settings that were run on other tops
 
 
 class Cell(NamedTuple):
@@ -146,8 +149,36 @@ def safest(data: xr.DataTree, cell: Cell, keeping: bool = False) -> tuple[list[S
         work = one["work"].transpose("level", "kind").values
         work = (np.where(weights > 0.0, work, 0.0) * weights).sum(axis=1) / max(weights.sum(), 1.0)
         error = float(tariff.error[tariff.names.index(name)])
-        ladders.append(Ladder(name, met[mask][wide], settings, work * price + call, fixed, error))
+        reached = met[mask][wide] * served_over_interpolated(data, cell, name)
+        ladders.append(Ladder(name, reached, settings, work * price + call, fixed, error))
     return safe(ladders, tariff.marked)
+
+
+def served_over_interpolated(data: xr.DataTree, cell: Cell, name: str) -> float:
+    """The safe setting that other tops of a cell showed over the interpolated one; 1 where no other tops were run."""
+    there = (cell.horizon, cell.quantity, cell.tops) == ("short", "axis", NATURAL) and CONFIRMED in data.children
+    if not there or name not in data[CONFIRMED]["variant"].values:
+        return 1.0
+    one = data[CONFIRMED].to_dataset().isel(scene=0).sel(variant=name, target=cell.target)
+    ratio = float(one["served"] / one["interpolated"])
+    return 1.0 if math.isnan(ratio) else ratio
+
+
+def advised(data: xr.DataTree, others: Sequence[str]) -> dict[str, list[float]]:
+    """By variant the safe settings for each target on natural tops, over ten nutations; NaN where none is asked for.
+
+    Of those within `WITHIN` of the cheapest of their class, of those of the cheapest that keep every constant, and of
+    the `others`.
+    """
+    asked: dict[str, list[float]] = {}
+    for place, target in enumerate(targets(data)):
+        for needs, keeping in [*((needs, False) for needs in CLASSES), (CLASSES[0], True)]:
+            choices = safest(data, Cell("short", "axis", target, NATURAL, needs), keeping)[0]
+            for one in choices:
+                near = one.seconds <= WITHIN * choices[0].seconds or one.name in others
+                if near and math.isfinite(one.seconds):
+                    asked.setdefault(one.name, [math.nan] * len(targets(data)))[place] = one.setting
+    return dict(sorted(asked.items()))
 
 
 def reached(data: xr.DataTree, target: float) -> dict[str, Safe]:

@@ -13,6 +13,7 @@ from symtop.report.formats import duration, number
 
 from . import cells, far
 from .cells import CLASSES, Cell
+from .confirm import SAMPLES
 from .ladder import KEPT, WRONG
 from .prices import NOISY, PROCESSES, TOLERANCE, prices
 from .ranking import SAFE, TIE
@@ -63,7 +64,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
         "noisy": NOISY, "at": AT, "short_run": SHORT_RUN, "long_run": LONG_RUN,
         **winners_facts(data), **{f"{part}_{span}": value for span in cells.HORIZONS
                                   for part, value in span_facts(data, span).items()},
-        **silent_facts(data), **guard_facts(data), **far_facts(data),
+        **confirmed_facts(data), **silent_facts(data), **guard_facts(data), **far_facts(data),
         "variants": group.sizes["variant"],
         "marked": len(known.marked),
         "dense": known.sampled,  # price with dense output over heyoka's own
@@ -111,6 +112,14 @@ def _safe(key: str, data: xr.DataTree, cell: Cell) -> dict[str, Any]:
     best = cells.winner(data, cell)["safe"]
     name = best.name if best else NOTHING if cells.costs(data, cell).names else None
     return {key: name, f"{key}_seconds": best and best.seconds}
+
+
+def confirmed_facts(data: xr.DataTree) -> dict[str, float | None]:
+    """How many settings were run on other tops, at how many times, and how many times finer they became, as steps."""
+    table = confirmed(data)
+    steps = table[table["steps"]]
+    finer = float((steps["served"] / steps["interpolated"]).median()) if len(steps) else None
+    return {"confirmed": len(table), "looks": SAMPLES, "finer": finer}
 
 
 def silent_facts(data: xr.DataTree) -> dict[str, Any]:
@@ -168,14 +177,15 @@ def far_facts(data: xr.DataTree) -> dict[str, Any]:
 
 
 def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
-    """What to use; winners in both protocols; by kind of top; other quantities; prices; silent runs; guard."""
+    """What to use; winners in both protocols; by kind; other quantities; settings run; prices; silent runs; guard."""
     kinds = [Cell("short", "axis", target, kind) for kind in KINDS[:-1] for target in cells.targets(data)]
     others = [cell for quantity in ("attitude", "energy") for cell in cells.cells(data, quantity)]
     return {
         "use": use(data), "have": have(data), "winners": winners(data, cells.winners(data)),
         "kinds": winners(data, [cells.winner(data, cell) for cell in kinds]),
         "quantities": winners(data, [cells.winner(data, cell) for cell in others]),
-        "prices": price_list(data), "silent": silent(data), "guard": cells.guard_counts(data), "checks": checked(data),
+        "confirmed": confirmed(data), "prices": price_list(data), "silent": silent(data),
+        "guard": cells.guard_counts(data), "checks": checked(data),
     }  # fmt: skip
 
 
@@ -250,6 +260,17 @@ def winners(data: xr.DataTree, each: list[dict[str, Any]]) -> pd.DataFrame:
                         best[1:6] if best else (np.nan,) * 5, strict=True))  # fmt: skip
         rows.append(row | {"hindsight lead": lead(one["hindsight_called"], best, marked)})
     return pd.DataFrame(rows)
+
+
+def confirmed(data: xr.DataTree) -> pd.DataFrame:
+    """Settings that were run on other tops, one a row: interpolated, and the first that served, with its share."""
+    header = ["variant", "error", "steps", "interpolated", "served", "share"]
+    if cells.CONFIRMED not in data.children:
+        return pd.DataFrame(columns=header)
+    group = data[cells.CONFIRMED].to_dataset().isel(scene=0)
+    rows = group[["interpolated", "served", "share"]].to_dataframe().dropna(subset=["interpolated"]).reset_index()
+    rows["steps"] = [integrator(name).fixed_step for name in rows["variant"]]
+    return rows.rename(columns={"target": "error"})[header].sort_values(["variant", "error"], ascending=[True, False])
 
 
 def lead(called: bool, best: Any, marked: list[str]) -> str:

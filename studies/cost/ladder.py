@@ -105,8 +105,12 @@ def run_level(variant: Integrator, tops: Tops, chosen: Members, level: int, budg
         h = tops.period[chosen] / FIRST * 0.5**level
         marks = np.broadcast_to(tops.marks << level, (len(chosen), tops.marks.size))
         return stepped(variant, tops.numbers[chosen], h, marks)
-    tolerance, solver = setting_of(variant, level), next(iter(variant.solvers.values()))
-    times = tops.times[chosen]
+    return at_tolerance(variant, tops, chosen, setting_of(variant, level), budget)
+
+
+def at_tolerance(variant: Integrator, tops: Tops, chosen: Members, tolerance: float, budget: float) -> Level:
+    """Run the chosen members with one tolerance."""
+    times, solver = tops.times[chosen], next(iter(variant.solvers.values()))
     if isinstance(solver, Adaptive):
         n, samples = times.shape
         done, _ = solver.many(tops.numbers[chosen], np.full(n, tolerance), times, np.full(n, samples), budget)

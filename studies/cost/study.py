@@ -3,8 +3,9 @@
 One ladder of settings (`ladder`), one model of cost, force evaluations times their price plus the call (`prices`), one
 ranking with intervals (`ranking`). In the first round every variant, a method in one chart, climbs the ladder on the
 tops of two populations and the named scenes (`tops`) over ten nutations, and five processes time an evaluation. In the
-second the variants that come within `WITHIN` of the cheapest of their class climb it over a thousand, variants whose
-price is noisy are timed again, and cells of the phase diagram that were predicted are run (`far`).
+second the variants that come within `WITHIN` of the cheapest of their class climb it over a thousand, the settings that
+are advised are run on other tops (`confirm`), variants whose price is noisy are timed again, and cells of the phase
+diagram that were predicted are run (`far`).
 """
 
 import numpy as np
@@ -14,12 +15,14 @@ from symtop.methods.framework.registry import Integrator, integrator, variants
 from symtop.runner.study import Case, Study
 
 from . import cells, facts, far, figures
+from .confirm import confirm
 from .ladder import table
 from .prices import BATCHES, COMPANY, ENOUGH, PROCESSES, measured, prices
-from .tops import named, tops_of
+from .tops import NATURAL, named, tops_of
 
 SEED = 1
 SHORT, LONG, TOPS, PRICES, FAR, CHECKS = "short", "long", "tops", "prices", "far", "checks"  # groups of cases
+SAFE = cells.CONFIRMED
 FULL = {
     SHORT: {"strata": 700, "natural": 700, "seed": SEED, "nutations": 10.0, "budget": 4e4, "guarded": 120},
     LONG: {"strata": 250, "natural": 160, "seed": SEED, "nutations": 1000.0, "budget": 5e5, "guarded": 0},
@@ -67,14 +70,18 @@ def grid(*, quick: bool = False) -> list[Case]:
 
 
 def follow_up(data: xr.DataTree) -> list[Case]:
-    """The long runs of those that may win, the prices that were noisy, and the checks of the phase diagram."""
+    """The long runs of those that may win, their settings on other tops, noisy prices, and checks of the map."""
     quick = cells.members(data, SHORT) < 1000
     asked = (QUICK if quick else FULL)[LONG]
     known = prices(data)
     quiet = [name for name in known.names if name not in known.marked]
     again = [*known.marked, *quiet[:: max(len(quiet) // COMPANY, 1)]] if known.marked else []
+    short = (QUICK if quick else FULL)[SHORT]
+    other = {"members": short["natural"], "seed": SEED + 1, "nutations": short["nutations"]}
+    settings = cells.advised(data, [*facts.HAVE, *figures.FAMILIAR])
     return [
         *(Case("tops", name, asked, group=LONG) for name in cells.contenders(data)),
+        *(Case(NATURAL, name, other | {"start": start}, group=SAFE) for name, start in settings.items()),
         *(timing(again, BATCHES[1], quick=quick) if again else []),
         *(Case("natural", f"check-{place:02d}", settings, group=CHECKS)
           for place, settings in enumerate(far.chosen(data, CHECKED[quick]) if FAR in data.children else ())),
@@ -82,7 +89,7 @@ def follow_up(data: xr.DataTree) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    """The table of a variant, of the tops, of the prices, or of the phase diagram."""
+    """The table of a variant, of its settings, of the tops, of the prices, or of the phase diagram."""
     asked = case.settings
     if case.group == PRICES:
         return measured(asked["integrators"], asked["rounds"], asked["batch"])
@@ -91,6 +98,8 @@ def measure(case: Case) -> xr.Dataset:
     if case.group == FAR:
         tops = far.tops_of(asked["members"], asked["seed"])
         return far.ladder(integrator(case.integrator), tops, asked["levels"], asked["steps"], asked["budget"])
+    if case.group == SAFE:
+        return confirm(integrator(case.integrator), **asked)
     drawn = tops_of(asked["strata"], asked["natural"], asked["seed"], asked["nutations"])
     if case.group == TOPS:
         return about_tops(drawn).assign(nutations=asked["nutations"])

@@ -58,6 +58,12 @@ LEFT_OUT = {  # tags of scenes, with the reason
 TOGETHER = 512  # members whose errors are computed at a time: what is between states and errors stays in the cache
 
 
+def sample_marks(steps: int, samples: int = SAMPLES) -> NDArray[np.int64]:
+    """After which of so many steps a run is sampled: golden fractions apart, the last step among them."""
+    places = np.arange(1.0, samples + 1.0) + np.append(np.mod(GOLDEN * np.arange(1.0, samples), 1.0) - 0.5, 0.0)
+    return np.unique(np.maximum(np.rint(places * steps / samples).astype(np.int64), 1))
+
+
 class Body(NamedTuple):
     """The parameters of n tops, each (n, 1) beside samples."""
 
@@ -79,18 +85,22 @@ class Shown(Protocol):
 
 
 class Tops:
-    """Tops and starts as rows (n, 9) of `NUMBERS`, followed for a number of nutations, and places in `KINDS`, (n,)."""
+    """Tops and starts as rows (n, 9) of `NUMBERS`, followed for a number of nutations, and places in `KINDS`, (n,).
 
-    def __init__(self, numbers: Array, nutations: float, kinds: NDArray[np.int64] | None = None) -> None:
+    Samples fall on whole steps of a run that makes `first` a nutation.
+    """
+
+    def __init__(
+        self, numbers: Array, nutations: float, kinds: NDArray[np.int64] | None = None, *, first: float = FIRST,
+        samples: int = SAMPLES,
+    ) -> None:  # fmt: skip
         self.numbers, self.nutations = np.ascontiguousarray(numbers), nutations
         self.kinds = np.zeros(len(numbers), dtype=np.int64) if kinds is None else kinds
         self.forms = ClosedForms(self.numbers)
         self._members: dict[int, tuple[SymmetricTop, Angles]] = {}
         self.period = np.array(self.forms.nutation_period)
-        self.steps = math.ceil(nutations * FIRST)  # of the coarsest run
-        places = np.arange(1.0, SAMPLES + 1.0) + np.append(np.mod(GOLDEN * np.arange(1.0, SAMPLES), 1.0) - 0.5, 0.0)
-        self.marks = np.unique(np.maximum(np.rint(places * self.steps / SAMPLES).astype(np.int64), 1))
-        self.times = self.marks * (self.period / FIRST)[:, np.newaxis]
+        self.marks = sample_marks(math.ceil(nutations * first), samples)
+        self.times = self.marks * (self.period / first)[:, np.newaxis]
 
     @property
     def known(self) -> NDArray[np.bool_]:

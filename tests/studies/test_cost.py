@@ -1,5 +1,6 @@
 """The study of cost: the ladder, prices, the ranking with its intervals, safe settings, and what its data say."""
 
+import itertools
 import math
 import timeit
 
@@ -8,7 +9,8 @@ import pytest
 import xarray as xr
 from symtop_studies.cost import cells, facts, figures, ladder, prices as pricing, study, tops as tops_module
 from symtop_studies.cost.cells import GENERAL, Cell
-from symtop_studies.cost.ranking import Ladder, cost_to_reach, hindsight, run_lengths, safe, slowdowns, wins
+from symtop_studies.cost.confirm import rounded, share_served
+from symtop_studies.cost.ranking import SAFE, Ladder, cost_to_reach, hindsight, run_lengths, safe, slowdowns, wins
 from symtop_studies.cost.tops import ASKED, FIRST, KINDS, MOMENTA, NATURAL, SCENE, natural, tops_of
 
 import symtop
@@ -367,8 +369,12 @@ def small():
     cases += [Case("short", "exact", asked, group="tops")]
     few = study.FAR_QUICK | {"members": 2, "levels": 6, "steps": 4e3, "budget": 1e4}
     cases += [Case("natural", "rk4[axis]", few, group="far")]
-    tree = datasets.combine([(case, study.measure(case)) for case in cases])
-    return tree.assign({"prices": tree_of([[7e-9, 3e-8, 1.4e-8, 8e-9]] * 5, names)["prices"]})
+    done = [(case, study.measure(case)) for case in cases]
+    priced = {"prices": tree_of([[7e-9, 3e-8, 1.4e-8, 8e-9]] * 5, names)["prices"]}
+    advised = cells.advised(datasets.combine(done).assign(priced), [])
+    other = {"members": 60, "seed": 2, "nutations": asked["nutations"]}
+    cases = [Case(NATURAL, name, other | {"start": start}, group=study.SAFE) for name, start in advised.items()]
+    return datasets.combine([*done, *((case, study.measure(case)) for case in cases)]).assign(priced)
 
 
 def test_facts_and_tables_are_those_of_the_cells(small):
@@ -430,6 +436,31 @@ def test_quick_results_hold_every_verdict_and_a_cost_holds_the_call(data):
     cell = Cell("short", "axis", 1e-3, NATURAL, "derivative")
     every, keeping = ({one.name for one in cells.safest(data, cell, only)[0]} for only in (False, True))
     assert keeping == {name for name in every if name.startswith("gauss-")} < every
+    served = facts.confirmed(data).set_index(["variant", "error"])
+    for needs, target in itertools.product(cells.CLASSES, cells.targets(data)):  # what the front page advises was run
+        for first in cells.safest(data, Cell("short", "axis", target, NATURAL, needs))[0][:1]:
+            if np.isfinite(first.seconds):
+                assert served.loc[(first.name, target), "served"] == pytest.approx(first.setting)
+                assert served.loc[(first.name, target), "share"] >= SAFE
+
+
+def test_an_advised_setting_was_run_on_other_tops_and_serves_them(small):
+    assert [rounded(value, True) for value in (14.11, 209.2, 16.7)] == [14.2, 210.0, 16.7]
+    assert [rounded(value, False) for value in (8.9e-5, 1e-9, 2.05e-10)] == [8e-5, 1e-9, 2e-10]
+    table = facts.tables(small)["confirmed"].set_index(["variant", "error"])
+    for (name, error), row in table.iterrows():
+        choices = cells.safest(small, Cell("short", "axis", error, NATURAL, integrator(name).needs))[0]
+        printed = facts.setting_words(name, next(one for one in choices if one.name == name).setting)
+        assert printed in (facts.setting_words(name, row["served"]), "inf steps")
+    one = table.loc["rk4[axis]", 1e-3]
+    variant, others = integrator("rk4[axis]"), natural(60, 2)
+    shares = [share_served(variant, others, 10.0, part * one["served"], 1e-3) for part in (0.5, 1.0)]
+    assert shares[0] < 0.9 < SAFE <= shares[1] == one["share"]
+    top, period = (scene := scene_of(tops_module.Tops(others, 10.0), 0)), scene.nutation_period  # from outside
+    run = symtop.simulate(top, "rk4[axis]", step_size=period / one["served"], horizon=10.0 * period)
+    largest = float(symtop.errors(run, top)["axis"].max())
+    for part, share in ((1.01, 1.0), (0.5, 0.0)):
+        assert share_served(variant, others[:1], 10.0, one["served"], part * largest) == share
 
 
 def test_the_page_says_what_was_measured_and_shares_of_silent_runs_are_of_their_kind(small, tmp_path):
