@@ -131,8 +131,7 @@ def stepped(variant: Integrator, numbers: Array, h: Array, marks: NDArray[np.int
 
 def of_length_one(variant: Integrator, runs: Level) -> Level:
     """Runs end where their quaternion has left length one, as they do one by one."""
-    with np.errstate(all="ignore"):  # a run may have blown up
-        lost = off_length(next(iter(variant.solvers)), runs.states)
+    lost = off_length(next(iter(variant.solvers)), runs.states)
     outcome = np.where(lost.any(axis=1), NOT_NORMALISED, runs.outcome)
     return runs._replace(states=np.where(lost[..., np.newaxis], np.nan, runs.states), outcome=outcome)
 

@@ -61,7 +61,8 @@ def finite(name: str, value: object, least: float = -math.inf) -> float:
     """Return `value` as a float; refuse anything that is not one finite real number, or is below the least."""
     number = math.nan
     # float() would read a number in them
-    if not isinstance(value, (bool, str, bytes, bytearray)) and type(value).__name__ != "MaskedConstant":
+    other = getattr(getattr(value, "dtype", None), "kind", "") in ("b", "U", "S", "c")
+    if not (other or isinstance(value, (bool, str, bytes, bytearray)) or type(value).__name__ == "MaskedConstant"):
         with contextlib.suppress(TypeError, ValueError, OverflowError):
             number = value = float(value)  # type: ignore[arg-type]
     if not math.isfinite(number):

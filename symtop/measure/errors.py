@@ -38,7 +38,7 @@ from symtop.model.scenes import Scene, scene as find_scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.ensemble.inputs import read_members, refuse_others
 from symtop.run.reference.truth import PRECISIONS, reference
-from symtop.run.trajectory import Trajectory, dataset
+from symtop.run.trajectory import Trajectory, column, dataset
 
 QUANTITIES: dict[str, str] = {
     "axis": "angle between axes (rad)",
@@ -268,7 +268,7 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
         k = int(np.argmax(bad))
         after = f" after {time[k - 1]:g}" if k else ""
         raise SymtopError(f"time must be finite, at least 0 and increase, but sample {k} is at {time[k]:g}{after}")
-    columns: dict[str, Any] = {name: _numbers(name, data[name]) for name in SHAPES if name in data}
+    columns: dict[str, Any] = {name: _numbers(name, column(data, name)) for name in SHAPES if name in data}
     check_shapes(columns, time.size)
     if not set(ENOUGH) & set(columns):
         raise SymtopError("data must hold one of axis, quaternion, theta beside time, to show where the top is")

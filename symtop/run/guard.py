@@ -36,7 +36,7 @@ import numpy as np
 
 from symtop.core.numbers import EPSILON, GOLDEN
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan, sentence
+from symtop.methods.framework.plan import LENGTH, QUATERNIONS, Plan, sentence
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
@@ -74,6 +74,7 @@ OWN = 10.0  # times that steps of a probe multiply a change more than the motion
 PRECESSED = 0.1  # the same, of a step that is tried past a pole
 TRIES, LESS = 8, 0.6  # steps that are tried, each at most so much of the one before
 MOST_STEPS = 20_000_000_000  # of a run: ten minutes of the fastest kernel
+NO_LENGTHS = np.empty(0)
 
 
 class Probe(NamedTuple):
@@ -84,6 +85,7 @@ class Probe(NamedTuple):
     outcome: str
     reached: float  # time of the run, not of the probe
     evaluations: int  # of the force, at the step of the run
+    stray: Array = NO_LENGTHS  # how far the length of the quaternion is from one; empty of a chart without
 
 
 class Forecast(NamedTuple):
@@ -127,11 +129,13 @@ def _probe(
     run = solve(method, chart, motion.scene.top, motion.start(since), piece)
     with np.errstate(all="ignore"):
         error = motion.error(piece.times, chart, run.states, since, plan.horizon)
+        lengths = np.linalg.norm(run.states[:, :4], axis=1) if chart in QUATERNIONS else None
+        stray = NO_LENGTHS if lengths is None else np.abs(lengths - 1.0)
     outcome = run.outcome
     if not math.isfinite(error.sum()):  # no angle is more than pi
         error[~np.isfinite(error)] = math.inf
         outcome = "not_finite" if outcome == "ok" else outcome
-    return Probe(piece.times, error, outcome, since + run.reached, run.force_evaluations)
+    return Probe(piece.times, error, outcome, since + run.reached, run.force_evaluations, stray)
 
 
 def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
@@ -233,9 +237,8 @@ def _expected(motion: Integrated, method: Integrator, chart: str, plan: Plan) ->
         probe = _probe(motion, method, chart, plan, min(plan.horizon, piece), step)
         return _fixed(motion, method, probe, plan.horizon), probe
     coarse = twice / round(allowed / step)
-    probe = _probe(motion, method, chart, plan, twice, coarse)
-    probe = probe._replace(evaluations=round(probe.evaluations * coarse / step))
-    finer: float = (step / coarse) ** (method.order or 1)
+    probe, finer = _probe(motion, method, chart, plan, twice, coarse), (step / coarse) ** (method.order or 1)
+    probe = probe._replace(evaluations=round(probe.evaluations * coarse / step), stray=probe.stray * finer)
     expected = _fixed(motion, method, probe, plan.horizon) * finer
     if chart == "angles" and marks.rate * coarse > RESOLVED:
         since = max(0.0, motion.closest() - 0.5 * allowed)
@@ -269,12 +272,23 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: I
         pieces = plan.horizon / float(probe.times[-1]) - 1.0
         error = max(error, float(probe.error.max()) * math.exp(min(pieces * math.log(growth), MOST_FOLDS)))
     ended, rounding = (probe.outcome, probe.reached), motion.rounding(plan.horizon, whole=whole)
+    if probe.outcome == "ok" and probe.stray.size and not whole:
+        ended = _length_lost(probe, plan.horizon) or ended
     limit = getattr(method.solvers[chart], "limit", None)
     if limit is not None and probe.outcome == "ok" and probe.times[-1] >= min(marks.period, plan.horizon):
         reached = float(probe.times[-1]) * limit(plan) / max(probe.evaluations, 1)
         if reached < plan.horizon:
             error, ended = math.inf, ("out_of_budget", reached)
     return Forecast(max(error, unstable), rounding, steps, passage, *ended, marks, unstable, whole, growth)
+
+
+def _length_lost(probe: Probe, horizon: float) -> tuple[str, float] | None:
+    """How and when the length of the quaternion, which drifts as it does over the halves of the probe, ends the run."""
+    half, most = 0.5 * float(probe.times[-1]), float(probe.stray.max())
+    drift = (most - float(probe.stray[probe.times <= half].max(initial=0.0))) / half
+    if most + drift * (horizon - 2.0 * half) <= LENGTH:
+        return None
+    return "not_normalised", 2.0 * half + (LENGTH - most) / drift
 
 
 def _own_growth(motion: Integrated, method: Integrator, chart: str, plan: Plan, piece: float) -> float:

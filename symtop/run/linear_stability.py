@@ -31,6 +31,8 @@ from symtop.model.scenes import Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
 
 NUDGE = 1e-6  # rad: nonlinear terms are 1e-12 of the linear ones, rounding 1e-10
+BESIDE = 1e-5  # rad from a pole: closer, the motion is that at the pole, but in Euler's angles
+NEAR, LEAST = 1e-3, 1e-9  # of the way to a pole, a nudge beside one: nonlinear terms are 1e-6; rad
 SINGLE_NUDGE, SINGLE_EPSILON = 1e-3, 2.0**-23  # rad, of a method in single precision; the spacing of its numbers at 1
 WARM_UP = 4  # strides before those that are compared: a multistep method has its start behind it by then
 ROUNDING = 32.0 * EPSILON  # of an inclination after some steps, rad
@@ -142,8 +144,11 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
     angle a, the two terms are nearly one, and rounding e of the difference leaves a doubt of e/a^2 in their roots.
     """
     stride = max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))  # steps
-    runs, delta, off = _apart(method, scene, h, chart, NUDGE, stride)
-    nudge, rounding, places = NUDGE, EPSILON, runs[0].states[1:, :3]
+    gap = min(theta := scene.top.steady_theta(scene.top.momenta(scene.start)), math.pi - theta)
+    at_pole, rounding = chart != "angles" and gap < BESIDE, EPSILON
+    nudge = NUDGE if at_pole else min(NUDGE, max(NEAR * gap, LEAST))
+    runs, delta, off = _apart(method, scene, h, chart, nudge, stride)
+    places = runs[0].states[1:, :3]
     with np.errstate(over="ignore"):  # of a run that has blown up
         single = chart != "angles" and bool((places.astype(np.float32) == places).all())
     if single:
@@ -168,7 +173,7 @@ def _apart(
     """Two runs at a distance of two nudges, half their difference every `stride` steps, how far off their middle is."""
     top, momenta = scene.top, scene.top.momenta(scene.start)
     theta = top.steady_theta(momenta)
-    beside = chart != "angles" and min(theta, math.pi - theta) < 10.0 * nudge
+    beside = chart != "angles" and min(theta, math.pi - theta) < BESIDE
     if beside:
         tilt, spin = math.pi - nudge if theta > 1.0 else nudge, momenta.p_psi / top.I3
         pair = [Angles(tilt, phi, psi_dot=spin) for phi in (0.0, math.pi)]

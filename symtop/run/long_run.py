@@ -39,7 +39,7 @@ from symtop.core.numbers import GOLDEN
 from symtop.core.progress import progress_bar
 from symtop.core.signals import ending_on_sigterm
 from symtop.methods.framework.loop import FixedStep, Loop, Marks, Position, inside
-from symtop.methods.framework.plan import OK, ending, sentence
+from symtop.methods.framework.plan import NOT_NORMALISED, OK, ending, off_length, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.charts import BODY, Array, View, body_energy
 from symtop.model.scenes import Scene, scene as find_scene
@@ -87,6 +87,11 @@ def chart_of(method: Integrator, *, of_body: bool = False) -> tuple[str, FixedSt
     return chart, loops[chart]
 
 
+def presented(solver: FixedStep, par: Any, states: Array) -> Array:
+    """States of a loop as its chart has them."""
+    return states if solver.present is None else solver.present(par, np.zeros(len(states)), states)
+
+
 def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     """Relative changes of energy, modified energy and momenta since the start, and theta, of any samples of a run.
 
@@ -103,24 +108,24 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
 
     conserved = {"p_phi", "p_psi"} <= set(method.conserves or ())
 
-    def presented(states: Array) -> Array:
-        return states if solver.present is None else solver.present(par, np.zeros(len(states)), states)
-
     def energies(states: Array, momenta: Array) -> tuple[Array, Array]:
         used = None if conserved else momenta
         plain = modified.energy(scene, chart, states, used)
         return plain, modified.modified_energy(scene, method, chart, states, h, used)
 
     head = solver.loop(par, rule, state, h, scattered(0, FIRST, 8 * SAMPLES))
-    first, momenta = presented(head.states), head.momenta
+    first, momenta = presented(solver, par, head.states), head.momenta
     ran = np.isfinite(first).all(axis=1) & np.isfinite(momenta).all(axis=1)  # a run may fail in its first steps
-    at_start, momenta_start = presented(solver.loop(par, rule, state, h, np.array([0])).states), np.array([start[:2]])
+    at_start, momenta_start = (
+        presented(solver, par, solver.loop(par, rule, state, h, np.array([0])).states),
+        np.array([start[:2]]),
+    )
     first, momenta = (first[ran], momenta[ran]) if ran.any() else (at_start, momenta_start)
     energy_start = float(energies(at_start, momenta_start)[0][0])
     rest = modified.oscillation(*modified.section(chart, first), energies(first, momenta)[1])
 
     def gauge(states: Array, momenta: Array, *, shown: bool = False) -> dict[str, Array]:
-        states = states if shown else presented(states)
+        states = states if shown else presented(solver, par, states)
         energy, values = energies(states, momenta)
         return {
             "energy": (energy - energy_start) / energy_unit,
@@ -142,8 +147,7 @@ def _watch_body(scene: Scene, method: Integrator) -> Gauge:
     energy_start = body_energy(body, np.array([[*scene.start.quaternion, *L]]))[0]
 
     def gauge(states: Array, momenta: Array, *, shown: bool = False) -> dict[str, Array]:
-        if not shown and solver.present is not None:
-            states = solver.present(par, np.zeros(len(states)), states)
+        states = states if shown else presented(solver, par, states)
         view = View(BODY, body, states)
         return {
             "energy": (view.energy - energy_start) / scene.energy_scale,
@@ -174,7 +178,7 @@ def long_run(
     """
     chosen, method, silent = find_scene(scene, bodies=True), find_integrator(integrator), boolean("quiet", quiet)
     count, h = whole("steps", steps, 1, MOST_STEPS), positive("step_size", step_size)
-    _, solver = chart_of(method, of_body=chosen.of_body)
+    chart, solver = chart_of(method, of_body=chosen.of_body)
     assert isinstance(solver.loop, Loop)  # noqa: S101
     compensated = boolean("compensated", compensated)
     loop = solver.loop if compensated else solver.loop.plain()
@@ -188,8 +192,11 @@ def long_run(
     with checkpoints.saved_on_failure():
         with progress_bar(title, quiet=silent, total=count, initial=at.k, unit="step", unit_scale=True) as bar:
             while gauge is not None and len(rows) < len(ends) and outcome == OK:
-                stretch, after = loop.advance(par, rule, at, h, scattered(at.k, ends[len(rows)]))
+                marks = scattered(at.k, ends[len(rows)])
+                stretch, after = loop.advance(par, rule, at, h, marks)
                 outcome, reached = stretch.outcome, after.k
+                if outcome == OK and (lost := off_length(chart, presented(solver, par, stretch.states))).any():
+                    outcome, reached = NOT_NORMALISED, int([at.k, *marks][lost.argmax()])
                 if outcome == OK:
                     rows.append(summary(gauge(stretch.states, stretch.momenta)))
                     bar.update(after.k - at.k)

@@ -174,7 +174,7 @@ def _outlook(
         if rule:
             marks = np.unique(np.rint(min(round(piece / setting), PROBED) * places).clip(1.0))
             return marks * setting, _stepped(f, rule, t, start, setting, marks), setting
-        (name, cost), shown = SCIPY[method], np.minimum(t + piece * places, t + piece)
+        (name, cost), shown = SCIPY[method], np.unique(np.minimum(t + piece * places, t + piece))
         run = solve_ivp(_finite(f), (t, t + piece), start, name, shown, rtol=setting, atol=setting)
         return run.t - t, run.y.T, piece * cost / run.nfev
 

@@ -41,7 +41,7 @@ class Trajectory(NamedTuple):
     force_evaluations: int = 0
     newton_iterations: int = 0
     outcome: str = "ok"
-    reached_time: float = np.nan  # end of the last completed step
+    reached_time: float = np.nan  # end of the last completed step, or of the last sample whose quaternion has length 1
 
     @classmethod
     def of_run(cls, scene: Scene, chart: str, plan: Plan, run: Run) -> Self:
@@ -74,13 +74,26 @@ class Trajectory(NamedTuple):
     def of_data(cls, data: xr.Dataset | Mapping[str, Any]) -> Self:
         """The trajectory in a dataset of `simulate`, or in any dataset or mapping with some of its variables."""
         attributes = getattr(data, "attrs", {})
-        values: dict[str, Any] = {name: np.asarray(data[name]) for name in ("time", *COLUMNS) if name in data}
+        values: dict[str, Any] = {name: np.asarray(column(data, name)) for name in ("time", *COLUMNS) if name in data}
         return cls(**values, **{name: attributes[name] for name in FACTS if name in attributes})
 
     @property
     def columns(self) -> dict[str, Array]:
         """What is shown, by name, without ``time``."""
         return {name: values for name in COLUMNS if (values := getattr(self, name)) is not None}
+
+
+def column(data: xr.Dataset | Mapping[str, Any], name: str) -> Any:
+    """What data hold under that name, over time first; named components are in the order of `LABELS`."""
+    values = data[name]
+    if isinstance(values, xr.DataArray):
+        for dim, labels in LABELS.items():
+            given = values.coords[dim].to_numpy().tolist() if dim in values.coords else [*labels]
+            if given != [*labels] and {*given} == {*labels}:
+                values = values.sel({dim: [*labels]})
+        if "time" in values.dims[1:]:
+            values = values.transpose("time", ...)
+    return values
 
 
 COLUMNS, FACTS = Trajectory._fields[1:11], Trajectory._fields[11:]

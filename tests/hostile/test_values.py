@@ -36,7 +36,8 @@ class Unprintable:
     __hash__ = None
 
 
-ODD = [None, "x", "", b"1", [], [1.0], {}, (), object(), 1j, True, np.array([1.0, 2.0]), "1e", lambda: 1.0, 10**400]
+ODD = [None, "x", "", b"1", [], [1.0], {}, (), object(), 1j, True, np.array([1.0, 2.0]), "1e", lambda: 1.0, 10**400,
+       np.True_, xr.DataArray(True), np.array("0.01"), np.complex128(0.01 + 1j)]  # fmt: skip
 NOT_FINITE = [*ODD, math.nan, math.inf, -math.inf]
 NOT_POSITIVE = [*NOT_FINITE, 0.0, -0.0, -1.0, -1e300, -5e-324, np.float64(-2.0)]
 NOT_WHOLE = [*NOT_POSITIVE, 1.5, 2.0000001]

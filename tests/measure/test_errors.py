@@ -171,7 +171,8 @@ def test_a_part_of_a_run_is_judged_by_what_it_shows_and_no_other_shape_is_taken(
         shown = symtop.errors(part)
         assert ("attitude" in shown) is ("phi" in part)
         xr.testing.assert_allclose(shown, whole[list(shown)], atol=1e-15)
-    for wrong in (run.transpose(), run.sel(component="z")):
+    xr.testing.assert_identical(symtop.errors(run.transpose()), whole)
+    for wrong in (run.isel(component=slice(2)), run.sel(component="z")):
         with pytest.raises(symtop.SymtopError, match=r"axis must have the shape \(41, 3\), one row for each time, not"):
             symtop.errors(wrong)
 
@@ -253,7 +254,11 @@ def test_errors_of_an_ensemble_are_those_of_its_members_and_other_members_are_re
         symtop.errors(many.drop_vars("stratum"), symtop.population(4, seed=2))
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        symtop.errors(many, drawn)
+        wrong = symtop.errors(many, drawn)
+        turned = many.sel(component=["z", "x", "y"]).transpose()  # read by its labels
+        xr.testing.assert_identical(symtop.errors(turned, drawn), wrong)
+    with pytest.warns(symtop.SymtopWarning, match="is this the start of the scene"):
+        symtop.errors(turned.assign_coords(component=["x", "y", "z"]), drawn)  # the control
 
 
 @pytest.mark.parametrize(("top", "start", "integrator"), [

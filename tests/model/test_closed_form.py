@@ -217,6 +217,16 @@ def test_next_to_the_separatrix_the_motion_is_periodic():
     assert ClosedForm(top, Angles(0.0, theta_dot=2.0, psi_dot=1e-9)).nutation_period < 100.0
 
 
+def test_after_as_many_turns_as_doubles_count_the_attitude_is_within_its_bound():
+    named, most = scene("spheroid"), 2.0**52
+    form, precise = ClosedForm(named.top, named.start), PreciseForm(named.top, named.start, 60)
+    times = np.random.default_rng(0).uniform(most, 2.0 * most, 12) * form.nutation_period / 4.0
+    true = np.array([[float(part) for part in precise.quaternion(float(time))] for time in times])
+    assert charts.attitude_distance(form.quaternion(times), true).max() < 1e-14
+    for value in (0.5, 1.5, 2.5, -2.5, most / 2 + 0.5, most / 2 + 1.5, -most / 2 - 1.5, most - 0.5, most + 1.0):
+        assert double_double.whole_part(value) == round(value)
+
+
 @pytest.mark.parametrize("count", [1, pytest.param(40, marks=pytest.mark.slow)])
 def test_every_family_keeps_the_accuracy_that_is_claimed(count):
     """So many of each; `python -m benchmarks.accuracy` measures ten thousand."""

@@ -19,7 +19,7 @@ from symtop.model.scenes import closed_form, grazing, steady
 from symtop.run import guard
 from symtop.run.ensemble.bodies import body_population, scenes_of
 from symtop.run.guard import EXPECTED, Probe, grown
-from symtop.run.linear_stability import trace
+from symtop.run.linear_stability import nutation_growth, trace
 from symtop.run.motion import Exact, Integrated, _apart, landmarks
 from symtop.run.simulation import make_plan
 
@@ -366,6 +366,22 @@ def test_passages_of_a_pole_add_up_and_what_was_lost_is_not_compared():
         assert math.isnan(_apart(lost, whole, units))
     assert _apart(whole, (*whole[:6], 3.5), units) == 0.5
     assert _apart(whole[1:], (1.002, *whole[2:]), units) == 1.002  # an axis
+
+
+def test_beside_a_pole_no_growth_is_seen_where_there_is_none_and_a_length_that_drifts_away_is():
+    top = symtop.SymmetricTop(1.0, 1.6394085537167262, -1.0)
+    start = symtop.Angles(2.2919252442665026, 0.0, 0.0, -0.31389947196684775, 3.9060646246484256, 3.388443612658759)
+    scene = symtop.Scene("beside", top, start, 50.0 * (period := top.nutation_period(start)))
+    assert caution(scene, "vern9-fixed[axis]", step_size=period / 100.0) == ""
+    fine, coarse = (nutation_growth(symtop.integrator(name), scene, period / parts, "axis", math.tau / period).factor
+                    for name, parts in (("vern9-fixed", 100.0), ("rkmk-se3-2", 3.0)))  # fmt: skip
+    assert abs(fine - 1.0) < 1e-7
+    assert coarse - 1.0 > 5e-3
+    top = symtop.SymmetricTop(0.4577082721218755, 0.11243869742655017, 116.05806957319277)
+    start = symtop.Angles(1.4123814e-3, -2.63782662, -1.424354898914134, 5.8594e-3, 18.072692920427624, 143.08986495395)
+    scene = symtop.Scene("long", top, start, 56.3)
+    assert "the quaternion's length left one" in caution(scene, "rk4[attitude]", step_size=1.948e-3)
+    assert caution(scene, "rk4[attitude]", step_size=1.3e-3) == ""
 
 
 def test_no_body_turns_much_faster_than_the_watch_takes_it_to():

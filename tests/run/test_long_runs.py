@@ -276,6 +276,11 @@ def test_a_body_is_watched_as_simulate_shows_it(name):
         span = float(values.max() - values.min())
         assert float(data[f"{quantity}_least"].min()) == pytest.approx(float(values.min()), abs=0.05 * span + 1e-15)
         assert float(data[f"{quantity}_largest"].max()) == pytest.approx(float(values.max()), abs=0.05 * span + 1e-15)
+    scene = symtop.Scene("free", symtop.RigidBody(1.0, 1.2, 0.6), symtop.Attitude((1, 0, 0, 0), (0.2, 0.3, 5.0)), 200.0)
+    lost = long_run(scene, "rk4", steps=2000, step_size=0.1, quiet=True)
+    alone = symtop.simulate(scene, "rk4", step_size=0.1, guard=False)
+    assert lost.outcome == alone.outcome == "not_normalised"
+    assert abs(lost.reached_time - alone.reached_time) < 0.02 * alone.reached_time
 
 
 def test_what_a_free_body_keeps_grows_as_rounding_and_what_it_does_not_keep_as_the_time(tmp_path):

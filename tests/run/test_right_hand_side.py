@@ -146,6 +146,8 @@ def test_a_motion_may_begin_at_zero():
     assert symtop.guard(prothero_robinson(1e3), 0.0, [0.0], 0.5, step_size=0.01).cause == "stiffness"
     still = symtop.guard(lambda _t, y: 0.0 * y, 0.0, [0.0], 10.0, step_size=0.1)
     assert (still.error, still.setting) == (0.0, 10.0)  # no step is longer than the run
+    turning = symtop.guard(lambda _t, y: [y[1], -y[0]], 0.0, [1.0, 0.0], 93.05488730716638, "rk45", tolerance=1e-4)
+    assert 1e-4 < turning.error < 0.1  # two of its times are neighbours, which SciPy refuses
 
 
 def test_f_may_return_one_array_again_and_a_horizon_beyond_the_end_is_refused():

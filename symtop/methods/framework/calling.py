@@ -75,8 +75,7 @@ def _of_length_one(plan: Plan, run: Run, chart: str) -> Run:
     squares = np.einsum("ij,ij->i", quaternions, quaternions)  # six times as fast as the search that follows
     if np.abs(squares - 1.0).max(initial=0.0) <= LENGTH:
         return run
-    with np.errstate(all="ignore"):
-        lost = off_length(chart, run.states)
+    lost = off_length(chart, run.states)
     if not lost.any():
         return run
     states, p_phi, p_psi = np.where(lost[:, None], np.nan, run.states), *np.where(lost, np.nan, run[1:3])

@@ -106,7 +106,8 @@ def off_length(chart: str, states: Array) -> NDArray[np.bool_]:
     """
     if chart not in QUATERNIONS:
         return np.zeros(states.shape[:-1], dtype=bool)
-    length = np.sqrt((states[..., :4] ** 2).sum(axis=-1))
+    with np.errstate(all="ignore"):  # a run may have blown up
+        length = np.sqrt((states[..., :4] ** 2).sum(axis=-1))
     return np.logical_or.accumulate(np.isfinite(length) & (np.abs(length - 1.0) > LENGTH), axis=-1)
 
 

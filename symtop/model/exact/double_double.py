@@ -63,7 +63,10 @@ def ordered_sum(a: float, b: float) -> DoubleDouble:
 @inlined
 def whole_part(x: float) -> float:
     """The nearest integer, ties to even, as a double."""
-    return (x + TO_WHOLE) - TO_WHOLE if abs(x) < 2251799813685248.0 else x
+    if abs(x) < 2251799813685248.0:
+        return (x + TO_WHOLE) - TO_WHOLE
+    far = math.copysign(4503599627370496.0, x)  # doubles from 2^51 to 2^52 have halves
+    return (x + far) - far if abs(x) < 4503599627370496.0 else x
 
 
 @inlined
