@@ -1,13 +1,17 @@
-"""symtop without what Windows lacks: locks of `fcntl`, interval timers, groups of processes, fork.
+"""symtop without what Windows lacks: locks of `fcntl`, interval timers, groups of processes, fork, parents' numbers.
 
 A `sitecustomize` takes them away from a whole tree of processes, the workers of a study included. It cannot show that
 symtop runs on Windows; it shows that none of them is needed.
 """
 
+import errno
+import fcntl
 import json
+import os
 
 import pytest
 
+from symtop.core import files
 from tests.commands import customized
 
 POORER = """
@@ -21,6 +25,21 @@ multiprocessing.context._concrete_contexts.pop("fork")
 multiprocessing.context._concrete_contexts.pop("forkserver")
 multiprocessing.get_all_start_methods = lambda: ["spawn"]
 """
+
+
+def test_a_file_is_whole_where_only_a_writer_may_bring_it_to_the_disk_and_the_umask_counts(tmp_path, monkeypatch):
+    def as_on_windows(number):
+        if fcntl.fcntl(number, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY:
+            raise OSError(errno.EBADF, "only read")
+
+    monkeypatch.setattr(os, "fsync", as_on_windows)
+    before = os.umask(0o027)
+    try:
+        with files.replacing(tmp_path / "file") as partial:
+            partial.write_text("whole")
+    finally:
+        os.umask(before)
+    assert (tmp_path / "file").stat().st_mode & 0o777 == 0o640
 
 
 COMMANDS = """

@@ -16,9 +16,7 @@ import functools
 import gc
 import hashlib
 import json
-import os
 import sys
-import tempfile
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -43,7 +41,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple as fixed_tuple
 
 from symtop.core.code_hash import PACKAGE, Code, Part, by_file, by_name, digest, hashed
 from symtop.core.errors import SymtopError
-from symtop.core.files import cache_root, is_trusted, locked, make_private, on_cold, prune, touch
+from symtop.core.files import cache_root, is_trusted, locked, make_private, on_cold, prune, replacing, touch
 from symtop.core.jit_functions import Function, fused, marked, two_product
 from symtop.core.sines import polynomials, sincos
 
@@ -271,12 +269,8 @@ def _write(file: Path, content: bytes, of: bytes) -> None:
         _pruned.append(file)
         prune(file.parent.parent, MOST_BYTES)
     make_private(file.parent)
-    handle, partial = tempfile.mkstemp(prefix=".", dir=file.parent)
-    with contextlib.ExitStack() as stack:
-        stack.callback(Path(partial).unlink, missing_ok=True)
-        with os.fdopen(handle, "wb") as opened:
-            opened.write(hashlib.sha256(of + content).digest() + content)
-        Path(partial).replace(file)
+    with replacing(file, mode=0o600) as partial:
+        partial.write_bytes(hashlib.sha256(of + content).digest() + content)
 
 
 def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:

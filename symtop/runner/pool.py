@@ -94,7 +94,7 @@ def execute_case(task: Task, study: Study | None = None) -> Result:
             return Result("busy")
         if not task.fresh and store.load_case(path) is not None:
             return Result("found")
-        netcdf.sweep(path)  # of a worker that was killed
+        files.sweep(path)  # of a worker that was killed
         try:
             with at_most(task.limit, processor=False), _traced(task):
                 data = study.measure(case)

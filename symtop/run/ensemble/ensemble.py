@@ -19,7 +19,7 @@ import xarray as xr
 from symtop.core import netcdf
 from symtop.core.code_hash import digest, hashed, packages
 from symtop.core.errors import SymtopError, SymtopWarning, boolean, check_replaceable, file_path, positive, whole
-from symtop.core.files import locked
+from symtop.core.files import locked, replacing, sweep
 from symtop.core.jit import code
 from symtop.core.parallel import MOST_THREADS, cores, in_order, in_threads
 from symtop.core.progress import progress_bar
@@ -304,11 +304,11 @@ class Stream:
         if not empty and not stored.is_file():
             words = "is there and does not say which ensemble it is of: remove it or name another path than"
             raise SymtopError(f"{self.folder} {words} {path}")
-        netcdf.sweep(path)
+        sweep(path)
         if stored.is_file() and stored.read_text(encoding="utf-8") != identity:
             words = "holds the beginning of another ensemble, or of another version's; remove it or name another path"
             raise SymtopError(f"{self.folder} {words} than {path}")
-        with netcdf.replacing(stored) as partial:
+        with replacing(stored) as partial:
             partial.write_text(identity, encoding="utf-8")
 
     def missing(self, chunks: list[slice]) -> list[slice]:
@@ -317,12 +317,12 @@ class Stream:
 
     def keep(self, chunk: slice, columns: dict[str, Any]) -> None:
         """Put a chunk on disk."""
-        with ending_on_sigterm(), netcdf.replacing(self._part(chunk), ".npz") as partial:
+        with ending_on_sigterm(), replacing(self._part(chunk), ".npz") as partial:
             np.savez(partial, **columns)
 
     def finish(self, chunks: list[slice]) -> xr.Dataset:
         """Put the chunks together; the dataset reads from the file what it is asked for."""
-        with netcdf.one_thread, netcdf.replacing(self.path) as partial:
+        with netcdf.one_thread, replacing(self.path) as partial:
             first = self._columns(chunks[0])
             shared = all(same_times(self._columns(chunk, "time")["time"], first["time"][0]) for chunk in chunks)
             labels = {name: values[: chunks[0].stop] for name, values in self.labels.items()}
