@@ -1,6 +1,7 @@
 """The command line: what it prints and its exit codes, that it starts fast, and `doctor`, which finds each fault."""
 
 import importlib.metadata
+import importlib.util
 import json
 import os
 import re
@@ -395,6 +396,8 @@ def test_a_cache_that_cannot_be_written_and_a_wrong_number_are_seen(tmp_path, mo
     findings = faults(doctor._self_check(Path()))
     assert "not somebody, something" in findings["published values"].result
     assert set(findings) == {"published values"}
+    monkeypatch.setattr(importlib.util, "find_spec", lambda _: None)  # its requirement says where heyoka must be
+    assert not faults(doctor._heyoka(Path()))
 
 
 def test_a_check_that_fails_is_a_finding_and_the_code_is_1(monkeypatch, tmp_path):
@@ -420,8 +423,9 @@ def test_all_is_well_here_and_every_compiled_method_is_run_in_each_of_its_charts
     names = doctor.variants()
     assert len(names) == len(set(names))
     for method in symtop.integrators().values():
-        variants = {f"{method.name}[{chart}]" for chart in method.charts()}
+        variants = {f"{method.name}[{chart}]" for chart in method.solvers}
         assert variants <= set(names) if method.implementation != "python" else not variants & set(names)
+    assert [doctor._run(name) for name in ("rk4[body]", "gauss-4[axis]", "midpoint[angles]")] == [""] * 3
 
 
 @pytest.mark.slow
