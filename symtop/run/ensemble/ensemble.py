@@ -46,7 +46,7 @@ def ensemble(
     per_nutation: object = None, tolerance: object = None, horizon: object = None, nutations: object = None,
     samples: int = SAMPLES, observe: str | None = None, variables: Iterable[str] | None = None,
     budget: float | None = None, path: str | Path | None = None, threads: int | None = None,
-    scheduler: str | None = None, quiet: bool = False,
+    scheduler: str | None = None, quiet: bool = False, added: Callable[[xr.Dataset], dict[str, Any]] = lambda _: {},
 ) -> xr.Dataset:  # fmt: skip
     """Run one integrator on many tops, or on many bodies; each member has the bits of `simulate` alone.
 
@@ -79,6 +79,7 @@ def ensemble(
     `scheduler`. The attribute ``execution`` says how members were run: in "lanes", 32 side by side, where the method
     can. With a `path`, members go to that netCDF file as they are computed, in memory that does not grow with
     `samples` (0.4 kB a member). The same call resumes one that was killed, to the same file, and the dataset is lazy.
+    Variables that `added` makes of the dataset are added to it, before the file is in its place.
 
     Raises SymtopError for arguments that make no sense, for members that are no top or no start, by number, and for a
     path to which another process is writing.
@@ -126,13 +127,14 @@ def ensemble(
             raise SymtopError(first)
         data = as_dataset(columns, read.labels, of=job)
         data = netcdf.describe(data, **words, **({RAISED: first} if raised else {}))
+        data = data.assign(added(data))
     else:
         with _stream(file_path("path", path), job, read.labels, words) as stream:
             raised, first = compute(stream.missing(chunks), stream.keep)
             if raised == n:
                 stream.forget(chunks)  # there is nothing to resume
                 raise SymtopError(first)
-            data = stream.finish(chunks)
+            data = stream.finish(chunks, added)
     if raised:
         sentence = f"{raised} of {n} members raised an exception, the first: {first}"
         warnings.warn(sentence, SymtopWarning, stacklevel=2)
@@ -320,7 +322,7 @@ class Stream:
         with ending_on_sigterm(), replacing(self._part(chunk), ".npz") as partial:
             np.savez(partial, **columns)
 
-    def finish(self, chunks: list[slice]) -> xr.Dataset:
+    def finish(self, chunks: list[slice], added: Callable[[xr.Dataset], dict[str, Any]]) -> xr.Dataset:
         """Put the chunks together; the dataset reads from the file what it is asked for."""
         with netcdf.one_thread, replacing(self.path) as partial:
             first = self._columns(chunks[0])
@@ -336,6 +338,10 @@ class Stream:
                             del columns["time"]
                         for name, values in columns.items():
                             file[name][chunk] = values.astype(object) if values.dtype.kind == "U" else values
+                with xr.open_dataset(partial, engine="netcdf4") as data:
+                    columns = added(data)
+                if columns:
+                    xr.Dataset(columns).to_netcdf(partial, mode="a")
             except RuntimeError as error:  # the netCDF library's own word for a disk that is full
                 words = f"What was computed is in {self.folder}, and the same call goes on from there"
                 raise SymtopError(f"cannot write {self.path}: {error}; is the disk full? {words}") from error
