@@ -55,9 +55,8 @@ def examine(results: Path) -> list[Finding]:
 def _machine(_: Path) -> list[Finding]:
     from symtop.runner import scripts
 
-    python = f"{platform.python_version()} at {sys.executable}, {platform.system()} {platform.machine()}"
     return [
-        Finding("python", python),
+        Finding("python", f"{platform.python_version()} at {sys.executable}, {platform.system()} {platform.machine()}"),
         Finding("studies", f"{len(scripts.names())} in {scripts.folder()}"),
         Finding("cores", f"{os.cpu_count()}"),
         Finding("gcc", shutil.which("gcc") or "absent; only the benchmarks of a checkout (make bench) need it"),

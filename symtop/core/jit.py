@@ -57,8 +57,7 @@ NAMED = ("modname", "qualname", "unique_name", "mangled_name", "env_name", "args
 WITHIN = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # kernels alone call it: 14 % less to compile
 WRAPPERS = ("_ZN7cpython", "cfunc.")  # names of functions that Python and C can call
 INLINED = {"forceinline": True, **WITHIN}
-UNUSABLE = (OSError, ValueError, LookupError, RuntimeError, zlib.error, AttributeError, TypeError)
-# what a damaged file, a full disk or another numba raises where a kernel is loaded or kept
+UNUSABLE = (OSError, ValueError, LookupError, RuntimeError, zlib.error, AttributeError, TypeError)  # disk, or numba
 _ARRAYS = [types.Array(kind, n, "C") for kind in (types.float64, types.int64) for n in (1, 2, 3)]
 RETURNED = {repr(kind): kind for kind in (types.none, types.boolean, types.int64, types.float64, *_ARRAYS)}
 
@@ -295,19 +294,15 @@ def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
     return entry
 
 
-def _part(x: float) -> float:
-    return x + 1.0
-
-
 @functools.cache
-def is_lean() -> bool:
-    """Has numba what `_Library` needs, which is private? If not, it compiles as it does. A trial takes 0.06 s."""
-    register_jitable(_part, OPTIONS | WITHIN)
-    kernel = njit(**OPTIONS)(lambda x: 2.0 * _part(x))
+def is_lean() -> Any:
+    """Has numba what `_Library` needs, which is private? If not, it compiles as it does. The trial stays; 0.06 s."""
+    part = register_jitable(lambda x: x + 1.0, OPTIONS | WITHIN)
+    kernel = njit(**OPTIONS)(lambda x: 2.0 * part(x))
     with contextlib.suppress(Exception):
         _lean(kernel, kernel.compile, (types.float64,))
-        return bool(kernel(1.0) == 4.0)
-    return False
+        return kernel if kernel(1.0) == 4.0 else None
+    return None
 
 
 def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
@@ -348,11 +343,10 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     kernel.compile = _once(kernel, kernel.compile)
     functions = (part.thing for part in parts if isinstance(part.thing, FunctionType))
     written = [part for part in functions if not part.__module__.startswith("namedtuple_")]
-    if all(Path(part.__code__.co_filename).is_file() for part in written):
-        folder = cache_root() / "kernels" / made_of
-        if all(map(is_trusted, (cache_root(), folder.parent, folder))):
-            touch(folder)
-            kernel._cache = _Cache(folder)
+    folder, filed = cache_root() / "kernels" / made_of, all(Path(one.__code__.co_filename).is_file() for one in written)
+    if filed and all(map(is_trusted, (cache_root(), folder.parent, folder))):
+        touch(folder)
+        kernel._cache = _Cache(folder)
     return kernel
 
 
@@ -368,9 +362,7 @@ def is_cached(kernel: Any, signature: Any, *, bitcode: bool = False) -> bool:
     """Is a kernel's machine code in memory or on disk, or, if that is asked for, at least its bitcode on disk?"""
     if signature in kernel.overloads:
         return True
-    if not isinstance(kernel._cache, _Cache):
-        return False
-    with contextlib.suppress(AttributeError, TypeError):
+    with contextlib.suppress(AttributeError, TypeError):  # numba's own cache, or another numba
         files = kernel._cache.files(signature, kernel.targetctx.codegen())
         return any(file.is_file() for file in files[: 3 if bitcode else 1])
     return False

@@ -14,8 +14,8 @@ from typing import Any
 import matplotlib.pyplot as plt
 import numpy as np
 
+from symtop.core import netcdf
 from symtop.core.errors import SymtopError, file_path, shown
-from symtop.core.files import replacing
 from symtop.judging.findings import Finding, Ledger, claim_name, description
 from symtop.model.charts import BODY
 from symtop.report.figures import SMALLEST
@@ -135,6 +135,5 @@ def write_badge(ledger: Ledger, path: str | Path) -> Path:
 
 def _write(text: str, path: str | Path) -> Path:
     target = file_path("path", path)
-    with replacing(target, target.suffix) as partial:
-        partial.write_text(text, encoding="utf-8")
+    netcdf.write_text(target, text)
     return target

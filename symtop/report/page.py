@@ -206,7 +206,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
         title=re.sub(r"^# ", "", parts["front"].partition("\n")[0]),
         css="".join((TEMPLATES / name).read_text(encoding="utf-8") for name in ("style.css", "report.css")),
         scripts=[(TEMPLATES / name).read_text(encoding="utf-8") for name in ("page.js", "chart.js")],
-        contents=[(name, _heading(part)) for name, part in together.items()],
+        contents=[(name, part.partition("\n")[0].lstrip("# ")) for name, part in together.items()],
         parts={name: writer(part.replace(f"]({REFERENCE}#", "](#")) for name, part in together.items()},
         integrators=_whole("integrators", *records),
         provenance=netcdf.provenance(changes=True),
@@ -217,10 +217,6 @@ def write(results: Path, *, embed: bool = False) -> Path:
     netcdf.write_text(results / WORDS, "\n".join(parts.values()))
     netcdf.write_text(results / REFERENCE, "# For reference\n\n" + "\n".join(more.values()))
     return target
-
-
-def _heading(part: str) -> str:
-    return part.partition("\n")[0].lstrip("# ")
 
 
 def _whole(name: str, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:

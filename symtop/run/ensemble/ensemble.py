@@ -310,8 +310,7 @@ class Stream:
         if stored.is_file() and stored.read_text(encoding="utf-8") != identity:
             words = "holds the beginning of another ensemble, or of another version's; remove it or name another path"
             raise SymtopError(f"{self.folder} {words} than {path}")
-        with replacing(stored) as partial:
-            partial.write_text(identity, encoding="utf-8")
+        netcdf.write_text(stored, identity)
 
     def missing(self, chunks: list[slice]) -> list[slice]:
         """The chunks that are not on disk."""
