@@ -38,11 +38,9 @@ def test_a_file_is_whole_where_only_a_writer_may_bring_it_to_the_disk_and_the_um
 
     monkeypatch.setattr(os, "fsync", as_on_windows)
     before = os.umask(0o027)
-    try:
-        with files.replacing(tmp_path / "file") as partial:
-            partial.write_text("whole")
-    finally:
-        os.umask(before)
+    with files.replacing(tmp_path / "file") as partial:
+        partial.write_text("whole")
+    os.umask(before)
     assert (tmp_path / "file").stat().st_mode & 0o777 == 0o640
 
 

@@ -271,13 +271,10 @@ def test_the_tables_of_a_kernel_are_closed_as_python_closes_them(name):
             assert tuple(made.bend) == tuple(c * bend for c in rule.gradient)
 
 
-def in_python(solver):
-    """The same solver with a preparation that does not compile: a run in stretches."""
-    return dataclasses.replace(solver, prepare=solver.prepare.__call__)
-
-
 def assert_the_same_run(solver, top, start, plan):
-    at_once, stretched = solver(top, start, plan), in_python(solver)(top, start, plan)
+    """At once, and in stretches by a solver whose preparation does not compile."""
+    in_python = dataclasses.replace(solver, prepare=solver.prepare.__call__)
+    at_once, stretched = solver(top, start, plan), in_python(top, start, plan)
     for one, other in zip(at_once, stretched, strict=True):
         np.testing.assert_array_equal(one, other)
     assert type(at_once.steps) is int
