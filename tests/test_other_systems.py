@@ -1,18 +1,26 @@
-"""symtop without what Windows lacks: locks of `fcntl`, interval timers, groups of processes, fork.
+"""symtop without what Windows lacks: locks of `fcntl`, interval timers, groups of processes, fork, parents' numbers.
 
 A `sitecustomize` takes them away from a whole tree of processes, the workers of a study included. It cannot show that
 symtop runs on Windows; it shows that none of them is needed.
 """
 
+import errno
+import fcntl
 import json
+import os
+import signal
+import time
 
 import pytest
 
+from symtop.core import files
 from tests.commands import customized
 
 POORER = """
-import multiprocessing, multiprocessing.context, os, signal, sys
+import multiprocessing, multiprocessing.context, multiprocessing.resource_tracker, os, signal, sys
 sys.modules["fcntl"] = None
+multiprocessing.resource_tracker.ensure_running = None  # it needs _posixsubprocess, as the spawning here does
+os.getppid = (lambda number: lambda: number)(os.getppid())  # that of a parent that has ended stays
 for module, names in ((os, ["killpg", "setsid", "fork"]), (signal, ["setitimer", "SIGALRM"])):
     for name in names:
         delattr(module, name)
@@ -21,6 +29,35 @@ multiprocessing.context._concrete_contexts.pop("fork")
 multiprocessing.context._concrete_contexts.pop("forkserver")
 multiprocessing.get_all_start_methods = lambda: ["spawn"]
 """
+
+
+def test_a_file_is_whole_where_only_a_writer_may_bring_it_to_the_disk_and_the_umask_counts(tmp_path, monkeypatch):
+    def as_on_windows(number):
+        if fcntl.fcntl(number, fcntl.F_GETFL) & os.O_ACCMODE == os.O_RDONLY:
+            raise OSError(errno.EBADF, "only read")
+
+    monkeypatch.setattr(os, "fsync", as_on_windows)
+    before = os.umask(0o027)
+    with files.replacing(tmp_path / "file") as partial:
+        partial.write_text("whole")
+    os.umask(before)
+    assert (tmp_path / "file").stat().st_mode & 0o777 == 0o640
+
+
+ORPHAN = """
+import os, signal
+from symtop.runner.pool import Pool
+pool = Pool(1)
+pool.open(1)
+pool.submit(signal.alarm, 20).result()  # ends a worker that has not ended by then
+os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+def test_a_worker_ends_with_its_parent(tmp_path):
+    began = time.monotonic()
+    assert customized(tmp_path, POORER)(python=ORPHAN).returncode == -signal.SIGKILL  # and its output has ended
+    assert time.monotonic() < began + 15.0
 
 
 COMMANDS = """

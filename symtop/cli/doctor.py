@@ -29,7 +29,6 @@ LEAST_SPACE = 500_000_000  # free bytes below which a full run of the studies ma
 LARGE_CACHE = 5_000_000_000  # bytes of a cache that the doctor advises to delete
 TAYLOR_GAP = 1e-12  # rad, allowed between the closed form and Taylor over one horizon
 MIDPOINT_GAP = 1e-2  # rad, allowed between the closed form and midpoint with a step of 0.001
-OLDEST_PYTHON = (3, 11)
 
 
 class Finding(NamedTuple):
@@ -56,10 +55,8 @@ def examine(results: Path) -> list[Finding]:
 def _machine(_: Path) -> list[Finding]:
     from symtop.runner import scripts
 
-    python = f"{platform.python_version()} at {sys.executable}, {platform.system()} {platform.machine()}"
-    oldest = ".".join(map(str, OLDEST_PYTHON))
     return [
-        Finding("python", python, sys.version_info >= OLDEST_PYTHON, f"symtop needs Python {oldest} or newer"),
+        Finding("python", f"{platform.python_version()} at {sys.executable}, {platform.system()} {platform.machine()}"),
         Finding("studies", f"{len(scripts.names())} in {scripts.folder()}"),
         Finding("cores", f"{os.cpu_count()}"),
         Finding("gcc", shutil.which("gcc") or "absent; only the benchmarks of a checkout (make bench) need it"),
@@ -91,8 +88,8 @@ def _packages(_: Path) -> list[Finding]:
 def _heyoka(_: Path) -> list[Finding]:
     """The precisions that this build of heyoka has."""
     if importlib.util.find_spec("heyoka") is None:
-        advice = "heyoka has wheels for Linux only; elsewhere try conda-forge. The closed form works without it"
-        return [Finding("precisions", "no Taylor series: heyoka is absent", False, advice)]
+        words = "no Taylor series: heyoka is absent; it has wheels for Linux only, elsewhere try conda-forge"
+        return [Finding("precisions", words)]  # where it is required, `_packages` says that it lacks
     from symtop.methods.taylor.heyoka import arithmetic, stepper
 
     findings = []
@@ -175,7 +172,7 @@ CHECKS: dict[str, Callable[[Path], list[Finding]]] = {
     "machine": _machine, "packages": _packages, "heyoka": _heyoka, "caches": _caches, "results": _results,
     "self-check": _self_check,
 }  # fmt: skip
-SCENE = "goldstein"
+SCENE, BODY_SCENE = "goldstein", "heavy-brick"
 PERIODS = 0.02  # of a nutation: the length of a run that compiles
 
 
@@ -188,7 +185,8 @@ def _run(name: str) -> str:
     from symtop.run.reference.truth import reference
     from symtop.run.simulation import simulate
 
-    span = PERIODS * scene(SCENE).nutation_period
+    place = BODY_SCENE if name.endswith("[body]") else SCENE
+    span = PERIODS * scene(place, bodies=True).nutation_period
     try:
         if not name:
             for kernel in LAZY:
@@ -198,10 +196,10 @@ def _run(name: str) -> str:
             return ""
         variant = integrator(name)
         setting = variant.given(span / 2 if variant.fixed_step else max(1e-6, variant.least_tolerance))
-        observe = "attitude" if variant.charts() == ("angles",) else variant.charts()[0]
+        observe = "axis" if name.endswith("[axis]") else "attitude"
         options: dict[str, Any] = {**setting, "observe": observe, "horizon": span, "samples": 2}
-        simulate(SCENE, name, **options)
-        ensemble([SCENE] * 2, name, **options, threads=1, quiet=True)
+        simulate(place, name, **options)
+        ensemble([place] * 2, name, **options, threads=1, quiet=True)
     except Exception as error:  # noqa: BLE001  (one that fails must not keep the others from being compiled)
         return f"{name or 'truth'}: {words_of(error)}"
     return ""
@@ -211,8 +209,8 @@ def variants() -> list[str]:
     """Every variant, ``method[chart]``, that compiles something."""
     from symtop.methods.framework.registry import integrators
 
-    compiled = [method for method in integrators().values() if method.implementation in {"compiled", "heyoka"}]
-    return [f"{method.name}[{chart}]" for method in compiled for chart in method.charts()]
+    compiled = [method for method in integrators().values() if method.implementation == "compiled"]
+    return [f"{method.name}[{chart}]" for method in compiled for chart in method.solvers]
 
 
 def kernels() -> int:

@@ -254,26 +254,29 @@ def ensemble(
     if figure is not None and not compared:
         needed = " or ".join(SHOWN_BY[name] for name in words)
         raise SymtopError(f"--figure needs {needed} among --variables, whose errors it shows")
+    wrong, own = dict[str, Any](), dict[str, Any]()  # errors over time, and the largest, of each member
+
+    def added(data: Any) -> dict[str, Any]:
+        few, results = (part.isel(member=slice(0, most)) for part in (sample, data))
+        with ticking("comparing with the true motion"):
+            wrong.update({name: member_errors(few, results, name) for name in compared})
+        own.update({name: largest(values) for name, values in wrong.items()})
+        return _columns(sample, own, words)
+
     files.expected[0] = KERNELS
     post(f"running {so_many(members, noun)}")
     try:
-        data = runs.ensemble(sample, integrator, variables=variables, path=output, **settings)
+        data = runs.ensemble(sample, integrator, variables=variables, path=output, added=added, **settings)
     except KeyboardInterrupt:
         warn("interrupted" + ("" if output is None else "; what was run is kept: the same command resumes"))
         sys.exit(130)
-    few, results = (part.isel(member=slice(0, most)) for part in (sample, data))
     outcomes, steps = Counter(data["outcome"].values.tolist()), int(data["steps"].sum())
-    with ticking("comparing with the true motion"):
-        wrong = {name: member_errors(few, results, name) for name in compared}
-        if figure is not None:
-            from symtop.report.plot import draw_ensemble
+    worst = {name: spread(values[:, None])[:, 0].tolist() for name, values in own.items()}
+    if figure is not None:
+        from symtop.report.plot import draw_ensemble
 
-            draw_ensemble(results, wrong, figure)
-        own = {name: largest(values) for name, values in wrong.items()}
-        worst = {name: spread(values[:, None])[:, 0].tolist() for name, values in own.items()}
+        draw_ensemble(data.isel(member=slice(0, most)), wrong, figure)
     data.close()
-    if output is not None:
-        _add_members(output, sample, own, words)
     if as_json:
         errors = {name: dict(zip(map("{:g}".format, LEVELS), row, strict=True)) for name, row in worst.items()}
         click.echo(as_text({"outcomes": outcomes, "steps": steps, "largest_errors": errors}))
@@ -282,10 +285,7 @@ def ensemble(
         execution = data.attrs["execution"]
         say(f"{data.attrs['integrator']} on {so_many(members, noun)}: {counts}")
         say(f"{counted(steps, 'step')}, computed {EXECUTION.get(execution, execution)}")
-        heading = [
-            f"largest error, {so_many(few.sizes['member'], noun)}",
-            *(f"{100.0 * level:g} %" for level in LEVELS),
-        ]
+        heading = [f"largest error, {so_many(min(members, most), noun)}", *(f"{100.0 * level:g} %" for level in LEVELS)]
         if worst:
             click.echo(table(heading, [[words[name], *map("{:.1e}".format, row)] for name, row in worst.items()]))
         say_written(output, figure)
@@ -295,10 +295,9 @@ def ensemble(
         sys.exit(3)
 
 
-def _add_members(file: str, sample: Any, errors: dict[str, Any], words: dict[str, str]) -> None:
-    """Put the members, ``I1`` and ``start_theta``, and the largest ``axis_error`` of each into a file of their runs."""
+def _columns(sample: Any, errors: dict[str, Any], words: dict[str, str]) -> dict[str, Any]:
+    """The members, ``I1`` and ``start_theta``, and the largest ``axis_error`` of each, for a file of their runs."""
     import numpy as np
-    import xarray as xr
 
     numbers = {name: column.variable for name, column in sample.data_vars.items() if column.dtype.kind == "f"}
     added: dict[str, Any] = {name if name in PARAMETERS else f"start_{name}": one for name, one in numbers.items()}
@@ -306,7 +305,7 @@ def _add_members(file: str, sample: Any, errors: dict[str, Any], words: dict[str
         padded = np.pad(values, (0, sample.sizes["member"] - len(values)), constant_values=math.nan)
         about = {"long_name": f"{words[name]}, largest over the run, infinite after a failure"}
         added[f"{name}_error"] = "member", padded, about
-    xr.Dataset(added).to_netcdf(file, mode="a")
+    return added
 
 
 @click.command(short_help="Open the explorer: one run in a browser, with sliders.")

@@ -241,14 +241,14 @@ def check_all(
 def report(results: str, embed: bool) -> None:
     """Gather the findings of all studies into one page beside its figures.
 
-    If the folder holds no findings and its folder ``quick`` does, the page is made of those of ``quick``.
+    If the folder holds no findings of a study and its folder ``quick`` does, the page is made of those of ``quick``.
     """
-    folder = Path(results)
-    if not any(folder.glob("*.json")) and any((folder / "quick").glob("*.json")):
-        common.warn(f"{folder} holds no findings; the report is made of those in {folder / 'quick'}")
-        folder /= "quick"
     from symtop.report import page
 
+    folder = Path(results)
+    if not page.has_studies(folder) and page.has_studies(folder / "quick"):
+        common.warn(f"{folder} holds no findings of a study; the report is made of those in {folder / 'quick'}")
+        folder /= "quick"
     click.echo(f"report: {page.write(folder, embed=embed)}")
 
 

@@ -1,4 +1,4 @@
-"""Files: the cache of what can be made again, and locks.
+"""Files: those that are whole or absent, the cache of what can be made again, and locks.
 
 The cache holds compiled kernels, references and checkpoints of long runs. Every use of an entry sets its time of
 modification, at most once a day. Entries that nobody used for `UNUSED` days are removed, and those used longest ago
@@ -8,6 +8,7 @@ until the folder is small enough. Another process may be doing the same.
 import contextlib
 import errno
 import functools
+import glob
 import os
 import shutil
 import sys
@@ -119,6 +120,38 @@ def by_last_use(folder: Path) -> list[Path]:
         with contextlib.suppress(OSError):
             times[entry] = entry.stat().st_mtime
     return sorted(times, key=lambda entry: -times[entry])
+
+
+@contextlib.contextmanager
+def replacing(path: str | os.PathLike[str], suffix: str = "", mode: int = 0o666) -> Iterator[Path]:
+    """A file to write to in place of `path`, which it replaces in one move if all goes well and not at all if not.
+
+    The user's umask restricts `mode`, as of any new file. Raises SymtopError if the disk is full, the folder cannot be
+    written to, or `path` is a folder.
+    """
+    target = Path(path)
+    if "\0" in str(target):
+        raise SymtopError(f"a path must not hold a null character, as {str(target)!r} does")
+    partial = target.parent / f".{target.name}.{os.urandom(4).hex()}.part{suffix}"
+    try:
+        if target.is_dir():
+            raise SymtopError(f"cannot write {target}: it is a folder")
+        target.parent.mkdir(parents=True, exist_ok=True)
+        partial.touch(mode, exist_ok=False)
+        with contextlib.ExitStack() as stack:
+            stack.callback(partial.unlink, missing_ok=True)
+            yield partial
+            with partial.open("rb+") as file:  # on Windows what is only read cannot be brought to the disk
+                os.fsync(file.fileno())
+            partial.replace(target)
+    except OSError as error:
+        raise SymtopError(f"cannot write {target}: {error.strerror or error}") from error
+
+
+def sweep(path: Path) -> None:
+    """Remove the partial files of writers that were killed; call it only while nobody else writes the file."""
+    for partial in path.parent.glob(f".{glob.escape(path.name)}.*.part*"):
+        partial.unlink(missing_ok=True)
 
 
 try:

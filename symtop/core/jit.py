@@ -16,9 +16,7 @@ import functools
 import gc
 import hashlib
 import json
-import os
 import sys
-import tempfile
 import zlib
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -43,7 +41,7 @@ from numba.np.unsafe.ndarray import to_fixed_tuple as fixed_tuple
 
 from symtop.core.code_hash import PACKAGE, Code, Part, by_file, by_name, digest, hashed
 from symtop.core.errors import SymtopError
-from symtop.core.files import cache_root, is_trusted, locked, make_private, on_cold, prune, touch
+from symtop.core.files import cache_root, is_trusted, locked, make_private, on_cold, prune, replacing, touch
 from symtop.core.jit_functions import Function, fused, marked, two_product
 from symtop.core.sines import polynomials, sincos
 
@@ -59,8 +57,7 @@ NAMED = ("modname", "qualname", "unique_name", "mangled_name", "env_name", "args
 WITHIN = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # kernels alone call it: 14 % less to compile
 WRAPPERS = ("_ZN7cpython", "cfunc.")  # names of functions that Python and C can call
 INLINED = {"forceinline": True, **WITHIN}
-HOOKS = ("_optimize_final_module", "_finalize_final_module", "_set_compiled_object")
-LEAN = all(hasattr(JITCodeLibrary, name) for name in HOOKS)  # another numba compiles as it does, and keeps nothing
+UNUSABLE = (OSError, ValueError, LookupError, RuntimeError, zlib.error, AttributeError, TypeError)  # disk, or numba
 _ARRAYS = [types.Array(kind, n, "C") for kind in (types.float64, types.int64) for n in (1, 2, 3)]
 RETURNED = {repr(kind): kind for kind in (types.none, types.boolean, types.int64, types.float64, *_ARRAYS)}
 
@@ -181,21 +178,21 @@ class _Cache:
     def load_overload(self, signature: Any, context: Any) -> Any:
         """The compiled kernel, as numba asks for it; None, and whoever listens is told, if it has to be compiled."""
         context.refresh()
-        code, *bitcode = self.files(signature, context.codegen())
-        for file in bitcode:
-            with contextlib.suppress(OSError, ValueError, LookupError, RuntimeError, zlib.error):
-                return _loaded(signature, context, _read(file, _name(file)), code)
+        for of in (1, 2):
+            with contextlib.suppress(*UNUSABLE):
+                files = self.files(signature, context.codegen())
+                return _loaded(signature, context, _read(files[of], _name(files[of])), files[0])
         for tell in on_cold:
             tell()
         return None
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Keep a compiled kernel, if what is written says all that another process needs."""
-        library, kernel, constants = result.library, result.fndesc, result.environment.consts
-        about = {name: getattr(kernel, name) for name in NAMED} | {"library": library.name}
-        about |= {"returned": _words(result.signature.return_type), "constants": [str(one) for one in constants]}
-        inner = [one for one in result._find_referenced_environments() if one is not result.environment]
-        with contextlib.suppress(OSError, LookupError, AttributeError, TypeError):
+        with contextlib.suppress(*UNUSABLE):
+            library, kernel, constants = result.library, result.fndesc, result.environment.consts
+            about = {name: getattr(kernel, name) for name in NAMED} | {"library": library.name}
+            about |= {"returned": _words(result.signature.return_type), "constants": [str(one) for one in constants]}
+            inner = [one for one in result._find_referenced_environments() if one is not result.environment]
             same = _type(about["returned"]) == result.signature.return_type
             same &= [np.dtype(one) for one in about["constants"]] == constants and not any(one.consts for one in inner)
             if same and not library.has_dynamic_globals and not result.reload_init:
@@ -220,7 +217,7 @@ def _loaded(arguments: tuple[Any, ...], context: Any, entry: bytes, code: Path) 
         library._optimize_final_module()
     library._finalize_final_module()
     if library._compiled:  # now
-        with contextlib.suppress(OSError):
+        with contextlib.suppress(OSError, SymtopError):
             _write(code, library._get_compiled_object(), entry)
     kernel = PythonFunctionDescriptor(
         True, about["modname"], about["qualname"], about["unique_name"], "", {}, returned, {}, tuple(about["args"]), (),
@@ -271,19 +268,15 @@ def _write(file: Path, content: bytes, of: bytes) -> None:
         _pruned.append(file)
         prune(file.parent.parent, MOST_BYTES)
     make_private(file.parent)
-    handle, partial = tempfile.mkstemp(prefix=".", dir=file.parent)
-    with contextlib.ExitStack() as stack:
-        stack.callback(Path(partial).unlink, missing_ok=True)
-        with os.fdopen(handle, "wb") as opened:
-            opened.write(hashlib.sha256(of + content).digest() + content)
-        Path(partial).replace(file)
+    with replacing(file, mode=0o600) as partial:
+        partial.write_bytes(hashlib.sha256(of + content).digest() + content)
 
 
 def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
     """Compile a kernel as a `_Library`; environments get addresses with its code. The caller holds numba's lock."""
     codegen = kernel.targetctx.codegen()
     own = vars(codegen)
-    if not LEAN or "set_env" in own:
+    if "set_env" in own:
         return compiling(signature)
 
     def set_where_defined(name: str, environment: Any) -> None:
@@ -299,6 +292,17 @@ def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
         for environment in result._find_referenced_environments():
             codegen.set_env(environment.env_name, environment)
     return entry
+
+
+@functools.cache
+def is_lean() -> Any:
+    """Has numba what `_Library` needs, which is private? If not, it compiles as it does. The trial stays; 0.06 s."""
+    part = register_jitable(lambda x: x + 1.0, OPTIONS | WITHIN)
+    kernel = njit(**OPTIONS)(lambda x: 2.0 * part(x))
+    with contextlib.suppress(Exception):
+        _lean(kernel, kernel.compile, (types.float64,))
+        return kernel if kernel(1.0) == 4.0 else None
+    return None
 
 
 def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
@@ -319,7 +323,8 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
                 with contextlib.suppress(SymtopError, OSError):  # a cache that cannot be written costs time and no run
                     make_private(kernel._cache.cache_path)
                     stack.enter_context(locked(kernel._cache.cache_path / "code", wait=True))
-            return _lean(kernel, compiling, signature)
+            lean = is_cached(kernel, signature, bitcode=True) or is_lean()
+            return _lean(kernel, compiling, signature) if lean else compiling(signature)
 
     return compile_now
 
@@ -338,11 +343,10 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     kernel.compile = _once(kernel, kernel.compile)
     functions = (part.thing for part in parts if isinstance(part.thing, FunctionType))
     written = [part for part in functions if not part.__module__.startswith("namedtuple_")]
-    if LEAN and all(Path(part.__code__.co_filename).is_file() for part in written):
-        folder = cache_root() / "kernels" / made_of
-        if all(map(is_trusted, (cache_root(), folder.parent, folder))):
-            touch(folder)
-            kernel._cache = _Cache(folder)
+    folder, filed = cache_root() / "kernels" / made_of, all(Path(one.__code__.co_filename).is_file() for one in written)
+    if filed and all(map(is_trusted, (cache_root(), folder.parent, folder))):
+        touch(folder)
+        kernel._cache = _Cache(folder)
     return kernel
 
 
@@ -358,10 +362,10 @@ def is_cached(kernel: Any, signature: Any, *, bitcode: bool = False) -> bool:
     """Is a kernel's machine code in memory or on disk, or, if that is asked for, at least its bitcode on disk?"""
     if signature in kernel.overloads:
         return True
-    if not isinstance(kernel._cache, _Cache):
-        return False
-    files = kernel._cache.files(signature, kernel.targetctx.codegen())
-    return any(file.is_file() for file in files[: 3 if bitcode else 1])
+    with contextlib.suppress(AttributeError, TypeError):  # numba's own cache, or another numba
+        files = kernel._cache.files(signature, kernel.targetctx.codegen())
+        return any(file.is_file() for file in files[: 3 if bitcode else 1])
+    return False
 
 
 @intrinsic

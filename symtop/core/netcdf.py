@@ -6,7 +6,6 @@ are compressed: round-off does not compress. No time stamps inside, so that equa
 
 import contextlib
 import functools
-import glob
 import hashlib
 import json
 import os
@@ -14,7 +13,6 @@ import platform
 import shutil
 import subprocess
 import sys
-import tempfile
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -26,6 +24,7 @@ import xarray as xr
 from symtop.core import __version__
 from symtop.core.code_hash import processor, version
 from symtop.core.errors import SymtopError, words_of
+from symtop.core.files import replacing
 from symtop.core.signals import deferred
 
 one_thread = threading.RLock()  # two threads inside the netCDF library at once end the process (segmentation fault)
@@ -141,39 +140,6 @@ def attributes_of(title: str, **attributes: Any) -> dict[str, Any]:
         is_plain = isinstance(number, (str, float)) or (type(number) is int and abs(number) < 2**63)
         plain[key] = number if is_plain else json.dumps(number, sort_keys=True, default=str)
     return {**CONVENTIONS, "title": title, **plain, **provenance()}
-
-
-@contextlib.contextmanager
-def replacing(path: str | os.PathLike[str], suffix: str = "") -> Iterator[Path]:
-    """A file to write to in place of `path`, which it replaces in one move if all goes well and not at all if not.
-
-    Raises SymtopError if the disk is full, the folder cannot be written to, or `path` is a folder.
-    """
-    target, partial = Path(path), ""
-    if "\0" in str(target):
-        raise SymtopError(f"a path must not hold a null character, as {str(target)!r} does")
-    try:
-        if target.is_dir():
-            raise SymtopError(f"cannot write {target}: it is a folder")
-        target.parent.mkdir(parents=True, exist_ok=True)
-        handle, partial = tempfile.mkstemp(prefix=f".{target.name}.", suffix=f".part{suffix}", dir=target.parent)
-        os.close(handle)
-        yield Path(partial)
-        with open(partial, "rb") as file:  # noqa: PTH123
-            os.fsync(file.fileno())
-        Path(partial).chmod(0o644)
-        Path(partial).replace(target)
-    except OSError as error:
-        raise SymtopError(f"cannot write {target}: {error.strerror or error}") from error
-    finally:
-        if partial:
-            Path(partial).unlink(missing_ok=True)
-
-
-def sweep(path: Path) -> None:
-    """Remove the partial files of writers that were killed; call it only while nobody else writes the file."""
-    for partial in path.parent.glob(f".{glob.escape(path.name)}.*.part*"):
-        partial.unlink(missing_ok=True)
 
 
 def write_text(path: Path, text: str) -> None:

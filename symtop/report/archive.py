@@ -33,6 +33,7 @@ import pandas as pd
 import xarray as xr
 
 from symtop.core import __version__, netcdf
+from symtop.core.files import replacing
 from symtop.measure import columns
 from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import Scene, scenes
@@ -67,7 +68,7 @@ def bundle(results: Path, target: Path | None = None) -> Path:
     sums = "".join(f"{hashlib.sha256(content).hexdigest()}  {name}\n" for name, content in sorted(files.items()))
     files["SHA256SUMS"] = sums.encode()
     path = target or results / f"{NAME}.zip"
-    with netcdf.replacing(path) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
+    with replacing(path) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in sorted(files.items()):
             entry = zipfile.ZipInfo(f"{NAME}/{name}", EPOCH)
             entry.external_attr = 0o644 << 16

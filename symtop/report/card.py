@@ -135,6 +135,5 @@ def write_badge(ledger: Ledger, path: str | Path) -> Path:
 
 def _write(text: str, path: str | Path) -> Path:
     target = file_path("path", path)
-    with netcdf.replacing(target, target.suffix) as partial:
-        partial.write_text(text, encoding="utf-8")
+    netcdf.write_text(target, text)
     return target

@@ -62,18 +62,17 @@ def _series(name: str, points: Sequence[tuple[float | None, float | None, str]])
 
 
 def gather(results: Path) -> list[dict[str, Any]]:
-    """The findings that are in the folder: of all studies, in order, then of `make` targets.
+    """The findings that are in the folder: of all studies, in order, then of benchmarks.
 
-    A target of the Makefile (`make peers`, `make bench`) may leave findings in the form of a study's, as NAME.json.
-    They stay as they are when the studies run again, so that their ``measured`` says when, where and with what.
+    A benchmark (`make peers`) may leave findings in the form of a study's, as NAME.json. They stay as they are when the
+    studies run again, so that their ``measured`` says when, where, with what and by which command.
     A study that ships with symtop has the page of its folder, any other the page that its findings hold.
     Raises SymtopError if findings are incomplete or a file is damaged, or there are none.
     """
     studies, gathered = list(runner.names()), []
     others = sorted({file.stem for file in results.glob("*.json")} - set(studies))
     for name in [*studies, *others]:
-        command = f"make {name}" if name in others else f"symtop study {name}"
-        findings = _stored(results / f"{name}.json", command)
+        findings = _stored(results / f"{name}.json", f"run it again: symtop study {name}, or " * (name in studies))
         if not isinstance(findings, dict) or (name in others and "pictures" not in findings):
             continue
         shipped = runner.file_beside(name, "page.md") if name in studies else None
@@ -87,6 +86,7 @@ def gather(results: Path) -> list[dict[str, Any]]:
             page = findings["page"] if shipped is None else shipped.read_text(encoding="utf-8")
             gathered.append({**findings, **about, "page": page})
         except (OSError, KeyError, TypeError) as error:
+            command = (*re.findall("`([^`]+)` does", str(findings.get("measured"))), f"symtop study {name}")[0]
             raise SymtopError(
                 f"the findings of {name} in {results} are incomplete ({error}); run it again: {command}"
             ) from error
@@ -95,12 +95,18 @@ def gather(results: Path) -> list[dict[str, Any]]:
     return gathered
 
 
-def _stored(file: Path, command: str) -> Any:
+def has_studies(results: Path) -> bool:
+    """Does the folder hold findings, or what may have been some, that no benchmark has left?"""
+    contents = map(netcdf.read_json, results.glob("*.json"))
+    return any(not (isinstance(one, dict) and one.get("measured")) for one in contents)
+
+
+def _stored(file: Path, remedy: str) -> Any:
     """The content of a file, None if there is none; SymtopError if it is damaged."""
     try:
         return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
     except (OSError, ValueError) as error:
-        raise SymtopError(f"{file} is damaged ({error}); run it again: {command}, or remove the file") from error
+        raise SymtopError(f"{file} is damaged ({error}); {remedy}remove the file") from error
 
 
 def _image(file: Path, *, embed: bool) -> dict[str, Any]:
@@ -200,7 +206,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
         title=re.sub(r"^# ", "", parts["front"].partition("\n")[0]),
         css="".join((TEMPLATES / name).read_text(encoding="utf-8") for name in ("style.css", "report.css")),
         scripts=[(TEMPLATES / name).read_text(encoding="utf-8") for name in ("page.js", "chart.js")],
-        contents=[(name, _heading(part)) for name, part in together.items()],
+        contents=[(name, part.partition("\n")[0].lstrip("# ")) for name, part in together.items()],
         parts={name: writer(part.replace(f"]({REFERENCE}#", "](#")) for name, part in together.items()},
         integrators=_whole("integrators", *records),
         provenance=netcdf.provenance(changes=True),
@@ -211,10 +217,6 @@ def write(results: Path, *, embed: bool = False) -> Path:
     netcdf.write_text(results / WORDS, "\n".join(parts.values()))
     netcdf.write_text(results / REFERENCE, "# For reference\n\n" + "\n".join(more.values()))
     return target
-
-
-def _heading(part: str) -> str:
-    return part.partition("\n")[0].lstrip("# ")
 
 
 def _whole(name: str, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:

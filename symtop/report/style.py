@@ -15,7 +15,7 @@ import matplotlib as mpl
 import matplotlib.pyplot as plt
 import numpy as np
 
-from symtop.core import netcdf
+from symtop.core.files import replacing, sweep
 
 WIDTH = 6.5  # inches, of a figure: the text block of a page
 LEAST_TEXT = 7.0  # points, of any text at that width
@@ -162,8 +162,8 @@ def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
 
     kind = target.suffix.lower()
     metadata = {UNDATED.get(kind, "Software"): None}
-    netcdf.sweep(target)
-    with netcdf.replacing(target, target.suffix) as path:
+    sweep(target)
+    with replacing(target, target.suffix) as path:
         if kind not in {".png", ".pdf"}:
             figure.savefig(path, metadata=metadata, dpi=dpi)
             return

@@ -48,7 +48,9 @@ def filled(findings: Findings, results: Path, *, pages: Mapping[str, str] | None
     text = rendered(findings["page"], f"page of {name}", context)
     head, _, body = without_gaps(text).strip().partition("\n\n")
     parts = [head, PARTIAL if GAP in text else "", body, *findings["failures"], findings.get("measured")]
-    return "\n\n".join(filter(None, [*parts, _ending(findings)])) + "\n"
+    file, cases = findings.get("dataset"), findings["cases"]
+    parts += [f"Data: [{file}]({file}), {formats.count(cases)} case{'' if cases == 1 else 's'}." if file else ""]
+    return "\n\n".join(filter(None, parts)) + "\n"
 
 
 def front(template: str, studies: Sequence[Findings], results: Path, pages: Mapping[str, str]) -> str:
@@ -175,8 +177,3 @@ def _names(studies: Sequence[Findings], results: Path, *, whole: bool = False) -
         return all(name in pictures or name in tables or name in facts for name in names)
 
     return {"figure": figure, "table": listed, "has": has}
-
-
-def _ending(findings: Findings) -> str:
-    name, cases = findings.get("dataset"), findings["cases"]
-    return f"Data: [{name}]({name}), {formats.count(cases)} case{'' if cases == 1 else 's'}." if name else ""

@@ -53,7 +53,8 @@ def write(folder: str | Path, scenes: Sequence[Scene] | None = None) -> Path:
         post(f"test set: {len(motions)} of {len(scenes)} motions")
         motions.append(body_digits(scene.top, scene.start, times_of(scene)))
     path.mkdir(parents=True, exist_ok=True)
-    files = {"problems.csv": _problems_csv(scenes)}
+    rows = [",".join([scene.name, *map(repr, scene.top.flat(scene.start))]) for scene in scenes]
+    files = {"problems.csv": "\n".join([",".join(["name", *GIVEN]), *rows, ""])}
     files |= {f"states-{digits}.csv": _states_csv(scenes, motions, digits) for digits in ROUNDED}
     kinds = [scene.name.rpartition("-")[0] for scene in scenes]
     readme = environment().get_template("test-set.md").render(
@@ -67,11 +68,6 @@ def write(folder: str | Path, scenes: Sequence[Scene] | None = None) -> Path:
         (path / name).write_bytes(resources.files("symtop.report").joinpath("templates", f"{name}.txt").read_bytes())
     netcdf.write(states(scenes, motions), path / "states.nc")
     return path
-
-
-def _problems_csv(scenes: Sequence[Scene]) -> str:
-    rows = [",".join([scene.name, *map(repr, scene.top.flat(scene.start))]) for scene in scenes]
-    return "\n".join([",".join(["name", *GIVEN]), *rows, ""])
 
 
 def _states_csv(scenes: Sequence[Scene], motions: Sequence[Digits], digits: int) -> str:

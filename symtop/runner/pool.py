@@ -20,7 +20,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Future, wait
 from functools import partial
-from multiprocessing import resource_tracker
+from multiprocessing import parent_process, resource_tracker
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -94,7 +94,7 @@ def execute_case(task: Task, study: Study | None = None) -> Result:
             return Result("busy")
         if not task.fresh and store.load_case(path) is not None:
             return Result("found")
-        netcdf.sweep(path)  # of a worker that was killed
+        files.sweep(path)  # of a worker that was killed
         try:
             with at_most(task.limit, processor=False), _traced(task):
                 data = study.measure(case)
@@ -152,14 +152,12 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             wait(self._analyses)
             self.close_workers()
             self.size = min(size, self.jobs)
-            if threading.current_thread() is threading.main_thread():
-                # the process in which Python counts semaphores is deaf to SIGHUP; Python protects it from SIGTERM alone
+            if hasattr(os, "fork") and threading.current_thread() is threading.main_thread():
+                # the process that counts semaphores, but on Windows, is deaf to SIGHUP; to SIGTERM Python makes it so
                 before = signal.signal(HANGUP, signal.SIG_IGN)
                 resource_tracker.ensure_running()
                 signal.signal(HANGUP, before)
-            self._workers = ProcessPool(
-                self.size, initializer=begin_worker, initargs=(os.getpid(),), context=parallel.OneThreadEach()
-            )
+            self._workers = ProcessPool(self.size, initializer=begin_worker, context=parallel.OneThreadEach())
 
     def submit(self, function: Callable[..., Any], *args: Any, limit: float | None = None) -> "Future[Any]":
         """Call a function in a worker; after `limit` seconds the worker is ended, and the result is TimeoutError."""
@@ -259,7 +257,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
         self.close()
 
 
-def begin_worker(parent: int) -> None:
+def begin_worker() -> None:
     """Initialise a worker: SIGTERM ends it in compiled code as well, and it exits when the parent process has ended."""
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
     gc.set_threshold(50_000, 10, 10)  # at 700, looking for garbage takes 4 % of a quick run
@@ -267,9 +265,9 @@ def begin_worker(parent: int) -> None:
     tqdm.set_lock(threading.RLock())  # its own would be a semaphore of the system, left behind when a worker is ended
 
     def watch() -> None:
-        while os.getppid() == parent:
-            time.sleep(1.0)
-        os._exit(1)
+        if (parent := parent_process()) is not None:  # whose number Windows leaves to its children
+            parent.join()
+            os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
 

@@ -132,7 +132,7 @@ def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> 
     dataset, words = results / f"{study.name}.nc", results / f"{study.name}.json"
     with files.locked(dataset, wait=True):
         for file in (dataset, words):
-            netcdf.sweep(file)
+            files.sweep(file)
         combined = cases.combined()
         systems = {getattr(catalogue.get(case.scene), "units", "") for case in cases.cases.values()}
         units = "SI" if systems == {"SI"} else ""

@@ -30,7 +30,7 @@ import xarray as xr
 from symtop.core import netcdf
 from symtop.core.code_hash import hashed
 from symtop.core.errors import SymtopError
-from symtop.core.files import locked
+from symtop.core.files import locked, replacing, sweep
 from symtop.measure.datasets import as_text
 from symtop.runner import fingerprint
 from symtop.runner.study import Case, Study
@@ -80,7 +80,7 @@ def save_case(data: xr.Dataset, path: Path, study: Study, case: Case) -> None:
         {"variables": variables, "attributes": attributes},
         default=lambda value: value.tolist() if hasattr(value, "tolist") else str(value),
     )
-    with netcdf.replacing(path) as partial, partial.open("wb") as file:
+    with replacing(path) as partial, partial.open("wb") as file:
         np.savez(file, about=about, content=_content(about, arrays), **arrays)
     failure_path(path).unlink(missing_ok=True)
 
@@ -141,12 +141,12 @@ def tidy(results: Path, study: Study) -> None:
         path = lock.with_name(f"{lock.stem[1:]}.npz")
         with locked(path, wait=False) as ours:
             if ours:
-                netcdf.sweep(path)
+                sweep(path)
                 trace_path(path).unlink(missing_ok=True)
     with locked(results / f"{study.name}.nc", wait=False) as ours:
         if ours:
             for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):
-                netcdf.sweep(file)
+                sweep(file)
             for partial in (results / "figures").glob(f".{study.name}-*.part*"):
                 partial.unlink(missing_ok=True)
 
@@ -183,6 +183,6 @@ def is_current(results: Path, name: str, made_of: str) -> bool:
 def note(results: Path, name: str, made_of: str, paths: Iterable[Path]) -> None:
     """Write that the files of an entry are up to date; another process may be writing another entry."""
     with locked(manifest(results), wait=True):
-        netcdf.sweep(manifest(results))
+        sweep(manifest(results))
         entry = {"made_of": made_of, "files": _marks(results, paths)}
         netcdf.write_json(manifest(results), _entries(results) | {name: entry})

@@ -98,15 +98,11 @@ def test_the_axis_as_a_particle_has_the_acceleration_of_the_axis(scene):
     assert not np.allclose(particle[6:], np.cross(torque, e) / top.I1)  # gravity alone
 
 
-def _own(name):
-    return peers.Peer(measure.OURS, symtop.integrator(name), own.LANGUAGE)
-
-
 @pytest.mark.parametrize(
     ("name", "setting"), [("takahashi-imada", 0.01), ("rk4", 0.005), ("taylor", 1e-12), ("rk45-compiled", 1e-10)]
 )
 def test_the_kernel_alone_ends_where_simulate_ends(scene, name, setting):
-    peer = _own(name)
+    peer = peers.Peer(measure.OURS, symtop.integrator(name), own.LANGUAGE)
     whole, loop = measure.ready(scene, peer, setting)
     data = whole()
     assert data["time"].size == measure.SHOWN
@@ -208,15 +204,11 @@ def test_noise_is_no_win_and_methods_on_f_alone_are_counted_by_themselves():
     assert "solve_ivp takes 2 to 2 times and 22.5 to 22.5" in study.caption(both)[0]
 
 
-def _peers_into(folder):
-    data = _stored({"symtop": (1e-3, 2e-5), "scipy[axis] C": (6e-3, 4e-3)})
-    found = study.findings(data, [], folder, ["drake was skipped."])
-    found["provenance"] = {**found["provenance"], "processor": "an abacus"}
-    netcdf.write_json(folder / "peers.json", found)
-
-
 def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_path, quick_results):
-    _peers_into(tmp_path)
+    data = _stored({"symtop": (1e-3, 2e-5), "scipy[axis] C": (6e-3, 4e-3)})
+    found = study.findings(data, [], tmp_path, ["drake was skipped."])
+    found["provenance"] = {**found["provenance"], "processor": "an abacus"}
+    netcdf.write_json(tmp_path / "peers.json", found)
     shutil.copytree(quick_results / "cases" / "truth", tmp_path / "cases" / "truth")  # it only has to be drawn
     (tmp_path / "report.md").write_text("what an earlier run left")
     truth = runner.load("truth")
@@ -234,11 +226,11 @@ def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_p
 def test_cleaning_spares_what_the_studies_do_not_make(tmp_path):
     shutil.copy(ROOT / "Makefile", tmp_path)
     (tmp_path / "results").mkdir()
-    for name in ("peers.nc", "peers.json", "bench.json", "claims.nc", "claims.json", "report.md"):
+    kept = {"report.md", *re.findall(r"^!results/([^/\n]+)$", (ROOT / ".gitignore").read_text(), re.MULTILINE)}
+    for name in kept | {"claims.nc", "claims.json"}:
         (tmp_path / "results" / name).touch()
     subprocess.run(["make", "clean"], cwd=tmp_path, check=True, capture_output=True)
-    left = {path.name for path in (tmp_path / "results").iterdir()}
-    assert left == {"peers.nc", "peers.json", "bench.json", "report.md"}
+    assert {path.name for path in (tmp_path / "results").iterdir()} == kept > {"peers.nc", "guard.json"}
 
 
 def test_the_stored_measurement_is_whole_and_its_inner_loops_did_the_work():

@@ -2,6 +2,7 @@
 
 import functools
 import json
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -18,10 +19,15 @@ STEPS = ("--per-nutation", 30, "--nutations", 2)
 call = functools.partial(commands.call, "ensemble")
 
 
-def test_the_file_and_the_figure_are_those_of_the_ensemble(tmp_path):
+def test_the_file_and_the_figure_are_those_of_the_ensemble(tmp_path, monkeypatch):
     path, figure = tmp_path / "runs.nc", tmp_path / "spread.png"
     words = ("--members", 50, "--seed", 3, "strang", *STEPS, "--samples", 21, "-o", path)
     call(*words)
+    whole = path.read_bytes()
+    with monkeypatch.context() as patch:
+        patch.setattr(xr.Dataset, "to_netcdf", Mock(side_effect=KeyboardInterrupt))
+        call(*words, code=130)
+    assert path.read_bytes() == whole  # nothing is added to what is in its place
     result = call(*words, "--figure", figure)  # runs them again, into the same file
     assert "strang on 50 tops: 50 reached the horizon" in result.output
     assert "in vector registers (lanes)" in result.output

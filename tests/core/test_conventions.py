@@ -76,20 +76,6 @@ def test_units_are_those_of_the_scene():
         dataclasses.replace(symtop.scene("spheroid"), units="imperial")
 
 
-@pytest.fixture
-def stored(tmp_path):
-    names = ["rk4", "strang", "gauss-4", "taylor"]  # text is what makes the other way of reading crash
-    part = xr.Dataset({"error": (("variant", "step"), np.ones((4, 200)))}, {"variant": names})
-    parts = dict.fromkeys(("long", "short"), part)
-    tree = xr.DataTree.from_dict({"/": xr.Dataset(attrs={"title": "two kinds"}), **parts})
-    return tree, netcdf.write(tree, tmp_path / "tree.nc")
-
-
-def test_a_file_without_groups_is_a_dataset(tmp_path):
-    flat = xr.Dataset({"error": ("step", np.arange(4.0))}, attrs={"title": "one kind"})
-    assert netcdf.read_any(netcdf.write(flat, tmp_path / "flat.nc")).identical(flat)
-
-
 @pytest.mark.parametrize("content", [None, b"", b"no netCDF at all"])
 def test_what_is_no_netcdf_is_refused_in_a_sentence(tmp_path, content):
     path = tmp_path / "broken.nc"
@@ -100,8 +86,12 @@ def test_what_is_no_netcdf_is_refused_in_a_sentence(tmp_path, content):
             read(path)
 
 
-def test_a_tree_comes_back_whole_also_beside_lazy_ones(stored):
-    tree, path = stored
+def test_a_file_without_groups_is_a_dataset_and_a_tree_comes_back_whole_also_beside_lazy_ones(tmp_path):
+    names = ["rk4", "strang", "gauss-4", "taylor"]  # text is what makes the other way of reading crash
+    part = xr.Dataset({"error": (("variant", "step"), np.ones((4, 200)))}, {"variant": names})
+    tree = xr.DataTree.from_dict({"/": xr.Dataset(attrs={"title": "two kinds"}), "long": part, "short": part})
+    flat, path = netcdf.write(part, tmp_path / "flat.nc"), netcdf.write(tree, tmp_path / "tree.nc")
+    assert netcdf.read_any(flat).identical(part)
     assert netcdf.read_any(path).identical(tree)
     # `with xr.open_datatree` in the place of `read_any` ends this process with a segmentation fault.
     script = """
@@ -116,4 +106,4 @@ def test_a_tree_comes_back_whole_also_beside_lazy_ones(stored):
                 held.append(tree)
             assert netcdf.read_any(sys.argv[1])["long"]["error"].sum() == 800.0
     """
-    printed_by(textwrap.dedent(script), stored[1])
+    printed_by(textwrap.dedent(script), path)

@@ -10,6 +10,7 @@ from unittest.mock import Mock
 
 import numpy as np
 import pytest
+from numba.core.codegen import CPUCodegen
 
 import symtop
 from symtop.core import jit
@@ -65,7 +66,7 @@ import hashlib, sys, symtop
 from symtop.core import jit
 way, count = sys.argv[1], int(sys.argv[2])
 if way == "numba alone":
-    jit.LEAN = False
+    jit.is_lean = lambda: False
 if way == "bitcode":
     jit.on_cold[:] = [lambda: sys.exit("compiled")]
 every = [f"{one.name}[{chart}]" for one in symtop.integrators().values() if one.implementation == "compiled"
@@ -154,15 +155,22 @@ def test_machine_code_is_run_with_the_bitcode_that_it_was_made_of(monkeypatch, t
     assert kernel.signatures == again.signatures
 
 
-def test_a_full_disk_costs_time_and_no_run(monkeypatch, tmp_path):
+def test_a_full_disk_or_a_numba_that_keeps_nothing_costs_time_and_no_run(monkeypatch, tmp_path):
     full = Mock(side_effect=OSError(errno.ENOSPC, os.strerror(errno.ENOSPC)))
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
     with monkeypatch.context() as patch:
         patch.setattr(jit, "_write", full)
         assert compile_kernel(_doubled)(2.0) == 4.0
+    library = jit.JITCodeLibrary
+    for owner, name in ((CPUCodegen, "magic_tuple"), (library, "_get_compiled_object")):
+        with monkeypatch.context() as patch:
+            patch.setattr(owner, name, property())
+            assert compile_kernel(_doubled)(2.0) == 4.0
     assert not list(tmp_path.rglob("*.code"))
     assert compile_kernel(_doubled)(2.0) == 4.0
     assert list(tmp_path.rglob("*.code"))
+    monkeypatch.setattr(library, "_set_compiled_object", property())
+    assert compile_kernel(_doubled)(2.0) == 4.0
 
 
 def test_kernels_of_one_factory_have_names_of_their_own():
@@ -263,13 +271,10 @@ def test_the_tables_of_a_kernel_are_closed_as_python_closes_them(name):
             assert tuple(made.bend) == tuple(c * bend for c in rule.gradient)
 
 
-def in_python(solver):
-    """The same solver with a preparation that does not compile: a run in stretches."""
-    return dataclasses.replace(solver, prepare=solver.prepare.__call__)
-
-
 def assert_the_same_run(solver, top, start, plan):
-    at_once, stretched = solver(top, start, plan), in_python(solver)(top, start, plan)
+    """At once, and in stretches by a solver whose preparation does not compile."""
+    in_python = dataclasses.replace(solver, prepare=solver.prepare.__call__)
+    at_once, stretched = solver(top, start, plan), in_python(top, start, plan)
     for one, other in zip(at_once, stretched, strict=True):
         np.testing.assert_array_equal(one, other)
     assert type(at_once.steps) is int

@@ -84,10 +84,6 @@ def test_a_card_without_measurements_says_why_and_one_that_cannot_be_written_is_
         card(NOTHING, tmp_path)
     with pytest.raises(symtop.SymtopError, match="path must be the name of a file, not 3"):
         card(NOTHING, 3)
-
-
-@pytest.mark.parametrize("other", [3, None, {}, "card.html"])
-def test_a_card_of_anything_but_a_ledger_is_refused(other, tmp_path):
-    with pytest.raises(symtop.SymtopError, match=r"a card needs a ledger, which symtop\.judge returns, not "):
-        symtop.card(other, tmp_path / "card.html")
-    assert symtop.card(NOTHING, tmp_path / "card.html").is_file()
+    for other in (3, None, {}, "card.html"):
+        with pytest.raises(symtop.SymtopError, match=r"a card needs a ledger, which symtop\.judge returns, not "):
+            symtop.card(other, tmp_path / "card.html")

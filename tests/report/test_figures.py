@@ -40,9 +40,7 @@ def faults(name, figure) -> list[str]:
     least, text = least_text(figure)
     if least < style.LEAST_TEXT - 1e-9:
         problems.append(f"{text!r} has {least:.1f} points")
-    if (
-        not figure.get_suptitle() and runner.file_beside(name, "page.md") is None
-    ):  # a template has the titles of its figures
+    if not figure.get_suptitle() and runner.file_beside(name, "page.md") is None:  # a template has the titles
         problems.append("no message")
     legends = [*figure.legends, *(axis.get_legend() for axis in figure.axes if axis.get_legend())]
     most = max((len(one.get_texts()) for one in legends), default=0)

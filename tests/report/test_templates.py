@@ -14,6 +14,7 @@ from symtop.report import page, template
 from symtop.report.html import slug
 from symtop.report.page import TEMPLATES, gather, prepared
 from symtop.runner import run as runner
+from tests.commands import call
 
 OTHERS = {name: TEMPLATES / f"{name}.md" for name in ("front", "measured", "equations")}
 PAGES = {name: path for name in runner.names() if (path := runner.file_beside(name, "page.md")) is not None}
@@ -90,16 +91,23 @@ def test_a_page_without_what_was_not_measured_says_so_once_and_points_without_a_
         gather(tmp_path)
 
 
-@pytest.mark.parametrize(("name", "command"), [("drift", "symtop study drift"), ("peers", "make peers")])
-def test_a_damaged_file_is_named_and_one_of_another_kind_is_left_out(name, command, tmp_path):
+@pytest.mark.parametrize(("name", "remedy"), [("drift", "run it again: symtop study drift, or "), ("peers", "")])
+def test_a_damaged_file_is_named_and_one_of_another_kind_is_left_out(name, remedy, tmp_path):
     findings = {"study": "mine", "question": "Q?", "page": PAGE, "facts": {}, "tables": [], "pictures": []}
     (tmp_path / "mine.json").write_text(json.dumps(findings), encoding="utf-8")
     for other in ("null", "[]"):
         (tmp_path / f"{name}.json").write_text(other, encoding="utf-8")
         assert [one["study"] for one in gather(tmp_path)] == ["mine"]
     (tmp_path / f"{name}.json").write_text("{", encoding="utf-8")
-    with pytest.raises(SymtopError, match=rf"{name}\.json is damaged .*; run it again: {command}, or remove the file"):
+    with pytest.raises(SymtopError, match=rf"{name}\.json is damaged \(.*\); {remedy}remove the file"):
         gather(tmp_path)
+    (tmp_path / "quick").mkdir()
+    (tmp_path / "mine.json").rename(tmp_path / "quick" / "mine.json")
+    about = {"measured": "The studies do not; `python -m benchmarks.guard` does.", "pictures": [{"file": "none.png"}]}
+    (tmp_path / f"{name}.json").write_text(json.dumps(findings | about), encoding="utf-8")
+    with pytest.raises(SymtopError, match=r"run it again: python -m benchmarks\.guard$"):
+        gather(tmp_path)
+    assert "the report is made of those in" in call("report", "--results", tmp_path, code=None).output
 
 
 def lines(table):

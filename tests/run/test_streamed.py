@@ -120,9 +120,9 @@ def test_one_process_at_a_time_writes_a_file(tmp_path, small_pieces, monkeypatch
 def test_a_piece_that_was_removed_is_not_called_damaged(tmp_path, small_pieces, monkeypatch):
     path, finish = tmp_path / "runs.nc", ensemble.Stream.finish
 
-    def robbed(stream, some):
+    def robbed(stream, some, added):
         (tmp_path / "runs.nc.parts" / "7-14.npz").unlink()
-        return finish(stream, some)
+        return finish(stream, some, added)
 
     with monkeypatch.context() as patch:
         patch.setattr(ensemble.Stream, "finish", robbed)

@@ -2,7 +2,6 @@
 
 import os
 import shutil
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -44,15 +43,11 @@ def study(tmp_path):
     return runner.load(str(tmp_path / "rounds.py"))
 
 
-def cases_of(results: Path, timed: bool) -> list[Path]:
-    return [path for path in (results / "cases" / "rounds").glob("*.npz") if ("--together--" in path.name) == timed]
-
-
 def test_timed_cases_that_alone_are_missing_run_in_new_workers(study, tmp_path, monkeypatch):
     """A new worker knows nothing of the studies' package, and is handed settings that hold a record from it."""
     results = tmp_path / "r"
     assert runner.run(study, results, quiet=True)["failures"] == []
-    (later,) = cases_of(results, timed=True)
+    (later,) = (results / "cases" / "rounds").glob("*--together--*.npz")
     assert set(np.ravel(store.load_case(later)["process"])) == {os.getpid()}  # the control: few cases need no workers
     later.unlink()
     monkeypatch.setattr(pools, "WORTH_WORKERS", 1)

@@ -17,7 +17,6 @@ from symtop.methods.framework.registry import Integrator
 from symtop.model import scenes as catalogue
 from symtop.model.scenes import TAGS
 from symtop.runner import run as runner, store
-from symtop.runner.run import load
 from symtop.runner.study import Case
 from tests.commands import PROBE, call, contents
 
@@ -159,26 +158,13 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path, clean_registr
     assert runner.run(small, tmp_path, quick=True, quiet=True)["failures"]  # tried again, not forgotten
 
 
-BUILT_IN = ("convergence", "drift", "claims")
-
-
-def scenes_of(study: str, *, quick: bool = False) -> list[str]:
-    return list(dict.fromkeys(case.scene for case in load(study).cases(quick)))
-
-
-@pytest.fixture
-def new_scene(monkeypatch):
-    """A scene that somebody has added to the catalogue of the package."""
-    scene = dataclasses.replace(symtop.scene("loop"), name="brand-new", tags=())
-    known = catalogue._catalogue()
-    monkeypatch.setattr(catalogue, "_catalogue", lambda: {**known, scene.name: scene})
-    return scene
-
-
-@pytest.mark.parametrize("study", BUILT_IN)
+@pytest.mark.parametrize("study", ["convergence", "drift", "claims"])
 @pytest.mark.parametrize("quick", [False, True])
-def test_a_scene_that_joins_the_catalogue_is_in_every_study(study, quick, new_scene):
-    assert scenes_of(study, quick=quick)[-1] == new_scene.name
+def test_a_scene_that_joins_the_catalogue_is_in_every_study(study, quick, monkeypatch):
+    new = dataclasses.replace(symtop.scene("loop"), name="brand-new", tags=())
+    known = catalogue._catalogue()
+    monkeypatch.setattr(catalogue, "_catalogue", lambda: {**known, new.name: new})
+    assert [*dict.fromkeys(case.scene for case in runner.load(study).cases(quick))][-1] == new.name
 
 
 def test_scenes_are_left_out_by_the_question_and_by_their_tags():
@@ -262,9 +248,7 @@ def test_cases_that_differ_in_their_group_alone_have_files_and_scenes_of_their_o
     assert dict(data["phases"].sizes) == {"scene": 1, "variant": 1, "sample": 4}
     short = data["windows/energy"].sel(scene="goldstein", variant="midpoint").values
     np.testing.assert_array_equal(short, [4.0, np.nan, np.nan])
-    from symtop.runner.run import load
-
-    study = load("drift")
+    study = runner.load("drift")
     cases = [Case("spheroid", "strang", {"steps": 1}, group=group) for group in ("windows", "rounding")]
     paths = [store.case_path(tmp_path, study, case) for case in cases]
     assert len({store.identity_of(path) for path in paths}) == 2

@@ -20,7 +20,7 @@ import xarray as xr
 from symtop.core import netcdf
 from symtop.core.code_hash import digest, hashed, packages
 from symtop.core.errors import SymtopError, SymtopWarning, boolean, check_replaceable, file_path, positive, whole
-from symtop.core.files import locked
+from symtop.core.files import locked, replacing, sweep
 from symtop.core.jit import code
 from symtop.core.parallel import MOST_THREADS, cores, in_order, in_threads
 from symtop.core.progress import progress_bar
@@ -47,7 +47,7 @@ def ensemble(
     per_nutation: object = None, tolerance: object = None, horizon: object = None, nutations: object = None,
     samples: int = SAMPLES, observe: str | None = None, variables: Iterable[str] | None = None,
     budget: float | None = None, path: str | Path | None = None, threads: int | None = None,
-    scheduler: str | None = None, quiet: bool = False,
+    scheduler: str | None = None, quiet: bool = False, added: Callable[[xr.Dataset], dict[str, Any]] = lambda _: {},
 ) -> xr.Dataset:  # fmt: skip
     """Run one integrator on many tops, or on many bodies; each member has the bits of `simulate` alone.
 
@@ -81,6 +81,7 @@ def ensemble(
     `scheduler`. The attribute ``execution`` says how members were run: in "lanes", 32 side by side, where the method
     can. With a `path`, members go to that netCDF file as they are computed, in memory that does not grow with
     `samples` (0.4 kB a member). The same call resumes one that was killed, to the same file, and the dataset is lazy.
+    Variables that `added` makes of the dataset are added to it, before the file is in its place.
 
     Raises SymtopError for arguments that make no sense, for members that are no top or no start, by number, and for a
     path to which another process is writing.
@@ -128,13 +129,14 @@ def ensemble(
             raise SymtopError(first)
         data = as_dataset(columns, read.labels, of=job)
         data = netcdf.describe(data, **words, **({RAISED: first} if raised else {}))
+        data = data.assign(added(data))
     else:
         with _stream(file_path("path", path), job, read.labels, words) as stream:
             raised, first = compute(stream.missing(chunks), stream.keep)
             if raised == n:
                 stream.forget(chunks)  # there is nothing to resume
                 raise SymtopError(first)
-            data = stream.finish(chunks)
+            data = stream.finish(chunks, added)
     early = Counter(() if silent else data["outcome"].values.tolist())
     del early["ok"], early[RAISED]
     counts = ", ".join(map("{0[1]} {0[0]}".format, early.most_common()))
@@ -309,12 +311,11 @@ class Stream:
         if not empty and not stored.is_file():
             words = "is there and does not say which ensemble it is of: remove it or name another path than"
             raise SymtopError(f"{self.folder} {words} {path}")
-        netcdf.sweep(path)
+        sweep(path)
         if stored.is_file() and stored.read_text(encoding="utf-8") != identity:
             words = "holds the beginning of another ensemble, or of another version's; remove it or name another path"
             raise SymtopError(f"{self.folder} {words} than {path}")
-        with netcdf.replacing(stored) as partial:
-            partial.write_text(identity, encoding="utf-8")
+        netcdf.write_text(stored, identity)
 
     def missing(self, chunks: list[slice]) -> list[slice]:
         """The chunks that are not on disk."""
@@ -322,12 +323,12 @@ class Stream:
 
     def keep(self, chunk: slice, columns: dict[str, Any]) -> None:
         """Put a chunk on disk."""
-        with ending_on_sigterm(), netcdf.replacing(self._part(chunk), ".npz") as partial:
+        with ending_on_sigterm(), replacing(self._part(chunk), ".npz") as partial:
             np.savez(partial, **columns)
 
-    def finish(self, chunks: list[slice]) -> xr.Dataset:
+    def finish(self, chunks: list[slice], added: Callable[[xr.Dataset], dict[str, Any]]) -> xr.Dataset:
         """Put the chunks together; the dataset reads from the file what it is asked for."""
-        with netcdf.one_thread, netcdf.replacing(self.path) as partial:
+        with netcdf.one_thread, replacing(self.path) as partial:
             first = self._columns(chunks[0])
             shared = all(same_times(self._columns(chunk, "time")["time"], first["time"][0]) for chunk in chunks)
             labels = {name: values[: chunks[0].stop] for name, values in self.labels.items()}
@@ -341,6 +342,10 @@ class Stream:
                             del columns["time"]
                         for name, values in columns.items():
                             file[name][chunk] = values.astype(object) if values.dtype.kind == "U" else values
+                with xr.open_dataset(partial, engine="netcdf4") as data:
+                    columns = added(data)
+                if columns:
+                    xr.Dataset(columns).to_netcdf(partial, mode="a")
             except RuntimeError as error:  # the netCDF library's own word for a disk that is full
                 words = f"What was computed is in {self.folder}, and the same call goes on from there"
                 raise SymtopError(f"cannot write {self.path}: {error}; is the disk full? {words}") from error
