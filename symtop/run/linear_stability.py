@@ -31,7 +31,8 @@ from symtop.model.scenes import Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
 
 NUDGE = 1e-6  # rad: nonlinear terms are 1e-12 of the linear ones, rounding 1e-10
-BESIDE = 1e-5  # rad from a pole: closer, the motion is that at the pole, but in Euler's angles
+BESIDE = 1e-3  # rad from a pole: closer, the motion is that at the pole to 1e-6, but in Euler's angles
+STABLE = 1e-2  # of p_psi^2: a rotation at the pole that is so far from its threshold is stable
 NEAR, LEAST = 1e-3, 1e-9  # of the way to a pole, a nudge beside one: nonlinear terms are 1e-6; rad
 SINGLE_NUDGE, SINGLE_EPSILON = 1e-3, 2.0**-23  # rad, of a method in single precision; the spacing of its numbers at 1
 WARM_UP = 4  # strides before those that are compared: a multistep method has its start behind it by then
@@ -145,8 +146,7 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
     """
     stride = max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))  # steps
     gap = min(theta := scene.top.steady_theta(scene.top.momenta(scene.start)), math.pi - theta)
-    at_pole, rounding = chart != "angles" and gap < BESIDE, EPSILON
-    nudge = NUDGE if at_pole else min(NUDGE, max(NEAR * gap, LEAST))
+    nudge, rounding = NUDGE if _beside(scene, chart) else min(NUDGE, max(NEAR * gap, LEAST)), EPSILON
     runs, delta, off = _apart(method, scene, h, chart, nudge, stride)
     places = runs[0].states[1:, :3]
     with np.errstate(over="ignore"):  # of a run that has blown up
@@ -167,13 +167,20 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
     return Growth(factor, off + rounding * math.sqrt(0.5 / max(math.log(max(factor, 1.0)), SLOWEST)), doubt)
 
 
+def _beside(scene: Scene, chart: str) -> bool:
+    """Is the steady precession so close to a pole, where the top would turn stably, that it is followed as there?"""
+    top, momenta = scene.top, scene.top.momenta(scene.start)
+    theta, square = top.steady_theta(momenta), momenta.p_psi**2
+    weight = 4.0 * top.I1 * (top.mgl if theta < 1.0 else -top.mgl)  # p_psi^2 at the threshold
+    return chart != "angles" and min(theta, math.pi - theta) < BESIDE and square - weight > STABLE * max(square, weight)
+
+
 def _apart(
     method: Integrator, scene: Scene, h: float, chart: str, nudge: float, stride: int, count: int = STEPS
 ) -> tuple[list[Run], np.ndarray, float]:
     """Two runs at a distance of two nudges, half their difference every `stride` steps, how far off their middle is."""
     top, momenta = scene.top, scene.top.momenta(scene.start)
-    theta = top.steady_theta(momenta)
-    beside = chart != "angles" and min(theta, math.pi - theta) < BESIDE
+    theta, beside = top.steady_theta(momenta), _beside(scene, chart)
     if beside:
         tilt, spin = math.pi - nudge if theta > 1.0 else nudge, momenta.p_psi / top.I3
         pair = [Angles(tilt, phi, psi_dot=spin) for phi in (0.0, math.pi)]
