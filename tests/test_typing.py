@@ -27,15 +27,8 @@ foreign = symtop.errors({"time": run["time"].values, "axis": run["axis"].values}
 long = symtop.long_run("spheroid", symtop.integrator("strang"), steps=1000, step_size=0.01)
 advice = symtop.recommend("spheroid", accuracy=1e-6)
 mine = symtop.composition("mine", (1.0,), (0.5, 0.5), order=2)
-reveal_type(run)
-reveal_type(truth)
-reveal_type(wrong)
-reveal_type(foreign)
-reveal_type(long)
-reveal_type(advice.expected_error)
-reveal_type(mine.order)
-reveal_type(symtop.scenes()["spheroid"].horizon)
 """
+ASKED = "run", "truth", "wrong", "foreign", "long", "advice.expected_error", "mine.order", "scene.horizon"
 SEEN = [*["xarray.core.dataset.Dataset"] * 5, "float", "int | None", "float"]
 
 BAD = """
@@ -54,7 +47,7 @@ REPORTED = {4: "stepsize", 5: '"str"', 6: "simluate", 7: "Scene", 8: "Dataset"}
 def checked(tmp_path_factory):
     """What mypy says of both scripts, by file, line by line."""
     folder = tmp_path_factory.mktemp("typed")
-    for name, text in (("good", GOOD), ("bad", BAD)):
+    for name, text in (("good", GOOD + "".join(map("reveal_type({})\n".format, ASKED))), ("bad", BAD)):
         (folder / f"{name}.py").write_text(text, encoding="utf-8")
     # with the settings of `make lint`, whose cache serves here, too
     words = [sys.executable, "-m", "mypy", "--no-error-summary", str(folder / "good.py"), str(folder / "bad.py")]

@@ -8,9 +8,9 @@ import socket
 import struct
 import subprocess
 import sys
-import threading
 import time
 import urllib.request
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -51,20 +51,15 @@ def first_line(port, path, body=b"", *, leave=False, patience=60.0):
 
 def at_once(count, ask):
     """The answers of so many threads."""
-    answers = []
 
-    def work():
+    def answer(_):
         try:
-            answers.append(ask())
+            return ask()
         except OSError as error:
-            answers.append(repr(error))
+            return repr(error)
 
-    threads = [threading.Thread(target=work) for _ in range(count)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    return answers
+    with ThreadPoolExecutor(count) as pool:
+        return [*pool.map(answer, range(count))]
 
 
 @pytest.mark.parametrize("count", [pytest.param(20, id="few"), pytest.param(200, id="many", marks=pytest.mark.slow)])

@@ -45,9 +45,8 @@ def test_every_refused_run_is_one_sentence_and_what_can_be_used_is_used(misbehav
         code, (_, *lines) = output_of(["run", "spheroid", name, *RUN, guard])
         assert code == 0, name
         if "float32" not in name:
-            assert [line.split("largest")[-1] for line in lines[-5:]] == [
-                line.split("largest")[-1] for line in expected[-5:]
-            ], name
+            ends, wanted = ([line.split("largest")[-1] for line in part[-5:]] for part in (lines, expected))
+            assert ends == wanted, name
     for name in misbehaving.BROKEN:
         assert output_of(["run", "spheroid", name, *RUN, guard])[0] == 3, name
 

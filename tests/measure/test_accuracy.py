@@ -99,9 +99,7 @@ def alone(scene, stages, horizon, count):
     e = axis_from_angles(*angles)
     L = np.array(momentum_parts(np, top, *angles, at.theta_dot, at.phi_dot, at.psi_dot))
     h, up = np.longdouble(horizon) / count, np.array([0.0, 0.0, 1.0], np.longdouble)
-    kicks, drifts = (
-        np.array(part, np.longdouble) / sum(map(np.longdouble, part)) for part in (stages.kick, stages.drift)
-    )
+    kicks, drifts = (np.array(row, np.longdouble) / sum(map(np.longdouble, row)) for row in (stages.kick, stages.drift))
     for _ in range(count):
         for kick, drift in zip(kicks, [*drifts, 0.0], strict=True):
             L = L + h * kick * top.mgl * np.cross(up, e)

@@ -107,9 +107,7 @@ def test_a_foreign_trajectory_is_compared_and_one_turned_by_a_thousandth_shows_a
     mine = quaternion(truth)
     for factor in (1.0, -1.0, 1.0002):  # either sign, and a length that single precision would be ashamed of
         shown = symtop.errors({**mine, "quaternion": factor * mine["quaternion"]}, "spheroid")
-        assert set(shown.data_vars) == {
-            f"{name}{end}" for name in ("axis", "attitude", "theta") for end in ("", "_bound")
-        }
+        assert {*shown} == {f"{name}{end}" for name in ("axis", "attitude", "theta") for end in ("", "_bound")}
         for name in ("axis", "attitude", "theta"):
             assert np.all(shown[name].values <= shown[f"{name}_bound"].values)
     moved = {"time": TIMES, "quaternion": turned_about_the_vertical(truth["quaternion"].values, TURN)}

@@ -130,9 +130,8 @@ def test_rattle_on_directors_is_the_lie_group_variational_integrator():
         P = P - R @ (wrong / (inverse[:, None] + inverse[None, :]))
         np.testing.assert_allclose(R, matrices(rows)[k + 1], atol=3e-13)
     M = R.T @ P
-    np.testing.assert_allclose(
-        R @ np.array([M[2, 1] - M[1, 2], M[0, 2] - M[2, 0], M[1, 0] - M[0, 1]]), rows[4, 4:], atol=1e-11
-    )
+    L = R @ np.array([M[2, 1] - M[1, 2], M[0, 2] - M[2, 0], M[1, 0] - M[0, 1]])
+    np.testing.assert_allclose(L, rows[4, 4:], atol=1e-11)
 
 
 def test_the_scalar_equations_are_solved_and_the_discrete_rigid_body_ends_at_a_right_angle():

@@ -1,6 +1,7 @@
 """Threads that work at the same time, each in a precision of its own, get the digits that they would get alone."""
 
 import threading
+from concurrent.futures import ThreadPoolExecutor
 
 import mpmath
 import numpy as np
@@ -17,18 +18,9 @@ SCENES = ("spheroid", "goldstein")
 
 def together(*tasks):
     """What each task returns, each run in a thread of its own; they begin together."""
-    barrier, results = threading.Barrier(len(tasks)), [None] * len(tasks)
-
-    def work(i):
-        barrier.wait()
-        results[i] = tasks[i]()
-
-    threads = [threading.Thread(target=work, args=(i,)) for i in range(len(tasks))]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
-    return results
+    barrier = threading.Barrier(len(tasks))
+    with ThreadPoolExecutor(len(tasks)) as pool:
+        return [*pool.map(lambda task: (barrier.wait(), task())[1], tasks)]
 
 
 def coefficients():

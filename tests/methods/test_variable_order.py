@@ -155,9 +155,8 @@ def test_huge_times_begin_and_a_step_rounded_to_what_it_was_halved_from_ends_the
     assert run.attrs["reached_time"] < 4.0
 
 
-SOLVERS = {
-    row.name: row.solvers[row.charts()[0]] for row in variants() if isinstance(row.solvers[row.charts()[0]], Adaptive)
-}
+EACH = {row.name: row.solvers[row.charts()[0]] for row in variants()}
+SOLVERS = {name: solver for name, solver in EACH.items() if isinstance(solver, Adaptive)}
 ONE_CHART = {name.split("[")[0]: name for name in SOLVERS}
 OWN = sorted(ONE_CHART)
 PAIRS = [pair.name for pair in (pairs.RK45, *pairs.PAIRS)]

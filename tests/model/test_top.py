@@ -7,7 +7,7 @@ import pytest
 from scipy.optimize import brentq
 
 from symtop import Angles, SymmetricTop, scene
-from symtop.model.top import newton_between
+from symtop.model.top import effective_force, newton_between
 from tests.conftest import random_scenes
 
 
@@ -19,9 +19,8 @@ def test_slope_and_curvature_are_the_derivatives_of_the_potential(chosen):
 
         def potential(theta):
             p_phi, p_psi = (n + s) / 2, (s - n) / 2
-            return (p_phi - p_psi * mpmath.cos(theta)) ** 2 / (2 * I1 * mpmath.sin(theta) ** 2) + mgl * mpmath.cos(
-                theta
-            )
+            square = (p_phi - p_psi * mpmath.cos(theta)) ** 2
+            return square / (2 * I1 * mpmath.sin(theta) ** 2) + mgl * mpmath.cos(theta)
 
         for theta in (0.5, 1.2, 2.4):
             values = [mpmath.diff(potential, mpmath.mpf(theta), k) for k in range(3)]
@@ -45,8 +44,6 @@ def test_the_potential_keeps_its_digits_at_a_pole_where_the_textbook_form_does_n
         p_phi = top.I1 * start.phi_dot * mpmath.sin(t) ** 2 + p_psi * mpmath.cos(t)
         exact = (p_phi - p_psi * mpmath.cos(t)) ** 2 / (2 * top.I1 * mpmath.sin(t) ** 2) + top.mgl * mpmath.cos(t)
         exact_rate = (p_phi - p_psi * mpmath.cos(t)) / (top.I1 * mpmath.sin(t) ** 2)
-    from symtop.model.top import effective_force
-
     assert top.potential(theta, momenta) == pytest.approx(float(exact), rel=4e-15)
     rate = effective_force(theta, momenta.north, momenta.south, top.I1, top.mgl)[1]
     assert rate == pytest.approx(float(exact_rate), rel=4e-15)

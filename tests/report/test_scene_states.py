@@ -163,9 +163,7 @@ def test_the_reference_has_nothing_beyond_its_bounds_and_what_is_printed_is_what
         assert printed == data["time"].sel(problem=scene.name).values.tolist()
         assert [float(given[name]) for name in test_set.GIVEN] == list(scene.top.flat(scene.start))
     said = " ".join((folder / "README.md").read_text(encoding="utf-8").split())
-    assert (
-        "In all files a number that is given, of a problem or a time, is the double nearest to what is printed" in said
-    )
+    assert "a number that is given, of a problem or a time, is the double nearest to what is printed" in said
 
 
 def test_a_sign_in_the_inertia_is_found_by_both_checkers(bodies, tmp_path):

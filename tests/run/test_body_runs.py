@@ -244,9 +244,8 @@ def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
     at = Attitude((0.6, 0.0, 0.8, 0.0), (0.3, 0.2, 0.1))
     inside = body.in_principal(at)
     spin = np.array(at.omega_body)
-    assert 0.5 * spin @ matrix @ spin == pytest.approx(
-        0.5 * np.dot(body.momentum(inside), inside.omega_body), rel=1e-13
-    )
+    kinetic = 0.5 * np.dot(body.momentum(inside), inside.omega_body)
+    assert 0.5 * spin @ matrix @ spin == pytest.approx(kinetic, rel=1e-13)
     heavy = rotated(inside.quaternion, body.centre)[2]  # the height of the centre, in either axes
     assert heavy == pytest.approx(rotated(at.quaternion, columns @ [0.0, 0.6, 0.8])[2], rel=1e-13)
     brick = RigidBody.from_brick(12.0, (1.0, 2.0, 3.0))

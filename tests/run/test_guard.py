@@ -305,9 +305,7 @@ def test_the_guard_without_the_truth_is_asked_for_by_its_name():
 
 def test_a_run_far_longer_than_is_watched_is_warned_of_and_a_free_top_judged_like_any():
     for spin in (0.0, 0.5):
-        free = symtop.Scene(
-            "free", symtop.SymmetricTop(2.0, 1.0, 0.0), symtop.Angles(1.0, 0.0, 0.0, 1.0, 0.0, spin), 20.0
-        )
+        free = symtop.Scene("free", symtop.SymmetricTop(2, 1, 0), symtop.Angles(1, 0, 0, 1, 0, spin), 20.0)
         assert "expect an axis error" in caution(free, "rk4[axis]", step_size=1.5)
         assert caution(free, "rk4[axis]", step_size=1e-3) == ""
     body = symtop.Scene("far", symtop.RigidBody(1.0, 2.0, 3.0), symtop.Attitude(omega_body=(1e-6, 1.0, 1e-6)), 1e22)

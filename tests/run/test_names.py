@@ -38,9 +38,8 @@ def test_long_run_modified_energy_stability_and_forecast_do_not_look_at_the_name
     np.testing.assert_array_equal(first, second)
     assert np.max(np.abs(first - modified_energy(SCENE, "rk4", chart, states, h))) > 1e-6  # it is not the energy itself
     steady, grid = symtop.scene("steady-fast"), np.linspace(0.02, 0.5, 12)
-    assert linear_limits(own, steady, grid) == pytest.approx(
-        linear_limits(other, steady, grid), rel=0, abs=0, nan_ok=True
-    )
+    limits, again = (linear_limits(method, steady, grid) for method in (own, other))
+    assert limits == pytest.approx(again, rel=0, abs=0, nan_ok=True)
     assert (own.sleeps_from is None) == (other.sleeps_from is None)
     assert own.sleeps_from is None or own.sleeps_from(0.4) == other.sleeps_from(0.4)
     assert sleeping_threshold(own, 0.4) == sleeping_threshold(other, 0.4)

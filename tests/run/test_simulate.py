@@ -123,9 +123,8 @@ def test_two_datasets_share_nothing_and_a_trajectory_has_the_numbers_of_its_data
     data = symtop.simulate("spheroid", "midpoint", guard=False, **settings)
     trajectory = integrate("spheroid", "midpoint", **settings)
     np.testing.assert_equal(Trajectory.of_data(data)._asdict(), trajectory._asdict())
-    assert {name: data[name].values.tobytes() for name in data.data_vars} == {
-        name: values.tobytes() for name, values in trajectory.columns.items()
-    }
+    stored = {name: data[name].values.tobytes() for name in data.data_vars}
+    assert stored == {name: values.tobytes() for name, values in trajectory.columns.items()}
 
 
 def test_files_are_whole_and_a_failed_write_leaves_the_old_one(tmp_path, monkeypatch):

@@ -69,9 +69,8 @@ def test_what_is_on_disk_is_not_computed_again_and_the_bytes_are_the_same(tmp_pa
     monkeypatch.setattr(ensemble.Stream, "keep", interrupted)
     with pytest.raises(KeyboardInterrupt):
         symtop.ensemble(SOME, "strang[axis]", path=path, threads=threads, **SETTINGS)
-    assert {file.name for file in (tmp_path / "runs.nc.parts").glob("*.npz")} == {
-        f"{first}-{first + 7}.npz" for first in made
-    }
+    parts = {file.name for file in (tmp_path / "runs.nc.parts").glob("*.npz")}
+    assert parts == {f"{first}-{first + 7}.npz" for first in made}
     assert not path.exists()
     again = []
     monkeypatch.setattr(ensemble.Stream, "keep", lambda *given: again.append(given[1].start) or keep(*given))

@@ -217,11 +217,9 @@ def wait_for_cases(log: Path, count: int, process) -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("number", "code", "says"), [(2, 130, "interrupted"), (15, 143, "terminated"), (1, 143, "terminated")]
-)
+@pytest.mark.parametrize(("number", "code"), [(2, 130), (15, 143), (1, 143)])
 @pytest.mark.parametrize("quick", [True, False])
-def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quick):
+def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, quick):
     log = tmp_path / "log"
     words = ["study", PROBE, "--results", tmp_path / "r", "--jobs", 2, *(["--quick"] if quick else [])]
     process = symtop(*words, PROBE_LOG=log, PROBE_PAUSE=0.5)
@@ -231,6 +229,7 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, says, quic
     ended_with, _, err = ended(process)
     assert time.monotonic() - start < 10.0
     assert ended_with == code
+    says = "interrupted" if number == signal.SIGINT else "terminated"
     assert sentences(err) == [f"symtop: {says}; what was computed is kept, and the same command goes on from there"]
     assert not leftovers(tmp_path / "r")
     count = len(list((tmp_path / "r").rglob("cases/probe/*.npz")))

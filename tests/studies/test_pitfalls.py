@@ -8,13 +8,8 @@ from symtop.measure import datasets
 from tests.templates import checked
 
 
-@pytest.fixture(scope="module")
-def data():
-    """All runs of the quick pass."""
-    return datasets.combine([(case, study.measure(case)) for case in study.cases(True)])
-
-
-def test_the_pitfalls_are_there_and_the_page_says_what_was_measured(data, tmp_path):
+def test_the_pitfalls_are_there_and_the_page_says_what_was_measured(tmp_path):
+    data = datasets.combine([(case, study.measure(case)) for case in study.cases(True)])
     largest = {name: study.run_of(data, study.TERM, name)["axis"].max("sample").values
                for name in (study.WITHOUT, study.WITH, study.RIGHT)}  # fmt: skip
     assert np.ptp(largest[study.WITHOUT]) < 0.01 * largest[study.WITHOUT].mean()
@@ -23,7 +18,6 @@ def test_the_pitfalls_are_there_and_the_page_says_what_was_measured(data, tmp_pa
     answers = study.facts(data)
     assert answers["falling_energy"] < 0.01
     assert answers["falling"] > 0.5
-    answers = study.facts(data)
     assert answers["ended"] < 1.0
     through = study.run_of(data, study.POLE, study.AXIS).isel(setting=0)
     assert float(through["axis"].max()) < 1e-3

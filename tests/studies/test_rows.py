@@ -36,10 +36,9 @@ def test_every_stored_dataset_says_in_which_chart_a_method_ran(study, quick_resu
     assert [name for group in groups for name in without_a_chart(group)] == []
 
 
-@pytest.mark.parametrize(
-    ("names", "found"),
-    [(["rk4", "midpoint"], ["rk4"]), (["rk4[axis]", "strang"], ["strang"]), (["rk4[axis]", "exact"], [])],
-)
+@pytest.mark.parametrize(("names", "found"), [
+    (["rk4", "midpoint"], ["rk4"]), (["rk4[axis]", "strang"], ["strang"]), (["rk4[axis]", "exact"], []),
+])  # fmt: skip
 def test_a_name_that_leaves_the_chart_open_is_found(names, found):
     data = xr.Dataset({"axis": ("variant", np.zeros(len(names)))}, coords={"variant": names})
     assert without_a_chart(data) == found

@@ -1,7 +1,6 @@
 """The truth study: its facts are those of its data, and its page says them."""
 
 import numpy as np
-import pytest
 from symtop_studies.truth import facts, study
 from symtop_studies.truth.measures import BOUND, ERROR
 
@@ -10,14 +9,9 @@ from symtop.runner.study import Case
 from tests.templates import checked
 
 
-@pytest.fixture(scope="module")
-def data():
-    """Two sources on one scene, at two times."""
+def test_facts_and_page_follow_from_the_errors_and_a_broken_bound_is_counted(tmp_path):
     cases = [Case("spheroid", name, {"horizons": [8.0, 20.0]}) for name in ("closed form", "double, attitude")]
-    return datasets.combine([(case, study.measure(case)) for case in cases])
-
-
-def test_facts_and_page_follow_from_the_errors_and_a_broken_bound_is_counted(data, tmp_path):
+    data = datasets.combine([(case, study.measure(case)) for case in cases])
     answers = facts.facts(data)
     assert answers["closed_form"] == float(data[ERROR].sel(variant="closed form").max()) < 1e-14
     assert answers["integrated"] > answers["closed_form"]
