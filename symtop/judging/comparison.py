@@ -128,9 +128,10 @@ def find(method: Any, on: Scene) -> Integrator:
     """A method by its name, its record, or as what `judge` takes: a step in the chart of the axis, or of a body."""
     if isinstance(method, Integrator):
         return method
-    file = set("/ ") & set(str(method)) or ".py" in str(method) or str(method).partition(":")[0].endswith(LIBRARIES)
-    if isinstance(method, str) and not file:
-        return find_integrator(method)
+    if isinstance(method, str):
+        file = {*"/ "} & {*method} or ".py" in method or method.partition(":")[0].endswith(LIBRARIES)
+        if not file:
+            return find_integrator(method)
     return adapted(open_target(method, None, "axis", on=on))
 
 

@@ -92,7 +92,7 @@ def chart_of(method: Integrator, watched: str, observe: str | None = None) -> st
             able = ", ".join(name for name, entry in methods().items() if BODY in entry.solvers)
             raise SymtopError(f"integrator must have the chart body, of a RigidBody, not {method.name}: {able}")
         return BODY
-    if observe == "theta":
+    if isinstance(observe, str) and observe == "theta":
         raise SymtopError("observe must be nutation, which shows theta, axis or attitude, not 'theta'", "observe")
     if observe is not None:
         return method.chart_for(one_of("observe", observe, OBSERVABLES))

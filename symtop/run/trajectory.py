@@ -86,7 +86,7 @@ class Trajectory(NamedTuple):
 def column(data: xr.Dataset | Mapping[str, Any], name: str) -> Any:
     """What data hold under that name, over time first; named components are in the order of `LABELS`."""
     values = data[name]
-    if isinstance(values, xr.DataArray):
+    if isinstance(values, xr.DataArray) and values.dims != ("time",):
         for dim, labels in LABELS.items():
             given = values.coords[dim].to_numpy().tolist() if dim in values.coords else [*labels]
             if given != [*labels] and {*given} == {*labels}:

@@ -41,7 +41,7 @@ ODD = [None, "x", "", b"1", [], [1.0], {}, (), object(), 1j, True, np.array([1.0
 NOT_FINITE = [*ODD, math.nan, math.inf, -math.inf]
 NOT_POSITIVE = [*NOT_FINITE, 0.0, -0.0, -1.0, -1e300, -5e-324, np.float64(-2.0)]
 NOT_WHOLE = [*NOT_POSITIVE, 1.5, 2.0000001]
-UNKNOWN = [None, 3, "", "no-such", b"spheroid", [], object(), "Spheroid ", "\0", "x" * 5000]
+UNKNOWN = [None, 3, "", "no-such", b"spheroid", [], object(), "Spheroid ", "\0", "x" * 5000, np.array(["x", "y"])]
 NOT_LABEL = [None, 3, "", " x", "a b", "ä", "-x", "x" * 65, "a/b", "a\nb", b"x", []]
 NOT_ROW = [None, "01", {}, 3.0, [math.nan], ["x"], [[0.5]], [None], object(), [1j]]
 
@@ -59,7 +59,7 @@ ANY = [
 RUN = symtop.simulate("spheroid", "strang", step_size=0.01, horizon=0.5, samples=11)
 NO_TIMES = [{"time": [0.0]}, {"time": "x", "theta": [1.0]}, xr.Dataset(), {"axis": [[0, 0, 1.0]]}]
 NOT_DATA = [None, 3, "x", [], {}, object(), *NO_TIMES]
-NAMED = [value for value in UNKNOWN if value]  # where None or "" asks for the default
+NAMED = [value for value in UNKNOWN if isinstance(value, np.ndarray) or value]  # where None or "" asks for the default
 NO_NUMBER = [value for value in NOT_POSITIVE if not isinstance(value, np.ndarray | list)]
 SMALL = symtop.population(3, seed=1)
 KINDS = {  # what is refused of arguments of these names, by whichever function; None is right where it is the default
