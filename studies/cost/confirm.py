@@ -17,6 +17,7 @@ import xarray as xr
 
 from symtop.measure.settings import TARGETS
 from symtop.methods.framework.registry import Integrator
+from symtop.model.charts import Array
 
 from .ladder import at_tolerance, stepped
 from .ranking import SAFE
@@ -36,7 +37,7 @@ def rounded(setting: float, fixed: bool) -> float:
     return float(f"{whole * unit:.{DIGITS[fixed]}g}")
 
 
-def share_served(variant: Integrator, numbers: np.ndarray, nutations: float, setting: float, target: float) -> float:
+def share_served(variant: Integrator, numbers: Array, nutations: float, setting: float, target: float) -> float:
     """The share of the tops, rows (n, 9), whose axis is off by `target` at most, of those of which it is asked."""
     fixed, (chart,) = variant.fixed_step, variant.solvers
     tops = Tops(numbers, nutations, first=setting if fixed else DENSE, samples=SAMPLES)
@@ -55,14 +56,14 @@ def confirm(variant: Integrator, members: int, seed: int, nutations: float, star
     numbers, fixed = natural(members, seed), variant.fixed_step
     served, share = np.full((2, len(TARGETS)), np.nan)
     for place, (target, first) in enumerate(zip(TARGETS, start, strict=True)):
-        setting = last = rounded(first, fixed) if math.isfinite(first) else math.nan
+        setting = rounded(first, fixed) if math.isfinite(first) else math.nan
         while math.isfinite(setting):
             share[place] = share_served(variant, numbers, nutations, setting, target)
             if share[place] >= SAFE:
                 break
-            last, setting = setting, rounded(setting * FINER[fixed], fixed)
-            ratio = setting / first if fixed else (first / setting)
-            if ratio > MOST or setting == last or not (fixed or setting >= variant.least_tolerance):
+            setting = rounded(setting * FINER[fixed], fixed)
+            ratio = setting / first if fixed else first / setting
+            if ratio > MOST or not (fixed or setting >= variant.least_tolerance):
                 setting = math.inf
         served[place] = setting
     variables = {"interpolated": np.array(start), "served": served, "share": share}
