@@ -63,6 +63,6 @@ def test_methods_on_a_scene_are_timed_in_one_case_and_those_for_symmetric_bodies
         (together,) = [case for case in cases if case.scene == place and study.STUDY.is_timed(case)]
         alone = [case.integrator for case in cases if case.scene == place and case is not together]
         assert sorted(together.settings["integrators"]) == sorted(alone)
-    assert facts.for_any_body("rk4[axis]")
-    assert not facts.for_any_body("takahashi-imada[axis]")
-    assert not facts.for_any_body("series[axis]")
+    assert facts.on_f_alone("rk4[axis]")
+    assert not facts.on_f_alone("takahashi-imada[axis]")
+    assert not facts.on_f_alone("series[axis]")
