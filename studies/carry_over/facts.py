@@ -72,7 +72,7 @@ class Pooled(NamedTuple):
     def words(self) -> str:
         """In a table."""
         within = f"median {number(self.middle, 3)}, {percent(MOST_OF)} below {number(self.most, 3)}"
-        beyond = f"{self.beyond} of {self.asked} beyond the budget"
+        beyond = f"{self.beyond} of {self.asked} cases over budget"
         return ", ".join([within] * (self.beyond < self.asked) + [beyond] * (self.beyond > 0))
 
     @property

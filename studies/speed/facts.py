@@ -94,5 +94,5 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
          ", ".join(f"{target:.0e}" for target in TARGETS if met_by_coarsest(part.sel(variant=name), target))]
         for name in names
     ]  # fmt: skip
-    header = ["variant", *(f"{target:.0e} rad (us)" for target in TARGETS), "at most (rad)"]
+    header = ["variant", *(f"{target:.0e} rad (us)" for target in TARGETS), "upper bound at (rad)"]
     return {"times": pd.DataFrame(rows, columns=header)}
