@@ -282,7 +282,7 @@ def test_planted_factors_of_steps_and_of_silent_runs_are_found():
 
 @pytest.mark.parametrize(
     ("unserved", "words"),
-    [(0, "median 3, 95\xa0% below 3"), (3, "median 3, 95\xa0% below 3, 1 of 9 beyond the budget")],
+    [(0, "median 3, 95\xa0% below 3"), (3, "median 3, 95\xa0% below 3, 1 of 9 cases over budget")],
 )
 def test_a_method_that_no_step_within_the_budget_makes_safe_is_counted(unserved, words):
     data = planted(3.0)
@@ -296,7 +296,7 @@ def test_a_method_that_no_step_within_the_budget_makes_safe_is_counted(unserved,
     drawn_texts = {one.get_text() for one in figures.draw_steps(data).axes[0].texts}
     assert drawn_texts == ({"+1"} if unserved else set())
     everyone_beyond = facts.pooled([{"strang[body]": np.inf}])
-    assert everyone_beyond.words == "1 of 1 beyond the budget"
+    assert everyone_beyond.words == "1 of 1 cases over budget"
 
 
 GRID = 0.1
