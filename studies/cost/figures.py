@@ -116,7 +116,7 @@ def draw_map(data: xr.DataTree) -> Any:
     each = {quantity: far.diagram(data, quantity) for quantity in far.QUANTITIES}
     won = Counter(panel.names[k] for panel in each.values() for k in panel.winner.ravel() if k >= 0)
     colors = _colors([name for name, _ in won.most_common(MOST_KEYS)])
-    colors |= dict.fromkeys(won.keys() - colors, REST)
+    colors |= {name: REST for name in won if name not in colors}
     figure, axes = panels(1, len(far.QUANTITIES), height=3.6, sharex=True, sharey=True)
     for axis, (quantity, panel) in zip(axes[0], each.items(), strict=True):
         _panel(axis, panel, colors)

@@ -76,7 +76,7 @@ _LOOKS = {  # of methods that people know, in one colour with fixed steps and th
     "dop853-compiled": Look(BROWN, "v"), "dop853-compiled-fixed": Look(BROWN, "^"), "dop853": Look(BROWN, "o"),
     "gauss-4": Look(PURPLE, "^"), "gauss-8": Look(PURPLE, ">"), "gauss-12": Look(ORANGE, "X"),
     "lsoda": Look(REDS[1], "s"), "radau": Look(REDS[2], "v"), "taylor": Look(BLACK, "*", 6.0),
-    "series": Look(BLACKS[2], "D"), "exact": Look(GREY, "x"),
+    "series": Look(BLACKS[2], "D"), "series-general": Look(BLACKS[1], "D"), "exact": Look(GREY, "x"),
 }  # fmt: skip
 
 FILLS = {"angles": "none", "axis": "full", "attitude": "left", "body": "top"}  # of a marker, by chart
