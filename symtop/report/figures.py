@@ -111,7 +111,7 @@ APART = 3.0  # pixels
 MOST_SPOTS = 40  # of a line between its ends, beside which its name is tried
 BESIDE = (16.0, 10.0)  # pixels to a dot of another line, whose the name seems to be
 LINE, WRONG, ELSEWHERE = 0.8, 8.0, (0.0, 2.0, 6.0)  # prices: a point of a line covered, such a dot; first end, inside
-ASIDE = {"left": 0.0, "right": 2.0, "center": 3.0}  # of the side of a name that is at its place
+ASIDE = {"left": 0.0, "right": 2.0, "center": 14.0}  # of the side of a name that is at its place
 PLACES = (*((dx, dy, side) for dx, side in ((5, "left"), (-5, "right")) for dy in (0, -5, 5, -9, 9)),
           *((0, dy, "center") for dy in (-11, 11, -15, 15)))  # fmt: skip
 
