@@ -255,12 +255,12 @@ def draw(known: dict[str, list[Run]], target: Path) -> None:
     tops_by = grouped([run for run in known["tops"] if run.periods in NUTATIONS], "periods")
     panels: list[tuple[str, list[tuple[str, list[Run], str, str]]]] = [
         (f"tops, {float(name):g} nutations",
-         [("closed form", runs, "exact", style.BLUE), ("integration", runs, "series", style.VERMILLION)])
+         [("tops, closed form", runs, "exact", style.BLUE), ("tops, integration", runs, "series", style.VERMILLION)])
         for name, runs in sorted(tops_by.items(), key=lambda item: float(item[0]))
     ]  # fmt: skip
     bodies_shown = [
-        ("symtop's", known["bodies"], "series", style.GREEN),
-        ("hostile", known["hostile"], "series", style.PURPLE),
+        ("bodies, symtop's", known["bodies"], "series", style.GREEN),
+        ("bodies, hostile", known["hostile"], "series", style.PURPLE),
     ]
     for axis, (title, lines) in zip(axes.flat, [*panels, ("bodies", bodies_shown)], strict=True):
         for label, runs, guarded, color in lines:
@@ -269,10 +269,9 @@ def draw(known: dict[str, list[Run]], target: Path) -> None:
             rest = [run for run in runs if run.outcome == "ok"]
             last = sum(getattr(run, guarded) > guard.EXPECTED for run in rest) - 1
             axis.plot(max(false[last], 1e-4), hits[last], "o", color=color)
-        axis.set(xscale="log", xlim=(1e-4, 1.2), ylim=(0.9, 1.003), title=title)
-        axis.legend(loc="lower left")
+        axis.set(xscale="log", xlim=(1e-4, 1.2), ylim=(0.9, 1.003), title=title, xlabel="right ones warned of")
     axes[0, 0].set_ylabel("wrong runs warned of")
-    figure.supxlabel("right runs warned of", fontsize=8)
+    style.legend_below(figure, axes)
     style.save(figure, target)
 
 

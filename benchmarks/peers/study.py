@@ -23,23 +23,25 @@ WORDS = {"numba": "compiled", "Python": "Python"}  # a right-hand side
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
-    """The time of each library over symtop's at the same error, in both calls."""
-    known = summary.groups(data)
+    """The time of each library over symtop's at the same error, in both calls; open, over what needs f(t, y) alone."""
+    known, alone = summary.groups(data), summary.general(data)
     spans = {name: _spans(data, known, name) for name in known if name not in (OURS, *ENGINES)}
     names = sorted((name for name in spans if all(spans[name])), key=lambda name: max(spans[name][0]))
-    figure, axes = style.panels(1, len(NAMES), height=0.19 * len(names) + 1.1, sharey=True)
-    for k, (axis, words) in enumerate(zip(axes[0], NAMES.values(), strict=True)):
-        farthest = max((max(spans[name][k]) for name in names), default=1.0)
+    figure, axes = style.panels(1, len(NAMES), height=0.23 * len(names) + 1.1, sharey=True)
+    for k, (axis, (call, words)) in enumerate(zip(axes[0], NAMES.items(), strict=True)):
+        farthest, nearest = max((max(spans[name][k]) for name in names), default=1.0), 1.0
         for place, name in enumerate(names):
             ratios, color = spans[name][k], SPOKEN if name.startswith(SOLVE_IVP) else OTHER
-            axis.plot([min(ratios), max(ratios)], [place, place], color=color, lw=1.2)
-            axis.plot(ratios, [place] * len(ratios), "o", color=color, ms=4.0)
+            simple = summary.ratios(data, call, alone, known[name])
+            for each, at, face in ((ratios, place - 0.12, color), (simple, place + 0.18, "white")):
+                axis.plot(each, [at] * len(each), "o-", color=color, mfc=face, ms=4.0, lw=1.2)
+            nearest = min(nearest, *ratios, *simple)
             axis.annotate(
                 summary.range_of((min(ratios), max(ratios))), (1.02, place), xycoords=("axes fraction", "data"),
                 va="center", fontsize=style.LEAST_TEXT, color=style.ink(color), annotation_clip=False,
             )  # fmt: skip
         axis.axvline(1.0, color=style.BLUE, lw=1.6)
-        axis.set(xscale="log", xlim=(0.8, 1.5 * farthest), ylim=(len(names) - 0.4, -0.6), title=words)
+        axis.set(xscale="log", xlim=(0.8 * nearest, 1.5 * farthest), ylim=(len(names) - 0.4, -0.6), title=words)
         axis.set_xlabel("times as long as symtop's own methods")
         axis.text(1.0, -0.65, " symtop", color=style.BLUE, fontsize=style.LEAST_TEXT, va="bottom", ha="center")
         axis.title.set_position((0.5, 1.06))
@@ -53,8 +55,8 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     errors = " and ".join(number(target) for target in JUDGED)
     figure.supxlabel(
         f"A dot: the library's fastest run with an error of at most {errors} rad over {PERIODS:g} nutations of "
-        f"{scenes},\nover symtop's fastest, {', '.join(summary.fastest(data))}. Public call: what a user types. "
-        "Inner loop: without set-up and samples.",
+        f"{scenes},\nover symtop's fastest, {', '.join(summary.fastest(data))} (full, and the numbers), or its fastest "
+        "that needs f(t, y) alone (open).\nPublic call: what a user types. Inner loop: without set-up and samples.",
         fontsize=7.5, ha="left", x=0.01,
     )  # fmt: skip
     return [Picture("fronts", figure)]
@@ -95,7 +97,7 @@ def _over_general(data: xr.Dataset, known: dict[str, list[str]], said: Mapping[s
     sides = zip(("left", "right"), NAMES, strict=True)
     slower = [f"{names} at the {side}" for side, call in sides if (names := said[f"general_slower_{call}"])]
     return (
-        f"Over the fastest that needs f(t, y) alone ({said['general']}; {scenes}), solve_ivp takes "
+        f"Over the fastest that needs f(t, y) alone (open dots; {said['general']}; {scenes}), solve_ivp takes "
         f"{' and '.join(gains)} as long"
         f"{'; faster than it are ' if slower else ''}{' and '.join(slower)}. "
     )

@@ -325,8 +325,6 @@ def _of_family(data: xr.DataTree, family: str) -> dict[str, Any]:
         least = np.nanquantile(ratio, 1.0 - MOST_OF, axis=1)
         answers[f"limit_{place}_low"], answers[f"limit_{place}_least"] = limit_ends(data, family)[0], float(least.min())
         answers[f"limit_{place}_of"] = label(str(data["steady"]["variant"].values[int(np.argmin(least))]))
-    if family == FREE:
-        answers["round_steps"] = own_steps(data, family, NEEDLE).middle
     for name, kind, seen, first in by.orders(data) if order[1] else ():
         if (name, kind) == (order[1], family):
             answers |= {f"order_{place}_seen": seen, f"order_{place}_top": first}

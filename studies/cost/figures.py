@@ -28,15 +28,14 @@ FAMILIAR = (  # of figure 1: methods that people know
     "midpoint[angles]", "taylor[axis]", "series[axis]",
 )  # fmt: skip
 TOP = "this-top"
-PALEST = "#AAAAAA"  # of methods made for this top
 NAMED = 7  # variants of the run lengths with a label
 BESIDE = ("rk4[axis]", "strang[axis]", "dop853-compiled-fixed[axis]")  # named in any case
 MARKS, LATEST = 9, 0.995
 HALF = 0.5
-HATCH, LETTER, UNREACHED = "////", 0.62, "#F0F0F0"
-MOST_KEYS, REST = 6, "#F0E442"  # methods without room for their name inside that have a key, and the colour of others
-PALE = 0.62  # of white in the colour of a predicted cell
-LEFT = (style.SKY, style.ORANGE, style.VERMILLION, style.YELLOW, style.BLUE, style.LEAF)
+HATCH, LETTER, UNREACHED = "////", 0.62, "xxx"
+MOST_KEYS, REST = 10, style.YELLOW  # methods that have a key, and the colour of others
+PALE = 0.55  # of white in the colour of a predicted cell
+LEFT = (style.SKY, style.ORANGE, style.VERMILLION, style.BLUE, style.LEAF)
 TITLES = {
     "axis": "axis: angle between\nat one time (rad)", "energy": "energy:\nrelative change",
     "shape": "shape: distance\nto the true orbit",
@@ -60,15 +59,16 @@ def draw_accuracy(data: xr.DataTree) -> Any:
         points = [(1e6 * known[name].seconds, target, 1e6 * known[name].low, 1e6 * known[name].high)
                   for target, known in each.items() if name in known]  # fmt: skip
         x, y, low, high = np.array(points).T
-        own = integrator(name).needs == TOP
-        style_of = style.line(name) | ({"color": PALEST} if own else {})
-        axis.plot(x, y, lw=1.0 if own else 1.6, zorder=2 if own else 3, **style_of)
-        axis.hlines(y, low, high, color=style_of["color"], lw=3.0, alpha=0.35, zorder=2)
-        ends.append((f"{name}{' (made for this top)' if own else serves(name)}", style_of["color"], x, y))
+        look, whom = style.line(name), " (this top)" if integrator(name).needs == TOP else serves(name)
+        axis.plot(x, y, lw=1.6, zorder=3, **look)
+        axis.hlines(y, low, high, color=look["color"], lw=3.0, alpha=0.35, zorder=2)
+        ends.append((f"{name.removesuffix('[axis]')}{whom}", look["color"], x, y))
     axis.set(xscale="log", yscale="log", ylim=(2e-13, 5e-3), ylabel="axis error that 95 % of the tops keep (rad)")
     axis.set_yticks(list(each), [f"$10^{{{math.log10(target):.0f}}}$" for target in each])
     axis.yaxis.minorticks_off()
     axis.set_xlabel("time of a safe run: evaluations × price + call (µs)")
+    low, high = axis.get_xlim()
+    axis.set_xlim(low, 4.0 * high)  # with room for the labels
     label_lines(axis, ends)
     return figure
 
@@ -115,19 +115,16 @@ def draw_map(data: xr.DataTree) -> Any:
     """Three panels: the cheapest variant for every allowed error and run length."""
     each = {quantity: far.diagram(data, quantity) for quantity in far.QUANTITIES}
     won = Counter(panel.names[k] for panel in each.values() for k in panel.winner.ravel() if k >= 0)
-    inside = {name for panel in each.values() for name in panel.names
-              if any(_places(panel.winner == panel.names.index(name), split_name(name)[0]))}  # fmt: skip
-    below = [name for name, _ in won.most_common() if name not in inside]
-    named = [name for name, _ in won.most_common() if name not in below[MOST_KEYS:]]
-    colors = _colors(named) | dict.fromkeys(below[MOST_KEYS:], REST)
+    colors = _colors([name for name, _ in won.most_common(MOST_KEYS)])
+    colors |= {name: REST for name in won if name not in colors}
     figure, axes = panels(1, len(far.QUANTITIES), height=3.6, sharex=True, sharey=True)
     for axis, (quantity, panel) in zip(axes[0], each.items(), strict=True):
         _panel(axis, panel, colors)
         axis.set(title=TITLES[quantity], xlabel="run length (nutations)")
     axes[0][0].set_ylabel("largest error allowed")
-    keys = [Patch(facecolor=colors[name], label=name) for name in below[:MOST_KEYS]]
-    keys += [Patch(facecolor=REST, label="another method")] if below[MOST_KEYS:] else []
-    keys.append(Patch(facecolor=UNREACHED, edgecolor="#BBBBBB", label="reached by no method"))
+    keys = [Patch(facecolor=color, label=name) for name, color in colors.items() if color != REST]
+    keys += [Patch(facecolor=REST, label="another method")] if REST in colors.values() else []
+    keys.append(Patch(facecolor="white", edgecolor="#BBBBBB", hatch=UNREACHED, label="reached by no method"))
     figure.legend(handles=keys, loc="outside lower center", ncols=3, frameon=False)
     return figure
 
@@ -145,14 +142,15 @@ def _panel(axis: Any, panel: far.Diagram, painted: dict[str, str]) -> None:
     """Cells in the colours of variants, paler and hatched where predicted, with names."""
     x, y = np.log10(panel.horizons), np.log10(far.TARGETS)
     dx, dy = 0.5 * (x[1] - x[0]), 0.5 * (y[0] - y[1])
-    colors = np.full((*panel.winner.shape, 3), to_rgb(UNREACHED))
+    colors = np.ones((*panel.winner.shape, 3))
     masks = [panel.winner == (panel.names.index(name) if name in panel.names else -2) for name in painted]
     for mask, color in zip(masks, map(to_rgb, painted.values()), strict=True):
         colors[mask] = color
         colors[mask & panel.predicted] = PALE + (1.0 - PALE) * np.asarray(color)
     axis.imshow(colors, extent=(x[0] - dx, x[-1] + dx, y[-1] - dy, y[0] + dy), aspect="auto", interpolation="none")
-    for t, h in np.argwhere(panel.predicted):
-        axis.add_patch(Rectangle((x[h] - dx, y[t] - dy), 2 * dx, 2 * dy, fill=False, lw=0, hatch=HATCH, ec="#FFFFFF"))
+    for cells_of, hatch, ink in ((panel.predicted, HATCH, "#FFFFFF"), (panel.winner < 0, UNREACHED, "#BBBBBB")):
+        for t, h in np.argwhere(cells_of):
+            axis.add_patch(Rectangle((x[h] - dx, y[t] - dy), 2 * dx, 2 * dy, fill=False, lw=0, hatch=hatch, ec=ink))
     level = np.argwhere((panel.winner >= 0) & (panel.ratio < far.TIE))
     axis.plot(x[level[:, 1]], y[level[:, 0]], ls="none", marker="o", ms=2.4, mfc="white", mec="black", mew=0.3)
     axis.vlines(x[1:] - dx, y[-1] - dy, y[0] + dy, color="white", lw=0.3)

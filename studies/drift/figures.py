@@ -44,7 +44,6 @@ def _residuals(histories: xr.Dataset) -> Picture:
                 good = np.isfinite(r) & np.isfinite(t) & (t > 0.0)
                 if good.any():
                     t, r = t[good], np.maximum(r[good], SMALLEST)
-                    axis.plot(t, r, ",", color=look(name).color, alpha=0.25, zorder=2, rasterized=True)
                     axis.plot(*envelope(t, r), **line(name, 0.8), label=name, zorder=3)
             axis.set(xscale="log", yscale="log")
         row[0].set_ylabel(f"relative change of {LABELS[constant]}")
@@ -54,11 +53,11 @@ def _residuals(histories: xr.Dataset) -> Picture:
         axis.set_title(f"scene {scene}")
         first, last = axis.get_xlim()
         axis.autoscale(enable=False)
-        slope_guide(axis, 1.0, (first * 6.0, last / 2.0), 1e-8, "as $t$")
+        slope_guide(axis, 1.0, (first * 6.0, last / 2.0), 1e-11, "as $t$")
     for axis in axes[-1]:
         axis.set_xlabel("time (s)")
     few_ticks(*axes.flat)
-    note = "markers: the largest in a span of time\ndots: single samples"  # where every panel of p_phi is empty
+    note = "a marker: the largest\nin a span of time"  # where every panel of p_phi is empty
     axes[1, 0].text(0.98, 0.45, note, transform=axes[1, 0].transAxes, ha="right", va="center", **NOTE)
     legend_below(figure, axes)
     return Picture("residuals", figure)

@@ -7,21 +7,21 @@ import numpy as np
 import xarray as xr
 
 from symtop.methods.framework.registry import split_name
-from symtop.report.figures import MOST_NAMED, error_band, label_lines
+from symtop.report.figures import error_band, label_lines
 from symtop.report.style import LEAST_TEXT, look, panels
 from symtop.runner.study import REFERENCE, Chart, Picture, Series
 
 from .facts import shown
 
-PALE, SCIPY = "#B8B8B8", (0, (1.2, 1.4))  # of methods that few people know; the line of what is called through SciPy
-NAMES = {  # of what is not pale
+SCIPY = (0, (1.2, 1.4))  # the line of what is called through SciPy
+NAMES = {  # beside the lines; others have the names of their methods
     "stormer-verlet[angles]": "Störmer-Verlet", "midpoint[angles]": "midpoint (discrete Lagrangian)",
     "trapezoidal[angles]": "trapezoidal (discrete Lagrangian)", "rk4[axis]": "RK4", "gauss-8[axis]": "Gauss 8",
     "rk45-compiled[axis]": "RK45, adaptive", "rk45[axis]": "RK45 through SciPy",
     "tsit5-fixed[axis]": "Tsit5, fixed steps", "dop853-compiled[axis]": "DOP853, adaptive",
     "dop853[axis]": "DOP853 through SciPy", "vern9-fixed[axis]": "Vern9, fixed steps",
-    "strang[axis]": "Strang splitting", "takahashi-imada[axis]": "Takahashi-Imada (symmetric)",
-    "taylor[axis]": "Taylor (heyoka), adaptive",
+    "strang[axis]": "Strang splitting", "takahashi-imada[axis]": "Takahashi-Imada (symmetric body)",
+    "taylor[axis]": "Taylor (heyoka), adaptive", "series[axis]": "series, for\nthis top alone",
 }  # fmt: skip
 LEAST, MOST = 1e-16, 3.0  # rad, of the panel
 COSTS = {"time of a run, one core (µs)": "seconds", "force evaluations": "force_evaluations"}
@@ -40,7 +40,6 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     axis.set_xlabel(f"time of a run of {float(part['nutations']):g} nutations, one core (µs)")
     axis.set_ylabel("largest error of the axis (rad)")
     level = error_band(axis, part["axis_bound"].values)
-    few = part.sizes["variant"] <= MOST_NAMED
     for name in map(str, part["variant"].values):
         cell = part.sel(variant=name)
         x, y = (cell[key].values for key in ("seconds", "axis"))
@@ -48,11 +47,9 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         if name == REFERENCE or not good.any():
             continue
         method = split_name(name)[0]
-        label = NAMES.get(name, "Taylor for this top" if method == "series" else method)
-        color, dash = look(name).color if few or name in NAMES else PALE, SCIPY if "SciPy" in label else "-"
+        label, color = NAMES.get(name, method), look(name).color
         x, y = x[good], np.maximum(y[good], 0.3 * level)
-        thick = (1.0, 1.5, 1.5) if color == PALE else (1.7, 2.4, 2.0)
-        axis.plot(x, y, color=color, ls=dash, marker="o", **dict(zip(("lw", "ms", "zorder"), thick, strict=True)))
+        axis.plot(x, y, color=color, ls=SCIPY if "SciPy" in label else "-", marker="o", lw=1.7, ms=2.4)
         ends.append((label, color, x, y))
     axis.text(0.995, math.sqrt(LEAST * level), "below the bound of the truth ", transform=axis.get_yaxis_transform(),
               ha="right", va="center", fontsize=LEAST_TEXT, color="#444444")  # fmt: skip
@@ -65,7 +62,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         above |= {"color": "#444444", "fontsize": LEAST_TEXT}
         axis.annotate("exact motion, no integrator", (exact, 1.0), (0, 2), **above)
     low, high = axis.get_xlim()
-    axis.set_xlim(low, 6.0 * high)  # with room for the labels
+    axis.set_xlim(0.5 * low, 2.0 * high)  # with room for the labels
     label_lines(axis, ends, walls)
     return [Picture("error-against-time", figure)]
 

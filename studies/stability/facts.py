@@ -11,6 +11,7 @@ from symtop.report.formats import abridged
 
 from .atlas import COMMON, FAST, NEAR, SLOW, OutcomeMap, families, halved_by_pole, map_of, maps, methods_of
 from .failures import LOST, MOST
+from .many_verdicts import SAID
 from .mechanisms import BARELY, lawful, limits, measured, misses, outlasting, resonant, sampled
 from .tables import PERIODS
 
@@ -156,7 +157,7 @@ def atlas_table(data: xr.Dataset) -> pd.DataFrame:
                 "accurate (%)": 100.0 * one.accurate,
                 "accurate up to, fast tops": one.usual_reach["fast"],
                 "accurate up to, slow tops": one.usual_reach["slow"],
-                "fails from": one.failure.setting, "fails mostly by": one.failure.kind.replace("_", " "),
+                "fails from": one.failure.setting, "fails mostly by": SAID.get(one.failure.kind, ""),
                 "ended early (%)": 100.0 * one.early, "wrong without an error (%)": 100.0 * one.silent,
                 "small nutations grow from": None if limit is None else float(limit.min()),
             })  # fmt: skip

@@ -17,8 +17,8 @@ from symtop.report.figures import chosen
 from symtop.runner.study import Picture
 
 from .atlas import OutcomeMap, families, maps
-from .failures import LOST, SEEN
-from .many_verdicts import JUDGED
+from .failures import LOST, MOST as LARGEST, SEEN
+from .many_verdicts import EARLY, JUDGED, SAID
 from .mechanisms import measured
 
 KNOWN = (  # the variants whose maps are drawn, if they are there
@@ -27,9 +27,8 @@ KNOWN = (  # the variants whose maps are drawn, if they are there
 )  # fmt: skip
 MOST, COLUMNS = len(KNOWN), 4  # maps in a figure, and beside each other
 OUTCOMES = {  # as the key names them; what ends early for any reason is one of them
-    "accurate": style.GREEN, "bounded energy, wrong motion": style.YELLOW, "energy drifts": style.ORANGE,
-    "crosses a turning point of the true motion": style.PURPLE, "ended early": style.BLACK,
-    "accurate, not run": "#9FDAC8",
+    **dict(zip((SAID[name] for name in JUDGED), (style.GREEN, style.YELLOW, style.ORANGE, style.PURPLE), strict=True)),
+    EARLY: style.BLACK, "accurate, not run": "#9FDAC8",
 }  # fmt: skip
 LINES = {"linear_limit": ("small nutations grow beyond", "-"),
          "third_turn": ("a step turns the nutation by a third", (0, (4, 2)))}  # fmt: skip
@@ -138,7 +137,7 @@ def _resonance(axis: Any, data: xr.Dataset) -> None:
     _lines(axis, part, "phase_value", "surviving")
     axis.set(
         xlabel=r"step $h\omega$ ($\omega$: frequency of the nutation)",
-        ylabel="survives a displacement of (rad)",
+        ylabel=f"largest displacement survived\n(rad; {LARGEST:g}: none larger tried)",
         title="resonance of step and nutation",
     )
 

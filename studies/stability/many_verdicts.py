@@ -25,6 +25,9 @@ from symtop.model.top import effective_potential, flat
 JUDGED = ("accurate", "bounded_but_wrong", "drifting", "wrong_regime")
 VERDICTS = (*JUDGED, *OUTCOMES[1:])
 BOUNDED_BUT_WRONG, DRIFTING, WRONG_REGIME = 1, 2, 3
+EARLY = "ended early"
+SAID = dict(zip(JUDGED, ("accurate", "bounded energy, wrong motion", "energy drifts", "crosses a turning point"),
+                strict=True)) | {name: f"{EARLY}: {name.replace('_', ' ')}" for name in OUTCOMES[1:]}  # fmt: skip
 
 
 class Judged(NamedTuple):

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.patches import Rectangle
 from matplotlib.patheffects import withStroke
+from matplotlib.transforms import Bbox
 
 from symtop.report.style import LEAST_TEXT, ink
 
@@ -68,7 +69,7 @@ def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]]) -> None:
 
 
 def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: Sequence[tuple[Any, Any]] = ()) -> None:
-    """Write the name of each line beside an end of it or its middle, in its colour, where it covers little else.
+    """Write the name of each line beside a point of it, at best the last, in its colour, where it covers little else.
 
     `lines` have name, colour, x and y, and `others`, which have no name, x and y. Limits and layout of the panel must
     be final.
@@ -77,41 +78,47 @@ def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: S
         return
     figure = axis.figure.canvas.figure
     figure.draw_without_rendering()
-    renderer, frame = figure.canvas.get_renderer(), axis.get_window_extent()
+    renderer, frame, point = figure.canvas.get_renderer(), axis.get_window_extent(), figure.dpi / 72.0
     marks = np.concatenate([_dense(axis, x, y) for *_, x, y in [*lines, *others]])
+    dots = [axis.transData.transform(np.stack([x, y], axis=1)) for *_, x, y in lines]
+    halo = [withStroke(linewidth=2.5, foreground="white")]  # over the lines that a name covers
+    look: dict[str, Any] = {"textcoords": "offset points", "va": "center", "size": LEAST_TEXT, "weight": "bold"}
     boxes: list[Any] = []
-    for name, color, x, y in sorted(lines, key=lambda one: -len(one[0])):
-        look = {
-            "textcoords": "offset points",
-            "va": "center",
-            "size": LEAST_TEXT,
-            "color": ink(color),
-            "weight": "bold",
-            "path_effects": [withStroke(linewidth=2.5, foreground="white")],  # over the lines that it covers
-        }
+    for place in sorted(range(len(lines)), key=lambda place: -len(lines[place][0])):
+        name, color, x, y = lines[place]
+        text = axis.annotate(name, (x[0], y[0]), (0, 0), color=ink(color), path_effects=halo, **look)
+        size, own = text.get_window_extent(renderer).size, dots[place]
+        foreign = np.concatenate([marks[:0], *(each for one, each in enumerate(dots) if one != place)])
+        between = np.concatenate([own[1:-1], 0.5 * (own[1:] + own[:-1])])
+        spots = [own[-1], own[0], *between[:: len(between) // MOST_SPOTS + 1]]
         candidates: list[Any] = []
-        for kind, (dx, dy, side) in product(range(3), PLACES):
-            end = (len(x) - 1, 0, len(x) // 2)[kind]
-            text = axis.annotate(name, (x[end], y[end]), (dx, dy), ha=side, **look)
-            box = text.get_window_extent(renderer)
+        for k, (dx, dy, side) in product(range(len(spots)), PLACES):
+            low = spots[k] + point * np.array([dx, dy]) - size * (0.5 - 0.5 * np.sign(dx), 0.5)
+            box = Bbox([low, low + size])
             out = box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0 or box.y1 > frame.y1
-            covered = np.all((marks > box.min) & (marks < box.max), axis=1).sum()
-            price = (
-                1e3 * (sum(box.overlaps(other) for other in boxes) + out) + covered + abs(dy) / 3.0 + ELSEWHERE[kind]
-            )
-            candidates.append((price, len(candidates), text, box))
-        best = min(candidates)
-        for _, _, text, _ in candidates:
-            if text is not best[2]:
-                text.remove()
-        boxes.append(best[3])
+            covered = LINE * _inside(marks, box).sum() + WRONG * _inside(foreign, box, BESIDE).sum()
+            covered += WRONG * _inside(np.concatenate(dots), box, 2.0).sum()
+            price = 1e3 * (sum(box.overlaps(other) for other in boxes) + out) + covered
+            price += abs(dy) / 2.0 + ELSEWHERE[min(k, 2)] + ASIDE[side]
+            candidates.append((price, len(candidates), box, spots[k], (dx, dy), side))
+        *_, box, text.xy, shift, side = min(candidates)
+        text.xy = axis.transData.inverted().transform(text.xy)
+        text.set(position=shift, ha=side)
+        boxes.append(box)
 
 
 APART = 3.0  # pixels
-ELSEWHERE = (0.0, 2.0, 8.0)  # points of lines that a name covers rather than stand at the first end, or in the middle
-PLACES = tuple(
-    (dx, dy, side) for dx, side in ((5, "left"), (-5, "right")) for dy in (0, -5, 5, -9, 9, -14, 14)
-)  # points
+MOST_SPOTS = 40  # of a line between its ends, beside which its name is tried
+BESIDE = (16.0, 10.0)  # pixels to a dot of another line, whose the name seems to be
+LINE, WRONG, ELSEWHERE = 0.8, 8.0, (0.0, 2.0, 6.0)  # prices: a point of a line covered, such a dot; first end, inside
+ASIDE = {"left": 0.0, "right": 2.0, "center": 14.0}  # of the side of a name that is at its place
+PLACES = (*((dx, dy, side) for dx, side in ((5, "left"), (-5, "right")) for dy in (0, -5, 5, -9, 9)),
+          *((0, dy, "center") for dy in (-11, 11, -15, 15)))  # fmt: skip
+
+
+def _inside(points: Any, box: Any, margin: Any = 0.0) -> Any:
+    """Which points lie in a box or within a margin of it."""
+    return np.all((points > box.min - margin) & (points < box.max + margin), axis=1)
 
 
 def _dense(axis: Any, x: Any, y: Any) -> Any:

@@ -61,6 +61,7 @@ DASHES = {  # of a line, by family; a family that is not here has a solid one
     "splitting": (0, (6.0, 1.2)), "runge-kutta": (0, (3.0, 1.2)), "lie-group": (0, (6.0, 1.2, 1.0, 1.2)),
     "taylor": (0, (1.5, 0.8)), "library": (0, (1.0, 1.6)), "engine": (0, (3.0, 1.2, 1.0, 1.2)),
 }  # fmt: skip
+ADAPTIVE = (0, (6.0, 1.2, 1.0, 1.2, 1.0, 1.2))  # of Runge-Kutta with a tolerance: a formula may be drawn both ways
 UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata that would change a file made again
 _MARKERS = "osv^<>DPXph8dH"
 
@@ -68,13 +69,14 @@ _LOOKS = {  # of methods that people know, in one colour with fixed steps and th
     "midpoint": Look(BLUE, "o", 6.0), "trapezoidal": Look(SKY, "s"), "stormer-verlet": Look(GREEN, "^"),
     "strang": Look(LEAF, "<"), "cayley": Look(GREENS[1], ">"), "takahashi-imada": Look(GREENS[2], "P"),
     "yoshida-4": Look(GREENS[2], "p"), "srkn-14-6": Look(GREENS[1], "H"), "chin-4a": Look(TEAL, "D"),
-    "rk4": Look(ORANGE, "o"),
-    "rk45-compiled": Look(VERMILLION, "s"), "rk45": Look(VERMILLION, "D"), "tsit5-fixed": Look(NAVY, "P"),
-    "tsit5": Look(NAVY, "X"), "vern9-fixed": Look(PLUM, "s"), "vern9": Look(PLUM, "d"),
+    "kahan-li-8": Look(GREENS[2], "X"), "five-rotations": Look(TEAL, "s"), "euler-poincare": Look(SKY, "D"),
+    "galerkin-simpson": Look(NAVY, "D"), "lie-variational": Look(BLUE, "v"),
+    "rk4": Look(ORANGE, "o"), "rk45-compiled": Look(VERMILLION, "s"), "rk45": Look(VERMILLION, "D"),
+    "tsit5-fixed": Look(NAVY, "P"), "tsit5": Look(NAVY, "X"), "vern9-fixed": Look(PLUM, "s"), "vern9": Look(PLUM, "d"),
     "dop853-compiled": Look(BROWN, "v"), "dop853-compiled-fixed": Look(BROWN, "^"), "dop853": Look(BROWN, "o"),
-    "gauss-4": Look(PURPLE, "^"), "gauss-8": Look(PURPLE, ">"), "lsoda": Look(REDS[1], "s"),
-    "radau": Look(REDS[2], "v"), "taylor": Look(BLACK, "*", 6.0), "series": Look(BLACKS[1], "D"),
-    "exact": Look(GREY, "x"),
+    "gauss-4": Look(PURPLE, "^"), "gauss-8": Look(PURPLE, ">"), "gauss-12": Look(ORANGE, "X"),
+    "lsoda": Look(REDS[1], "s"), "radau": Look(REDS[2], "v"), "taylor": Look(BLACK, "*", 6.0),
+    "series": Look(BLACKS[2], "D"), "series-general": Look(BLACKS[1], "D"), "exact": Look(GREY, "x"),
 }  # fmt: skip
 
 FILLS = {"angles": "none", "axis": "full", "attitude": "left", "body": "top"}  # of a marker, by chart
@@ -93,7 +95,8 @@ def look(name: str) -> Look:
         return look(name)._replace(fill=FILLS[chart])
     registered = integrators()
     family = registered[name].family if name in registered else "other"
-    dash = DASHES.get(family, "-")
+    adaptive = family == "runge-kutta" and not registered[name].fixed_step
+    dash = ADAPTIVE if adaptive else DASHES.get(family, "-")
     if name in _LOOKS:
         return _LOOKS[name]._replace(dash=dash)
     pairs = {one[:2] for one in _LOOKS.values()}

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from PIL import Image
 
@@ -17,7 +18,6 @@ from symtop.runner import run as runner
 
 MOST_LINES, MOST_ENTRIES = 10, 8
 GREYS = 0.05  # of saturation: a line of less colour is drawn for context
-KEYED = ("stability",)  # whose maps have a key of colours, not names of lines
 SHOWN_BY_ORDER = ("engines", "oscillators", "truth")  # whose lines are coloured by what they are, not by method
 
 
@@ -43,8 +43,8 @@ def faults(name, figure) -> list[str]:
     if not figure.get_suptitle() and runner.file_beside(name, "page.md") is None:  # a template has the titles
         problems.append("no message")
     legends = [*figure.legends, *(axis.get_legend() for axis in figure.axes if axis.get_legend())]
-    most = max((len(one.get_texts()) for one in legends), default=0)
-    if most > MOST_ENTRIES and name not in (*SHOWN_BY_ORDER, *KEYED):
+    lines = [sum(isinstance(entry, Line2D) for entry in one.legend_handles) for one in legends]  # a map has patches
+    if (most := max(lines, default=0)) > MOST_ENTRIES and name not in SHOWN_BY_ORDER:
         problems.append(f"a legend of {most} entries")
     for axis in figure.axes if name not in SHOWN_BY_ORDER else []:
         kinds = {line.get_label() for line in axis.get_lines() if saturation(line.get_color()) > GREYS}

@@ -470,5 +470,5 @@ def test_the_page_says_what_was_measured_and_shares_of_silent_runs_are_of_their_
     assert np.array_equal(rows["wrong"], health.wrong[at, kind] / health.drawn[kind])
     text = checked("cost", small, tmp_path, elsewhere={"use", "have"})
     named = {one.get_text() for one in figures.draw_accuracy(small).axes[0].texts}
-    assert {"takahashi-imada[axis] (symmetric)", "rk4[axis]"} <= named
+    assert {"takahashi-imada (symmetric)", "rk4"} <= named
     assert PARTIAL in text  # there are no long runs
