@@ -11,7 +11,7 @@ import importlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from symtop.core import __version__ as __version__, old_paths as old_paths
+from symtop.core import __version__ as __version__
 
 if TYPE_CHECKING:
     from symtop.advise import Advice as Advice, recommend as recommend

@@ -628,7 +628,7 @@ def i_use(
     best = min(errors, key=lambda name: errors[name])
     error = errors[best]
     if accuracy is not None:
-        limits["step_size"] = step_size
+        limits["step_size"] = h
     elif limits.get("quantity") not in (None, "axis"):
         raise SymtopError(f"quantity must be axis where there is no accuracy, not {limits['quantity']!r}", "quantity")
     target = error if accuracy is None else accuracy

@@ -197,7 +197,7 @@ class Code:
         self._parts: dict[tuple[str, int], Part] = {}
         self._open: list[Part] = []
         self._at = Part("", "", None)
-        self._held: dict[int, object] = {}  # values of the present part that were added, by id
+        self._held: dict[int, tuple[object, str]] = {}  # values of the present part by id, each with its hash
 
     def reached(self, label: str, *things: object) -> list[Part]:
         """The parts that things lead to, the first of them, under that label, the things themselves."""
@@ -262,9 +262,14 @@ class Code:
             self._add_class(thing)
         elif isinstance(thing, ModuleType):
             self._note(thing.__name__)
-        elif id(thing) not in self._held:
-            self._held[id(thing)] = thing
-            self._add_value(thing)
+        else:
+            values, begin = self._at.values, len(self._at.values)
+            if id(thing) not in self._held:
+                self._held[id(thing)] = thing, "itself"  # where a cycle leads back to it
+                self._add_value(thing)
+                self._held[id(thing)] = thing, hashed(*values[begin:])
+                del values[begin:]
+            values.append(self._held[id(thing)][1])
 
     def _add_function(self, function: FunctionType) -> None:
         file, library = function.__code__.co_filename, _of_library(function.__module__)

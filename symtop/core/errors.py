@@ -131,7 +131,7 @@ def at_home(path: str | os.PathLike[str]) -> Path:
 def row(name: str, values: object) -> list[float]:
     """Return `values` as a list of finite floats; refuse anything that is not a row of them."""
     with contextlib.suppress(TypeError):  # nothing to go through, such as an array without dimensions
-        entries = None if isinstance(values, (str, bytes, dict)) else list(values)  # type: ignore[call-overload]
+        entries = None if isinstance(values, (str, bytes, dict, set)) else list(values)  # type: ignore[call-overload]
         if entries is not None:
             return [finite(f"an entry of {name}", value) for value in entries]
     raise SymtopError(f"{name} must be a row of numbers, not {shown(values)}", name)

@@ -126,12 +126,12 @@ def by_last_use(folder: Path) -> list[Path]:
 def replacing(path: str | os.PathLike[str], suffix: str = "", mode: int = 0o666) -> Iterator[Path]:
     """A file to write to in place of `path`, which it replaces in one move if all goes well and not at all if not.
 
-    The user's umask restricts `mode`, as of any new file. Raises SymtopError if the disk is full, the folder cannot be
-    written to, or `path` is a folder.
+    The user's umask restricts `mode`, and of a link what it names is replaced. Raises SymtopError if the disk is full,
+    the folder cannot be written to, or `path` is a folder.
     """
-    target = Path(path)
-    if "\0" in str(target):
-        raise SymtopError(f"a path must not hold a null character, as {str(target)!r} does")
+    if "\0" in str(path):
+        raise SymtopError(f"a path must not hold a null character, as {str(path)!r} does")
+    target = Path(os.path.realpath(path))
     partial = target.parent / f".{target.name}.{os.urandom(4).hex()}.part{suffix}"
     try:
         if target.is_dir():

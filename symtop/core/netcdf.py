@@ -150,7 +150,8 @@ def write_text(path: Path, text: str) -> None:
 
 def write_json(path: Path, content: Any) -> None:
     """Replace a JSON file in one move."""
-    write_text(path, json.dumps(content, indent=1, ensure_ascii=False, default=str) + "\n")
+    plain = lambda value: value.tolist() if isinstance(value, (np.generic, np.ndarray)) else str(value)
+    write_text(path, json.dumps(content, indent=1, ensure_ascii=False, default=plain) + "\n")
 
 
 def read_json(path: Path) -> Any:

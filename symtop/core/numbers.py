@@ -28,7 +28,7 @@ def context(digits: int) -> Any:
 
 
 def real_numbers(name: str, values: object) -> np.ndarray:
-    """An array of doubles of any shape, C-ordered; SymtopError for anything else, complex numbers and text included."""
+    """An array of doubles of any shape, C-ordered; SymtopError for all else: complex numbers, text, masked entries."""
     if type(values) is np.ndarray and values.dtype == np.float64:
         return np.ascontiguousarray(values).reshape(values.shape)
     try:
@@ -37,6 +37,6 @@ def real_numbers(name: str, values: object) -> np.ndarray:
             array = np.array([finite(name, value) for value in array.ravel().tolist()]).reshape(array.shape)
     except (TypeError, ValueError, OverflowError):  # ragged, or no number
         array = np.empty(0, dtype=object)
-    if array.dtype.kind not in "fiu":
+    if array.dtype.kind not in "fiu" or np.ma.is_masked(values):
         raise SymtopError(f"{name} must be real numbers, not {short(values)}")
     return np.asarray(array, dtype=np.float64, order="C")

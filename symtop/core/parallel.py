@@ -6,6 +6,7 @@ with one. It reads its variable when it is loaded, so that it is set while a pro
 
 import os
 import threading
+from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from itertools import islice
@@ -18,6 +19,7 @@ Result = TypeVar("Result")
 MOST_THREADS = 1024
 AHEAD = 2  # pieces for each thread that are computed before their turn: results that wait take memory
 _stop = threading.local()
+_starting = threading.Lock()  # a process, whose environment is set while it starts
 
 
 class StoppedError(Exception):
@@ -58,9 +60,9 @@ def in_threads(work: Callable[[Piece], Result], pieces: Iterable[Piece], threads
 def in_order(pool: Executor, work: Callable[[Piece], Result], pieces: Iterable[Piece], ahead: int) -> Iterator[Result]:
     """The results of the pieces that a pool computes, in their order; `ahead` of them are with the pool at a time."""
     rest = iter(pieces)
-    submitted: list[Future[Result]] = [pool.submit(work, piece) for piece in islice(rest, ahead)]
+    submitted: deque[Future[Result]] = deque(pool.submit(work, piece) for piece in islice(rest, ahead))
     while submitted:
-        yield submitted.pop(0).result()
+        yield submitted.popleft().result()
         submitted += [pool.submit(work, piece) for piece in islice(rest, 1)]
 
 
@@ -72,13 +74,14 @@ class OneThread(SpawnProcess):
 
     def start(self) -> None:
         """Start it; the environment of this process is afterwards what it was."""
-        added = [name for name in VARIABLES if name not in os.environ]
-        os.environ.update(dict.fromkeys(added, "1"))
-        try:
-            super().start()
-        finally:
-            for name in added:
-                del os.environ[name]
+        with _starting:
+            added = [name for name in VARIABLES if name not in os.environ]
+            os.environ.update(dict.fromkeys(added, "1"))
+            try:
+                super().start()
+            finally:
+                for name in added:
+                    del os.environ[name]
 
 
 class OneThreadEach(SpawnContext):

@@ -84,8 +84,9 @@ def deferred() -> Iterator[None]:
     finally:
         for number, handler in usual.items():
             signal.signal(number, handler)
-        if requests:
-            signal.raise_signal(requests[0])
+        with contextlib.ExitStack() as stack:  # each is heard, whatever the one before raises
+            for number in reversed(dict.fromkeys(requests)):
+                stack.callback(signal.raise_signal, number)
 
 
 @contextlib.contextmanager
@@ -104,12 +105,13 @@ def at_most(seconds: float | None, *, processor: bool = True) -> Iterator[None]:
 
     number, timer = (signal.SIGVTALRM, signal.ITIMER_VIRTUAL) if processor else (signal.SIGALRM, signal.ITIMER_REAL)
     before = signal.signal(number, stop)
-    signal.setitimer(timer, seconds, 1.0)
+    outer = signal.setitimer(timer, seconds, 1.0)
     try:
         yield
     finally:
-        signal.setitimer(timer, 0.0)
+        left = signal.setitimer(timer, 0.0)[0]
         signal.signal(number, before)
+        signal.setitimer(timer, max(outer[0] - (seconds - left), 1e-3) if outer[0] else 0.0, outer[1])  # one around it
 
 
 def is_of_user(error: BaseException) -> bool:

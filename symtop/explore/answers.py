@@ -83,7 +83,7 @@ class Setup:
         return control | {"observe": "attitude", "samples": self.samples, "budget": self.budget}
 
 
-_budgets: dict[tuple[str, int], float] = {}  # by method and decade of the tolerance: the same for a run and its script
+_budgets: dict[tuple[str, bool, int], float] = {}  # by method, kind of body and decade of the tolerance
 
 
 def _budget(config: Setup) -> float:
@@ -93,7 +93,7 @@ def _budget(config: Setup) -> float:
     tolerance shrinks: no field of an integrator says as much.
     """
     tolerance = config.setting or 1.0
-    key = config.method.name, math.floor(math.log10(tolerance))
+    key = config.method.name, config.scene.of_body, math.floor(math.log10(tolerance))
     most = MOST_WORK[config.method.implementation]
     if key in _budgets:
         return _budgets[key]

@@ -69,7 +69,7 @@ def _compute(scene: Scene, variants: dict[str, Integrator], key: tuple[Any, ...]
             rows[name] = [dict(zip(("setting_value", "outcome", "error"), run, strict=True)) for run in runs]
         try:
             timed_rows([(scene, variants[name], scene.horizon, own) for name, own in rows.items()])
-        except SymtopError as problem:
+        except Exception as problem:  # noqa: BLE001  (as above)
             rows, messages = {name: [] for name in rows}, dict.fromkeys(rows, str(problem))
         while len(_charts) >= MOST_CHARTS:
             del _charts[next(iter(_charts))]

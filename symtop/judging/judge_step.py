@@ -44,13 +44,13 @@ from symtop.judging.claims.subject import Subject, open_target, seconds_a_step
 from symtop.judging.findings import About, Finding, Ledger, Measured, error_units, undecided
 from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
 from symtop.measure.conservation import CONSTANTS, constant_of
-from symtop.measure.errors import checked, completed, errors, refuse_other_order, refuse_other_scene, sampled
+from symtop.measure.errors import checked, completed, doubles, errors, refuse_other_order, refuse_other_scene, sampled
 from symtop.methods.framework.registry import ENERGY_ERRORS, Integrator
 from symtop.model.body import rotated
 from symtop.model.charts import CHARTS, axis_distance, axis_from_quaternion, body_energy, space_energy
 from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.reference.truth import reference
-from symtop.run.trajectory import Trajectory
+from symtop.run.trajectory import Trajectory, column
 
 FILES = (".csv", ".txt", ".dat", ".nc")
 VECTORS = {
@@ -165,7 +165,7 @@ def _no_solver(*_: Any) -> Any:
 def read(target: Any) -> dict[str, Any]:
     """Columns by name, of a text file, a Dataset or a mapping; SymtopError for anything else."""
     if not isinstance(target, (str, Path)):
-        return {name: np.asarray(target[name]) for name in (*VECTORS, *SCALARS) if name in target}
+        return {name: doubles(name, column(target, name)) for name in (*VECTORS, *SCALARS) if name in target}
     path = at_home(target)
     try:
         head, *lines = path.read_text(encoding="utf-8-sig").replace(",", " ").splitlines()
@@ -281,22 +281,29 @@ def _from_states(scene: Scene, states: Trajectory) -> dict[str, np.ndarray]:
 
 
 def _error(name: str, scene: Scene, time: np.ndarray, deviation: xr.Dataset) -> Finding:
-    """The largest error of a quantity and its law of growth."""
-    values = deviation[name].values
+    """The largest error of a quantity and its law of growth, of the samples that are not lost."""
+    there = np.isfinite(deviation[name].values)
+    if not there.any():
+        return undecided(f"{name}_error", "", f"all of its {there.size} samples are lost")
+    time, values, lost = time[there], deviation[name].values[there], int((~there).sum())
     growth = constant_of(time, values) if time.size >= FEWEST else None
-    largest = float(np.nanmax(values)) if np.isfinite(values).any() else math.nan
+    largest, gone = float(values.max()), f", {lost} of {there.size} samples lost" * bool(lost)
     bound = float(np.nanmax(deviation[f"{name}_bound"].values))
     unit = error_units(name)
-    why = f"largest error {largest:.1e}{unit} in {time.size} samples up to t = {time[-1]:.4g}{scene.second}"
+    why = f"largest error {largest:.1e}{unit} in {time.size} samples up to t = {time[-1]:.4g}{scene.second}{gone}"
     if growth is not None and math.isfinite(growth.exponent):
         why += f", growing as t^{growth.exponent:.2f} +- {growth.exponent_interval:.2f} ({growth.law})"
     law = growth.law if growth is not None and growth.law not in ("undecided", "not judged") else ""
-    measured = Measured(law, largest, text=f"{largest:.0e}{unit}{law and ', '}{law}")
+    measured = Measured(law, largest, text=f"{largest:.0e}{unit}{law and ', '}{law}{gone}")
     return Finding(f"{name}_error", "", measured, "measured", why, largest, bound)
 
 
 def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, scene: Scene) -> Finding:
     """What became of a constant of the motion, beside what is claimed of it."""
+    there = ~np.isnan(values)
+    if not there.any():
+        return undecided(name, declared, f"all of its {there.size} samples are lost")
+    time, values = time[there], values[there]
     scale, grain = (scene.energy_scale, scene.energy_grain) if name == "energy" else (scene.momentum_scale, 1.0)
     true = getattr(scene.top.momenta(scene.start), name) if name != "energy" else scene.top.energy(scene.start)
     times = time if time[-1] else [1.0]  # of a start alone nothing grows
@@ -305,8 +312,13 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
     if time.size < FEWEST:
         change = change._replace(exponent=math.nan)
     constant = Constant(change, math.nan, KEPT * grain, grain)
-    words = f"in {time.size} samples; it begins {abs(values[0] - true) / scale:.1e} from the scene's"
+    count = f"{time.size}{f' of {there.size}' * (not there.all())} samples"
+    words = f"in {count}; it begins {abs(values[0] - true) / scale:.1e} from the scene's"
     finding = constant.finding(name, declared, constant.words(words))
+    if finding.verdict != "refuted" and time.size < FEWEST and np.ptp(time) < scene.time_scale():
+        finding = undecided(
+            name, declared, f"{finding.why}; fewer than {FEWEST}, over less than a {scene.period_word}, say nothing"
+        )
     beyond = blows_up(scene, (values - values[0]) / scale) if name == "energy" else np.empty(0)
     return blow_up_finding(finding, time[beyond[0]]) if beyond.size else finding
 

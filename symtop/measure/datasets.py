@@ -1,6 +1,7 @@
 """Datasets over scene and variant: made of those of single cases, and compared with each other."""
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,10 @@ def _dense(cases: list[tuple[Any, xr.Dataset]]) -> xr.Dataset:
             cells.append((case.scene, case.integrator, data))
     scenes, methods = (list(dict.fromkeys(names)) for names in list(zip(*cells, strict=True))[:2])
     sizes, coordinates = _coordinates(cells)
+    kinds: dict[str, list[Any]] = {}
+    for _, _, data in cells:
+        for name, variable in data.data_vars.items():
+            kinds.setdefault(str(name), []).append(variable.dtype)
     filled: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]] = {}
     keys = set[tuple[str, str, str]]()
     for scene, method, data in cells:
@@ -59,8 +64,10 @@ def _dense(cases: list[tuple[Any, xr.Dataset]]) -> xr.Dataset:
             keys.add((scene, method, str(name)))
             dims = tuple(str(dim) for dim in variable.dims)
             if str(name) not in filled:
-                blank = np.full((len(scenes), len(methods), *(sizes[dim] for dim in dims)), *_blank(variable.dtype))
+                blank = np.full((len(scenes), len(methods), *(sizes[dim] for dim in dims)), *_blank(kinds[str(name)]))
                 filled[str(name)] = ("scene", "variant", *dims), blank, dict(variable.attrs)
+            if (other := filled[str(name)][0][2:]) != dims:
+                raise SymtopError(f"{name} of {method} on {scene} must be over {other}, as in other cases, not {dims}")
             corner = tuple(slice(0, size) for size in variable.shape)
             filled[str(name)][1][(*place, *corner)] = variable.values
     variables = {name: (dims, as_text(values), attrs) for name, (dims, values, attrs) in filled.items()}
@@ -74,7 +81,7 @@ def _coordinates(cells: list[Cell]) -> tuple[dict[str, int], dict[str, Any]]:
     for scene, method, data in cells:
         for dim, size in data.sizes.items():
             name = str(dim)
-            if name in longest and dim in data.coords and data[dim].dtype.kind == "f":
+            if name in longest and dim in data.coords:
                 shared = min(size, sizes[name])
                 if not np.array_equal(data[dim].values[:shared], longest[name].values[:shared]):
                     raise SymtopError(f"the coordinate {name} of {method} on {scene} differs from that of other cases")
@@ -85,10 +92,11 @@ def _coordinates(cells: list[Cell]) -> tuple[dict[str, int], dict[str, Any]]:
     return sizes, longest
 
 
-def _blank(kind: "np.dtype[Any]") -> tuple[Any, Any]:
-    """What stands for nothing in an array of that type, and the type that can hold it."""
-    if kind.kind in "OUT":
+def _blank(kinds: "Sequence[np.dtype[Any]]") -> tuple[Any, Any]:
+    """What stands for nothing in an array of values of those types, and the type that can hold all of them."""
+    if any(kind.kind in "OUT" for kind in kinds):
         return "", object
+    kind = np.result_type(*kinds)
     return (np.iinfo(kind).max, kind) if kind.kind == "u" else (math.nan, kind if kind == np.float32 else float)
 
 

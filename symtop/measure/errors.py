@@ -245,7 +245,7 @@ def sampled(run: xr.Dataset) -> xr.Dataset:
     """
     if "integrator" not in run.attrs or "time" not in run or run["time"].dims != ("time",):
         return run
-    there = np.isfinite(_numbers("time", run["time"]))
+    there = np.isfinite(doubles("time", run["time"]))
     return run if there.all() else run.isel(time=there)
 
 
@@ -260,7 +260,7 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
         )
     if "time" not in data:
         raise SymtopError("data must hold time, elapsed since the start of the scene; there is none")
-    time = _numbers("time", data["time"])
+    time = doubles("time", data["time"])
     if time.ndim != 1 or time.size == 0:
         raise SymtopError(f"time must be a row of numbers, not of shape {time.shape}")
     bad = ~np.isfinite(time) | (np.diff(time, prepend=-1.0 if time[0] == 0.0 else 0.0) <= 0.0)
@@ -268,7 +268,7 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
         k = int(np.argmax(bad))
         after = f" after {time[k - 1]:g}" if k else ""
         raise SymtopError(f"time must be finite, at least 0 and increase, but sample {k} is at {time[k]:g}{after}")
-    columns: dict[str, Any] = {name: _numbers(name, column(data, name)) for name in SHAPES if name in data}
+    columns: dict[str, Any] = {name: doubles(name, column(data, name)) for name in SHAPES if name in data}
     check_shapes(columns, time.size)
     if not set(ENOUGH) & set(columns):
         raise SymtopError("data must hold one of axis, quaternion, theta beside time, to show where the top is")
@@ -309,7 +309,7 @@ def completed(data: Trajectory) -> Trajectory:
     return data._replace(axis=axis, quaternion=attitude, theta=theta)
 
 
-def _numbers(name: str, values: Any) -> charts.Array:
+def doubles(name: str, values: Any) -> charts.Array:
     """Doubles of anything that holds real numbers, a table's text too; NaN where a sample is lost (None, masked)."""
     try:
         given = np.ma.filled(values.astype(float), np.nan) if np.ma.isMaskedArray(values) else np.asarray(values)

@@ -24,7 +24,7 @@ from symtop.measure import columns
 from symtop.measure.accuracy import as_table, blank_row, enough_samples, error_row
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator, integrators, split_name
-from symtop.model.scenes import Scene, scene as find_scene
+from symtop.model.scenes import Scene, horizon_of, scene as find_scene
 from symtop.run.simulation import chart_of, make_plan
 
 KEEP_EVERY = 5.0  # seconds between two writings of the file
@@ -171,7 +171,7 @@ def _cell(
     timed: bool,
 ) -> _Cell:  # fmt: skip
     """A cell, refused before anything is run if one of its runs could not be."""
-    until = scene.horizon if horizon is None else positive("horizon", horizon)
+    until = scene.horizon if horizon is None else horizon_of(horizon)
     if method.fixed_step:
         if ("step_size" in given) is ("per_nutation" in given):
             both = ", not both" if "step_size" in given else ""

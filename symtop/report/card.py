@@ -11,15 +11,16 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
-import matplotlib.pyplot as plt
+import matplotlib as mpl
 import numpy as np
+from matplotlib.figure import Figure
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, file_path, shown
 from symtop.judging.findings import Finding, Ledger, claim_name, description
 from symtop.model.charts import BODY
 from symtop.report.figures import SMALLEST
-from symtop.report.style import BLUE, GREEN, GREY, ORANGE, VERMILLION, panels, slope_guide
+from symtop.report.style import BLUE, GREEN, GREY, ORANGE, PAPER, VERMILLION, slope_guide
 from symtop.report.template import environment
 
 LETTER = 6.6  # width of a letter of the badge, pixels
@@ -29,17 +30,18 @@ SIGNS = {"confirmed": "✓", "refuted": "✗", "measured": "=", "undecided": "?"
 
 def figures(ledger: Ledger) -> tuple[Any, Any]:
     """Two figures: errors over the step size, and the change of the energy over the long run."""
-    (first, order), (second, energy) = (panels(1, 1, width=4.8, height=3.1) for _ in range(2))
-    _order(order[0, 0], ledger)
-    _energy(energy[0, 0], ledger)
-    return first, second
+    with mpl.rc_context(PAPER):  # the caller's settings and figures stay as they are
+        both = Figure(figsize=(4.8, 3.9)), Figure(figsize=(4.8, 3.9))
+        _order(both[0].subplots(), ledger)
+        _energy(both[1].subplots(), ledger)
+    return both
 
 
 def _as_svg(figure: Any) -> str:
     """A figure as SVG, from its opening tag on."""
     buffer = io.StringIO()
-    figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
-    plt.close(figure)
+    with mpl.rc_context(PAPER):
+        figure.savefig(buffer, format="svg", metadata={"Date": None, "Creator": None})
     return buffer.getvalue().partition("<svg")[2]
 
 

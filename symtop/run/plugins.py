@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from types import ModuleType
 
+from symtop.core.code_hash import hashed
 from symtop.core.errors import SymtopError, at_home, foreign_code
 from symtop.methods.framework.registry import integrators, is_built_in, split_name
 from symtop.model.scenes import added_scenes, body_scenes, scenes
@@ -53,7 +54,7 @@ def load(path: str | Path) -> list[str]:
     before = [*integrators().values(), *scenes().values(), *body_scenes().values()]
     with foreign_code(f"plugin {file.name}"):
         try:
-            execute(f"symtop_plugin_{file.stem}", file)
+            execute(f"symtop_plugin_{file.stem}_{hashed(str(file))[:8]}", file)
         except SymtopError as error:  # the names in it are the file's, and no options of a command
             raise SymtopError(f"plugin {file.name}: {error}") from error
     entries = (*integrators().items(), *scenes().items(), *body_scenes().items())

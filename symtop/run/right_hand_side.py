@@ -117,7 +117,7 @@ def _finite(f: Any) -> Any:
 
 
 def _motion(f: Any, t: float, y: Array, end: float) -> tuple[Any, float]:
-    """The solution by DOP853, a function of the time, and how long it is."""
+    """The solution by DOP853, a function of the time, or None if not one step of it can be made, and how long it is."""
     from scipy.integrate import DOP853, OdeSolution  # 0.2 s
 
     # a start at zero has no size, and is given one that is lost in what the motion leads to
@@ -127,7 +127,12 @@ def _motion(f: Any, t: float, y: Array, end: float) -> tuple[Any, float]:
     while solver.status == "running" and len(parts) < WATCHED and solver.step() is None:
         times.append(solver.t)
         parts.append(solver.dense_output())
-    return OdeSolution(times, parts), times[-1] - t
+    return OdeSolution(times, parts) if parts else None, times[-1] - t
+
+
+def _apart(near: Any, far: Any, t: float, times: Array, first: float) -> Growth:
+    """How far two motions are apart, in units of their first distance."""
+    return Growth.of(times, np.linalg.norm(far(t + times) - near(t + times), axis=0) / first, SATURATED / MOVED)
 
 
 def _expected(times: Array, error: Array, end: float, amplified: float, extent: float) -> float:
@@ -149,7 +154,7 @@ def _outlook(
     from scipy.integrate import solve_ivp
 
     near, watched = _motion(f, t, y, end)
-    if near.t_max < t + end and len(near.interpolants) < WATCHED:
+    if near is None or (near.t_max < t + end and len(near.interpolants) < WATCHED):
         words = f"below {watched:.6g}, not {end!r}: the motion goes beyond all bounds there, as far as DOP853 can tell"
         raise SymtopError(f"horizon must be {words}", "horizon")
     elapsed = watched * np.arange(1.0, POINTS + 1.0) / POINTS
@@ -163,9 +168,8 @@ def _outlook(
     slow = min(frequency, 2.0 * math.pi * turns / watched)
     moved = y + MOVED * extent / math.sqrt(y.size)
     far, reached = _motion(f, t, moved, watched)
-    times = elapsed[elapsed <= reached * (1.0 + EPSILON)]
-    apart = np.linalg.norm(far(t + times) - near(t + times), axis=0) / (MOVED * extent)
-    growth, kind = Growth.of(times, apart, SATURATED / MOVED), "step" if rule else "tolerance"
+    times, kind = elapsed[elapsed <= reached * (1.0 + EPSILON)], "step" if rule else "tolerance"
+    growth = _apart(near, far, t, times, MOVED * extent) if times.size else Growth(elapsed[:1], np.array([math.inf]))
     piece = min(end, watched, max(SHARE * end, PERIODS * 2.0 * math.pi / max(frequency, TINY)))
     places = np.union1d(np.geomspace(FIRST, 1.0, POINTS // 4), elapsed / watched)  # of the piece
 
@@ -187,7 +191,8 @@ def _outlook(
     better = setting * (accuracy / max(expected, TINY)) ** (1.0 / ((rule and integrator(method).order) or 1))
     better = 0.3 * setting if ended else min(better, end if rule else LOOSEST)
     change = math.sqrt(EPSILON) * extent
-    slopes = [(f(t, y + change * unit) - f(t, y)) / change for unit in np.eye(y.size)]
+    rate = f(t, y)
+    slopes = [(f(t, y + change * unit) - rate) / change for unit in np.eye(y.size)]
     fastest, cause = float(np.abs(np.linalg.eigvals(np.array(slopes))).max()), "step"
     if rule and fastest > STIFF * slow:  # no longer than is stable
         better = min(better, max(setting, 1.0 / fastest))

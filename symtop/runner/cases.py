@@ -127,11 +127,13 @@ def status(
     """
     cases = StudyCases.stored(study, results, quick=quick, full=full)
     stored = store.stored(cases.results, study)
-    older = store.superseded(stored, cases.cases)
+    older: dict[str, list[Path]] = {}
+    for old in store.superseded(stored, cases.cases):
+        older.setdefault(store.identity_of(old), []).append(old)
     rows = []
     for path, case in cases.cases.items():
         record = netcdf.read_json(store.failure_path(path))
-        earlier = [old for old in older if store.identity_of(old) == store.identity_of(path)]
+        earlier = older.get(store.identity_of(path), [])
         state, message, causes = DONE, "", list[str]()
         if path not in cases.data:
             state = FAILED if isinstance(record, dict) else STALE if earlier else MISSING

@@ -11,6 +11,7 @@ import time
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
 from numba import types
 
@@ -211,16 +212,28 @@ def test_a_kernel_is_the_same_to_a_profiler():
     assert digest(by_file(jit.code_of(kernel_with(1.0)))) == plain
 
 
-def test_no_method_hangs_on_how_many_types_numba_has_made():
+def test_a_value_counts_where_it_stands_and_not_by_its_identity():
+    """A symmetric composition names its first table again at its end."""
+    of, a, b, loop = lambda *things: digest(Code().reasons("values", things)), (1.5, 0.25), np.ones(2), [1.0]
+    loop.append(loop)
+    different = [of((a, b)), of((a, b, a)), of((a, b, b)), of((b, a)), of(((1.0,), 2.0)), of(((1.0, 2.0),)), of(loop)]
+    assert len(set(different)) == len(different)
+    assert of((a, a), (b, b)) == of((a, (1.5, 0.25)), (b, b.copy()))
+
+
+def test_no_method_hangs_on_how_many_types_numba_has_made(monkeypatch):
     """numba numbers its types by process; a hash with such a number would make every case stale in another one."""
 
     class Kind(types.Type):
         """The control: a type that is held by value."""
 
+    noted = set[str]()
+    monkeypatch.setattr(Code, "_note", lambda self, *values: (noted.update(values), self._at.values.extend(values)))
     reached = jit.code().reached("methods", symtop.integrators())
     assert any("symtop/methods/simd.py" in part.file for part in reached)
-    assert not any("'_code'" in part.values for part in reached)
-    assert any("'_code'" in part.values for part in jit.code().reached("kind", Kind("of a test")))
+    assert "'_code'" not in noted
+    jit.code().reached("kind", Kind("of a test"))
+    assert "'_code'" in noted
 
 
 def test_the_cache_keeps_what_was_used_last(tmp_path):

@@ -3,6 +3,7 @@
 import signal
 import sys
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ import xarray as xr
 from xarray.backends.locks import HDF5_LOCK
 
 from symtop.core import netcdf
-from symtop.core.signals import InterruptedByUser, TerminatedError, deferred, ending_on_sigterm, told_apart
+from symtop.core.signals import InterruptedByUser, TerminatedError, at_most, deferred, ending_on_sigterm, told_apart
 
 DATA = xr.Dataset({"value": ("x", np.arange(5.0))})
 
@@ -94,6 +95,16 @@ def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, heari
             events.append("outer")
         events.append("after")
     assert events == ["inner", "outer"]
+
+
+def test_two_requests_are_both_heard_and_a_limit_inside_another_leaves_that_one_running(default_handlers):
+    with ending_on_sigterm(), told_apart(), pytest.raises(TerminatedError), deferred():  # noqa: PT012
+        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGINT):
+            signal.raise_signal(number)
+    with pytest.raises(TimeoutError, match=r"after 0\.2 s"), at_most(0.2, processor=False):  # noqa: PT012
+        with at_most(60.0, processor=False):
+            pass
+        time.sleep(5.0)
 
 
 def test_handlers_are_left_as_they_were_and_threads_are_left_alone():

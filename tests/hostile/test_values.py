@@ -271,6 +271,8 @@ def test_numbers_of_every_kind_are_read_and_a_swing_too_narrow_is_refused():
         assert real_numbers("row", row).tolist() == [1.0]
     assert real_numbers("row", [10**30]).tolist() == [1e30]
     assert real_numbers("row", 2.5).shape == ()
+    with pytest.raises(symtop.SymtopError, match="row must be real numbers, not masked_array"):
+        real_numbers("row", np.ma.array([0.0, 1e3], mask=[False, True]))
     for shape in ((), (0,), (2, 2)):
         assert FORM(np.ones((*shape, 2))[..., 0]).theta.shape == shape
         assert FORM.quaternion(np.ones(shape)).shape == (*shape, 4)

@@ -92,6 +92,20 @@ def test_combining_refuses_cases_with_different_coordinates():
     assert np.isnan(joined["error"].sel(variant="a", horizon=1000.0))
     with pytest.raises(symtop.SymtopError, match="coordinate horizon of b on spheroid differs"):
         datasets.combine([case("a", [8.0, 100.0]), case("b", [8.0, 1000.0])])
+    for these, those in ((["x", "y"], ["y", "x"]), ([10, 20], [20, 30])):
+        with pytest.raises(symtop.SymtopError, match="coordinate horizon of b on spheroid differs"):
+            datasets.combine([case("a", these), case("b", those)])
+
+
+def test_combined_values_are_those_of_each_case_whatever_its_type_and_another_order_of_dimensions_is_refused():
+    of = lambda name, dims, values: (Case("spheroid", name), xr.Dataset({"value": (dims, values)}))
+    pairs = [(np.array([3, 4], np.uint8), np.array([300.0, -1.5])), (np.float32([1.0, 2.0]), np.array([1e300, 0.1])),
+             (np.array([3, 4], np.uint8), np.array([300, 7], np.uint16))]  # fmt: skip
+    for first, second in pairs:
+        both = datasets.combine([of("a", ("n",), first), of("b", ("n",), second)])["value"].sel(scene="spheroid")
+        np.testing.assert_array_equal(both, [first, second])
+    with pytest.raises(symtop.SymtopError, match=r"value of b on spheroid must be over \('n', 'm'\)"):
+        datasets.combine([of("a", ("n", "m"), np.eye(2)), of("b", ("m", "n"), np.eye(2))])
 
 
 @pytest.fixture

@@ -165,6 +165,8 @@ def test_f_may_return_one_array_again_and_a_horizon_beyond_the_end_is_refused():
     with pytest.raises(symtop.SymtopError, match=r"horizon must be below 1, not 2\.0: the motion goes beyond"):
         symtop.guard(lambda _t, y: y * y, 0.0, [1.0], 2.0, step_size=0.01)
     assert symtop.guard(lambda _t, y: y * y, 0.0, [1.0], 0.9, step_size=0.01).error < 1e-3
+    fast = lambda _t, y: 1e12 * y * y  # a motion beside zero ends at once
+    assert symtop.guard(fast, 0.0, [0.0], 1.0, step_size=0.01).error == 0.0
     for start in (0.1, 0.3, 0.7, 1e10):  # where the rounded end of a run is not its horizon
         assert symtop.guard(swing, start, [1.0, 0.0], 0.6, step_size=0.1).error < 1e-3
 

@@ -32,6 +32,7 @@ and it may take `MOST_NEWTON` rounds. With a tolerance, rtol = atol, the class c
 import contextlib
 import math
 import sys
+import threading
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -57,6 +58,7 @@ ANY = 1e300  # a tolerance that every step meets; infinity times a component of 
 LOOSE = 1e8  # one that every step meets, and beside which an update of Newton's iteration can be seen
 SOLVED, MOST_NEWTON, NEWTON = 1e-14, 50, "NEWTON_MAXITER"  # of a stage, absolute; rounds, and what modules call them
 SAME = 1e-9  # of a step: one that is this near to h has its length
+_patching = threading.RLock()  # `compare` runs variants in threads
 
 
 def state_like(before: Array, after: Any, what: str = "step") -> Array:
@@ -169,10 +171,11 @@ class ScipySolver(PythonStep):
             return state_like(y, solver.y, "a solver")
 
         with contextlib.ExitStack() as undo:  # Newton's iteration goes on until it is solved
-            for module in {sys.modules.get(one.__module__) for one in self.function.__mro__}:  # type: ignore[attr-defined]
-                if hasattr(module, NEWTON):
-                    undo.callback(setattr, module, NEWTON, getattr(module, NEWTON))
-                    setattr(module, NEWTON, MOST_NEWTON)
+            modules = {sys.modules.get(one.__module__) for one in self.function.__mro__}  # type: ignore[attr-defined]
+            for module in [one for one in modules if hasattr(one, NEWTON)]:
+                undo.enter_context(_patching)
+                undo.callback(setattr, module, NEWTON, getattr(module, NEWTON))
+                setattr(module, NEWTON, MOST_NEWTON)
             return repeat(once, state_like(y, solver.y, "a solver"), marks)
 
 

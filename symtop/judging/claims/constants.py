@@ -218,7 +218,7 @@ def blows_up(scene: Scene, change: Array) -> NDArray[np.int64]:
 def blow_up_finding(finding: Finding, time: float, steps: str = "") -> Finding:
     """The finding on such an energy."""
     measured, when = Measured("blows up", finding.value, f"blows up at t = {time:.3g}{steps}"), f"by t = {time:.3g}"
-    why = f"{when} it rises by more than that of the nutation and 2 |mgl|: {finding.why}"
+    why = f"{when} it rises by more than that of the nutation and 2 |mgl|; before: {finding.why}"
     return finding._replace(measured=measured, verdict="refuted" if finding.declared else "measured", why=why)
 
 

@@ -256,7 +256,8 @@ def _thing(target: Any) -> tuple[Any, str]:
         raise SymtopError(f"{words}, not {str(target)!r}{own}")
     file = python_file(path, "a step", "FILE.py:NAME with a file that is there (a command needs form program)")
     with foreign_code(f"the file {file.name}"):
-        sys.path.insert(0, str(file.parent))  # what stands beside it, as Python has it for a script
+        if str(file.parent) not in sys.path:  # what stands beside it, as Python has it for a script, also when it runs
+            sys.path.insert(0, str(file.parent))
         module = execute(f"symtop_judged_{Path(file).stem}", file)
     thing = getattr(module, name or "step", None)
     if not (callable(thing) or is_solver(thing)):

@@ -397,6 +397,6 @@ def _identity(job: Job, labels: dict[str, Any]) -> str:
     limits = job.chart, job.samples, job.budget, job.observables, CHUNK, CHUNK_STEPS
     return digest({
         **code().reasons("integrator", job.method, Job), **packages(),
-        "numbers": hashed(*(netcdf.array_hash(values) for values in (*arrays, *labels.values()))),
+        "numbers": hashed(*(netcdf.array_hash(values) for values in (*arrays, *labels.values())), *labels),
         "limits": hashed(repr(limits)),
     })  # fmt: skip
