@@ -92,7 +92,7 @@ def test_failures_are_rows():
 
 
 def test_a_file_with_other_cells_is_refused_and_left_as_it_is(tmp_path, monkeypatch):
-    """Fewer cells than the file holds, or others, would destroy what is there; more, in any order and failing, do not."""
+    """Fewer cells than the file holds, or others, would destroy what is there; more, in any order, do not."""
     file, arguments = tmp_path / "sweep.nc", {"step_size": [0.02, 1.0], "horizon": 2.0, "quiet": True}
     symtop.sweep("spheroid", ["rk4[axis]", "strang"], path=file, **arguments)
     before, table = file.read_bytes(), module._table
