@@ -68,6 +68,7 @@ AGREED, TIED = 3, 1.1  # of them meet the accuracy at least, the fastest is one 
 FINALISTS, LEVEL = 3, 1.3  # methods that are run to the whole horizon, and those that cost so little more than the best
 TOO_DEAR = 40.0  # a search ends at this multiple of the evaluations of the cheapest candidate so far
 CHEAP = 1e5  # evaluations that no search ends at: it may have begun with a step that is far too fine
+WIDER = 3e7  # evaluations of a run at most where what the table names fails: often nothing serves, and that takes minutes
 CONFIDENCE = {
     "checked": "measured to the end",
     "at the reference's limit": "measured to the end, as far as the reference can tell",
@@ -211,7 +212,8 @@ def recommend(
     leaves out what does not run on bodies without symmetry, `keeps` ("energy", "momenta" or both) what lets them drift.
 
     Raises SymtopError for arguments that are out of range, and for a `horizon` to which the motion of a body is not
-    known. It runs what it recommends: once the candidates are compiled, from 0.1 s to half a minute.
+    known. It runs what it recommends: once the candidates are compiled, from 0.1 s to half a minute, and minutes if what
+    the table names fails.
     """
     scene = scenes.scene(scene, bodies=True)
     quantity = ("attitude" if scene.of_body else "axis") if quantity is None else quantity
@@ -300,7 +302,7 @@ class _Search:
         if not ranked and self.menu:
             everyone = _everyone(self.question._replace(needs=self.question.needs or OF_ANY))
             self.widened, rest = len(everyone), {*everyone} - {*self.names, *self.menu}
-            self._try(rest)
+            self._try(rest, WIDER)
             ranked = self._confirmed([name for name in self._names() if name in rest], FINALISTS)
         return _timed(self.question, ranked, self.fails, ROUNDS)
 
@@ -311,14 +313,14 @@ class _Search:
     def _names(self) -> list[str]:
         return [one.run.integrator.name for one in self.trials]
 
-    def _try(self, names: Collection[str]) -> None:
+    def _try(self, names: Collection[str], most: float = math.inf) -> None:
         """Those of high order first: they are the cheapest at most accuracies, and their cost ends other searches."""
         files.expected[0] = math.ceil(KERNELS * len(names))
         for number, method in enumerate(sorted(map(integrator, names), key=lambda method: -(method.order or 0)), 1):
             post(f"trying method {number} of {len(names)}")
             rivals = (one.run.evaluations for one in self.trials if one.run.integrator.needs not in THIS_TOP)
             patience = max(TOO_DEAR * min(rivals, default=math.inf), CHEAP)
-            self._sort_in(_try(self.question, method, patience), self.trials, method)
+            self._sort_in(_try(self.question, method, patience, most), self.trials, method)
         timed = _timed(self.question, self.trials, self.fails)
         self.trials = sorted(timed, key=lambda one: one.cost(self.question))
 
@@ -389,7 +391,7 @@ def _candidates(question: _Question) -> tuple[list[str], str]:
     return list(dict.fromkeys([*menu, *own, *of_top])), "a study of random tops found the cheapest for such questions"
 
 
-def _try(question: _Question, method: Integrator, patience: float) -> "_Trial | str | float":
+def _try(question: _Question, method: Integrator, patience: float, most: float = math.inf) -> "_Trial | str | float":
     """A candidate's setting and cost from short runs, or the reason why it has none, or its error at the step."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
@@ -404,10 +406,10 @@ def _try(question: _Question, method: Integrator, patience: float) -> "_Trial | 
     short = min(horizon, settings.SHORT * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** settings.growth(method, quantity)
     best = settings.search(
-        scene, method, accuracy * law, quantity, short, patience=patience, longest=question.max_step
+        scene, method, accuracy * law, quantity, short, patience=min(patience, most), longest=question.max_step
     )  # fmt: skip
     if isinstance(best, str):
-        dear = best == settings.BUDGET and patience < settings.MOST_EVALUATIONS[method.implementation]
+        dear = best == settings.BUDGET and patience < min(settings.MOST_EVALUATIONS[method.implementation], most)
         return f"Not within {TOO_DEAR:g} times the work of the best" if dear else best
     if method.fixed_step and horizon / best.setting > MOST_STEPS:
         return f"Would need more than {MOST_STEPS:.0e} steps"
