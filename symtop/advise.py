@@ -458,17 +458,19 @@ def _advice(
         return question.advice(reason=reason, beside=_beside(beside), closed_form=without, fails=fails)
     best = ranked[0]
     name, fixed = best.run.integrator.name, best.run.integrator.fixed_step
-    worth = f"error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
-    if need := best.run.integrator.needs:
-        worth += f"; it needs {NEEDS[need]} ({need})"
+    worth = f"Error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
     if fixed:
         count = scene.time_scale(horizon) / best.run.setting
         worth += f"; steps are {count:.3g} a {scene.period_word}, {1e6 * best.a_step:.2g} us each"
+    need = best.run.integrator.needs
+    needed = f"It needs {NEEDS[need]} ({need})." if need else ""
+    use = f"{needed}{_carries(question, best.run.integrator)}".strip()
+    sentences = f"{best.words()} meets {goal}.", f"{worth}.", use, f"{source[0].upper()}{source[1:]}."
     runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
     setting = {str(best.run.integrator.control): best.run.setting}
     return question.advice(
         integrator=name, expected_error=best.error, seconds=best.seconds, confidence=best.confidence, fails=fails,
-        reason=f"{best.words()} meets {goal}: {worth}; {source}.{_carries(question, best.run.integrator)}",
+        reason="\n".join(filter(None, sentences)),
         runner_up="".join(runners), beside=_beside(beside, best.seconds),
         closed_form=_without_steps(question, best.seconds), **setting,
         **_lines(question, best.run.integrator, best.run.setting),
@@ -481,9 +483,9 @@ def _the_motion(question: _Question, limit: float) -> Advice:
     closed_form.compile_now()  # its time is the answer
     exact, seconds = integrator("exact"), _exact_seconds(question)
     reason = (
-        f"exact, the closed form, meets {quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}: error below "
-        f"{limit:.2g} in {seconds:.2g} s, without steps; it needs {NEEDS['solution']} (solution)."
-        f"{_carries(question, exact)}"
+        f"exact, the closed form, meets {quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}.\n"
+        f"Error below {limit:.2g} in {seconds:.2g} s, without steps.\n"
+        f"It needs {NEEDS['solution']} (solution).{_carries(question, exact)}"
     )
     return question.advice(
         integrator=exact.name, expected_error=limit, seconds=seconds, confidence="at the reference's limit",

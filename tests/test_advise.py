@@ -176,12 +176,12 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     advice = symtop.recommend(scene, accuracy=1e-8, horizon=30.0)
     assert sorted(names) == sorted([*menu[:5], "series[axis]"])
     assert advice.integrator == "vern9-fixed[axis]"
-    assert "tried the 5 methods" in advice.reason
+    assert "Tried the 5 methods" in advice.reason
     names.clear()
     menu[:5] = menu[4::-1]  # the fastest is the last of five
     advice = symtop.recommend(scene, accuracy=1e-8, horizon=30.0)
     assert sorted(names) == sorted([*menu, "series[axis]"])
-    assert "tried the 6 methods" in advice.reason
+    assert "Tried the 6 methods" in advice.reason
     names.clear()
     menu[:] = ["stormer-verlet", "strang[axis]", "midpoint", "trapezoidal", "cayley[axis]", "kahan[axis]"]
     everyone = {*menu, "vern9-fixed[axis]", "srkn-14-6[axis]"}  # of many more: each takes its kernel and its trials
@@ -191,7 +191,7 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     assert advice.confidence == "checked"
     assert advice.integrator not in menu
     assert {*names} - {"series[axis]"} == everyone
-    assert "tried all 8 compiled methods" in advice.reason
+    assert "Tried all 8 compiled methods" in advice.reason
     monkeypatch.setattr(advise, "WIDER", 10.0)
     advice = symtop.recommend(scene, accuracy=1e-11, horizon=30.0)
     assert any(words.startswith(settings.BUDGET) and "vern9-fixed[axis]" in words for words in advice.fails)
@@ -261,7 +261,7 @@ def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
     assert set(serving) < set(usable("axis"))
     advice = symtop.recommend("spheroid", accuracy=1e-6, horizon=4.0, needs="expression")
     assert symtop.integrator(advice.integrator).needs == "expression"
-    assert "it needs f as a formula (expression)" in advice.reason
+    assert "It needs f as a formula (expression)" in advice.reason
     with pytest.raises(symtop.SymtopError, match="needs 'luck' is unknown"):
         symtop.recommend("spheroid", accuracy=1e-6, needs=["luck"])
     words = {("torque",): "kicks group", ("torque", " free motion"): "kicks", ("inertia, torque",): "group", (): "",
