@@ -57,8 +57,7 @@ def findings(results: Results, facts: Mapping[str, Any]) -> dict[str, Any]:
     return pages.findings(
         "bench", "Kernels beside C", "Are the kernels as fast as the same loop in C, and what does a call add to them?",
         verdict(results), how_to_read, tables(results), cases=len(results.kernels),
-        measured=measured.sentence(facts, "make bench"),
-        provenance={key: facts[key] for key in facts if key not in ("measured", "cores", "load_before")},
+        **measured.record(facts, "make bench"),
     )  # fmt: skip
 
 

@@ -324,8 +324,7 @@ def page(results: Path) -> None:
         "unstable rotation stay 0.01 rad apart until they pass it again. These were mended.",
         [table],
         captions={"curves": (caption, alt)}, cases=sum(map(len, known.values())),
-        measured=measured.sentence(facts, "python -m benchmarks.guard"),
-        provenance={key: facts[key] for key in facts if key not in ("measured", "cores", "load_before")},
+        **measured.record(facts, "python -m benchmarks.guard"),
     )  # fmt: skip
     counted = [dict(zip(header, row, strict=True)) for row in rows]
     pictures = [{"name": "curves", "file": "guard-curves.png"}]

@@ -76,8 +76,7 @@ def main() -> None:
         "horizon", "Very long runs", "Do predictions hold up to 10^8 nutations?", [sentence],
         "A ratio near one is a prediction that holds. A motion is lost when its axis is off by "
         f"{laws.SATURATED} rad.", [table],
-        cases=1, measured=measured.sentence(facts, "python -m benchmarks.horizon"),
-        provenance={key: facts[key] for key in facts if key not in ("measured", "cores", "load_before")},
+        cases=1, **measured.record(facts, "python -m benchmarks.horizon"),
     )  # fmt: skip
     netcdf.write_json(options.results / "horizon.json", page)
 

@@ -1,4 +1,4 @@
-"""When, where and with which versions a benchmark was taken, in a sentence that the report shows beside its numbers."""
+"""When, where, with which versions and by which command a benchmark was taken, which the report shows beside it."""
 
 import datetime
 import json
@@ -19,14 +19,17 @@ def circumstances() -> dict[str, Any]:
     }
 
 
-def sentence(facts: Mapping[str, Any], command: str, versions: Mapping[str, str] | None = None) -> str:
-    """The circumstances in words; `versions` are those of further packages."""
+def record(facts: Mapping[str, Any], command: str, versions: Mapping[str, str] | None = None) -> dict[str, Any]:
+    """What findings hold of it: a sentence, the command and the provenance; `versions` are those of other packages."""
     core = json.loads(facts["dependencies"])
     given = {name: core[name] for name in ("heyoka", "numba", "numpy", "scipy")} | dict(versions or {})
-    return (
+    sentence = (
         f"Measured on {facts['measured']} with symtop {facts['symtop_version']}, revision {facts['symtop_revision']}, "
         f"on {facts['processor']} ({facts['cores']} cores, load {float(facts['load_before']):.2f} before), "
         f"{facts['platform']}, Python {facts['python_version']}; "
         f"{', '.join(f'{name} {version}' for name, version in sorted(given.items()))}. "
         f"The studies do not measure it again; `{command}` does."
     )
+    return {
+        "measured": sentence, "command": command, "provenance": {key: facts[key] for key in netcdf.provenance()},
+    }  # fmt: skip

@@ -205,8 +205,7 @@ def write(facts: dict[str, Any], ratios: dict[str, float]) -> None:
     page = pages.findings(
         "repeat", "Two runs", "Does the study of cost say the same twice?", [sentence],
         "A ratio is the cost that the study gives a run, over `timeit` of that run; for heyoka, of the prices alone.",
-        [table], cases=2, facts=facts, measured=measured.sentence(about, "python -m benchmarks.repeat"),
-        provenance={key: about[key] for key in about if key not in ("measured", "cores", "load_before")},
+        [table], cases=2, facts=facts, **measured.record(about, "python -m benchmarks.repeat"),
     )  # fmt: skip
     netcdf.write_json(Path("results/repeat.json"), page)
 

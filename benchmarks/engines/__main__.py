@@ -9,7 +9,7 @@ from pathlib import Path
 from benchmarks.engines import ADAPTERS, load
 from benchmarks.engines.measure import row
 from benchmarks.engines.study import NAME, findings, verdict
-from benchmarks.measured import circumstances, sentence
+from benchmarks.measured import circumstances, record
 from symtop.core import netcdf
 
 
@@ -31,8 +31,8 @@ def main() -> None:
     for made in rows:
         known = versions.setdefault(made["engine"], [])
         known += [made["version"]] if made["version"] not in known else []
-    measured = sentence(facts, "make engines", {engine: " and ".join(known) for engine, known in versions.items()})
-    said = findings(rows, missing, measured)
+    about = record(facts, "make engines", {engine: " and ".join(known) for engine, known in versions.items()})
+    said = findings(rows, missing, about)
     netcdf.write_json(file, said)
     for line in (*verdict(rows), *said["failures"]):
         print(line)

@@ -1,12 +1,11 @@
 """The engines as a section of the report: which was run, whether the map is its own, and what follows."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from benchmarks import pages
 from benchmarks.engines.measure import COMPARED, COUNT, LEVEL, STEPS, agrees
 from benchmarks.pages import Table
-from symtop.core import netcdf
 from symtop.methods.framework.registry import integrator
 from symtop.report.formats import FEW, counted
 
@@ -74,12 +73,12 @@ def verdict(rows: Sequence[dict[str, Any]]) -> list[str]:
     return said
 
 
-def findings(rows: Sequence[dict[str, Any]], missing: Sequence[str], measured: str) -> dict[str, Any]:
+def findings(rows: Sequence[dict[str, Any]], missing: Sequence[str], record: Mapping[str, Any]) -> dict[str, Any]:
     """What the report wants, and the numbers themselves."""
     failed = [f"{made['engine']} ({made['name']}): {made['failed']}" for made in rows if "failed" in made]
     table = Table("Engines against their maps", HEADER, [cells(made) for made in rows])
     return pages.findings(
         NAME, "Engines against their maps", "Are the maps of the catalogue those that the engines take?", verdict(rows),
-        HOW_TO_READ, [table], failures=[*missing, *failed], cases=len(rows), measured=measured,
-        provenance=netcdf.provenance(changes=True), rows=list(rows), missing=list(missing),
+        HOW_TO_READ, [table], failures=[*missing, *failed], cases=len(rows),
+        rows=list(rows), missing=list(missing), **record,
     )  # fmt: skip

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from benchmarks import pages
-from benchmarks.measured import sentence
+from benchmarks.measured import record
 from benchmarks.peers import distributions, summary, together
 from benchmarks.peers.measure import HEYOKA, OURS, PERIODS
 from benchmarks.peers.summary import ENGINES, JUDGED, NAMES
@@ -128,12 +128,12 @@ def _gains(data: xr.Dataset, known: dict[str, list[str]], mine: Sequence[str]) -
     return [_range(each) for each in calls]
 
 
-def measured(data: xr.Dataset) -> str:
-    """When, where and with which versions, in a sentence."""
+def measured(data: xr.Dataset) -> dict[str, Any]:
+    """When, where, with which versions and by which command."""
     pairs = zip(data["package"].values.astype(str), data["version"].values.astype(str), strict=True)
     wheels = distributions()
     versions = {wheels.get(name, name): version for name, version in pairs if name not in (OURS, HEYOKA)}
-    return sentence(data.attrs, "make peers", versions)
+    return record(data.attrs, "make peers", versions)
 
 
 STUDY = Study(
@@ -158,5 +158,4 @@ def findings(data: xr.Dataset, many: list[together.Row], results: Path, missing:
         STUDY.name, STUDY.title, STUDY.question, [*summary.verdict(data), *together.verdict(many)],
         summary.HOW_TO_READ, tables, further=summary.pairs(data), captions={"fronts": caption(data)},
     )  # fmt: skip
-    stored = {"measured": measured(data), "together": [row._asdict() for row in many]}
-    return drawn | {"page": said["page"]} | stored
+    return drawn | {"page": said["page"], "together": [row._asdict() for row in many], **measured(data)}

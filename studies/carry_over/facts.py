@@ -75,7 +75,7 @@ class Pooled(NamedTuple):
     def words(self) -> str:
         """In a table."""
         within = f"median {number(self.middle, 3)}, {percent(MOST_OF)} below {number(self.most, 3)}"
-        beyond = f"{self.beyond} of {self.asked} beyond the budget"
+        beyond = f"{self.beyond} of {self.asked} cases over budget"
         return ", ".join([within] * (self.beyond < self.asked) + [beyond] * (self.beyond > 0))
 
     @property
@@ -218,7 +218,7 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
     taken, own = steps(data, family), own_steps(data, family)
     share, before = silent_share(data, family), silent_share(data, SYMMETRIC)
     order, first = order_gap(data, family)[0], first_steps(data, family)
-    lost = f", {first.count(math.inf)} of {len(first)} beyond the budget" * (math.inf in first)
+    lost = f", {first.count(math.inf)} of {len(first)} cases over budget" * (math.inf in first)
     but = f"; without needles {own_steps(data, family, NEEDLE).words}" if family == FREE else ""
     own_tau = least([by.own_tau(data, family, target) for target in ASKED])
     return {
@@ -236,9 +236,10 @@ def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
     }  # fmt: skip
 
 
+ANSWER = "what holds for tops"  # the first column
 LINES = {
     "ranking": "ranking by cost, kernels for any body", "own ranking": "ranking by the top's own kernels",
-    "own": "safe steps a period over those of a top", "silent": "wrong without a sign",  # so far: front page
+    "own": "safe steps a period over those of a top", "silent": "wrong, energy and momenta kept",  # so far: front page
     "winner": "the cheapest kernels for any body", "growth": "growth of errors with time",
     "first": "safe steps of three methods with f(t, y)", "steps": "safe steps over those of a top as a body",
     "order": "order of a method",
@@ -250,13 +251,13 @@ LINES = {
 def carry(data: xr.DataTree) -> pd.DataFrame:
     """The answer: a line for each thing, a column for each kind of body, number and verdict."""
     each = {family: cells(data, family) for family in SHOWN}
-    rows = [{"of tops": text} | {words(family): sentence(*each[family][line]) for family in SHOWN}
+    rows = [{ANSWER: text} | {words(family): sentence(*each[family][line]) for family in SHOWN}
             for line, text in LINES.items()]  # fmt: skip
     prices = np.array([*by.price_factors(data).values()])
     if prices.size:
         times = f"{number(float(np.median(prices)), 3)} times, {number(prices.min(), 2)} to {number(prices.max(), 2)}"
         verdict = by.factor_verdict(float(prices.max()))
-        rows.append({"of tops": "time of an evaluation", **dict.fromkeys(map(words, SHOWN), sentence(times, verdict))})
+        rows.append({ANSWER: "time of an evaluation", **dict.fromkeys(map(words, SHOWN), sentence(times, verdict))})
     return pd.DataFrame(rows)
 
 

@@ -91,6 +91,6 @@ def draw_silent(data: xr.DataTree) -> Any:
         axis.plot(range(len(shares) - 2), shares[:-2], label=label(name), **look)  # the others are no farther ones
         axis.plot(range(len(shares) - 2, len(shares)), shares[-2:], **(look | {"ls": "none"}))
     _families(axis, [*FAMILIES])
-    axis.set(ylabel="wrong without a sign (% of bodies)", ylim=(-1.0, None))
+    axis.set(ylabel="wrong, energy and momenta kept (% of bodies)", ylim=(-1.0, None))
     style.legend_below(figure, [axis])
     return figure

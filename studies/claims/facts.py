@@ -74,7 +74,6 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "usual_runs": usual_runs,
         "free": FREE,
         "free_methods": bodies["integrator"].nunique() or None,
-        "free_declared": on_body["confirmed"] + on_body["refuted"] or None,
         **{f"free_{word}": on_body[word] for word in ("confirmed", "refuted", "undecided")},
     }
 

@@ -9,7 +9,7 @@ import xarray as xr
 
 from symtop.judging.claims.subject import declared
 from symtop.methods.framework.registry import NEEDS, integrator
-from symtop.report.formats import duration, number
+from symtop.report.formats import count, duration, number
 from symtop.run.guard import EXPECTED
 
 from . import cells, far
@@ -86,6 +86,11 @@ def span_facts(data: xr.DataTree, span: str) -> dict[str, float | None]:
     }
 
 
+def over(data: xr.DataTree) -> str:
+    """What the front page shows of an error that no setting within the budget keeps."""
+    return f"over {count(span_facts(data, 'short')['budget'] or 0.0)} evaluations a nutation"
+
+
 def winners_facts(data: xr.DataTree) -> dict[str, Any]:
     """The safe choices for any body and of each class, where a count of evaluations misleads most, who wins twice."""
     named: dict[str, Any] = {"safe_called": 0}
@@ -158,8 +163,8 @@ def far_facts(data: xr.DataTree) -> dict[str, Any]:
         panel = far.diagram(data, quantity)
         there = panel.winner >= 0
         reached, predicted = reached + int(there.sum()), predicted + int((panel.predicted & there).sum())
-        for place, count in Counter(panel.winner[there].tolist()).most_common(1):
-            named |= {f"map_{quantity}": panel.names[place], f"map_{quantity}_share": count / there.sum()}
+        for place, most in Counter(panel.winner[there].tolist()).most_common(1):
+            named |= {f"map_{quantity}": panel.names[place], f"map_{quantity}_share": most / there.sum()}
         splits = np.isin(panel.winner, [k for k, name in enumerate(panel.names) if integrator(name).needs == "kicks"])
         named[f"map_{quantity}_clear"] = float((panel.ratio[there] >= far.TIE).mean()) if there.any() else None
         for end, part in (("short", panel.horizons <= SHORT_RUN), ("long", panel.horizons >= LONG_RUN)):
@@ -203,7 +208,7 @@ def use(data: xr.DataTree) -> pd.DataFrame:
             cell = Cell("short", "axis", target, NATURAL, needs)
             choices, called = cells.safest(data, cell, keeping)
             best = next((one for one in choices if np.isfinite(one.seconds)), None)
-            words = NOTHING if cells.asked_tops(data, cell).any() else "not asked"
+            words = over(data) if cells.asked_tops(data, cell).any() else "not asked"
             if best is not None:
                 words = f"{'' if called else '~ '}{best.name}{serves(best.name)}, "
                 words += f"{setting_words(best.name, best.setting)}, {duration(best.seconds)}"
@@ -235,7 +240,7 @@ def have(data: xr.DataTree) -> pd.DataFrame:
         best = min((one.seconds for one in known.values() if integrator(one.name).general), default=np.nan)
         for row in rows:
             one = known.get(row["you have"])
-            row[f"1e-{decades(target)} rad"] = NOTHING if one is None else (
+            row[f"1e-{decades(target)} rad"] = over(data) if one is None else (
                 f"{setting_words(one.name, one.setting)}, {duration(one.seconds)}, {number(one.seconds / best)} times"
             )  # fmt: skip
     return pd.DataFrame(rows)

@@ -24,7 +24,7 @@ TERM, FALLING, POLE = "goldstein", "sleeping-unstable", "bruls-cardona-arnold"  
 WITHOUT, WITH, RIGHT = "no-gyro[axis]", "jolt[axis]", "strang[axis]"  # the gyroscopic term; the last no engine's
 ANGLES, AXIS = "rk4[angles]", "rk4[axis]"
 LADDER = [32.0 * 2.0**k for k in range(10)]  # steps a nutation
-SAMPLES, CLOSE = 301, 0.1  # of a run; rad, an error that the engine with the term is asked for
+SAMPLES, CLOSE, WRONG = 301, 0.1, 0.01  # of a run; rad, asked of the engine with the term; rad, of a wrong run
 ENDED = "ended, in the angles"
 LABELS = {WITHOUT: "without the term", WITH: "with the term", RIGHT: "Strang splitting"}
 
@@ -40,16 +40,21 @@ def cases(quick: bool) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    """Errors of the axis (rad) and the energy (over E0 - min V) over ``setting`` and ``sample``, NaN after the end."""
+    """Errors of the axis (rad) and the energy (over E0 - min V) over ``setting`` and ``sample``, NaN after the end.
+
+    ``warned`` says whether the guard warned before the run.
+    """
     on, variant, nutations = scene(case.scene), integrator(case.integrator), case.settings["nutations"]
     parts = []
     for steps in case.settings["steps"]:
+        sentences: list[str] = []
         run = integrate(on, variant, step_size=on.nutation_period / steps, horizon=nutations * on.nutation_period,
-                        samples=SAMPLES, observe="axis")  # fmt: skip
+                        samples=SAMPLES, observe="axis", guard=sentences.append)  # fmt: skip
         wrong = errors_against(on, run, reference(on, run.time, precision="closed-form"))
         there = (run.time <= run.reached_time) | (run.outcome == "ok")
         one: dict[str, Any] = {name: ("sample", np.where(there, wrong[name], np.nan)) for name in ("axis", "energy")}
-        one |= {"time": ("sample", run.time / on.nutation_period), "outcome": run.outcome, "steps": steps}
+        one |= {"time": ("sample", run.time / on.nutation_period), "outcome": run.outcome, "steps": steps,
+                "warned": float(bool(sentences))}  # fmt: skip
         parts.append(xr.Dataset(one))
     return xr.concat(parts, "setting")
 
@@ -64,9 +69,8 @@ def run_of(data: xr.Dataset, on: str, name: str) -> xr.Dataset | None:
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """How wrong each is: largest errors of the axis (rad) and of the energy (1), and when the run at the pole ended."""
-    known: dict[str, Any] = dict.fromkeys(
-        ("steps", "without", "without_energy", "needed", "falling", "falling_energy", "ended")
-    )
+    keys = "steps", "without", "without_energy", "needed", "falling", "falling_energy", "ended"
+    known: dict[str, Any] = dict.fromkeys(keys) | _warned(data)
     if (without := run_of(data, TERM, WITHOUT)) is not None:
         last = without.isel(setting=-1)
         known |= {"steps": float(last["steps"]), "without": float(last["axis"].max()),  # rad
@@ -81,15 +85,26 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     return known
 
 
+def _warned(data: xr.Dataset) -> dict[str, int]:
+    """How many runs were wrong or ended early, and of how many of these and of the others the guard warned."""
+    made = np.isfinite(data["steps"])
+    bad = ((data["axis"].max("sample") > WRONG) | (data["outcome"] != "ok")) & made
+    warned = data["warned"] > 0.0
+    counts = {"bad": bad, "bad_warned": bad & warned, "good": made & ~bad, "good_warned": made & ~bad & warned}
+    return {name: int(one.sum()) for name, one in counts.items()}
+
+
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     """Every run with its largest errors and how it ended, the shortest step of each variant first."""
     parts = []
     for on in map(str, data["scene"].values):
         for name in map(str, data["variant"].values):
             if (one := run_of(data, on, name)) is not None:
-                worst = one[["steps", "outcome"]].assign(one[["axis", "energy"]].max("sample"))
+                worst = one[["steps", "outcome", "warned"]].assign(one[["axis", "energy"]].max("sample"))
+                worst["warned"] = worst["warned"].astype(bool)
                 parts.append(worst.isel(setting=slice(None, None, -1)).to_pandas().assign(scene=on, variant=name))
-    names = {"steps": "steps a nutation", "axis": "axis error (rad)", "energy": "energy error / (E0 - min V)"}
+    names = {"steps": "steps a nutation", "axis": "axis error (rad)", "energy": "energy error / (E0 - min V)",
+             "warned": "guard warned"}  # fmt: skip
     rows = pd.concat([part.reset_index(drop=True) for part in parts]).sort_index(kind="stable").rename(columns=names)
     return {"runs": rows[["scene", "variant", *names.values(), "outcome"]]}
 

@@ -51,14 +51,14 @@ def costs(data: xr.Dataset, target: float) -> dict[str, float]:
     return dict(sorted(((name, one) for name, one in known.items() if one < math.inf), key=lambda item: item[1]))
 
 
-def for_any_body(name: str) -> bool:
-    """Does a method exist for a body without symmetry?"""
+def on_f_alone(name: str) -> bool:
+    """Does a method need the right-hand side f(t, y) alone?"""
     method = split_name(name)[0]
-    return method in integrators() and bool(integrator(method).general)
+    return method in integrators() and integrator(method).needs == "derivative"
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
-    """The fastest methods for any body at each error (s), and how many times as long DOP853 and SciPy's RK45 take."""
+    """The fastest methods on f(t, y) alone at each error (s), and over them DOP853 and SciPy's RK45."""
     part = shown(data)
     answers: dict[str, Any] = {
         "scene": str(part["scene"].values), "nutations": float(part["nutations"]),
@@ -67,7 +67,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "variants": data.sizes["variant"] - 1,
     }  # fmt: skip
     for target in TARGETS:
-        first = next(((name, one) for name, one in costs(data, target).items() if for_any_body(name)), (None, None))
+        first = next(((name, one) for name, one in costs(data, target).items() if on_f_alone(name)), (None, None))
         answers |= {
             f"fastest_{-math.log10(target):.0f}": first[0],
             f"fastest_{-math.log10(target):.0f}_seconds": first[1],
@@ -94,5 +94,5 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
          ", ".join(f"{target:.0e}" for target in TARGETS if met_by_coarsest(part.sel(variant=name), target))]
         for name in names
     ]  # fmt: skip
-    header = ["variant", *(f"{target:.0e} rad (us)" for target in TARGETS), "at most (rad)"]
+    header = ["variant", *(f"{target:.0e} rad (us)" for target in TARGETS), "upper bound at (rad)"]
     return {"times": pd.DataFrame(rows, columns=header)}

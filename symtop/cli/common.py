@@ -193,6 +193,10 @@ class Group(click.Group):
             ctx.with_resource(telling(str(name)))
         return name, command, rest
 
+    def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  (click calls it so)
+        """In the order in which they were added, those that people use first."""
+        return list(self.commands)
+
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command."""
         try:

@@ -22,8 +22,11 @@ def main() -> None:
 
     \b
     symtop run spheroid midpoint --step-size 0.01
+    symtop recommend spheroid --accuracy 1e-6
     symtop study convergence --quick
-    symtop report
+
+    Exit codes: 1 a case or claim failed, 2 bad input, 3 a run ended early, 130 interrupted, 141 output unread,
+    143 terminated. eval "$(_SYMTOP_COMPLETE=bash_source symtop)" completes names.
     """
 
     def announce() -> None:  # once, before the first kernel is compiled
@@ -34,7 +37,7 @@ def main() -> None:
 
 
 for command in (
-    lists.integrators, lists.scenes, runs.run, compare.compare, runs.long, runs.ensemble, runs.explore, judge.claims,
-    judge.judge, judge.recommend, study.study, study.report, study.archive, lists.cite, doctor.doctor,
+    runs.run, judge.recommend, compare.compare, judge.judge, runs.ensemble, runs.long, runs.explore, lists.scenes,
+    lists.integrators, judge.claims, study.study, study.report, study.archive, lists.cite, doctor.doctor,
 ):  # fmt: skip
     main.add_command(command)

@@ -161,10 +161,8 @@ def _energy_scale(top: SymmetricTop, start: Angles) -> float:
 
     depth = 0.5 * top.I1 * start.theta_dot**2 + height(start.theta) - height(top.steady_theta(momenta))
     rounding = EPSILON * (abs(top.energy(start)) + abs(top.mgl))
-    for scale in (depth, 0.5 * top.I1 * top.nutation_frequency(momenta) ** 2, abs(top.mgl)):
-        if scale > STEADY * rounding:
-            return scale
-    return TINY  # a free top at rest
+    scales = (depth, 0.5 * top.I1 * top.nutation_frequency(momenta) ** 2, abs(top.mgl))
+    return next((scale for scale in scales if scale > STEADY * rounding), max(*scales, TINY))  # the spin may hide all
 
 
 @functools.lru_cache(maxsize=256)
@@ -425,5 +423,5 @@ def energy_scales(numbers: Array, theta_range: Array) -> Array:
     depth = 0.5 * I1 * numbers[:, 6] ** 2 + at_start - least
     swing = 0.5 * np.maximum(effective_stiffness(lowest, north, south, I1, mgl), 0.0)
     rounding = STEADY * EPSILON * (np.abs(start_energies(numbers)) + np.abs(mgl))
-    kinds = [depth > rounding, swing > rounding, np.abs(mgl) > rounding]
-    return np.asarray(np.select(kinds, [depth, swing, np.abs(mgl)], TINY))
+    scales = np.array([depth, swing, np.abs(mgl)])
+    return np.asarray(np.select(list(scales > rounding), list(scales), np.maximum(scales.max(axis=0), TINY)))

@@ -65,7 +65,7 @@ def gather(results: Path) -> list[dict[str, Any]]:
     """The findings that are in the folder: of all studies, in order, then of benchmarks.
 
     A benchmark (`make peers`) may leave findings in the form of a study's, as NAME.json. They stay as they are when the
-    studies run again, so that their ``measured`` says when, where, with what and by which command.
+    studies run again, so that their ``measured`` says when, where and with what, and ``command`` how to repeat it.
     A study that ships with symtop has the page of its folder, any other the page that its findings hold.
     Raises SymtopError if findings are incomplete or a file is damaged, or there are none.
     """
@@ -86,7 +86,7 @@ def gather(results: Path) -> list[dict[str, Any]]:
             page = findings["page"] if shipped is None else shipped.read_text(encoding="utf-8")
             gathered.append({**findings, **about, "page": page})
         except (OSError, KeyError, TypeError) as error:
-            command = (*re.findall("`([^`]+)` does", str(findings.get("measured"))), f"symtop study {name}")[0]
+            command = findings.get("command", f"symtop study {name}")
             raise SymtopError(
                 f"the findings of {name} in {results} are incomplete ({error}); run it again: {command}"
             ) from error

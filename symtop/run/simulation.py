@@ -89,8 +89,9 @@ def chart_of(method: Integrator, watched: str, observe: str | None = None) -> st
     if watched == BODY:
         one_of("observe", observe or "attitude", ("axis", "attitude"))
         if BODY not in method.solvers:
-            able = ", ".join(name for name, entry in methods().items() if BODY in entry.solvers)
-            raise SymtopError(f"integrator must have the chart body, of a RigidBody, not {method.name}: {able}")
+            able = [name for name, entry in methods().items() if BODY in entry.solvers]
+            other = f"{method.method} without brackets" if method.method in able else f"one of {', '.join(able)}"
+            raise SymtopError(f"integrator must have the chart body, of a RigidBody, not {method.name}: take {other}")
         return BODY
     if isinstance(observe, str) and observe == "theta":
         raise SymtopError("observe must be nutation, which shows theta, axis or attitude, not 'theta'", "observe")

@@ -42,8 +42,8 @@ def test_the_axis_error_is_that_of_the_catalogue_and_an_engine_that_raises_a_row
     assert not measure.agrees(made)
     unknown = {**made, "method": "", "goldstein_step": 0.0, "fast_step": 0.0}
     assert not measure.agrees(unknown)  # a map that the catalogue does not have
-    assert "1 setting of Engine ran without a map" in study.findings([unknown], [], "today")["page"]
-    found = study.findings([made], ["Other is not installed here and was skipped: reason."], "today")
+    assert "1 setting of Engine ran without a map" in study.findings([unknown], [], {"measured": "today"})["page"]
+    found = study.findings([made], ["Other is not installed here and was skipped: reason."], {"measured": "today"})
     assert found["failures"] == [*found["missing"], "Engine (bad): RuntimeError: no such body"]
 
 

@@ -103,7 +103,7 @@ def test_a_damaged_file_is_named_and_one_of_another_kind_is_left_out(name, remed
         gather(tmp_path)
     (tmp_path / "quick").mkdir()
     (tmp_path / "mine.json").rename(tmp_path / "quick" / "mine.json")
-    about = {"measured": "The studies do not; `python -m benchmarks.guard` does.", "pictures": [{"file": "none.png"}]}
+    about = {"measured": "Then.", "command": "python -m benchmarks.guard", "pictures": [{"file": "none.png"}]}
     (tmp_path / f"{name}.json").write_text(json.dumps(findings | about), encoding="utf-8")
     with pytest.raises(SymtopError, match=r"run it again: python -m benchmarks\.guard$"):
         gather(tmp_path)

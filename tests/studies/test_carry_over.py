@@ -284,7 +284,7 @@ def test_planted_factors_of_steps_and_of_silent_runs_are_found():
 
 
 @pytest.mark.parametrize(("unserved", "words"), [
-    (0, "median 3, 95\xa0% below 3"), (3, "median 3, 95\xa0% below 3, 1 of 9 beyond the budget"),
+    (0, "median 3, 95\xa0% below 3"), (3, "median 3, 95\xa0% below 3, 1 of 9 cases over budget"),
 ])  # fmt: skip
 def test_a_method_that_no_step_within_the_budget_makes_safe_is_counted(unserved, words):
     data = planted(3.0)
@@ -296,7 +296,7 @@ def test_a_method_that_no_step_within_the_budget_makes_safe_is_counted(unserved,
     assert facts.steps(data, "0.1").words == "median 1, 95\xa0% below 1"
     assert by.step_factors(data, FREE, 1e-3).get("strang[body]") == pytest.approx(np.inf if unserved else 3.0)
     assert {one.get_text() for one in figures.draw_steps(data).axes[0].texts} == ({"+1"} if unserved else set())
-    assert facts.pooled([{"strang[body]": np.inf}]).words == "1 of 1 beyond the budget"
+    assert facts.pooled([{"strang[body]": np.inf}]).words == "1 of 1 cases over budget"
 
 
 GRID = 0.1

@@ -19,6 +19,7 @@ def test_the_pitfalls_are_there_and_the_page_says_what_was_measured(tmp_path):
     assert answers["falling_energy"] < 0.01
     assert answers["falling"] > 0.5
     assert answers["ended"] < 1.0
+    assert (answers["bad_warned"], answers["good_warned"]) == (answers["bad"], 0)
     through = study.run_of(data, study.POLE, study.AXIS).isel(setting=0)
     assert float(through["axis"].max()) < 1e-3
     assert float(through["time"].max()) == pytest.approx(2.0)

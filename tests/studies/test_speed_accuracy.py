@@ -30,9 +30,9 @@ def test_a_cost_lies_between_the_runs_and_one_of_the_coarsest_setting_is_an_uppe
     assert facts.cost(cell, middle, "force_evaluations") == pytest.approx(math.sqrt(seconds[1] * seconds[2]))
     assert facts.cost(cell, error[2], "force_evaluations") == pytest.approx(seconds[2])
     assert facts.cost(cell, 1e-3 * error.min(), "force_evaluations") == math.inf
-    assert facts.tables(data)["times"].set_index("variant")["at most (rad)"].eq("").all()  # the control
+    assert facts.tables(data)["times"].set_index("variant")["upper bound at (rad)"].eq("").all()  # the control
     finer = data.assign(axis=data["axis"] * xr.where(data["variant"] == "strang[axis]", 1e-3, 1.0))
-    column = facts.tables(finer)["times"].set_index("variant")["at most (rad)"]
+    column = facts.tables(finer)["times"].set_index("variant")["upper bound at (rad)"]
     assert column["strang[axis]"] == "1e-03"
     assert column.drop("strang[axis]").eq("").all()
 
@@ -63,6 +63,6 @@ def test_methods_on_a_scene_are_timed_in_one_case_and_those_for_symmetric_bodies
         (together,) = [case for case in cases if case.scene == place and study.STUDY.is_timed(case)]
         alone = [case.integrator for case in cases if case.scene == place and case is not together]
         assert sorted(together.settings["integrators"]) == sorted(alone)
-    assert facts.for_any_body("rk4[axis]")
-    assert not facts.for_any_body("takahashi-imada[axis]")
-    assert not facts.for_any_body("series[axis]")
+    assert facts.on_f_alone("rk4[axis]")
+    assert not facts.on_f_alone("takahashi-imada[axis]")
+    assert not facts.on_f_alone("series[axis]")
