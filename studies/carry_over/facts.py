@@ -46,8 +46,9 @@ def long_tau(data: xr.DataTree, family: str) -> tuple[float, int]:
 
 
 def least(each: list[by.Interval]) -> by.Interval:
-    """The interval with the least number."""
-    return min((one for one in each if not math.isnan(one.value)), key=lambda one: one.value, default=each[0])
+    """The least number, low end and high end of all: which target has the least number may be noise."""
+    known = [one for one in each if not math.isnan(one.value)]
+    return by.Interval(*(min(ends) for ends in zip(*known, strict=True))) if known else each[0]
 
 
 def tau_words(one: by.Interval) -> str:
