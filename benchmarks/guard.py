@@ -281,11 +281,12 @@ def summed(name: str, runs: list[Run], guarded: str) -> tuple[str, int]:
     right = [run for run in runs if run.outcome == "ok" and run.error <= guard.EXPECTED]
     silent = [run for run in wrong if not getattr(run, guarded) > guard.EXPECTED]
     false = sum(getattr(run, guarded) > guard.EXPECTED for run in right)
+    ended = counts(runs, guarded)[0]
     words = f"tops, guard {guarded!r}" if name == "tops" else name
     sentence = (
         f"{len(runs)} runs of {words}: of {len(wrong)} wrong ones {len(silent)} were silent, the worst off by "
         f"{max((run.error for run in silent), default=0.0):.2g} rad; of {len(right)} right ones {false} were "
-        f"warned of ({100.0 * false / max(len(right), 1):.2g} %)."
+        f"warned of ({100.0 * false / max(len(right), 1):.2g} %), and of those that ended early {ended}."
     )
     return sentence, len(silent)
 

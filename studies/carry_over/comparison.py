@@ -178,16 +178,23 @@ def of_class(table: Costs, needs: str) -> list[int]:
 @of_one_dataset
 def winner(data: xr.DataTree, family: str, target: float, needs: str = ANY, span: str = "short") -> str | None:
     """The method of a class with the least median cost."""
-    table = costs(data, family, target, span=span)
-    rows, bodies = of_class(table, needs), judged_bodies(table)
-    middle = medians(table.values[np.ix_(rows, bodies)]) if bodies.size and rows else np.array([UNREACHED])
-    return table.names[rows[int(np.argmin(middle))]] if middle.min() < UNREACHED else None
+    return next(iter(cheapest(data, family, target, needs, span)), None)
 
 
 @of_one_dataset
-def transferred(data: xr.DataTree, family: str, target: float, needs: str = ANY) -> Interval:
-    """The cost of the winner at epsilon = 0 over the least of its class on each body: median, and of 95 % the ends."""
-    best = winner(data, SYMMETRIC, target, needs)
+def cheapest(data: xr.DataTree, family: str, target: float, needs: str = ANY, span: str = "short") -> list[str]:
+    """The methods of a class whose median costs are level, up to `LEVEL` times the least, the least first."""
+    table = costs(data, family, target, span=span)
+    rows, bodies = of_class(table, needs), judged_bodies(table)
+    middle = medians(table.values[np.ix_(rows, bodies)]) if bodies.size and rows else np.array([UNREACHED])
+    level = np.flatnonzero((middle <= LEVEL * middle.min()) & (middle < UNREACHED))
+    return [table.names[rows[place]] for place in level[np.argsort(middle[level], kind="stable")]]
+
+
+@of_one_dataset
+def transferred(data: xr.DataTree, family: str, target: float, needs: str = ANY, best: str | None = None) -> Interval:
+    """The cost of the winner at epsilon = 0, or of `best`, over the least of the class on each body, with 95 % ends."""
+    best = best or winner(data, SYMMETRIC, target, needs)
     table = costs(data, family, target)
     rows, bodies = of_class(table, needs), judged_bodies(table)
     if best is None or not bodies.size:

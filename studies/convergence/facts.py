@@ -74,11 +74,13 @@ def cheapest(data: xr.Dataset) -> pd.DataFrame:
     works, enough = efficiencies(data, TARGET), min(LEAST_SCENES, data.sizes["scene"])
     rows = []
     for name, label in merged(stepping(data), MAIN).items():
-        known = [one.work for (_, variant), one in works.items() if variant == name]
-        if known:
-            work = float(np.median(known)), min(known), max(known), len(known)
+        every = [one for (_, variant), one in works.items() if variant == name]
+        if every:
+            known, foreseen = [one.work for one in every], sum(one.foreseen for one in every)
+            work = float(np.median(known)), min(known), max(known), len(known), foreseen
             rows.append([label, declared_order(name), *work, len(known) >= enough])
-    table = pd.DataFrame(rows, columns=["variant", "order", "work", "least", "most", "scenes", "ranked"])
+    header = ["variant", "order", "work", "least", "most", "scenes", "of these by the law", "ranked"]
+    table = pd.DataFrame(rows, columns=header)
     return table.astype({"ranked": bool}).sort_values(["ranked", "work"], ascending=[False, True])
 
 

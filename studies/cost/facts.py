@@ -10,6 +10,7 @@ import xarray as xr
 from symtop.judging.claims.subject import declared
 from symtop.methods.framework.registry import NEEDS, integrator
 from symtop.report.formats import count, duration, number
+from symtop.run.guard import EXPECTED
 
 from . import cells, far
 from .cells import CLASSES, Cell
@@ -141,11 +142,11 @@ def silent_facts(data: xr.DataTree) -> dict[str, Any]:
 
 
 def guard_facts(data: xr.DataTree) -> dict[str, int]:
-    """Runs that the guard was asked about and warned of: wrong ones that are longer than its trial, and right ones."""
+    """Runs longer than its trial that the guard was asked about and warned of: wrong ones and right ones."""
     rows = cells.guard_counts(data)
-    parts = {"piece": ("wrong", rows[~rows["whole"]]), "right": ("right", rows)}
-    return {f"guard_{name}{end}": int(part[f"{key}{end}"].sum())
-            for name, (key, part) in parts.items() for end in ("", "_warned")}  # fmt: skip
+    rows = rows[~rows["whole"]]
+    return {"expected": EXPECTED} | {f"guard_{key}{end}": int(rows[f"{key}{end}"].sum())
+                                     for key in ("wrong", "right") for end in ("", "_warned")}  # fmt: skip
 
 
 def far_facts(data: xr.DataTree) -> dict[str, Any]:

@@ -6,7 +6,8 @@ Steps are halved from setting to setting, tolerances divided by ten. A member le
     before a run that is foreseen to take more force evaluations than the budget,
     when no target that is left can be reached within the budget: the error falls with the declared order or, if that is
     more, as from the last setting to this, and a tenth of the target's distance is forgiven,
-    when two settings below `NEAR_ROUNDING` have the same error: rounding.
+    when two settings below `NEAR_ROUNDING` have the same error: rounding; three tolerances, since the error of a method
+    whose order depends on the tolerance falls by steps.
 
 The energy is asked from `LEAST_STEPS` a nutation on, because longer steps may keep it and miss the motion. A run is
 *wrong* if its axis is off by more than `WRONG`; it is a *silent failure* if nothing warns of it: it ended `ok` and kept
@@ -200,7 +201,8 @@ def _stay(
             gain = np.clip(before / error, falls, 1e4)
             gain = np.where(np.isfinite(before), gain, 1e4)
             foreseen = error * gain**-left / FORGIVEN
-        stuck = (error < NEAR_ROUNDING) & (error > before / FLAT)
+        earlier = before if variant.fixed_step or level < 2 else done.errors[name][level - 2, live]
+        stuck = (error < NEAR_ROUNDING) & (error > earlier / FLAT)
         worth |= (following > 0.0) & ~stuck & ((foreseen <= following) | (error > ASYMPTOTIC))
     return worth & (left >= 1.0), settled
 

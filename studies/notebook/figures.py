@@ -7,7 +7,7 @@ import xarray as xr
 from symtop.report import style
 from symtop.runner.study import Picture
 
-from .facts import ORDER_TWO
+from .facts import DRAWN
 from .long_energy import better_from, energy_until, notebook_end
 from .measures import MIDPOINT, MODIFIED, SOLVER
 
@@ -15,13 +15,13 @@ from .measures import MIDPOINT, MODIFIED, SOLVER
 def pictures(data: xr.Dataset) -> list[Picture]:
     """The energy of the solver and of methods of order two; the modified energy."""
     runs = data["variant"].values
-    drawn = [draw_energy(data)] if any(name in runs for name in (SOLVER, *ORDER_TWO)) else []
+    drawn = [draw_energy(data)] if any(name in runs for name in (SOLVER, *DRAWN)) else []
     return [*drawn, draw_modified_energy(data)] if any(name in runs for name in MODIFIED) else drawn
 
 
 def draw_energy(data: xr.Dataset) -> Picture:
     """The largest energy error so far of the solver and of methods of order two, far beyond the notebook's end."""
-    names = [name for name in (SOLVER, *ORDER_TWO) if name in data["variant"].values]
+    names = [name for name in (SOLVER, *DRAWN) if name in data["variant"].values]
     labels = ("time (s)", "largest relative\nenergy error so far")
     figure, axes = style.grid(data.sizes["scene"], 2, labels, height=2.7, sharey=True)
     ring = {"color": style.BLACK, "mfc": "none", "ms": 8.0, "mew": 1.3, "lw": 0.0, "zorder": 5}

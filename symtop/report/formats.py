@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from decimal import ROUND_CEILING, Context
+from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import Any
 
 FIRM = "\N{NO-BREAK SPACE}"
@@ -27,6 +27,12 @@ def at_most(value: float, digits: int = 2, unit: str = "") -> str:
     """The same, rounded up: what is at most 1.249 is at most ``1.3``, and not 1.2."""
     upward = Context(prec=digits, rounding=ROUND_CEILING).create_decimal(repr(float(value)))
     return number(float(upward), digits, unit)
+
+
+def at_least(value: float, digits: int = 2, unit: str = "") -> str:
+    """The same, rounded down: what is at least 0.958 is at least ``0.95``, and not 0.96."""
+    downward = Context(prec=digits, rounding=ROUND_FLOOR).create_decimal(repr(float(value)))
+    return number(float(downward), digits, unit)
 
 
 def count(value: float) -> str:
@@ -86,7 +92,7 @@ def cell(value: Any, digits: int = 3) -> str:
     return str(value)
 
 
-FILTERS = (number, at_most, count, percent, power, fixed, duration, code, by_name, cell)
+FILTERS = (number, at_most, at_least, count, percent, power, fixed, duration, code, by_name, cell)
 
 
 def table(header: Sequence[str], rows: Sequence[Sequence[str]]) -> str:

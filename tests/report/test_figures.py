@@ -114,6 +114,7 @@ def test_a_number_of_a_title(value, text):
     assert formats.number(value).replace(formats.FIRM, " ") == text
     assert " " not in formats.number(value)
     assert [formats.at_most(one) for one in (1.249, 1.2, 0.1, 185.3)] == ["1.3", "1.2", "0.1", "190"]
+    assert [formats.at_least(one) for one in (0.958, 0.95, 185.3)] == ["0.95", "0.95", "180"]
 
 
 def test_a_published_figure_has_a_vector_beside_it_and_the_same_bytes_again(tmp_path):

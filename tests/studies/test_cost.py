@@ -221,14 +221,12 @@ def test_the_natural_tops_are_written_down_and_variants_of_variable_order_have_p
     assert np.quantile(np.cos(theta), [0.25, 0.5, 0.75]) == pytest.approx([-0.5, 0.0, 0.5], abs=0.02)  # isotropic
     spin = np.log2(np.abs(I3 * (psi_dot + phi_dot * np.cos(theta)) / (2.0 * np.sqrt(I1 * mgl))))
     assert np.quantile(spin, [0.0, 0.5, 1.0]) == pytest.approx([-4.0, 0.5, 5.0], abs=0.05)
-    assert (I3 / I1).min() > 0.02
-    assert (I3 / I1).max() < 1.46
+    assert ((I3 / I1 > 0.02) & (I3 / I1 < 1.46)).all()
     assert np.hypot(theta_dot, phi_dot * np.sin(theta)).max() <= 2.0 + 1e-9
 
 
 def test_the_named_scenes_are_tops_among_the_others(tops):
-    assert (tops.kinds == KINDS.index(NATURAL)).sum() == 20
-    assert (tops.kinds == KINDS.index(SCENE)).sum() == len(tops_module.named())
+    assert [(tops.kinds == KINDS.index(one)).sum() for one in (NATURAL, SCENE)] == [20, len(tops_module.named())]
     assert np.array_equal(tops.numbers[-len(tops_module.named()) :], [*tops_module.named().values()])
     assert "goldstein" in tops_module.named()
     members = list(tops.members(np.array([3, 0, 11])))
@@ -305,6 +303,8 @@ def strang(tops):
 def test_the_stored_setting_meets_the_target_at_the_stored_cost(tops, strang, name):
     row = integrator(name)
     table = strang if name == "strang[axis]" else ladder.table(row, tops, 2e4, twin=False, guarded=0)
+    finest = table["cost"].sel(quantity="axis", target=1e-12)[tops.kinds == KINDS.index(NATURAL)]
+    assert row.fixed_step or np.isfinite(finest).all()  # two tolerances with one error are no rounding
     one = table.sel(quantity="axis", target=1e-3)
     members = np.flatnonzero(np.isfinite(one["cost"].values))[:6]
     assert np.array_equal(np.isfinite(one["met_at"].values), np.isfinite(one["cost"].values))
@@ -326,8 +326,7 @@ def test_finer_targets_cost_more_within_the_budget_and_every_top_drawn_is_judged
     runs, wrong, silent = (strang[name].values for name in ("runs", "wrong", "silent"))
     assert (runs[0] == strang["drawn"].values).all()
     assert (runs <= strang["drawn"].values).all()
-    assert (silent <= wrong).all()
-    assert (wrong <= runs).all()
+    assert ((silent <= wrong) & (wrong <= runs)).all()
     assert wrong[0].sum() > wrong[6].sum()
     data = xr.DataTree.from_dict({"short": strang.expand_dims(scene=["tops"], variant=["strang[axis]"])})
     health = cells.health(data, "strang[axis]")

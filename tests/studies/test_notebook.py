@@ -195,8 +195,7 @@ def test_the_page_says_what_the_notebook_and_the_discrete_methods_keep(data, tmp
     assert (answers["first_turned"], answers["second_turned"]) == pytest.approx((90.0, 90.0), abs=0.1)
     assert (answers["alpha_at_rest"], answers["alpha_rate"]) == pytest.approx((1.4981443962885, 0.31914824723237937))
     assert (answers["power_least"], answers["modified_most"]) == pytest.approx((2.0, 4.0), abs=0.06)
-    assert answers["first_behind"] == 5
-    assert (answers["second_behind"], answers["second_ahead"]) == (2, 3)  # the other two get ahead after 100 s
+    assert [answers[name] for name in ("first_behind", "second_behind", "second_ahead")] == [5, 2, 3]  # to 100 s
 
 
 @pytest.mark.parametrize("name", ["midpoint[angles]", "strang[axis]", SOLVER])
@@ -225,7 +224,7 @@ def test_momenta_beside_the_solvers_are_those_compared_and_the_notebooks_questio
     other = data.sel(variant=["cayley[axis]"]).assign_coords(variant=["five-rotations[attitude]"])
     loses = other.assign(p_psi_largest=other["p_psi_largest"] + 1e-3)
     answers = facts.facts(xr.concat([data, loses], "variant"))
-    assert (answers["compared"], answers["discrete"], answers["momenta_kept"]) == (5, 6, 5)
+    assert (answers["compared"], answers["discrete"], answers["momenta_kept"]) == (6, 6, 5)  # all of order two
     assert answers["momenta"] == facts.facts(data)["momenta"]
     leaks = data.assign(p_psi_largest=data["p_psi_largest"] + 1e-3)  # the control
     assert facts.facts(leaks)["momenta"] > 9e-4
