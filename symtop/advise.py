@@ -466,7 +466,7 @@ def _advice(
     needed = f"It needs {NEEDS[need]} ({need})." if need else ""
     use = f"{needed}{_carries(question, best.run.integrator)}".strip()
     sentences = f"{best.words()} meets {goal}.", f"{worth}.", use, f"{source[0].upper()}{source[1:]}."
-    runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
+    runners = [f"{trial.words()}, {_times(trial.seconds / best.seconds)} the time." for trial in ranked[1:2]]
     setting = {str(best.run.integrator.control): best.run.setting}
     return question.advice(
         integrator=name, expected_error=best.error, seconds=best.seconds, confidence=best.confidence, fails=fails,
@@ -475,6 +475,11 @@ def _advice(
         closed_form=_without_steps(question, best.seconds), **setting,
         **_lines(question, best.run.integrator, best.run.setting),
     )  # fmt: skip
+
+
+def _times(ratio: float) -> str:
+    """A factor: "1.1 times", "210 times"."""
+    return f"{float(f'{ratio:.2g}'):g} times"
 
 
 def _the_motion(question: _Question, limit: float) -> Advice:
@@ -511,7 +516,7 @@ def _solvers(method: Integrator) -> Collection[str]:
 
 def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
     """The best of what is made for this top."""
-    times = [f", {one.seconds / best:.2g} times the time" if math.isfinite(best) else "" for one in trials]
+    times = [f", {_times(one.seconds / best)} the time" if math.isfinite(best) else "" for one in trials]
     return "".join(f"Made for this top: {one.words()}{time}." for one, time in zip(trials, times, strict=True))
 
 
@@ -553,11 +558,11 @@ def _without_steps(question: _Question, best: float) -> str:
         return f"The closed form, integrator exact, takes no step{error}."
     seconds = _exact_seconds(question)
     if not best > seconds:
-        more = f", {seconds / best:.2g} times that" if math.isfinite(best) else ""
+        more = f", {_times(seconds / best)} that" if math.isfinite(best) else ""
         return f"The closed form, integrator exact, takes {seconds * 1e6:.2g} us{more}{error}, and no step."
     return (
-        f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us, {best / seconds:.2g}"
-        f" times less{error}. The integrators are compared for what they do where there is no closed form."
+        f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us, "
+        f"{_times(best / seconds)} less{error}. The integrators are compared for what they do where there is no closed form."
     )
 
 
