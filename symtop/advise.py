@@ -68,7 +68,8 @@ AGREED, TIED = 3, 1.1  # of them meet the accuracy at least, the fastest is one 
 FINALISTS, LEVEL = 3, 1.3  # methods that are run to the whole horizon, and those that cost so little more than the best
 TOO_DEAR = 40.0  # a search ends at this multiple of the evaluations of the cheapest candidate so far
 CHEAP = 1e5  # evaluations that no search ends at: it may have begun with a step that is far too fine
-WIDER = 3e7  # evaluations of a run at most where what the table names fails: often nothing serves, and that takes minutes
+LESS = 3e7  # most evaluations of a run once `AGREED` methods have failed and none serves: often none does
+HOPELESS = (settings.STOPPED, settings.BUDGET, settings.TRIED)  # why they failed
 CONFIDENCE = {
     "checked": "measured to the end",
     "at the reference's limit": "measured to the end, as far as the reference can tell",
@@ -212,8 +213,8 @@ def recommend(
     leaves out what does not run on bodies without symmetry, `keeps` ("energy", "momenta" or both) what lets them drift.
 
     Raises SymtopError for arguments that are out of range, and for a `horizon` to which the motion of a body is not
-    known. It runs what it recommends: once the candidates are compiled, from 0.1 s to half a minute, and minutes if what
-    the table names fails.
+    known. It runs what it recommends: once the candidates are compiled, from 0.1 s to half a minute, and minutes where
+    rounding stops most methods or all.
     """
     scene = scenes.scene(scene, bodies=True)
     quantity = ("attitude" if scene.of_body else "axis") if quantity is None else quantity
@@ -302,7 +303,7 @@ class _Search:
         if not ranked and self.menu:
             everyone = _everyone(self.question._replace(needs=self.question.needs or OF_ANY))
             self.widened, rest = len(everyone), {*everyone} - {*self.names, *self.menu}
-            self._try(rest, WIDER)
+            self._try(rest)
             ranked = self._confirmed([name for name in self._names() if name in rest], FINALISTS)
         return _timed(self.question, ranked, self.fails, ROUNDS)
 
@@ -313,13 +314,15 @@ class _Search:
     def _names(self) -> list[str]:
         return [one.run.integrator.name for one in self.trials]
 
-    def _try(self, names: Collection[str], most: float = math.inf) -> None:
+    def _try(self, names: Collection[str]) -> None:
         """Those of high order first: they are the cheapest at most accuracies, and their cost ends other searches."""
         files.expected[0] = math.ceil(KERNELS * len(names))
         for number, method in enumerate(sorted(map(integrator, names), key=lambda method: -(method.order or 0)), 1):
             post(f"trying method {number} of {len(names)}")
-            rivals = (one.run.evaluations for one in self.trials if one.run.integrator.needs not in THIS_TOP)
+            rivals = [one.run.evaluations for one in self.trials if one.run.integrator.needs not in THIS_TOP]
             patience = max(TOO_DEAR * min(rivals, default=math.inf), CHEAP)
+            failed = sum(len(self.fails.get(why, ())) for why in HOPELESS)
+            most = LESS if failed >= AGREED and not rivals else math.inf
             self._sort_in(_try(self.question, method, patience, most), self.trials, method)
         timed = _timed(self.question, self.trials, self.fails)
         self.trials = sorted(timed, key=lambda one: one.cost(self.question))

@@ -201,7 +201,7 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     assert advice.integrator not in menu
     assert {*names} - {"series[axis]"} == everyone
     assert "Tried all 8 compiled methods" in advice.reason
-    monkeypatch.setattr(advise, "WIDER", 10.0)
+    monkeypatch.setattr(advise, "LESS", 10.0)
     advice = symtop.recommend(scene, accuracy=1e-11, horizon=30.0)
     assert any(words.startswith(settings.BUDGET) and "vern9-fixed[axis]" in words for words in advice.fails)
 
