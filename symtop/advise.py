@@ -565,7 +565,7 @@ def _without_steps(question: _Question, best: float) -> str:
         return f"The closed form, integrator exact, takes {seconds * 1e6:.2g} us{more}{error}, and no step."
     return (
         f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us, "
-        f"{_times(best / seconds)} less{error}. The integrators are compared for what they do where there is no closed form."
+        f"{_times(best / seconds)} less{error}. Integrators are compared for what they do where it does not exist."
     )
 
 
