@@ -68,6 +68,8 @@ AGREED, TIED = 3, 1.1  # of them meet the accuracy at least, the fastest is one 
 FINALISTS, LEVEL = 3, 1.3  # methods that are run to the whole horizon, and those that cost so little more than the best
 TOO_DEAR = 40.0  # a search ends at this multiple of the evaluations of the cheapest candidate so far
 CHEAP = 1e5  # evaluations that no search ends at: it may have begun with a step that is far too fine
+LESS = 3e7  # most evaluations of a run once `AGREED` methods have failed and none serves: often none does
+HOPELESS = (settings.STOPPED, settings.BUDGET, settings.TRIED)  # why they failed
 CONFIDENCE = {
     "checked": "measured to the end",
     "at the reference's limit": "measured to the end, as far as the reference can tell",
@@ -211,7 +213,8 @@ def recommend(
     leaves out what does not run on bodies without symmetry, `keeps` ("energy", "momenta" or both) what lets them drift.
 
     Raises SymtopError for arguments that are out of range, and for a `horizon` to which the motion of a body is not
-    known. It runs what it recommends: once the candidates are compiled, from 0.1 s to half a minute.
+    known. It runs what it recommends: once the candidates are compiled, from 0.1 s to half a minute, and minutes where
+    rounding stops most methods or all.
     """
     scene = scenes.scene(scene, bodies=True)
     quantity = ("attitude" if scene.of_body else "axis") if quantity is None else quantity
@@ -316,9 +319,11 @@ class _Search:
         files.expected[0] = math.ceil(KERNELS * len(names))
         for number, method in enumerate(sorted(map(integrator, names), key=lambda method: -(method.order or 0)), 1):
             post(f"trying method {number} of {len(names)}")
-            rivals = (one.run.evaluations for one in self.trials if one.run.integrator.needs not in THIS_TOP)
+            rivals = [one.run.evaluations for one in self.trials if one.run.integrator.needs not in THIS_TOP]
             patience = max(TOO_DEAR * min(rivals, default=math.inf), CHEAP)
-            self._sort_in(_try(self.question, method, patience), self.trials, method)
+            failed = sum(len(self.fails.get(why, ())) for why in HOPELESS)
+            most = LESS if failed >= AGREED and not rivals else math.inf
+            self._sort_in(_try(self.question, method, patience, most), self.trials, method)
         timed = _timed(self.question, self.trials, self.fails)
         self.trials = sorted(timed, key=lambda one: one.cost(self.question))
 
@@ -389,7 +394,7 @@ def _candidates(question: _Question) -> tuple[list[str], str]:
     return list(dict.fromkeys([*menu, *own, *of_top])), "a study of random tops found the cheapest for such questions"
 
 
-def _try(question: _Question, method: Integrator, patience: float) -> "_Trial | str | float":
+def _try(question: _Question, method: Integrator, patience: float, most: float = math.inf) -> "_Trial | str | float":
     """A candidate's setting and cost from short runs, or the reason why it has none, or its error at the step."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
@@ -404,10 +409,10 @@ def _try(question: _Question, method: Integrator, patience: float) -> "_Trial | 
     short = min(horizon, settings.SHORT * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** settings.growth(method, quantity)
     best = settings.search(
-        scene, method, accuracy * law, quantity, short, patience=patience, longest=question.max_step
+        scene, method, accuracy * law, quantity, short, patience=min(patience, most), longest=question.max_step
     )  # fmt: skip
     if isinstance(best, str):
-        dear = best == settings.BUDGET and patience < settings.MOST_EVALUATIONS[method.implementation]
+        dear = best == settings.BUDGET and patience < min(settings.MOST_EVALUATIONS[method.implementation], most)
         return f"Not within {TOO_DEAR:g} times the work of the best" if dear else best
     if method.fixed_step and horizon / best.setting > MOST_STEPS:
         return f"Would need more than {MOST_STEPS:.0e} steps"
@@ -456,21 +461,28 @@ def _advice(
         return question.advice(reason=reason, beside=_beside(beside), closed_form=without, fails=fails)
     best = ranked[0]
     name, fixed = best.run.integrator.name, best.run.integrator.fixed_step
-    worth = f"error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
-    if need := best.run.integrator.needs:
-        worth += f"; it needs {NEEDS[need]} ({need})"
+    worth = f"Error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
     if fixed:
         count = scene.time_scale(horizon) / best.run.setting
         worth += f"; steps are {count:.3g} a {scene.period_word}, {1e6 * best.a_step:.2g} us each"
-    runners = [f"{trial.words()}, {trial.seconds / best.seconds:.2g} times the time." for trial in ranked[1:2]]
+    need = best.run.integrator.needs
+    needed = f"It needs {NEEDS[need]} ({need})." if need else ""
+    use = f"{needed}{_carries(question, best.run.integrator)}".strip()
+    sentences = f"{best.words()} meets {goal}.", f"{worth}.", use, f"{source[0].upper()}{source[1:]}."
+    runners = [f"{trial.words()}, {_times(trial.seconds / best.seconds)} the time." for trial in ranked[1:2]]
     setting = {str(best.run.integrator.control): best.run.setting}
     return question.advice(
         integrator=name, expected_error=best.error, seconds=best.seconds, confidence=best.confidence, fails=fails,
-        reason=f"{best.words()} meets {goal}: {worth}; {source}.{_carries(question, best.run.integrator)}",
+        reason="\n".join(filter(None, sentences)),
         runner_up="".join(runners), beside=_beside(beside, best.seconds),
         closed_form=_without_steps(question, best.seconds), **setting,
         **_lines(question, best.run.integrator, best.run.setting),
     )  # fmt: skip
+
+
+def _times(ratio: float) -> str:
+    """A factor: "1.1 times", "210 times"."""
+    return f"{float(f'{ratio:.2g}'):g} times"
 
 
 def _the_motion(question: _Question, limit: float) -> Advice:
@@ -479,9 +491,9 @@ def _the_motion(question: _Question, limit: float) -> Advice:
     closed_form.compile_now()  # its time is the answer
     exact, seconds = integrator("exact"), _exact_seconds(question)
     reason = (
-        f"exact, the closed form, meets {quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}: error below "
-        f"{limit:.2g} in {seconds:.2g} s, without steps; it needs {NEEDS['solution']} (solution)."
-        f"{_carries(question, exact)}"
+        f"exact, the closed form, meets {quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}.\n"
+        f"Error below {limit:.2g} in {seconds:.2g} s, without steps.\n"
+        f"It needs {NEEDS['solution']} (solution).{_carries(question, exact)}"
     )
     return question.advice(
         integrator=exact.name, expected_error=limit, seconds=seconds, confidence="at the reference's limit",
@@ -507,7 +519,7 @@ def _solvers(method: Integrator) -> Collection[str]:
 
 def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
     """The best of what is made for this top."""
-    times = [f", {one.seconds / best:.2g} times the time" if math.isfinite(best) else "" for one in trials]
+    times = [f", {_times(one.seconds / best)} the time" if math.isfinite(best) else "" for one in trials]
     return "".join(f"Made for this top: {one.words()}{time}." for one, time in zip(trials, times, strict=True))
 
 
@@ -549,11 +561,11 @@ def _without_steps(question: _Question, best: float) -> str:
         return f"The closed form, integrator exact, takes no step{error}."
     seconds = _exact_seconds(question)
     if not best > seconds:
-        more = f", {seconds / best:.2g} times that" if math.isfinite(best) else ""
+        more = f", {_times(seconds / best)} that" if math.isfinite(best) else ""
         return f"The closed form, integrator exact, takes {seconds * 1e6:.2g} us{more}{error}, and no step."
     return (
-        f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us, {best / seconds:.2g}"
-        f" times less{error}. The integrators are compared for what they do where there is no closed form."
+        f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us, "
+        f"{_times(best / seconds)} less{error}. Integrators are compared for what they do where it does not exist."
     )
 
 

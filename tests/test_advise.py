@@ -84,6 +84,15 @@ def test_a_search_says_why_it_found_nothing(name, accuracy, patience, why):
     assert reason == why
 
 
+def test_a_flat_error_is_rounding_of_steps_and_may_be_a_stair_of_tolerances():
+    stair = lambda tolerance: (10.0 ** -(3 * math.floor(-math.log10(tolerance) / 3)), 100.0)  # one error for a thousand
+    floor = lambda tolerance: (max(tolerance, 3e-11), 100.0)
+    for target in (1e-9, 1e-10, 1e-12):
+        assert stair(settings.seek(stair, 1e-7, target, (1e-15, 1.0), 1.0, fixed_step=False))[0] <= target
+    assert settings.seek(floor, 1e-9, 1e-12, (1e-15, 1.0), 1.0, fixed_step=False) == settings.STOPPED
+    assert settings.seek(lambda h: (3e-11, 1.0 / h), 0.1, 1e-12, (1e-9, 1.0), 4.0) == settings.STOPPED
+
+
 def test_what_nobody_reaches_is_said_and_an_accuracy_beyond_pi_is_of_what_is_no_angle(monkeypatch):
     advice = symtop.recommend("spheroid", accuracy=1e-17, horizon=8.0)
     assert advice.integrator is None
@@ -176,12 +185,12 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     advice = symtop.recommend(scene, accuracy=1e-8, horizon=30.0)
     assert sorted(names) == sorted([*menu[:5], "series[axis]"])
     assert advice.integrator == "vern9-fixed[axis]"
-    assert "tried the 5 methods" in advice.reason
+    assert "Tried the 5 methods" in advice.reason
     names.clear()
     menu[:5] = menu[4::-1]  # the fastest is the last of five
     advice = symtop.recommend(scene, accuracy=1e-8, horizon=30.0)
     assert sorted(names) == sorted([*menu, "series[axis]"])
-    assert "tried the 6 methods" in advice.reason
+    assert "Tried the 6 methods" in advice.reason
     names.clear()
     menu[:] = ["stormer-verlet", "strang[axis]", "midpoint", "trapezoidal", "cayley[axis]", "kahan[axis]"]
     everyone = {*menu, "vern9-fixed[axis]", "srkn-14-6[axis]"}  # of many more: each takes its kernel and its trials
@@ -191,7 +200,10 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     assert advice.confidence == "checked"
     assert advice.integrator not in menu
     assert {*names} - {"series[axis]"} == everyone
-    assert "tried all 8 compiled methods" in advice.reason
+    assert "Tried all 8 compiled methods" in advice.reason
+    monkeypatch.setattr(advise, "LESS", 10.0)
+    advice = symtop.recommend(scene, accuracy=1e-11, horizon=30.0)
+    assert any(words.startswith(settings.BUDGET) and "vern9-fixed[axis]" in words for words in advice.fails)
 
 
 def test_the_table_names_methods_for_every_class_and_none_where_a_user_limits_steps():
@@ -258,7 +270,7 @@ def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
     assert set(serving) < set(usable("axis"))
     advice = symtop.recommend("spheroid", accuracy=1e-6, horizon=4.0, needs="expression")
     assert symtop.integrator(advice.integrator).needs == "expression"
-    assert "it needs f as a formula (expression)" in advice.reason
+    assert "It needs f as a formula (expression)" in advice.reason
     with pytest.raises(symtop.SymtopError, match="needs 'luck' is unknown"):
         symtop.recommend("spheroid", accuracy=1e-6, needs=["luck"])
     words = {("torque",): "kicks group", ("torque", " free motion"): "kicks", ("inertia, torque",): "group", (): "",

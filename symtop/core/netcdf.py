@@ -223,9 +223,12 @@ def _netcdf(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def read(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Load a netCDF file completely into memory and close it."""
+    """Load a netCDF file completely into memory and close it.
+
+    Without its encoding, which has the length of the longest text there: longer ones would be written cut.
+    """
     with _netcdf(path), xr.open_dataset(path, engine="netcdf4") as data:
-        return data.load()
+        return data.load().drop_encoding()
 
 
 def read_any(path: str | os.PathLike[str]) -> xr.Dataset | xr.DataTree:
@@ -239,6 +242,6 @@ def read_any(path: str | os.PathLike[str]) -> xr.Dataset | xr.DataTree:
     with _netcdf(path), contextlib.closing(netCDF4.Dataset(path, memory=Path(path).read_bytes())) as file:
         parts, ahead = dict[str, xr.Dataset](), [file]
         for group in ahead:
-            parts[group.path] = xr.open_dataset(xr.backends.NetCDF4DataStore(group)).load()
+            parts[group.path] = xr.open_dataset(xr.backends.NetCDF4DataStore(group)).load().drop_encoding()
             ahead += group.groups.values()
     return xr.DataTree.from_dict(parts) if len(parts) > 1 else parts["/"]

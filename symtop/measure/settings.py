@@ -32,6 +32,7 @@ LEAST = 0.3  # of the target: the least error that ends a search
 TRIES = 9  # runs of a search
 MOST_EVALUATIONS = {"compiled": 3e8, "python": 3e5}  # of one run
 FLAT, NEAR_ROUNDING = 1.3, 1e-8  # a finer setting that gains less has met rounding, if its error is below this
+STAIR = 0.1  # what becomes of a tolerance at least that has gained nothing
 
 STOPPED = "Stopped by rounding or by what the method's settings allow"
 BUDGET = "Not within the work that a run may take"
@@ -124,7 +125,7 @@ def seek(
     """
     (finest, coarsest), goal = ends, math.sqrt(least) * target
     after_failure, finer, coarser = (0.4, 0.02, 8.0) if fixed_step else (0.01, 1e-5, 1e4)  # changes of a setting
-    setting, why, smallest = min(max(guess, finest), coarsest), TRIED, math.inf
+    setting, why, smallest, flat = min(max(guess, finest), coarsest), TRIED, math.inf, 0
     met: tuple[float, float] | None = None  # the coarsest setting that meets the target, with its error
     missed: tuple[float, float] | None = None  # the finest that does not
     for _ in range(TRIES):
@@ -135,18 +136,19 @@ def seek(
             met = setting, error
             if error >= least * target or setting >= coarsest:
                 break
-        elif met is None and missed is not None and missed[1] < FLAT * error < NEAR_ROUNDING:
-            why = STOPPED  # a finer setting gains nothing
-            break
         else:
-            missed = setting, error
+            gains = met is not None or missed is None or not missed[1] < FLAT * error < NEAR_ROUNDING
+            flat, missed = 0 if gains else flat + 1, (setting, error)
+            if flat == (1 if fixed_step else 2):  # an order that depends on the tolerance makes the error fall by steps
+                why = STOPPED  # a finer setting gains nothing
+                break
         if met is not None and missed is not None:
             if missed[0] < 1.15 * met[0]:
                 break
             setting = between(*met, *missed, goal)
         else:
             change = (goal / max(error, 1e-3 * target)) ** (1.0 / power)
-            setting *= after_failure if math.isinf(error) else min(max(change, finer), coarser)
+            setting *= after_failure if math.isinf(error) else min(max(change, finer), STAIR if flat else coarser)
             setting = min(max(setting, finest), coarsest)
         if setting == last or evaluations * (last / setting if fixed_step else 1.0) > patience:
             why = STOPPED if setting == last else BUDGET

@@ -312,10 +312,10 @@ def test_a_motion_that_is_wrong_is_told_so_whatever_is_claimed(claimed, only):
         assert wrong is None or finding.value == pytest.approx(wrong, rel=0.2)
 
 
-def test_a_step_that_returns_nan_is_told_so(only):
+def test_a_step_that_returns_nan_or_the_derivative_is_told_so(only):
     only("calls", "order")
-    for value, words in ((np.nan, "returns NaN"), (np.inf, "returns infinity")):
-        ledger = symtop.judge(lambda f, t, y, h, value=value: y + value, quick=True)
+    for value, words in ((np.nan, "returns NaN"), (np.inf, "returns infinity"), (0.0, "jumps")):
+        ledger = symtop.judge(lambda f, t, y, h, value=value: f(t, y) + value, quick=True)
         assert (ledger["calls"].measured.kind, ledger["calls"].verdict) == (words, "refuted")
         assert "differ" not in ledger["calls"].why
         assert not ledger["order"].measured
@@ -332,6 +332,7 @@ def impatient(monkeypatch):
     (hangs, r"a step of h = \d.* had not returned after \d+ s"),
     (crashes, r"its process was ended by SIGSEGV in a step of h = "),
     (raises, r"a step of h = .* raises RuntimeError: no luck"),
+    (lambda f, t, y, h: sys.exit("so"), r"a step of h = .* raises SystemExit: so"),
     (returns_nothing, "step must return the new state, 6 real numbers, not None"),
     (lambda f, t, y, h: y[:3], r"6 real numbers, not ndarray of shape \(3,\)"),
     (lambda f, t, y, h: (y, h), "step must return the new state, 6 real numbers, not tuple$"),

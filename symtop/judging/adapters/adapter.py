@@ -184,7 +184,7 @@ class Heartbeat(ctypes.Structure):
 
     def __exit__(self, _kind: object, error: BaseException | None, _trace: object) -> None:
         self.inside = False
-        if isinstance(error, Exception) and not isinstance(error, SymtopError):
+        if isinstance(error, Exception | SystemExit) and not isinstance(error, SymtopError):
             raise SymtopError(f"a step of h = {self.step:.3g} raises {words_of(error)}") from error
 
 

@@ -136,7 +136,7 @@ class Program(Stepper):
                     self.words, input=line.encode(), capture_output=True, timeout=seconds, check=False
                 )
             except subprocess.TimeoutExpired:
-                what = f"{steps} steps of {h:.3g}"
+                what = f"{steps} step{'s' * (steps != 1)} of {h:.3g}"
                 raise SymtopError(f"{self.name} had not ended {seconds:.0f} s after it was asked for {what}") from None
         if result.returncode != 0:
             words = " ".join(result.stderr.decode(errors="replace").split())[-WORDS:]

@@ -68,7 +68,11 @@ def _calls(subject: Subject) -> Finding:
     if refuted := _repeated(stepper, lambda: relative_gap(first, once(start, h)), lambda step: once(other, step), h):
         return refuted
     step = one_step(subject.method, subject.method.charts()[0], scene, NOTHING * h)
-    if (gap := step.gap(step.image(step.point(other)), step.at(other))) > STANDS:
+    own, gap = (step.gap(step.image(step.point(at)), step.at(at)) for at in (start, other))
+    if own > STANDS:
+        why = f"a step of {step.h:.0e} moves by {own:.1e}: what it returns is no state, or no next one"
+        return _refuted("jumps", why, own, STANDS)
+    if gap > STANDS:
         why = f"it keeps something of its first start: from another one, a step of {step.h:.0e} moves by {gap:.1e}"
         return _refuted("keeps state", why, gap, STANDS)
     traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # in two words, and in a clause

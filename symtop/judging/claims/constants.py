@@ -290,7 +290,8 @@ def change_of(
     Of `plain` sums half of what rounding makes in one step may be a bias, and add up, but no more than a unit of
     rounding a step. A motion that is not `even` may begin calmly and turn over later, and so may its residuals.
     """
-    jumps = np.abs(np.diff(every_step))
+    with np.errstate(invalid="ignore"):  # of a run that blows up
+        jumps = np.abs(np.diff(every_step))
     a_step = float(np.max(jumps[np.isfinite(jumps)])) if np.isfinite(jumps).any() else math.nan
     rounding = a_step * math.sqrt(steps) if a_step <= ROUNDING_OF_A_STEP * grain else 0.0
     rounding = max(rounding, min(0.5 * a_step, EPSILON * grain) * steps * plain * (rounding > 0.0))
