@@ -202,8 +202,8 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     assert {*names} - {"series[axis]"} == everyone
     assert "Tried all 8 compiled methods" in advice.reason
     monkeypatch.setattr(advise, "LESS", 10.0)
-    advice = symtop.recommend(scene, accuracy=1e-11, horizon=30.0)
-    assert any(words.startswith(settings.BUDGET) and "vern9-fixed[axis]" in words for words in advice.fails)
+    fails = symtop.recommend(scene, accuracy=1e-11, horizon=30.0).fails
+    assert any(one.startswith(settings.BUDGET) and "vern9-fixed[axis]" in one for one in fails)
 
 
 def test_the_table_names_methods_for_every_class_and_none_where_a_user_limits_steps():
