@@ -39,7 +39,6 @@ SEEN = 6.0  # 1/g, the time at which its early error is read
 
 
 def _run(method: Integrator, scene: Scene, start: Angles, plan: Plan) -> tuple[str, View]:
-    """The outcome of a run from `start`, and what its samples show."""
     chart = method.chart_for("axis")
     run = solve(method, chart, scene.top, start, plan)
     return run.outcome, View(chart, scene.top, run.states, run.p_phi, run.p_psi)
