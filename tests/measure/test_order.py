@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.measure.order import BESIDE, CLEARLY, Fit, order, order_verdict, power_law
-from symtop.measure.order_conditions import (
+from symtop.judging.claims.order_conditions import (
     commutator,
     conditions,
     density,
@@ -23,8 +22,9 @@ from symtop.measure.order_conditions import (
     triangle,
     vanishing,
 )
+from symtop.judging.claims.step_series import compared, step_series
+from symtop.measure.order import BESIDE, CLEARLY, Fit, order, order_verdict, power_law
 from symtop.measure.step_map import generic_start, one_step
-from symtop.measure.step_series import compared, step_series
 from symtop.methods.runge_kutta.pair_tables import DORMAND_PRINCE
 from tests.judging.blind.right import CLASSICAL
 
