@@ -195,7 +195,7 @@ def test_there_are_as_many_conditions_as_there_are(longest):
 
 
 def test_log_undoes_exp_and_begins_as_baker_campbell_and_hausdorff_say():
-    t, v = element(4, t=1.0), element(4, v=1.0)
+    t, v = element(t=1.0), element(v=1.0)
     words = logarithm(product(exponential(t), exponential(v)))
     np.testing.assert_allclose(words[1], [1.0, 1.0])
     np.testing.assert_allclose(words[2], 0.5 * commutator(t, v)[2])
