@@ -7,7 +7,6 @@ import math
 
 import numpy as np
 import pytest
-from symtop_studies.grid import grid_variants
 from symtop_studies.stability import study
 from symtop_studies.stability.failures import (
     sampled_energy_error,
@@ -20,6 +19,7 @@ from symtop_studies.stability.solver_tolerance import solver_sweep, textbook_mid
 from symtop_studies.stability.tables import narrow_window
 
 import symtop
+from symtop.measure.settings import smallest_charts
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator, methods
@@ -346,7 +346,7 @@ NOT_ONE_MAP = {  # of theta and p_theta, so that its samples are no iterates
 
 def test_every_fixed_step_method_shows_its_trace_and_is_scanned_but_those_left_out():
     left = {name for names in study.NOT_SLEEPING.values() for name in names}
-    fixed = {row.name for row in grid_variants("axis") if row.fixed_step}
+    fixed = {row.name for row in smallest_charts("axis") if row.fixed_step}
     assert left < fixed  # a name that no variant has would leave nothing out
     for quick in (True, False):
         assert {case.integrator for case in study.cases(quick) if case.scene == "sleeping"} == fixed - left
