@@ -12,7 +12,7 @@ from symtop.model.scenes import added_scenes
 from symtop.runner.study import Case, Study
 
 from . import facts, figures
-from .tables import MECHANISMS, PERIODS, map_table
+from .measures import MECHANISMS, PERIODS, map_table
 
 FAMILY = "cusp"  # let go at theta = 0.8 with any spin
 NOT_SLEEPING = {  # variants that do not take part in the mechanism "sleeping"

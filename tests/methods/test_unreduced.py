@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from symtop_studies.reduction.tables import unreduced_cost, unreduced_gaps
+from symtop_studies.reduction.measures import unreduced_cost, unreduced_gaps
 
 import symtop
 from symtop.measure.conservation import trend

@@ -15,8 +15,8 @@ from symtop_studies.stability.failures import (
     surviving_displacements,
 )
 from symtop_studies.stability.linear_limits import linear_limits, sign_changes, sleep_margin, sleeping_threshold
+from symtop_studies.stability.measures import narrow_window
 from symtop_studies.stability.solver_tolerance import solver_sweep, textbook_midpoint
-from symtop_studies.stability.tables import narrow_window
 
 import symtop
 from symtop.measure.settings import smallest_charts
