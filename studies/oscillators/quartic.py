@@ -178,7 +178,6 @@ def true_path(oscillator: Quartic, times: Sequence[float] | Array) -> Array:
 
 
 def _fixed(value: float) -> int:
-    """A number in units of 2^-BITS."""
     return int(math.ldexp(value, BITS))
 
 

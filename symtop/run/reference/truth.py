@@ -403,7 +403,6 @@ def _compared(scene: Scene, kind: str) -> xr.Dataset:
 
 
 def _times(scene: Scene, nutations: float) -> Array:
-    """Times of comparison: up to so many nutations, or to the horizon where there are none."""
     period = scene.nutation_period
     return check_times(scene, nutations * period if math.isfinite(period) else scene.horizon)
 
