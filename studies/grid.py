@@ -1,12 +1,8 @@
-"""Which scenes and variants a study runs: all that suit its question, a user's own too, but for those that it leaves
-out for a reason that it names.
-"""
+"""Which scenes a study runs: all that suit its question, a user's own too, but for some, for a reason."""
 
 from collections.abc import Callable, Iterable
 
 from symtop.core.errors import one_of
-from symtop.measure.settings import smallest_charts
-from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import TAGS, Scene, scenes
 
 ALL_BUT_TWO = {  # tags that leave spheroid and goldstein, with the reason
@@ -27,12 +23,3 @@ def grid_scenes(left_out: Iterable[str] = (), suits: Callable[[Scene], bool] = l
     """
     tags = {one_of("left_out", tag, TAGS) for tag in left_out}
     return [name for name, scene in scenes().items() if not tags.intersection(scene.tags) and suits(scene)]
-
-
-def grid_variants(observe: str) -> list[Integrator]:
-    """The variants of a grid: every method in each of its charts that shows the "nutation" or the "axis".
-
-    Where a method has the axis chart, its attitude chart is left out: it steps the same axis and angular momentum, and
-    the rotation about the axis besides, which neither quantity depends on.
-    """
-    return smallest_charts(observe)

@@ -1,1 +1,1 @@
-"""Which method is the cheapest at the accuracy I need, with what I have?"""
+"""My body is no symmetric top: which of these verdicts hold for it?"""

@@ -13,8 +13,7 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from symtop_studies.cost.ladder import KEPT, LEVELS, WRONG, Climb, climb, setting_of, stored, typical_work
-from symtop_studies.cost.ranking import cost_to_reach
+from symtop_studies.cost.ladder import KEPT, WRONG, Climb, climb, costs_of, typical_work
 from symtop_studies.cost.tops import CLEAR, MOMENTA
 
 from symtop.measure.settings import TARGETS
@@ -62,19 +61,9 @@ def _traits(variant: Integrator) -> dict[str, Any]:
 
 
 def _costs(variant: Integrator, done: Climb, asked: dict[str, Any], bodies: Any) -> xr.Dataset:
-    settings = np.array([setting_of(variant, level) for level in range(LEVELS)])
-    set_to = np.where(np.isfinite(done.work), settings[:, np.newaxis], np.nan)
-    shape = len(asked), len(TARGETS), len(bodies.period)
-    costs, met = np.full(shape, np.nan, np.float32), np.full(shape, np.nan, np.float32)
-    for place, name in enumerate(asked):
-        for into, values in ((costs, done.work), (met, set_to)):
-            into[place] = np.where(asked[name], stored(cost_to_reach(values, done.errors[name], TARGETS)), np.nan)
-    over = ("quantity", "target", "member")
-    data: dict[str, Any] = {
-        "cost": (over, costs), "met_at": (over, met), "setting": ("level", settings),
-        "work": ("level", typical_work(variant, done, bodies)[:, 0]),
-    }  # fmt: skip
-    return xr.Dataset(data, {"quantity": list(asked), "target": list(TARGETS)})
+    work = {"work": ("level", typical_work(variant, done, bodies)[:, 0])}
+    coords = {"quantity": list(asked), "target": list(TARGETS)}
+    return xr.Dataset(costs_of(variant, done, asked, list(asked)) | work, coords)
 
 
 def _family(variant: Integrator, bodies: Bodies, budget: float) -> xr.Dataset:

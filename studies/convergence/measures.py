@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
+from symtop_studies.cost.ranking import cost_to_reach
 from symtop_studies.memoize import of_one_dataset
 
 from symtop.core.numbers import EPSILON
@@ -172,16 +173,12 @@ def efficiencies(data: xr.Dataset, error: float) -> dict[tuple[str, str], Effici
 
 
 def _between(cell: xr.Dataset, name: str, error: float) -> float:
-    """The work between the last run with more than an error and the next; NaN if there are no such two."""
+    """The work between the last run with more than an error and the next, by `cost_to_reach`; else not finite."""
     order = np.argsort(-cell["step_size"].values)
     errors, works = cell[MAIN].values[order], evaluations_a_nutation(cell, name)[order]
     good = (errors > 0.0) & (works > 0.0)
-    errors, works = np.log(errors[good] / error), np.log(works[good])
-    more = np.flatnonzero(errors > 0.0)
-    if not more.size or more[-1] + 1 == errors.size:
-        return math.nan
-    k = more[-1]
-    return math.exp(works[k] + (works[k + 1] - works[k]) * errors[k] / (errors[k] - errors[k + 1]))
+    errors, works = errors[good, np.newaxis], works[good, np.newaxis]
+    return float(cost_to_reach(works, errors, [error])[0, 0]) if (errors > error).any() else math.nan
 
 
 TARGET = 1e-6  # rad, the axis error at which costs are compared

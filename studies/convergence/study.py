@@ -51,7 +51,7 @@ def on_scene(name: str, quick: bool) -> list[Case]:
 def measure(case: Case) -> xr.Dataset:
     """The error table of one method in one chart on one scene, with the attitude where the chart shows it.
 
-    Of the five named methods on one scene also the change of the energy over a longer time.
+    Of the methods in `NAMED` on one scene also the change of the energy over a longer time.
     """
     on, row = scene(case.scene), integrator(case.integrator)
     horizon = case.settings["horizon"]

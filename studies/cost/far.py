@@ -31,14 +31,14 @@ from symtop.core.numbers import EPSILON, GOLDEN
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator, integrator, variants
 from symtop.model import charts
-from symtop.model.charts import Array, axis_of, space_energy
-from symtop.model.top import effective_potential
+from symtop.model.charts import Array, View
+from symtop.run.ensemble import chunks
 
 from . import laws
 from .ladder import in_turn, stepped, stored
 from .prices import prices
 from .ranking import cost_to_reach
-from .tops import FIRST as FEWEST_STEPS, Body, Tops, natural
+from .tops import FIRST as FEWEST_STEPS, Tops, natural
 
 QUANTITIES = ("axis", "energy", "shape")
 MOST = {"axis": 2.0, "energy": 1.0, "shape": 1.0}  # the largest power of the horizon (see `laws`)
@@ -168,21 +168,16 @@ def filled(marks: NDArray[np.int64], count: int) -> NDArray[np.int64]:
 
 def errors(chart: str, tops: Tops, shown: Shown, times: Array) -> dict[str, Array]:
     """Each quantity at each sample, (n, samples); inf where a run has failed."""
-    states, body = shown.states, Body(*tops.body)
-    p_phi, p_psi = shown.momenta[..., 0], shown.momenta[..., 1]
+    view = View(chart, chunks.together(tops.numbers), shown.states, shown.momenta[..., 0], shown.momenta[..., 1])
     with np.errstate(all="ignore"):
-        axis = axis_of(chart, states)
+        axis, I1 = view.axis, view.top.I1
         if chart == "angles":
-            place = effective_potential(states[..., 0], p_phi - p_psi, p_phi + p_psi, body.I1, body.mgl)
-            energy = states[..., 1] ** 2 / (2.0 * body.I1) + p_psi**2 / (2.0 * body.I3) + place
-            rate = -np.sin(states[..., 0]) * states[..., 1] / body.I1
+            rate = -np.sin(view.theta) * view.p_theta / I1
         else:
-            momentum = states[..., -3:]
-            energy = space_energy(body, axis, momentum, p_psi)  # type: ignore[arg-type]
-            rate = (momentum[..., 0] * axis[..., 1] - momentum[..., 1] * axis[..., 0]) / body.I1
+            rate = (view.momentum[..., 0] * axis[..., 1] - view.momentum[..., 1] * axis[..., 0]) / I1
         each = {
             "axis": charts.axis_distance(axis, tops.forms.axis(times)),
-            "energy": np.abs(energy - tops.energy[:, np.newaxis]) / tops.energy_scale[:, np.newaxis],
+            "energy": np.abs(view.energy - tops.energy[:, np.newaxis]) / tops.energy_scale[:, np.newaxis],
             "shape": shape(tops, axis[..., 2], rate),
         }
     return {name: np.where(np.isfinite(values), values, np.inf) for name, values in each.items()}
@@ -190,7 +185,7 @@ def errors(chart: str, tops: Tops, shown: Shown, times: Array) -> dict[str, Arra
 
 def shape(tops: Tops, u: Array, rate: Array) -> Array:
     """Distance of heights and their rates (n, samples) from the true orbits, in units of the axis's length."""
-    I1, I3, mgl = tops.body
+    I1, I3, mgl = (tops.numbers[:, k, np.newaxis] for k in range(3))
     p_phi, p_psi = (part[:, np.newaxis] for part in tops.momenta[:2])
     a, b, beta = p_psi / I1, p_phi / I1, 2.0 * mgl / I1
     alpha = (2.0 * tops.energy[:, np.newaxis] - p_psi**2 / I3) / I1

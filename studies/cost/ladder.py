@@ -218,20 +218,10 @@ def table(variant: Integrator, tops: Tops, budget: float, *, twin: bool, guarded
     """The dataset of one variant over one horizon."""
     asked = {name: mask for name, mask in tops.asked(TARGETS).items() if name in quantities_of(variant, twin)}
     done = climb(variant, tops, asked, budget)
-    settings = np.array([setting_of(variant, level) for level in range(LEVELS)])
-    set_to = np.where(np.isfinite(done.work), settings[:, np.newaxis], np.nan)
-    costs, met = (np.full((len(ASKED), len(TARGETS), len(tops.period)), np.nan, np.float32) for _ in range(2))
-    for place, name in enumerate(ASKED):
-        if name in asked:
-            first = round(math.log2(LEAST_STEPS / FIRST)) if variant.fixed_step and name == "energy" else 0
-            for into, values in ((costs, done.work), (met, set_to)):
-                reached = cost_to_reach(values[first:], done.errors[name][first:], TARGETS)
-                into[place] = np.where(asked[name], stored(reached), np.nan)
     scenes = tops.kinds == KINDS.index(SCENE)
+    energy_from = round(math.log2(LEAST_STEPS / FIRST)) if variant.fixed_step else 0
     data: dict[str, Any] = {
-        "cost": (("quantity", "target", "member"), costs),
-        "met_at": (("quantity", "target", "member"), met),
-        "setting": ("level", settings),
+        **costs_of(variant, done, asked, ASKED, {"energy": energy_from}),
         "work": (("level", "kind"), typical_work(variant, done, tops)),
         **{name: (("level", "kind"), values) for name, values in _healthy(done, tops).items()},
         "drawn": ("kind", [float((tops.known & (tops.kinds == kind)).sum()) for kind in range(len(KINDS))]),
@@ -251,6 +241,24 @@ def table(variant: Integrator, tops: Tops, budget: float, *, twin: bool, guarded
             for name, values in guarded_runs(variant, tops, done, guarded).items()
         }
     return xr.Dataset(data, coords={"quantity": list(ASKED), "target": list(TARGETS), "kind": list(KINDS)})
+
+
+def costs_of(
+    variant: Integrator, done: Climb, asked: dict[str, NDArray[np.bool_]], names: Sequence[str],
+    firsts: dict[str, int] | None = None,
+) -> dict[str, Any]:  # fmt: skip
+    """The variables ``cost``, ``met_at`` and ``setting``; of some quantities the levels before a first do not count."""
+    settings = np.array([setting_of(variant, level) for level in range(LEVELS)])
+    set_to = np.where(np.isfinite(done.work), settings[:, np.newaxis], np.nan)
+    costs, met = (np.full((len(names), len(TARGETS), done.work.shape[1]), np.nan, np.float32) for _ in range(2))
+    for place, name in enumerate(names):
+        if name in asked:
+            first = (firsts or {}).get(name, 0)
+            for into, values in ((costs, done.work), (met, set_to)):
+                reached = cost_to_reach(values[first:], done.errors[name][first:], TARGETS)
+                into[place] = np.where(asked[name], stored(reached), np.nan)
+    over = "quantity", "target", "member"
+    return {"cost": (over, costs), "met_at": (over, met), "setting": ("level", settings)}
 
 
 def typical_work(variant: Integrator, done: Climb, tops: Any) -> Array:

@@ -36,7 +36,7 @@ import xarray as xr
 from symtop_studies import fresh_process
 from symtop_studies.memoize import of_one_dataset
 
-from symtop.measure.timing import quartile_spread, timings
+from symtop.measure.timing import timings
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.body import Attitude, RigidBody
@@ -174,6 +174,12 @@ class Prices(NamedTuple):
         return np.exp(np.interp(at, x[known], np.log(self.price[row, known]))), np.interp(
             at, x[known], self.call[row, known]
         )
+
+
+def quartile_spread(samples: Array, axis: int = -1) -> Array:
+    """The distance of the quartiles over the median along an axis, of the samples that are not NaN."""
+    low, middle, high = np.nanquantile(samples, (0.25, 0.5, 0.75), axis=axis)
+    return np.asarray((high - low) / middle)
 
 
 def spread_of(values: Array) -> Array:

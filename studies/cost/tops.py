@@ -27,7 +27,7 @@ import functools
 import math
 from collections.abc import Iterator
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,9 +36,10 @@ from symtop_studies.grid import grid_scenes
 from symtop.core.numbers import EPSILON, GOLDEN, TINY
 from symtop.methods.framework.lanes import members_of
 from symtop.model import charts, scenes
-from symtop.model.charts import Array, axis_of, space_energy
+from symtop.model.charts import Array, View
 from symtop.model.exact.closed_form import ClosedForms
-from symtop.model.top import NUMBERS, Angles, SymmetricTop, effective_potential, flat
+from symtop.model.top import NUMBERS, Angles, SymmetricTop, flat
+from symtop.run.ensemble.chunks import together
 from symtop.run.ensemble.population import STRATA, population
 from symtop.run.reference.truth import ROUNDING
 
@@ -62,14 +63,6 @@ def sample_marks(steps: int, samples: int = SAMPLES) -> NDArray[np.int64]:
     """After which of so many steps a run is sampled: golden fractions apart, the last step among them."""
     places = np.arange(1.0, samples + 1.0) + np.append(np.mod(GOLDEN * np.arange(1.0, samples), 1.0) - 0.5, 0.0)
     return np.unique(np.maximum(np.rint(places * steps / samples).astype(np.int64), 1))
-
-
-class Body(NamedTuple):
-    """The parameters of n tops, each (n, 1) beside samples."""
-
-    I1: Array
-    I3: Array
-    mgl: Array
 
 
 class Shown(Protocol):
@@ -112,11 +105,6 @@ class Tops:
         """Axes (n, samples, 3) and quaternions (n, samples, 4)."""
         times = np.where(self.known[:, np.newaxis], self.times, 0.0)
         return self.forms.axis(times), self.forms.quaternion(times)
-
-    @property
-    def body(self) -> Body:
-        """The parameters, beside samples."""
-        return Body(*(self.numbers[:, k, np.newaxis] for k in range(3)))
 
     @cached_property
     def momenta(self) -> tuple[Array, Array, Array, Array]:
@@ -194,20 +182,14 @@ class Tops:
 
     def _errors(self, chart: str, states: Array, momenta: Array, chosen: NDArray[np.int64]) -> dict[str, Array]:
         """The errors of a few members."""
-        body, p_phi, p_psi = Body(*(part[chosen] for part in self.body)), momenta[..., 0], momenta[..., 1]
+        p_phi, p_psi = momenta[..., 0], momenta[..., 1]
+        view = View(chart, together(self.numbers[chosen]), states, p_phi, p_psi)
         with np.errstate(all="ignore"):  # a run may have blown up
-            axis = axis_of(chart, states)
-            each = {"axis": charts.axis_distance(axis, self.truth[0][chosen])}
-            if chart == "angles":
-                quaternion = charts.quaternion_from_angles(states[..., 0], states[..., 2], states[..., 3])
-                place = effective_potential(states[..., 0], p_phi - p_psi, p_phi + p_psi, body.I1, body.mgl)
-                energy = states[..., 1] ** 2 / (2.0 * body.I1) + p_psi**2 / (2.0 * body.I3) + place
-            else:
-                quaternion = states[..., :4]
-                energy = space_energy(body, axis, states[..., -3:], p_psi)  # type: ignore[arg-type]
+            each = {"axis": charts.axis_distance(view.axis, self.truth[0][chosen])}
             if chart != "axis":
-                each["attitude"] = charts.attitude_distance(quaternion, self.truth[1][chosen])
-            each["energy"] = np.abs(energy - self.energy[chosen, np.newaxis]) / self.energy_scale[chosen, np.newaxis]
+                each["attitude"] = charts.attitude_distance(view.quaternion, self.truth[1][chosen])
+            off = np.abs(view.energy - self.energy[chosen, np.newaxis])
+            each["energy"] = off / self.energy_scale[chosen, np.newaxis]
             start = [part[chosen, np.newaxis] for part in self.momenta[:2]]
             scale = np.maximum(np.maximum(np.abs(start[0]), np.abs(start[1])), TINY)
             each[MOMENTA] = np.maximum(np.abs(p_phi - start[0]), np.abs(p_psi - start[1])) / scale

@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike
 
 from symtop.measure.conservation import Trend, constant_of, residuals
 from symtop.measure.order import Fit, power_law
-from symtop.measure.phase import nutation_phase
+from symtop.measure.phase import nutates, split_states
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
@@ -26,6 +26,19 @@ from symtop.run.simulation import integrate
 
 DRAWS, SEED = 2000, 1937  # of the bootstrap
 BLOCKS = 50
+
+
+def nutation_phase(scene: Scene, time: Array, theta: Array, theta_dot: Array) -> Array:
+    """How far states (n,) are ahead of the truth at the same times, rad of the nutation, unwrapped.
+
+    NaN where a state is not finite, and everywhere if the motion has no nutation (see `nutates`).
+    """
+    phase, good = np.full(np.shape(time), math.nan), np.isfinite(theta) & np.isfinite(theta_dot)
+    if nutates(scene) and good.any():
+        u, du = np.cos(theta[good]), -np.sin(theta[good]) * theta_dot[good]
+        early = split_states(scene, time[good], u, du, np.zeros_like(u)).lag
+        phase[good] = 2.0 * math.pi / scene.nutation_period * early
+    return phase
 
 
 def history(scene: Scene, method: Integrator, **settings: Any) -> xr.Dataset:

@@ -10,13 +10,12 @@ import math
 import numpy as np
 import xarray as xr
 
-from symtop.measure.phase import nutation_phase
 from symtop.measure.settings import seek
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 from symtop.run.simulation import simulate
 
-from .growth import horizon, lost_at
+from .growth import horizon, lost_at, nutation_phase
 
 LOST = 1e-2  # rad
 SHORT = 1000.0  # nutations of the run that predicts

@@ -5,8 +5,9 @@ from collections.abc import Iterable
 
 import xarray as xr
 from symtop_studies.drift.runs import rounding, run_history, windows
-from symtop_studies.grid import grid_scenes, grid_variants
+from symtop_studies.grid import grid_scenes
 
+from symtop.measure.settings import smallest_charts
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.scenes import TAGS, Scene, scene
 from symtop.run.long_run import PER_NUTATION
@@ -56,7 +57,7 @@ def grid(
     long_run = {"steps": longest, "per_nutation": PER_NUTATION}
     ensemble = {"steps": walk, "per_nutation": PER_NUTATION, "count": members}
     loss = {"short": share * SHORT, "target": share * TARGET, "most": share * MOST_STEPS}
-    variants = grid_variants("nutation")
+    variants = smallest_charts("nutation")
     return [
         *(Case(name, row.name, history_settings(scene(name), row, steps), group=HISTORIES)
           for name in grid_scenes(left_out, lambda one: math.isfinite(one.nutation_period))

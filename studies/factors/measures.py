@@ -13,9 +13,10 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 from symtop_studies import fresh_process
+from symtop_studies.cost.prices import quartile_spread
 
 from symtop.measure import settings
-from symtop.measure.timing import first_call, quartile_spread, timings
+from symtop.measure.timing import first_call, timings
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 

@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from symtop_studies.grid import grid_variants
 
 from symtop.measure.conservation import residuals
+from symtop.measure.settings import smallest_charts
 from symtop.methods.framework.registry import integrator
 from symtop.methods.library.scipy_ivp import integrated
 from symtop.model.scenes import Scene, closed_form
@@ -33,9 +33,8 @@ SAMPLES, PATH_SAMPLES = 301, 1201
 
 def discrete_methods() -> list[str]:
     """Variants of the discrete Lagrangians and splittings of the registry, in the angles or the axis chart."""
-    return [
-        variant.name for variant in grid_variants("nutation") if variant.family in ("discrete-lagrangian", "splitting")
-    ]
+    families = "discrete-lagrangian", "splitting"
+    return [variant.name for variant in smallest_charts("nutation") if variant.family in families]
 
 
 def residual_history(scene: Scene, name: str, setting: float) -> xr.Dataset:

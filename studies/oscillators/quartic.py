@@ -8,8 +8,8 @@ form, Z_{n+1} + Z_{n-1} = 2 f(|Z_n|^2) Z_n:
 
     stormer-verlet    f = 1 + h^2 (3 b/2 + sigma s)                                          x_n = Z_n
     mcmillan          f = (1 + 3 b h^2/2)/(1 - sigma h^2 s), integrable at any step          x_n = Z_n
-    exact-discrete    f = A/(1 + B s) of `symtop.methods.lagrangian.exact_discrete`                     x_n = exp(i n
-    delta) Z_n midpoint          x_{n+1} = x_n + h v,  v = x'_n + h F((x_n + x_{n+1})/2)/2
+    exact-discrete    f = A/(1 + B s) (`symtop.methods.lagrangian.exact_discrete`)           x_n = exp(i n delta) Z_n
+    midpoint          x_{n+1} = x_n + h v,  v = x'_n + h F((x_n + x_{n+1})/2)/2
 
 The discrete Lagrangian of the first three is r (|Z1 - Z0|^2/2 - (V(Z0) + V(Z1))/2) with dV/ds = 1 - f. With sigma = 0
 the exact one has B = delta = 0, A = cos w h and r = w/sin w h, w^2 = -3 b:
@@ -178,7 +178,6 @@ def true_path(oscillator: Quartic, times: Sequence[float] | Array) -> Array:
 
 
 def _fixed(value: float) -> int:
-    """A number in units of 2^-BITS."""
     return int(math.ldexp(value, BITS))
 
 

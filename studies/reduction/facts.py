@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from .tables import CHART_PERIODS, COMMUTES, COMPARED_STEPS, GAPS, chart_ratios, commutation_order
+from .measures import CHART_PERIODS, COMMUTES, COMPARED_STEPS, GAPS, chart_ratios, commutation_order
 
 WORST = "largest difference (rad)"
 AS_FAST = 1.1  # times as long: what the noise of a time hides

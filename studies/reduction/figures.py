@@ -9,7 +9,7 @@ from symtop.report.figures import SMALLEST
 from symtop.runner.study import Picture
 
 from .facts import cells
-from .tables import COMMUTES, commutation_order
+from .measures import COMMUTES, commutation_order
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:

@@ -16,7 +16,7 @@ from symtop.methods.framework.registry import integrator, methods
 from symtop.model.scenes import TAGS, scene
 from symtop.runner.study import Case, Study
 
-from . import facts, figures, tables
+from . import facts, figures, measures
 from .commutation import reduced_first
 
 FIRST = "spheroid"
@@ -33,11 +33,11 @@ def cases(quick: bool) -> list[Case]:
             if method.implementation == "compiled" and len(method.charts()) > 1 and name == FIRST
         ]
         for method in several[2:6] if quick else several:
-            settings = ladder(method, start, tables.CHART_PERIODS * period, 8, 1e5)[1 :: 3 if quick else 2]
-            plan = {"settings": settings, "horizon": tables.CHART_PERIODS * period, "batches": 3 if quick else 5}
+            settings = ladder(method, start, measures.CHART_PERIODS * period, 8, 1e5)[1 :: 3 if quick else 2]
+            plan = {"settings": settings, "horizon": measures.CHART_PERIODS * period, "batches": 3 if quick else 5}
             grid.append(Case(name, method.name, {"part": "charts", **plan}))
         plan = {"horizon": 8.0 * period, "step_sizes": [period / 30.7, period / 307.0], "batches": 3 if quick else 5}
-        grid += [Case(name, reduced, {"part": "twins", **plan}) for reduced in tables.unreduced_forms()]
+        grid += [Case(name, reduced, {"part": "twins", **plan}) for reduced in measures.unreduced_forms()]
         plan = {"horizon": 2.0 * period, "counts": [50 * 2**k for k in range(4 if quick else 6)]}
         known = [method.name for method in methods().values() if reduced_first(start, method)]
         grid += [Case(name, method, {"part": "commutation", **plan}) for method in known]
@@ -48,17 +48,17 @@ def measure(case: Case) -> xr.Dataset:
     """The part of the question that a case asks."""
     start, method, plan = scene(case.scene), integrator(case.integrator), case.settings
     if plan["part"] == "charts":
-        return tables.chart_table(start, method, plan["settings"], plan["horizon"], plan["batches"])
+        return measures.chart_table(start, method, plan["settings"], plan["horizon"], plan["batches"])
     if plan["part"] == "twins":
-        gaps = tables.unreduced_gaps(start, method.name, plan["horizon"], tables.COMPARED_STEPS)
-        return gaps.merge(tables.unreduced_cost(start, method.name, plan["step_sizes"], plan["batches"]))
-    return tables.commutation_table(start, method, plan["horizon"], plan["counts"])
+        gaps = measures.unreduced_gaps(start, method.name, plan["horizon"], measures.COMPARED_STEPS)
+        return gaps.merge(measures.unreduced_cost(start, method.name, plan["step_sizes"], plan["batches"]))
+    return measures.commutation_table(start, method, plan["horizon"], plan["counts"])
 
 
 def uses(case: Case) -> list[str]:
     """The integrators that a case runs: its own, and for a comparison of kernels the unreduced form."""
     name = case.integrator
-    return [name, tables.unreduced_forms()[name]] if case.settings["part"] == "twins" else [name]
+    return [name, measures.unreduced_forms()[name]] if case.settings["part"] == "twins" else [name]
 
 
 STUDY = Study(

@@ -1,1 +1,1 @@
-"""How fast is a well-known method at the accuracy I need?"""
+"""How fast are well-known methods at the accuracy I need?"""

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 import xarray as xr
+from symtop_studies.cost.ranking import cost_to_reach
 
 from symtop.measure.timing import NOISY
 from symtop.methods.framework.registry import integrator, integrators, split_name
@@ -22,19 +23,12 @@ def shown(data: xr.Dataset) -> xr.Dataset:
     return data.sel(scene=SHOWN if SHOWN in data["scene"].values else data["scene"].values[0]).isel(nutations=0)
 
 
-def cost(cell: xr.Dataset, target: float, unit: str = "seconds") -> float:
-    """The least cost of a run whose axis error is at most the target, between settings as a power; or inf."""
-    error, paid = cell["axis"].values, cell[unit].values
+def cost(cell: xr.Dataset, target: float) -> float:
+    """Seconds of a run whose axis error is at most the target, by `cost_to_reach`; or inf."""
+    error, paid = cell["axis"].values, cell["seconds"].values
     good = np.isfinite(error) & np.isfinite(paid) & (error > 0.0)
-    error, paid = np.log(error[good]), np.log(paid[good])
-    answers = [math.inf]
-    for k in np.flatnonzero(error <= math.log(target)):
-        if k and error[k - 1] > math.log(target):
-            part = (math.log(target) - error[k - 1]) / (error[k] - error[k - 1])
-            answers.append(math.exp(paid[k - 1] + part * (paid[k] - paid[k - 1])))
-        else:
-            answers.append(math.exp(paid[k]))
-    return min(answers)
+    columns = paid[good, np.newaxis], error[good, np.newaxis]
+    return float(cost_to_reach(*columns, [target])[0, 0]) if good.any() else math.inf
 
 
 def met_by_coarsest(cell: xr.Dataset, target: float) -> bool:

@@ -15,8 +15,8 @@ import xarray as xr
 from symtop.methods.framework.registry import Integrator, integrator, integrators, split_name
 
 from .many_verdicts import BOUNDED_BUT_WRONG, JUDGED, VERDICTS
+from .measures import MECHANISMS
 from .outcome_maps import NOT_RUN, SETTLED
-from .tables import MECHANISMS
 
 SLOW, FAST = 1.0, 3.0  # relative spin
 LOWER_SHARE = 0.1  # of the rows may reach less far than what is quoted

@@ -12,8 +12,8 @@ from symtop.report.formats import abridged
 from .atlas import COMMON, FAST, NEAR, SLOW, OutcomeMap, families, halved_by_pole, map_of, maps, methods_of
 from .failures import LOST, MOST
 from .many_verdicts import SAID
+from .measures import PERIODS
 from .mechanisms import BARELY, lawful, limits, measured, misses, outlasting, resonant, sampled
-from .tables import PERIODS
 
 QUOTED = "stormer-verlet[angles]"  # whose numbers are quoted
 NAMES = (  # of all facts that are measured

@@ -33,13 +33,12 @@ from symtop.run.linear_stability import trace, with_momenta
 RUNS_AWAY = 4.0  # times the displacement; an island that a resonance has bent is at most three times as long as wide
 LOST = 0.1  # rad, axis error at which a run next to the separatrix has lost its accuracy
 LONGEST = 80.0  # 1/g, of a run next to the separatrix
-MOST, TRIED = 0.3, 8  # rad, the largest displacement tried; how many are
+LEAST, MOST, TRIED = 1e-4, 0.3, 8  # rad, the displacements tried; how many are
 HALVINGS = 5  # how often the gap above the last that survives is halved: it ends at 4 %
 SEEN = 6.0  # 1/g, the time at which its early error is read
 
 
 def _run(method: Integrator, scene: Scene, start: Angles, plan: Plan) -> tuple[str, View]:
-    """The outcome of a run from `start`, and what its samples show."""
     chart = method.chart_for("axis")
     run = solve(method, chart, scene.top, start, plan)
     return run.outcome, View(chart, scene.top, run.states, run.p_phi, run.p_psi)
@@ -71,15 +70,13 @@ def survives(
     return stays.reshape(h.shape)
 
 
-def surviving_displacements(
-    method: Integrator, scene: Scene, h: Sequence[float], steps: int, least: float = 1e-4
-) -> Array:
-    """For each step h the largest displacement, rad, up to which all that are tried survive; 0 if not even `least`.
+def surviving_displacements(method: Integrator, scene: Scene, h: Sequence[float], steps: int) -> Array:
+    """For each step h the largest displacement, rad, up to which all that are tried survive; 0 if not even `LEAST`.
 
     It is measured from the fixed point of the method, which for a splitting is O(h^2) away from the true one. Where the
     method has none that four steps can find, nothing survives; where h is NaN there is nothing to measure.
     """
-    step, tried = np.asarray(h, float), np.geomspace(least, MOST, TRIED)
+    step, tried = np.asarray(h, float), np.geomspace(LEAST, MOST, TRIED)
     centre = np.array([trace(method, scene, one).theta if math.isfinite(one) else math.nan for one in step.tolist()])
     there = np.flatnonzero(np.isfinite(centre))
     good, bad = np.where(np.isfinite(step), 0.0, math.nan), np.full(step.shape, math.nan)

@@ -49,7 +49,7 @@ def sleep_margin(method: Integrator, spin: float, h: float) -> float:
     return 4.0 * x * (1.0 - x)
 
 
-def sign_changes(function: Callable[[float], float], grid: np.ndarray, tolerance: float = 1e-12) -> list[float]:
+def sign_changes(function: Callable[[float], float], grid: np.ndarray) -> list[float]:
     """Where a function changes its sign between neighbours of a grid, by bisection; jumps through NaN do not count."""
     values = [function(float(x)) for x in grid]
     roots = []
@@ -57,7 +57,7 @@ def sign_changes(function: Callable[[float], float], grid: np.ndarray, tolerance
         if not (math.isfinite(low) and math.isfinite(high)) or (low > 0.0) == (high > 0.0):
             continue
         a, b = float(left), float(right)
-        while b - a > tolerance * max(1.0, abs(b)):
+        while b - a > 1e-12 * max(1.0, abs(b)):
             middle = 0.5 * (a + b)
             value = function(middle)
             if not math.isfinite(value):

@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from symtop.measure.verdicts import DRIFT, FEWEST, GROWING, NO_GAP, barriers
 from symtop.methods.framework.plan import NOT_FINITE, NOT_NORMALISED, OUTCOMES, off_length
+from symtop.methods.framework.space import axis_of as of_quaternion
 from symtop.model.charts import DIMENSIONS, Array
 from symtop.model.exact import samples
 from symtop.model.exact.closed_form import ClosedForms
@@ -105,8 +106,7 @@ def _kernel() -> Any:  # noqa: C901  (one loop, read in one piece)
             return across * math.sin(state[2]), -across * math.cos(state[2]), math.cos(state[0])
         if len(state) == 6:
             return state[0], state[1], state[2]
-        w, x, y, z = state[0], state[1], state[2], state[3]
-        return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z
+        return of_quaternion(state[0], state[1], state[2], state[3])
 
     @register_jitable
     def energy_of(scene, state, p_phi, p_psi):  # type: ignore[no-untyped-def]

@@ -4,15 +4,15 @@ import math
 
 import numpy as np
 import xarray as xr
-from symtop_studies.grid import grid_variants
 
+from symtop.measure.settings import smallest_charts
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.scenes import added_scenes
 from symtop.runner.study import Case, Study
 
 from . import facts, figures
-from .tables import MECHANISMS, PERIODS, map_table
+from .measures import MECHANISMS, PERIODS, map_table
 
 FAMILY = "cusp"  # let go at theta = 0.8 with any spin
 NOT_SLEEPING = {  # variants that do not take part in the mechanism "sleeping"
@@ -80,11 +80,11 @@ def cases(quick: bool) -> list[Case]:
     grid, left = [], {name for names in NOT_SLEEPING.values() for name in names}
     for name in [FAMILY, *added_scenes()]:  # the family holds the other tops, and a map of each method takes minutes
         coarser = 1 if quick or name == FAMILY else 3
-        for method in grid_variants("axis"):
+        for method in smallest_charts("axis"):
             ladder, parameters = axes(method, steps[::coarser], spins[::coarser], quick)
             settings = {"parameters": parameters, "ladder": ladder, "periods": PERIODS, "limits": limits}
             grid.append(Case(name, method.name, settings))
-    for method in grid_variants("axis"):
+    for method in smallest_charts("axis"):
         ladder, parameters = axes(method, passes, gaps, quick)
         settings = {"parameters": parameters, "ladder": ladder, "periods": 1.0}
         grid.append(Case("grazing", method.name, settings | {"shown": 0.005 if method.fixed_step else 1e-6}))

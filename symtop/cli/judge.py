@@ -10,10 +10,10 @@ from symtop.cli import common
 from symtop.cli.clock import ticking
 from symtop.cli.common import File, as_text, check_outputs, completing, json_option, plugin_option, say, say_written
 from symtop.core.errors import SymtopError
+from symtop.judging import FORMS
 
 BESIDE, NUTATIONS, MOST_BESIDE = ("rk4", "strang", "dop853", "taylor"), 10.0, 2e4  # of runs, and their evaluations
 LONGEST_BESIDE = 5.0  # seconds of a run of the judged step, which may be slow
-FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
 
 
 @click.command(short_help="Judge an integrator of your own.")

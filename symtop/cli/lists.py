@@ -168,7 +168,6 @@ def _numbers(scene: "Scene") -> Record:
 
 
 def _digits(value: Any) -> str:
-    """A number, or a row of numbers."""
     return f"({', '.join(map(_digits, value))})" if isinstance(value, tuple) else f"{value:.10g}"
 
 

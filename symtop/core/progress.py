@@ -20,13 +20,13 @@ def post(words: str) -> None:
 
 @contextlib.contextmanager
 def progress_bar(words: str, *, quiet: bool = False, **options: Any) -> Iterator[Any]:
-    """A progress bar of tqdm, or without options the words alone, where somebody is watching.
+    """A progress bar of tqdm, or without options the words and the time since, where somebody is watching.
 
     It is drawn again each second although nothing is finished, and closed at the end.
     """
     from tqdm import tqdm
 
-    options = options or {"total": 1, "bar_format": "{desc}"}
+    options = options or {"total": 1, "bar_format": "{desc}: {elapsed}"}
     ended = threading.Event()
 
     def beat() -> None:

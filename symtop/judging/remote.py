@@ -132,7 +132,8 @@ class Process:
         code = self.process.exitcode
         if code is not None and code < 0:
             during = f" in a step of h = {heartbeat.step:.3g}" if heartbeat.inside else ""
-            return f"its process was ended by {signal.strsignal(-code) or code}{during}"
+            name = next((one.name for one in signal.Signals if one == -code), f"signal {-code}")  # one in real time
+            return f"its process was ended by {name}{during}"
         self.output.seek(0)
         words = " ".join(self.output.read()[-4 * WORDS :].decode(errors="replace").split())[-WORDS:]
         return f"its process ended with code {code}{': ' if words else ''}{words}"

@@ -89,24 +89,13 @@ def nutates(scene: Scene) -> bool:
     return high - low > STEADY and math.isfinite(scene.nutation_period)
 
 
-def nutation_phase(scene: Scene, time: Array, theta: Array, theta_dot: Array) -> Array:
-    """How far states (n,) are ahead of the truth at the same times, rad of the nutation, unwrapped.
-
-    NaN where a state is not finite, and everywhere if the motion has no nutation (see `nutates`).
-    """
-    phase, good = np.full(np.shape(time), math.nan), np.isfinite(theta) & np.isfinite(theta_dot)
-    if nutates(scene) and good.any():
-        u, du = np.cos(theta[good]), -np.sin(theta[good]) * theta_dot[good]
-        phase[good] = 2.0 * math.pi / scene.nutation_period * _split(scene, time[good], u, du, np.zeros_like(u)).lag
-    return phase
-
-
 def split(scene: Scene, run: Trajectory) -> Split:
     """Shape error and lags at every sample (n,) of a run without failures."""
-    return _split(scene, run.time, np.cos(run.theta), -np.sin(run.theta) * run.p_theta / scene.top.I1, run.phi)
+    return split_states(scene, run.time, np.cos(run.theta), -np.sin(run.theta) * run.p_theta / scene.top.I1, run.phi)
 
 
-def _split(scene: Scene, t: Array, u: Array, du: Array, phi: Array) -> Split:
+def split_states(scene: Scene, t: Array, u: Array, du: Array, phi: Array) -> Split:
+    """The same of states (n,) by u = cos(theta), u' and phi."""
     period = scene.nutation_period
     omega = 2.0 * math.pi / period if math.isfinite(period) else 1.0
     if not nutates(scene):

@@ -21,7 +21,6 @@ MENU = 6  # variants in a row
 
 @functools.cache
 def _rows() -> dict[tuple[float, str, float, str, bool], list[str]]:
-    """The variants of the table by `ASKED`."""
     lines = (line.split("\t") for line in TABLE.read_text(encoding="utf-8").splitlines()[1:])
     return {(float(n), what, float(a), need, g == "yes"): names.split(" ") for n, what, a, need, g, names in lines}
 

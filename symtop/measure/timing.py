@@ -16,9 +16,7 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from symtop.methods.framework.plan import Array, Run
+from symtop.methods.framework.plan import Run
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.exact import closed_form
 from symtop.model.scenes import Scene, scene
@@ -123,12 +121,6 @@ def bare_run(
     plan, _ = make_plan(scene, method, **method.given(setting), horizon=horizon, samples=2, budget=budget)
     solve = method.solvers[chart]
     return lambda: solve(scene.top, scene.start, plan)
-
-
-def quartile_spread(samples: Array, axis: int = -1) -> Array:
-    """The distance of the quartiles over the median along an axis, of the samples that are not NaN."""
-    low, middle, high = np.nanquantile(samples, (0.25, 0.5, 0.75), axis=axis)
-    return np.asarray((high - low) / middle)
 
 
 SPAN = 0.03  # seconds of a worker in one turn

@@ -7,7 +7,7 @@ it come off. The first is known in closed form, for kick-drift-kick splittings H
       stormer-verlet      V_tt = p^2 V''/I1^2,                       |grad V|^2 = V'^2 / I1
       strang              V_tt = mgl (L_z (L.e) - u |L|^2) / I1^2,   |grad V|^2 = mgl^2 (1 - u^2) / I1
     midpoint              H - h^2 (p^2 V''/I1^2 + V'^2 / I1) / 24
-    cayley                exactly conserved: `splitting_space.cayley_energy` / I1
+    cayley                exactly conserved: `splitting.space.cayley_energy` / I1
 
 and leaves C h^4 (nothing for cayley); each form is the field `Integrator.modified_energy`. The second is whatever
 remains: the motion has one degree of freedom, a symplectic map stays on a closed curve of its (theta, p_theta), or of

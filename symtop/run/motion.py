@@ -85,7 +85,7 @@ class Growth(NamedTuple):
 
     @classmethod
     def of(cls, times: Array, apart: Array, most: float) -> Self:
-        """From a distance in units of the first one; beyond `most`, which shows no A, it grows on exponentially."""
+        """From a distance in units of the first one at `times`, after 0 and not empty; beyond `most` it grows on."""
         size = np.maximum.accumulate(np.maximum(np.where(np.isnan(apart), math.inf, apart), 1.0))
         last = int(np.searchsorted(size, most))
         if last < size.size:

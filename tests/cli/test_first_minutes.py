@@ -2,7 +2,6 @@
 
 import re
 import shlex
-import sys
 import time
 
 import pytest
@@ -82,33 +81,6 @@ def test_a_proposed_step_is_of_use_and_the_guard_warns_of_what_the_verdict_calls
         step = float(result.stderr.split("for example ")[1])
         error = float(symtop.errors(symtop.simulate("spheroid", name, step_size=step, guard=False))["axis"].max())
         assert 1e-5 < error < 1e-2
-
-
-LOCKED = """
-import ctypes
-import symtop
-rk4 = symtop.integrator("rk4").solvers["axis"]
-def holds_the_lock(*asked):
-    ctypes.PyDLL(None).usleep(3_000_000)  # as a compiler in C++ does, which no thread of Python can interrupt
-    return rk4(*asked)
-symtop.register(
-    symtop.Integrator(
-        name="holds-the-lock", family="other", summary="", solvers={"axis": holds_the_lock}, order=4,
-        implementation="python",
-    )
-)
-"""
-
-
-@pytest.mark.slow
-@pytest.mark.skipif(sys.platform == "win32", reason="the C library is loaded by another name there")
-def test_the_clock_goes_on_while_somebody_holds_the_lock_of_python(tmp_path):
-    (tmp_path / "locked.py").write_text(LOCKED, encoding="utf-8")
-    words = ["run", "spheroid", "holds-the-lock", "--step-size", "0.01", "--no-guard"]
-    recording = recorded([*words, "--plugin", str(tmp_path / "locked.py")])
-    assert recording.code == 0, recording.text
-    assert recording.longest_wait("running: ") < 2.5, recording.drawings  # the lock is held for three
-    assert recording.text.rindex("running: ") < recording.text.index("holds-the-lock[axis] on spheroid: reached")
 
 
 def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):

@@ -16,12 +16,11 @@ from scipy.integrate import RK23
 from scipy.spatial.transform import Rotation
 
 import symtop
-from symtop.cli.judge import FORMS as OFFERED
 from symtop.judging import judge_step
 from symtop.judging.adapters.adapter import heartbeat, integrator, label_of
 from symtop.judging.adapters.python_step import PythonStep, RotationStep, SeparableStep
 from symtop.judging.battery import stages
-from symtop.judging.claims.subject import FORMS, open_target
+from symtop.judging.claims.subject import open_target
 from symtop.judging.findings import VERDICTS
 from symtop.judging.remote import clock
 from tests.commands import answer
@@ -177,7 +176,6 @@ def test_a_file_beside_others_one_that_fails_and_a_name_that_is_not_there(tmp_pa
     with pytest.raises(symtop.SymtopError, match=r"the file mine\.py failed: ModuleNotFoundError"):
         open_target(str(file), None, "axis")
     assert label_of("./my engine (new)") == "my-engine-new"
-    assert OFFERED == FORMS
 
 
 def hangs(f, t, y, h):

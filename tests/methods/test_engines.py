@@ -6,10 +6,9 @@ import math
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
-from symtop_studies.grid import grid_variants
 
 import symtop
-from symtop.measure.settings import compared
+from symtop.measure.settings import compared, smallest_charts
 from symtop.methods.framework import registry
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
@@ -202,5 +201,5 @@ def test_comparisons_and_recommendations_leave_engines_out():
     assert {entry.family for entry in engines.values()} == {"engine"}
     assert not set(engines) & set(registry.methods())
     assert set(engines) | set(registry.methods()) == set(symtop.integrators())
-    for rows in (registry.variants(), compared("axis"), compared("attitude"), grid_variants("nutation")):
+    for rows in (registry.variants(), compared("axis"), compared("attitude"), smallest_charts("nutation")):
         assert not {row.method for row in rows} & set(engines)

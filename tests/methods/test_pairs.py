@@ -10,7 +10,7 @@ from scipy import integrate
 
 import symtop
 from symtop.core.jit import compile_kernel, register_jitable
-from symtop.measure.order_conditions import conditions
+from symtop.judging.claims.order_conditions import conditions
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator

@@ -8,8 +8,8 @@ import pytest
 import xarray as xr
 from symtop_studies.stability import atlas, facts, mechanisms, outcome_maps, study
 from symtop_studies.stability.many_verdicts import JUDGED, VERDICTS
+from symtop_studies.stability.measures import family_limits, map_table, sampling_table
 from symtop_studies.stability.outcome_maps import NOT_RUN, family, outcome_map, row_plan, spin_unit, with_spin
-from symtop_studies.stability.tables import family_limits, map_table, sampling_table
 
 import symtop
 from symtop.core import netcdf

@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.optimize import root
 from symtop_studies.reduction import commutation, facts, figures, study
 from symtop_studies.reduction.commutation import gap, kernel_path, path, reduced_first
-from symtop_studies.reduction.tables import chart_ratios, commutation_table, unreduced_forms
+from symtop_studies.reduction.measures import chart_ratios, commutation_table, unreduced_forms
 
 import symtop
 from symtop.measure import datasets

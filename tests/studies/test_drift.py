@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import xarray as xr
 from symtop_studies.drift import facts, figures, measures, study
-from symtop_studies.drift.growth import ensemble_growth, history, horizon, lost_at
+from symtop_studies.drift.growth import ensemble_growth, history, horizon, lost_at, nutation_phase
 from symtop_studies.drift.measures import ROUNDINGS
 from symtop_studies.drift.phase_loss import phase_loss
 from symtop_studies.drift.runs import elapsed_steps, gauges_of, members, run_history, side_by_side
@@ -17,7 +17,6 @@ import symtop
 from symtop.judging.claims.constants import KEPT, Constant
 from symtop.measure import datasets
 from symtop.measure.conservation import CONSTANTS, Changed, growth, law
-from symtop.measure.phase import nutation_phase
 from symtop.methods.framework.lanes import LEAST
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import scene

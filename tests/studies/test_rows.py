@@ -7,11 +7,11 @@ and a number without its step or tolerance cannot be compared with another.
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.grid import grid_variants
 from symtop_studies.memoize import of_one_dataset
 
 from symtop.core import netcdf
 from symtop.core.code_hash import Code, digest
+from symtop.measure.settings import smallest_charts
 from symtop.methods.framework.registry import integrators, methods, split_name
 
 STUDIES = (
@@ -46,7 +46,7 @@ def test_a_name_that_leaves_the_chart_open_is_found(names, found):
 
 
 def test_the_rows_of_a_grid_are_every_method_and_no_chart_that_repeats_another():
-    rows = [row.name for row in grid_variants("nutation")]
+    rows = [row.name for row in smallest_charts("nutation")]
     assert {split_name(name)[0] for name in rows} == set(methods())
     assert {"rk4[angles]", "rk4[axis]", "strang[axis]", "exact[attitude]"} <= set(rows)
     assert "strang[attitude]" not in rows

@@ -146,5 +146,4 @@ def _late(subject: Subject) -> list[tuple[int, int]]:
 
 
 def _gap(first: Any, second: Any) -> float:
-    """Largest difference."""
     return float(np.max(np.abs(first - second)))

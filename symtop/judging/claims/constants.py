@@ -317,7 +317,10 @@ def measure(subject: Subject) -> list[Finding]:
         except SymtopError as error:
             every = (*OF_A_RUN, "momentum")
             findings = [undecided(claim, declared(method, claim), str(error)) for claim in every]
-        by_chart.append([_with_chart(one, chart) for one in findings])
+        for k, one in enumerate(findings):  # the chart, where the reason does not speak of it already
+            if one.verdict != "inapplicable" and not one.why.endswith(" chart"):
+                findings[k] = one._replace(why=f"{one.why}, in the {chart} chart")
+        by_chart.append(findings)
     if runs:
         run = min(runs, key=lambda run: run.steps)
         length = {"steps_run": np.array(run.steps), "nutations_run": np.array(run.nutations)}
@@ -329,12 +332,6 @@ def of_run(method: Integrator, run: LongRun) -> list[Finding]:
     """What one long run shows of each claim of `OF_A_RUN`."""
     motion = [_constant(method, one, declared(method, one), run, run.constants.get(one)) for one in OF_MOTION]
     return [*motion, _of_states(run), _invariant(method, run), *_costs(method, run)]
-
-
-def _with_chart(finding: Finding, chart: str) -> Finding:
-    """The finding with its chart, where the reason does not speak of it already."""
-    plain = finding.verdict == "inapplicable" or finding.why.endswith(" chart")
-    return finding if plain else finding._replace(why=f"{finding.why}, in the {chart} chart")
 
 
 def _badness(one: Finding) -> tuple[int, int, float]:

@@ -11,7 +11,7 @@ the scene does not show it, on `FALLBACK` over longer runs. An adaptive method i
 there. So the error at the end of a short run of many steps, with its sign, is extrapolated to h = 0 (Richardson's,
 eliminating h^p and h^(p+1)); what is left beyond rounding is a wrong limit.
 
-*The power series of one step* (`symtop.measure.step_series`) sees an order condition that is off by 1e-10, which no
+*The power series of one step* (`claims.step_series`) sees an order condition that is off by 1e-10, which no
 slope does, but not what a run carries from step to step.
 
 *The table*, Butcher's or a splitting's, needs no run. A condition of order k that is off by d adds an error of
@@ -39,16 +39,16 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError
+from symtop.judging.claims.order_conditions import Conditions, conditions, splitting_conditions, triangle
+from symtop.judging.claims.step_series import Series, compared, step_series
 from symtop.judging.claims.structure import ONE_MAP, map_of
 from symtop.judging.claims.subject import FINEST, Subject, hidden_by_single
 from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, undecided, yes_no
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import BESIDE, CLEARLY, LARGEST_ERROR, Fit, order_verdict
-from symtop.measure.order_conditions import Conditions, conditions, splitting_conditions, triangle
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
 from symtop.measure.step_map import APART, StepMap, aligned, generic_start, one_step, restart_gap, unit_of
-from symtop.measure.step_series import Series, compared, step_series
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import Array

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from symtop.core.errors import SymtopError, foreign_code, one_of
+from symtop.judging import FORMS
 from symtop.judging.adapters.adapter import Stepper
 from symtop.judging.adapters.external import BatchStep, DiffraxSolver, Program, SharedObject, is_solver
 from symtop.judging.adapters.python_step import REDUCED, PythonStep, RotationStep, ScipySolver, SeparableStep
@@ -30,7 +31,6 @@ from symtop.model.charts import BODY, CHARTS
 from symtop.model.scenes import Scene
 from symtop.run.plugins import execute, python_file
 
-FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")
 ON_BODY = ("ode", "rotation", "scipy")  # the forms of a step that are judged on a body without symmetry
 ARGUMENTS = {"ode": "(f, t, y, h)", "separable": "(state, h, dT, dV)", "rotation": "(q, w, h, inertia, torque)"}
 LIBRARIES = (".so", ".dylib", ".dll")

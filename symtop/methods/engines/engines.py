@@ -274,7 +274,6 @@ def _in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
 
 
 def _momentum_in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """The same of rates."""
     w, x, y, z, b1, b2, b3 = _in_body(par, rule, state, k, h)
     return w, x, y, z, par.I1 * b1, par.I2 * b2, par.I3 * b3
 

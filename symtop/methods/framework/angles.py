@@ -130,9 +130,5 @@ def sampled_momenta(par: Any, states: Array) -> tuple[Array, Array]:
     return p_phi, p_psi
 
 
-def _to_angles(par: Any, t: float, y: Any) -> Any:
-    """An unreduced state as (theta, p_theta, phi, psi), the angles chart of `simulate`."""
-    return y[0], par.I1 * y[3], y[1], y[2]
-
-
-to_angles = Shown(_to_angles, 4)
+# an unreduced state as (theta, p_theta, phi, psi), the angles chart of `simulate`
+to_angles = Shown(lambda par, _t, y: (y[0], par.I1 * y[3], y[1], y[2]), 4)

@@ -241,7 +241,6 @@ def _predict(step: Any, carry: Any) -> Any:
 
 @register_jitable
 def _evaluate(step: Any, x: Any) -> Any:
-    """The sums and the forces at one d."""
     sums = node_sums(step.rule, step.theta, x[0], step.opened)
     return sums, forces(step.par, sums)
 

@@ -195,12 +195,9 @@ def _with_momenta(top: Any, at: Any) -> Any:
     )  # fmt: skip
 
 
-def _in_angles(par: Any, t: float, y: Any) -> Any:
-    """(theta, p_theta, phi, psi) of the six state variables; p_phi and p_psi are columns of their own."""
-    return y[0], y[3], y[1], y[2]
-
-
-with_momenta, in_angles = Preparation(_with_momenta, 6, require_chart), Shown(_in_angles, 4)
+with_momenta = Preparation(_with_momenta, 6, require_chart)
+# (theta, p_theta, phi, psi) of the six state variables; p_phi and p_psi are columns of their own
+in_angles = Shown(lambda _par, _t, y: (y[0], y[3], y[1], y[2]), 4)
 
 
 def unreduced(method: Integrator) -> Integrator:

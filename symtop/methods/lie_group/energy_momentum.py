@@ -57,7 +57,6 @@ def _mean(e: Any, u: Any) -> Any:
 
 @register_jitable
 def _guess(par: Any, e: Any, a: Any, quarter: float) -> Any:
-    """The first u."""
     start = plus(a, quarter, gravity(par, e))
     along = dot(start, e)
     return plus(scaled(1.0 / par.I1, start), along / par.I3 - along / par.I1, e)

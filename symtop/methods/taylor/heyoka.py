@@ -196,10 +196,6 @@ _SUMMARIES = {
 }
 
 
-def _body_read(_top: Any, _times: Array, states: Array) -> tuple[Array, Array, Array]:
-    return states, *FORMS[BODY].momenta(None, states)
-
-
 def built_in() -> list[Integrator]:
     """heyoka's integrator in three arithmetics, where heyoka is installed."""
     try:
@@ -213,7 +209,7 @@ def built_in() -> list[Integrator]:
             name="taylor" if precision == "double" else f"taylor-{precision}",
             family="taylor", summary=_SUMMARIES[precision],
             solvers={chart: solver(chart, precision) for chart in ("axis", "attitude")}
-            | {BODY: solver(BODY, precision, _body_read)},
+            | {BODY: solver(BODY, precision, lambda _, __, states: (states, *FORMS[BODY].momenta(None, states)))},
             control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
             least_tolerance=arithmetic(precision).epsilon / 1000.0,
             default_tolerance=arithmetic(precision).epsilon / 100.0,

@@ -69,7 +69,6 @@ class Provenance(NamedTuple):
 
 
 def _constant(place: int, words: str) -> property:
-    """A property that reads one constant of a form, or of each of many."""
     return property(lambda form: form._constant(place), doc=words)
 
 

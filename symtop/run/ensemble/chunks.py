@@ -87,8 +87,12 @@ def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -
         if steps is None:
             times[rows] = horizon[rows, None] * place
             return
-        marks[rows], plan.counts[rows] = _distinct(np.rint(steps[rows, None] * place).astype(np.int64))
-        times[rows] = marks[rows] * h[rows, None]
+        each = np.rint(steps[rows, None] * place).astype(np.int64)
+        new = np.diff(each, axis=1, prepend=-1) > 0
+        plan.counts[rows] = new.sum(axis=1)
+        few = plan.counts[rows] < samples  # each mark once, and the last again in the rest of the row
+        each[few] = np.sort(np.where(new[few], each[few], each[few, -1:]), axis=1)
+        marks[rows], times[rows] = each, each * h[rows, None]
 
     lay_out(np.arange(n), dithered=False)
     long_enough = np.isfinite(period) & (horizon > 2.0 * period)
@@ -96,15 +100,6 @@ def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -
     lay_out(rows[unseen(times[rows], period[rows, None]) >= WIDEST_GAP], dithered=True)
     times[np.arange(samples) >= plan.counts[:, None]] = np.nan
     return plan
-
-
-def _distinct(marks: Whole) -> tuple[Whole, Whole]:
-    """Ascending rows of marks, each mark once and the last again in the rest of its row; and how many there are."""
-    new = np.diff(marks, axis=1, prepend=-1) > 0
-    counts = new.sum(axis=1)
-    few = counts < marks.shape[1]
-    marks[few] = np.sort(np.where(new[few], marks[few], marks[few, -1:]), axis=1)
-    return marks, counts
 
 
 def nutation_periods(numbers: Array) -> Array:

@@ -246,7 +246,6 @@ def conditioned(scene: Scene, horizon: float) -> str:
 
 
 def _dataset(scene: Scene, times: Array, columns: dict[str, Array], bounds: dict[str, Array]) -> xr.Dataset:
-    """Values, bounds and the constants of the motion."""
     form = closed_form(scene)
     constants = {name: np.full(times.size, getattr(form, name)) for name in ("energy", "p_phi", "p_psi")}
     return dataset(times, columns | {f"{name}_error_bound": bound for name, bound in bounds.items()} | constants)
@@ -387,7 +386,6 @@ def _path(scene: Scene, kind: str) -> Path:
 
 
 def _stored(scene: Scene, kind: str) -> Certificate:
-    """The certificate on disk, or one that is made and put there."""
     data = cached(_path(scene, kind), lambda: _compared(scene, kind), None)
     return Certificate(*(data[name].item() for name in Certificate._fields))
 
@@ -405,7 +403,6 @@ def _compared(scene: Scene, kind: str) -> xr.Dataset:
 
 
 def _times(scene: Scene, nutations: float) -> Array:
-    """Times of comparison: up to so many nutations, or to the horizon where there are none."""
     period = scene.nutation_period
     return check_times(scene, nutations * period if math.isfinite(period) else scene.horizon)
 

@@ -125,9 +125,9 @@ def commutator(first: Words, second: Words) -> Words:
     return [one - other for one, other in zip(product(first, second), product(second, first), strict=True)]
 
 
-def element(most: int, t: float = 0.0, v: float = 0.0) -> Words:
-    """t T + v V as a series up to the length `most`."""
-    return [np.array([t, v]) if k == 1 else np.zeros(2**k) for k in range(most + 1)]
+def element(t: float = 0.0, v: float = 0.0) -> Words:
+    """t T + v V as a series up to `LONGEST_WORD`."""
+    return [np.array([t, v]) if k == 1 else np.zeros(2**k) for k in range(LONGEST_WORD + 1)]
 
 
 def exponential(words: Words) -> Words:
@@ -184,21 +184,20 @@ def _spread(column: Array, letter: int) -> Array:
 
 
 def splitting_conditions(
-    drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] = (), processor: float = 0.0,
-    most: int = LONGEST_WORD,
-) -> Conditions:  # fmt: skip
+    drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] = (), processor: float = 0.0
+) -> Conditions:
     """What the conditions of a table are off by: the largest coefficient of each length that must vanish and does not.
 
     `drift`, `kick` (kick[0] comes first), `gradient` and `processor` are those of `symtop.composition`.
     """
-    t, v = element(most, t=1.0), element(most, v=1.0)
+    t, v = element(t=1.0), element(v=1.0)
     bent = commutator(v, commutator(v, t))
-    step = exponential(element(most))
+    step = exponential(element())
     for place, (b, c) in enumerate(zip(kick, gradient or [0.0] * len(kick), strict=True)):
         if b or c:
             step = product(step, exponential([b * one + c * more for one, more in zip(v, bent, strict=True)]))
         if place < len(drift):
-            step = product(step, exponential(element(most, t=drift[place])))
+            step = product(step, exponential(element(t=drift[place])))
     if processor:
         ends = [exponential([sign * processor * row for row in commutator(t, v)]) for sign in (1.0, -1.0)]
         step = product(product(ends[0], step), ends[1])

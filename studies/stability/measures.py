@@ -1,4 +1,4 @@
-"""The tables of the stability study: one dataset for each mechanism of failure and each integrator.
+"""What a case of the study measures: one dataset for each mechanism of failure and each integrator.
 
 Outcomes are stored as bytes, an index into `VERDICTS`; 254 means that a scene had settled (`outcome_maps`) and was not
 run, 255 that there is no such cell. Steps are in nutation periods of the scene they belong to; phases are h omega, the

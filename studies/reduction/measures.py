@@ -90,12 +90,12 @@ def unreduced_forms() -> dict[str, str]:
     return {name: forms[rule] for name, method in integrators().items() if (rule := rule_of(method)) in forms}
 
 
-def unreduced_gaps(scene: Scene, name: str, horizon: float, steps: int, samples: int = 201) -> xr.Dataset:
+def unreduced_gaps(scene: Scene, name: str, horizon: float, steps: int) -> xr.Dataset:
     """Distances (rad) between a reduced kernel and its unreduced form over one run; dimension ``sample``.
 
     The momenta of the unreduced form are part of its state, conserved only as far as its equations are solved.
     """
-    plan = {"step_size": horizon / steps, "horizon": horizon, "samples": samples}
+    plan = {"step_size": horizon / steps, "horizon": horizon, "samples": 201}
     reduced, whole = (
         simulate(scene, label, **plan, observe="attitude", guard=False) for label in (name, unreduced_forms()[name])
     )
