@@ -13,10 +13,7 @@ NAMED = re.compile(r"\b(?:figure|table)\(\"([\w-]+)\"|\(tables/\w+?-([\w-]+)\.cs
 
 
 def checked(name: str, data: object, folder: Path, elsewhere: Collection[str] = ()) -> str:
-    """The page of a study with what a dataset shows; all that its template names is there, with or without numbers.
-
-    Figures and tables that are shown `elsewhere` stand on the front page.
-    """
+    """The page of a study with what a dataset shows and its template names; what is `elsewhere` is on the first."""
     study, page = runner.load(name), runner.file_beside(name, "page.md")
     assert page is not None
     close = lambda figure, _: plt.close(figure)

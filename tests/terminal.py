@@ -1,7 +1,4 @@
-"""Commands on a terminal of 80 x 24: what they print, and how long they are silent.
-
-A silence is the longest time between two characters, the start of the process and its end included.
-"""
+"""Commands on a terminal of 80 x 24: what they print, and the longest time between characters, ends included."""
 
 import fcntl
 import os

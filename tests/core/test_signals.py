@@ -98,9 +98,8 @@ def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, heari
 
 
 def test_two_requests_are_both_heard_and_a_limit_inside_another_leaves_that_one_running(default_handlers):
-    with ending_on_sigterm(), told_apart(), pytest.raises(TerminatedError), deferred():  # noqa: PT012
-        for number in (signal.SIGINT, signal.SIGTERM, signal.SIGINT):
-            signal.raise_signal(number)
+    with ending_on_sigterm(), told_apart(), pytest.raises(TerminatedError), deferred():
+        list(map(signal.raise_signal, (signal.SIGINT, signal.SIGTERM, signal.SIGINT)))
     with pytest.raises(TimeoutError, match=r"after 0\.2 s"), at_most(0.2, processor=False):  # noqa: PT012
         with at_most(60.0, processor=False):
             pass
