@@ -84,7 +84,7 @@ def titled(report: str, title: str) -> str:
 def beginning(report: str) -> str:
     """The front page from its first figure to what will go wrong, figures where the README finds them."""
     text = re.split(r"(?:## |\*\*)What will go wrong", report.partition("\n\n")[2].partition("\n\n")[2])[0].strip()
-    text = text.replace("](figures/", "](docs/snapshot/figures/")
+    text = re.sub(r" \(the first \d+ of \d+ rows\)", "", text).replace("](figures/", "](docs/snapshot/figures/")
     return "\n\n".join(map(wrapped, text.split("\n\n"))) + "\n"
 
 
