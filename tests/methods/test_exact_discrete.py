@@ -52,6 +52,21 @@ def test_the_step_is_the_motion_whatever_its_size(name, steps):
     assert charts.axis_distance(axis.states[:, :3], charts.axis_from_quaternion(truth[:, :4])).max() < bound
 
 
+def test_a_slow_top_keeps_its_energy_at_a_third_of_a_nutation_and_whole_ones_are_exact_beside_a_pole():
+    top = symtop.SymmetricTop(1.0, 0.5, 1.0)
+    for spin, share in ((0.3, 0.36), (0.3, 1.0 / 3.0), (0.0, 0.36)):
+        scene = symtop.Scene("slow", top, symtop.Angles(1.0, psi_dot=spin), 1.0)
+        h = share * scene.nutation_period
+        slow = symtop.simulate(scene, "exact-discrete", step_size=h, horizon=900 * h, guard=False)
+        assert float(abs(slow["energy"] - slow["energy"][0]).max()) < 1e-12
+    for start in (symtop.Angles(0.01), symtop.Angles(0.01, psi_dot=0.02), symtop.Angles(1.0)):
+        form = symtop.ClosedForm(top, start)
+        for share in (1.0, 2.2, 3.4):
+            h = share * form.nutation_period
+            done = run(top, start, h, 30, "axis")
+            assert charts.axis_distance(done.states[:, :3], form.axis(h * np.arange(31))).max() < 1e-9
+
+
 def test_random_tops_follow_the_closed_form_at_every_step():
     worst = 0.0
     for top, start in exactness.random_tops(300, seed=3):

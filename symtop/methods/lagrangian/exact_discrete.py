@@ -37,9 +37,10 @@ nutations and a rest turns Z by 2 delta(T/2) + pi for each nutation and is the s
 large. Next to a separatrix P - wp is a small difference at large steps; there a step is made of several (`parts`).
 
 *Rounding.* On the orbit 1 + B s = (P - wp)/D with one wp for both oscillators: one division a step. Each step brings
-the p of the longer of Z_1, Z_2 nearer to the second condition above, and its length to the one that |chi| = 1 asks for
-once that is off by `IDLE`. That keeps J; without it two oscillators whose energies are rounded apart leave each other
-near an unstable pole (`sleeping-unstable`, ten nutations: 1e-4, and 5e-11 with it). Phases are exact products.
+the p of the longer of Z_1, Z_2 to the second condition above, and its length to the one that |chi| = 1 asks for once
+that is off by `IDLE`. That keeps J; without it two oscillators whose energies are rounded apart leave each other near
+an unstable pole (`sleeping-unstable`, ten nutations: 1e-4, and 5e-11 with it), and with half of it those of a slow top
+do so at a third of a nutation a step. Phases are exact products.
 
 *Sums.* A state is Z and W = Z_{n+1} - Z_n = p/r + f Z, f Z the half kick: a step is one drift W and one kick 2 f Z. Z,
 W and the kick are carried as two doubles each; f is one. A kick along Z, whatever its strength, and a drift along W
@@ -71,7 +72,6 @@ from symtop.methods.lagrangian import oscillators
 from symtop.methods.lagrangian.oscillators import Map, OscillatorTop, attitude_state, axis_state, on_oscillators
 from symtop.methods.vectors import accumulate_plainly, summed
 
-SHARE = 0.5  # of what breaks |chi| = 1 that a step takes off: all of it would feed on the rounding that the loop sums
 IDLE = 2e-15  # |chi|^2 may be off by as much: below that, what is seen of it is the rounding of |Z|^2
 
 
@@ -139,11 +139,11 @@ def _step(rule: Any, state: Any, carry: Any) -> Any:
     # the longer one gets the length that it must have, and p the inverse of that factor, so that J remains
     lack, other = (1.0 - s1) - s2, (1.0 - s2) - s1
     lack = lack if longer else other
-    half = 0.5 * SHARE * lack
+    half = 0.5 * lack
     lack = half if abs(lack) > IDLE else 0.0
     # and what is wrong with p is taken off it: sum Re(conj(Z) (W - f Z))/r = 0
     out1, out2 = x1 * u1 + y1 * v1 - f1 * s1, x2 * u2 + y2 * v2 - f2 * s2
-    swell = SHARE * (out1 * rule.q1 + out2 * rule.q2)
+    swell = out1 * rule.q1 + out2 * rule.q2
     # both are made, and one is chosen: a branch that holds arithmetic is none in lanes
     i1, i2 = _inverse(s1), _inverse(s2)
     e1, e2, c1, c2 = lack * i1, lack * i2, swell * rule.r1 * i1, swell * rule.r2 * i2

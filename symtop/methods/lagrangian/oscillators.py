@@ -39,6 +39,7 @@ from symtop.core.jit import register_jitable
 from symtop.methods.framework.preparation import Preparation, Scaled
 from symtop.methods.framework.space import with_spin
 from symtop.model.exact.elliptic import differences, half_period, r_j, roots
+from symtop.model.top import nutation_period
 
 
 class OscillatorTop(NamedTuple):
@@ -109,7 +110,7 @@ SHORTEST = 1e-100  # of a step, and of what is left of one that is a whole numbe
 STEEPEST = 16.0  # (P - e3)/(P - e2): what rounding of the constants is amplified by
 MOST_PARTS = 1000
 NEXT_TO_ROOT = 1e-4
-TINY = 1e-300  # in the place of a root that is a zero of chi: J is zero, too
+TINY = 1e-80  # of e1 - e3, in the place of e1 - b where e1 is a zero of chi: J is zero, too
 
 
 class Map(NamedTuple):
@@ -146,12 +147,18 @@ def one_oscillator(above: Any, g2: float, g3: float, sigma: float, b: float, J: 
 
 @register_jitable
 def _whole_turn(e: Any, sigma: float, b: float, J: float) -> float:
-    """delta of one nutation; where b is next to the root e1 that bounds it, J and the integral are 0 times infinity."""
-    rest = max(e.e1 - b, TINY)
-    turn = sigma * J
-    if rest < NEXT_TO_ROOT * (e.e1 - e.e3):
-        turn = math.copysign(math.sqrt(rest * abs(b - e.e2) * abs(b - e.e3)), turn)
-    return 2.0 * turn * r_j(0.0, e.e1 - e.e2, e.e1 - e.e3, rest) / 3.0
+    """delta of one nutation; where b is next to the root e1 that bounds it, J and the integral are 0 times infinity.
+
+    There e1 - b is that of J^2 = (e1 - b)(b - e2)(b - e3): the difference of two roots is their rounding.
+    """
+    wide, rest, turn = e.e1 - e.e3, e.e1 - b, sigma * J
+    y, z = e.e1 - e.e2, wide
+    if rest < NEXT_TO_ROOT * wide:
+        y, z = abs(b - e.e2), abs(b - e.e3)
+        rest = max(turn * turn / (y * z), TINY * wide)
+        turn = math.copysign(math.sqrt(rest * y * z), turn)
+        y, z = y + rest, z + rest
+    return 2.0 * turn * r_j(0.0, y, z, rest) / 3.0
 
 
 @register_jitable
@@ -176,7 +183,8 @@ def _mapped(rule: Any, top: Any, at: Any, h: float) -> Any:
     """The numbers of the step h from a start; `rule` says nothing but their type."""
     par, s = oscillator_numbers(top, at)
     e = roots(par.g2, par.g3)
-    half = half_period(e)
+    # two roots that are neighbours lose digits: e1 and e2 beside a separatrix, both turning points in a steady motion
+    half = half_period(e) if e.e1 - e.e2 > e.e2 - e.e3 else 0.5 * nutation_period(top, at)
     nutations = np.rint(0.5 * h / half)
     rest = h - 2.0 * nutations * half if nutations != 0.0 else h
     parts = 1
