@@ -26,9 +26,8 @@ import numpy as np
 from symtop.core.errors import SymtopError, finite, positive, row, shown
 from symtop.core.jit_functions import inlined, two_product
 from symtop.core.numbers import EPSILON
-from symtop.model.top import LARGEST, bounded, unit, vector
+from symtop.model.top import LARGEST, SLACK, bounded, unit, vector
 
-SLACK = 1e-12  # of the triangle inequality: moments come rounded
 SYMMETRIC = 1e-9  # of the largest entry: how far a matrix may be from a symmetric one
 
 

@@ -17,7 +17,7 @@ and ``e = q k q*``. In the space frame, with n = (cos phi, sin phi, 0) the line 
 Source: Marsden and Ratiu, Introduction to Mechanics and Symmetry, chapter 15.
 
 Distances are the angles of the smallest rotation, accurate for small angles: ``atan2(|a x b|, a.b)`` for
-axes, ``4 asin(|q - q'|/2)`` with the nearer sign for attitudes (2 acos has a floor of 1e-8).
+axes, twice that of the quaternions with the nearer sign for attitudes (2 acos has a floor of 1e-8).
 
 `readings`, `axes` and `continuous` are compiled passes over a few hundred states. They do the operations of `View` and
 `unwrapped` in their order, to the same bits; those answer until the kernels are loaded.

@@ -120,6 +120,7 @@ def effective_potential(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -
 
 
 NUMBERS = ("I1", "I3", "mgl", "theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")  # that are a top and a start
+SLACK = 1e-12  # of the inequalities between moments: they come rounded
 LARGEST = 1e40  # of any parameter or rate, and one over the smallest inertia: squares of squares stay finite
 BISECTIONS = 60  # of an interval of cosines at most 2 wide: to the last place
 
@@ -236,7 +237,7 @@ class SymmetricTop:
         object.__setattr__(self, "I1", bounded("I1", positive("I1", self.I1), 1.0 / LARGEST))
         object.__setattr__(self, "I3", bounded("I3", positive("I3", self.I3), 1.0 / LARGEST))
         object.__setattr__(self, "mgl", bounded("mgl", self.mgl))
-        if self.I3 > 2.0 * self.I1:
+        if self.I3 > 2.0 * self.I1 * (1.0 + SLACK):
             words = f"not {self.I3!r} with I1 = {self.I1!r}"
             raise SymtopError(f"I3 must be at most 2 I1 (no rigid body exceeds it), {words}")
 
@@ -273,7 +274,7 @@ class SymmetricTop:
         """
         mass, arm = positive("mass", mass), finite("distance", distance)
         across, axial = positive("at_centre", at_centre), positive("axial", axial)
-        if axial > 2.0 * across:
+        if axial > 2.0 * across * (1.0 + SLACK):
             raise SymtopError(f"axial must be at most 2 at_centre (no rigid body exceeds it), not {axial!r}")
         return cls(across + mass * arm * arm, axial, mass * finite("gravity", gravity, 0.0) * arm)
 
@@ -319,7 +320,10 @@ class SymmetricTop:
         return _steady_theta(self, momenta)
 
     def nutation_frequency(self, momenta: Momenta) -> float:
-        """Angular frequency of small nutations about the steady precession with these momenta."""
+        """Angular frequency of small nutations about the steady precession with these momenta.
+
+        Of a sleeping top, whose axis passes the pole, that of the signed angle: half of 2 pi/`nutation_period`.
+        """
         theta = self.steady_theta(momenta)
         if theta in (0.0, math.pi):
             # x cot(x)-like limit of V'': one momentum combination vanishes, the other is 2 I3 w3
@@ -336,7 +340,10 @@ class SymmetricTop:
         return turning_cosines(self, at)
 
     def nutation_period(self, at: Angles) -> float:
-        """Time of one nutation, ``2 pi / AGM(sqrt(beta (u3-u1)), sqrt(beta (u3-u2)))``; inf on a separatrix."""
+        """Time of one nutation, ``2 pi / AGM(sqrt(beta (u3-u1)), sqrt(beta (u3-u2)))``; inf on a separatrix.
+
+        Beside one, and where both turning points meet, it has half the digits; `ClosedForm.nutation_period` has all.
+        """
         return nutation_period(self, at)
 
 

@@ -160,12 +160,13 @@ def simulate(
 
     Dimension ``time`` (elapsed) and ``component`` (x, y, z). Variables ``theta``, ``phi``, ``psi`` (unwrapped; absent
     where the chart does not show them), ``axis(time, component)``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, and
-    ``quaternion`` where the chart has one. Samples after a failure are NaN; ``outcome``, ``outcome_message`` and
-    ``reached_time`` say what happened, ``guard`` what was expected to. `observe` ("nutation", "axis", "attitude";
-    default: what the scene is watched for) picks the smallest chart of the integrator that shows it; a variant, such as
-    ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` shows every step. A whole number of
-    steps fills the horizon, the one nearest to horizon/step_size: the attribute ``step_size`` is the step made.
-    ``sampling`` is "uniform", "nearest steps" (to uniform times), or "dithered", so that all of a nutation is seen.
+    ``quaternion`` where the chart has one (its sign may change between samples). Samples after a failure are NaN;
+    ``outcome``, ``outcome_message`` and ``reached_time`` say what happened, ``guard`` what was expected to. `observe`
+    ("nutation", "axis", "attitude"; default: what the scene is watched for) picks the smallest chart of the integrator
+    that shows it; a variant, such as ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` shows
+    every step. A whole number of steps fills the horizon, the one nearest to horizon/step_size: the attribute
+    ``step_size`` is the step made. ``sampling`` is "uniform", "nearest steps" (to uniform times), or "dithered", so
+    that all of a nutation is seen.
 
     Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a large
     error is expected; the run is the same either way. It compares a piece of the run with the closed form ("exact", of

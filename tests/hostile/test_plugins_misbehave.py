@@ -23,7 +23,7 @@ BEFORE = repr(symtop.scene("spheroid"))
 @pytest.fixture(scope="module", autouse=True)
 def misbehaving():
     plugins.load(PLUGIN)
-    return next(module for name, module in sys.modules.items() if name.startswith("symtop_plugin_plugin_"))
+    return next(one for one in [*sys.modules.values()] if getattr(one, "__file__", None) == str(PLUGIN))
 
 
 def output_of(words):

@@ -103,8 +103,7 @@ def test_own_scenes_and_methods_engines_and_scipy_take_part(clean_registry, tmp_
     scene = symtop.Scene("mine", top, symtop.Angles(theta=0.4, psi_dot=60.0), horizon=0.2)
     names = ["on-the-axis", "refusing", "mujoco-euler", "rk45", "rk4[axis]", "rk4[angles]", "exact"]
     rounds = radau.NEWTON_MAXITER
-    classes = [type(f"Radau{k}", (radau.Radau,), {}) for k in range(3)]
-    symtop.compare(scene, classes, quiet=True, budget=1e3)
+    symtop.compare(scene, [type(f"Radau{k}", (radau.Radau,), {}) for k in range(3)], quiet=True, budget=1e3)
     assert rounds == radau.NEWTON_MAXITER  # though threads change it
     data = symtop.compare(scene, names, quiet=True, budget=1e4)
     own, refused, engine, *_ = data["variant"].values.tolist()

@@ -101,9 +101,9 @@ def test_combined_values_are_those_of_each_case_whatever_its_type_and_another_or
     of = lambda name, dims, values: (Case("spheroid", name), xr.Dataset({"value": (dims, values)}))
     pairs = [(np.array([3, 4], np.uint8), np.array([300.0, -1.5])), (np.float32([1.0, 2.0]), np.array([1e300, 0.1])),
              (np.array([3, 4], np.uint8), np.array([300, 7], np.uint16))]  # fmt: skip
-    for first, second in pairs:
-        both = datasets.combine([of("a", ("n",), first), of("b", ("n",), second)])["value"].sel(scene="spheroid")
-        np.testing.assert_array_equal(both, [first, second])
+    for two in pairs:
+        both = datasets.combine([of(name, ("n",), values) for name, values in zip("ab", two, strict=True)])["value"]
+        np.testing.assert_array_equal(both.sel(scene="spheroid"), [*two])
     with pytest.raises(symtop.SymtopError, match=r"value of b on spheroid must be over \('n', 'm'\)"):
         datasets.combine([of("a", ("n", "m"), np.eye(2)), of("b", ("m", "n"), np.eye(2))])
 

@@ -57,12 +57,11 @@ def test_a_slow_top_keeps_its_energy_at_a_third_of_a_nutation_and_whole_ones_are
     for spin, share in ((0.3, 0.36), (0.3, 1.0 / 3.0), (0.0, 0.36)):
         scene = symtop.Scene("slow", top, symtop.Angles(1.0, psi_dot=spin), 1.0)
         h = share * scene.nutation_period
-        slow = symtop.simulate(scene, "exact-discrete", step_size=h, horizon=900 * h, guard=False)
-        assert float(abs(slow["energy"] - slow["energy"][0]).max()) < 1e-12
+        energy = symtop.simulate(scene, METHOD, step_size=h, horizon=900 * h, guard=False)["energy"].values
+        assert np.ptp(energy) < 1e-12
     for start in (symtop.Angles(0.01), symtop.Angles(0.01, psi_dot=0.02), symtop.Angles(1.0)):
         form = symtop.ClosedForm(top, start)
-        for share in (1.0, 2.2, 3.4):
-            h = share * form.nutation_period
+        for h in np.array([1.0, 2.2, 3.4]) * form.nutation_period:
             done = run(top, start, h, 30, "axis")
             assert charts.axis_distance(done.states[:, :3], form.axis(h * np.arange(31))).max() < 1e-9
 

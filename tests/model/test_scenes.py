@@ -176,13 +176,12 @@ def test_a_body_from_its_moments_about_the_centre_is_the_spheroid():
     assert symtop.SymmetricTop.from_inertia(mass, across, along, -arm).mgl == -made.mgl
     on_the_moon = symtop.SymmetricTop.from_inertia(mass, across, along, arm, gravity=1.62)
     assert on_the_moon.mgl == pytest.approx(mass * 1.62 * arm)
+    assert symtop.SymmetricTop.from_inertia(1.32, 1.32 * 3 * 0.85**2 / 12, 1.32 * 0.85**2 / 2, 0.0).mgl == 0.0  # a disc
 
 
 @pytest.mark.parametrize(("call", "words"), [
-    (
-        lambda: symtop.Angles.from_quaternion([1, 0, 0, 0], omega_body=[1, 1, 1], omega_space=[1, 1, 1]),
-        "give omega_body or omega_space, not both",
-    ),
+    (lambda: symtop.Angles.from_quaternion([1, 0, 0, 0], omega_body=[1, 1, 1], omega_space=[1, 1, 1]),
+     "give omega_body or omega_space, not both"),
     (lambda: symtop.Angles.from_axis(symtop.SymmetricTop(1, 1, 1), [0, 0, 2], [0, 0, 1]), "axis must have unit"),
     (lambda: symtop.SymmetricTop.from_inertia(1, 1, 3, 1), "axial must be at most 2 at_centre"),
     (lambda: symtop.RigidBody.from_inertia(5.0), "matrix must be rows of 3 numbers, not 5.0"),

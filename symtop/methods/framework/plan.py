@@ -38,8 +38,10 @@ class Plan(NamedTuple):
 
     @classmethod
     def until(cls, times: ArrayLike, tolerance: float, budget: float | None = None) -> Self:
-        """To the last of `times` at a tolerance (nan for a method that has none), sampled at all of them."""
+        """To the last of `times`, after 0, at a tolerance (nan for a method that has none), sampled at all of them."""
         samples = np.asarray(times, dtype=float)
+        if not (samples.size and samples[-1] > 0.0):  # a loop of steps would never end
+            raise SymtopError(f"times must end after 0, not at {samples[-1] if samples.size else 'none'}")
         return cls(samples, float(samples[-1]), math.nan, np.empty(0, dtype=np.int64), tolerance, budget)
 
     def last_of(self, whole: Any) -> float:

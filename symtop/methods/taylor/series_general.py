@@ -40,7 +40,7 @@ from symtop.methods.vectors import summed
 from symtop.model.charts import BODY
 
 ORDER = 16  # with a fixed step
-HIGHEST = 24  # of a tolerance: N = 21 at the least one
+HIGHEST = 24  # of a tolerance: N = 21 at the default, 23 at the least
 
 
 @register_jitable

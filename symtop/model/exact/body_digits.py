@@ -7,7 +7,7 @@ A number is a whole multiple of 2^-bits and a step a power of two, so that the b
 last terms of the series choose the step. Moments, weight, start and times are the doubles that are given, exactly, and
 the quaternion is scaled to length one.
 
-The bound is the distance of a second run with fewer bits, of a lower order and with longer steps: it is the error of
+The bound is the distance of a second run with fewer bits, of a lower order and with a looser goal: it is the error of
 that run, and larger than that of the first by `APART` bits as long as errors grow alike. Slow (ms a step), and for
 references that are made once. Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99, for the steps.
 """
