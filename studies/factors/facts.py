@@ -158,30 +158,11 @@ def against_scipy(frame: pd.DataFrame) -> pd.DataFrame:
             user, inner = (fastest(theirs, call, tie=0.0) for call in (SOLVE_IVP, KERNEL))
             ours, own = (fastest(part, call, COMPILED) for call in (SIMULATE, KERNEL))
             if user is not None and inner is not None and ours is not None and own is not None:
-                rows.append(
-                    [
-                        *goal,
-                        scheme,
-                        user["variant"],
-                        user["seconds"],
-                        ours["variant"],
-                        ours["seconds"],
-                        user["seconds"] / ours["seconds"],
-                        own["variant"],
-                        inner["seconds"] / own["seconds"],
-                    ]
-                )
-    header = [
-        *GOAL,
-        "method",
-        "SciPy's",
-        "solve_ivp (s)",
-        "fastest, as called",
-        "simulate (s)",
-        "times, as called",
-        "fastest kernel",
-        "times, kernels",
-    ]
+                rows.append([*goal, scheme, user["variant"], user["seconds"], ours["variant"], ours["seconds"],
+                             user["seconds"] / ours["seconds"], own["variant"],
+                             inner["seconds"] / own["seconds"]])  # fmt: skip
+    header = [*GOAL, "method", "SciPy's", "solve_ivp (s)", "fastest, as called", "simulate (s)", "times, as called",
+              "fastest kernel", "times, kernels"]  # fmt: skip
     return pd.DataFrame(rows, columns=header)
 
 
