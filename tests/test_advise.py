@@ -85,10 +85,10 @@ def test_a_search_says_why_it_found_nothing(name, accuracy, patience, why):
 
 
 def test_a_flat_error_is_rounding_of_steps_and_may_be_a_stair_of_tolerances():
-    stair = lambda tolerance: (10.0 ** -(3 * math.floor(-math.log10(tolerance) / 3)), 100.0)  # one error for a thousand
+    stair = lambda tolerance: (10.0 ** (-1 - 2 * math.floor(-math.log10(tolerance) / 2)), 1.0)  # one for a hundred
     floor = lambda tolerance: (max(tolerance, 3e-11), 100.0)
     for target in (1e-9, 1e-10, 1e-12):
-        assert stair(settings.seek(stair, 1e-7, target, (1e-15, 1.0), 1.0, fixed_step=False))[0] <= target
+        assert stair(settings.seek(stair, 0.99e-8, target, (1e-15, 1.0), 1.0, fixed_step=False))[0] <= target
     assert settings.seek(floor, 1e-9, 1e-12, (1e-15, 1.0), 1.0, fixed_step=False) == settings.STOPPED
     assert settings.seek(lambda h: (3e-11, 1.0 / h), 0.1, 1e-12, (1e-9, 1.0), 4.0) == settings.STOPPED
 
