@@ -117,7 +117,8 @@ Words = list[Array]  # coefficients of the words of length 0, 1, 2 ..., shapes (
 
 def product(first: Words, second: Words) -> Words:
     """The product of two series of words."""
-    return [np.sum([np.kron(first[j], second[k - j]) for j in range(k + 1)], axis=0) for k in range(len(first))]
+    outer = np.multiply.outer  # `np.kron` of two rows, a tenth of its time
+    return [np.sum([outer(first[j], second[k - j]).ravel() for j in range(k + 1)], axis=0) for k in range(len(first))]
 
 
 def commutator(first: Words, second: Words) -> Words:
