@@ -237,7 +237,7 @@ def recommend(
     limits = step, longest, boolean("general", general), constants, pace
     question = _Question(scene, accuracy, quantity, horizon, allowed, *limits)
     if accuracy < limit:
-        source = f"nothing was, as that is below {limit:.2g}, the least error that the reference can judge"
+        source = f"no run was made, as that is below {limit:.2g}, the least error that the reference can judge"
         return _advice(question, [], (), source)
     if {*allowed} == {"solution"} and not scene.of_body and question.allows(integrator("exact")):
         return _the_motion(question, limit)
@@ -600,9 +600,8 @@ class EngineAdvice:
             nearer = f", {times:.3g} times nearer than {default}" if self.errors[default] < math.pi else ""
             lines.append(f"Its best setting is {self.best}{nearer}.")
         if not near:
-            lines.append(
-                f"No setting is within {WORST:g} rad: none is better than another, and there is nothing to match."
-            )
+            none = f"No setting is within {WORST:g} rad: none is better than another, and there is nothing to match."
+            lines.append(none)
         if self.advice is None:
             return "\n".join(lines)
         if (accuracy := self.advice.accuracy) != self.errors[self.best]:

@@ -7,6 +7,7 @@ not come back. Where other threads still work, they are waited for as usual. Lin
 
 import atexit
 import os
+import signal
 import sys
 import threading
 
@@ -21,6 +22,7 @@ def run(name: str | None = None) -> None:
     try:
         main(prog_name=name)
     except SystemExit as end:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # a second Ctrl-C, while threads end, has no traceback
         alone = all(thread.daemon or thread is threading.main_thread() for thread in threading.enumerate())
         if not alone or not (end.code is None or isinstance(end.code, int)):
             raise

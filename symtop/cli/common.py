@@ -121,9 +121,8 @@ def body_options(command: Callable[..., None]) -> Callable[..., None]:
         if numbers:
             if "body" not in numbers or settings[scene] != BODY:
                 options = ", ".join(f"--{name}" for name in numbers)
-                raise SymtopError(
-                    f"{options} must come with --body I1,I2,I3 on the scene {BODY}, not {settings[scene]}"
-                )
+                place = "" if settings[scene] == BODY else f" on the scene {BODY}, not {settings[scene]}"
+                raise SymtopError(f"{options} must come with --body I1,I2,I3{place}")
             settings[scene] = _own_body(numbers)
         command(**settings)
 
@@ -231,9 +230,8 @@ def _in_options(error: SymtopError, command: click.Command | None) -> str:
     """An error's sentence with the options of a command, and what helps where a scene or an integrator is unknown."""
     parameters = command.params if command is not None else []
     options = [one for one in parameters if isinstance(one, click.Option)]
-    sentence = error.renamed(
-        {str(one.name): max(one.opts, key=len) for one in reversed(options)}
-    )  # the first of a name
+    named = {str(one.name): max(one.opts, key=len) for one in reversed(options)}  # the first of a name
+    sentence = error.renamed(named)
     if not isinstance(error, UnknownNameError) or error.parameters[0] not in ("scene", "integrator"):
         return sentence
     from symtop.methods.framework.registry import integrators, split_name

@@ -37,7 +37,7 @@ LONGEST_BESIDE = 5.0  # seconds of a run of the judged step, which may be slow
 @click.option("--autonomous", is_flag=True, help="It was written for y' = f(y), without a time.")
 @click.option("--quick", is_flag=True, help="Shorter runs: some ten seconds, or forty where a step takes 1 ms.")
 @click.option("--seed", type=int, help="Draw the starts, times and steps of an earlier judging again.")
-@click.option("--output", type=File(dir_okay=False), help="Write the findings to this netCDF file.")
+@click.option("--output", "-o", type=File(dir_okay=False), help="Write the findings to this netCDF file.")
 @click.option("--card", type=File(dir_okay=False), help="Write a page with two figures and the ledger (HTML).")
 @click.option("--badge", type=File(dir_okay=False), help="Write a badge for a README (SVG).")
 @click.option("--figure", type=File(dir_okay=False), help="Draw its error against evaluations, beside four methods.")

@@ -46,7 +46,7 @@ EXECUTION = {
 @click.option("--budget", type=float, help="Most steps, or force evaluations of an adaptive method.")
 @click.option("--guard", is_flag=False, flag_value="on", default="on", metavar="exact|series", help=GUARD)
 @click.option("--no-guard", "guard", flag_value="off", help="Do not warn before the run of a large error.")
-@click.option("--output", type=File(), help="Write the run to this netCDF file.")
+@click.option("--output", "-o", type=File(), help="Write the run to this netCDF file.")
 @click.option("--figure", type=File(), help="Draw the run and its errors: .png, .svg or .pdf.")
 @common.scene_options
 def run(
@@ -144,7 +144,7 @@ def estimate(steps: float, run: Callable[[int], object]) -> None:
 @click.option("--step-size", type=float, help="Step; a thousandth of a nutation period by default.")
 @common.per_nutation_option
 @click.option("--checkpoint", type=File(), help="File to resume from; symtop's own by default.")
-@click.option("--output", type=File(), help="Write the windows to this netCDF file.")
+@click.option("--output", "-o", type=File(), help="Write the windows to this netCDF file.")
 @common.body_options
 @common.plugin_option
 def long(

@@ -253,7 +253,7 @@ def report(results: str, embed: bool) -> None:
 
 
 @click.command(short_help="Bundle all results for a repository of data.")
-@click.option("--output", type=File(), help="The zip to write; in the results folder by default.")
+@click.option("--output", "-o", type=File(), help="The zip to write; in the results folder by default.")
 @click.option("--test-set", is_flag=True, help="Write the test set of rigid bodies instead, a folder; takes a minute.")
 @results_option
 @plugin_option

@@ -31,8 +31,12 @@ def _end(*_: object) -> None:
     raise TerminatedError
 
 
-def _interrupt(*_: object) -> None:
-    raise InterruptedByUser
+def _interrupt(number: int, frame: Any) -> None:
+    while frame is not None and "_object_cache_" not in frame.f_code.co_name:
+        frame = frame.f_back
+    if frame is None:
+        raise InterruptedByUser
+    threading.Timer(0.1, signal.raise_signal, [number]).start()  # what a callback of LLVM raises is printed and lost
 
 
 def _in_main_thread() -> bool:

@@ -52,7 +52,7 @@ from symtop.model.scenes import Scene, scene as find_scene
 from symtop.run.reference.truth import reference
 from symtop.run.trajectory import Trajectory, column
 
-FILES = (".csv", ".txt", ".dat", ".nc")
+FILES = (".csv", ".tsv", ".txt", ".dat", ".nc")
 VECTORS = {
     "axis": ("ex", "ey", "ez"), "quaternion": ("qw", "qx", "qy", "qz"), "momentum": ("Lx", "Ly", "Lz"),
     "omega_body": ("wx", "wy", "wz"),
@@ -177,14 +177,13 @@ def read(target: Any) -> dict[str, Any]:
     fields = (*SCALARS, *(part for parts in VECTORS.values() for part in parts))
     for parts in VECTORS.values():
         if lacking := {*parts} - {*names} if {*parts} & {*names} else ():
-            raise SymtopError(
-                f"{path.name} must have all of {', '.join(parts)}, and lacks {', '.join(sorted(lacking))}"
-            )
+            words = f"{path.name} must have all of {', '.join(parts)}, and lacks {', '.join(sorted(lacking))}"
+            raise SymtopError(words)
     wrong = [f"{name} is none of them" for name in dict.fromkeys(names) if name not in fields]
     wrong += [f"{name} is there twice" for name in dict.fromkeys(names) if names.count(name) > 1]
     wrong += ["there is no time"] * ("time" not in names)
     if wrong:
-        begin = f"{path.name} must begin with a line of names, time and of {', '.join(fields[1:])}"
+        begin = f"{path.name} must begin with names, commas or spaces between: time and of {', '.join(fields[1:])}"
         raise SymtopError(f"{begin}, but of {head[:60]!r} {', '.join(wrong[:SHOWN])}{' ...' * (len(wrong) > SHOWN)}")
     if not any(one.partition("#")[0].strip() for one in lines):
         raise SymtopError(f"{path.name} must have a line of numbers below its names, and has none")

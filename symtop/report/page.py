@@ -87,9 +87,8 @@ def gather(results: Path) -> list[dict[str, Any]]:
             gathered.append({**findings, **about, "page": page})
         except (OSError, KeyError, TypeError) as error:
             command = findings.get("command", f"symtop study {name}")
-            raise SymtopError(
-                f"the findings of {name} in {results} are incomplete ({error}); run it again: {command}"
-            ) from error
+            words = f"the findings of {name} in {results} are incomplete ({error}); run it again: {command}"
+            raise SymtopError(words) from error
     if not gathered:
         raise SymtopError(f"no study has left findings in {results}; run one first, for example: symtop study --all")
     return gathered

@@ -6,6 +6,7 @@ input makes the same files. A state of 17 digits is what doubles hold. Numbers o
 nearest to what is printed, in every file.
 """
 
+import tempfile
 from collections.abc import Sequence
 from importlib import resources
 from pathlib import Path
@@ -48,11 +49,12 @@ def write(folder: str | Path, scenes: Sequence[Scene] | None = None) -> Path:
     path, scenes = file_path("folder", folder), list(scenes or problems())
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise SymtopError(f"the test set needs a folder that is new or empty, not {str(folder)!r}")
+    path.mkdir(parents=True, exist_ok=True)
+    tempfile.TemporaryFile(dir=path).close()  # a folder that cannot be written is told of before the minutes
     motions = list[Digits]()
     for scene in scenes:
         post(f"test set: {len(motions)} of {len(scenes)} motions")
         motions.append(body_digits(scene.top, scene.start, times_of(scene)))
-    path.mkdir(parents=True, exist_ok=True)
     rows = [",".join([scene.name, *map(repr, scene.top.flat(scene.start))]) for scene in scenes]
     files = {"problems.csv": "\n".join([",".join(["name", *GIVEN]), *rows, ""])}
     files |= {f"states-{digits}.csv": _states_csv(scenes, motions, digits) for digits in ROUNDED}

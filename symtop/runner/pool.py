@@ -220,9 +220,8 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
                     self.close_workers()
                     fruitless += 1
                     if fruitless == MOST_FRUITLESS:
-                        raise SymtopError(
-                            "the worker processes end before they begin; try --jobs 1 or look at the free memory"
-                        ) from None
+                        words = "the worker processes end before they begin; try --jobs 1 or look at the free memory"
+                        raise SymtopError(words) from None
             remaining.update(died)
 
     def at_once(self, width: int) -> tuple[int, float]:

@@ -65,9 +65,8 @@ def test_a_driver_gets_the_numbers_of_the_body_and_its_quaternions_have_length_o
     np.testing.assert_array_equal(path.velocity, np.tile(body.velocity, (4, 1)))
 
 
-@pytest.mark.parametrize(
-    ("setting", "message"), [("broken", "ended with 1: no such body"), ("short", "2 rows where 3 were expected")]
-)
+@pytest.mark.parametrize(("setting", "message"), [
+    ("broken", "ended with 1: no such body"), ("short", "2 rows where 3 were expected")])  # fmt: skip
 def test_a_driver_that_fails_is_an_error_with_its_reason(setting, message):
     with pytest.raises(RuntimeError, match=message):
         drivers.run((sys.executable, "-c", ECHO), setting, "free", body_of(symtop.scene("goldstein")), 0.1, 2)

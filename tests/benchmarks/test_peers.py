@@ -98,9 +98,8 @@ def test_the_axis_as_a_particle_has_the_acceleration_of_the_axis(scene):
     assert not np.allclose(particle[6:], np.cross(torque, e) / top.I1)  # gravity alone
 
 
-@pytest.mark.parametrize(
-    ("name", "setting"), [("takahashi-imada", 0.01), ("rk4", 0.005), ("taylor", 1e-12), ("rk45-compiled", 1e-10)]
-)
+@pytest.mark.parametrize(("name", "setting"), [
+    ("takahashi-imada", 0.01), ("rk4", 0.005), ("taylor", 1e-12), ("rk45-compiled", 1e-10)])  # fmt: skip
 def test_the_kernel_alone_ends_where_simulate_ends(scene, name, setting):
     peer = peers.Peer(measure.OURS, symtop.integrator(name), own.LANGUAGE)
     whole, loop = measure.ready(scene, peer, setting)

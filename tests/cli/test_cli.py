@@ -93,7 +93,7 @@ def numbers(text):
 
 
 def test_run_prints_the_errors_and_writes_the_dataset_also_of_a_run_that_fails_or_has_nan(tmp_path):
-    words = ("run", "spheroid", "midpoint", "--step-size", 0.01, "--output", tmp_path / "run.nc")
+    words = ("run", "spheroid", "midpoint", "--step-size", 0.01, "-o", tmp_path / "run.nc")
     assert "angle between axes" in call(*words).output
     assert netcdf.read(tmp_path / "run.nc").attrs["integrator"] == "midpoint"
     report = numbers(call(*words, "--json").stdout)
@@ -217,6 +217,8 @@ def test_a_command_ends_with_its_code_takes_nothing_apart_and_waits_for_threads(
     result = ending(before="threading.Thread(target=work).start()")
     assert result.stdout.splitlines() == ["the answer", "the thread is done", "what was registered", "taken apart"]
     assert result.returncode == 3
+    result = ending(before="threading.Timer(0.3, os.kill, (os.getpid(), 2)).start()")  # Ctrl-C, while it waits
+    assert (result.returncode, result.stderr) == (-signal.SIGINT, "")
     result = ending(code="'a text'")
     assert (result.returncode, result.stderr) == (1, "a text\n")
 

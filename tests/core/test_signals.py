@@ -8,9 +8,10 @@ import time
 import numpy as np
 import pytest
 import xarray as xr
+from numba.core.registry import cpu_target
 from xarray.backends.locks import HDF5_LOCK
 
-from symtop.core import netcdf
+from symtop.core import jit, netcdf
 from symtop.core.signals import InterruptedByUser, TerminatedError, at_most, deferred, ending_on_sigterm, told_apart
 
 DATA = xr.Dataset({"value": ("x", np.arange(5.0))})
@@ -95,6 +96,13 @@ def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, heari
             events.append("outer")
         events.append("after")
     assert events == ["inner", "outer"]
+
+
+def test_ctrl_c_is_heard_while_llvm_calls_back(monkeypatch):
+    engine = cpu_target.target_context.codegen()._engine._ee
+    monkeypatch.setattr(engine, "_object_cache_notify", lambda *_: signal.raise_signal(signal.SIGINT))
+    with told_apart(), pytest.raises(InterruptedByUser):
+        jit.is_lean.__wrapped__(), time.sleep(5.0)
 
 
 def test_two_requests_are_both_heard_and_a_limit_inside_another_leaves_that_one_running(default_handlers):

@@ -48,9 +48,8 @@ def test_what_is_right_is_not_warned_of(k):
 OLDER = tuple(name for name in symtop.integrators() if name not in NEWER)
 
 
-@pytest.mark.parametrize(
-    ("count", "without"), [(28, NEWER), (40, OLDER), pytest.param(1500, NEWER, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("count", "without"), [
+    (28, NEWER), (40, OLDER), pytest.param(1500, NEWER, marks=pytest.mark.slow)])  # fmt: skip
 def test_random_runs_are_not_wrong_in_silence(count, without):
     """Many in a process apart, which may end or not; a few here."""
     runs = run_all(count, 3, without) if count > 40 else [one(k, 3, without=without) for k in range(count)]

@@ -153,7 +153,7 @@ def test_a_slow_program_has_the_time_that_earlier_runs_took_also_after_a_short_o
     ("nothing.py:step", {}, "FILE.py:NAME with a file that is there"),
     ("no-such-program-anywhere -x", {"form": "program"}, "must be a command that can be run"),
     ("my 'engine -x", {"form": "program"}, 'must be a command that can be run, not "my \'engine -x"'),
-    ("true", {}, "or a command with form program, not 'true'$"),
+    ("true", {}, "a trajectory such as FILE.csv, or a command with form program, not 'true'$"),
     ("rk4[axis]", {}, r"form program, not 'rk4\[axis\]', an integrator, whose claims `symtop claims rk4` measures$"),
     (midpoint, {"form": "rotation"}, r"must take \(q, w, h, inertia, torque\), not \(f, t, y, h\)"),
     (lambda y, h: y, {}, r"must take \(f, t, y, h\), not \(y, h\)"),
@@ -215,9 +215,8 @@ def _keeps_its_slope(f, t, y, h, memory=[np.zeros(6)]):  # noqa: B006, B008  (wh
 PENDULUM = symtop.Scene("pendulum", symtop.SymmetricTop(1.0, 0.5, 1.0), symtop.Angles(theta=2.0), 20.0)
 
 
-@pytest.mark.parametrize(
-    "scene", ["sleeping", *(pytest.param(scene, marks=pytest.mark.slow) for scene in ("separatrix", PENDULUM))]
-)
+@pytest.mark.parametrize("scene", [
+    "sleeping", *(pytest.param(scene, marks=pytest.mark.slow) for scene in ("separatrix", PENDULUM))])  # fmt: skip
 def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, only):
     """Beside a pole angles know a state badly; a pendulum has momenta of zero, which are no unit."""
     only("calls", "order")

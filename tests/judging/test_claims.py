@@ -125,9 +125,8 @@ def test_a_law_is_named_only_if_the_interval_excludes_its_neighbours(size, slope
     assert behaviour(size, slope, interval, rounding=1e-11) == kind
 
 
-@pytest.mark.parametrize(
-    ("a_step", "plain", "kind"), [(1e-16, False, "drift"), (1e-16, True, "kept"), (1e-15, True, "drift")]
-)
+@pytest.mark.parametrize(("a_step", "plain", "kind"), [
+    (1e-16, False, "drift"), (1e-16, True, "kept"), (1e-15, True, "drift")])  # fmt: skip
 def test_a_bias_of_a_unit_of_rounding_a_step_is_rounding_where_sums_are_plain(a_step, plain, kind):
     """As of products of quaternions: 144,000 steps make 1.6e-11."""
     steps, rounding = 144_000, 6e-16 * np.sin(np.arange(400.0))

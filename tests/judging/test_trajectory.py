@@ -85,20 +85,20 @@ def test_an_unknown_claim_about_a_trajectory_is_refused_and_one_that_a_ledger_ha
 
 
 def test_the_command_takes_a_file(table, tmp_path):
-    file = tmp_path / "run.csv"
+    file = tmp_path / "run.tsv"
     file.write_text(text(table), encoding="utf-8")
     result = call("judge", file, "--energy", "kept", "--json", code=1)
     assert {row["claim"]: row["verdict"] for row in json.loads(result.output)}["energy"] == "refuted"
     for option in ("card", "figure"):
         words = (f"--{option}", tmp_path / f"a.{'html' if option == 'card' else 'png'}", "--output", tmp_path / "a.nc")
         assert "a card or a figure shows a method: there is none" in call("judge", file, *words, code=2).output
-    assert [path.name for path in tmp_path.iterdir()] == ["run.csv"]
-    call("judge", file, "--output", tmp_path / "a.nc", "--badge", tmp_path / "a.svg")
+    assert [path.name for path in tmp_path.iterdir()] == ["run.tsv"]
+    call("judge", file, "-o", tmp_path / "a.nc", "--badge", tmp_path / "a.svg")
 
 
 @pytest.mark.parametrize(("content", "words"), [
-    ("time,x\n0,1\n", "must begin with a line of names, .*, but of 'time x' x is none of them$"),
-    ("ex,ey,ez\n0,0,1\n", "must begin with a line of names, .*, but of 'ex ey ez' there is no time$"),
+    ("time,x\n0,1\n", "names, commas or spaces between: time .*, but of 'time x' x is none of them$"),
+    ("ex,ey,ez\n0,0,1\n", "names, commas or spaces between: time .*, but of 'ex ey ez' there is no time$"),
     ("time,ex,ey,ez,mass,note\n0,0,0,1,2,3\n", "mass is none of them, note is none of them$"),
     ("time,theta,theta\n0,1,1\n", "theta is there twice$"),
     ("0,0.1,0.2,0.3,0.4\n", r"0 is none of them, 0.1 is none of them, 0.2 is none of them \.\.\.$"),

@@ -40,9 +40,8 @@ def test_a_study_of_ones_own_keeps_its_names_or_declares_them_beside_it(tmp_path
     assert netcdf.read_columns(None) == {}
 
 
-@pytest.mark.parametrize(
-    "line", ["gap\tm", "gap\t\t\t\t", "gap\tm\t\tyes\ta gap", "gap\tm\t\t\ta gap\ngap\tm\t\t\tagain", ""]
-)
+@pytest.mark.parametrize("line", [
+    "gap\tm", "gap\t\t\t\t", "gap\tm\t\tyes\ta gap", "gap\tm\t\t\ta gap\ngap\tm\t\t\tagain", ""])  # fmt: skip
 def test_a_line_that_declares_no_column_is_refused(tmp_path, line):
     file = tmp_path / "columns.tsv"
     file.write_text(f"variable\tunits\twithout_units\tflags\tlong_name\n{line}\n")

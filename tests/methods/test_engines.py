@@ -161,9 +161,8 @@ def test_a_fast_top_ends_flat_where_the_length_of_L_is_all_that_is_kept(name):
     assert spin_left("bullet") == pytest.approx(1.0, abs=1e-12)  # it damps the wobble instead
 
 
-@pytest.mark.parametrize(
-    "name", ["jsbsim-buss2[axis]", "jolt-float32[attitude]", "rapier[axis]", "no-squish[attitude]"]
-)
+@pytest.mark.parametrize("name", [
+    "jsbsim-buss2[axis]", "jolt-float32[attitude]", "rapier[axis]", "no-squish[attitude]"])  # fmt: skip
 def test_a_member_of_an_ensemble_has_the_bits_of_the_run_alone(name):
     numbers = np.array([flat(scene.top, scene.start) for scene in (GOLDSTEIN, *random_scenes(4, seed=5))])
     h, marks = np.linspace(0.01, 0.02, len(numbers)), np.tile([0, 30, 77], (len(numbers), 1))

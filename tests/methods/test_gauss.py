@@ -120,9 +120,8 @@ def test_everything_is_kept(stages, scene, observe):
     assert_keeps_everything(integrator(f"gauss-{2 * stages}"), scene, observe, 30.3)
 
 
-@pytest.mark.parametrize(
-    ("scene", "observe"), [("spheroid", "axis"), ("goldstein", "axis"), ("cusp", "axis"), ("cusp", "attitude")]
-)
+@pytest.mark.parametrize(("scene", "observe"), [
+    ("spheroid", "axis"), ("goldstein", "axis"), ("cusp", "axis"), ("cusp", "attitude")])  # fmt: skip
 @pytest.mark.parametrize("stages", STAGES)
 def test_everything_is_kept_at_large_steps(stages, scene, observe):
     for phase in LARGE:

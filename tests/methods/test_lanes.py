@@ -168,9 +168,8 @@ def spread(count, steps):
     return numbers, np.full(count, at.nutation_period / 300), np.tile([0, steps], (count, 1))
 
 
-@pytest.mark.parametrize(
-    ("name", "longer"), [("midpoint[angles]", 40.0), *((f"{name}[attitude]", 20.0) for name in ITERATED)]
-)
+@pytest.mark.parametrize(("name", "longer"), [
+    ("midpoint[angles]", 40.0), *((f"{name}[attitude]", 20.0) for name in ITERATED)])  # fmt: skip
 def test_a_lane_that_takes_more_iterations_changes_no_other(name, longer):
     """A step so large that one lane takes more passes; the others keep bits and counts, and that one does not."""
     numbers, h, marks = spread(W, 40)

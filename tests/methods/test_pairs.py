@@ -38,9 +38,8 @@ def weights(values, stages):
     return np.pad(values, (0, stages - len(values)))
 
 
-@pytest.mark.parametrize(
-    ("table", "order", "estimate", "third"), [(TSIT5, 5, 4, None), (DOP853, 8, 5, 3), (VERN9, 9, 8, None)]
-)
+@pytest.mark.parametrize(("table", "order", "estimate", "third"), [
+    (TSIT5, 5, 4, None), (DOP853, 8, 5, 3), (VERN9, 9, 8, None)])  # fmt: skip
 def test_tables_meet_the_order_conditions_of_every_tree_up_to_their_order_and_not_beyond(table, order, estimate, third):
     stages = max(len(table.a) + 1, len(table.error))
     matrix, b = square(table, stages), weights(table.b, stages)

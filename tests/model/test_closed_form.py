@@ -94,9 +94,8 @@ def test_the_arithmetic_is_recorded():
     assert ClosedForm(*SEPARATRIX).provenance == ("double", 0.0, "")
 
 
-@pytest.mark.parametrize(
-    "named", [scene("spheroid"), scene("steady"), sleeping(2.05), sleeping(1.9), grazing(1e-4), grazing(-1e-12)]
-)
+@pytest.mark.parametrize("named", [
+    scene("spheroid"), scene("steady"), sleeping(2.05), sleeping(1.9), grazing(1e-4), grazing(-1e-12)])  # fmt: skip
 def test_the_last_resort_gives_the_same_motion(named, monkeypatch):
     times = np.linspace(-20.0, 1e3, 301)
     ours = ClosedForm(named.top, named.start)

@@ -168,9 +168,8 @@ def pixels(path, mode: str) -> np.ndarray:
         return np.asarray(picture.convert(mode))
 
 
-@pytest.mark.parametrize(
-    ("write", "dpi"), [(style.sketch, style.SKETCHED), pytest.param(style.publish, style.DPI, marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("write", "dpi"), [
+    (style.sketch, style.SKETCHED), pytest.param(style.publish, style.DPI, marks=pytest.mark.slow)])  # fmt: skip
 def test_a_picture_has_the_pixels_of_savefig(tmp_path, write, dpi):
     write(sample_figure(), tmp_path / "a.png")
     sample_figure().savefig(tmp_path / "b.png", dpi=dpi)

@@ -248,6 +248,9 @@ def test_the_command_refuses_a_folder_that_holds_something(tmp_path, monkeypatch
     assert "the test set needs a folder that is new or empty" in result.stderr
     result = call("archive", "--test-set", "--output", tmp_path / "test-set", code=2)
     assert "the test set needs a folder that is new or empty" in result.stderr
+    with monkeypatch.context() as patch:  # told before anything is computed
+        patch.setattr(test_set, "body_digits", None)
+        call("archive", "--test-set", "--output", tmp_path / "test-set" / "mine" / "folder", code=2)
     (tmp_path / "test-set" / "mine").unlink()
     monkeypatch.setattr(test_set, "problems", lambda: scenes_of(body_population(1, seed=3, kind="lagrange")))
     monkeypatch.setattr(test_set, "PERIODS", 0.1)

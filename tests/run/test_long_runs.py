@@ -252,7 +252,7 @@ def test_a_fused_sum_is_rounded_once_and_memory_does_not_grow_with_the_steps():
 
 
 def test_the_command_runs_and_says_what_changed(tmp_path):
-    files = ["--checkpoint", tmp_path / "c.nc", "--output", tmp_path / "long.nc"]
+    files = ["--checkpoint", tmp_path / "c.nc", "-o", tmp_path / "long.nc"]
     assert "modified_energy" in call("long", "spheroid", "cayley", "--steps", "2e4", *files).output
     assert (tmp_path / "long.nc").is_file()
     refused = call("long", "spheroid", "rk45", "--steps", "10", "--step-size", "0.1", code=2)

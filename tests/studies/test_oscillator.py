@@ -63,9 +63,8 @@ def test_the_whole_force_at_one_end_costs_an_order(damping):
     assert power_law(table["step_size"], table["position_error"]).slope == pytest.approx(1.0, abs=0.05)
 
 
-@pytest.mark.parametrize(
-    "rule", [*RULES.values(), rule_sums(ONE_SIDED), RULES["simpson-linear"]._replace(push=0.3, pull=0.7)]
-)
+@pytest.mark.parametrize("rule", [
+    *RULES.values(), rule_sums(ONE_SIDED), RULES["simpson-linear"]._replace(push=0.3, pull=0.7)])  # fmt: skip
 def test_the_exponents_are_those_of_the_step_matrix(rule):
     for damping, h in itertools.product((0.0, 0.1, 1.0, 2.0001, 4.0, 7.0), (0.01, 0.3, 1.0)):
         oscillator = Oscillator(1.3, damping, 0.8)

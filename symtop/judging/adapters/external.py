@@ -125,9 +125,8 @@ class Program(Stepper):
         near = np.abs([states[0] - y, states[0] + y, np.sin(0.5 * (states[0] - y))]).min(axis=0)
         if np.isfinite(states[0]).all() and not (near <= SHORT * np.abs(y).max()).all():
             first = ", ".join(f"{value:.4g}" for value in states[0])
-            raise SymtopError(
-                f"{self.name} must write the start that it was given as the first of its states, not {first}"
-            )
+            words = f"{self.name} must write the start that it was given as the first of its states, not {first}"
+            raise SymtopError(words)
         return March(states[marks // stride], 0)
 
     def _answer(self, line: str, h: float, steps: int) -> bytes:
@@ -265,9 +264,8 @@ class DiffraxSolver(Stepper):
             raise SymtopError(f"form diffrax needs an instance of a solver, such as diffrax.Tsit5(), not {solver!r}")
         if isinstance(solver.term_structure, tuple):
             name = type(solver).__name__
-            raise SymtopError(
-                f"{name} steps a system in two parts; form diffrax has one, y' = f(y): judge it with form separable"
-            )
+            words = f"{name} steps a system in two parts; form diffrax has one, y' = f(y): judge it with form separable"
+            raise SymtopError(words)
         if hasattr(solver, "root_finder"):
             newton = importlib.import_module("optimistix").Newton(rtol=SAME, atol=SAME)
             solver = dataclasses.replace(solver, root_finder=newton, root_find_max_steps=MOST_NEWTON)

@@ -250,7 +250,7 @@ def _thing(target: Any) -> tuple[Any, str]:
         return target, ""
     path, _, name = str(target).partition(":")
     if not path.endswith(".py"):
-        words = "a step must be FILE.py:NAME or FILE.so, or a command with form program"
+        words = "a step must be FILE.py:NAME, FILE.so, a trajectory such as FILE.csv, or a command with form program"
         known = (method := path.partition("[")[0]) in methods()
         own = f", an integrator, whose claims `symtop claims {method}` measures" * known
         raise SymtopError(f"{words}, not {str(target)!r}{own}")
