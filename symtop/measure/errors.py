@@ -316,7 +316,8 @@ def doubles(name: str, values: Any) -> charts.Array:
         # complex numbers and dates are none
         return given.astype(np.float64, casting="same_kind" if given.dtype.kind in "cmM" else "unsafe")
     except (TypeError, ValueError, OverflowError) as error:
-        raise SymtopError(f"{name} must be an array of real numbers, not {type(values).__name__}") from error
+        kind = getattr(values, "dtype", type(values).__name__)
+        raise SymtopError(f"{name} must be an array of real numbers, not {kind}") from error
 
 
 def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:

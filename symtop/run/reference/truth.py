@@ -167,10 +167,12 @@ def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, prec
     SymtopError for one that is lost before the last time, as in chaos.
     """
     motion, times = _motion(body, start), np.frombuffer(plain).copy()
-    shown = motion.samples(times) if body.free else motion.samples(times, precise=precise)  # type: ignore[call-arg]
-    if (lost := shown.lost(times)) is not None:
-        words = "its motion is not known to 1e-9 rad from there on"
-        raise SymtopError(f"times must be below {lost:.6g} on {name}, not {times.max():.6g}: {words}", "times")
+    sampled = motion.samples if body.free else functools.partial(motion.samples, precise=precise)  # type: ignore[call-arg]
+    if (lost := (shown := sampled(times)).lost(times)) is not None:
+        finer = np.linspace(0.0, lost, 201)
+        known = 0.999 * finer[np.isfinite(sampled(finer).bound)].max()  # what is printed is known, too
+        words = f"at most {known:.4g} on {name}, not {times.max():.6g}: its motion is not known to 1e-9 rad for longer"
+        raise SymtopError(f"times must be {words}", "times")
     return shown
 
 
