@@ -22,6 +22,7 @@ D J D^T - B has rank two when the map of a fixed t is symplectic: then the third
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1, VI.2, VII.2; Ridders, Adv. Eng. Softw. 4 (1982).
 """
 
+import contextlib
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
@@ -47,6 +48,7 @@ APART = 0.01  # rad from a pole: nearer, angles know a state to 2e-16 over their
 UPRIGHT = 1e-15  # rad: no more than rounding leaves of pi
 LEAST_UNIT = 1e-3  # of 2 pi I1 over the nutation period
 SHARE = 0.37  # of a nutation: what an adaptive method is run for
+SEVERAL = 8  # steps, more than a method of several steps is started with
 
 
 @dataclass(frozen=True)
@@ -282,9 +284,8 @@ def _differences(step: StepMap, z: Array, middle: Array, width: float) -> Array:
 
 def aligned(chart: str, y: Array, middle: Array) -> Array:
     """Y with the sign of q that is nearer to that of `middle`: q and -q are one attitude."""
-    if chart == "attitude" and float(y[:4] @ middle[:4]) < 0.0:
-        return np.concatenate([-y[:4], y[4:]])
-    return y
+    other = chart == "attitude" and float(y[:4] @ middle[:4]) < 0.0
+    return np.concatenate([-y[:4], y[4:]]) if other else y
 
 
 def _miss(chart: str, slopes: Array, y: Array) -> Array:
@@ -309,10 +310,8 @@ def return_miss(step: StepMap, start: Angles) -> float:
                 raise
     arrived = step.restart(step.image(step.point(start)))
     if step.method.fixed_step:
-        try:
+        with contextlib.suppress(SymtopError):
             return step.gap(step.shown(step.run(arrived, -step.h)), before)
-        except SymtopError:
-            pass
     back = step.restart(step.shown(step.run(reversed_rates(arrived), step.h)))
     return step.gap(step.at(reversed_rates(back)), before)
 
@@ -323,13 +322,13 @@ def reversed_rates(start: Angles) -> Angles:
 
 
 def restart_gap(step: StepMap, start: Angles) -> float:
-    """How much a run of two steps differs from two runs of one step: rounding, if a step is a map.
+    """How much a run of two steps, or of `SEVERAL` quarters, differs from them one by one: rounding, if it is a map.
 
     A step that does not keep |e| or |q| at one cannot be taken up again by a start: that is no evidence, and zero.
     """
     if (onward := step.own("onward")) is not None:
-        twice = step.shown(onward(step.top, start, (step.h, step.h)))
-        return step.gap(step.shown(step.run(start, step.h, 2)), twice)
+        singly = step.shown(onward(step.top, start, (0.25 * step.h,) * SEVERAL))
+        return step.gap(step.shown(step.run(start, 0.25 * step.h, SEVERAL)), singly)
     after = step.image(step.point(start))
     if not step.method.fixed_step or abs(step.length(after) - 1.0) > UNIT:
         return 0.0

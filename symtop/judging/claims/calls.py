@@ -12,6 +12,7 @@ import contextlib
 import math
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -42,8 +43,7 @@ ELSEWHERE = 0.3  # rad and units of the rates, from the start that is called
 
 def measure(subject: Subject) -> list[Finding]:
     """The finding on the calls; refuted if a step is not a function of its arguments."""
-    fixed = subject.method.fixed_step
-    return [_calls(subject) if fixed else inapplicable("calls", "it has no step of a given length")]
+    return [_calls(subject) if subject.method.fixed_step else inapplicable("calls", "it has no step of a given length")]
 
 
 def _refuted(kind: str, why: str, value: float = math.nan, resolution: float = SAME) -> Finding:
@@ -52,15 +52,15 @@ def _refuted(kind: str, why: str, value: float = math.nan, resolution: float = S
 
 def _calls(subject: Subject) -> Finding:
     stepper, scene = subject.stepper, subject.scene
-    h, start = SHARE * scene.time_scale(), generic_start(scene)
+    flat = {"phi": 0.0, "psi": 0.0}  # as a map of (theta, p_theta) shows them
+    h, start = SHARE * scene.time_scale(), replace(generic_start(scene), **(flat if subject.in_plane else {}))
 
     def once(at: Angles, step: float) -> Any:
         state, run = stepper.from_start(scene.top, at, step)
         return run(state, 1)[0]
 
     stepper.renew()  # the step has been timed
-    values = {name: getattr(start, name) * (1.0 - ELSEWHERE) for name in Angles.__slots__}
-    other = Angles(**values | {"phi": 0.0, "psi": 0.0})  # which a map of (theta, p_theta) shows as zero
+    other = Angles(**{name: getattr(start, name) * (1.0 - ELSEWHERE) for name in Angles.__slots__} | flat)
     first = once(start, h)
     if not np.isfinite(first).all():
         kind = f"returns {'NaN' if np.isnan(first).any() else 'infinity'}"

@@ -299,7 +299,7 @@ def change_of(
     with np.errstate(all="ignore"):  # a run may blow up
         ratio = np.abs(np.diff(values)) / max(a_step * steps / (time.size - 1), floor)
         calm = np.abs(values[1:-1]) < LITTLE
-        jump = np.flatnonzero((ratio[1:] > SUDDEN) & (ratio[:-1] < SUDDEN / 10.0) & calm)
+        jump = np.flatnonzero((ratio[1:] > SUDDEN) & (np.fmax.accumulate(ratio)[:-1] < SUDDEN / 10.0) & calm)
     words = "after t = {:.4g} it changes {:.0e} times as much as by its first steps"
     sudden = words.format(time[jump[0] + 1], ratio[jump[0] + 1]) if even and jump.size else ""
     return Constant(constant_of(time, values), a_step, floor, grain, sudden)

@@ -48,7 +48,7 @@ from symtop.measure.accuracy import error_table
 from symtop.measure.order import BESIDE, CLEARLY, LARGEST_ERROR, Fit, order_verdict
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
-from symtop.measure.step_map import APART, StepMap, aligned, generic_start, one_step, restart_gap, unit_of
+from symtop.measure.step_map import APART, SEVERAL, StepMap, aligned, generic_start, one_step, restart_gap, unit_of
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import Array
@@ -440,7 +440,7 @@ class Hastened:
 
 
 def series_by_clock(subject: Subject, uneven: float) -> tuple[Series, set[float]]:
-    """The series of a step by a clock that is so `uneven`, and the times at which it asks for f."""
+    """The series of a step by a clock that is so `uneven`, of several if the first is a start, and when f is asked."""
     scene, start, scale = subject.scene, generic_start(subject.scene), subject.scene.time_scale()
     begin, rate, unit = BEGIN * scale, 2.0 * math.pi * WAVES / scale, np.repeat([1.0, unit_of(scene)], 3)
     par, state = FORMULATIONS["axis"].prepare(scene.top, start)
@@ -449,7 +449,9 @@ def series_by_clock(subject: Subject, uneven: float) -> tuple[Series, set[float]
     def motion(h: float) -> Array:
         return true(h + uneven * (math.sin(rate * h + 1.0) - math.sin(1.0)) / rate)
 
+    count = SEVERAL ** (subject.stepper.own_loop and restart_gap(*map_of(subject, subject.charts[-1])) > ONE_MAP)
+
     def image(h: float) -> Any:
-        return subject.stepper.along(f, begin, np.array(state), h, np.array([1]))[0] / unit
+        return subject.stepper.along(f, begin, np.array(state), h / count, np.array([count]))[0] / unit
 
     return compared(image, motion, scale, "axis"), f.times

@@ -53,15 +53,13 @@ class Series(NamedTuple):
     @property
     def resolved(self) -> int:
         """The highest power up to which every term can be told from none."""
-        sharp = self.noise < SHARP
-        return int(np.argmin(sharp)) - 1 if not sharp.all() else sharp.size - 1
+        return int(np.argmin([*(self.noise < SHARP), False])) - 1
 
     @property
     def order(self) -> int:
         """The power up to which the terms are those of the motion, at most `resolved`."""
         wrong = self.defect > np.maximum(AGREES, SURE * self.noise)
-        first = int(np.argmax(wrong)) if wrong.any() else wrong.size
-        return min(first - 1, self.resolved)
+        return min(int(np.argmax([*wrong, True])) - 1, self.resolved)
 
     @property
     def is_exact(self) -> bool:

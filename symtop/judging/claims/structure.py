@@ -136,14 +136,15 @@ def _bracket(step: maps.StepMap, start: Angles, traces: dict[str, Any] | None = 
     if traces is not None:
         traces.update(defect_width=defect.widths, bracket_defect=defect.raw)
     floor = max(3.0 * defect.noise, 1e-12)
-    shrinks = f"from {defect.raw[0]:.0e} to {defect.raw[-1]:.0e} as the differencing width shrinks 16 times"
-    if defect.size <= SYMPLECTIC and defect.noise <= SYMPLECTIC:
+    shrinks = f"from {defect.raw[0]:.0e} to {defect.raw[-1]:.0e} at a 16th of the width; noise {defect.noise:.0e}"
+    foreign = step.own("onward") is not None  # of several steps, perhaps: then the first is not its own
+    if defect.size <= min(SYMPLECTIC, floor) and defect.noise <= SYMPLECTIC and not (foreign and gap > ONE_MAP):
         return True, defect.size, floor, f"defect of the bracket {defect.size:.0e} (it falls {shrinks})"
     if gap > ONE_MAP:
-        if step.chart != "axis" and defect.rest <= max(3.0 * defect.noise, SYMPLECTIC):
+        if not foreign and step.chart != "axis" and defect.rest <= max(3.0 * defect.noise, SYMPLECTIC):
             why = f"one number that a run takes from its start explains the defect ({defect.rest:.0e} is left)"
             return True, defect.rest, floor, why
-        return None, defect.size, floor, f"two steps differ from twice one step by {gap:.0e}: no one map"
+        return None, defect.size, floor, f"a run differs from its steps one by one by {gap:.0e}: no one map"
     stands = defect.raw[-1] > STANDS * defect.raw[0] and defect.raw[-1] > 100.0 * MET
     bad = stands or defect.size > max(10.0 * defect.noise, MET)
     return False if bad else None, defect.size, floor, f"defect of the bracket {defect.size:.1e} (it goes {shrinks})"
@@ -151,8 +152,8 @@ def _bracket(step: maps.StepMap, start: Angles, traces: dict[str, Any] | None = 
 
 def _returned(step: maps.StepMap, start: Angles) -> Answer:
     miss = maps.return_miss(step, start)
-    if miss > RETURNED and (gap := maps.restart_gap(step, start)) > ONE_MAP:
-        return None, miss, RETURNED, f"two steps differ from twice one step by {gap:.0e}: no one map"
+    if (miss > RETURNED or step.own("onward") is not None) and (gap := maps.restart_gap(step, start)) > ONE_MAP:
+        return None, miss, RETURNED, f"a run differs from its steps one by one by {gap:.0e}: no one map"
     why = f"a step forth and back misses the start by {miss:.1e}"
     return True if miss <= RETURNED else False if miss > MISSED else None, miss, RETURNED, why
 

@@ -229,12 +229,13 @@ def energy_clipped(f, t, y, h):
 class AdamsBashforth3(HeunSolver):
     """Of order 3 but for its start, two steps of Euler's."""
 
-    slopes = ()
+    slopes, start, late, off = (), staticmethod(euler), 0.0, 0.0
 
     def moved(self, t, y, h):
-        self.slopes = [self.fun(t, y), *self.slopes[:2]]
-        weights = (1,) if len(self.slopes) < 3 else (23 / 12, -16 / 12, 5 / 12)
-        return y + h * sum(w * k for w, k in zip(weights, self.slopes, strict=False))
+        self.slopes = [self.fun(t + self.late * h, y), *self.slopes[:2]]
+        if len(self.slopes) < 3:
+            return self.start(self.fun, t, y, h)
+        return y + h * (np.array([23 / 12 + self.off, -16 / 12, 5 / 12]) @ self.slopes)
 
 
 class OnlyForward(HeunSolver):
