@@ -68,7 +68,8 @@ def _calls(subject: Subject) -> Finding:
     if refuted := _repeated(stepper, lambda: relative_gap(first, once(start, h)), lambda step: once(other, step), h):
         return refuted
     step = one_step(subject.method, subject.method.charts()[0], scene, NOTHING * h)
-    own, gap = (step.gap(step.image(step.point(at)), step.at(at)) for at in (start, other))
+    after = step.shown(step.run(start, step.h)), step.image(step.point(other))  # the second is at no pole, or refused
+    own, gap = (step.gap(shown, step.at(at)) for shown, at in zip(after, (start, other), strict=True))
     if own > STANDS:
         why = f"a step of {step.h:.0e} moves by {own:.1e}: what it returns is no state, or no next one"
         return _refuted("jumps", why, own, STANDS)
