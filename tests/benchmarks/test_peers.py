@@ -114,10 +114,9 @@ def _scipy(row):
     return next(peer for peer in peers.load(("scipy", "odeint"))[0] if peer.row == row)
 
 
-@pytest.mark.parametrize(
-    "row",
-    ["scipy-dop853-python[axis]", "scipy-dop853-numba[angles]", "scipy-lsoda-numba[axis]", "scipy-odeint-numba[axis]"],
-)
+@pytest.mark.parametrize("row", [
+    "scipy-dop853-python[axis]", "scipy-dop853-numba[angles]", "scipy-lsoda-numba[axis]", "scipy-odeint-numba[axis]",
+])  # fmt: skip
 def test_both_calls_of_scipy_end_at_the_truth(scene, row):
     peer = _scipy(row)
     whole, loop = measure.ready(scene, peer, 1e-11)

@@ -235,10 +235,8 @@ def test_however_it_is_called_linear_algebra_has_one_thread(words, tmp_path):
     assert result.stdout.endswith("threads 1\n")
 
 
-@pytest.mark.parametrize(
-    ("command", "entries"),
-    [(["integrators"], methods), (["integrators", "--engines"], engines), (["scenes"], symtop.scenes)],
-)
+@pytest.mark.parametrize(("command", "entries"), [
+    (["integrators"], methods), (["integrators", "--engines"], engines), (["scenes"], symtop.scenes)])  # fmt: skip
 def test_a_list_fits_the_terminal_and_names_every_entry(command, entries):
     for columns in (80, 120):
         lines = call(*command, COLUMNS=str(columns)).output.splitlines()

@@ -179,10 +179,9 @@ def test_in_single_precision_a_step_is_the_same_but_for_rounding(name):
     assert (exact[:4] != exact[:4].astype(np.float32)).any()
 
 
-@pytest.mark.parametrize(
-    ("name", "best", "error"), [("jolt", 25_600, 5.4e-3), ("rapier", 6_400, 7.6e-3), ("physx", 204_800, 3.7e-4),
-                                ("bullet", 51_200, 2.0e-3)],
-)  # fmt: skip
+@pytest.mark.parametrize(("name", "best", "error"), [
+    ("jolt", 25_600, 5.4e-3), ("rapier", 6_400, 7.6e-3), ("physx", 204_800, 3.7e-4), ("bullet", 51_200, 2.0e-3),
+])  # fmt: skip
 def test_in_single_precision_there_is_a_best_step(name, best, error):
     """Error and step of the engines' own runs: the map meets the error within a factor of 2.5, and then gets worse."""
     counts = [best // 8, best, 32 * best if name != "bullet" else 64 * best]

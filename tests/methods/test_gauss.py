@@ -112,10 +112,9 @@ def test_a_step_next_to_a_vertical_top_is_the_stability_function(stages, phase, 
     assert abs(abs(pade(stages, 1.0 + 1j * phase)) - 1.0) > 1e-3  # off the imaginary axis it is not one
 
 
-@pytest.mark.parametrize(
-    ("stages", "scene", "observe"),
-    [*((stages, "spheroid", "axis") for stages in STAGES), (3, "goldstein", "axis"), (3, "goldstein", "attitude")],
-)
+@pytest.mark.parametrize(("stages", "scene", "observe"), [
+    *((stages, "spheroid", "axis") for stages in STAGES), (3, "goldstein", "axis"), (3, "goldstein", "attitude"),
+])  # fmt: skip
 def test_everything_is_kept(stages, scene, observe):
     assert_keeps_everything(integrator(f"gauss-{2 * stages}"), scene, observe, 30.3)
 

@@ -47,10 +47,8 @@ def test_the_card_is_one_page_with_every_verdict_and_the_energy_of_the_long_run(
     assert float(data["long_nutations"].max()) == pytest.approx(float(data["nutations_run"]), rel=0.05)
 
 
-@pytest.mark.parametrize(
-    ("chart", "unit", "scale"),
-    [("axis", "nutations", "nutation's energy"), ("body", "natural periods", "kinetic energy and |mgl|")],
-)
+@pytest.mark.parametrize(("chart", "unit", "scale"), [
+    ("axis", "nutations", "nutation's energy"), ("body", "natural periods", "kinetic energy and |mgl|")])  # fmt: skip
 def test_the_units_of_a_card_are_those_of_its_scene(chart, unit, scale, tmp_path):
     run = {"long_nutations": [1.0, 2.0], "energy_change": [1e-9, 2e-9], "steps_run": np.array(200)}
     energy = Finding("energy", "", Measured("drift", 2e-9), "measured", "it grows", 2e-9, 1e-11)

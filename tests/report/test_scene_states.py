@@ -69,10 +69,8 @@ def distances(data, true, name):
     return np.linalg.norm(axis, axis=-1), np.abs(theta)
 
 
-@pytest.mark.parametrize(
-    ("names", "precision", "shift"),
-    [([*symtop.scenes()], "", 1e-13), (["goldstein", "bruls-cardona-arnold"], "quad", 1e-24)],  # the last by a pole
-)
+@pytest.mark.parametrize(("names", "precision", "shift"), [  # the last by a pole
+    ([*symtop.scenes()], "", 1e-13), (["goldstein", "bruls-cardona-arnold"], "quad", 1e-24)])  # fmt: skip
 def test_the_reference_agrees_with_the_test_set_to_its_bounds(names, precision, shift):
     if precision:
         pytest.importorskip("heyoka")

@@ -47,10 +47,9 @@ def test_errors_of_many_runs_are_those_of_each(family):
         assert shown[MOMENTA][k] < 1e-2
 
 
-@pytest.mark.parametrize(
-    ("name", "level", "ends"),
-    [("strang", 0, {OK}), ("rk4", 1, {NOT_NORMALISED}), ("rk4", 7, {OK}), ("gauss-4", 1, {OK, NOT_CONVERGED})],
-)
+@pytest.mark.parametrize(("name", "level", "ends"), [
+    ("strang", 0, {OK}), ("rk4", 1, {NOT_NORMALISED}), ("rk4", 7, {OK}), ("gauss-4", 1, {OK, NOT_CONVERGED}),
+])  # fmt: skip
 def test_bodies_in_lanes_run_and_end_as_one_by_one(name, level, ends):
     variant, bodies = integrator(f"{name}[body]"), drawn("0.3")
     plans = [Plan.steps(float(period) / FIRST * 0.5**level, bodies.marks << level) for period in bodies.period]

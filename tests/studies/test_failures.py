@@ -84,10 +84,8 @@ def swings(name, phase, steps, nudge, centre=STEADY.start.theta):
     return float(np.ptp(theta[:width])), float(np.ptp(theta[-width:])), float(np.ptp(theta))
 
 
-@pytest.mark.parametrize(
-    ("name", "phase", "drifts"),
-    [("rkmk-se3-2", 0.03, 1e-4), ("commutator-free-4", 0.17, 1e-4), ("rkmk-se3-4", 0.8, 1e-2)],
-)
+@pytest.mark.parametrize(("name", "phase", "drifts"), [
+    ("rkmk-se3-2", 0.03, 1e-4), ("commutator-free-4", 0.17, 1e-4), ("rkmk-se3-4", 0.8, 1e-2)])  # fmt: skip
 def test_a_drift_of_the_inclination_is_no_growth(name, phase, drifts):
     """The trace of a method that drifts takes that for growth; its nutations, followed, do not grow."""
     method = integrator(name)

@@ -38,6 +38,7 @@ LATE = {False: (100_000, 3.0), True: (20_000, 0.5)}  # quick: steps before a lat
 # late runs, steps after each, and what may be missed where our loop remembers nothing
 LATER, AFTER, RECALLED = 4, 64, 1e-6
 BLOWN_UP = 1e6  # times the start
+GROWN = 10.0  # times what the motion makes of the last bit, as beside a separatrix, is nothing that was kept
 ELSEWHERE = 0.3  # rad and units of the rates, from the start that is called
 
 
@@ -131,8 +132,9 @@ def _cut(stepper: Stepper, scene: Scene, h: float, parts: Sequence[tuple[int, in
             stepper.renew()
         if not np.abs(middle).max() <= BLOWN_UP * np.abs(start).max():  # NaN too, which SciPy's classes refuse
             continue  # there the last bit alone moves a step further than any memory
-        gap = _gap(end, run(np.nextafter(middle, np.inf), m)[0]) / a_step
-        words = words if np.isfinite(gap) else "after a run that fails"
+        above, below = (run(np.nextafter(middle, side), m)[0] for side in (np.inf, -np.inf))
+        gap = max(_gap(end, above) - GROWN * _gap(above, below), 0.0) / a_step
+        words = words if np.isfinite(gap) or worst else "after a run that fails"
         if gap > worst:
             worst, words = gap, f"after {n} steps the next {m} are {gap:.1e} of a step from those asked again"
     return worst, words
@@ -147,4 +149,5 @@ def _late(subject: Subject) -> list[tuple[int, int]]:
 
 
 def _gap(first: Any, second: Any) -> float:
-    return float(np.max(np.abs(first - second)))
+    with np.errstate(invalid="ignore"):  # both infinite, of runs that blow up
+        return float(np.max(np.abs(first - second)))
