@@ -31,7 +31,7 @@ MOST_NAMED = 8  # integrators and scenes in a line of the status
 @click.option("--status", is_flag=True, help="Print the state of every case; compute nothing.")
 @click.option("--why", is_flag=True, help="With --status: what has changed, one line for all cases with that reason.")
 @click.option("--check", is_flag=True, help="Compute some stored cases again, in another folder, and compare.")
-@click.option("--only", metavar="METHOD,...", callback=separated, help="Cases of these methods, into the folder only.")
+@click.option("--only", metavar="METHOD,...", callback=separated, help="Cases of these methods, into RESULTS/only.")
 @click.option("--jobs", type=click.IntRange(1), help="Processes that compute cases; one a core by default.")
 @click.option("--scheduler", metavar="ADDRESS", help="Compute cases that are not timed on this dask cluster.")
 @click.option("--limit", type=float, metavar="SECONDS", help="Longest time of one case; an hour by default.")
