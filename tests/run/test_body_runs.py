@@ -198,7 +198,7 @@ OWN = ["--body", "1,2,3", "--rates", "0.01,1,0"]
 
 
 @pytest.mark.parametrize(("words", "sentence"), [
-    (["run", "body", "rk4", "--step-size", "0.1", "--mgl", "3"], "--mgl must come with --body I1,I2,I3"),
+    (["run", "body", "rk4", "--step-size", "0.1", "--mgl", "3"], "--mgl must come with --body I1,I2,I3\n"),
     (["run", "spheroid", "rk4", *OWN], "--body, --rates must come with --body I1,I2,I3 on the scene body, not sph"),
     (["scenes", "body", "--body", "1,2"], "--body must be 3 numbers with commas between, not '1,2'"),
     (["scenes", "body", "--body", "1,2,3"], "--body without a weight needs --rates"),
