@@ -37,7 +37,7 @@ MOST_KEYS, REST = 10, style.YELLOW  # methods that have a key, and the colour of
 PALE = 0.55  # of white in the colour of a predicted cell
 LEFT = (style.SKY, style.ORANGE, style.VERMILLION, style.BLUE, style.LEAF)
 TITLES = {
-    "axis": "axis: angle between\nat one time (rad)", "energy": "energy:\nrelative change",
+    "axis": "axis: angle from the\ntrue axis (rad)", "energy": "energy:\nrelative change",
     "shape": "shape: distance\nto the true orbit",
 }  # fmt: skip
 
