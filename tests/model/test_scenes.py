@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 
 import symtop
 from symtop.model import charts
-from symtop.model.scenes import Catalogue, closed_form, grazing, sleeping, steady
+from symtop.model.scenes import Catalogue, closed_form, energy_scales, grazing, sleeping, steady
+from symtop.model.top import flat
 from tests.conftest import random_scenes
 
 
@@ -25,6 +26,13 @@ def test_tags_say_what_the_motion_does(scene):
     low, high = closed_form(scene).theta_range
     assert ("steady" in scene.tags) == (high - low < 1e-6)
     assert ("near_pole" in scene.tags) == (low < 2e-3 or high > math.pi - 2e-3)
+
+
+def test_the_scale_of_the_energy_of_many_tops_is_that_of_each():
+    every = symtop.scenes().values()
+    numbers = np.array([flat(one.top, one.start) for one in every])
+    scales = energy_scales(numbers, np.array([closed_form(one).theta_range for one in every]))
+    np.testing.assert_allclose(scales, [one.energy_scale for one in every], rtol=1e-12)
 
 
 @pytest.mark.parametrize("tags", ["steady", ["staedy"], 5, [["steady"]]])
