@@ -197,6 +197,7 @@ def test_sleeping_top_stands_and_its_period_is_that_of_its_neighbours(w3, stable
     form, times = ClosedForm(top, Angles(0.0, 0.2, 0.1, 0.0, 0.7, w3 - 0.7)), np.array([0.0, 3.0, 1e4])
     motion = form(times)
     assert not motion.theta.any()
+    assert [*PreciseForm(top, Angles(0.0, psi_dot=w3)).roots] == sorted([1.0, 1.0, 0.5 * w3**2 - 1.0])
     np.testing.assert_allclose(motion.phi + motion.psi, 0.3 + w3 * times, rtol=2 * EPS)
     np.testing.assert_allclose(form.axis(times), [[0.0, 0.0, 1.0]] * 3, atol=0)
     nearby = ClosedForm(top, Angles(1e-6, 0.2, 0.1, 0.0, 0.5 * w3, 0.5 * w3))

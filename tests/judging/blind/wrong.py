@@ -368,8 +368,7 @@ _TABLE = {  # names: claims, the line that names the defect, options
     "rotation_frames rotation_no_gyroscope rotation_semi_implicit rotation_whole_angle rotation_half_once":
         ({"order": 2}, "order", ROTATION),
     "rotation_unnormalised": ({"order": 2, "conserves": ["axis_length"]}, "axis_length", ROTATION),
-    "WrongTableau": ({"order": 5}, "order", {}),
-    "WrongSum": ({}, "order", {"adaptive": True}),
+    "WrongTableau": ({"order": 5}, "order", {}), "WrongSum": ({}, "order", {"adaptive": True}),
     "WrongAdams sub_steps extrapolated": ({"order": 2}, "order", {}),
     "averaged_field": ({"order": 2, "symmetric": True, "symplectic": True}, "symplectic", {"chart": "attitude"}),
     "hurried": ({"order": 2, "symmetric": True, "conserves": KEPT}, "order", {}),
@@ -382,8 +381,7 @@ _TABLE = {  # names: claims, the line that names the defect, options
     "separable_no_half_square separable_damped": ({"order": 2, "symplectic": True}, "order", SEPARABLE),
     "separable_stale": ({"order": 2}, "calls", SEPARABLE),
     "separable_swapped": ({"order": 2, "symplectic": True, "symmetric": True}, "order", SEPARABLE),
-    "euler_in_a_spot": ({"order": 4}, "energy", {}),
-    "half_symmetric": ({"symmetric": True}, "symmetric", {}),
+    "euler_in_a_spot": ({"order": 4}, "energy", {}), "half_symmetric": ({"symmetric": True}, "symmetric", {}),
     "edits_the_judge": (ALL, "symplectic", {}),
 }  # fmt: skip
 CLAIMS = {name: entry for names, entry in _TABLE.items() for name in names.split()}
