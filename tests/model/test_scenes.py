@@ -28,6 +28,15 @@ def test_tags_say_what_the_motion_does(scene):
     assert ("near_pole" in scene.tags) == (low < 2e-3 or high > math.pi - 2e-3)
 
 
+def test_the_gyroscope_of_kinon_and_betsch_is_a_cone_of_aluminium():
+    height, radius, gravity = 0.1, 0.05, 9.81
+    mass = 2700.0 * math.pi * radius**2 * height / 3.0
+    across, along = 3.0 / 80.0 * mass * (4.0 * radius**2 + height**2), 0.3 * mass * radius**2
+    cone = symtop.SymmetricTop.from_inertia(mass, across, along, 0.75 * height, gravity)
+    top = symtop.scene("kinon-betsch").top
+    assert (top.I1, top.I3, top.mgl) == pytest.approx((cone.I1, cone.I3, cone.mgl), rel=2e-12, abs=0.0)
+
+
 def test_the_scale_of_the_energy_of_many_tops_is_that_of_each():
     every = symtop.scenes().values()
     numbers = np.array([flat(one.top, one.start) for one in every])
