@@ -35,10 +35,8 @@ ROUNDED = tuple(name.removesuffix("-float32") for name in registry.engines() if 
 
 def axis_error(row, steps, scene=GOLDSTEIN, horizon=10.0, against=None):
     """The largest angle (rad) between a run's axis and the true one, or that of another closed form."""
-    run = symtop.simulate(
-        scene, row, step_size=horizon / steps, horizon=horizon, samples=101, guard=False,
-        observe="axis" if row.endswith("[axis]") else "attitude",
-    )  # fmt: skip
+    run = symtop.simulate(scene, row, step_size=horizon / steps, horizon=horizon, samples=101, guard=False,
+                          observe="axis" if row.endswith("[axis]") else "attitude")  # fmt: skip
     if against is None:
         return float(symtop.errors(run)["axis"].max())
     return float(charts.axis_distance(run["axis"].values, against.axis(run["time"].values)).max())

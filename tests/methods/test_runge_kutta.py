@@ -39,8 +39,7 @@ def test_a_step_of_a_users_tableau_is_the_definition_and_has_its_order(a, b, ord
 @pytest.mark.parametrize(("a", "b", "c", "words"), [
     (KUTTA_A, (1 / 6, 1 / 3, 1 / 3, 1 / 3), None, "b must sum to 1"),
     (KUTTA_A, KUTTA_B, (0.0, 0.5, 0.5, 0.9), "c must be the row sums"),
-    (KUTTA_A[:3], KUTTA_B, None, "a must have one row for each"),
-    (((0.5,),), (1.0,), None, "row 1 of a"),
+    (KUTTA_A[:3], KUTTA_B, None, "a must have one row for each"), (((0.5,),), (1.0,), None, "row 1 of a"),
     (((), (0.5, 0.1, 0.0), (0.0, 0.5, 0.5)), (0.2, 0.3, 0.5), None, "row 2 of a"),
     (np.zeros((2, 3)), np.array([0.5, 0.5]), None, "row 1 of a must have 0 entries"),
     (np.array([[0.0, 1.0], [1.0, 0.0]]), (0.5, 0.5), None, "row 1 of a must have 0 entries"),

@@ -134,8 +134,7 @@ def test_each_cause_is_named():
 
 
 @pytest.mark.parametrize(("scene", "name", "control", "horizon"), [
-    ("spheroid", "midpoint", {"step_size": 0.05}, 40.0),
-    ("spheroid", "rk45-compiled", {"tolerance": 1e-4}, 100.0),
+    ("spheroid", "midpoint", {"step_size": 0.05}, 40.0), ("spheroid", "rk45-compiled", {"tolerance": 1e-4}, 100.0),
     ("cusp", "gauss-4", {"step_size": 0.3}, 300.0),
 ])  # fmt: skip
 def test_a_remedy_is_a_remedy(scene, name, control, horizon):

@@ -131,6 +131,16 @@ def test_each_cause_is_named(f, y0, horizon, name, control, cause):
     assert "\n" not in str(expected)
 
 
+def test_a_forecast_has_the_units_of_the_motion():
+    """Of a length 1024 times and a time 64 times as long, of which the numbers keep their bits."""
+    outlook = lambda length, time: symtop.guard(
+        lambda _, y: np.array([y[1], -y[0]]) / time, 0.0, [length, 0.0], 300.0 * time, "rk4", step_size=0.2 * time,
+        accuracy=1e-4 * length)  # fmt: skip
+    one, other = outlook(1.0, 1.0), outlook(1024.0, 64.0)
+    assert (other.cause, other.error) == (one.cause, pytest.approx(1024.0 * one.error, rel=1e-3))
+    assert other.setting == pytest.approx(64.0 * one.setting, rel=0.1)  # two digits
+
+
 def test_a_motion_may_begin_at_zero():
     """Its size is that of what drives it: z'' = c sin t - 2 z is c (sin t - sin(t sqrt 2)/sqrt 2)."""
     c, h, z = 1e-9, 0.1, np.zeros(2)

@@ -33,10 +33,8 @@ def test_a_map_says_what_single_runs_say(name):
         spun = with_spin(scene("cusp"), ratio)
         for column, value in enumerate(STEPS):
             horizon = math.ceil(12.0 / value) * value * spun.nutation_period
-            run = symtop.simulate(
-                spun, name, step_size=value * spun.nutation_period, horizon=horizon, samples=241, observe="axis",
-                guard=False,
-            )  # fmt: skip
+            run = symtop.simulate(spun, name, step_size=value * spun.nutation_period, horizon=horizon, samples=241,
+                                  observe="axis", guard=False)  # fmt: skip
             error = symtop.errors(run)["axis"].values
             mapped = VERDICTS[runs.verdict[place, column]]
             single = judgement(spun, run, error).verdict
