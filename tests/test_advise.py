@@ -20,10 +20,9 @@ from tests.commands import call
 
 def measured(scene, advice, quantity="axis"):
     """Error of the recommended run at other times than those it was judged by."""
-    run = symtop.simulate(
-        scene, advice.integrator, step_size=advice.step_size, tolerance=advice.tolerance, horizon=advice.horizon,
-        samples=1009, observe="attitude" if quantity == "attitude" else "axis", guard=False,
-    )  # fmt: skip
+    run = symtop.simulate(scene, advice.integrator, step_size=advice.step_size, tolerance=advice.tolerance,
+                          horizon=advice.horizon, samples=1009,
+                          observe="attitude" if quantity == "attitude" else "axis", guard=False)  # fmt: skip
     return float(symtop.errors(run)[quantity].max())
 
 

@@ -121,9 +121,8 @@ def test_a_step_is_the_engines_formula_in_body_axes_and_a_turn_about_the_axis_ch
         assert charts.attitude_distance(done[:4], np.roll(new.as_quat(), 1)) < 1e-13
         np.testing.assert_allclose(done[4:], L, rtol=0.0, atol=2e-14 * np.linalg.norm(L) + 1e-14)
         if "axis" in symtop.integrator(name).charts():
-            np.testing.assert_allclose(
-                one_step(name, scene, h, "axis"), [*new.as_matrix()[:, 2], *L], atol=2e-14 * (1.0 + np.linalg.norm(L))
-            )
+            np.testing.assert_allclose(one_step(name, scene, h, "axis"), [*new.as_matrix()[:, 2], *L],
+                                       atol=2e-14 * (1.0 + np.linalg.norm(L)))  # fmt: skip
     quaternion = np.array([0.8, 0.4, -0.3, 0.2]) / math.sqrt(0.93)
     at, h = Attitude(tuple(quaternion), (0.7, -1.1, 2.0)), 0.013
     for moments in ((0.5, 0.9, 1.3), (1.3, 0.5, 0.9)):

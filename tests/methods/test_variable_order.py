@@ -71,9 +71,8 @@ def test_it_needs_no_more_evaluations_than_scipys_adams_codes_and_errs_no_more(n
     run = symtop.simulate(scene, "adams[axis]", tolerance=tolerance, samples=33, guard=False)
     error = float(symtop.errors(run)["axis"].max())
     start = field.state(scene.start)
-    lsoda = integrate.solve_ivp(
-        field, (0.0, scene.horizon), start, method="LSODA", rtol=tolerance, atol=tolerance, t_eval=times
-    )
+    lsoda = integrate.solve_ivp(field, (0.0, scene.horizon), start, method="LSODA", rtol=tolerance, atol=tolerance,
+                                t_eval=times)  # fmt: skip
     count = [0]
 
     def counted(t, y):

@@ -187,9 +187,8 @@ def test_the_exact_separatrix_climbs_for_ever(rate):
     energy = 0.5 * top.I1 * motion.theta_dot**2 + top.mgl * np.cos(motion.theta)
     np.testing.assert_allclose(energy, top.energy(start), rtol=4 * EPS)
     assert np.sign(motion.theta_dot).tolist() == [-1.0, -1.0, math.copysign(1.0, rate), 1.0, 1.0, 1.0, 1.0]
-    np.testing.assert_allclose(
-        form.momentum(0.0), 4.0 * rate * np.array([math.cos(0.3), math.sin(0.3), 0.0]), rtol=4 * EPS
-    )
+    np.testing.assert_allclose(form.momentum(0.0), 4.0 * rate * np.array([math.cos(0.3), math.sin(0.3), 0.0]),
+                               rtol=4 * EPS)  # fmt: skip
 
 
 def test_a_scene_on_the_separatrix_is_simulated_and_has_a_reference(monkeypatch, tmp_path):

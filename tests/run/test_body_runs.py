@@ -181,9 +181,8 @@ def test_energy_and_momentum_are_those_of_its_states_and_a_trajectory_of_another
 
 
 def test_a_sweep_and_a_comparison_take_a_body(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    data = symtop.sweep(
-        "heavy-brick", ["rk4", "tsit5-fixed"], per_nutation=[32, 64], quiet=True, path=tmp_path / "s.nc"
-    )
+    data = symtop.sweep("heavy-brick", ["rk4", "tsit5-fixed"], per_nutation=[32, 64], quiet=True,
+                        path=tmp_path / "s.nc")  # fmt: skip
     error = data["attitude"].values[0]
     assert ((error[:, 1] < error[:, 0] / 10.0) & (error[:, 1] > 1e-12)).all()
     assert (data["chart"].values == "body").all()
