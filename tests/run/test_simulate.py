@@ -169,6 +169,7 @@ HUGE = symtop.Scene("huge", symtop.SymmetricTop(1.0, 1.0, 1e30), symtop.Angles(t
     ("spheroid", "rk4", {"step_size": 0.4, "horizon": 40.0}, "left_chart"),
     ("bruls-cardona-arnold", "rk45", {"tolerance": 0.5}, "left_chart"),
     ("spheroid", "gauss-2", {"step_size": 10.0, "horizon": 200.0, "observe": "axis"}, "not_converged"),
+    ("spheroid", "collective-gauss-4", {"step_size": 10.0, "horizon": 200.0, "observe": "axis"}, "not_converged"),
     ("spheroid", "simo-wong", {"step_size": 10.0, "horizon": 200.0, "observe": "axis"}, "not_converged"),
     ("sleeping", "trapezoidal", {"step_size": 2.0, "horizon": 4000.0}, "not_converged"),
     ("simo-wong", "rk4", {"step_size": 1.0, "observe": "axis"}, "not_finite"),
