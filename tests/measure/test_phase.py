@@ -87,5 +87,6 @@ def test_frequencies_of_the_exact_motion_are_wrong_by_no_more_than_their_bounds(
     parts = phase(scene, run, reference(scene, run.time, precision="closed-form"))
     assert parts.nutation_period <= parts.nutation_period_bound
     assert parts.precession_rate <= parts.precession_rate_bound
+    assert max(parts.nutation_period_bound, parts.precession_rate_bound) < 1e-9
     failed = phase(scene, run._replace(outcome="left_chart"), reference(scene, run.time, precision="closed-form"))
     assert all(math.isnan(value) for value in failed)

@@ -21,7 +21,7 @@ from symtop.model.charts import (
 )
 from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.exact.digits import PreciseForm
-from symtop.model.scenes import Scene
+from symtop.model.scenes import Scene, scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.reference.independent_checks import integrate
 from tests.model.theta_functions import theta_quaternion
@@ -162,6 +162,14 @@ def test_elementary_separatrix(body):
             assert abs(at.phi - true_phi) < mp.mpf(10) ** -58
             assert abs(at.psi - (mp.sqrt(3) * gt * (I1 / I3 - 1) + true_phi)) < mp.mpf(10) ** -58
             assert abs(at.phi - true_phi - mp.mpf(10) ** -50) > mp.mpf(10) ** -51
+
+
+def test_the_axis_stands_still_at_a_cusp():
+    """Where phi' vanishes as t^2 it is no difference of its two fractions, whose rounding is 1e-15."""
+    cusp = scene("cusp")
+    times = cusp.nutation_period * np.linspace(-1e-4, 1e-4, 9)
+    rates = [float(PreciseForm(cusp.top, cusp.start)(t)[4]) for t in times]
+    np.testing.assert_allclose(ClosedForm(cusp.top, cusp.start)(times).phi_dot, rates, rtol=0.0, atol=1e-18)
 
 
 def test_steady_precession_keeps_its_angles():
