@@ -349,11 +349,9 @@ def test_a_liar_is_caught_for_the_right_reason(liar, clean_registry):
     assert refuted <= {claim} | FOLLOWS.get(liar, set())
 
 
-HONEST = [
-    "midpoint", "stormer-verlet", "strang", "cayley", "rk4", "gauss-4", "takahashi-imada", "yoshida-4", "gauss-2",
-    "galerkin-simpson", "trapezoidal", "chin-4a", "srkn-6-4", "suzuki-4", "rk45-compiled", "gauss-6", "srkn-11-6",
-    "midpoint-unreduced", "cayley-tuned", "aba-8-6-4",
-]  # fmt: skip
+HONEST = ["midpoint", "stormer-verlet", "strang", "cayley", "rk4", "gauss-4", "takahashi-imada", "yoshida-4", "gauss-2",
+          "galerkin-simpson", "trapezoidal", "chin-4a", "srkn-6-4", "suzuki-4", "rk45-compiled", "gauss-6", "srkn-11-6",
+          "midpoint-unreduced", "cayley-tuned", "aba-8-6-4"]  # fmt: skip
 
 
 @pytest.mark.slow  # `test_honest_claims_are_confirmed` has three of them on the spheroid

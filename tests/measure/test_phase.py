@@ -19,11 +19,9 @@ def moved(name, periods=20.0, early=0.0, faster=0.0, turned=0.0, turning=0.0, li
     scene = symtop.scene(name)
     times = np.linspace(0.0, periods * scene.nutation_period, samples)
     motion = closed_form(scene)(times * (1.0 + faster) + early)
-    columns = {
-        "theta": motion.theta + lifted,
-        "phi": motion.phi + turned + turning * times,
-        "p_theta": scene.top.I1 * motion.theta_dot,
-    }
+    columns = {"theta": motion.theta + lifted,
+               "phi": motion.phi + turned + turning * times,
+               "p_theta": scene.top.I1 * motion.theta_dot}  # fmt: skip
     return scene, Trajectory(times, **columns), reference(scene, times, precision="closed-form")
 
 

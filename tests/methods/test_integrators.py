@@ -139,10 +139,8 @@ def independent_step(top, point, h, weights=SIMPSON):
     def slopes(unknown):
         q = np.stack([q0, unknown[:3], unknown[3:]])
         parts = [derivatives(top, q[i, 0], shape[i] @ q / h) for i in range(3)]
-        return [
-            h * weights[j] * parts[j][1] + sum(weights[i] * shape[i, j] * parts[i][0] for i in range(3))
-            for j in range(3)
-        ]
+        return [h * weights[j] * parts[j][1] + sum(weights[i] * shape[i, j] * parts[i][0] for i in range(3))
+                for j in range(3)]  # fmt: skip
 
     def equations(unknown):
         first, middle, _ = slopes(unknown)

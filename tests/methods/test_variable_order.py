@@ -93,10 +93,8 @@ def test_it_needs_no_more_evaluations_than_scipys_adams_codes_and_errs_no_more(n
     ("extrapolation", (1e-4, 1e-8, 1e-12)),
 ])  # fmt: skip
 def test_errors_follow_the_tolerance_and_orders_rise_with_it(name, tolerances, chart):
-    runs = [
-        symtop.simulate("spheroid", f"{name}[{chart}]", tolerance=tolerance, samples=161, guard=False)
-        for tolerance in tolerances
-    ]
+    runs = [symtop.simulate("spheroid", f"{name}[{chart}]", tolerance=tolerance, samples=161, guard=False)
+            for tolerance in tolerances]  # fmt: skip
     assert [run.attrs["outcome"] for run in runs] == ["ok"] * 3
     errors = [float(symtop.errors(run)["axis"].max()) for run in runs]
     assert all(50.0 * fine < coarse for coarse, fine in itertools.pairwise(errors))

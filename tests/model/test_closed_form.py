@@ -31,11 +31,9 @@ SEPARATRIX = SymmetricTop(1.0, 0.5, -1.0), Angles(0.0, theta_dot=2.0)
 
 def _double(monkeypatch):
     """Double arithmetic in place of double-double."""
-    short = {
-        "add": lambda a, b: (a[0] + b[0], 0.0), "sub": lambda a, b: (a[0] - b[0], 0.0),
-        "mul": lambda a, b: (a[0] * b[0], 0.0), "div": lambda a, b: (a[0] / b[0], 0.0),
-        "square": lambda a: (a[0] * a[0], 0.0), "root": lambda a: (math.sqrt(max(a[0], 0.0)), 0.0),
-    }  # fmt: skip
+    short = {"add": lambda a, b: (a[0] + b[0], 0.0), "sub": lambda a, b: (a[0] - b[0], 0.0),
+             "mul": lambda a, b: (a[0] * b[0], 0.0), "div": lambda a, b: (a[0] / b[0], 0.0),
+             "square": lambda a: (a[0] * a[0], 0.0), "root": lambda a: (math.sqrt(max(a[0], 0.0)), 0.0)}  # fmt: skip
     for module in (turning_points, elliptic, constants, double_double):
         for name, function in short.items():
             if hasattr(module, name):

@@ -265,12 +265,10 @@ def test_a_body_is_watched_as_simulate_shows_it(name):
     data = long_run(scene, name, steps=steps, step_size=h, quiet=True)
     dense = symtop.simulate(scene, name, step_size=h, horizon=steps * h, samples=steps + 1, guard=False)
     length = np.linalg.norm(dense.momentum, axis=1)
-    changes = {
-        "energy": (dense.energy - scene.top.energy(scene.start)) / scene.energy_scale,
-        "p_phi": (dense.p_phi - scene.top.momenta(scene.start).p_phi) / scene.momentum_scale,
-        "momentum": length / scene.momentum_scale - 1.0,
-        "theta": dense.theta,
-    }
+    changes = {"energy": (dense.energy - scene.top.energy(scene.start)) / scene.energy_scale,
+               "p_phi": (dense.p_phi - scene.top.momenta(scene.start).p_phi) / scene.momentum_scale,
+               "momentum": length / scene.momentum_scale - 1.0,
+               "theta": dense.theta}  # fmt: skip
     for quantity, values in changes.items():
         span = float(values.max() - values.min())
         assert float(data[f"{quantity}_least"].min()) == pytest.approx(float(values.min()), abs=0.05 * span + 1e-15)
