@@ -96,8 +96,9 @@ def test_p_phi_stays_where_it_is_linear_in_the_state_and_is_lost_in_angles(name)
         change[chart] = {p: float(np.ptp(run[p].values)) / scene.momentum_scale for p in ("p_phi", "p_psi")}
     assert change["axis"]["p_phi"] <= 2e-16
     assert change["attitude"]["p_phi"] <= 2e-16
-    assert change["angles"]["p_phi"] > 1e-8  # the negative control
-    assert min(change[chart]["p_psi"] for chart in change) > 1e-9  # L.e is not linear, and nothing is copied
+    assert 1e-8 < change["angles"]["p_phi"] < 1e-3  # the negative control
+    spins = [one["p_psi"] for one in change.values()]
+    assert 1e-9 < min(spins) <= max(spins) < 1e-3  # L.e is not linear, and nothing is copied
 
 
 @pytest.mark.parametrize("chart", list(FORMULATIONS))
