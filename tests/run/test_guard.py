@@ -322,6 +322,9 @@ def test_changes_tell_chaos_from_order_and_unstable_motions_are_warned_of_beyond
     grown = [Integrated(one).amplification(50.0, 50.0) for one in scenes]
     assert grown[0] > 1e4
     assert grown[1] < 1e3
+    brick, method = symtop.model.scenes.scene("heavy-brick", bodies=True), symtop.integrator("rkmk-se3-2")
+    plan, _ = make_plan(brick, method, brick.nutation_period / 4.0, horizon=60.0 * brick.nutation_period, samples=11)
+    assert guard.forecast(brick, method, "body", plan).axis_error > 100.0  # its own steps multiply a small change
 
 
 def fastest(scene, periods=40.0):
