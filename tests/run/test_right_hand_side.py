@@ -134,7 +134,7 @@ def test_each_cause_is_named(f, y0, horizon, name, control, cause):
 def test_a_forecast_has_the_units_of_the_motion():
     """Of a length 1024 times and a time 64 times as long, of which the numbers keep their bits."""
     outlook = lambda length, time: symtop.guard(
-        lambda _, y: np.array([y[1], -y[0]]) / time, 0.0, [length, 0.0], 300.0 * time, "rk4", step_size=0.2 * time,
+        lambda _, y: np.array([y[1], -y[0]]) / time, 0.0, [length, 0.0], 60.0 * time, "rk4", step_size=0.2 * time,
         accuracy=1e-4 * length)  # fmt: skip
     one, other = outlook(1.0, 1.0), outlook(1024.0, 64.0)
     assert (other.cause, other.error) == (one.cause, pytest.approx(1024.0 * one.error, rel=1e-3))
