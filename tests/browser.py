@@ -166,9 +166,8 @@ class Browser:
     def resize(self, width: int, height: int) -> None:
         """Give the page the window of a desk or, below 500 pixels, of a telephone."""
         self._size = width, height
-        self._send(
-            "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1, mobile=width < 500
-        )
+        self._send("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1,
+                   mobile=width < 500)  # fmt: skip
         self.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))")
 
     def open(self, address: str) -> None:

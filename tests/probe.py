@@ -33,9 +33,8 @@ def measure(case: Case) -> xr.Dataset:
             file.write(f"{case.label}\n")
     tqdm(total=1, disable=True)  # as a long run has one
     time.sleep(float(os.environ.get("PROBE_PAUSE", "0")))
-    run = simulate(
-        scene(case.scene), integrator(case.integrator), samples=51, observe="axis", guard=False, **case.settings
-    )
+    run = simulate(scene(case.scene), integrator(case.integrator), samples=51, observe="axis", guard=False,
+                   **case.settings)  # fmt: skip
     return xr.Dataset({"energy": ("sample", run["energy"].values), "outcome": run.attrs["outcome"]})
 
 

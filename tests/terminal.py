@@ -41,10 +41,8 @@ def recorded(words: list[str], limit: float = 300.0, code: str | None = None, **
     shape = {"COLUMNS": "80", "LINES": "24", "TERM": "xterm"}
     began = last = time.monotonic()
     start = ["-m", "symtop.cli"] if code is None else ["-c", code]
-    process = subprocess.Popen(
-        [sys.executable, *start, *words], stdin=theirs, stdout=theirs,
-        stderr=theirs, env={**os.environ, **shape, **environment},
-    )  # fmt: skip
+    process = subprocess.Popen([sys.executable, *start, *words], stdin=theirs, stdout=theirs, stderr=theirs,
+                               env={**os.environ, **shape, **environment})  # fmt: skip
     os.close(theirs)
     output, silence, drawings = b"", 0.0, []
     while time.monotonic() - began < limit:

@@ -20,10 +20,9 @@ from tests.commands import call
 
 def measured(scene, advice, quantity="axis"):
     """Error of the recommended run at other times than those it was judged by."""
-    run = symtop.simulate(
-        scene, advice.integrator, step_size=advice.step_size, tolerance=advice.tolerance, horizon=advice.horizon,
-        samples=1009, observe="attitude" if quantity == "attitude" else "axis", guard=False,
-    )  # fmt: skip
+    run = symtop.simulate(scene, advice.integrator, step_size=advice.step_size, tolerance=advice.tolerance,
+                          horizon=advice.horizon, samples=1009,
+                          observe="attitude" if quantity == "attitude" else "axis", guard=False)  # fmt: skip
     return float(symtop.errors(run)[quantity].max())
 
 
@@ -109,13 +108,15 @@ def test_what_nobody_reaches_is_said_and_an_accuracy_beyond_pi_is_of_what_is_no_
 
 
 @pytest.mark.parametrize("horizon", [20.0, 12.3456789])
-def test_the_advised_lines_are_the_run_that_was_checked(horizon, monkeypatch):
+def test_the_advised_lines_are_the_run_that_was_checked(horizon, monkeypatch, clean_registry):
     """The same step and horizon to the last digit in the command, in Python and in the run whose error is told."""
     few(monkeypatch, 1)
     calls, real = [], settings.attempt
     monkeypatch.setattr(settings, "attempt", lambda *arguments: calls.append(arguments) or real(*arguments))
+    symtop.register(symtop.Integrator("mine", "other", "plain", {"axis": print}, implementation="python"))
     advice = symtop.recommend("spheroid", accuracy=1e-3, horizon=horizon)
     assert advice.confidence == "checked"
+    assert "Not tried, as only compiled methods are timed: mine." in str(advice)
     assert float(f"{advice.step_size:.5g}") == advice.step_size
     _, words = advice.command.split(" strang ")
     arguments = dict(zip((parts := words.split())[::2], map(float, parts[1::2]), strict=True))

@@ -161,14 +161,11 @@ def _stored(times, spread=0.01):
     flat = samples.min(axis=-1)
     one, each = ("scene", "variant", "setting"), ("call", "scene", "variant", "setting")
     words = {
-        "package": [name.partition("[")[0] for name in names],
-        "version": ["1"] * len(names),
-        "chart": ["angles" if "[angles" in name else "axis" for name in names],
+        "package": [name.partition("[")[0] for name in names], "version": ["1"] * len(names),
+        "chart": ["angles" if "[angles" in name else "axis" for name in names], "shows": ["dense output"] * len(names),
         "language": ["Python" if "Python" in name else "numba, called from C" for name in names],
-        "implementation": ["compiled"] * len(names),
-        "formulation": ["as it is"] * len(names),
-        "shows": ["dense output"] * len(names),
-    }
+        "implementation": ["compiled"] * len(names), "formulation": ["as it is"] * len(names),
+    }  # fmt: skip
     data = xr.Dataset(
         {
             "axis": (one, np.where(np.isfinite(flat[0]), 1e-10, np.nan)),

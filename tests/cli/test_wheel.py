@@ -17,9 +17,8 @@ TRAP = "raise SystemExit('a study of the working directory was run')\n"
 
 def run(*command, **settings):
     """What a command prints."""
-    result = subprocess.run(
-        list(map(str, command)), capture_output=True, text=True, timeout=1200, check=False, **settings
-    )  # fmt: skip
+    result = subprocess.run(list(map(str, command)), capture_output=True, text=True, timeout=1200, check=False,
+                            **settings)  # fmt: skip
     assert result.returncode == 0, result.stdout + result.stderr
     return result.stdout
 

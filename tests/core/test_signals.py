@@ -81,8 +81,7 @@ def default_handlers():
 
 
 @pytest.mark.parametrize(("number", "hearing", "kind"), [
-    (signal.SIGTERM, ending_on_sigterm, TerminatedError),
-    (signal.SIGHUP, ending_on_sigterm, TerminatedError),
+    (signal.SIGTERM, ending_on_sigterm, TerminatedError), (signal.SIGHUP, ending_on_sigterm, TerminatedError),
     (signal.SIGINT, told_apart, InterruptedByUser),
 ])  # fmt: skip
 def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, hearing, kind, default_handlers):

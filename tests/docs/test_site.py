@@ -71,10 +71,8 @@ def site(tmp_path_factory):
     """The site, built as `make docs` builds it."""
     out = tmp_path_factory.mktemp("site")
     words = ["-W", "--keep-going", "-q", "-b", "html", "-d", out / "doctrees", ROOT / "docs", out / "html"]
-    done = subprocess.run(
-        [sys.executable, "-m", "sphinx", *map(str, words)], capture_output=True, text=True, timeout=500, check=False,
-        env={**os.environ, "PYTHONPATH": str(ROOT)},
-    )  # fmt: skip
+    done = subprocess.run([sys.executable, "-m", "sphinx", *map(str, words)], capture_output=True, text=True,
+                          timeout=500, check=False, env={**os.environ, "PYTHONPATH": str(ROOT)})  # fmt: skip
     assert done.returncode == 0, done.stderr
     return out / "html"
 

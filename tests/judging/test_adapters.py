@@ -46,6 +46,8 @@ def test_a_python_step_makes_the_steps_of_the_tableau_that_it_is(chart):
     ours, mine = symtop.simulate(SPHEROID, tableau.variant(chart), **plan), run_of(PythonStep(midpoint, chart))
     np.testing.assert_allclose(mine["axis"].values, ours["axis"].values, rtol=0, atol=1e-12)
     np.testing.assert_allclose(mine["p_psi"].values, ours["p_psi"].values, rtol=1e-12)
+    ended = run_of(PythonStep(lambda f, t, y, h: midpoint(f, t, y, h) * (1.0 if t < 0.45 else np.nan), chart))
+    assert [ended.attrs[key] for key in ("outcome", "reached_time", "steps")] == ["not_finite", 0.4, 100]
 
 
 def test_a_scipy_class_makes_the_steps_that_it_is_told_to():

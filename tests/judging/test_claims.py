@@ -19,10 +19,12 @@ from symtop.judging.adapters.python_step import PythonStep
 from symtop.judging.battery import CLAIMS, judge
 from symtop.judging.claims import constants, constants as long, order, structure
 from symtop.judging.claims.constants import long_run
+from symtop.judging.claims.step_series import Series
 from symtop.judging.claims.subject import Subject, seconds_a_step
 from symtop.judging.findings import VERDICTS, Finding, Ledger, Measured, description, pace
 from symtop.judging.remote import Process, separated, solvers_of
 from symtop.measure.conservation import Changed, behaviour
+from symtop.measure.order import Fit
 from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss, step_map, symplectic_defect
 from symtop.methods.framework.plan import Run
 from symtop.methods.framework.registry import Integrator, integrator
@@ -245,6 +247,24 @@ def test_honest_claims_are_confirmed(name):
     assert {ledger[claim].verdict for claim in ("order", "symplectic", "symmetric", "explicit")} == {"confirmed"}
 
 
+@pytest.mark.parametrize(("main", "other", "verdict"), [
+    (5.5, 4.0, "confirmed"), (5.5, 3.0, "refuted"), (3.0, 4.0, "refuted"), (4.0, 3.0, "refuted"),
+])  # fmt: skip
+def test_a_slope_that_is_too_large_yields_to_the_terms_of_a_step_and_a_lower_one_stands(main, other, verdict):
+    terms = Series(1.0, np.array([0.0] * 5 + [1e-3]), np.full(6, 1e-14), True, "axis")  # of order 4
+    fits = [Fit(slope, 0.01, 1.0, np.ones(1, dtype=bool)) for slope in (main, other)]
+    assert order._claimed(4, order.Order("", *[np.ones(1)] * 4, fits[0], {}), fits, terms, "").verdict == verdict
+
+
+@pytest.mark.parametrize(("orders", "lower"), [
+    ([4, 4, 4, 4], (math.inf, math.nan)), ([4, 4, 2, 2.5], (2.5, 0.25)), ([2, 8, 4, 4], (2.0, 1.0)),
+])  # fmt: skip
+def test_an_order_that_is_lower_at_the_finest_steps_or_jumps_below_one_that_is_lower_is_seen(orders, lower):
+    misses = 1e-4 * np.cumprod([1.0, *(0.5 ** (power + 1.0) for power in orders)])
+    found = order._lower(0.5 ** np.arange(5.0), misses, 4, 0.3, 1e-13)
+    np.testing.assert_allclose(found, lower, rtol=1e-12)
+
+
 def test_what_nobody_claimed_is_measured_and_a_claim_that_denies_what_the_method_has_is_refuted():
     none = dict.fromkeys(("order", "explicit", "symplectic", "symmetric", "conserves"))
     verlet = dataclasses.replace(symtop.integrator("stormer-verlet"), **none)
@@ -329,11 +349,9 @@ def test_a_liar_is_caught_for_the_right_reason(liar, clean_registry):
     assert refuted <= {claim} | FOLLOWS.get(liar, set())
 
 
-HONEST = [
-    "midpoint", "stormer-verlet", "strang", "cayley", "rk4", "gauss-4", "takahashi-imada", "yoshida-4", "gauss-2",
-    "galerkin-simpson", "trapezoidal", "chin-4a", "srkn-6-4", "suzuki-4", "rk45-compiled", "gauss-6", "srkn-11-6",
-    "midpoint-unreduced", "cayley-tuned", "aba-8-6-4",
-]  # fmt: skip
+HONEST = ["midpoint", "stormer-verlet", "strang", "cayley", "rk4", "gauss-4", "takahashi-imada", "yoshida-4", "gauss-2",
+          "galerkin-simpson", "trapezoidal", "chin-4a", "srkn-6-4", "suzuki-4", "rk45-compiled", "gauss-6", "srkn-11-6",
+          "midpoint-unreduced", "cayley-tuned", "aba-8-6-4"]  # fmt: skip
 
 
 @pytest.mark.slow  # `test_honest_claims_are_confirmed` has three of them on the spheroid

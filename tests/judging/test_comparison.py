@@ -31,10 +31,8 @@ def data():
 
 def least(data, target, variable="force_evaluations"):
     places = cheapest(data, target)
-    return {
-        str(name): float(data[variable].values[k, place]) if place >= 0 else math.inf
-        for k, (name, place) in enumerate(zip(data["variant"].values, places, strict=True))
-    }
+    return {str(name): float(data[variable].values[k, place]) if place >= 0 else math.inf
+            for k, (name, place) in enumerate(zip(data["variant"].values, places, strict=True))}  # fmt: skip
 
 
 def test_each_run_is_that_of_simulate_and_every_variable_has_words_and_units(data):

@@ -19,11 +19,9 @@ def moved(name, periods=20.0, early=0.0, faster=0.0, turned=0.0, turning=0.0, li
     scene = symtop.scene(name)
     times = np.linspace(0.0, periods * scene.nutation_period, samples)
     motion = closed_form(scene)(times * (1.0 + faster) + early)
-    columns = {
-        "theta": motion.theta + lifted,
-        "phi": motion.phi + turned + turning * times,
-        "p_theta": scene.top.I1 * motion.theta_dot,
-    }
+    columns = {"theta": motion.theta + lifted,
+               "phi": motion.phi + turned + turning * times,
+               "p_theta": scene.top.I1 * motion.theta_dot}  # fmt: skip
     return scene, Trajectory(times, **columns), reference(scene, times, precision="closed-form")
 
 
@@ -87,5 +85,6 @@ def test_frequencies_of_the_exact_motion_are_wrong_by_no_more_than_their_bounds(
     parts = phase(scene, run, reference(scene, run.time, precision="closed-form"))
     assert parts.nutation_period <= parts.nutation_period_bound
     assert parts.precession_rate <= parts.precession_rate_bound
+    assert max(parts.nutation_period_bound, parts.precession_rate_bound) < 1e-9
     failed = phase(scene, run._replace(outcome="left_chart"), reference(scene, run.time, precision="closed-form"))
     assert all(math.isnan(value) for value in failed)

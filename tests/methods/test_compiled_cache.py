@@ -236,9 +236,8 @@ def tops(count, seed=3):
     draw = random.Random(seed)
     for _ in range(count):
         I1 = 10.0 ** draw.uniform(-4, 4)
-        top = SymmetricTop(
-            I1, I1 * draw.uniform(1e-3, 2.0), draw.choice((0.0, 1.0, -1.0)) * 10.0 ** draw.uniform(-4, 4)
-        )
+        top = SymmetricTop(I1, I1 * draw.uniform(1e-3, 2.0),
+                           draw.choice((0.0, 1.0, -1.0)) * 10.0 ** draw.uniform(-4, 4))  # fmt: skip
         rates = [draw.gauss(0.0, 1.0) * 10.0 ** draw.uniform(-3, 3) for _ in range(3)]
         theta = draw.choice((draw.uniform(1e-6, 3.14), 10.0 ** draw.uniform(-9, 0)))
         yield top, Angles(theta, draw.uniform(-9, 9), draw.uniform(-9, 9), *rates)

@@ -35,10 +35,8 @@ ROUNDED = tuple(name.removesuffix("-float32") for name in registry.engines() if 
 
 def axis_error(row, steps, scene=GOLDSTEIN, horizon=10.0, against=None):
     """The largest angle (rad) between a run's axis and the true one, or that of another closed form."""
-    run = symtop.simulate(
-        scene, row, step_size=horizon / steps, horizon=horizon, samples=101, guard=False,
-        observe="axis" if row.endswith("[axis]") else "attitude",
-    )  # fmt: skip
+    run = symtop.simulate(scene, row, step_size=horizon / steps, horizon=horizon, samples=101, guard=False,
+                          observe="axis" if row.endswith("[axis]") else "attitude")  # fmt: skip
     if against is None:
         return float(symtop.errors(run)["axis"].max())
     return float(charts.axis_distance(run["axis"].values, against.axis(run["time"].values)).max())
@@ -123,9 +121,8 @@ def test_a_step_is_the_engines_formula_in_body_axes_and_a_turn_about_the_axis_ch
         assert charts.attitude_distance(done[:4], np.roll(new.as_quat(), 1)) < 1e-13
         np.testing.assert_allclose(done[4:], L, rtol=0.0, atol=2e-14 * np.linalg.norm(L) + 1e-14)
         if "axis" in symtop.integrator(name).charts():
-            np.testing.assert_allclose(
-                one_step(name, scene, h, "axis"), [*new.as_matrix()[:, 2], *L], atol=2e-14 * (1.0 + np.linalg.norm(L))
-            )
+            np.testing.assert_allclose(one_step(name, scene, h, "axis"), [*new.as_matrix()[:, 2], *L],
+                                       atol=2e-14 * (1.0 + np.linalg.norm(L)))  # fmt: skip
     quaternion = np.array([0.8, 0.4, -0.3, 0.2]) / math.sqrt(0.93)
     at, h = Attitude(tuple(quaternion), (0.7, -1.1, 2.0)), 0.013
     for moments in ((0.5, 0.9, 1.3), (1.3, 0.5, 0.9)):

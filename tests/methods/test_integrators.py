@@ -11,7 +11,7 @@ import symtop
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import order
 from symtop.measure.step_map import StepMap, angles_at, one_step, return_miss, symplectic_defect
-from symtop.methods.framework.angles import chart_outcome, on_angles
+from symtop.methods.framework.angles import chart_outcome, ended_angles, on_angles
 from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK
 from symtop.methods.framework.registry import Integrator
@@ -87,6 +87,8 @@ def test_the_chart_ends_at_its_poles(theta):
     assert chart_outcome(theta) == LEFT_CHART
     assert chart_outcome(1.0) == chart_outcome(5e-324) == chart_outcome(math.nextafter(math.pi, 0.0)) == OK
     assert chart_outcome(math.nan) == chart_outcome(math.inf) == chart_outcome(-math.inf) == NOT_FINITE
+    states = [(1.0, *row) for row in (*np.diag([math.inf] * 5).tolist(), [0.0] * 5)]
+    assert [*map(ended_angles, states)] == [NOT_FINITE] * 5 + [OK]
 
 
 @pytest.mark.parametrize("family", [discrete_lagrangian, galerkin], ids=lambda family: family.__name__)
@@ -137,10 +139,8 @@ def independent_step(top, point, h, weights=SIMPSON):
     def slopes(unknown):
         q = np.stack([q0, unknown[:3], unknown[3:]])
         parts = [derivatives(top, q[i, 0], shape[i] @ q / h) for i in range(3)]
-        return [
-            h * weights[j] * parts[j][1] + sum(weights[i] * shape[i, j] * parts[i][0] for i in range(3))
-            for j in range(3)
-        ]
+        return [h * weights[j] * parts[j][1] + sum(weights[i] * shape[i, j] * parts[i][0] for i in range(3))
+                for j in range(3)]  # fmt: skip
 
     def equations(unknown):
         first, middle, _ = slopes(unknown)

@@ -49,10 +49,8 @@ def members(count=1000, samples=4, seed=0):
     rate = 10.0 ** draw.uniform(-1, 1, count)  # of the motion
     turns = rate[:, None] * draw.normal(size=(count, 3))
     mgl = I1 * rate**2 * draw.choice([-1.0, 0.0, 1.0, 1.0, 1.0], count) * draw.uniform(0.1, 10.0, count)
-    numbers = np.column_stack(
-        [I1, I1 * draw.uniform(0.01, 2.0, count), mgl, np.arccos(draw.uniform(-1, 1, count)),
-         draw.uniform(-9.0, 9.0, (count, 2)), turns]
-    )  # fmt: skip
+    numbers = np.column_stack([I1, I1 * draw.uniform(0.01, 2.0, count), mgl, np.arccos(draw.uniform(-1, 1, count)),
+                               draw.uniform(-9.0, 9.0, (count, 2)), turns])  # fmt: skip
     h = 10.0 ** draw.uniform(-3.0, -1.2, count) / rate
     h[FAR] *= 300.0
     h[LOST] *= 1e200
@@ -282,11 +280,9 @@ CHARTS = ("axis", "attitude")
 
 def test_kernels_are_shared_by_charts_compositions_and_numbers():
     """Axis and attitude differ in what is shown, compositions in the table; other equations are other kernels."""
-    kernels = {
-        (name, chart): SOLVERS[f"{name}[{chart}]"]._whole.blocks().march
-        for name in (*EXPLICIT, *ITERATED)
-        for chart in CHARTS
-    }
+    kernels = {(name, chart): SOLVERS[f"{name}[{chart}]"]._whole.blocks().march
+               for name in (*EXPLICIT, *ITERATED)
+               for chart in CHARTS}  # fmt: skip
     assert all(kernels[name, "axis"] is kernels[name, "attitude"] for name in (*EXPLICIT, *ITERATED))
     assert kernels["lie-variational", "axis"] is kernels["lie-variational-suzuki-4", "axis"]
     assert len(set(map(id, kernels.values()))) == 8

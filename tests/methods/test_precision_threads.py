@@ -44,12 +44,10 @@ def disturbed(times):
 def test_coefficients_and_starts_are_those_computed_alone_while_others_change_the_precision():
     assert [len(str(context(number).sqrt(2))) for number in (20, 50, 20)] == [21, 51, 21]  # a point and the digits
     alone = coefficients(), numbers("spheroid"), numbers("goldstein")
-    rule, first, second, _ = together(
-        lambda: [coefficients() for _ in range(5)],
-        lambda: [numbers("spheroid") for _ in range(20)],
-        lambda: [numbers("goldstein") for _ in range(20)],
-        lambda: disturbed(20_000),
-    )
+    rule, first, second, _ = together(lambda: [coefficients() for _ in range(5)],
+                                      lambda: [numbers("spheroid") for _ in range(20)],
+                                      lambda: [numbers("goldstein") for _ in range(20)],
+                                      lambda: disturbed(20_000))  # fmt: skip
     assert all(np.array_equal(values, alone[0]) for values in rule)
     assert set(first) == {alone[1]}
     assert set(second) == {alone[2]}

@@ -149,9 +149,8 @@ def forces_for(scene, method, error):
     """The least force evaluations from which on finer steps keep the axis within that error, over one nutation."""
     form, forces = closed_form(scene), 0
     for h in scene.nutation_period * np.geomspace(0.05, 1e-7, 300):
-        done = symtop.simulate(
-            scene, method, step_size=h, horizon=scene.nutation_period, samples=101, observe="axis", guard=False
-        )
+        done = symtop.simulate(scene, method, step_size=h, horizon=scene.nutation_period, samples=101, observe="axis",
+                               guard=False)  # fmt: skip
         gap = charts.axis_distance(done["axis"].values, form.axis(done["time"].values)).max()
         if not gap < error:
             forces = 0

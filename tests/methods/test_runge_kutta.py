@@ -39,8 +39,7 @@ def test_a_step_of_a_users_tableau_is_the_definition_and_has_its_order(a, b, ord
 @pytest.mark.parametrize(("a", "b", "c", "words"), [
     (KUTTA_A, (1 / 6, 1 / 3, 1 / 3, 1 / 3), None, "b must sum to 1"),
     (KUTTA_A, KUTTA_B, (0.0, 0.5, 0.5, 0.9), "c must be the row sums"),
-    (KUTTA_A[:3], KUTTA_B, None, "a must have one row for each"),
-    (((0.5,),), (1.0,), None, "row 1 of a"),
+    (KUTTA_A[:3], KUTTA_B, None, "a must have one row for each"), (((0.5,),), (1.0,), None, "row 1 of a"),
     (((), (0.5, 0.1, 0.0), (0.0, 0.5, 0.5)), (0.2, 0.3, 0.5), None, "row 2 of a"),
     (np.zeros((2, 3)), np.array([0.5, 0.5]), None, "row 1 of a must have 0 entries"),
     (np.array([[0.0, 1.0], [1.0, 0.0]]), (0.5, 0.5), None, "row 1 of a must have 0 entries"),
@@ -81,7 +80,7 @@ def test_adaptive_methods_follow_their_tolerance_in_every_chart(name, chart):
     errors = []
     for tolerance in (1e-5, 1e-8):
         run = symtop.simulate(scene, f"{name}[{chart}]", tolerance=tolerance, horizon=3.0, samples=61, guard=False)
-        assert (run.attrs["outcome"], run.attrs["chart"]) == ("ok", chart)
+        assert [run.attrs[key] for key in ("outcome", "chart", "newton_iterations")] == ["ok", chart, 0]
         errors.append(float(symtop.errors(run)["axis"].max()))
     assert errors[1] < 3e-6
     assert errors[1] < errors[0] / 30.0
@@ -97,8 +96,9 @@ def test_p_phi_stays_where_it_is_linear_in_the_state_and_is_lost_in_angles(name)
         change[chart] = {p: float(np.ptp(run[p].values)) / scene.momentum_scale for p in ("p_phi", "p_psi")}
     assert change["axis"]["p_phi"] <= 2e-16
     assert change["attitude"]["p_phi"] <= 2e-16
-    assert change["angles"]["p_phi"] > 1e-8  # the negative control
-    assert min(change[chart]["p_psi"] for chart in change) > 1e-9  # L.e is not linear, and nothing is copied
+    assert 1e-8 < change["angles"]["p_phi"] < 1e-3  # the negative control
+    spins = [one["p_psi"] for one in change.values()]
+    assert 1e-9 < min(spins) <= max(spins) < 1e-3  # L.e is not linear, and nothing is copied
 
 
 @pytest.mark.parametrize("chart", list(FORMULATIONS))

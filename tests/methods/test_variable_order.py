@@ -71,9 +71,8 @@ def test_it_needs_no_more_evaluations_than_scipys_adams_codes_and_errs_no_more(n
     run = symtop.simulate(scene, "adams[axis]", tolerance=tolerance, samples=33, guard=False)
     error = float(symtop.errors(run)["axis"].max())
     start = field.state(scene.start)
-    lsoda = integrate.solve_ivp(
-        field, (0.0, scene.horizon), start, method="LSODA", rtol=tolerance, atol=tolerance, t_eval=times
-    )
+    lsoda = integrate.solve_ivp(field, (0.0, scene.horizon), start, method="LSODA", rtol=tolerance, atol=tolerance,
+                                t_eval=times)  # fmt: skip
     count = [0]
 
     def counted(t, y):
@@ -94,10 +93,8 @@ def test_it_needs_no_more_evaluations_than_scipys_adams_codes_and_errs_no_more(n
     ("extrapolation", (1e-4, 1e-8, 1e-12)),
 ])  # fmt: skip
 def test_errors_follow_the_tolerance_and_orders_rise_with_it(name, tolerances, chart):
-    runs = [
-        symtop.simulate("spheroid", f"{name}[{chart}]", tolerance=tolerance, samples=161, guard=False)
-        for tolerance in tolerances
-    ]
+    runs = [symtop.simulate("spheroid", f"{name}[{chart}]", tolerance=tolerance, samples=161, guard=False)
+            for tolerance in tolerances]  # fmt: skip
     assert [run.attrs["outcome"] for run in runs] == ["ok"] * 3
     errors = [float(symtop.errors(run)["axis"].max()) for run in runs]
     assert all(50.0 * fine < coarse for coarse, fine in itertools.pairwise(errors))

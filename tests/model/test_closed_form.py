@@ -31,11 +31,9 @@ SEPARATRIX = SymmetricTop(1.0, 0.5, -1.0), Angles(0.0, theta_dot=2.0)
 
 def _double(monkeypatch):
     """Double arithmetic in place of double-double."""
-    short = {
-        "add": lambda a, b: (a[0] + b[0], 0.0), "sub": lambda a, b: (a[0] - b[0], 0.0),
-        "mul": lambda a, b: (a[0] * b[0], 0.0), "div": lambda a, b: (a[0] / b[0], 0.0),
-        "square": lambda a: (a[0] * a[0], 0.0), "root": lambda a: (math.sqrt(max(a[0], 0.0)), 0.0),
-    }  # fmt: skip
+    short = {"add": lambda a, b: (a[0] + b[0], 0.0), "sub": lambda a, b: (a[0] - b[0], 0.0),
+             "mul": lambda a, b: (a[0] * b[0], 0.0), "div": lambda a, b: (a[0] / b[0], 0.0),
+             "square": lambda a: (a[0] * a[0], 0.0), "root": lambda a: (math.sqrt(max(a[0], 0.0)), 0.0)}  # fmt: skip
     for module in (turning_points, elliptic, constants, double_double):
         for name, function in short.items():
             if hasattr(module, name):
@@ -187,9 +185,8 @@ def test_the_exact_separatrix_climbs_for_ever(rate):
     energy = 0.5 * top.I1 * motion.theta_dot**2 + top.mgl * np.cos(motion.theta)
     np.testing.assert_allclose(energy, top.energy(start), rtol=4 * EPS)
     assert np.sign(motion.theta_dot).tolist() == [-1.0, -1.0, math.copysign(1.0, rate), 1.0, 1.0, 1.0, 1.0]
-    np.testing.assert_allclose(
-        form.momentum(0.0), 4.0 * rate * np.array([math.cos(0.3), math.sin(0.3), 0.0]), rtol=4 * EPS
-    )
+    np.testing.assert_allclose(form.momentum(0.0), 4.0 * rate * np.array([math.cos(0.3), math.sin(0.3), 0.0]),
+                               rtol=4 * EPS)  # fmt: skip
 
 
 def test_a_scene_on_the_separatrix_is_simulated_and_has_a_reference(monkeypatch, tmp_path):

@@ -21,7 +21,7 @@ from symtop.model.charts import (
 )
 from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.exact.digits import PreciseForm
-from symtop.model.scenes import Scene
+from symtop.model.scenes import Scene, scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.reference.independent_checks import integrate
 from tests.model.theta_functions import theta_quaternion
@@ -164,6 +164,14 @@ def test_elementary_separatrix(body):
             assert abs(at.phi - true_phi - mp.mpf(10) ** -50) > mp.mpf(10) ** -51
 
 
+def test_the_axis_stands_still_at_a_cusp():
+    """Where phi' vanishes as t^2 it is no difference of its two fractions, whose rounding is 1e-15."""
+    cusp = scene("cusp")
+    times = cusp.nutation_period * np.linspace(-1e-4, 1e-4, 9)
+    rates = [float(PreciseForm(cusp.top, cusp.start)(t)[4]) for t in times]
+    np.testing.assert_allclose(ClosedForm(cusp.top, cusp.start)(times).phi_dot, rates, rtol=0.0, atol=1e-18)
+
+
 def test_steady_precession_keeps_its_angles():
     top = SymmetricTop(1.0, 1.0, 8.0)  # I1 = I3 and mgl = I3 phi' psi': steady in exact arithmetic, at any inclination
     start = Angles(1.1, 0.3, 0.2, 0.0, 2.0, 4.0)
@@ -197,6 +205,7 @@ def test_sleeping_top_stands_and_its_period_is_that_of_its_neighbours(w3, stable
     form, times = ClosedForm(top, Angles(0.0, 0.2, 0.1, 0.0, 0.7, w3 - 0.7)), np.array([0.0, 3.0, 1e4])
     motion = form(times)
     assert not motion.theta.any()
+    assert [*PreciseForm(top, Angles(0.0, psi_dot=w3)).roots] == sorted([1.0, 1.0, 0.5 * w3**2 - 1.0])
     np.testing.assert_allclose(motion.phi + motion.psi, 0.3 + w3 * times, rtol=2 * EPS)
     np.testing.assert_allclose(form.axis(times), [[0.0, 0.0, 1.0]] * 3, atol=0)
     nearby = ClosedForm(top, Angles(1e-6, 0.2, 0.1, 0.0, 0.5 * w3, 0.5 * w3))

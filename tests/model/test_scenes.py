@@ -8,7 +8,8 @@ from scipy.spatial.transform import Rotation
 
 import symtop
 from symtop.model import charts
-from symtop.model.scenes import Catalogue, closed_form, grazing, sleeping, steady
+from symtop.model.scenes import Catalogue, closed_form, energy_scales, grazing, sleeping, steady
+from symtop.model.top import flat
 from tests.conftest import random_scenes
 
 
@@ -25,6 +26,22 @@ def test_tags_say_what_the_motion_does(scene):
     low, high = closed_form(scene).theta_range
     assert ("steady" in scene.tags) == (high - low < 1e-6)
     assert ("near_pole" in scene.tags) == (low < 2e-3 or high > math.pi - 2e-3)
+
+
+def test_the_gyroscope_of_kinon_and_betsch_is_a_cone_of_aluminium():
+    height, radius, gravity = 0.1, 0.05, 9.81
+    mass = 2700.0 * math.pi * radius**2 * height / 3.0
+    across, along = 3.0 / 80.0 * mass * (4.0 * radius**2 + height**2), 0.3 * mass * radius**2
+    cone = symtop.SymmetricTop.from_inertia(mass, across, along, 0.75 * height, gravity)
+    top = symtop.scene("kinon-betsch").top
+    assert (top.I1, top.I3, top.mgl) == pytest.approx((cone.I1, cone.I3, cone.mgl), rel=2e-12, abs=0.0)
+
+
+def test_the_scale_of_the_energy_of_many_tops_is_that_of_each():
+    every = symtop.scenes().values()
+    numbers = np.array([flat(one.top, one.start) for one in every])
+    scales = energy_scales(numbers, np.array([closed_form(one).theta_range for one in every]))
+    np.testing.assert_allclose(scales, [one.energy_scale for one in every], rtol=1e-12)
 
 
 @pytest.mark.parametrize("tags", ["steady", ["staedy"], 5, [["steady"]]])

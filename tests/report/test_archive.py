@@ -25,14 +25,10 @@ def draw(data):
 
 
 STUDY = Study(
-    name="small",
-    title="Small",
-    question="Is it bundled?",
-    cases=lambda _: [Case("spheroid", "strang", {})],
+    name="small", title="Small", question="Is it bundled?", cases=lambda _: [Case("spheroid", "strang", {})],
     measure=lambda case: xr.Dataset({"x": ("step_size", [1.0, 2.0], {"long_name": "a number", "units": "rad"})},
                                     {"step_size": [0.1, 0.2]}),
-    pictures=draw,
-    facts=lambda data: {"answer": "yes"},
+    pictures=draw, facts=lambda data: {"answer": "yes"},
     tables=lambda data: {"one": pd.DataFrame({"a": [1], "b": [2.5]})},
 )  # fmt: skip
 

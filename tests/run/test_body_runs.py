@@ -25,19 +25,15 @@ from tests.run.test_ensemble import assert_alone
 
 BODIES = ("check-case-2", "heavy-brick")
 # every method that steps a body and claims an order, and the longest steps of its runs, by the order
-FIXED = {
-    name: entry.order for name, entry in (symtop.integrators() | engines()).items()
-    if BODY in entry.solvers and entry.fixed_step and entry.order is not None
-}  # fmt: skip
+FIXED = {name: entry.order for name, entry in (symtop.integrators() | engines()).items()
+         if BODY in entry.solvers and entry.fixed_step and entry.order is not None}  # fmt: skip
 FEWEST = {1: 400, 2: 40, 3: 30, 4: 20, 5: 20, 6: 10, 8: 6, 9: 5, 10: 4, 12: 3, 16: 4}  # steps a natural period
 FINER, ROUNDING = 2.0 ** (np.arange(9) / 4.0), 5e-14  # times as many; rad, what ten roundings make of an attitude
 # what a method keeps of a free body, and of a heavy one
-CONSERVED = {
-    "rk4": ((), ()), "strang": (("momentum",), ("p_phi",)), "chin-4a": (("momentum",), ("p_phi",)),
-    "gauss-4": (("energy",), ("energy",)), "five-rotations": (("momentum",), ("p_phi",)),
-    "lie-variational": (("momentum", "energy"), ("p_phi",)), "euler-poincare": (("momentum",), ("p_phi",)),
-    "commutator-free-4": (("momentum",), ("p_phi",)), "rkmk-se3-4": (("momentum",), ("p_phi",)),
-}  # fmt: skip
+CONSERVED = {"rk4": ((), ()), "strang": (("momentum",), ("p_phi",)), "chin-4a": (("momentum",), ("p_phi",)),
+             "gauss-4": (("energy",), ("energy",)), "five-rotations": (("momentum",), ("p_phi",)),
+             "lie-variational": (("momentum", "energy"), ("p_phi",)), "euler-poincare": (("momentum",), ("p_phi",)),
+             "commutator-free-4": (("momentum",), ("p_phi",)), "rkmk-se3-4": (("momentum",), ("p_phi",))}  # fmt: skip
 # the steps of the symmetric top, and another method there, of the same order
 TO_ROUNDING = ("strang", "kahan-li-8", "chin-4a", "srkn-11-6", "lie-variational", "euler-poincare", "five-rotations",
                "no-squish")  # fmt: skip
@@ -181,9 +177,8 @@ def test_energy_and_momentum_are_those_of_its_states_and_a_trajectory_of_another
 
 
 def test_a_sweep_and_a_comparison_take_a_body(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    data = symtop.sweep(
-        "heavy-brick", ["rk4", "tsit5-fixed"], per_nutation=[32, 64], quiet=True, path=tmp_path / "s.nc"
-    )
+    data = symtop.sweep("heavy-brick", ["rk4", "tsit5-fixed"], per_nutation=[32, 64], quiet=True,
+                        path=tmp_path / "s.nc")  # fmt: skip
     error = data["attitude"].values[0]
     assert ((error[:, 1] < error[:, 0] / 10.0) & (error[:, 1] > 1e-12)).all()
     assert (data["chart"].values == "body").all()

@@ -203,9 +203,8 @@ def test_a_schedule_has_the_rows_of_sample_times(steps, samples):
     counts = None if steps is None else np.full(60, steps) + np.arange(60) % 3
     rows = schedule(period, horizon, samples, counts)
     for i, (top, start) in enumerate(members_of(numbers)):
-        times, marks, dithered = sample_times(
-            float(horizon[i]), samples, top.nutation_period(start), None if counts is None else int(counts[i])
-        )
+        times, marks, dithered = sample_times(float(horizon[i]), samples, top.nutation_period(start),
+                                              None if counts is None else int(counts[i]))  # fmt: skip
         assert rows.dithered[i] == dithered
         np.testing.assert_array_equal(rows.times[i, : rows.counts[i]], times)
         assert np.isnan(rows.times[i, rows.counts[i] :]).all()

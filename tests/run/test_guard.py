@@ -13,6 +13,7 @@ import pytest
 
 import symtop
 from symtop.methods.framework.registry import methods
+from symtop.methods.runge_kutta.explicit import runge_kutta
 from symtop.model import charts
 from symtop.model.charts import axes
 from symtop.model.scenes import closed_form, grazing, steady
@@ -133,8 +134,7 @@ def test_each_cause_is_named():
 
 
 @pytest.mark.parametrize(("scene", "name", "control", "horizon"), [
-    ("spheroid", "midpoint", {"step_size": 0.05}, 40.0),
-    ("spheroid", "rk45-compiled", {"tolerance": 1e-4}, 100.0),
+    ("spheroid", "midpoint", {"step_size": 0.05}, 40.0), ("spheroid", "rk45-compiled", {"tolerance": 1e-4}, 100.0),
     ("cusp", "gauss-4", {"step_size": 0.3}, 300.0),
 ])  # fmt: skip
 def test_a_remedy_is_a_remedy(scene, name, control, horizon):
@@ -322,6 +322,9 @@ def test_changes_tell_chaos_from_order_and_unstable_motions_are_warned_of_beyond
     grown = [Integrated(one).amplification(50.0, 50.0) for one in scenes]
     assert grown[0] > 1e4
     assert grown[1] < 1e3
+    brick, method = symtop.model.scenes.scene("heavy-brick", bodies=True), symtop.integrator("rkmk-se3-2")
+    plan, _ = make_plan(brick, method, brick.nutation_period / 4.0, horizon=60.0 * brick.nutation_period, samples=11)
+    assert guard.forecast(brick, method, "body", plan).axis_error > 100.0  # its own steps multiply a small change
 
 
 def fastest(scene, periods=40.0):
@@ -382,9 +385,18 @@ def test_beside_a_pole_no_growth_is_seen_where_there_is_none_and_a_length_that_d
     assert caution(scene, "rk4[attitude]", step_size=1.3e-3) == ""
 
 
+@pytest.mark.parametrize("x", [0.02, 0.6])
+def test_a_step_of_eulers_method_multiplies_small_nutations_by_its_stability_function(x):
+    scene = symtop.scene("spheroid")
+    frequency = scene.top.nutation_frequency(scene.top.momenta(scene.start))
+    growth = nutation_growth(runge_kutta("euler", ((),), (1.0,)), scene, x / frequency, "angles", frequency)
+    assert abs(growth.factor - math.hypot(1.0, x)) < growth.doubt < 1e-7
+
+
 def test_no_body_turns_much_faster_than_the_watch_takes_it_to():
     """By what the start says alone, the natural period and its own rate, some turn a fifth faster or more."""
     drawn = [one for one in scenes_of(body_population(48, seed=29)) if math.isfinite(one.nutation_period)]
+    np.testing.assert_allclose([one.horizon / one.nutation_period for one in drawn], 10.0, rtol=1e-12)
     rates = np.array([fastest(one) for one in drawn])
     bounds = np.array([Integrated(one).fast for one in drawn])
     starts = [math.hypot(2.0 * math.pi / one.nutation_period, *one.start.omega_body) for one in drawn]

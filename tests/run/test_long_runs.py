@@ -46,8 +46,7 @@ def test_the_energy_is_that_of_simulate_whether_or_not_the_momenta_are_kept(name
 
 
 @pytest.mark.parametrize(("files", "words"), [
-    ({"output": "keep.py"}, "no netCDF file"),
-    ({"output": ""}, "output must be a file, not the folder"),
+    ({"output": "keep.py"}, "no netCDF file"), ({"output": ""}, "output must be a file, not the folder"),
     ({"checkpoint": ""}, "checkpoint must be a file, not the folder"),
     ({"output": "a.nc", "checkpoint": "a.nc"}, "output and checkpoint must be two files"),
     ({"output": "a.nc", "checkpoint": "b/../a.nc"}, "output and checkpoint must be two files"),
@@ -266,12 +265,10 @@ def test_a_body_is_watched_as_simulate_shows_it(name):
     data = long_run(scene, name, steps=steps, step_size=h, quiet=True)
     dense = symtop.simulate(scene, name, step_size=h, horizon=steps * h, samples=steps + 1, guard=False)
     length = np.linalg.norm(dense.momentum, axis=1)
-    changes = {
-        "energy": (dense.energy - scene.top.energy(scene.start)) / scene.energy_scale,
-        "p_phi": (dense.p_phi - scene.top.momenta(scene.start).p_phi) / scene.momentum_scale,
-        "momentum": length / scene.momentum_scale - 1.0,
-        "theta": dense.theta,
-    }
+    changes = {"energy": (dense.energy - scene.top.energy(scene.start)) / scene.energy_scale,
+               "p_phi": (dense.p_phi - scene.top.momenta(scene.start).p_phi) / scene.momentum_scale,
+               "momentum": length / scene.momentum_scale - 1.0,
+               "theta": dense.theta}  # fmt: skip
     for quantity, values in changes.items():
         span = float(values.max() - values.min())
         assert float(data[f"{quantity}_least"].min()) == pytest.approx(float(values.min()), abs=0.05 * span + 1e-15)

@@ -216,9 +216,8 @@ print(repr(float(data["theta"][-1])))
 
 def call(cache, *arguments):
     environment = {**os.environ, "SYMTOP_CACHE": str(cache)}
-    return subprocess.Popen(
-        [sys.executable, "-W", "error", "-c", CALL, *arguments], env=environment, stdout=subprocess.PIPE, text=True
-    )
+    return subprocess.Popen([sys.executable, "-W", "error", "-c", CALL, *arguments], env=environment,
+                            stdout=subprocess.PIPE, text=True)  # fmt: skip
 
 
 @pytest.mark.slow

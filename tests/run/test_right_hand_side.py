@@ -110,6 +110,7 @@ def test_chaos_is_told_from_order_and_what_was_not_watched_says_so():
     y0, horizon = of_energy(1.0 / 6.0, -0.1), 120.0
     chaotic = symtop.guard(henon_heiles, 0.0, y0, horizon, "rk45", tolerance=1e-6)
     assert chaotic.cause == "instability"
+    assert chaotic.setting < 1e-6  # rounding, which grows 1e8 times, stays small
     assert "the motion multiplies a small change" in str(chaotic)
     regular = symtop.guard(henon_heiles, 0.0, of_energy(1.0 / 12.0, 0.1), horizon, "rk45", tolerance=1e-6)
     assert regular.cause != "instability"
@@ -128,6 +129,16 @@ def test_each_cause_is_named(f, y0, horizon, name, control, cause):
     assert expected.cause == cause, str(expected)
     assert str(expected).startswith(f"{name}: expect an error of ")
     assert "\n" not in str(expected)
+
+
+def test_a_forecast_has_the_units_of_the_motion():
+    """Of a length 1024 times and a time 64 times as long, of which the numbers keep their bits."""
+    outlook = lambda length, time: symtop.guard(
+        lambda _, y: np.array([y[1], -y[0]]) / time, 0.0, [length, 0.0], 60.0 * time, "rk4", step_size=0.2 * time,
+        accuracy=1e-4 * length)  # fmt: skip
+    one, other = outlook(1.0, 1.0), outlook(1024.0, 64.0)
+    assert (other.cause, other.error) == (one.cause, pytest.approx(1024.0 * one.error, rel=1e-3))
+    assert other.setting == pytest.approx(64.0 * one.setting, rel=0.1)  # two digits
 
 
 def test_a_motion_may_begin_at_zero():

@@ -30,13 +30,11 @@ def test_a_run_costs_what_it_computes(name):
     plan, _ = make_plan(chosen, row, h, horizon=horizon, samples=501)
     form, warned = closed_form(chosen), list[str]()
     settings = {"step_size": h, "horizon": horizon}
-    calls = [
-        steps,
-        lambda: symtop.simulate(chosen, row, **settings, guard=False),
-        lambda: symtop.simulate(chosen, row, **settings, guard=warned.append),
-        lambda: form.axis(plan.times[:300]),
-        lambda: forecast(chosen, row, "angles", plan._replace(step_size=0.5 * h)),
-    ]
+    calls = [steps,
+             lambda: symtop.simulate(chosen, row, **settings, guard=False),
+             lambda: symtop.simulate(chosen, row, **settings, guard=warned.append),
+             lambda: form.axis(plan.times[:300]),
+             lambda: forecast(chosen, row, "angles", plan._replace(step_size=0.5 * h))]  # fmt: skip
     kernel, bare, whole, truth, finer = (timing.best for timing in timings(calls, batches=80, batch=2e-3))
     assert bool(warned) == (name == "spheroid")
     assert bare / kernel < 12.0

@@ -228,10 +228,8 @@ def test_a_million_members_take_little_memory_and_survive_a_kill(tmp_path):
     assert path.read_bytes() == calm.read_bytes()
     with xr.open_dataset(path) as data:
         assert (data.outcome == "ok").mean() > 0.999
-        last = symtop.ensemble(
-            symtop.population(1_000_000, seed=2).isel(member=slice(-5, None)), "strang[axis]", per_nutation=50,
-            nutations=2, samples=3, quiet=True,
-        )  # fmt: skip
+        last = symtop.ensemble(symtop.population(1_000_000, seed=2).isel(member=slice(-5, None)), "strang[axis]",
+                               per_nutation=50, nutations=2, samples=3, quiet=True)  # fmt: skip
         np.testing.assert_array_equal(data.axis[-5:], last.axis)
 
 

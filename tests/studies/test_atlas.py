@@ -33,10 +33,8 @@ def test_a_map_says_what_single_runs_say(name):
         spun = with_spin(scene("cusp"), ratio)
         for column, value in enumerate(STEPS):
             horizon = math.ceil(12.0 / value) * value * spun.nutation_period
-            run = symtop.simulate(
-                spun, name, step_size=value * spun.nutation_period, horizon=horizon, samples=241, observe="axis",
-                guard=False,
-            )  # fmt: skip
+            run = symtop.simulate(spun, name, step_size=value * spun.nutation_period, horizon=horizon, samples=241,
+                                  observe="axis", guard=False)  # fmt: skip
             error = symtop.errors(run)["axis"].values
             mapped = VERDICTS[runs.verdict[place, column]]
             single = judgement(spun, run, error).verdict
@@ -254,12 +252,10 @@ def test_a_pole_that_halves_the_reach_is_told_and_variants_that_reach_equally_fa
 
 
 def test_runs_that_outlast_the_law_are_not_counted_nor_floors_of_ratios_and_windows_count_without_a_limit():
-    columns = {
-        "early_error": (("variant", "setting"), [[1e-6, 1e-8], [1e-6, 1e-8]]),
-        "predicted_horizon": (("variant", "setting"), [[29.0, 38.2], [29.0, 38.2]]),
-        "horizon": (("variant", "setting"), [[29.5, 38.4], [72.0, 71.0]]),
-        "broken": (("variant", "setting"), [[0.0, 0.0], [0.0, 0.0]]),
-    }
+    columns = {"early_error": (("variant", "setting"), [[1e-6, 1e-8], [1e-6, 1e-8]]),
+               "predicted_horizon": (("variant", "setting"), [[29.0, 38.2], [29.0, 38.2]]),
+               "horizon": (("variant", "setting"), [[29.5, 38.4], [72.0, 71.0]]),
+               "broken": (("variant", "setting"), [[0.0, 0.0], [0.0, 0.0]])}  # fmt: skip
     part = xr.Dataset(columns, coords={"variant": ["rk4[axis]", "gauss-4[axis]"]})
     assert mechanisms.outlasting(part) == ["gauss-4[axis]"]
     assert facts.separatrix_facts(part)["outlasting"] == "`gauss-4[axis]`"

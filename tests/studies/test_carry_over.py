@@ -231,11 +231,9 @@ def planted(factor):
         {"variant": variants, "priced_at": 10.0 ** -np.arange(2.0, 16.0, 2.0),
          "scene": ["first-0", "first-1", "first-2"]},
     )  # fmt: skip
-    about = xr.Dataset(
-        {"growth": (("scene", "family", "member"), np.full((1, len(families), members), 10.0)),
-         "stratum": (("scene", "family", "member"), np.full((1, len(families), members), "heavy"))},
-        {"scene": ["short"], "family": families},
-    ).expand_dims("variant")  # fmt: skip
+    about = xr.Dataset({"growth": (("scene", "family", "member"), np.full((1, len(families), members), 10.0)),
+                        "stratum": (("scene", "family", "member"), np.full((1, len(families), members), "heavy"))},
+                       {"scene": ["short"], "family": families}).expand_dims("variant")  # fmt: skip
     return xr.DataTree.from_dict({"/short": short, "/prices": prices, "/bodies": about})
 
 

@@ -82,10 +82,8 @@ def histories():
     both |= {"phase_exponent": np.array(PHASE), "phase_exponent_interval": np.full((5, 2), 0.01)}
     both |= {"nutations": np.full((5, 2), 100.0), "steps_a_nutation": np.full((5, 2), 118.0)}
     both |= {"tolerance": np.full((5, 2), np.nan), "own_tolerance": np.zeros((5, 2))}
-    data = xr.Dataset(
-        {key: (("variant", "scene"), values) for key, values in both.items()},
-        coords={"variant": NAMES, "scene": ["spheroid", "goldstein"]},
-    )
+    data = xr.Dataset({key: (("variant", "scene"), values) for key, values in both.items()},
+                      coords={"variant": NAMES, "scene": ["spheroid", "goldstein"]})  # fmt: skip
     over, times = ("variant", "scene"), np.broadcast_to(np.linspace(0.0, 1.0, 3), (5, 2, 3))
     return data.assign(outcome=(over, np.full((5, 2), "ok")), sample_time=((*over, "sample"), times))
 

@@ -139,12 +139,9 @@ def axis_terms(v: Vectors, first: First, a: Any, m: Any, last: int) -> tuple[lis
 
 
 def slope(v: Vectors, S: list[Any], last: int) -> Any:
-    """Sum of n S_n for 1 < n <= last."""
-    terms = []
-    for n in range(2, last + 1, 2):
-        term = v.builder.fmul(S[n], v.constant(n))
-        terms.append(v.fma(S[n + 1], v.constant(n + 1), term) if n < last else term)
-    return v.total(terms)
+    """Sum of n S_n for 1 < n <= last, which is odd."""
+    pairs = ((S[n + 1], v.constant(n + 1), v.builder.fmul(S[n], v.constant(n))) for n in range(2, last, 2))
+    return v.total([v.fma(*pair) for pair in pairs])
 
 
 def size(v: Vectors, S: list[Any], n: int) -> Any:

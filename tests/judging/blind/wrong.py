@@ -356,20 +356,18 @@ _TABLE = {  # names: claims, the line that names the defect, options
     "swapped_weights stale_stage rounded_triple square_root_triple six_digits long_step weak_gravity "
     "third_for_fourth energy_clipped late_euler euler_off_the_energy euler_above coarse_rk2":
         ({"order": 4}, "order", {}),
-    "wrong_nodes early": ({"order": 4}, "time", {}),
+    "wrong_nodes early": ({"order": 4}, "time", {}), "noisy sometimes_noisy counted tires": ({"order": 4}, "calls", {}),
     "averaged_with_the_past stale_force compensated adams_from_memory adams_from_a_table": ({"order": 2}, "calls", {}),
     "symplectic_euler": ({"order": 1, "symplectic": True}, "symplectic", {}),
     "one_sweep only_forward root_of_the_step OnlyForward": ({"order": 2, "symmetric": True}, "symmetric", {}),
-    "four_sweeps loose": ({"order": 2, "conserves": KEPT}, "energy", {}),
+    "four_sweeps loose": ({"order": 2, "conserves": KEPT}, "energy", {}), "edits_the_judge": (ALL, "symplectic", {}),
     "single leaking": ({"order": 4, "conserves": ["p_phi"]}, "p_phi", {}),
-    "noisy sometimes_noisy counted tires": ({"order": 4}, "calls", {}),
-    "damped": ({"order": 1, "energy": "bounded"}, "energy", {}),
+    "damped": ({"order": 1, "energy": "bounded"}, "energy", {}), "separable_stale": ({"order": 2}, "calls", SEPARABLE),
     "projected": ({"order": 4, "symplectic": True}, "symplectic", {}),
     "rotation_frames rotation_no_gyroscope rotation_semi_implicit rotation_whole_angle rotation_half_once":
         ({"order": 2}, "order", ROTATION),
     "rotation_unnormalised": ({"order": 2, "conserves": ["axis_length"]}, "axis_length", ROTATION),
-    "WrongTableau": ({"order": 5}, "order", {}),
-    "WrongSum": ({}, "order", {"adaptive": True}),
+    "WrongTableau": ({"order": 5}, "order", {}), "WrongSum": ({}, "order", {"adaptive": True}),
     "WrongAdams sub_steps extrapolated": ({"order": 2}, "order", {}),
     "averaged_field": ({"order": 2, "symmetric": True, "symplectic": True}, "symplectic", {"chart": "attitude"}),
     "hurried": ({"order": 2, "symmetric": True, "conserves": KEPT}, "order", {}),
@@ -380,10 +378,7 @@ _TABLE = {  # names: claims, the line that names the defect, options
     "rounded": ({"order": 4, "conserves": ["p_psi"]}, "p_psi", {}),
     "rotation_linear": ({"order": 2, "symmetric": True}, "symmetric", ROTATION),
     "separable_no_half_square separable_damped": ({"order": 2, "symplectic": True}, "order", SEPARABLE),
-    "separable_stale": ({"order": 2}, "calls", SEPARABLE),
     "separable_swapped": ({"order": 2, "symplectic": True, "symmetric": True}, "order", SEPARABLE),
-    "euler_in_a_spot": ({"order": 4}, "energy", {}),
-    "half_symmetric": ({"symmetric": True}, "symmetric", {}),
-    "edits_the_judge": (ALL, "symplectic", {}),
+    "euler_in_a_spot": ({"order": 4}, "energy", {}), "half_symmetric": ({"symmetric": True}, "symmetric", {}),
 }  # fmt: skip
 CLAIMS = {name: entry for names, entry in _TABLE.items() for name in names.split()}
