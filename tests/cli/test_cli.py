@@ -36,8 +36,7 @@ OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --bod
     ("run spheroid midpont --step-size 0.1", ["integrator 'midpont'", "midpoint", "symtop integrators", OWN]),
     ("run midpoint spheroid", ["scene 'midpoint'", "an integrator", "scene comes first"]),
     ("run spheroid midpoint[attitude] --step-size 0.1", ["chart of midpoint 'attitude'", "angles"]),
-    ("run spheroid midpoint", ["needs --step-size", "0.007"]),
-    ("run spheroid rk45", ["needs a tolerance", "1e-6"]),
+    ("run spheroid midpoint", ["needs --step-size", "0.007"]), ("run spheroid rk45", ["needs a tolerance", "1e-6"]),
     ("run spheroid taylor --figure no-such/x.png", ["--figure", "folder that is there", "no-such/x.png"]),
     ("run spheroid taylor --output run.csv", ["--output is written as netCDF", "run.nc", "'run.csv'"]),
     ("run spheroid rk4 --step-size 0.1 --output a.png --figure ./a.png", ["--output and --figure", "two files"]),
@@ -45,11 +44,9 @@ OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --bod
     ("run spheroid strang --step-size 0.01 --figure ../x.png", ["--figure must be a file, not the folder"]),
     ("long spheroid strang --steps 1e12 --output ..", ["--output must be a file, not the folder"]),
     ("ensemble strang --members 1000000 --figure ../x.png", ["--figure must be a file, not the folder"]),
-    ("recommend spheroid", ["--accuracy", "--i-use"]),
     ("recommend spheroid --accuracy 1 --step-size 1 --per-nutation 9", ["--step-size", "not both"]),
-    ("study convergense", ["'convergense'", "convergence"]),
-    ("study", ["name a study", "--all", "convergence"]),
-    ("study convergence --status --check", ["--status and --check"]),
+    ("study convergense", ["'convergense'", "convergence"]), ("study", ["name a study", "--all", "convergence"]),
+    ("recommend spheroid", ["--accuracy", "--i-use"]), ("study convergence --status --check", ["--status and --check"]),
 ])  # fmt: skip
 def test_a_refusal_names_the_argument_its_value_and_what_is_allowed(words, parts, tmp_path, monkeypatch):
     (tmp_path / "x.png").mkdir()
