@@ -160,16 +160,15 @@ def _motion(body: RigidBody, start: Attitude) -> "FreeBody | HeavyBody":
 
 @functools.lru_cache(maxsize=16)
 def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> "BodyMotion":
-    """The motion of a body of that name at times, kept for a while: methods on one scene ask for the same ones.
-
-    SymtopError for one that is lost before the last time, as in chaos.
-    """
+    """The motion of a body of that name at times, kept for a while; SymtopError if it is lost before, as in chaos."""
     motion, times = _motion(body, start), np.frombuffer(plain).copy()
     sampled = motion.samples if body.free else functools.partial(motion.samples, precise=precise)  # type: ignore[call-arg]
-    if (lost := (shown := sampled(times)).lost(times)) is not None:
-        for part in (np.append(0.0, np.geomspace(1e-120, 1.0, 400)), np.linspace(0.0, 1.0, 201)):
-            good = np.isfinite(sampled(finer := lost * part).bound)
-            known, lost = float(f"{0.999 * finer[good].max():.4g}"), finer[~good].min(initial=lost)
+    if (lost := (shown := sampled(times)).lost(times)) is not None:  # the answer does not hang on the times
+        end = body.nutation_period(start)
+        while end < lost and np.isfinite(sampled(np.array([end])).bound[0]):
+            end *= 2.0
+        finer = np.linspace(0.0, min(end, lost), 201)
+        known = float(f"{0.999 * finer[np.isfinite(sampled(finer).bound)].max():.4g}")
         while not sampled(np.array([known])).bound[0] < 5e-10:  # what is printed is known, too
             known = float(f"{0.98 * known:.4g}")
         words = f"at most {known:g} on {name}, not {times.max():.6g}: its motion is not known to 1e-9 rad for longer"
