@@ -202,6 +202,8 @@ OWN = ["--body", "1,2,3", "--rates", "0.01,1,0"]
     (["run", "spheroid", "rk4", *OWN], "--body, --rates must come with --body I1,I2,I3 on the scene body, not sph"),
     (["scenes", "body", "--body", "1,2"], "--body must be 3 numbers with commas between, not '1,2'"),
     (["scenes", "body", "--body", "1,2,3"], "--body without a weight needs --rates"),
+    (["scenes", "body", *OWN[:2], "--rates", "nan,1,0"], "an entry of --rates must be a finite number, not nan"),
+    (["scenes", "body", *OWN, "--attitude", "2,0,0,0"], "--attitude must have unit length, not 2"),
     (["scenes", "body", "--body", "1,2,4", "--mgl", "1"], "I3 must be at most the sum of the other moments"),
 ])  # fmt: skip
 def test_a_body_of_ones_own_that_is_none(words: list[str], sentence: str) -> None:
@@ -250,8 +252,7 @@ def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
     assert 0.5 * spin @ matrix @ spin == pytest.approx(kinetic, rel=1e-13)
     heavy = rotated(inside.quaternion, body.centre)[2]  # the height of the centre, in either axes
     assert heavy == pytest.approx(rotated(at.quaternion, columns @ [0.0, 0.6, 0.8])[2], rel=1e-13)
-    brick = RigidBody.from_brick(12.0, (1.0, 2.0, 3.0))
-    assert brick.moments == (13.0, 10.0, 5.0)
+    assert RigidBody.from_brick(12.0, (1.0, 2.0, 3.0)).moments == (13.0, 10.0, 5.0)
     corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-1.0, 1.0) for z in (-1.5, 1.5)]
     points = RigidBody.from_points([1.5] * 8, corners)
     assert sorted(points.moments) == pytest.approx([15.0, 30.0, 39.0])
@@ -281,9 +282,8 @@ def test_a_stored_body_is_read_back_to_the_bit(tmp_path):  # type: ignore[no-unt
     stored = netcdf.read(netcdf.write(run, tmp_path / "run.nc"))
     for errors in (symtop.errors(stored), symtop.errors(run, "heavy-brick")):
         np.testing.assert_array_equal(errors["attitude"], symtop.errors(run)["attitude"])
-    other = symtop.scene("heavy-chaotic", bodies=True)
     with pytest.raises(symtop.SymtopError, match="scene must be that of the data"):
-        symtop.errors(run, other)
+        symtop.errors(run, symtop.scene("heavy-chaotic", bodies=True))
     draws = np.random.default_rng(0).normal(size=(500, 4))
     for w, x, y, z in draws:
         body = symtop.RigidBody(1.0, 1.2, 0.9, 1.0, (x, y, z))

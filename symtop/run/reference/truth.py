@@ -170,7 +170,7 @@ def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, prec
         finer = np.linspace(0.0, min(end, lost), 201)
         known = float(f"{0.999 * finer[np.isfinite(sampled(finer).bound)].max():.4g}")
         while not sampled(np.array([known])).bound[0] < 5e-10:  # what is printed is known, too
-            known = float(f"{0.98 * known:.4g}")
+            known = float(f"{0.99 * known:.4g}")
         words = f"at most {known:g} on {name}, not {times.max():.6g}: its motion is not known to 1e-9 rad for longer"
         raise SymtopError(f"times must be {words}", "times")
     return shown
