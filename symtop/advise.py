@@ -625,8 +625,7 @@ def i_use(
 
     An engine is one of `SETTINGS` or a map, such as "mujoco-euler". With an `accuracy`, the advice is for that and
     for the step; `limits` are what else `recommend` takes. `step_size` is in the units of the scene, 1/240 by default,
-    `horizon` its own by default. Raises SymtopError for an engine that is
-    not known and for numbers that are out of range. It takes some seconds.
+    `horizon` its own by default. Raises SymtopError for an unknown engine and numbers out of range. It takes seconds.
     """
     maps = _settings()
     one_of("engine", engine, maps)

@@ -1,7 +1,6 @@
 """What the commands share: options, plug-ins, files to write, errors without a traceback, text that fits."""
 
 import contextlib
-import dataclasses
 import errno
 import functools
 import importlib
@@ -140,11 +139,13 @@ def given_body() -> str:
 def _own_body(numbers: dict[str, Any]) -> "Scene":
     from symtop.model import body, scenes
 
-    top = body.RigidBody(*numbers["body"], *numbers.get("mgl", ()))
-    top = dataclasses.replace(top, centre=numbers.get("centre", top.centre))
-    start = body.Attitude(numbers.get("attitude", (1.0, 0.0, 0.0, 0.0)), numbers.get("rates", (0.0, 0.0, 0.0)))
-    period = top.nutation_period(start)
-    if not math.isfinite(period):
+    given = *numbers["body"], *numbers.get("mgl", (0.0,)), numbers.get("centre", (0.0, 0.0, 1.0))
+    top = body.RigidBody(*given)
+    try:
+        start = body.Attitude(numbers.get("attitude", (1.0, 0.0, 0.0, 0.0)), numbers.get("rates", (0.0, 0.0, 0.0)))
+    except SymtopError as error:
+        raise SymtopError(str(error).replace("quaternion", "--attitude").replace("omega_body", "--rates")) from None
+    if not math.isfinite(period := top.nutation_period(start)):
         raise SymtopError("--body without a weight needs --rates: it does not move")
     return scenes.Scene(BODY, top, start, PERIODS * period, f"a body of your own, over {PERIODS:g} natural periods")
 

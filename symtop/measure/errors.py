@@ -203,10 +203,7 @@ ENOUGH = ("axis", "quaternion", "theta")  # one of them there must be
 
 
 def scene_of(run: xr.Dataset | Mapping[str, Any]) -> Scene:
-    """The scene that a dataset of `simulate` says that it was made of.
-
-    Raises SymtopError for any other data.
-    """
+    """The scene that a dataset of `simulate` says that it was made of; SymtopError for any other data."""
     attributes = getattr(run, "attrs", {})
     try:
         top, start = (json.loads(attributes[name]) for name in ("top", "start"))

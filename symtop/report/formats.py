@@ -67,10 +67,7 @@ def code(name: str) -> str:
 
 
 def by_name(pairs: Sequence[tuple[str | None, str]], link: str = "to") -> str | None:
-    """Names with what each is named for, a name once: ```a` to 10⁻³, and `b` to 10⁻⁶ and 10⁻⁹``.
-
-    None if a name is.
-    """
+    """Names with what each is named for, a name once: ```a` to 10⁻³, and `b` to 10⁻⁶ and 10⁻⁹``; None if one is."""
     groups: dict[str | None, list[str]] = {}
     for name, what in pairs:
         groups.setdefault(name, []).append(what)

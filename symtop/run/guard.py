@@ -10,7 +10,7 @@ exponentially), so that an error e_1 of one piece becomes after n pieces
 Symplectic and symmetric methods commit no error along which N shears, and theirs grows linearly. Where two nutations
 cost too much, the probe takes a coarser step and scales its error by the declared order; the passage of a pole is
 then probed by itself at the step of the run. A probe in angles whose steps are long beside a pole takes in as many
-passages as it may: what a passage adds depends on where the steps fall in it, and over few of them it cancels.
+passages as it may, as over few of them what they add may cancel; one of a free body beside an unstable rotation, too.
 
 *The cause* is read from exact landmarks of the motion, in this order:
 
@@ -41,19 +41,18 @@ from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.run.linear_stability import Growth, nutation_growth, trace
-from symtop.run.motion import MOST_FOLDS, MOVED, UNSTABLE, Exact, Integrated, Landmarks
+from symtop.run.motion import MOST_FOLDS, MOVED, SHEARED, UNSTABLE, Exact, Integrated, Landmarks
 from symtop.run.reference.sensitivity import SMALL
 
 STEPS = {"compiled": 2000, "python": 50}  # a probe of two nutations may take these
-AT_LEAST = 0.25  # of them a probe takes in any case, up to the whole run
+AT_LEAST, AT_MOST = 0.25, 10.0  # of them a probe takes in any case, and where errors grow, up to the whole run
 SHARE = 0.1  # of the run, which a probe may always take, but no more than so many nutations (`Integrated`) and steps:
 MOST_PROBED = 20_000  # steps
 ROUNDED = 1e-13  # rad; a probe that is closer than this shows rounding, which grows as n^1.5
 PARTIAL = 10.0  # distrust of a probe shorter than a nutation: it may have missed where errors are made, or stretched
 AFFORDED = {"compiled": 12_000, "python": 1200}  # evaluations of a longer probe of an adaptive method
-THROUGH = 20.0  # times as many where the axis passes a pole closer than the tolerance: each passage may end the run
-MOST_WORK = {"compiled": 5e6, "python": 5e5}  # evaluations of any probe: 20 nutations take a hundredth; beside a pole
-# the steps of a solver may shrink to nothing, and the probe would take as long as the run
+THROUGH = 20.0  # times as many where the axis passes a pole closer than the tolerance, or a free body turns over
+MOST_WORK = {"compiled": 5e6, "python": 5e5}  # evaluations of any probe: beside a pole steps may shrink to nothing
 LOOSE = 1e-4  # tolerance from which a method in Python is probed for a whole nutation: a few of its steps
 LEAST_GROWTH = 0.05  # of the error of a piece: less growth from the first to the second is luck
 COMMITTED = 1e4, 1e7  # tolerances: an error that an adaptive method commits now and then, and one of variable order
@@ -153,9 +152,9 @@ def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
     return n * first + 0.5 * max(abs(whole - 2.0 * first), LEAST_GROWTH * whole) * n * (n - 1.0)
 
 
-def _amplifies(motion: Integrated, change: float, horizon: float) -> bool:
-    """Whether the motion multiplies a change of its start by far more than the shear of a stable one does."""
-    return motion.displacement(change, horizon) > change * UNSTABLE * (1.0 + horizon / motion.marks.period)
+def _amplifies(motion: Integrated, change: float, horizon: float, times: float = UNSTABLE) -> bool:
+    """Whether the motion multiplies a change of its start by so much more than the shear of a stable one does."""
+    return motion.displacement(change, horizon) > change * times * (1.0 + horizon / motion.marks.period)
 
 
 def _amplified(motion: Integrated, probe: Probe, horizon: float) -> float:
@@ -186,13 +185,12 @@ def _grown_tolerance(motion: Integrated, method: Integrator, plan: Plan) -> floa
     """
     if not _amplifies(motion, plan.tolerance, plan.horizon):
         return 0.0
-    committed = COMMITTED[method.order is None] * plan.tolerance
-    changes = (plan.tolerance, committed)
+    changes = plan.tolerance, COMMITTED[method.order is None] * plan.tolerance
     return max(float(np.nan_to_num(motion.displacement(change, plan.horizon))) for change in changes)
 
 
 def _adaptive_forecast(
-    motion: Integrated, method: Integrator, chart: str, plan: Plan, period: float, share: float, twice: float
+    motion: Integrated, method: Integrator, chart: str, plan: Plan, period: float, share: float, twice: float, far: bool
 ) -> tuple[float, Probe]:
     """The same of an adaptive method, whose work is known when a first piece has been probed.
 
@@ -212,7 +210,7 @@ def _adaptive_forecast(
     piece = max(share, least)
     expected, probe = probed(piece)
     afforded = AFFORDED[cheap.implementation] * min(cheap.speed, 1.0)
-    if chart == "angles" and motion.marks.gap < plan.tolerance and cheap.implementation == "compiled":
+    if (far or (chart == "angles" and motion.marks.gap < plan.tolerance)) and cheap.implementation == "compiled":
         afforded *= THROUGH
     longer = min(plan.horizon, piece * afforded / max(probe.evaluations, 1))
     if longer > 1.5 * piece:
@@ -223,17 +221,20 @@ def _adaptive_forecast(
 def _expected(motion: Integrated, method: Integrator, chart: str, plan: Plan) -> tuple[float, Probe]:
     """The largest axis error to expect, and the probe that says so."""
     straight, marks = bool(method.symplectic or method.symmetric), motion.marks
+    grows = motion.scene.of_body and motion.scene.top.free and _amplifies(motion, SMALL, plan.horizon, SHEARED)
     period = marks.period if math.isfinite(marks.period) else plan.horizon
     twice = min(2.0 * period, plan.horizon)
     long_steps = chart == "angles" and marks.rate * plan.step_size > RESOLVED
     share = min(SHARE * plan.horizon, (math.inf if long_steps else motion.longest) * period)
     if method.adaptive:
-        return _adaptive_forecast(motion, method, chart, plan, period, share, twice)
+        return _adaptive_forecast(motion, method, chart, plan, period, share, twice, grows)
     step = plan.step_size
     share = min(share, MOST_PROBED * step)
     allowed = max(STEPS[method.implementation] * step, share)
     if twice <= allowed:
         piece = max(twice, share, min(AT_LEAST * STEPS[method.implementation] * step, motion.reach * period))
+        if grows:
+            piece = max(piece, AT_MOST * STEPS[method.implementation] * step)
         probe = _probe(motion, method, chart, plan, min(plan.horizon, piece), step)
         return _fixed(motion, method, probe, plan.horizon), probe
     coarse = twice / round(allowed / step)
@@ -417,8 +418,7 @@ def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expec
             return Trouble(f"{size}: the motion is unstable, and a change of its start grows large; {advice}")
         return Trouble(f"{size}: errors add up over {plan.horizon / marks.period:.3g} {period}s; {advice}")
     if method.order is None:
-        words = "it has no order, so that a smaller step need not help; take another method, such as strang"
-        return Trouble(f"{size}: {words}")
+        return Trouble(f"{size}: it has no order, and smaller steps need not help; take another method, such as strang")
     return Trouble(
         f"{size}: a step is 1/{expected.steps_per_nutation:.3g} of a {period}, and errors add up over "
         f"{plan.horizon / marks.period:.3g} {period}s", _smaller(method, plan, expected),

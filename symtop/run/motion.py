@@ -11,6 +11,7 @@ of two integrations over the whole run: shear makes A grow with t, chaos and uns
 of the run does not show it, because a chaotic motion looks regular on many a piece.
 """
 
+import contextlib
 import functools
 import math
 from dataclasses import replace
@@ -18,12 +19,14 @@ from typing import Any, NamedTuple, Self
 
 import numpy as np
 
+from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
 from symtop.core.numbers import EPSILON
 from symtop.methods.framework.plan import LENGTH, Plan
 from symtop.methods.framework.registry import integrator
 from symtop.methods.runge_kutta.pairs import DOP8, two_runs
 from symtop.model.charts import BODY, Array, attitude_distance, axes, axis_distance
+from symtop.model.exact.free_body import FreeBody
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, flat
 from symtop.run.reference.sensitivity import displacement
@@ -34,13 +37,13 @@ CHECKED, MULTIPLIED = 10, 1e5  # or at the first ones where A is less, which mak
 CALM = 1e3  # times these tolerances where A and the law of the guard make less than that of an error by the horizon
 PAIR_STEPS = 7  # of two motions side by side, in a period of the fastest turn: with 5.3 chaos is damped away
 SWINGS = 8.0  # of the pull of a weight: twice what one swing adds to 2T
-MOVED = 1e-10  # of the natural frequency: small enough to show how much a motion beside a separatrix shears
+MOVED, FINELY_MOVED = 1e-10, 1e-13  # of the natural frequency: shows the shear beside a separatrix; in closed form
 SATURATED = 0.01  # rad; two motions that are farther apart no longer show how fast they part
 WATCHED = {BODY: 200.0, "axis": 20.0}  # natural periods of a run: the motion of a top is integrable
 MOST_WATCHED = 6000  # steps
 POINTS = 100  # of A
 MOST_POWER = 20.0  # of the time by which A grows beyond what is watched
-UNSTABLE = 50.0  # times that a stable motion may amplify a change of its start more than the time goes on
+UNSTABLE, SHEARED = 50.0, 10.0  # times that a stable motion, and most, may amplify a change more than time goes on
 LATER = 30.0  # of the errors of a piece: those that a method commits later in an unstable motion
 MOST_FOLDS = 100.0  # e times that anything grows: any is too much
 MOST_WORK = 1e6  # steps of an integration
@@ -159,9 +162,9 @@ class Integrated:
         """A time at which a method may have the most to do: when the axis first comes closest to a pole; 0 here."""
         return 0.0
 
-    def moved(self) -> Any:
-        """A start that differs by `MOVED`, of the natural frequency."""
-        at, rate = self.scene.start, MOVED * self.marks.frequency
+    def moved(self, by: float = MOVED) -> Any:
+        """A start that differs by so much of the natural frequency."""
+        at, rate = self.scene.start, by * self.marks.frequency
         if self.chart == BODY:
             x, y, z = at.omega_body
             return replace(at, omega_body=(x + 0.6 * rate, y - 0.48 * rate, z + 0.64 * rate))
@@ -170,17 +173,24 @@ class Integrated:
     def growth(self, horizon: float) -> Growth:
         """A up to the horizon, or as far as it is watched; made once.
 
-        Both motions take the same steps, so that their errors do not hide it.
+        Both motions take the same steps, so that their errors do not hide it; those of a free body that part are exact.
         """
         step = 2.0 * math.pi / self.fast / PAIR_STEPS
         until = min(horizon, WATCHED[self.chart] * self.marks.period, MOST_WATCHED * step)
         if until not in self.growths:
             steps = max(math.ceil(until / step), POINTS)
             h, marks, apart = until / steps, np.arange(1, POINTS + 1) * steps // POINTS, np.empty(POINTS)
-            starts = (flat(self.scene.top, start) for start in (self.scene.start, self.moved()))
+            given = (flat(self.scene.top, start) for start in (self.scene.start, self.moved()))
             units = (2.0 if self.chart == BODY else 1.0) / MOVED, 1.0 / (MOVED * self.inertia * self.marks.frequency)
-            two_runs(self.chart, DOP8, _apart)(*starts, h, marks, units, apart)
-            self.growths[until] = Growth.of(np.multiply(marks, h, dtype=float), apart, SATURATED / MOVED)
+            two_runs(self.chart, DOP8, _apart)(*given, h, marks, units, apart)
+            times, moved, top = np.multiply(marks, h, dtype=float), MOVED, self.scene.top
+            if self.chart == BODY and top.free and not apart.max() < SATURATED / MOVED:
+                starts = self.scene.start, self.moved(FINELY_MOVED)
+                with contextlib.suppress(SymtopError):  # of momenta that the closed form does not take
+                    forms = (FreeBody(top.moments, a.quaternion, top.momentum(a), top.momentum_lo(a)) for a in starts)
+                    apart = attitude_distance(*(form.samples(times).quaternion for form in forms)) / FINELY_MOVED
+                    moved = FINELY_MOVED
+            self.growths[until] = Growth.of(times, apart, SATURATED / moved)
         return self.growths[until]
 
     def amplification(self, until: float, horizon: float) -> float:
@@ -199,10 +209,7 @@ class Integrated:
         return error * times * (LATER if times > UNSTABLE * horizon / since else 1.0)
 
     def rounding(self, horizon: float, *, whole: bool) -> float:
-        """What rounding alone makes of a run, rad: large on a separatrix and in chaos, whatever the method.
-
-        0 if a piece was the `whole` run: what two orders differ by shows it.
-        """
+        """What rounding makes of a run, rad, whatever the method; 0 if a piece was the `whole` run, which shows it."""
         return 0.0 if whole else self.displacement(EPSILON, horizon)
 
 

@@ -44,10 +44,9 @@ OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --bod
     ("run spheroid strang --step-size 0.01 --figure ../x.png", ["--figure must be a file, not the folder"]),
     ("long spheroid strang --steps 1e12 --output ..", ["--output must be a file, not the folder"]),
     ("ensemble strang --members 1000000 --figure ../x.png", ["--figure must be a file, not the folder"]),
-    ("recommend spheroid", ["--accuracy", "--i-use"]),
     ("recommend spheroid --accuracy 1 --step-size 1 --per-nutation 9", ["--step-size", "not both"]),
     ("study convergense", ["'convergense'", "convergence"]), ("study", ["name a study", "--all", "convergence"]),
-    ("study convergence --status --check", ["--status and --check"]),
+    ("recommend spheroid", ["--accuracy", "--i-use"]), ("study convergence --status --check", ["--status and --check"]),
 ])  # fmt: skip
 def test_a_refusal_names_the_argument_its_value_and_what_is_allowed(words, parts, tmp_path, monkeypatch):
     (tmp_path / "x.png").mkdir()

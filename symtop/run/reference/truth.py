@@ -120,8 +120,7 @@ def reference(
     Of a body without symmetry: ``quaternion``, ``axis`` (its third), ``theta``, ``momentum`` (L in the space frame),
     ``energy``, ``p_phi``, ``axis_error_bound`` and ``attitude_error_bound``.
 
-    Raises SymtopError for times that are negative, not finite or none at all, and for those of a body at which its
-    motion is not known to 1e-9 rad.
+    Raises SymtopError for times that are negative, not finite or none, and for a body's that is not known to 1e-9 rad.
     """
     chosen = find_scene(scene, bodies=True)
     moments = real_numbers("times", times)
@@ -136,8 +135,7 @@ def reference(
             raise SymtopError(f"certify is for the closed form; precision {precision!r} is checked as it is computed")
     source = precision if have_heyoka() else "closed-form"
     if not have_heyoka() and (source != precision or certify == "integration"):
-        stands_in = f"stands in for precision {precision!r}"
-        missing = stands_in if source != precision else "is certified without an integration"
+        missing = "is certified without an integration" if source == precision else f"stands in for {precision!r}"
         sentence = f"heyoka is not installed: the closed form in double {missing}"
         warnings.warn(sentence, SymtopWarning, stacklevel=2)
     if source == "closed-form":
@@ -162,16 +160,18 @@ def _motion(body: RigidBody, start: Attitude) -> "FreeBody | HeavyBody":
 
 @functools.lru_cache(maxsize=16)
 def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> "BodyMotion":
-    """The motion of a body of that name at times, kept for a while: methods on one scene ask for the same ones.
-
-    SymtopError for one that is lost before the last time, as in chaos.
-    """
+    """The motion of a body of that name at times, kept for a while; SymtopError if it is lost before, as in chaos."""
     motion, times = _motion(body, start), np.frombuffer(plain).copy()
     sampled = motion.samples if body.free else functools.partial(motion.samples, precise=precise)  # type: ignore[call-arg]
-    if (lost := (shown := sampled(times)).lost(times)) is not None:
-        finer = np.linspace(0.0, lost, 201)
-        known = 0.999 * finer[np.isfinite(sampled(finer).bound)].max()  # what is printed is known, too
-        words = f"at most {known:.4g} on {name}, not {times.max():.6g}: its motion is not known to 1e-9 rad for longer"
+    if (lost := (shown := sampled(times)).lost(times)) is not None:  # the answer does not hang on the times
+        end = body.nutation_period(start)
+        while end < lost and np.isfinite(sampled(np.array([end])).bound[0]):
+            end *= 2.0
+        finer = np.linspace(0.0, min(end, lost), 201)
+        known = float(f"{0.999 * finer[np.isfinite(sampled(finer).bound)].max():.4g}")
+        while not sampled(np.array([known])).bound[0] < 5e-10:  # what is printed is known, too
+            known = float(f"{0.99 * known:.4g}")
+        words = f"at most {known:g} on {name}, not {times.max():.6g}: its motion is not known to 1e-9 rad for longer"
         raise SymtopError(f"times must be {words}", "times")
     return shown
 
@@ -193,7 +193,7 @@ def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) ->
     constants = {"energy": body.energy(start), "p_phi": body.momenta(start).p_phi}
     data = dataset(times, columns | {name: np.full(times.size, value) for name, value in constants.items()})
     source = "closed-form" if body.free else "quad" if precision == "quad" else "longdouble"
-    words = "256 times the distance of two integrations that differ in order, steps and rounding"
+    words = "256 times the distance of two integrations, of a body whose mgl times centre is rounded to doubles"
     words = "from the arithmetic of the exact motion of a free body" if body.free else words
     attributes = {"scene": scene.name, "precision": source, "asked_for": precision, "bound": words}
     return netcdf.describe(data, f"reference motion of {scene.name}", scene.units, **attributes)
