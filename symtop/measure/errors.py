@@ -272,6 +272,9 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
     check_shapes(columns, time.size)
     if not set(ENOUGH) & set(columns):
         raise SymtopError("data must hold one of axis, quaternion, theta beside time, to show where the top is")
+    places = (columns[name].reshape(time.size, -1) for name in ENOUGH if name in columns)
+    if all(np.isnan(place).any(axis=1).all() for place in places):
+        raise SymtopError("data must hold numbers, but where the top is every sample has one that is NaN")
     for name in ("axis", "quaternion"):
         if name in columns:
             length = np.sqrt(np.sum(columns[name] ** 2, axis=-1))

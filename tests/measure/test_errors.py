@@ -194,6 +194,7 @@ AXIS = np.tile([0.0, 0.0, 1.0], (41, 1))
 
 @pytest.mark.parametrize(("data", "scene", "words"), [
     ({"axis": AXIS}, "spheroid", "must hold time"),
+    ({"time": TIMES, "axis": np.where(AXIS > -2.0, np.nan, AXIS)}, "spheroid", "every sample has one that is NaN"),
     ({"time": np.where(TIMES > 7.0, np.nan, TIMES), "axis": AXIS}, "spheroid", "time must be finite"),
     ({"time": TIMES.astype("timedelta64[s]"), "axis": AXIS}, "spheroid", r"of real numbers, not timedelta64\[s"),
     ({"time": TIMES, "axis": AXIS.T}, "spheroid", r"shape \(41, 3\)"),
