@@ -614,7 +614,7 @@ class EngineAdvice:
 
 def _settings() -> dict[str, dict[str, str]]:
     """The maps by the settings of each engine, and each map by itself where no engine has its name."""
-    return {name: {name: name} for name in engines()} | SETTINGS
+    return SETTINGS | {name: {name: name} for name in engines() if name not in SETTINGS}
 
 
 def i_use(

@@ -46,9 +46,9 @@ static inline void part(const Rule *rule, double *state, Carry *carry, double *s
     double s1 = carry->s1, s2 = carry->s2, f1 = carry->f1, f2 = carry->f2;
     int longer = s1 >= s2;
     double lack = longer ? (1.0 - s1) - s2 : (1.0 - s2) - s1;
-    lack = fabs(lack) > 2e-15 ? 0.5 * 0.5 * lack : 0.0;
+    lack = fabs(lack) > 2e-15 ? 0.5 * lack : 0.0;
     double out1 = x[0] * u[0] + x[1] * u[1] - f1 * s1, out2 = x[2] * u[2] + x[3] * u[3] - f2 * s2;
-    double swell = 0.5 * (out1 * rule->q1 + out2 * rule->q2);
+    double swell = out1 * rule->q1 + out2 * rule->q2;
     double e1 = longer ? lack * inverse(s1) : 0.0, e2 = longer ? 0.0 : lack * inverse(s2);
     double c1 = longer ? swell * rule->r1 * inverse(s1) : 0.0, c2 = longer ? 0.0 : swell * rule->r2 * inverse(s2);
     c1 = 2.0 * e1 * f1 - c1, c2 = 2.0 * e2 * f2 - c2;

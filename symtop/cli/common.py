@@ -102,7 +102,7 @@ def _numbers(count: int) -> Callable[[click.Context, click.Parameter, str | None
 
 
 OF_BODY = {  # options of a body: how many numbers, and what they are
-    "body": (3, "I1,I2,I3", f"Principal moments of a body of your own, which is then the scene {BODY}."),
+    "body": (3, "I1,I2,I3", f"Principal moments of a body of your own, the scene {BODY}; I1 = I2 makes a top."),
     "mgl": (1, "NUMBER", "Its weight times the distance of its centre; free without."),
     "centre": (3, "X,Y,Z", "The direction of its centre in body axes; the third axis by default."),
     "attitude": (4, "W,X,Y,Z", "Its quaternion at the start, body to space; 1,0,0,0 by default."),
@@ -138,16 +138,21 @@ def given_body() -> str:
 
 def _own_body(numbers: dict[str, Any]) -> "Scene":
     from symtop.model import body, scenes
+    from symtop.model.top import Angles, SymmetricTop
 
     given = *numbers["body"], *numbers.get("mgl", (0.0,)), numbers.get("centre", (0.0, 0.0, 1.0))
-    top = body.RigidBody(*given)
+    top: Any = body.RigidBody(*given)
     try:
-        start = body.Attitude(numbers.get("attitude", (1.0, 0.0, 0.0, 0.0)), numbers.get("rates", (0.0, 0.0, 0.0)))
+        start: Any = body.Attitude(numbers.get("attitude", (1.0, 0.0, 0.0, 0.0)), numbers.get("rates", (0.0, 0.0, 0.0)))
     except SymtopError as error:
         raise SymtopError(str(error).replace("quaternion", "--attitude").replace("omega_body", "--rates")) from None
     if not math.isfinite(period := top.nutation_period(start)):
         raise SymtopError("--body without a weight needs --rates: it does not move")
-    return scenes.Scene(BODY, top, start, PERIODS * period, f"a body of your own, over {PERIODS:g} natural periods")
+    if top.I1 == top.I2 and (top.free or abs(top.centre[2]) == 1.0):
+        start = Angles.from_quaternion(start.quaternion, omega_body=start.omega_body)
+        top = SymmetricTop(top.I1, top.I3, top.torque[2])
+    purpose = f"a body of your own, over {PERIODS:g} natural periods"
+    return scenes.Scene(BODY, top, start, PERIODS * period, purpose, "axis")  # of tops: a body observes all of itself
 
 
 def step_of(scene: "str | Scene", settings: dict[str, Any]) -> float | None:

@@ -267,8 +267,11 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
         raise SymtopError(f"time must be finite, at least 0 and increase, but sample {k} is at {time[k]:g}{after}")
     columns: dict[str, Any] = {name: doubles(name, column(data, name)) for name in SHAPES if name in data}
     check_shapes(columns, time.size)
-    if not set(ENOUGH) & set(columns):
-        raise SymtopError("data must hold one of axis, quaternion, theta beside time, to show where the top is")
+    places = [columns[name].reshape(time.size, -1) for name in ENOUGH if name in columns]
+    if all(np.isnan(place).any(axis=1).all() for place in places):
+        words = "numbers, but every sample of where the top is has a NaN" if places else (
+            "one of axis, quaternion, theta beside time, to show where the top is")  # fmt: skip
+        raise SymtopError(f"data must hold {words}")
     for name in ("axis", "quaternion"):
         if name in columns:
             length = np.sqrt(np.sum(columns[name] ** 2, axis=-1))

@@ -131,14 +131,15 @@ class Scene:
     def momentum_scale(self) -> float:
         """What errors of p_phi and p_psi are divided by: the larger of both in size, or of a body |L|, at the start.
 
-        Where that is zero it is sqrt(|mgl| I1), which the weight gives.
+        Where that is zero to rounding, it is |L| or sqrt(|mgl| I1), which the weight gives.
         """
         if self.of_body:
-            size = math.hypot(*self.top.momentum(self.start))
+            size = turning = math.hypot(*self.top.momentum(self.start))
         else:
-            momenta = self.top.momenta(self.start)
+            momenta, turning = self.top.momenta(self.start), self.top.I1 * abs(self.start.theta_dot)
             size = max(float(abs(momenta.p_phi)), float(abs(momenta.p_psi)))
-        return size or max(math.sqrt(abs(self.top.mgl) * self.top.I1), TINY)
+        other = max(turning, math.sqrt(abs(self.top.mgl) * self.top.I1), TINY)
+        return size if size > STEADY * EPSILON * other else other
 
     def record(self) -> dict[str, str]:
         """What tables show of this scene, by column."""

@@ -16,7 +16,7 @@ from symtop.model.exact.closed_form import ClosedForms
 
 KEYS = kernels.keys()
 STEPS = 500
-FEW = [("stormer-verlet", "angles"), ("takahashi-imada", "attitude"), ("rk4", "axis")]  # of the fast tests
+FEW = [("stormer-verlet", "angles"), ("takahashi-imada", "attitude"), ("rk4", "axis"), ("exact-discrete", "axis")]
 needs_gcc = pytest.mark.skipif(twin.compiler() is None, reason="the twins are built with gcc")
 
 

@@ -194,6 +194,7 @@ AXIS = np.tile([0.0, 0.0, 1.0], (41, 1))
 
 @pytest.mark.parametrize(("data", "scene", "words"), [
     ({"axis": AXIS}, "spheroid", "must hold time"),
+    ({"time": TIMES, "axis": np.where(AXIS > -2.0, np.nan, AXIS)}, "spheroid", "where the top is has a NaN"),
     ({"time": np.where(TIMES > 7.0, np.nan, TIMES), "axis": AXIS}, "spheroid", "time must be finite"),
     ({"time": TIMES.astype("timedelta64[s]"), "axis": AXIS}, "spheroid", r"of real numbers, not timedelta64\[s"),
     ({"time": TIMES, "axis": AXIS.T}, "spheroid", r"shape \(41, 3\)"),
@@ -261,10 +262,11 @@ def test_errors_of_an_ensemble_are_those_of_its_members_and_other_members_are_re
 @pytest.mark.parametrize(("top", "start", "integrator"), [
     (symtop.RigidBody(1.0, 1.2, 0.6, mgl=1.0, centre=(0.1, 0.0, 1.0)), symtop.Attitude(), "vern9-fixed"),
     (symtop.SymmetricTop(1.0, 0.5, mgl=1.0), symtop.Angles(theta=1.0, phi=0.3), "rkmk-se3-4"),
+    (symtop.SymmetricTop(0.5, 0.5, mgl=0.0), symtop.Angles(theta=1.0, theta_dot=-2.0, psi_dot=1e-18), "rk4"),
 ])  # fmt: skip
-def test_momenta_of_what_is_let_go_at_rest_are_measured_by_what_the_weight_gives(top, start, integrator):
-    scene = symtop.Scene("at-rest", top, start, horizon=5.0)
-    assert scene.momentum_scale == pytest.approx(1.0)  # sqrt(mgl I1)
+def test_momenta_of_what_has_none_are_measured_by_what_the_weight_or_the_turning_gives(top, start, integrator):
+    scene = symtop.Scene("without", top, start, horizon=5.0)
+    assert scene.momentum_scale == pytest.approx(1.0)  # sqrt(mgl I1), or |L|
     wrong = symtop.errors(symtop.simulate(scene, integrator, step_size=0.05, guard=False, observe="axis"))
     names = ("momentum", "p_phi") if scene.of_body else ("p_phi", "p_psi")
     assert all(float(wrong[name].max()) < 1e-6 for name in names)
