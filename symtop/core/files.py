@@ -149,8 +149,9 @@ def replacing(path: str | os.PathLike[str], suffix: str = "", mode: int = 0o666)
 
 
 def sweep(path: Path) -> None:
-    """Remove the partial files of writers that were killed; call it only while nobody else writes the file."""
-    for partial in path.parent.glob(f".{glob.escape(path.name)}.*.part*"):
+    """Remove partial files of writers that were killed, its parts' too; call it only while nobody else writes it."""
+    ours = path.parent.glob(f".{glob.escape(path.name)}.*.part*")
+    for partial in (*ours, *path.with_name(f"{path.name}.parts").glob(".*.????????.part*")):
         partial.unlink(missing_ok=True)
 
 

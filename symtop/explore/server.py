@@ -146,9 +146,9 @@ class Handler(BaseHTTPRequestHandler):
                 return
             read, action, kind = ACTIONS[self.place]
             try:
-                question = json.loads(self.rfile.read(length))
-            except (ValueError, RecursionError) as error:
-                raise SymtopError(f"a question must be JSON: {error}") from None
+                question = dict(json.loads(self.rfile.read(length)))
+            except (TypeError, ValueError, RecursionError) as error:
+                raise SymtopError(f"a question must be JSON, names and their values: {error}") from None
             config = read(question)
             with _at_work:
                 if self._has_left():

@@ -5,17 +5,18 @@ compiled kernels let run at once. With a file, cells are kept in it as they are 
 its numbers depend on (`symtop.core.code_hash`), as the cases of a study are: what is up to date is not run again.
 """
 
+import contextlib
 import functools
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
 
-from symtop.core import code_hash, netcdf
+from symtop.core import code_hash, files, netcdf
 from symtop.core.errors import SymtopError, boolean, file_path, foreign_code, positive, row, whole
 from symtop.core.jit import code
 from symtop.core.parallel import MOST_THREADS, cores, in_threads
@@ -38,6 +39,7 @@ TIMED = (
 )
 MOST_NAMED = 4  # cells that a message lists
 _code = functools.cache(code)
+Stored = tuple[list[tuple[str, str]], dict[str, xr.Dataset]]
 
 
 class _Cell(NamedTuple):
@@ -80,7 +82,7 @@ def sweep(
     are done: the same call resumes a sweep that was interrupted, runs again what has changed (a setting, a scene, the
     source of a method) or raised an exception, and ends in the same dataset, which the file then holds. More scenes and
     integrators may be asked for than are in the file, but not fewer. Raises SymtopError for arguments that make no
-    sense.
+    sense, for a damaged file, and for one that another process is writing.
     """
     chosen = [find_scene(one, bodies=True) for one in listed(scenes)]
     methods = [find_integrator(one) for one in listed(integrators)]
@@ -99,45 +101,44 @@ def sweep(
     cells = [cell for row in grid for cell in row]
     pairs = [(cell.scene.name, cell.method.name) for cell in cells]
     file = None if path is None else file_path("path", path)
-    stored, done = _stored(file)
-    if others := [f"{name} on {of}" for of, name in stored if (of, name) not in pairs]:
-        few = ", ".join(others[:MOST_NAMED]) + (f" and {len(others) - MOST_NAMED} more" if others[MOST_NAMED:] else "")
-        must = "ask for these as well, or name another path"
-        raise SymtopError(f"path {str(file)!r} holds what was not asked for, {few}: {must}")
-    # what raised is tried again: the cause may have been of the moment
-    rest = [cell for cell in cells if cell.made_of not in done or RAISED in done[cell.made_of]["outcome"].values]
+    with _opened(file) as (stored, done):
+        if others := [f"{name} on {of}" for of, name in stored if (of, name) not in pairs]:
+            few = ", ".join(others[:MOST_NAMED]) + f" and {len(others) - MOST_NAMED} more" * bool(others[MOST_NAMED:])
+            must = f"{few}: ask for these as well, or name another path"
+            raise SymtopError(f"path {str(file)!r} holds what was not asked for, {must}")
+        # what raised is tried again: the cause may have been of the moment
+        rest = [cell for cell in cells if cell.made_of not in done or RAISED in done[cell.made_of]["outcome"].values]
 
-    def combined() -> xr.Dataset:
-        size = max(len(cell.settings) for cell in cells)
-        tables = [[_padded(done.get(cell.made_of), cell, size) for cell in row] for row in grid]
-        data = xr.concat([xr.concat(row, "variant") for row in tables], "scene")
-        data = data.assign_coords(scene=[one.name for one in chosen], variant=[one.name for one in methods])
-        data["chart"] = (
-            ("scene", "variant"),
-            [[chart_of(method, one.observes, observe) for method in methods] for one in chosen],
-        )
-        units = chosen[0].units if len({one.units for one in chosen}) == 1 else ""
-        words = {"timed": TIMED if timed else "nothing: timed was not asked for"}
-        return netcdf.describe(columns.described(data, units), "errors and work of a sweep", units=units, **words)
+        def combined() -> xr.Dataset:
+            size = max(len(cell.settings) for cell in cells)
+            tables = [[_padded(done.get(cell.made_of), cell, size) for cell in row] for row in grid]
+            data = xr.concat([xr.concat(row, "variant") for row in tables], "scene")
+            data = data.assign_coords(scene=[one.name for one in chosen], variant=[one.name for one in methods])
+            charts = [[chart_of(method, one.observes, observe) for method in methods] for one in chosen]
+            data["chart"] = ("scene", "variant"), charts
+            units = chosen[0].units if len({one.units for one in chosen}) == 1 else ""
+            words = {"timed": TIMED if timed else "nothing: timed was not asked for", "units": units}
+            title, content = "errors and work of a sweep", netcdf.content_hash(data)
+            return netcdf.describe(columns.described(data, units), title, content=content, **words)
 
-    written = time.monotonic()
-    with progress_bar("sweep", quiet=silent, total=len(cells), initial=len(cells) - len(rest)) as bar:
-        try:
-            for cell, table in zip(rest, in_threads(_table, rest, workers), strict=True):
-                done[cell.made_of] = table
-                bar.update()
-                if file is not None and time.monotonic() - written > KEEP_EVERY:
+        written = time.monotonic()
+        with progress_bar("sweep", quiet=silent, total=len(cells), initial=len(cells) - len(rest)) as bar:
+            try:
+                for cell, table in zip(rest, in_threads(_table, rest, workers), strict=True):
+                    done[cell.made_of] = table
+                    bar.update()
+                    if file is not None and time.monotonic() - written > KEEP_EVERY:
+                        netcdf.write(combined(), file)
+                        written = time.monotonic()
+                bar.set_description("timing")
+                changed = _time([cell for cell in cells if timed], done) or bool(rest)
+            except BaseException:
+                if file is not None and done:
                     netcdf.write(combined(), file)
-                    written = time.monotonic()
-            bar.set_description("timing")
-            changed = _time([cell for cell in cells if timed], done) or bool(rest)
-        except BaseException:
-            if file is not None and done:
-                netcdf.write(combined(), file)
-            raise
-    data = combined()
-    if file is not None and (changed or pairs != stored):  # in another order, the file would not be what is returned
-        netcdf.write(data, file)
+                raise
+        data = combined()
+        if file is not None and (changed or pairs != stored):  # in another order, it would not be what is returned
+            netcdf.write(data, file)
     return data
 
 
@@ -157,8 +158,7 @@ def listed(things: Any) -> list[Any]:
 
 
 def _settings(name: str, values: object) -> list[float]:
-    if isinstance(values, np.ndarray):
-        values = values.ravel()
+    values = values.ravel() if isinstance(values, np.ndarray) else values
     one = isinstance(values, (str, bytes)) or not isinstance(values, Iterable)
     settings = [positive(name, value) for value in ([values] if one else row(name, values))]
     if not settings:
@@ -245,13 +245,26 @@ def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:
     return whole.assign(made_of=((), cell.made_of))
 
 
-def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Dataset]]:
+@contextlib.contextmanager
+def _opened(file: Path | None) -> Iterator[Stored]:
+    """What an earlier sweep left in a file, which nobody else writes meanwhile; SymtopError if somebody does."""
+    if file is None:
+        yield [], {}
+        return
+    with files.locked(file.with_name(f"{file.name}.parts"), wait=False) as ours:  # the lock of an ensemble of that path
+        if not ours:
+            raise SymtopError(f"another process is writing {file}: wait until it has ended, or name another path")
+        files.sweep(file)
+        yield _stored(file) if file.exists() else ([], {})
+
+
+def _stored(file: Path) -> Stored:
     """Scenes and variants of an earlier sweep, and its error tables by their digests; SymtopError for another file."""
-    if file is None or not file.exists():
-        return [], {}
-    data = netcdf.read(file).drop_attrs()
+    data = netcdf.read(file)
     if "made_of" not in data:
         raise SymtopError(f"path must be a new file or that of a sweep, not {str(file)!r}")
+    if data.attrs.get("content", made := netcdf.content_hash(data)) != made:
+        raise SymtopError(f"path {str(file)!r} is damaged, its numbers are not those that were written: remove it")
     if "integrator" in data.coords:  # a file of version 0.2
         data = data.rename(integrator="variant")
     pairs, tables = [], {}
@@ -260,7 +273,7 @@ def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Data
             cell = data.isel(scene=s, variant=i)
             digest, run = str(cell["made_of"].values), cell["outcome"].values != "not_run"
             if digest and run.any():
-                own = cell.drop_vars(["scene", "variant", "made_of", "chart"], errors="ignore")
+                own = cell.drop_attrs().drop_vars(["scene", "variant", "made_of", "chart"], errors="ignore")
                 pairs.append((scene, name))
                 tables[digest] = own.isel(setting=np.flatnonzero(run))
     return pairs, tables

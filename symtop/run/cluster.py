@@ -26,10 +26,8 @@ def check_sent(address: object, work: object, name: str) -> None:
     try:
         pickle.dumps(work)
     except Exception:  # noqa: BLE001  (what cannot be sent says so in many ways)
-        raise SymtopError(
-            f"{name} cannot be sent to other processes: register it (symtop.register) in a plug-in file, or leave out "
-            f"the scheduler"
-        ) from None
+        remedy = "register it (symtop.register) in a plug-in file, or leave out the scheduler"
+        raise SymtopError(f"{name} cannot be sent to other processes: {remedy}") from None
 
 
 def connect(address: str) -> Any:

@@ -1,13 +1,11 @@
 """sweep(): one dataset of errors, work and outcomes; kept in a file, resumed from it, and drawn."""
 
-import math
-
 import numpy as np
 import pytest
 import xarray as xr
 
 import symtop
-from symtop.core import netcdf
+from symtop.core import files, netcdf
 from symtop.measure import sweep as module
 from symtop.measure.accuracy import error_row
 
@@ -33,8 +31,8 @@ def test_each_entry_is_that_of_one_run_whose_settings_are_its_own(data):
     assert adaptive["tolerance"].values[:2].tolist() == [1e-4, 1e-6]
     assert np.isnan(adaptive["step_size"].values[:2]).all()
     assert formula["outcome"].values.tolist() == ["ok", "not_run", "not_run"]
-    slope = np.diff(np.log(data.sel(variant="rk4[axis]", scene="spheroid")["axis"].values)) / math.log(0.5)
-    assert slope == pytest.approx([4.0, 4.0], abs=0.3)
+    slope = np.diff(np.log2(data.sel(variant="rk4[axis]", scene="spheroid")["axis"].values))
+    assert slope == pytest.approx([-4.0, -4.0], abs=0.3)
 
 
 def test_one_thread_and_many_and_a_file_give_the_same(data, tmp_path):
@@ -48,10 +46,7 @@ def test_one_thread_and_many_and_a_file_give_the_same(data, tmp_path):
 def test_a_sweep_that_was_stopped_goes_on_from_its_file(tmp_path, monkeypatch):
     """Killed after three cells of eight, it computes the other five; a changed setting computes its own cells only."""
     file, table, ran = tmp_path / "sweep.nc", module._table, []
-
-    def counted(cell):
-        ran.append((cell.scene.name, cell.method.name))
-        return table(cell)
+    counted = lambda cell: ran.append((cell.scene.name, cell.method.name)) or table(cell)
 
     def stopping(cell):
         if len(ran) == 3:
@@ -92,7 +87,7 @@ def test_failures_are_rows():
 
 
 def test_a_file_with_other_cells_is_refused_and_left_as_it_is(tmp_path, monkeypatch):
-    """Fewer cells than the file holds, or others, would destroy what is there; more, in any order, do not."""
+    """So is a damaged one, one that another process writes, and one that cannot be written; more cells are not."""
     file, arguments = tmp_path / "sweep.nc", {"step_size": [0.02, 1.0], "horizon": 2.0, "quiet": True}
     symtop.sweep("spheroid", ["rk4[axis]", "strang"], path=file, **arguments)
     before, table = file.read_bytes(), module._table
@@ -104,7 +99,14 @@ def test_a_file_with_other_cells_is_refused_and_left_as_it_is(tmp_path, monkeypa
     ):
         with pytest.raises(symtop.SymtopError, match=f"holds what was not asked for, {left}: ask for these as well"):
             symtop.sweep(scene, names, path=file, **arguments)
+    with files.locked(tmp_path / "sweep.nc.parts", wait=True), pytest.raises(symtop.SymtopError, match="is writing"):
+        symtop.sweep("spheroid", ["rk4[axis]", "strang"], path=file, **arguments)
     assert file.read_bytes() == before
+    netcdf.write(netcdf.read(file).assign(axis=lambda data: 3.0 * data["axis"]), file)
+    for path, says in ((file, "damaged, its numbers are not those that were written"), (file / "x.nc", "cannot write")):
+        with pytest.raises(symtop.SymtopError, match=says):
+            symtop.sweep("spheroid", ["rk4[axis]", "strang"], path=path, **arguments)
+    file.write_bytes(before)
     turned = symtop.sweep("spheroid", ["strang", "rk4[axis]"], path=file, **arguments)
     xr.testing.assert_identical(netcdf.read(file).drop_attrs(), turned.drop_attrs())
     monkeypatch.setattr(module, "_table", table)
