@@ -45,10 +45,11 @@ do so at a third of a nutation a step. Phases are exact products.
 *Sums.* A state is Z and W = Z_{n+1} - Z_n = p/r + f Z, f Z the half kick: a step is one drift W and one kick 2 f Z. Z,
 W and the kick are carried as two doubles each; f is one. A kick along Z, whatever its strength, and a drift along W
 change no J, so that rounding f leaves J alone; and f, a function of |Z|^2, is rounded alike on the way up and down, so
-that what it does to the energy comes back. Neither walks: on `spheroid` rms 8e-16 of J and 2e-15 of the energy, after
-1e6 steps as after 1e8 (`benchmarks/exactness.py`). With sums of one double they do: 1e-13 and 3e-14 at 1e6. What the
-sum of W rounds off is not waited for: it joins what is left of Z, and the next step. What a kick owes to what is left
-of Z is: put off, it would grow by sqrt |2 f| a step, and end a run with two steps a nutation within a hundred.
+that what it does to the energy comes back. Neither walks: on `spheroid` rms 2e-16 of the momenta and 2e-15 of the
+energy, after 1e5 steps as after 1e9 (`benchmarks/exactness.py`). With sums of one double they do: 3e-12 and 1e-12 at
+1e7. What the sum of W rounds off is not waited for: it joins what is left of Z, and the next step. What a kick owes to
+what is left of Z is: put off, it would grow by sqrt |2 f| a step, and end a run with two steps a nutation within a
+hundred.
 
 Sources: Kuznetsov, Petrera, Ragnisco, nlin/0403028 (Baecklund transformations of the Lagrange top discretise its flow);
 Suris, The Problem of Integrable Discretization (discrete Garnier system); Marsden and West, Acta Numerica 10 (2001)
