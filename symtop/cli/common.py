@@ -142,10 +142,7 @@ def _own_body(numbers: dict[str, Any]) -> "Scene":
 
     given = *numbers["body"], *numbers.get("mgl", (0.0,)), numbers.get("centre", (0.0, 0.0, 1.0))
     top: Any = body.RigidBody(*given)
-    try:
-        start: Any = body.Attitude(numbers.get("attitude", (1.0, 0.0, 0.0, 0.0)), numbers.get("rates", (0.0, 0.0, 0.0)))
-    except SymtopError as error:
-        raise SymtopError(str(error).replace("quaternion", "--attitude").replace("omega_body", "--rates")) from None
+    start: Any = body.Attitude(numbers.get("attitude", (1.0, 0.0, 0.0, 0.0)), numbers.get("rates", (0.0, 0.0, 0.0)))
     if not math.isfinite(period := top.nutation_period(start)):
         raise SymtopError("--body without a weight needs --rates: it does not move")
     if top.I1 == top.I2 and (top.free or abs(top.centre[2]) == 1.0):
@@ -237,7 +234,7 @@ def _in_options(error: SymtopError, command: click.Command | None) -> str:
     parameters = command.params if command is not None else []
     options = [one for one in parameters if isinstance(one, click.Option)]
     named = {str(one.name): max(one.opts, key=len) for one in reversed(options)}  # the first of a name
-    sentence = error.renamed(named)
+    sentence = error.renamed({"quaternion": "--attitude", "omega_body": "--rates"} | named)
     if not isinstance(error, UnknownNameError) or error.parameters[0] not in ("scene", "integrator"):
         return sentence
     from symtop.methods.framework.registry import integrators, split_name

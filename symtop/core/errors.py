@@ -16,6 +16,7 @@ from symtop.core.signals import is_of_user
 
 LONGEST_PART = 255  # bytes of a name in a folder
 SHOWN = 80  # characters of a name that are shown
+ENTRY = "an entry of "  # a row, before its name
 MAGIC = (b"\x89HDF", b"CDF")  # the first bytes of netCDF files
 
 
@@ -66,7 +67,7 @@ def finite(name: str, value: object, least: float = -math.inf) -> float:
         with contextlib.suppress(TypeError, ValueError, OverflowError):
             number = value = float(value)  # type: ignore[arg-type]
     if not math.isfinite(number):
-        raise SymtopError(f"{name} must be a finite number, not {shown(value)}", name)
+        raise SymtopError(f"{name} must be a finite number, not {shown(value)}", name.removeprefix(ENTRY))
     if number < least:
         raise SymtopError(f"{name} must be at least {least:g}, not {number!r}", name)
     return number
@@ -133,7 +134,7 @@ def row(name: str, values: object) -> list[float]:
     with contextlib.suppress(TypeError):  # nothing to go through, such as an array without dimensions
         entries = None if isinstance(values, (str, bytes, dict, set)) else list(values)  # type: ignore[call-overload]
         if entries is not None:
-            return [finite(f"an entry of {name}", value) for value in entries]
+            return [finite(f"{ENTRY}{name}", value) for value in entries]
     raise SymtopError(f"{name} must be a row of numbers, not {shown(values)}", name)
 
 

@@ -201,3 +201,13 @@ def locked(path: Path, *, wait: bool) -> Iterator[bool]:
             finally:
                 lock.unlink(missing_ok=True)
             return
+
+
+@contextlib.contextmanager
+def only_writer(path: Path) -> Iterator[Path]:
+    """The folder of a file's parts, while nobody else writes that file; SymtopError if another process does."""
+    folder = path.with_name(f"{path.name}.parts")
+    with locked(folder, wait=False) as ours:
+        if not ours:
+            raise SymtopError(f"another process is writing {path}: wait until it has ended, or name another path")
+        yield folder

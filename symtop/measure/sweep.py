@@ -251,9 +251,7 @@ def _opened(file: Path | None) -> Iterator[Stored]:
     if file is None:
         yield [], {}
         return
-    with files.locked(file.with_name(f"{file.name}.parts"), wait=False) as ours:  # the lock of an ensemble of that path
-        if not ours:
-            raise SymtopError(f"another process is writing {file}: wait until it has ended, or name another path")
+    with files.only_writer(file):
         files.sweep(file)
         yield _stored(file) if file.exists() else ([], {})
 

@@ -57,7 +57,7 @@ def unit(name: str, value: object, size: int) -> list[float]:
     numbers = vector(name, value, size)
     length = math.sqrt(math.fsum(number * number for number in numbers))
     if abs(length - 1.0) > UNIT:
-        raise SymtopError(f"{name} must have unit length, not {length:.9g}")
+        raise SymtopError(f"{name} must have unit length, not {length:.9g}", name)
     return [number / length for number in numbers]
 
 
@@ -129,7 +129,7 @@ def bounded(name: str, value: object, least: float = 0.0) -> float:
     """Return `value` as a float of at most `LARGEST` in size."""
     number = finite(name, value)
     if not least <= abs(number) <= LARGEST:
-        raise SymtopError(f"{name} must be between {least:g} and {LARGEST:g} in size, not {number!r}")
+        raise SymtopError(f"{name} must be between {least:g} and {LARGEST:g} in size, not {number!r}", name)
     return number
 
 

@@ -9,8 +9,8 @@ exponentially), so that an error e_1 of one piece becomes after n pieces
 
 Symplectic and symmetric methods commit no error along which N shears, and theirs grows linearly. Where two nutations
 cost too much, the probe takes a coarser step and scales its error by the declared order; the passage of a pole is
-then probed by itself at the step of the run. A probe in angles whose steps are long beside a pole takes in as many
-passages as it may, as over few of them what they add may cancel; one of a free body beside an unstable rotation, too.
+then probed by itself at the step of the run. A probe in angles whose steps are long beside a pole, and one of a free
+body beside an unstable rotation, take in as many passages as they may: what few of them add may cancel.
 
 *The cause* is read from exact landmarks of the motion, in this order:
 

@@ -165,21 +165,19 @@ def test_a_run_is_counted_by_whether_it_meets_the_error_as_predicted(errors, tol
     predicted = np.array([[1e-2] * 4, [1e-7, 1e-4, 1e-7, np.inf]])[:, np.newaxis]  # settings, horizon, members
     names, over = ["a", "b"], ("scene", "variant", "quantity", "setting", "horizon", "member")
     far = xr.Dataset({
-                         "error": (over, np.broadcast_to(predicted, (1, 2, 1, 2, 1, 4))),
-                         "setting_value": (over[:2] + over[3:4], np.broadcast_to([4.0, 8.0], (1, 2, 2))),
-                         "reach": (over[:2] + over[3:4], np.ones((1, 2, 2))),
-                         "work": (over[:2] + over[3:4] + over[5:], np.ones((1, 2, 2, 4))),
-                     },
-                     {"variant": names, "quantity": ["axis"], "horizon": [1e5]})  # fmt: skip
+        "error": (over, np.broadcast_to(predicted, (1, 2, 1, 2, 1, 4))),
+        "setting_value": (over[:2] + over[3:4], np.broadcast_to([4.0, 8.0], (1, 2, 2))),
+        "reach": (over[:2] + over[3:4], np.ones((1, 2, 2))),
+        "work": (over[:2] + over[3:4] + over[5:], np.ones((1, 2, 2, 4))),
+    }, {"variant": names, "quantity": ["axis"], "horizon": [1e5]})  # fmt: skip
     each = np.broadcast_to(np.array([[1e-2] * 4, errors]), (1, 1, 2, 2, 4))
     over = ("scene", "variant")
     ran = xr.Dataset({
-                         "errors": ((*over, "rank", "side", "member"), each),
-                         "setting_value": ((*over, "rank", "side"), np.broadcast_to([4.0, 8.0], (1, 1, 2, 2))),
-                         "contender": ((*over, "rank"), np.array([[names]])),
-                         "quantity": (over, [["axis"]]), "target": (over, [[1e-6]]), "checked_horizon": (over, [[1e5]]),
-                     },
-                     {"variant": ["check-00"]})  # fmt: skip
+        "errors": ((*over, "rank", "side", "member"), each),
+        "setting_value": ((*over, "rank", "side"), np.broadcast_to([4.0, 8.0], (1, 1, 2, 2))),
+        "contender": ((*over, "rank"), np.array([[names]])),
+        "quantity": (over, [["axis"]]), "target": (over, [[1e-6]]), "checked_horizon": (over, [[1e5]]),
+    }, {"variant": ["check-00"]})  # fmt: skip
     tree = xr.DataTree.from_dict({"/far": far, "/checks": ran})
     assert runs.checks(tree)["told"].sum() == 2 * (4 + told)
     (row,) = facts.checked(tree).to_dict("records")

@@ -20,7 +20,7 @@ import xarray as xr
 from symtop.core import netcdf
 from symtop.core.code_hash import digest, hashed, packages
 from symtop.core.errors import SymtopError, SymtopWarning, boolean, check_replaceable, file_path, positive, whole
-from symtop.core.files import locked, replacing, sweep
+from symtop.core.files import only_writer, replacing, sweep
 from symtop.core.jit import code
 from symtop.core.parallel import MOST_THREADS, cores, in_order, in_threads
 from symtop.core.progress import progress_bar
@@ -286,10 +286,7 @@ def _tolerances(method: Integrator, tolerance: object, members: Members, horizon
 def _stream(path: Path, job: Job, labels: dict[str, Any], words: dict[str, Any]) -> Iterator["Stream"]:
     """The stream to a file, while nobody else has one; SymtopError if another process does."""
     check_replaceable(path)
-    folder = path.with_name(f"{path.name}.parts")
-    with locked(folder, wait=False) as ours:
-        if not ours:
-            raise SymtopError(f"another process is writing {path}: wait until it has ended, or name another path")
+    with only_writer(path) as folder:
         yield Stream(path, folder, job, labels, words)
 
 
