@@ -1,4 +1,4 @@
-"""What a release ships agrees with pyproject.toml: the conda recipe's requirements and version, and the citation's."""
+"""What a release ships agrees with pyproject.toml: pins, requirements of the conda recipe, and versions."""
 
 import re
 import tomllib
@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 import yaml
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 import symtop
 
@@ -41,3 +43,21 @@ def test_recipe_versions_and_commands_agree_with_the_project(project, recipe):
     assert recipe["build"]["python"]["entry_points"] == commands
     changes = (ROOT / "CHANGELOG.md").read_text(encoding="utf-8")
     assert re.search(r"^## (?!Unreleased$)(\S+)", changes, re.MULTILINE)[1] == symtop.__version__
+
+
+def _unfulfilled(lines: list[str], *files: str) -> list[str]:
+    """Requirements that are not pinned in files of constraints, or pinned to a version that they exclude."""
+    rows = [row for file in files for row in (ROOT / file).read_text(encoding="utf-8").splitlines() if "==" in row]
+    pins = {canonicalize_name(name): version for name, _, version in (row.partition("==") for row in rows)}
+    wanted = [Requirement(line) for line in lines]
+    return [str(one) for one in wanted if not one.specifier.contains(pins.get(canonicalize_name(one.name), "0"))]
+
+
+def test_pins_fulfil_every_requirement(project):
+    """Negative controls: a bound above its pin, and a package that is not pinned."""
+    extras, groups = project["project"]["optional-dependencies"], project["dependency-groups"]
+    own = [*project["build-system"]["requires"], *project["project"]["dependencies"], *extras["distributed"]]
+    assert _unfulfilled([*own, *groups["test"], *groups["lint"]], "constraints.txt") == []
+    assert _unfulfilled(groups["docs"], "constraints.txt", "docs/constraints.txt") == []
+    assert _unfulfilled(extras["peers"], "constraints.txt", "benchmarks/peers/constraints.txt") == []
+    assert _unfulfilled(["numpy>=2.0", "numpy>=90", "no-such>=1"], "constraints.txt") == ["numpy>=90", "no-such>=1"]

@@ -61,8 +61,8 @@ def shown(value: object) -> str:
 def finite(name: str, value: object, least: float = -math.inf) -> float:
     """Return `value` as a float; refuse anything that is not one finite real number, or is below the least."""
     number = math.nan
-    # float() would read a number in them
-    other = getattr(getattr(value, "dtype", None), "kind", "") in ("b", "U", "S", "c")
+    # float() would read a number in them; one in an array of one entry, below NumPy 2.4
+    other = getattr(value, "ndim", 0) or getattr(getattr(value, "dtype", None), "kind", "") in ("b", "U", "S", "c")
     if not (other or isinstance(value, (bool, str, bytes, bytearray)) or type(value).__name__ == "MaskedConstant"):
         with contextlib.suppress(TypeError, ValueError, OverflowError):
             number = value = float(value)  # type: ignore[arg-type]
@@ -162,7 +162,7 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
 
 LONGEST = 300  # characters of an error's message that are shown
 _COMPILING = "(step: nopython frontend)"  # numba says it before each cause, from the loop inwards; the last counts
-_TRACE = r",? (?:defined at |File \"|During: |There are \d+ candidate)"  # what follows a cause
+_TRACE = r",? (?:defined at |raised from |File \"|During: |There are \d+ candidate)"  # what follows a cause
 
 
 def words_of(error: BaseException) -> str:

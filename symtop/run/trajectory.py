@@ -115,7 +115,7 @@ def _public(time: Array, columns: Mapping[str, Array], units: str) -> xr.Dataset
     variables = {name: (_DIMS[values.shape[1:]], values, attributes(name, units)) for name, values in columns.items()}
     used = [name for name in LABELS if any(name in dims for dims, _, _ in variables.values())]
     coordinates = {name: (name, list(LABELS[name]), attributes(name, units)) for name in used}
-    return xr.Dataset(variables, {"time": ("time", time, attributes("time", units)), **coordinates})
+    return xr.Dataset(variables, {"time": ("time", time.copy(), attributes("time", units)), **coordinates})
 
 
 def _direct(time: Array, columns: Mapping[str, Array], units: str) -> xr.Dataset:

@@ -1,6 +1,7 @@
 """Plug-ins that misbehave: each ends in one sentence and its exit code, whatever calls them, and spoils nothing."""
 
 import math
+import re
 import sys
 import warnings
 from pathlib import Path
@@ -99,7 +100,7 @@ symtop.register(
 @pytest.mark.parametrize(("returns", "says"), [
     ("(0.0,) * 4, carry, 1, 0", None),
     ("(0.0, 0.0), carry, 1, 0",
-     "TypingError: Cannot unify UniTuple(float64 x 4) and UniTuple(float64 x 2) for 'dstate.3'"),
+     "TypingError: Cannot unify UniTuple(float64 x 4) and UniTuple(float64 x 2) for 'dstate.N'"),
     ("unknown(state)", "TypingError: NameError: name 'unknown' is not defined"),
     ("(0.0,) * 4, carry, 1, 9", "must return an outcome from 0 to 6, not 9"),
     ("(0.0,) * 4, carry, 1, -1", "must return an outcome from 0 to 6, not -1"),
@@ -116,7 +117,8 @@ def test_a_kernel_that_does_not_compile_or_returns_no_outcome_is_one_sentence(re
         else:
             assert (code, len(lines)) == (2, 1), lines
             assert lines[0].startswith("symtop: "), lines
-            assert lines[0].endswith(says), lines
+            # numba counts the assignments to a variable in the bytecode, which differs between versions of Python
+            assert re.sub(r"(?<='dstate\.)\d+", "N", lines[0]).endswith(says), lines
 
 
 @pytest.mark.parametrize("count", [math.nan, math.inf, 1e30])

@@ -134,7 +134,7 @@ def test_frames_are_attitudes(theta):
     phi, psi = (values.ravel() for values in np.meshgrid(np.linspace(-3, 3, 7), np.linspace(0, 6, 7)))
     quaternion = charts.quaternion_from_angles(theta, phi, psi)
     axis = charts.axis_from_quaternion(quaternion)
-    across = Rotation.from_quat(quaternion, scalar_first=True).as_matrix()[..., 0]
+    across = Rotation.from_quat(np.roll(quaternion, -1, axis=1)).as_matrix()[..., 0]
     frames = np.concatenate([axis, np.zeros_like(axis), across], axis=1)
     again = frame_to_attitude(SpaceTop(1.0, 1.0, 0.0), np.zeros(phi.size), frames)[:, :4]
     assert np.max(charts.attitude_distance(again, quaternion)) < 2e-15

@@ -124,7 +124,7 @@ def body_rates(at):
 
 def matrix(q):
     """The rotation from body to space."""
-    return Rotation.from_quat(q, scalar_first=True).as_matrix()
+    return Rotation.from_quat(np.roll(q, -1)).as_matrix()
 
 
 @pytest.mark.parametrize("scene", random_scenes(20, seed=5))

@@ -4,15 +4,16 @@ import math
 
 import numpy as np
 import pytest
-from mpmath import elliprf, elliprj, mp, mpf, polyroots, workdps
+from mpmath import elliprf, elliprj, mp, mpf, workdps
 
 from symtop.model.exact.elliptic import differences, half_period, r_j, roots
 
 
 def exact_roots(g2, g3):
     """e1 >= e2 >= e3 to 40 digits."""
-    zeros = polyroots([-mpf(g3), -mpf(g2), 0, 4], maxsteps=300, extraprec=200, asc=True)
-    return sorted((root.real for root in zeros), reverse=True)
+    with mp.extraprec(200):
+        zeros, _ = mp.eig(mp.matrix([[0, 0, mpf(g3) / 4], [1, 0, mpf(g2) / 4], [0, 1, 0]]))  # the companion matrix
+    return sorted((mp.re(root) for root in zeros), reverse=True)
 
 
 def exact_differences(e, h):

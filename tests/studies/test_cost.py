@@ -463,7 +463,8 @@ def test_an_advised_setting_was_run_on_other_tops_and_serves_them(small):
 
 
 def test_the_page_says_what_was_measured_and_shares_of_silent_runs_are_of_their_kind(small, tmp_path):
-    rows = facts.tables(small)["silent"].set_index(["variant", "kind of top"]).loc[("rk4[axis]", "near-separatrix")]
+    silent = facts.tables(small)["silent"].set_index(["variant", "kind of top"]).sort_index()
+    rows = silent.loc[("rk4[axis]", "near-separatrix")]
     health, kind = cells.health(small, "rk4[axis]"), KINDS.index("near-separatrix")
     at = [int(np.argmin(np.abs(health.setting - steps))) for steps in facts.STEPS]
     assert np.array_equal(rows["wrong"], health.wrong[at, kind] / health.drawn[kind])

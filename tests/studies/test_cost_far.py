@@ -10,6 +10,7 @@ from symtop_studies.cost.far import diagram
 from symtop_studies.cost.tops import Tops
 
 import symtop
+from symtop.core import netcdf
 from symtop.measure.phase import split
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import closed_form, scene
@@ -33,7 +34,7 @@ def padded(errors):
 
 @pytest.fixture(scope="module")
 def data(quick_results):
-    return xr.load_datatree(quick_results / "cost.nc")
+    return netcdf.read_any(quick_results / "cost.nc")
 
 
 @pytest.mark.parametrize("power", laws.POWERS)
