@@ -57,6 +57,12 @@ def test_a_median_over_few_scenes_is_not_ranked(data, monkeypatch):
     works["loop", "strang[axis]"] = measures.Efficiency(1.0, True)
     monkeypatch.setattr(facts, "efficiencies", lambda *_: works)
     table = facts.cheapest(three)
+    more = {"midpoint[angles]": 10.0, "stormer-verlet[angles]": 20.0, "trapezoidal[angles]": 80.0}
+    more = {(scene, name): measures.Efficiency(work, False) for scene in scenes for name, work in more.items()}
+    monkeypatch.setattr(facts, "efficiencies", lambda *_: works | more)
+    answers, known = facts.facts(three), measures.stepping(data).sizes["variant"]
+    assert (answers["span"], answers["span_order"], answers["unknown"]) == (8.0, 2, known - 5)
+    monkeypatch.setattr(facts, "efficiencies", lambda *_: works)
     assert table["variant"].tolist() == ["rk4[axis]", "strang[axis, attitude]"]
     assert table[["ranked", "of these by the law"]].to_numpy().tolist() == [[True, 0], [False, 1]]
     assert facts.cheapest(data)["ranked"].all()  # the control: a dataset of one scene has no more
@@ -129,6 +135,11 @@ def test_rows_show_the_axis_the_attitude_where_they_can_and_work_a_nutation_and_
 
 def test_the_page_says_what_was_measured_and_adaptive_errors_follow_their_tolerance(data, tmp_path):
     fitted = measures.tolerance_fits(data)
+    tolerance = 10.0 ** -np.arange(2.0, 10.0)  # errors near the bound are the reference's: they follow no tolerance
+    columns = {"tolerance": tolerance, "axis": np.maximum(0.1 * tolerance, 5e-8), "axis_bound": np.full(8, 1e-8)}
+    rows = {name: (("scene", "variant", "setting"), one[None, None]) for name, one in columns.items()}
+    (one,) = measures.tolerance_fits(xr.Dataset(rows, {"scene": ["goldstein"], "variant": ["rk45[angles]"]})).values()
+    assert (one.slope, one.used.sum()) == (pytest.approx(1.0), 4)
     assert {name for _, name in fitted} == {name for name in ROWS if integrator(name).adaptive}
     assert fitted["goldstein", "rk45[angles]"].slope == pytest.approx(1.0, abs=0.15)
     text, answers = checked("convergence", data, tmp_path), facts.facts(data)
