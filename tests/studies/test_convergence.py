@@ -48,6 +48,12 @@ def test_verdicts_are_those_of_the_one_rule_and_a_wrong_declaration_is_refuted(d
     assert sum(word == "confirmed" for word, _ in results.values()) >= 7
     monkeypatch.setattr(measures, "declared_order", lambda name: 3)
     assert {measures.judged(data)["goldstein", name].verdict for name in ("strang[axis]", "rk4[axis]")} == {"refuted"}
+    monkeypatch.setattr(facts, "declared_order", lambda name: 3)
+    words = facts.tables(data)["orders"].set_index("variant")["verdict"]
+    assert (words["strang[axis]"], words["rk4[axis]"]) == ("lower", "higher")
+    monkeypatch.setattr(facts, "ratios", lambda _: {"a": np.array([1.0, 1.0, 9.0]), "b": np.full(4, 5.0)})
+    told = [facts.facts(data)[f"ratio_{name}"] for name in ("most_variant", "most", "middle", "runs")]
+    assert told == ["a", 9.0, 5.0, 7]
 
 
 def test_a_median_over_few_scenes_is_not_ranked(data, monkeypatch):
@@ -58,7 +64,8 @@ def test_a_median_over_few_scenes_is_not_ranked(data, monkeypatch):
     monkeypatch.setattr(facts, "efficiencies", lambda *_: works)
     table = facts.cheapest(three)
     more = {"midpoint[angles]": 10.0, "stormer-verlet[angles]": 20.0, "trapezoidal[angles]": 80.0}
-    more = {(scene, name): measures.Efficiency(work, False) for scene in scenes for name, work in more.items()}
+    more = {(scene, name): measures.Efficiency(part * work, False) for scene, part in zip(scenes, (1.0, 1.0, 9.0), strict=True)
+            for name, work in more.items()}  # fmt: skip
     monkeypatch.setattr(facts, "efficiencies", lambda *_: works | more)
     answers, known = facts.facts(three), measures.stepping(data).sizes["variant"]
     assert (answers["span"], answers["span_order"], answers["unknown"]) == (8.0, 2, known - 5)
@@ -90,6 +97,7 @@ def test_work_follows_from_runs_beside_it_or_from_its_error_constant(data):
     answers = measures.efficiencies(data, error)[pair]
     assert answers.work == pytest.approx(work, rel=0.1)
     assert not answers.foreseen
+    assert measures.efficiencies(data, 1e3)[pair].foreseen  # all runs are closer: a longer step was not tried
     far, beyond = (measures.efficiencies(data, target)[pair] for target in (1e-14, 25e-16))
     assert far.foreseen
     assert beyond.work == pytest.approx(2.0 * far.work, rel=1e-6)

@@ -11,7 +11,7 @@ import xarray as xr
 from symtop_studies.cost import cells, facts, figures, ladder, prices as pricing, study, tops as tops_module
 from symtop_studies.cost.cells import GENERAL, Cell
 from symtop_studies.cost.confirm import rounded, share_served
-from symtop_studies.cost.ranking import ENDS, SAFE, Ladder, cost_to_reach, hindsight, run_lengths, safe, slowdowns, wins
+from symtop_studies.cost.ranking import ENDS, SAFE, Ladder, cost_to_reach, factors, hindsight, run_lengths, safe, slowdowns, wins
 from symtop_studies.cost.tops import ASKED, FIRST, KINDS, MOMENTA, NATURAL, SCENE, natural, tops_of
 
 import symtop
@@ -118,6 +118,7 @@ def test_a_safe_setting_serves_95_of_100_tops():
     (one,), _ = safe([steps("a", np.arange(1.0, 61.0))])  # the 57th of 60: Beta(57, 4), its 2.5 % at 0.863
     assert (one.seconds, one.low) == pytest.approx((57.0, 52.0), rel=1e-6)
     assert (ENDS[1] - ENDS[0], sum(ENDS)) == pytest.approx((0.95, 1.0))
+    assert np.log(factors(np.array([0.8]))).std() == pytest.approx(0.8, rel=0.15)  # log-normal: no price is negative
     (spoilt,), called = safe([steps("a", np.where(met > 94.0, INF, met))])
     assert math.isinf(spoilt.seconds)  # six tops are never met
     assert not called
@@ -184,6 +185,11 @@ def test_a_price_is_the_median_and_a_process_that_is_slower_at_everything_no_spr
     assert pricing.prices(tree_of(apart, names)).marked  # the control
     few = tree_of(together[:, :3])  # of so few a common factor would be their own noise
     assert pricing.prices(few).marked == ["a", "b", "c"]
+    wide = pricing.prices(few).spread / 1.35  # standard deviations
+    assert pricing.prices(few).error == pytest.approx(1.25 * 2.78 / 1.96 * wide / math.sqrt(5.0))
+    slow = tree_of(together, names)
+    slow["prices"]["call"] = slow["prices"]["call"] * xr.DataArray([1.0, 1.3, 1.1, 0.8, 1.0], dims="scene")
+    assert pricing.prices(slow).call == pytest.approx(2e-6)  # a process that is slower calls as slowly
 
 
 def test_a_noisy_price_is_measured_again_and_marked_if_it_stays():
@@ -208,6 +214,14 @@ def test_a_price_is_the_slope_of_two_runs_and_the_guard_and_who_runs_long_are_co
     runs = runs.assign({name: (over[:2], [[word]]) for name, word in (("chart", "axis"), ("control", "step_size"))})
     (row,) = cells.guard_counts(xr.DataTree.from_dict({"short": runs})).to_dict("records")
     assert (row["wrong"], row["wrong_warned"], row["wrong_seen"]) == (1, 1, 0)  # the forecast alone shows it
+    each = np.array([[1.0, 1.0, 100.0], [2.0, 2.0, 2.0]])
+    monkeypatch.setattr(cells, "costs", lambda *_: cells.Costs(["a", "b"], each, np.zeros(2)))
+    assert cells.fewest(None, None) == "a"  # on the median top
+    drawn, none = np.full(len(KINDS), 100.0), np.zeros((1, len(KINDS)))
+    wrong, silent = none + 9.0 * np.eye(len(KINDS))[0], none + 5.0 * np.eye(len(KINDS))[1]
+    monkeypatch.setattr(cells, "health", lambda *_: cells.Health(np.array([facts.FINE]), drawn, wrong, silent, none))
+    told = facts.silent_facts({"short": xr.Dataset(coords={"variant": [facts.QUOTED]})})
+    assert (told["worst_kind"], told["worst_wrong"], told["worst_silent"]) == (KINDS[0], 0.09, 0.0)
     names, charts = ["a", "b", "c", "d"], ["axis", "attitude", "attitude", "angles"]
     ran = xr.Dataset({"chart": (over[:2], [charts])}, {"variant": names, "target": [1e-3]})
     each = {"axis": np.array([[1.0], [INF], [INF], [INF]]), "attitude": np.array([[1.0], [1.2], [2.0], [2.0]])}
@@ -375,6 +389,14 @@ def test_finer_targets_cost_more_within_the_budget_and_every_top_is_judged_or_dr
     data = xr.DataTree.from_dict({"short": strang.expand_dims(scene=["tops"], variant=["strang[axis]"])})
     health = cells.health(data, "strang[axis]")
     assert (health.dropped >= 0).all()
+    np.testing.assert_array_equal(health.wrong, wrong[: len(health.setting)])
+    blank = np.full((ladder.LEVELS, 3), NAN)
+    blank[0] = [1.0, 1.0, 10.0]
+    done = ladder.Climb(blank, {"axis": blank, "energy": 0.2 * blank, MOMENTA: 0.05 * blank}, blank == 1.0, blank[0] > 0.0)
+    three, rk4 = tops_module.Tops(tops.numbers[:3], 10.0), integrator("rk4[axis]")
+    assert ladder.typical_work(rk4, done, three)[0, 0] == 1.0  # of the median top
+    monkeypatch.setattr(ladder, "forecast", lambda *_: SimpleNamespace(axis_error=1.0, whole=False))
+    assert ladder.guarded_runs(rk4, three, done, 2)["watched"][0, 0] == 0.2  # the larger
     assert health.dropped[-1].sum() > 0  # a budget ends every ladder of order 2
     rows = cells.guard_counts(data)  # the guard is counted once for every run that it was asked about
     asked = np.isfinite(strang["foretold"].values).sum()
@@ -448,6 +470,10 @@ def test_facts_and_tables_are_those_of_the_cells(small):
     fine, dear = (xr.DataTree.from_dict({**parts, "prices": parts["prices"].assign(price=one)}) for one in
                   (price.where(~name | (price["priced_at"] > 1e-9), 1.0), xr.where(name, 1e3, 1.0) * price))  # fmt: skip
     before, after = (cells.costs(one, cell._replace(needs="expression")).values for one in (small, fine))
+    counted = cells.costs(small, cell._replace(needs="expression"), cells.EVALUATIONS).values
+    assert before == pytest.approx(1.4e-8 * counted + 2e-6)  # the call is paid for
+    table, known = facts.tables(small)["prices"], pricing.prices(small)
+    assert np.log((table["high (ns)"] / table["price (ns)"]).to_numpy()) == pytest.approx(1.96 * known.error)
     assert np.mean(before == after) > 0.9  # at the prices of tolerances that meet the error, not of the finest
     told = facts.winners_facts(dear)
     assert 1.0 < told["misled"] == pytest.approx(told["fewest_seconds"] / told["instead_seconds"])

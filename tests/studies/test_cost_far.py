@@ -4,6 +4,7 @@ import json
 import math
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from symtop_studies.cost import facts, far as runs, laws
@@ -13,6 +14,8 @@ from symtop_studies.cost.tops import Tops
 
 import symtop
 from symtop.core import netcdf
+from symtop.core.numbers import EPSILON
+from symtop.measure.order import power_law
 from symtop.measure.phase import split
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import closed_form, scene
@@ -80,6 +83,16 @@ def test_rounding_is_not_predicted_above_what_the_run_has_shown():
     late, end = int(np.argmin(np.abs(FAR[::2] - 1e4))), ends.size - 1
     assert 0.1 < told[late, 0] / seen[0, end, 0] < 30.0
     assert alone[end] > 1e3 * seen[0, end, 0]  # the control: without the limit
+    on = scene("fast")
+    size = (abs(on.top.energy(on.start)) + on.top.mgl) / on.energy_scale
+    assert runs.grain_of(one_top("fast")) == pytest.approx(EPSILON * size)
+    rough, ends = 1e-14 * (1.0 + 0.3 * np.sin(40.0 * np.arange(9.0))), FAR[:9]
+    seen = np.full((3, 1, FAR.size, 1), np.nan)
+    seen[:, 0, :9, 0] = rough
+    told = runs.predicted(seen, np.full((1, 1), 100.0), FAR, np.full(1, 1e-16), drifts=False)["error"].values[1, 0, 6, 0]
+    bounded = laws.fit(FAR, seen[1, 0].T).coefficients[0, 0]
+    walked = np.sqrt(2.0 * np.abs(rough / bounded - 1.0).max()) * rough.max() * np.sqrt(FAR[12] / ends[-1])
+    assert told == pytest.approx(np.hypot(bounded, walked), rel=2e-3)  # in quadrature, a decade beyond the run
 
 
 def test_a_drift_below_an_oscillation_is_found_and_a_wrong_law_would_not_predict():
@@ -89,6 +102,11 @@ def test_a_drift_below_an_oscillation_is_found_and_a_wrong_law_would_not_predict
     np.testing.assert_allclose(found.at(FAR)[0], drift, rtol=1e-6)
     assert found.leading.tolist() == [1.0, 0.0]
     assert np.isnan(found.powers[1, 1])
+    line = power_law(FAR, rough, SHORT)
+    assert (found.slope[1], found.interval[1]) == pytest.approx((line.slope, line.interval))
+    noise = 1e-6 * (1.0 + 0.05 * np.random.default_rng(0).standard_normal((9000, FAR.size)))
+    chosen = laws.fit(FAR, np.where(FAR < 60.0, noise, np.nan), drifts=True)  # four points: Student's of two degrees
+    assert 0.03 < np.mean(~np.isnan(chosen.powers[:, 1])) < 0.042
     errors = np.full((2, FAR.size), np.nan)
     errors[0, :3] = 1e-5
     errors[1, :8] = 2.0
@@ -204,7 +222,7 @@ def test_what_is_checked_was_predicted_and_a_prediction_that_fails_is_told(data)
     assert (ran.groupby(["quantity", "target", "horizon"]).size() == 4 * runs.CHECKED_TOPS).all()
 
 
-def test_the_map_goes_by_the_median_top_and_its_shares_are_of_the_cells_that_are_reached():
+def test_the_map_goes_by_the_median_top_and_its_shares_are_of_the_cells_that_are_reached(monkeypatch):
     names, over = ["rk4[axis]", "strang[axis]"], ("scene", "variant", "setting", "member")
     error = np.full((1, 2, 3, 2, 2, 4), 1e-4)
     error[..., 0, :, 2:] = 1.0  # two of four tops need the finer setting, which was not run so far
@@ -224,8 +242,14 @@ def test_the_map_goes_by_the_median_top_and_its_shares_are_of_the_cells_that_are
     reached = np.array(runs.TARGETS)[:, np.newaxis] >= 1e-4 * (1.0 - 1e-9) * np.ones(2)
     np.testing.assert_array_equal(panel.winner, np.where(reached, 0, -1))
     assert not panel.predicted.any()  # half of the tops are not most
+    error[..., 0, :, 1:] = 1.0  # three of four need it
+    more = xr.DataTree.from_dict({"far": far.assign(error=(far["error"].dims, error)), "prices": prices})
+    np.testing.assert_array_equal(diagram(more, "axis").predicted, reached & np.array([False, True]))
+    ran = {"quantity": "axis", "target": 1e-3, "horizon": np.arange(11), "told": True, "ratio": np.arange(11.0)}
+    monkeypatch.setattr(runs, "checks", lambda _: pd.DataFrame(ran))
     told = facts.far_facts(tree)
-    assert [told[f"map_axis{end}"] for end in ("", "_share", "_clear", "_short")] == ["rk4[axis]", 1.0, 1.0, 0.0]
+    assert [told[f"map_axis{end}"] for end in ("", "_share", "_clear", "_short", "_long")] == ["rk4[axis]", 1.0, 1.0, 0.0, 0.0]
+    assert [told[f"checks_{end}"] for end in ("low", "middle", "high")] == [1.0, 5.0, 9.0]
 
 
 def test_a_check_measures_the_error_of_each_run():

@@ -100,6 +100,11 @@ def test_a_constant_is_kept_bounded_or_lost_on_the_worst_scene(histories):
     ended = histories.assign(outcome=histories["outcome"].where(histories["variant"] != "strang[axis]", "left_chart"))
     assert measures.fates(ended)["energy"]["strang[axis]"] == measures.FAILED
     assert facts.of_histories(ended)["holding"] == 1
+    brief = histories.assign(sample_time=histories["sample_time"].copy(), energy_largest=histories["energy_largest"].copy())
+    brief["sample_time"].loc[{"variant": "rk4[axis]", "scene": "goldstein"}] *= 0.5
+    brief["energy_largest"].loc[{"variant": "gauss-4[axis]"}] = 1e-11  # a random walk
+    answers = facts.of_histories(brief)
+    assert [answers[name] for name in ("shortened", "shortest", "energy_lost")] == [1, 0.5, 3]
 
 
 @pytest.fixture(scope="module")
@@ -151,8 +156,8 @@ def test_phases_are_grouped_by_the_energy_and_a_run_that_keeps_it_is_none_of_tho
 
 
 def test_a_prediction_is_judged_by_what_was_measured():
-    cells = {"steps": [9.0] * 3, "evaluations": [9.0] * 3, "short": [1000.0] * 3, "ratio": [1.0, 1.25, np.nan],
-             "predicted": [2500.0, 2500.0, np.inf], "measured": [2500.0, 2000.0, np.nan]}  # fmt: skip
+    cells = {"steps": [9.0] * 3, "evaluations": [9.0] * 3, "short": [1000.0] * 3, "ratio": [1.0, 0.75, np.nan],
+             "predicted": [2500.0, 1500.0, np.inf], "measured": [2500.0, 2000.0, np.nan]}  # fmt: skip
     horizons = xr.Dataset({name: (("scene", "variant"), [values]) for name, values in cells.items()},
                           coords={"scene": ["spheroid"], "variant": ["a", "b", "c"]})  # fmt: skip
     answers = facts.of_losses(horizons)
@@ -285,7 +290,11 @@ def test_a_horizon_is_the_first_crossing_and_a_phase_that_is_not_lost_has_none()
     t = np.linspace(0.0, 100.0, 5001)
     bump = 1e-3 * t + np.exp(-(((t - 30.0) / 3.0) ** 2))
     assert 25.0 < lost_at(t, bump, 0.5) < 30.0
+    t = np.linspace(0.0, 1000.0, 4001)
+    assert horizon(t, 1e-6 * t - 1e-11 * t * t, 1e-2).time == pytest.approx(1.127e4, rel=1e-3)  # before it comes back
+    assert np.isnan(lost_at(t, -1e-3 * t, 2.0)) != np.isnan(lost_at(t, -1e-3 * t, 0.5))
     error = 1e-6 * np.sin(5.3 * TIME)
+    assert horizon(TIME, 1e-6 * TIME + error, 1e-2).constant == 0.0  # as an oscillation leaves it
     assert np.isnan(lost_at(TIME, error, 1e-2))
     assert horizon(TIME, error, 1e-2).time > 1e3 * TIME[-1]
 
