@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 import xarray as xr
 from scipy.linalg import expm
-from symtop_studies.carry_over import comparison as by, facts, figures, limits as of, measures
-from symtop_studies.carry_over.bodies import FAMILIES, FLOOR, FREE, SYMMETRIC, Bodies, as_tops, bodies_of, run_level, unit
+from symtop_studies.carry_over import bodies as drawing, comparison as by, facts, figures, limits as of, measures
+from symtop_studies.carry_over.bodies import FAMILIES, FREE, SYMMETRIC, Bodies, as_tops, bodies_of, run_level
 from symtop_studies.carry_over.measures import ASYMPTOTE, growth_table, observed_order, own_table, table, verdicts
 from symtop_studies.cost.ladder import LEVELS, Climb, one_by_one, setting_of
 from symtop_studies.cost.tops import FIRST, MOMENTA
@@ -74,8 +74,8 @@ def test_the_truth_is_within_its_bound_and_another_body_is_not(family):
              one.top.centre), one.start, one.horizon) for one in bodies.scenes]  # fmt: skip
     if family != FREE:
         motion = Integrated(bodies.scenes[0])
-        fine, check = (unit(motion.states(bodies.times[0], tolerance)[:, :4]) for tolerance in (FINE, CHECK))
-        assert bounds[0] == 4.0 * attitude_distance(check, fine).max() + FLOOR
+        fine, check = (drawing.unit(motion.states(bodies.times[0], tolerance)[:, :4]) for tolerance in (FINE, CHECK))
+        assert bounds[0] == 4.0 * attitude_distance(check, fine).max() + drawing.FLOOR
     assert bodies.asked([1e-3, 1e-6, 1e-9, 1e-12])["axis"].any(axis=1).tolist() == [True, True, True, False]
     moved = Bodies(other, bodies.strata, PERIODS).truth[0]
     assert all((attitude_distance(moved[k], states[k]).max() > 10.0 * bounds[k]) for k in range(COUNT))
@@ -131,7 +131,7 @@ def test_wrong_runs_are_told_by_what_shows_them_and_orders_and_exponents_read_of
     time = 5.0 * 2.0 ** np.arange(6)
     for power in (0.0, 1.0, 2.0):
         assert by.exponent(time, 1e-8 * time**power, "attitude") == pytest.approx(power)
-    assert by.exponent(time, np.minimum(1e-4 * time**2, 0.5), "energy") == pytest.approx(2.0)  # to the size of the motion
+    assert by.exponent(time, np.minimum(1e-4 * time**2, 0.5), "energy") == pytest.approx(2.0)  # while it is small
     assert np.isnan(by.exponent(time, np.full(6, 1e-16), "energy"))
 
 
@@ -211,7 +211,7 @@ def test_tau_is_kendalls_with_ties_and_verdicts_follow_limits_fixed_before():
         assert by.tau_of(first, second) == pytest.approx(kendalltau(first, second).statistic)
     reached = np.array([1.0, 2.0, 3.0, 1e300, 1e300])
     assert by.tau_of(reached, reached) == 1.0  # those that nobody reaches say nothing
-    assert by.tau_of(np.arange(1.0, 5.0), np.array([1e300, 1.0, 2.0, 3.0])) == 0.0  # of what one alone reaches: the last
+    assert by.tau_of(np.arange(1.0, 5.0), np.array([1e300, 1.0, 2.0, 3.0])) == 0.0  # what one alone reaches
     assert by.medians(np.array([[1.0, 2.0, 9.0], [1.0, np.inf, np.inf]])).tolist() == [2.0, 1e300]
     assert np.isnan(by.tau_of(reached[3:], reached[3:]))
     for ends, verdict in (((0.91, 0.99), by.YES), ((0.7, 0.95), by.PARTLY), ((0.6, 0.79), by.NO)):
@@ -309,11 +309,12 @@ def test_planted_factors_of_steps_and_of_silent_runs_are_found():
     strata[..., :4] = "thin"  # which need steps a hundred times as short
     met = both["short"]["met_at"].copy()
     met[{"member": slice(4)}] *= 100.0
-    both = xr.DataTree.from_dict({"/short": both["short"].to_dataset().assign(met_at=met), "/own": own, "/prices": tariff,
-                                  "/bodies": both["bodies"].to_dataset().assign(stratum=strata)})  # fmt: skip
+    short, about = (both[name].to_dataset() for name in ("short", "bodies"))
+    both = xr.DataTree.from_dict({"/short": short.assign(met_at=met), "/own": own, "/prices": tariff,
+                                  "/bodies": about.assign(stratum=strata)})  # fmt: skip
     assert [*by.price_factors(both).values()] == pytest.approx([3.0] * 3)
     ends = [[*by.own_factors(both, FREE, 1e-3, without).values()] for without in ("", "thin")]
-    assert min(ends[0]) > 50.0 > 1.01 > max(ends[1])
+    assert (min(ends[0]) > 50.0, max(ends[1]) < 1.01) == (True, True)
     cost = data["short"]["cost"].copy()
     cost[{"variant": 0}] = 1.02 * cost[{"variant": 2}].values  # rk4 and gauss-4 are level on tops
     cost[{"variant": 0, "family": [*FAMILIES].index(FREE)}] *= 3.0
@@ -404,7 +405,8 @@ def test_a_tilt_grows_beyond_the_limit_alone_and_an_unstable_rotation_has_no_lim
     assert far.sum() == 5
     assert of.grown(variant, bodies, h, tilted(6), most).tolist() == [[False, False, grows] for grows in far]
     times = np.linspace(0.0, 200.0, 4001)
-    tilts = np.array([[np.hypot(*(expm(t * slopes) @ tilted(1)[0])[:2]) for t in times] for slopes in bodies.slopes[:2]])
+    two, y = bodies.slopes[:2], tilted(1)[0]
+    tilts = np.array([[np.hypot(*(expm(t * slopes) @ y)[:2]) for t in times] for slopes in two])
     assert (tilts.max(axis=1) / most[:2]) == pytest.approx(0.99, abs=0.02)  # it comes as far, and no farther
     falls = of.Upright(np.array([[1.0, 1.1, 0.5], [1.0, 1.3, 1.15]]), np.array([1.0, 0.0]), np.array([0.5, 3.0]))
     assert not of.reach(falls, tilted(2))[2].any()  # too slow to sleep; about the middle axis

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.cost import cells, facts, figures, ladder, prices as pricing, study, tops as tops_module
+from symtop_studies.cost import cells, facts, figures, ladder, prices as pricing, ranking, study, tops as tops_module
 from symtop_studies.cost.cells import GENERAL, Cell
 from symtop_studies.cost.confirm import rounded, share_served
-from symtop_studies.cost.ranking import ENDS, SAFE, Ladder, cost_to_reach, factors, hindsight, run_lengths, safe, slowdowns, wins
+from symtop_studies.cost.ranking import SAFE, Ladder, cost_to_reach, hindsight, run_lengths, safe, slowdowns, wins
 from symtop_studies.cost.tops import ASKED, FIRST, KINDS, MOMENTA, NATURAL, SCENE, natural, tops_of
 
 import symtop
@@ -117,8 +117,8 @@ def test_a_safe_setting_serves_95_of_100_tops():
     assert safe([steps("a", np.arange(1.0, 31.0))])[0][0].setting == pytest.approx(29.0)  # 28 are less than 95 %
     (one,), _ = safe([steps("a", np.arange(1.0, 61.0))])  # the 57th of 60: Beta(57, 4), its 2.5 % at 0.863
     assert (one.seconds, one.low) == pytest.approx((57.0, 52.0), rel=1e-6)
-    assert (ENDS[1] - ENDS[0], sum(ENDS)) == pytest.approx((0.95, 1.0))
-    assert np.log(factors(np.array([0.8]))).std() == pytest.approx(0.8, rel=0.15)  # log-normal: no price is negative
+    assert (np.diff(ranking.ENDS)[0], sum(ranking.ENDS)) == pytest.approx((0.95, 1.0))
+    assert np.log(ranking.factors(np.array([0.8]))).std() == pytest.approx(0.8, rel=0.15)  # and none is negative
     (spoilt,), called = safe([steps("a", np.where(met > 94.0, INF, met))])
     assert math.isinf(spoilt.seconds)  # six tops are never met
     assert not called
@@ -209,7 +209,8 @@ def test_a_price_is_the_slope_of_two_runs_and_the_guard_and_who_runs_long_are_co
     taken = lambda calls, *_, **__: [SimpleNamespace(best=2e-6 + 1000.0 * nutations * 7e-9) for nutations in calls]
     monkeypatch.setattr(pricing, "timings", taken)
     assert pricing.slopes(["rk4[axis]"], 5, 0.01) == [("rk4[axis]", 1e-8, *map(pytest.approx, (7e-9, 2e-6)))]
-    over, seen = ("scene", "variant", "level", "guarded"), {"foretold": 0.05, "measured": 0.5, "watched": 1e-3, "whole": 0.0}
+    over = "scene", "variant", "level", "guarded"
+    seen = {"foretold": 0.05, "measured": 0.5, "watched": 1e-3, "whole": 0.0}
     runs = xr.Dataset({name: (over, np.full((1, 1, 1, 1), value)) for name, value in seen.items()})
     runs = runs.assign({name: (over[:2], [[word]]) for name, word in (("chart", "axis"), ("control", "step_size"))})
     (row,) = cells.guard_counts(xr.DataTree.from_dict({"short": runs})).to_dict("records")
@@ -392,7 +393,8 @@ def test_finer_targets_cost_more_within_the_budget_and_every_top_is_judged_or_dr
     np.testing.assert_array_equal(health.wrong, wrong[: len(health.setting)])
     blank = np.full((ladder.LEVELS, 3), NAN)
     blank[0] = [1.0, 1.0, 10.0]
-    done = ladder.Climb(blank, {"axis": blank, "energy": 0.2 * blank, MOMENTA: 0.05 * blank}, blank == 1.0, blank[0] > 0.0)
+    wrong = {"axis": blank, "energy": 0.2 * blank, MOMENTA: 0.05 * blank}
+    done = ladder.Climb(blank, wrong, blank == 1.0, blank[0] > 0.0)
     three, rk4 = tops_module.Tops(tops.numbers[:3], 10.0), integrator("rk4[axis]")
     assert ladder.typical_work(rk4, done, three)[0, 0] == 1.0  # of the median top
     monkeypatch.setattr(ladder, "forecast", lambda *_: SimpleNamespace(axis_error=1.0, whole=False))
@@ -458,7 +460,8 @@ def test_facts_and_tables_are_those_of_the_cells(small):
     assert "takahashi-imada[axis]" not in set(winners.loc[GENERAL]["safe"])  # it exists for symmetric bodies alone
     assert "takahashi-imada[axis] (symmetric)" in kicks["1e-3 rad"]
     assert tables["have"]["you have"].tolist() == ["rk4[axis]"]
-    parts, cell = {name: one.to_dataset() for name, one in small.children.items()}, Cell("short", "axis", 1e-3, "strata")
+    parts = {name: one.to_dataset() for name, one in small.children.items()}
+    cell = Cell("short", "axis", 1e-3, "strata")
     kinds = cells.kinds_of(small, "short")[cells.chosen(small, "short", "strata")][cells.asked_tops(small, cell)]
     (one,) = (one for one in cells.safest(small, cell)[0] if one.name == "taylor[axis]")
     taylor, share = parts["short"].isel(scene=0).sel(variant="taylor[axis]"), np.bincount(kinds) / kinds.size
@@ -468,7 +471,7 @@ def test_facts_and_tables_are_those_of_the_cells(small):
     assert one.seconds == pytest.approx(typical)
     price, name = parts["prices"]["price"], parts["prices"]["variant"] == "taylor[axis]"
     fine, dear = (xr.DataTree.from_dict({**parts, "prices": parts["prices"].assign(price=one)}) for one in
-                  (price.where(~name | (price["priced_at"] > 1e-9), 1.0), xr.where(name, 1e3, 1.0) * price))  # fmt: skip
+                  (price.where(~name | (price.priced_at > 1e-9), 1.0), price * xr.where(name, 1e3, 1.0)))  # fmt: skip
     before, after = (cells.costs(one, cell._replace(needs="expression")).values for one in (small, fine))
     counted = cells.costs(small, cell._replace(needs="expression"), cells.EVALUATIONS).values
     assert before == pytest.approx(1.4e-8 * counted + 2e-6)  # the call is paid for
