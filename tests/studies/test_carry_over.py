@@ -297,11 +297,12 @@ def test_planted_factors_of_steps_and_of_silent_runs_are_found():
         assert by.winner(data, FREE, 1e-6) == "gauss-4[body]"
         assert by.winner(data, FREE, 1e-6, "kicks") == "strang[body]"
         assert by.transferred(data, FREE, 1e-6).value == pytest.approx(1.0)
-    scatter = np.random.default_rng(1).lognormal(-10.0, 0.5, (3, 1, 1, 1, 40))  # the same of each family
+    scatter = np.random.default_rng(1).lognormal(10.0, 0.5, (3, 1, 1, 1, 40))  # the same of each family
     both = planted(1.0)
     both["short"] = both["short"].to_dataset().assign(cost=0.0 * both["short"]["cost"] + scatter)
     paired, apart = (by.tau(both, family, 1e-3) for family in ("0.1", FREE))
-    assert paired == (1.0, 1.0, 1.0) > apart[1:]
+    assert (paired, apart.value) == ((1.0, 1.0, 1.0), 1.0)
+    assert apart.low < 0.5
     names = ["rk4[axis]", "strang[axis]", "gauss-4[axis]"]
     tariff, strata = both["prices"].to_dataset(), both["bodies"]["stratum"].copy()
     tariff = xr.concat([tariff, tariff.assign(price=tariff["price"] / 3.0).assign_coords(variant=names)], "variant")
