@@ -131,7 +131,7 @@ def test_wrong_runs_are_told_by_what_shows_them_and_orders_and_exponents_read_of
     time = 5.0 * 2.0 ** np.arange(6)
     for power in (0.0, 1.0, 2.0):
         assert by.exponent(time, 1e-8 * time**power, "attitude") == pytest.approx(power)
-    assert by.exponent(time, np.minimum(1e-4 * time**2, 0.5), "energy") == pytest.approx(2.0)  # while it is small
+    assert by.exponent(time, np.minimum(1e-4 * time**2, 0.5), "attitude") == pytest.approx(2.0)  # while it is small
     assert np.isnan(by.exponent(time, np.full(6, 1e-16), "energy"))
 
 

@@ -85,13 +85,13 @@ def test_rounding_is_not_predicted_above_what_the_run_has_shown():
     assert alone[end] > 1e3 * seen[0, end, 0]  # the control: without the limit
     on = scene("fast")
     size = (abs(on.top.energy(on.start)) + on.top.mgl) / on.energy_scale
-    assert runs.grain_of(one_top("fast")) == pytest.approx(EPSILON * size)
-    rough, ends = 1e-14 * (1.0 + 0.3 * np.sin(40.0 * np.arange(9.0))), FAR[:9]
+    assert runs.grain_of(one_top("fast")) / EPSILON == pytest.approx(size)
+    rough, ends = 1e-6 * (1.0 + 0.3 * np.sin(40.0 * np.arange(9.0))), FAR[:9]
     seen = np.full((3, 1, FAR.size, 1), np.nan)
     seen[:, 0, :9, 0] = rough
-    told = runs.predicted(seen, np.full((1, 1), 100.0), FAR, np.full(1, 1e-16), drifts=False)
-    bounded = laws.fit(FAR, seen[1, 0].T).coefficients[0, 0]
-    walked = np.sqrt(2.0 * np.abs(rough / bounded - 1.0).max()) * rough.max() * np.sqrt(FAR[12] / ends[-1])
+    told = runs.predicted(seen, np.full((1, 1), 100.0), FAR, np.full(1, 1e-8), drifts=False)
+    assert told["walk"].values == pytest.approx(w := (rough / np.sqrt(100.0 * ends)).min(), rel=1e-3)
+    bounded, walked = laws.fit(FAR, seen[1, 0].T).coefficients[0, 0], w * np.sqrt(100.0 * FAR[12])
     assert told["error"].values[1, 0, 6, 0] == pytest.approx(np.hypot(bounded, walked), rel=2e-3)  # in quadrature
 
 
