@@ -628,6 +628,11 @@ def test_limits_are_extrapolated_falls_are_seen_and_a_cayley_map_keeps_its_own_e
     fitted = order.Order("", 10.0 ** -np.array([10.0, 6.0, 4.0, 2.0]), errors, errors, errors, fit, {})
     assert order._converges(fitted, "").verdict == "refuted"
     assert not structure.Passage("axis", "ok", 1e-3, 9e-4).passes
+    noise = np.array([1e-15, 1e-15, 1e-15, 1.0, 1.0])  # nothing is known of the last two terms
+    assert Series(1.0, np.full(5, 1e-12), noise, True, "axis").order == 2
+    half = lambda at, _: (True, 5e-10, 1e-9, "") if at.h < 0.1 else (False, 1e-6, 1e-9, "")
+    one = one_step(integrator("strang"), "axis", scene("spheroid"), 0.1)  # smaller, but by no power of the step
+    assert structure._answer_at(half, one, scene("spheroid").start)[0] is False
     for name, kept in (("cayley", True), ("strang", False)):
         path = integrate(scene("spheroid"), name, step_size=0.05, samples=161, observe="axis")
         assert (np.abs(constants.constants(scene("spheroid"), path)["cayley_energy"]).max() < 1e-12) == kept

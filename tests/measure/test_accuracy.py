@@ -81,6 +81,8 @@ def test_a_run_that_shows_its_quaternion_is_judged_without_the_rounding_of_its_a
     turned = float(np.max(np.abs(truth["phi"].values) + np.abs(truth["psi"].values)))
     wide, narrow = (float(error_bound(scene, run, truth, "attitude").max()) for run in (angles, attitude))
     assert wide - narrow == pytest.approx(0.5 * EPSILON * turned, rel=0.05)
+    table = error_table(scene, integrator("stormer-verlet"), [0.01], 8.0, observe="attitude")
+    assert float(table["attitude_bound"][0]) > 0.9 * wide  # the largest of the run
     assert errors_against(scene, attitude, truth)["attitude"][1] < 3.0 * narrow
 
 
