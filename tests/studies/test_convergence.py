@@ -64,8 +64,8 @@ def test_a_median_over_few_scenes_is_not_ranked(data, monkeypatch):
     monkeypatch.setattr(facts, "efficiencies", lambda *_: works)
     table = facts.cheapest(three)
     more = {"midpoint[angles]": 10.0, "stormer-verlet[angles]": 20.0, "trapezoidal[angles]": 80.0}
-    more = {(scene, name): measures.Efficiency(work * (part if work == 80.0 else 1.0), False) for name, work in more.items()
-            for scene, part in zip(scenes, (1.0, 1.0, 9.0), strict=True)}  # fmt: skip
+    more = {(scene, name): measures.Efficiency(work * (part if work == 80.0 else 1.0), False)
+            for name, work in more.items() for scene, part in zip(scenes, (1.0, 1.0, 9.0), strict=True)}  # fmt: skip
     monkeypatch.setattr(facts, "efficiencies", lambda *_: works | more)
     answers, known = facts.facts(three), measures.stepping(data).sizes["variant"]
     assert (answers["span"], answers["span_order"], answers["unknown"]) == (8.0, 2, known - 5)

@@ -90,8 +90,9 @@ def test_rounding_is_not_predicted_above_what_the_run_has_shown():
     seen = np.full((3, 1, FAR.size, 1), np.nan)
     seen[:, 0, :9, 0] = rough
     told = runs.predicted(seen, np.full((1, 1), 100.0), FAR, np.full(1, 1e-8), drifts=False)
-    assert told["walk"].values == pytest.approx(w := (rough / np.sqrt(100.0 * ends)).min(), rel=1e-3)
-    bounded, walked = laws.fit(FAR, seen[1, 0].T).coefficients[0, 0], w * np.sqrt(100.0 * FAR[12])
+    walk = (rough / np.sqrt(100.0 * ends)).min()
+    assert told["walk"].values == pytest.approx(walk, rel=1e-3)
+    bounded, walked = laws.fit(FAR, seen[1, 0].T).coefficients[0, 0], walk * np.sqrt(100.0 * FAR[12])
     assert told["error"].values[1, 0, 6, 0] == pytest.approx(np.hypot(bounded, walked), rel=2e-3)  # in quadrature
 
 
