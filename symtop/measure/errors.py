@@ -83,7 +83,7 @@ def errors(
     symmetry ``momentum`` (n, 3) in space, too.
 
     Returns a Dataset over ``time`` with those of ``axis``, ``attitude``, ``theta`` (rad), ``energy``, ``p_phi``,
-    ``p_psi`` (relative, see above) that the data show. ``NAME_bound`` (n,) is the least error that can be told from
+    ``p_psi`` (relative, by the scales of `symtop.measure.errors`), of a body ``momentum``, that the data show. ``NAME_bound`` (n,) is the least error that can be told from
     none: the bound of the reference and the rounding of the compared doubles. Samples that are NaN, as after a failure,
     stay NaN: the largest error is ``max("time", skipna=False)``, NaN of a run that ended early (or of a member of fewer
     steps than samples); without it, that before the end. `precision` is that of `reference`; the closed form costs a

@@ -64,7 +64,7 @@ def plot(
         an ensemble   quantiles over members of the error of `quantity` ("axis", of bodies "attitude", or "energy") over
                       time; `members` are those that were run (the dataset does not hold them)
 
-    `quantity` is one of axis, attitude, theta, energy, p_phi, p_psi. Raises SymtopError for anything else.
+    Any other `quantity` is one of axis, attitude, theta, energy, p_phi, p_psi. Raises SymtopError for anything else.
     """
     if not isinstance(data, xr.Dataset):
         raise SymtopError(f"data must be a dataset of simulate, sweep or ensemble, not {type(data).__name__}")
