@@ -83,11 +83,11 @@ def errors(
     symmetry ``momentum`` (n, 3) in space, too.
 
     Returns a Dataset over ``time`` with those of ``axis``, ``attitude``, ``theta`` (rad), ``energy``, ``p_phi``,
-    ``p_psi`` (relative, by the scales of `symtop.measure.errors`), of a body ``momentum``, that the data show. ``NAME_bound`` (n,) is the least error that can be told from
-    none: the bound of the reference and the rounding of the compared doubles. Samples that are NaN, as after a failure,
-    stay NaN: the largest error is ``max("time", skipna=False)``, NaN of a run that ended early (or of a member of fewer
-    steps than samples); without it, that before the end. `precision` is that of `reference`; the closed form costs a
-    microsecond a sample, and its rounding does not grow with time.
+    ``p_psi`` or ``momentum`` (relative, scaled as in `symtop.measure.errors`) that the data show. ``NAME_bound`` (n,)
+    is the least error that can be told from none: the bound of the reference and the rounding of the compared doubles.
+    Samples that are NaN, as after a failure, stay NaN: the largest error is ``max("time", skipna=False)``, NaN of a run
+    that ended early (or of a member of fewer steps than samples); without it, that before the end. `precision` is that
+    of `reference`; the closed form costs a microsecond a sample, and its rounding does not grow with time.
 
     Warns (`SymtopWarning`) where a foreign trajectory starts elsewhere than the scene, goes on for a hundred of its
     horizons, or holds NaN.
