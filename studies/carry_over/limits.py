@@ -132,7 +132,9 @@ def reach(bodies: Upright, y: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     """omega, how far small oscillations from y (n, 4) tilt at most, and whether the rotation is stable, each (n,)."""
     values, modes = np.linalg.eig(bodies.slopes)
     parts = np.linalg.solve(modes, y[..., np.newaxis].astype(complex))[..., 0]
-    most = (np.linalg.norm(modes[:, :2], axis=1) * np.abs(parts)).sum(axis=1)
+    ways = modes[:, :2] * parts[:, np.newaxis]  # Gamma of each mode, whose real part runs round an ellipse
+    squares = np.sum(np.abs(ways) ** 2, axis=1) + np.abs(np.sum(ways * ways, axis=1))  # 2 (its longer half axis)^2
+    most = np.sqrt(0.5 * squares).sum(axis=1)
     omega = np.abs(values.imag).max(axis=1)
     return omega, most, np.abs(values.real).max(axis=1) < UNSTABLE * omega
 

@@ -70,7 +70,7 @@ def sign_changes(function: Callable[[float], float], grid: np.ndarray) -> list[f
 def sleeping_threshold(method: Integrator, h: float) -> float:
     """The spin w3 at which the upright top of I1 = I3 = mgl = 1 begins to sleep under this method; the motion's is 2.
 
-    The largest root below the spin that turns the top by half a turn in a step. NaN where there is none, and for a
+    The largest root below the spin that turns the top by a whole turn in a step. NaN where there is none, and for a
     method that is not symmetric, whose tops all rise or fall a little in every step.
     """
     if not method.symmetric:

@@ -35,7 +35,7 @@ LONGEST_BESIDE = 5.0  # seconds of a run of the judged step, which may be slow
 @click.option("--energy", type=click.Choice(["kept", "bounded"]), help="Claim what becomes of the energy.")
 @click.option("--adaptive", is_flag=True, help="Judge a class of SciPy's at a tolerance, not at fixed steps.")
 @click.option("--autonomous", is_flag=True, help="It was written for y' = f(y), without a time.")
-@click.option("--quick", is_flag=True, help="Shorter runs: some ten seconds, or forty where a step takes 1 ms.")
+@click.option("--quick", is_flag=True, help="Shorter runs: some seconds, or ten to forty where a step takes 1 ms.")
 @click.option("--seed", type=int, help="Draw the starts, times and steps of an earlier judging again.")
 @click.option("--output", "-o", type=File(dir_okay=False), help="Write the findings to this netCDF file.")
 @click.option("--card", type=File(dir_okay=False), help="Write a page with two figures and the ledger (HTML).")

@@ -204,7 +204,7 @@ def long(
 @click.option("--seed", type=int, default=0, show_default=True, help="Seed of the population.")
 @click.option("--kind", default="all", show_default=True, help="A stratum of the population, or all.")
 @click.option("--bodies", is_flag=True, help="Bodies without symmetry in the place of tops.")
-@click.option("--epsilon", type=float, help="With --bodies: how far heavy ones are from a Lagrange top, 0 to 0.5.")
+@click.option("--epsilon", type=float, help="With --bodies: how far heavy ones are from a top, 0 (chaos: 0.02) to 0.5.")
 @click.option("--step-size", type=float, help="Step of a fixed-step method.")
 @click.option("--per-nutation", type=float, help="In place of a step: steps in a nutation period of each member.")
 @click.option("--tolerance", type=float, help="Tolerance of an adaptive method.")

@@ -117,10 +117,11 @@ def compare(
     }
     entries["target"] = "error that is accepted, largest over the run", *entries["error"][1:]
     own = {name: netcdf.Column(entry, {}) for name, entry in entries.items()}
+    columns.described(data, problem.units, own, [problem.of_body])
     return netcdf.describe(
-        columns.described(data, problem.units, own), f"error against cost on {problem.name}", units=problem.units,
-        quantity=quantity, cost=cost, horizon=end, nutations=end / problem.nutation_period,
-        timed=TIMED if cost == "time" else "nothing", budget=str(most or BUDGET),
+        data, f"error against cost on {problem.name}", units=problem.units, quantity=quantity, cost=cost, horizon=end,
+        nutations=end / problem.nutation_period, timed=TIMED if cost == "time" else "nothing",
+        budget=str(most or BUDGET),
     )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ elapsed since the start of the scene, and any of
 
     ex ey ez           the axis, a unit vector in space, z up       theta phi psi         Euler angles (z-x-z), rad
     qw qx qy qz        the attitude, body to space                  energy p_phi p_psi
-    Lx Ly Lz           the angular momentum in space                wx wy wz              rates in body axes, rad
+    Lx Ly Lz           the angular momentum in space                wx wy wz              rates in body axes
 
 A netCDF file has time, axis (n, 3), quaternion (n, 4), momentum (n, 3), omega_body (n, 3) and the same scalars, or is
 one of `simulate`.

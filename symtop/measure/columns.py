@@ -11,13 +11,13 @@ a line, separated by tabs (`netcdf.read_columns`):
     long_name       what it is; of an error, of what and against what
 """
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from types import MappingProxyType
 
 import numpy as np
 
 from symtop.core import netcdf
-from symtop.measure.errors import ERRORS
+from symtop.measure.errors import ERRORS, against
 
 Table = Mapping[str, netcdf.Column]
 ERROR_TABLE = {
@@ -32,12 +32,13 @@ ERROR_TABLE = {
 
 
 def described(
-    data: netcdf.Tree, units: str = "", own: Mapping[str, netcdf.Column] = MappingProxyType({})
-) -> netcdf.Tree:
+    data: netcdf.Tree, units: str = "", own: Mapping[str, netcdf.Column] = MappingProxyType({}),
+    of_body: Collection[bool] = (False,),
+) -> netcdf.Tree:  # fmt: skip
     """Give the variables of a dataset, in groups too, their long names, units and flags.
 
     `own` is the table of the study. A group with an ``axis_bound`` is an error table. What no table declares keeps the
-    name that it may have been given. `units` are those of `netcdf.describe`.
+    name that it may have been given. `units` are those of `netcdf.describe`; `of_body` says whether scenes are bodies.
     """
     for group, variables in ((path, one.variables) for path, one in netcdf.groups(data).items()):
         known = netcdf.VARIABLES | (ERROR_TABLE if "axis_bound" in variables else {})
@@ -45,7 +46,8 @@ def described(
             column = own.get(f"{group}/{name}", own.get(str(name)))
             if column or (name in known and "long_name" not in variable.attrs):
                 entry = column.entry if column else known[str(name)]
-                variable.attrs.update(netcdf.label(entry, units, " in units of the scene"))
+                words, *choice = entry
+                variable.attrs.update(netcdf.label((against(words, of_body), *choice), units, " in units of the scene"))
             if column and column.flags:
                 values = np.array(list(column.flags), variable.dtype)
                 variable.attrs.update(flag_values=values, flag_meanings=" ".join(column.flags.values()))

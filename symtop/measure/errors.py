@@ -21,7 +21,7 @@ Samples that hold a NaN stay NaN.
 import contextlib
 import json
 import warnings
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -62,6 +62,24 @@ ERRORS = {  # what each is of and against what, and its units
     "p_psi": ("error of p_psi against that of the start, relative to the larger momentum", "1"),
     "momentum": ("error of the angular momentum in the space frame, relative to that of the start", "1"),
 }
+SCALES = {  # what they are relative to, and of bodies without symmetry
+    "E0 - min V": "the kinetic energy of the start and |mgl|", "the larger momentum": "the momentum of the start",
+}  # fmt: skip
+
+
+def against(words: str, of_body: Collection[bool]) -> str:
+    """A long name with what errors are relative to, of tops, of bodies or of both."""
+    for top, body in SCALES.items():
+        words = words.replace(top, " or of bodies ".join([top] * (False in of_body) + [body] * (True in of_body)))
+    return words
+
+
+def quantity_words(data: xr.Dataset, quantity: str) -> str:
+    """The words for a quantity of a dataset of errors, with the scale that its long name has."""
+    name, (top, body) = str(data[quantity].attrs.get("long_name", "")), next(iter(SCALES.items()))
+    if body not in name:
+        return QUANTITIES[quantity]
+    return OF_BODY[quantity] if top not in name else f"{QUANTITIES[quantity]}, of bodies / (T0 + |mgl|)"
 
 
 def errors(
@@ -83,11 +101,11 @@ def errors(
     symmetry ``momentum`` (n, 3) in space, too.
 
     Returns a Dataset over ``time`` with those of ``axis``, ``attitude``, ``theta`` (rad), ``energy``, ``p_phi``,
-    ``p_psi`` (relative, see above) that the data show. ``NAME_bound`` (n,) is the least error that can be told from
-    none: the bound of the reference and the rounding of the compared doubles. Samples that are NaN, as after a failure,
-    stay NaN: the largest error is ``max("time", skipna=False)``, NaN of a run that ended early (or of a member of fewer
-    steps than samples); without it, that before the end. `precision` is that of `reference`; the closed form costs a
-    microsecond a sample, and its rounding does not grow with time.
+    ``p_psi`` or ``momentum`` (relative, scaled as in `symtop.measure.errors`) that the data show. ``NAME_bound`` (n,)
+    is the least error that can be told from none: the bound of the reference and the rounding of the compared doubles.
+    Samples that are NaN, as after a failure, stay NaN: the largest error is ``max("time", skipna=False)``, NaN of a run
+    that ended early (or of a member of fewer steps than samples); without it, that before the end. `precision` is that
+    of `reference`; the closed form costs a microsecond a sample, and its rounding does not grow with time.
 
     Warns (`SymtopWarning`) where a foreign trajectory starts elsewhere than the scene, goes on for a hundred of its
     horizons, or holds NaN.
@@ -118,9 +136,7 @@ def errors(
     shown = dataset(data.time, columns | bounds, chosen.units)
     for name in columns:
         words, units = ERRORS[name]
-        if chosen.of_body:
-            words = words.replace("E0 - min V", "the kinetic energy of the start and |mgl|")
-            words = words.replace("the larger momentum", "the momentum of the start")
+        words = against(words, [chosen.of_body])
         shown.variables[name].attrs.update(long_name=words, units=units)
         shown.variables[f"{name}_bound"].attrs.update(long_name=f"least {words} to be told from none", units=units)
     attributes = {"scene": chosen.name, "precision": truth.attrs["precision"]}

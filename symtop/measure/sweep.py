@@ -119,7 +119,8 @@ def sweep(
             units = chosen[0].units if len({one.units for one in chosen}) == 1 else ""
             words = {"timed": TIMED if timed else "nothing: timed was not asked for", "units": units}
             title, content = "errors and work of a sweep", netcdf.content_hash(data)
-            return netcdf.describe(columns.described(data, units), title, content=content, **words)
+            data = columns.described(data, units, of_body=[one.of_body for one in chosen])
+            return netcdf.describe(data, title, content=content, **words)
 
         written = time.monotonic()
         with progress_bar("sweep", quiet=silent, total=len(cells), initial=len(cells) - len(rest)) as bar:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from symtop.model.scenes import Scene
 from symtop.run.guard import EXPECTED
 
-ACCURATE = EXPECTED  # rad: what is wrong afterwards is what the guard warns of before
+ACCURATE = EXPECTED  # rad, from which the guard warns; it is silent on less in a narrow nutation
 OUTSIDE = 0.1  # of the nutation's width, or rad if it has none
 STEADY = 1e-6  # rad; a nutation narrower than this is a steady precession, known to rounding only
 DRIFT = 0.01  # of the energy of the nutation, `Scene.energy_scale`

@@ -206,7 +206,7 @@ class RigidBody:
         return Placed(math.fsum(m * g for m, g in zip(M, vertical(*at.quaternion), strict=True)), M[2])
 
     def nutation_period(self, at: Attitude) -> float:
-        """The natural period, see above; infinite for a free body at rest."""
+        """The natural period, see the head of `symtop.model.body`; infinite for a free body at rest."""
         middle = sorted(self.moments)[1]
         rate = math.hypot(math.hypot(*self.momentum(at)) / middle, math.sqrt(abs(self.mgl) / middle))
         return 2.0 * math.pi / rate if rate > 0.0 else math.inf

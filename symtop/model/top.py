@@ -361,9 +361,10 @@ def nutation_cubic(top: Any, at: Any) -> tuple[float, float, float, float]:
 def newton_between(
     value: Callable[[float], float], slope: Callable[[float], float], below: float, above: float
 ) -> float:
-    """The root of a function that is negative at `below` and positive at `above`, to two units in its last place.
+    """The root of a function that is negative at `below` and positive at `above`.
 
-    Newton's method from the middle; where a step leaves what is known to hold the root, half of that.
+    Newton's method from the middle, until a step is two units in the last place of the root; where a step leaves what
+    is known to hold the root, half of that. A slope that is k times too large ends as many times further off.
     """
     x, before = 0.5 * (below + above), math.inf
     while x != before:

@@ -14,7 +14,7 @@ import xarray as xr
 
 from symtop.core.errors import SymtopError, at_home, one_of
 from symtop.measure.conservation import residuals
-from symtop.measure.errors import QUANTITIES, errors
+from symtop.measure.errors import QUANTITIES, errors, quantity_words
 from symtop.measure.sweep import failed_setting, period_word, titled
 from symtop.model.scenes import Scene
 from symtop.report import spread
@@ -64,7 +64,7 @@ def plot(
         an ensemble   quantiles over members of the error of `quantity` ("axis", of bodies "attitude", or "energy") over
                       time; `members` are those that were run (the dataset does not hold them)
 
-    `quantity` is one of axis, attitude, theta, energy, p_phi, p_psi. Raises SymtopError for anything else.
+    Any other `quantity` is one of axis, attitude, theta, energy, p_phi, p_psi. Raises SymtopError for anything else.
     """
     if not isinstance(data, xr.Dataset):
         raise SymtopError(f"data must be a dataset of simulate, sweep or ensemble, not {type(data).__name__}")
@@ -98,7 +98,7 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
         ax.plot(wrong["time"].values[1:], later, color=color, lw=1.2, marker=marker)
         if has_bounds:
             ax.plot(times, np.maximum(data[f"{quantity}_bound"].values, SMALLEST), color="0.6", lw=0.8, ls=":")
-        ax.set(yscale="log", ylabel=QUANTITIES[quantity])
+        ax.set(yscale="log", ylabel=quantity_words(wrong, quantity))
     else:
         variables = {name: variable for name, variable in data.data_vars.items() if variable.dims == ("time",)}
         values = data[one_of("quantity", quantity, dict.fromkeys([*QUANTITIES, *map(str, variables)]))]
@@ -131,7 +131,7 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
     of_runs = [str(name) for name, values in numbers.items() if {*values.dims} == {"scene", "variant", "setting"}]
     x = one_of("x", x, of_runs)
     words = AXES.get(x, x.replace("_", " "))
-    ax.set(xscale="log", yscale="log", ylabel=f"largest {QUANTITIES[quantity]}", xlabel=words)
+    ax.set(xscale="log", yscale="log", ylabel=f"largest {quantity_words(data, quantity)}", xlabel=words)
     ends, level = {}, error_band(ax, data[f"{quantity}_bound"].values)
     edge: dict[str, Any] = {"transform": ax.get_xaxis_transform(), "clip_on": False, "zorder": 3}
     for number, scene in enumerate(data["scene"].values):

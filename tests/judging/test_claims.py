@@ -7,6 +7,7 @@ import re
 import tracemalloc
 from collections.abc import Callable
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ from symtop.methods.framework.registry import Integrator, integrator
 from symtop.methods.splitting import composition
 from symtop.model import charts
 from symtop.model.scenes import body_scenes, scene
+from symtop.run.simulation import integrate
 from tests import commands
 from tests.commands import answer, call
 from tests.conftest import random_scenes
@@ -614,3 +616,23 @@ def test_finer_runs_after_one_that_fails_late_share_its_steps(quick):
     run = long_run(method, SPHEROID, "axis", quick=quick, most=4000)
     assert run.outcome == "ok"
     assert (len(steps) < 6000) is quick
+
+
+def test_limits_are_extrapolated_falls_are_seen_and_a_cayley_map_keeps_its_own_energy(monkeypatch):
+    run = lambda _, h, __: np.array([1e-3 + h**2 + h**3])  # to a wrong motion, with order two
+    step = SimpleNamespace(h=0.1, chart="axis", motion=lambda _: lambda _: np.zeros(1), run=run, shown=lambda end: end)
+    monkeypatch.setattr(order, "one_step", lambda *_: step)
+    assert order.limit(integrator("strang"), scene("spheroid"), 2)[0] == pytest.approx(1e-3, rel=1e-9)
+    errors = np.array([1e-6, 5e-6, 1.0, 1.0])  # no better than at a tolerance ten thousand times as large
+    fit = Fit(2.0, 0.1, 1.0, errors > 0.0)
+    fitted = order.Order("", 10.0 ** -np.array([10.0, 6.0, 4.0, 2.0]), errors, errors, errors, fit, {})
+    assert order._converges(fitted, "").verdict == "refuted"
+    assert not structure.Passage("axis", "ok", 1e-3, 9e-4).passes
+    noise = np.array([1e-15, 1e-15, 1e-15, 1.0, 1.0])  # nothing is known of the last two terms
+    assert Series(1.0, np.full(5, 1e-12), noise, True, "axis").order == 2
+    half = lambda at, _: (True, 5e-10, 1e-9, "") if at.h < 0.1 else (False, 1e-6, 1e-9, "")
+    one = one_step(integrator("strang"), "axis", scene("spheroid"), 0.1)  # smaller, but by no power of the step
+    assert structure._answer_at(half, one, scene("spheroid").start)[0] is False
+    for name, kept in (("cayley", True), ("strang", False)):
+        path = integrate(scene("spheroid"), name, step_size=0.05, samples=161, observe="axis")
+        assert (np.abs(constants.constants(scene("spheroid"), path)["cayley_energy"]).max() < 1e-12) == kept

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import symtop
 from symtop.core.numbers import EPSILON
@@ -9,7 +10,7 @@ from symtop.measure import order_table
 from symtop.measure.accuracy import SAMPLES, enough_samples, error_table
 from symtop.measure.errors import error_bound, errors_against
 from symtop.measure.order import LARGEST_ERROR, order
-from symtop.measure.order_table import asymptotic_steps, extended_errors, extended_order_data
+from symtop.measure.order_table import asymptotic_steps, extended_errors, extended_order_data, order_fit
 from symtop.methods.framework.registry import integrator
 from symtop.model.charts import axis_from_angles, momentum_parts
 from symtop.run.reference.independent_checks import have_heyoka
@@ -28,6 +29,14 @@ def largest_errors(name, method, nutations, samples):
                           observe="axis", guard=False)  # fmt: skip
     errors = symtop.errors(run)
     return np.array([float(errors[quantity].max()) for quantity in ("axis", "theta")])
+
+
+def test_where_the_largest_error_scatters_the_order_is_that_at_the_end():
+    h, scatter = 0.02 / 2.0 ** np.arange(9.0), 10.0 ** np.random.default_rng(0).uniform(-1.0, 1.0, 9)
+    columns = {"step_size": h, "theta": h**2 * scatter, "theta_end": h**2, "theta_bound": np.full(9, 1e-14)}
+    table = xr.Dataset({name: ("setting", column) for name, column in columns.items()})
+    fit = order_fit(symtop.scene("spheroid"), integrator("rk4"), table, "theta", 8.0)
+    assert fit.slope == pytest.approx(2.0, abs=1e-3)
 
 
 @pytest.mark.parametrize("name", ["spheroid", "goldstein", "grazing"])
@@ -72,6 +81,8 @@ def test_a_run_that_shows_its_quaternion_is_judged_without_the_rounding_of_its_a
     turned = float(np.max(np.abs(truth["phi"].values) + np.abs(truth["psi"].values)))
     wide, narrow = (float(error_bound(scene, run, truth, "attitude").max()) for run in (angles, attitude))
     assert wide - narrow == pytest.approx(0.5 * EPSILON * turned, rel=0.05)
+    table = error_table(scene, integrator("stormer-verlet"), [0.01], 8.0, observe="attitude")
+    assert float(table["attitude_bound"][0]) > 0.9 * wide  # the largest of the run
     assert errors_against(scene, attitude, truth)["attitude"][1] < 3.0 * narrow
 
 

@@ -51,11 +51,11 @@ def test_a_line_that_declares_no_column_is_refused(tmp_path, line):
 
 def test_an_error_table_says_of_what_and_against_what_and_flags_have_meanings():
     assert ERRORS.keys() == (QUANTITIES | OF_BODY).keys()
-    data = columns.described(table_of(), "SI")
+    data = columns.described(table_of(), "SI", of_body=[True, False])
     words = "largest angle between the axis and the true axis over the run"
     assert data["axis"].attrs == {"long_name": words, "units": "rad"}
     assert data["energy"].attrs["units"] == "1"
-    assert "relative to E0 - min V" in data["energy"].attrs["long_name"]
+    assert "relative to E0 - min V or of bodies the kinetic energy" in data["energy"].attrs["long_name"]
     assert data["gap"].attrs == {}
     run = columns.described(table_of().drop_vars("axis_bound"), "SI")
     assert (run["energy"].attrs["long_name"], run["energy"].attrs["units"]) == ("total energy", "kg m2 s-2")

@@ -157,6 +157,7 @@ def test_timings_know_when_they_are_noisy_and_errors_are_relative_to_their_scale
     assert errors["p_phi"].values == pytest.approx(0.5 / 5.0, rel=1e-12)  # the larger momentum is p_psi = 5
     assert errors["energy"].values == pytest.approx(0.16 / 0.24705927, rel=1e-6)  # E0 - p_psi^2/2 I3 - min V
     assert Timing((1.0, 1.01, 1.02), 1.0).reliable
+    assert Timing((1.0, 1.0, 4.0), 1.0).spread == 0.0  # one disturbance is no spread
     assert not Timing((1.0, 1.9, 2.0), 1.0).reliable
     quick, slow = timings([lambda: sum(range(100)), lambda: sum(range(20_000))], batches=3, batch=0.002)
     assert slow.best > 20.0 * quick.best

@@ -51,6 +51,11 @@ def test_lags_of_more_than_a_turn_and_wrong_frequencies_are_found():
     parts = phase(scene, run, truth)
     assert parts.nutation_period == pytest.approx(1e-5, rel=1e-4)
     assert parts.precession_rate == pytest.approx(1e-5, rel=1e-4)  # it turns faster by as much
+    scene, run, truth = moved("spheroid", faster=0.01)
+    assert phase(scene, run, truth).nutation_period == pytest.approx(1.0 - 1.0 / 1.01, rel=1e-6)  # of the period
+    whole = closed_form(scene).phi_per_period / scene.nutation_period
+    parts = phase(*moved("spheroid", faster=1e-5, turning=-1e-5 * whole))
+    assert parts.precession_rate < 1e-8  # turned back by as much
     scene, run, truth = moved("spheroid", turning=1e-5)
     parts, form = phase(scene, run, truth), closed_form(scene)
     assert parts.nutation_period < 1e-14

@@ -179,3 +179,10 @@ def test_times_are_those_of_runs_that_ended_well_and_are_kept(tmp_path):
     assert untimed.attrs["timed"].startswith("nothing")
     with pytest.raises(symtop.SymtopError, match="timed must be"):
         symtop.sweep("spheroid", "rk4", step_size=0.1, timed="yes")
+
+
+def test_a_variant_fails_at_the_finest_of_its_coarsest_failed_runs():
+    rows = {"step_size": [1.0, 4.0, 2.0, 0.5], "tolerance": [np.nan] * 4}
+    rows["outcome"] = ["ok", "not_finite", "not_finite", "left_chart"]
+    cell = xr.Dataset({name: ("setting", row) for name, row in rows.items()})
+    assert module.failed_setting(cell) == "fails at 2, not finite"

@@ -42,7 +42,7 @@ def test_space_frame_constants_are_those_of_the_angles(scene):
     assert momentum @ node == pytest.approx(scene.top.I1 * scene.start.theta_dot, abs=1e-14)
     energy = momentum @ momentum / (2 * scene.top.I1) + scene.top.mgl * axis[2]
     energy += 0.5 * momenta.p_psi**2 * (1 / scene.top.I3 - 1 / scene.top.I1)
-    assert energy == pytest.approx(scene.top.energy(scene.start), rel=1e-14)
+    assert energy == pytest.approx(scene.top.energy(scene.start), rel=1e-14, abs=1e-14)
 
 
 @pytest.mark.parametrize("theta", [1e-3, 1e-6, 1e-9, math.pi - 1e-3, math.pi - 1e-6])

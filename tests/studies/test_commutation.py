@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.optimize import root
 from symtop_studies.reduction import commutation, facts, figures, study
 from symtop_studies.reduction.commutation import gap, kernel_path, path, reduced_first
-from symtop_studies.reduction.measures import chart_ratios, commutation_table, unreduced_forms
+from symtop_studies.reduction.measures import Ratio, chart_ratios, commutation_table, unreduced_forms
 
 import symtop
 from symtop.measure import datasets
@@ -107,6 +107,13 @@ def test_what_a_reduced_kernel_saves_is_split_into_iterations_and_the_time_of_on
     assert list(table["time of an iteration (ratio)"]) == pytest.approx([4.0 / 3.0, 1.0])
     assert (answers["step_least"], answers["step_most"]) == pytest.approx((2.0, 3.0))
     assert (answers["commuting"], answers["charts"], answers["twins_gap"]) == (None, None, None)
+    h, dims = 0.1 / 2.0 ** np.arange(4), ("scene", "variant", "commutation_step")
+    gaps = [[[3e-15, 1e-15, 1e-15, 1e-15], [8e-14, 1e-15, 1e-15, 1e-15], 1e-3 * h**2 * [3.0, 1.0, 1.0, 1.0]]]
+    data = xr.Dataset({"commutation_gap": (dims, gaps), "commutation_step_size": (dims, np.tile(h, (1, 3, 1)))},
+                      {"scene": ["spheroid"], "variant": ["a", "b", "c"]})  # fmt: skip
+    answers, table = facts.facts(data), facts.tables(data)["commutation"]
+    assert (answers["commuting"], answers["commuting_gap"], answers["others"]) == ("a, b", 8e-14, "c")
+    assert (answers["power_most"], table["at the finest step (rad)"][2]) == pytest.approx((2.0, gaps[0][2][-1]))
 
 
 @pytest.fixture(scope="module")
@@ -130,6 +137,8 @@ def test_facts_and_page_are_those_of_the_rules_and_charts(measured, tmp_path):
     assert answers["rules"] == "midpoint, trapezoidal"
     assert 0.0 < answers["twins_gap"] < 1e-11  # rounding over 10 000 steps without compensation
     assert answers["charts"] == len(facts.tables(measured)["charts"])
+    assert not (measured[["p_phi_drift", "p_psi_drift"]].to_dataarray() < 0.0).any()
+    assert 1.0 <= measured["iterations_per_step"].min() <= measured["iterations_per_step"].max() < 10.0
     two = measured.isel(commutation_step=slice(2))  # too few for an order, and no less apart
     assert facts.facts(two)["others"] == answers["others"]
     assert np.isnan(facts.facts(two)["power_least"])
@@ -140,14 +149,20 @@ def test_facts_and_page_are_those_of_the_rules_and_charts(measured, tmp_path):
 
 
 @pytest.mark.parametrize(("failed", "ratio"), [(np.nan, 2.0), (0.1, 1.75)])
-def test_a_run_that_failed_has_no_part_in_the_time_of_a_chart(failed, ratio):
-    axis = np.array([[np.nan] * 4, [1e-2, 1e-3, 1e-4, 1e-5], [failed, 1e-3, 1e-4, 1e-5]])
+def test_a_run_that_failed_has_no_part_in_the_time_of_a_chart(failed, ratio, monkeypatch):
+    axis = np.array([[np.nan] * 4, [1e-2, 1e-3, 1e-4, 1e-5], [failed, 2e-3, 5e-5, 3e-5]])
     seconds = np.array([[np.nan] * 4, [1.0] * 4, [0.5, 1.5, 2.0, 2.5]])  # what fails early is fast
     over = ("chart", "setting")
-    cell = xr.Dataset({"axis": (over, axis), "axis_bound": (over, np.full((3, 4), 1e-15)), "seconds": (over, seconds)},
+    bounds = np.tile([1e-15, 1e-15, 1e-15, 2e-6], (3, 1))
+    cell = xr.Dataset({"axis": (over, axis), "axis_bound": (over, bounds), "seconds": (over, seconds)},
                       {"chart": ["angles", "axis", "attitude"]})  # fmt: skip
     (one,) = chart_ratios(cell)
+    each = [Ratio("attitude", "axis", 1.05, 1.0), Ratio("angles", "axis", 2.0, 1.0), Ratio("angles", "axis", 1.2, 1.0)]
+    monkeypatch.setattr(facts, "chart_ratios", lambda _: each)
+    told = facts.facts(cell.expand_dims(scene=["spheroid"], variant=["gauss-2"]))
+    assert [told[name] for name in ("charts", "charts_as_fast", "slowest_time")] == [3, 1, 2.0]
     assert (one.chart, one.base, one.time) == ("attitude", "axis", ratio)
+    assert one.error == pytest.approx(1.0)  # twice and half as large; the last are next to their bound
 
 
 def test_a_kernel_is_known_under_any_name_and_a_method_without_a_twin_refused(monkeypatch):

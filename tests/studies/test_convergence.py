@@ -48,6 +48,12 @@ def test_verdicts_are_those_of_the_one_rule_and_a_wrong_declaration_is_refuted(d
     assert sum(word == "confirmed" for word, _ in results.values()) >= 7
     monkeypatch.setattr(measures, "declared_order", lambda name: 3)
     assert {measures.judged(data)["goldstein", name].verdict for name in ("strang[axis]", "rk4[axis]")} == {"refuted"}
+    monkeypatch.setattr(facts, "declared_order", lambda name: 3)
+    words = facts.tables(data)["orders"].set_index("variant")["verdict"]
+    assert (words["strang[axis]"], words["rk4[axis]"]) == ("lower", "higher")
+    monkeypatch.setattr(facts, "ratios", lambda _: {"a": np.array([1.0, 1.0, 9.0]), "b": np.full(4, 5.0)})
+    told = [facts.facts(data)[f"ratio_{name}"] for name in ("most_variant", "most", "middle", "runs")]
+    assert told == ["a", 9.0, 5.0, 7]
 
 
 def test_a_median_over_few_scenes_is_not_ranked(data, monkeypatch):
@@ -57,6 +63,13 @@ def test_a_median_over_few_scenes_is_not_ranked(data, monkeypatch):
     works["loop", "strang[axis]"] = measures.Efficiency(1.0, True)
     monkeypatch.setattr(facts, "efficiencies", lambda *_: works)
     table = facts.cheapest(three)
+    more = {"midpoint[angles]": 10.0, "stormer-verlet[angles]": 20.0, "trapezoidal[angles]": 80.0}
+    more = {(scene, name): measures.Efficiency(work * (part if work == 80.0 else 1.0), False)
+            for name, work in more.items() for scene, part in zip(scenes, (1.0, 1.0, 9.0), strict=True)}  # fmt: skip
+    monkeypatch.setattr(facts, "efficiencies", lambda *_: works | more)
+    answers, known = facts.facts(three), measures.stepping(data).sizes["variant"]
+    assert (answers["span"], answers["span_order"], answers["unknown"]) == (8.0, 2, known - 5)
+    monkeypatch.setattr(facts, "efficiencies", lambda *_: works)
     assert table["variant"].tolist() == ["rk4[axis]", "strang[axis, attitude]"]
     assert table[["ranked", "of these by the law"]].to_numpy().tolist() == [[True, 0], [False, 1]]
     assert facts.cheapest(data)["ranked"].all()  # the control: a dataset of one scene has no more
@@ -84,6 +97,7 @@ def test_work_follows_from_runs_beside_it_or_from_its_error_constant(data):
     answers = measures.efficiencies(data, error)[pair]
     assert answers.work == pytest.approx(work, rel=0.1)
     assert not answers.foreseen
+    assert measures.efficiencies(data, 1e3)[pair].foreseen  # all runs are closer: a longer step was not tried
     far, beyond = (measures.efficiencies(data, target)[pair] for target in (1e-14, 25e-16))
     assert far.foreseen
     assert beyond.work == pytest.approx(2.0 * far.work, rel=1e-6)
@@ -129,6 +143,11 @@ def test_rows_show_the_axis_the_attitude_where_they_can_and_work_a_nutation_and_
 
 def test_the_page_says_what_was_measured_and_adaptive_errors_follow_their_tolerance(data, tmp_path):
     fitted = measures.tolerance_fits(data)
+    tolerance = 10.0 ** -np.arange(2.0, 10.0)  # errors near the bound are the reference's: they follow no tolerance
+    columns = {"tolerance": tolerance, "axis": np.maximum(0.1 * tolerance, 5e-8), "axis_bound": np.full(8, 1e-8)}
+    rows = {name: (("scene", "variant", "setting"), one[None, None]) for name, one in columns.items()}
+    (one,) = measures.tolerance_fits(xr.Dataset(rows, {"scene": ["goldstein"], "variant": ["rk45[angles]"]})).values()
+    assert (one.slope, one.used.sum()) == (pytest.approx(1.0), 4)
     assert {name for _, name in fitted} == {name for name in ROWS if integrator(name).adaptive}
     assert fitted["goldstein", "rk45[angles]"].slope == pytest.approx(1.0, abs=0.15)
     text, answers = checked("convergence", data, tmp_path), facts.facts(data)

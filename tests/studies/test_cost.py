@@ -3,11 +3,12 @@
 import itertools
 import math
 import timeit
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 import xarray as xr
-from symtop_studies.cost import cells, facts, figures, ladder, prices as pricing, study, tops as tops_module
+from symtop_studies.cost import cells, facts, figures, ladder, prices as pricing, ranking, study, tops as tops_module
 from symtop_studies.cost.cells import GENERAL, Cell
 from symtop_studies.cost.confirm import rounded, share_served
 from symtop_studies.cost.ranking import SAFE, Ladder, cost_to_reach, hindsight, run_lengths, safe, slowdowns, wins
@@ -17,7 +18,7 @@ import symtop
 from symtop.core import netcdf
 from symtop.measure import datasets
 from symtop.measure.accuracy import error_row
-from symtop.measure.settings import TARGETS
+from symtop.measure.settings import LEAST_STEPS, TARGETS
 from symtop.measure.verdicts import barriers
 from symtop.methods.framework.plan import NOT_NORMALISED, Plan
 from symtop.methods.framework.registry import integrator
@@ -45,6 +46,7 @@ def scene_of(tops, member):
     ([1e-1, 1e-2, NAN, NAN], INF),  # it left before
     ([1e-4, NAN, NAN, NAN], 10.0),  # the coarsest run is enough
     ([NAN, NAN, NAN, NAN], INF),
+    ([1e-2, 1e-3, NAN, NAN], 20.0),  # to the target itself
     ([1e-2, 0.0, NAN, NAN], 10.0),  # an error of zero: close to the miss, and never below it
 ])  # fmt: skip
 def test_what_counts_as_a_hit(errors, cost):
@@ -59,7 +61,7 @@ def test_a_cost_lies_between_miss_and_hit_and_slowdowns_wins_and_run_lengths_fol
     assert reached[:, 0] == pytest.approx([10.0, 10.0 * math.sqrt(2.0), 20.0, 20.0 * math.sqrt(2.0), INF])
     table = np.array([[1.0, 4.0, INF], [2.0, 2.0, INF]])
     assert np.array_equal(slowdowns(table), [[1.0, 2.0, NAN], [2.0, 1.0, NAN]], equal_nan=True)
-    won, level = wins(np.array([[1.0, 1.0, 1.0], [1.05, 2.0, 0.5], [3.0, 1.2, INF]]))
+    won, level = wins(np.array([[1.0, 1.0, 1.0], [1.05, 2.0, 0.5], [3.0, 1.1, INF]]))
     assert won.tolist() == [[False, True, False], [False, False, True], [False, False, False]]
     assert level.tolist() == [[True, True, False], [True, False, True], [False, False, False]]
     budgets = np.array([0.5, 1.0, 2.0, 10.0])
@@ -78,6 +80,11 @@ def test_wins_and_what_is_met_have_one_denominator_each():
     assert one["c"].met == pytest.approx(1 / 4)
     assert not contest.called
     assert hindsight(["a", "b"], np.full((2, 4), INF), QUIET).first is None
+    ties = np.array([[1.0, 2.0, 3.0], [2.0, 1.0, 1.0], [3.0, 3.0, 1.05]])  # a and b win on one top each
+    assert hindsight("abc", ties, np.full(3, 0.01)).first.name == "b"  # and b is level on one more
+    solved = np.random.default_rng(0).random((2, 100)) * [[0.9], [1.0]]
+    most, least = hindsight("ab", solved, QUIET), hindsight("ab", np.hstack([solved, np.full((2, 100), INF)]), QUIET)
+    assert [one[1:5] for one in least.standings] == [one[1:5] for one in most.standings]  # of the solved tops alone
 
 
 def test_noise_of_a_price_widens_the_interval_of_a_share_which_covers_it_as_often_as_it_says():
@@ -107,6 +114,11 @@ def test_a_safe_setting_serves_95_of_100_tops():
     assert one.setting == pytest.approx(95.0)
     assert one.seconds == pytest.approx(95.0, rel=1e-6)  # a step costs one
     assert one.low < one.seconds < one.high
+    assert safe([steps("a", np.arange(1.0, 31.0))])[0][0].setting == pytest.approx(29.0)  # 28 are less than 95 %
+    (one,), _ = safe([steps("a", np.arange(1.0, 61.0))])  # the 57th of 60: Beta(57, 4), its 2.5 % at 0.863
+    assert (one.seconds, one.low) == pytest.approx((57.0, 52.0), rel=1e-6)
+    assert (np.diff(ranking.ENDS)[0], sum(ranking.ENDS)) == pytest.approx((0.95, 1.0))
+    assert np.log(ranking.factors(np.array([0.8]))).std() == pytest.approx(0.8, rel=0.15)  # and none is negative
     (spoilt,), called = safe([steps("a", np.where(met > 94.0, INF, met))])
     assert math.isinf(spoilt.seconds)  # six tops are never met
     assert not called
@@ -132,6 +144,7 @@ def test_a_lead_is_called_if_neither_tops_nor_prices_can_turn_it_and_hindsight_m
     assert [one.name for one in choices] == ["even", "spoilt"]
     assert hindsight(["spoilt", "even"], np.stack([met, np.full(200, 6.0)]), QUIET).first.name == "spoilt"
     met = np.full(200, 4.0)
+    assert not safe([steps("a", met), steps("b", met)])[1]  # equals
     for error, called in ((0.005, True), (0.10, False)):
         assert safe([steps("a", met, 1.0, error), steps("b", met, 1.08, error)])[1] is called
 
@@ -158,6 +171,10 @@ def test_a_price_is_the_median_and_a_process_that_is_slower_at_everything_no_spr
     plain, spoilt = (pricing.prices(tree_of(each)) for each in (quiet, planted))
     assert spoilt.price == pytest.approx(plain.price)
     assert spoilt.marked == []
+    assert plain.error == pytest.approx(1.25 * 2.78 / 1.96 * 0.04 / math.sqrt(5.0))  # of medians of five, Student's
+    dense = tree_of(quiet)
+    dense["prices"]["sampled"] = 2.0 * dense["prices"]["price"].isel(priced_at=0, drop=True)
+    assert pricing.prices(dense).sampled == pytest.approx(2.0)
     assert np.min(planted, axis=0)[0] == 4e-10  # the control: the least of them would be that
     quiet = np.array([[5e-9, 6e-9, 7e-9]] * 5)
     quiet, names = np.tile(quiet, 4), "abcdefghijkl"
@@ -168,6 +185,11 @@ def test_a_price_is_the_median_and_a_process_that_is_slower_at_everything_no_spr
     assert pricing.prices(tree_of(apart, names)).marked  # the control
     few = tree_of(together[:, :3])  # of so few a common factor would be their own noise
     assert pricing.prices(few).marked == ["a", "b", "c"]
+    wide = pricing.prices(few).spread / 1.35  # standard deviations
+    assert pricing.prices(few).error == pytest.approx(1.25 * 2.78 / 1.96 * wide / math.sqrt(5.0))
+    slow = tree_of(together, names)
+    slow["prices"]["call"] = slow["prices"]["call"] * xr.DataArray([1.0, 2.6, 3.3, 3.2, 5.0], dims="scene")
+    assert pricing.prices(slow).call == pytest.approx(6e-6)  # 2, 4, 6, 8, 10 us where a process is slower at all
 
 
 def test_a_noisy_price_is_measured_again_and_marked_if_it_stays():
@@ -180,6 +202,38 @@ def test_a_noisy_price_is_measured_again_and_marked_if_it_stays():
     assert pricing.prices(tree_of(np.concatenate([noisy, again]))).marked == []
     again[:, 1] = noisy[:, 1]
     assert pricing.prices(tree_of(np.concatenate([noisy, again]))).marked == ["b"]
+
+
+def test_a_price_is_the_slope_of_two_runs_and_the_guard_and_who_runs_long_are_counted(monkeypatch):
+    monkeypatch.setattr(pricing, "run_of", lambda variant, tolerance, nutations: (nutations, 1000.0 * nutations))
+    taken = lambda calls, *_, **__: [SimpleNamespace(best=2e-6 + 1000.0 * nutations * 7e-9) for nutations in calls]
+    monkeypatch.setattr(pricing, "timings", taken)
+    assert pricing.slopes(["rk4[axis]"], 5, 0.01) == [("rk4[axis]", 1e-8, *map(pytest.approx, (7e-9, 2e-6)))]
+    over = "scene", "variant", "level", "guarded"
+    seen = {"foretold": 0.05, "measured": 0.5, "watched": 1e-3, "whole": 0.0}
+    runs = xr.Dataset({name: (over, np.full((1, 1, 1, 1), value)) for name, value in seen.items()})
+    runs = runs.assign({name: (over[:2], [[word]]) for name, word in (("chart", "axis"), ("control", "step_size"))})
+    (row,) = cells.guard_counts(xr.DataTree.from_dict({"short": runs})).to_dict("records")
+    assert (row["wrong"], row["wrong_warned"], row["wrong_seen"]) == (1, 1, 0)  # the forecast alone shows it
+    each = np.array([[1.0, 1.0, 100.0], [2.0, 2.0, 2.0]])
+    monkeypatch.setattr(cells, "costs", lambda *_: cells.Costs(["a", "b"], each, np.zeros(2)))
+    assert cells.fewest(None, None) == "a"  # on the median top
+    drawn, none = np.full(len(KINDS), 100.0), np.zeros((1, len(KINDS)))
+    wrong, silent = none + 9.0 * np.eye(len(KINDS))[0], none + 5.0 * np.eye(len(KINDS))[1]
+    monkeypatch.setattr(cells, "health", lambda *_: cells.Health(np.array([facts.FINE]), drawn, wrong, silent, none))
+    told = facts.silent_facts({"short": xr.Dataset(coords={"variant": [facts.QUOTED]})})
+    assert (told["worst_kind"], told["worst_wrong"], told["worst_silent"]) == (KINDS[0], 0.09, 0.0)
+    names, charts = ["a", "b", "c", "d"], ["axis", "attitude", "attitude", "angles"]
+    ran = xr.Dataset({"chart": (over[:2], [charts])}, {"variant": names, "target": [1e-3]})
+    each = {"axis": np.array([[1.0], [INF], [INF], [INF]]), "attitude": np.array([[1.0], [1.2], [2.0], [2.0]])}
+    monkeypatch.setattr(cells, "costs", lambda _, cell: cells.Costs(names, each[cell.quantity], np.zeros(4)))
+    assert cells.contenders(xr.DataTree.from_dict({"short": ran})) == ["a", "b", "d"]
+    names, over = ["rk4[axis]", "strang[axis]", "takahashi-imada[axis]"], ("scene", "variant", "target")
+    ran = {"interpolated": (over, np.full((1, 3, 1), 10.0)), "served": (over, [[[10.0], [20.0], [70.0]]]),
+           "share": (over, np.ones((1, 3, 1)))}  # fmt: skip
+    data = xr.DataTree.from_dict({cells.CONFIRMED: xr.Dataset(ran, {"variant": names, "target": [1e-3]})})
+    assert cells.served_over_interpolated(data, Cell("short", "axis", 1e-3, NATURAL), "strang[axis]") == 2.0
+    assert facts.confirmed_facts(data)["finer"] == 2.0
 
 
 @pytest.mark.slow
@@ -316,12 +370,15 @@ def test_the_stored_setting_meets_the_target_at_the_stored_cost(tops, strang, na
         assert alone["force_evaluations"] == pytest.approx(float(one["cost"][member]), rel=0.1)
 
 
-def test_finer_targets_cost_more_within_the_budget_and_every_top_drawn_is_judged_or_dropped(strang):
+def test_finer_targets_cost_more_within_the_budget_and_every_top_is_judged_or_dropped(strang, tops, monkeypatch):
     cost = strang["cost"].transpose("quantity", "target", "member").values
     for values in cost:
         both = ~np.isnan(values[0]) & ~np.isnan(values[1])
         assert (values[0, both] <= values[1, both]).all()
     assert cost[np.isfinite(cost)].max() <= 2e4 * 1.001
+    monkeypatch.setattr(ladder, "FORGIVEN", 1e9)  # nobody leaves who would reach a target
+    patient = ladder.table(integrator("strang[axis]"), tops, 2e4, twin=False, guarded=0)
+    assert np.array_equal(np.isfinite(patient["cost"]), np.isfinite(strang["cost"]))
     assert np.isnan(strang["cost"].sel(quantity="attitude").values).all()
     runs, wrong, silent = (strang[name].values for name in ("runs", "wrong", "silent"))
     assert (runs[0] == strang["drawn"].values).all()
@@ -331,6 +388,19 @@ def test_finer_targets_cost_more_within_the_budget_and_every_top_drawn_is_judged
     data = xr.DataTree.from_dict({"short": strang.expand_dims(scene=["tops"], variant=["strang[axis]"])})
     health = cells.health(data, "strang[axis]")
     assert (health.dropped >= 0).all()
+    np.testing.assert_array_equal(health.wrong, wrong[: len(health.setting)])
+    monkeypatch.setattr(ladder, "costs_of", lambda *given: firsts.append(given[-1]) or {})
+    firsts = []  # levels that do not count: longer steps may keep the energy and miss the motion
+    ladder.table(integrator("strang[axis]"), tops, 50.0, twin=False, guarded=0)
+    assert firsts == [{"energy": 2}] == [{"energy": math.ceil(math.log2(LEAST_STEPS / FIRST))}]
+    blank = np.full((ladder.LEVELS, 3), NAN)
+    blank[0] = [1.0, 1.0, 10.0]
+    wrong = {"axis": blank, "energy": 0.2 * blank, MOMENTA: 0.05 * blank}
+    done = ladder.Climb(blank, wrong, blank == 1.0, blank[0] > 0.0)
+    three, rk4 = tops_module.Tops(tops.numbers[:3], 10.0), integrator("rk4[axis]")
+    assert ladder.typical_work(rk4, done, three)[0, 0] == 1.0  # of the median top
+    monkeypatch.setattr(ladder, "forecast", lambda *_: SimpleNamespace(axis_error=1.0, whole=False))
+    assert ladder.guarded_runs(rk4, three, done, 2)["watched"][0, 0] == 0.2  # the larger
     assert health.dropped[-1].sum() > 0  # a budget ends every ladder of order 2
     rows = cells.guard_counts(data)  # the guard is counted once for every run that it was asked about
     asked = np.isfinite(strang["foretold"].values).sum()
@@ -392,6 +462,26 @@ def test_facts_and_tables_are_those_of_the_cells(small):
     assert "takahashi-imada[axis]" not in set(winners.loc[GENERAL]["safe"])  # it exists for symmetric bodies alone
     assert "takahashi-imada[axis] (symmetric)" in kicks["1e-3 rad"]
     assert tables["have"]["you have"].tolist() == ["rk4[axis]"]
+    parts = {name: one.to_dataset() for name, one in small.children.items()}
+    cell = Cell("short", "axis", 1e-3, "strata")
+    kinds = cells.kinds_of(small, "short")[cells.chosen(small, "short", "strata")][cells.asked_tops(small, cell)]
+    (one,) = (one for one in cells.safest(small, cell)[0] if one.name == "taylor[axis]")
+    taylor, share = parts["short"].isel(scene=0).sel(variant="taylor[axis]"), np.bincount(kinds) / kinds.size
+    mean = taylor["work"].transpose("level", "kind").values[:, : share.size] @ share  # of all that are asked
+    x, good = -np.log(taylor["setting"].values), np.isfinite(mean) & np.isfinite(taylor["setting"].values)
+    typical = math.exp(np.interp(-math.log(one.setting), x[good], np.log(1.4e-8 * mean[good] + 2e-6)))
+    assert one.seconds == pytest.approx(typical)
+    price, name = parts["prices"]["price"], parts["prices"]["variant"] == "taylor[axis]"
+    fine, dear = (xr.DataTree.from_dict({**parts, "prices": parts["prices"].assign(price=one)}) for one in
+                  (price.where(~name | (price.priced_at > 1e-9), 1.0), price * xr.where(name, 1e3, 1.0)))  # fmt: skip
+    before, after = (cells.costs(one, cell._replace(needs="expression")).values for one in (small, fine))
+    counted = cells.costs(small, cell._replace(needs="expression"), cells.EVALUATIONS).values
+    assert before == pytest.approx(1.4e-8 * counted + 2e-6)  # the call is paid for
+    table, known = facts.tables(small)["prices"], pricing.prices(small)
+    assert np.log((table["high (ns)"] / table["price (ns)"]).to_numpy()) == pytest.approx(1.96 * known.error)
+    assert np.mean(before == after) > 0.9  # at the prices of tolerances that meet the error, not of the finest
+    told = facts.winners_facts(dear)
+    assert 1.0 < told["misled"] == pytest.approx(told["fewest_seconds"] / told["instead_seconds"])
     rk4 = cells.reached(small, 1e-3)["rk4[axis]"]
     best = cells.winner(small, Cell("short", "axis", 1e-3, NATURAL))["safe"]
     assert tables["have"]["1e-3 rad"][0].endswith(f" {number(rk4.seconds / best.seconds)} times")

@@ -1,16 +1,21 @@
 """Long runs: laws of growth predict horizons that were left out, the orbit's shape, the phase diagram and controls."""
 
 import json
+import math
 
 import numpy as np
+import pandas as pd
 import pytest
 import xarray as xr
 from symtop_studies.cost import facts, far as runs, laws
 from symtop_studies.cost.far import diagram
+from symtop_studies.cost.prices import TOLERANCES
 from symtop_studies.cost.tops import Tops
 
 import symtop
 from symtop.core import netcdf
+from symtop.core.numbers import EPSILON
+from symtop.measure.order import power_law
 from symtop.measure.phase import split
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import closed_form, scene
@@ -70,12 +75,25 @@ def test_rounding_is_not_predicted_above_what_the_run_has_shown():
     known = np.full((len(runs.QUANTITIES), 1, FAR.size, 1), np.nan)
     known[:, 0, : ends.size] = np.where(SHORT[: ends.size, np.newaxis], seen, np.nan)
     grain = runs.grain_of(tops)
-    told = runs.predicted(known, work[np.newaxis], FAR, grain, drifts=False)["error"].sel(quantity="axis").values[0]
+    foretold = runs.predicted(known, work[np.newaxis], FAR, grain, drifts=False)
+    assert (foretold["walk"].values <= grain).all()
+    told = foretold["error"].sel(quantity="axis").values[0]
     w = np.minimum(laws.walk(known[1], work[:, np.newaxis] * FAR[:, np.newaxis]), grain)
     alone = laws.rounding("axis", w[:, np.newaxis], FAR, work[:, np.newaxis] * FAR)[0]
     late, end = int(np.argmin(np.abs(FAR[::2] - 1e4))), ends.size - 1
     assert 0.1 < told[late, 0] / seen[0, end, 0] < 30.0
     assert alone[end] > 1e3 * seen[0, end, 0]  # the control: without the limit
+    on = scene("fast")
+    size = (abs(on.top.energy(on.start)) + on.top.mgl) / on.energy_scale
+    assert runs.grain_of(one_top("fast")) / EPSILON == pytest.approx(size)
+    rough, ends = 1e-6 * (1.0 + 0.3 * np.sin(40.0 * np.arange(9.0))), FAR[:9]
+    seen = np.full((3, 1, FAR.size, 1), np.nan)
+    seen[:, 0, :9, 0] = rough
+    told = runs.predicted(seen, np.full((1, 1), 100.0), FAR, np.full(1, 1e-8), drifts=False)
+    walk = (rough / np.sqrt(100.0 * ends)).min()
+    assert told["walk"].values == pytest.approx(walk, rel=1e-3)
+    bounded, walked = laws.fit(FAR, seen[1, 0].T).coefficients[0, 0], walk * np.sqrt(100.0 * FAR[12])
+    assert told["error"].values[1, 0, 6, 0] == pytest.approx(np.hypot(bounded, walked), rel=2e-3)  # in quadrature
 
 
 def test_a_drift_below_an_oscillation_is_found_and_a_wrong_law_would_not_predict():
@@ -85,10 +103,17 @@ def test_a_drift_below_an_oscillation_is_found_and_a_wrong_law_would_not_predict
     np.testing.assert_allclose(found.at(FAR)[0], drift, rtol=1e-6)
     assert found.leading.tolist() == [1.0, 0.0]
     assert np.isnan(found.powers[1, 1])
+    line = power_law(FAR, rough, SHORT)
+    assert (found.slope[1], found.interval[1]) == pytest.approx((line.slope, line.interval))
+    noise = 1e-6 * (1.0 + 0.05 * np.random.default_rng(0).standard_normal((9000, FAR.size)))
+    chosen = laws.fit(FAR, np.where(FAR < 60.0, noise, np.nan), drifts=True)  # four points: Student's of two degrees
+    assert 0.03 < np.mean(~np.isnan(chosen.powers[:, 1])) < 0.042
     errors = np.full((2, FAR.size), np.nan)
     errors[0, :3] = 1e-5
     errors[1, :8] = 2.0
     assert np.isnan(laws.fit(FAR, errors).at(FAR)).all()
+    room = laws.least(np.array([[1.0, 1.1]]), np.ones((1, 2)), np.full((1, 2), 10.0))
+    assert room == pytest.approx(math.sqrt(2.0 * 0.1) * 1.1 / 10.0)  # in quadrature beside a misfit of a tenth
     walked = laws.rounding("energy", 1e-16, FAR, 100.0 * FAR)
     np.testing.assert_allclose(walked, 1e-15 * np.sqrt(FAR))
     np.testing.assert_allclose(laws.rounding("axis", 1e-16, FAR, 100.0 * FAR) / walked, 2 * np.pi * FAR / np.sqrt(3))
@@ -181,6 +206,7 @@ def test_a_run_is_counted_by_whether_it_meets_the_error_as_predicted(errors, tol
     }, {"variant": ["check-00"]})  # fmt: skip
     tree = xr.DataTree.from_dict({"/far": far, "/checks": ran})
     assert runs.checks(tree)["told"].sum() == 2 * (4 + told)
+    assert runs.checks(tree)["ratio"].min() == 1.0  # no number over an infinite one
     (row,) = facts.checked(tree).to_dict("records")
     assert (row["runs"], row["meet or miss it as predicted"]) == (16, 2 * (4 + told))
 
@@ -195,6 +221,38 @@ def test_what_is_checked_was_predicted_and_a_prediction_that_fails_is_told(data)
     ran = runs.checks(data)
     assert (ran["horizon"] >= 1e5).all()
     assert (ran.groupby(["quantity", "target", "horizon"]).size() == 4 * runs.CHECKED_TOPS).all()
+
+
+def test_the_map_goes_by_the_median_top_and_its_shares_are_of_the_cells_that_are_reached(monkeypatch):
+    names, over = ["rk4[axis]", "strang[axis]"], ("scene", "variant", "setting", "member")
+    error = np.full((1, 2, 3, 2, 2, 4), 1e-4)
+    error[..., 0, :, 2:] = 1.0  # two of four tops need the finer setting, which was not run so far
+    work = np.full((1, 2, 2, 4), 10.0)
+    work[0, 0] = [1.0, 1.0, 1.0, 100.0]  # less in the median, and more in the mean
+    far = xr.Dataset({
+        "error": (("scene", "variant", "quantity", "setting", "horizon", "member"), error), "work": (over, work),
+        "setting_value": (over[:3], [[[4.0, 8.0]] * 2]), "reach": (over[:3], [[[1e5, 10.0]] * 2]),
+        "conserves_energy": (over[:2], [[0.0, 0.0]]),
+    }, {"variant": names, "quantity": list(runs.QUANTITIES), "horizon": [10.0, 1e5]})  # fmt: skip
+    over = ("scene", "variant", "priced_at")
+    prices = xr.Dataset({"price": (over, np.full((5, 2, 7), 1e-8)), "call": (over, np.zeros((5, 2, 7))),
+                         "sampled": (over[:2], np.full((5, 2), np.nan))},
+                        {"scene": [f"first-{k}" for k in range(5)], "variant": names,
+                         "priced_at": list(TOLERANCES)})  # fmt: skip
+    tree = xr.DataTree.from_dict({"far": far, "prices": prices})
+    panel = diagram(tree, "axis")
+    reached = np.array(runs.TARGETS)[:, np.newaxis] >= 1e-4 * (1.0 - 1e-9) * np.ones(2)
+    np.testing.assert_array_equal(panel.winner, np.where(reached, 0, -1))
+    assert not panel.predicted.any()  # half of the tops are not most
+    error[..., 0, :, 1:] = 1.0  # three of four need it
+    more = xr.DataTree.from_dict({"far": far.assign(error=(far["error"].dims, error)), "prices": prices})
+    np.testing.assert_array_equal(diagram(more, "axis").predicted, reached & np.array([False, True]))
+    ran = {"quantity": "axis", "target": 1e-3, "horizon": np.arange(11), "told": True, "ratio": np.arange(11.0)}
+    monkeypatch.setattr(runs, "checks", lambda _: pd.DataFrame(ran))
+    told = facts.far_facts(tree)
+    assert told["map_axis"] == "rk4[axis]"
+    assert [told[f"map_axis_{end}"] for end in ("share", "clear", "short", "long")] == [1.0, 1.0, 0.0, 0.0]
+    assert [told[f"checks_{end}"] for end in ("low", "middle", "high")] == [1.0, 5.0, 9.0]
 
 
 def test_a_check_measures_the_error_of_each_run():

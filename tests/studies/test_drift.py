@@ -10,7 +10,7 @@ from symtop_studies.drift import facts, figures, measures, study
 from symtop_studies.drift.growth import ensemble_growth, history, horizon, lost_at, nutation_phase
 from symtop_studies.drift.measures import ROUNDINGS
 from symtop_studies.drift.phase_loss import phase_loss
-from symtop_studies.drift.runs import elapsed_steps, gauges_of, members, run_history, side_by_side
+from symtop_studies.drift.runs import PLAIN_MEMBERS, elapsed_steps, gauges_of, members, run_history, side_by_side
 from symtop_studies.drift.study import TOLERANCE, cases
 
 import symtop
@@ -100,6 +100,12 @@ def test_a_constant_is_kept_bounded_or_lost_on_the_worst_scene(histories):
     ended = histories.assign(outcome=histories["outcome"].where(histories["variant"] != "strang[axis]", "left_chart"))
     assert measures.fates(ended)["energy"]["strang[axis]"] == measures.FAILED
     assert facts.of_histories(ended)["holding"] == 1
+    brief = histories.copy(deep=True)
+    brief["sample_time"] = brief["sample_time"].copy()
+    brief["sample_time"].loc[{"variant": "rk4[axis]", "scene": "goldstein"}] *= 0.5
+    brief["energy_largest"].loc[{"variant": "gauss-4[axis]"}] = 1e-11  # a random walk
+    answers = facts.of_histories(brief)
+    assert [answers[name] for name in ("shortened", "shortest", "energy_lost")] == [1, 0.5, 3]
 
 
 @pytest.fixture(scope="module")
@@ -117,6 +123,11 @@ def test_the_page_says_what_every_group_shows(data, tmp_path):
     assert (answers["variants"], answers["own"], answers["tolerance"]) == (6, 1, TOLERANCE)
     assert (answers["holding"], answers["energy_lost"]) == (4, 2)  # so soon rk4 in angles has not lost it
     assert answers["gain_least"] > 3.0
+    part = data[ROUNDINGS].to_dataset().isel(scene=0, variant=0).dropna("window", subset=["elapsed"])
+    late = part["elapsed"].values > 0.1 * part["elapsed"].values[-1]
+    plain, kept = (part[name].dropna(dim)[{dim: slice(PLAIN_MEMBERS), "window": late}]
+                   for dim, name in (("plain_member", "plain_drift"), ("member", "drift")))  # fmt: skip
+    assert float(part["gain"]) == pytest.approx(float(np.sqrt((plain**2).mean() / (kept**2).mean())))
     assert (answers["lost_count"], answers["lost_hits"]) == (4, 4)
     assert [len(one) for one in facts.tables(data).values()][1] == 6
 
@@ -146,8 +157,8 @@ def test_phases_are_grouped_by_the_energy_and_a_run_that_keeps_it_is_none_of_tho
 
 
 def test_a_prediction_is_judged_by_what_was_measured():
-    cells = {"steps": [9.0] * 3, "evaluations": [9.0] * 3, "short": [1000.0] * 3, "ratio": [1.0, 1.25, np.nan],
-             "predicted": [2500.0, 2500.0, np.inf], "measured": [2500.0, 2000.0, np.nan]}  # fmt: skip
+    cells = {"steps": [9.0] * 3, "evaluations": [9.0] * 3, "short": [1000.0] * 3, "ratio": [1.0, 0.75, np.nan],
+             "predicted": [2500.0, 1500.0, np.inf], "measured": [2500.0, 2000.0, np.nan]}  # fmt: skip
     horizons = xr.Dataset({name: (("scene", "variant"), [values]) for name, values in cells.items()},
                           coords={"scene": ["spheroid"], "variant": ["a", "b", "c"]})  # fmt: skip
     answers = facts.of_losses(horizons)
@@ -215,6 +226,11 @@ def test_a_law_is_named_where_the_interval_holds_one_and_growth_as_time_is_told(
                         "energy_largest": means + 5e-5, "energy_least": means - 5e-5})  # fmt: skip
     moves = np.abs(measures.shifts(cells))
     assert (float(moves.isel(window=-1).max()), float(moves.max())) == pytest.approx((0.01, 0.4))
+    ends = {f"{name}_{part}": ("variant", [size]) for name in ("p_phi", "p_psi") for part, size in
+            (("least", -3e-5), ("largest", 1e-5))} | {"steps": ("variant", [1e8])}  # fmt: skip
+    fallen = cells.assign(energy_mean=-cells["energy_mean"]).isel(window=slice(3)).assign(ends)
+    answers = facts.of_windows(fallen.expand_dims(scene=["spheroid"]))
+    assert [answers[name] for name in ("moved", "scattered", "long_momenta")] == pytest.approx([0.01, 0.4, 3e-5])
     slopes = np.array([0.91, 1.0, 1.09, 0.88, 1.12, 2.0])
     assert measures.as_time(slopes).tolist() == [True, True, True, False, False, False]
     assert measures.faster(slopes).tolist() == [False, False, False, False, True, True]
@@ -231,6 +247,10 @@ def test_an_ensemble_tells_a_walk_from_a_drift_and_means_of_a_walk_vary_with_the
     walks = np.cumsum(draw.standard_normal((8, 100_000)), axis=1)[:, steps - 1]
     walk, drift = ensemble_growth(steps, walks, 20.0), ensemble_growth(steps, walks + 0.2 * steps, 20.0)
     assert abs(walk.fit.slope - 0.5) < walk.fit.interval < 0.3
+    assert ensemble_growth(steps, np.where(steps < 20, 1e3, walks), 20.0).fit[:3] == pytest.approx(walk.fit[:3])
+    ensembles = np.cumsum(draw.standard_normal((60, 24, 1000)), axis=2)[..., 99::100]
+    fits = [ensemble_growth(np.arange(100, 1001, 100), one, 100.0).fit for one in ensembles]
+    assert sum(abs(fit.slope - 0.5) < fit.interval for fit in fits) >= 50  # of 60, at 95 %
     assert drift.fit.slope - drift.fit.interval > 0.65
     ends = np.array([100, 130, 200, 400, 1000])
     walks = np.cumsum(np.random.default_rng(4).standard_normal((20_000, 1000)), axis=1)
@@ -271,7 +291,11 @@ def test_a_horizon_is_the_first_crossing_and_a_phase_that_is_not_lost_has_none()
     t = np.linspace(0.0, 100.0, 5001)
     bump = 1e-3 * t + np.exp(-(((t - 30.0) / 3.0) ** 2))
     assert 25.0 < lost_at(t, bump, 0.5) < 30.0
+    t = np.linspace(0.0, 1000.0, 4001)
+    assert horizon(t, 1e-6 * t - 1e-11 * t * t, 1e-2).time == pytest.approx(1.127e4, rel=1e-3)  # before it comes back
+    assert np.isnan(lost_at(t, -1e-3 * t, 2.0)) != np.isnan(lost_at(t, -1e-3 * t, 0.5))
     error = 1e-6 * np.sin(5.3 * TIME)
+    assert horizon(TIME, 1e-6 * TIME + error, 1e-2).constant == 0.0  # as an oscillation leaves it
     assert np.isnan(lost_at(TIME, error, 1e-2))
     assert horizon(TIME, error, 1e-2).time > 1e3 * TIME[-1]
 
@@ -323,6 +347,8 @@ def test_a_lost_phase_is_predicted(name):
     found = phase_loss(symtop.scene("spheroid"), symtop.integrator(name), short=100.0, target=250.0)
     assert float(found["measured"]) > 150.0
     assert float(found["ratio"]) == pytest.approx(1.0, abs=0.02)
+    assert float(found["ratio"] * found["measured"]) == pytest.approx(float(found["predicted"]), rel=1e-12)
+    assert name != "rk4" or float(found["evaluations"] / found["steps"]) == pytest.approx(4.0, rel=1e-3)
 
 
 @pytest.mark.parametrize("name", ["stormer-verlet", "midpoint", "strang", "cayley"])

@@ -114,6 +114,8 @@ def test_a_fast_top_precesses_as_a_spherical_one_without_the_term_and_four_evalu
     without, whole = (measures.judged(fast, integrator(name), 1e-3, 10.0) for name in ("no-gyro[axis]", "strang[axis]"))
     assert without["precession"] == pytest.approx(ratio, abs=2e-3)
     assert abs(whole["precession"]) < 1e-4
+    long = measures.judged(GOLDSTEIN, integrator("strang[axis]"), 0.02, 1000.0)
+    assert abs(long["precession"]) < 0.01  # of more turns than samples that are shown
     made = measures.frames(GOLDSTEIN, integrator("rkmk4[axis]"), (10.0, 11.0))
     alone = measures.frames(GOLDSTEIN, integrator("mujoco-implicit[axis]"), (10.0, 11.0))
     assert float(made["forces_a_step"]) == 4.0
@@ -154,5 +156,17 @@ def test_facts_are_those_of_the_runs_and_the_page_has_them(measured, tmp_path):
     assert answers["best"] == answers["worst"] == float(usual["frame_axis"].sel(variant="mujoco-euler[axis]"))
     assert (answers["maps"], answers["turned"], answers["singles"], answers["members"]) == (2, 1, 1, 20)
     assert answers["lost"] == 1  # mujoco-euler flies apart on the fast top
+    known, tops = facts.lines(measured), measured["tops"].to_dataset()
+    float32 = tops["axis"].sel(scene="goldstein", variant="rapier-float32[attitude]")
+    assert known["best_count"]["rapier-float32[attitude]"] == float(float32.idxmin("per_nutation"))
+    other = tops.assign_coords(per_nutation=4.0 * tops["per_nutation"]).assign(frame_axis=0.0 * tops["frame_axis"])
+    other["axis"] = (1.0 / np.minimum(other["per_nutation"], 3000.0)).where(other["axis"].notnull())
+    other["frame_energy"] = xr.where(tops["variant"] == "no-gyro[axis]", np.nan, -0.5) + 0.0 * tops["frame_energy"]
+    other = xr.DataTree.from_dict({"tops": other})
+    assert (facts.facts(other)["lost"], facts.facts(other)["energy_lost"]) == (1, 2)  # one of them has ended
+    assert facts.lines(other)["order"]["strang[axis]"] == pytest.approx(1.0)
+    worse = tops.assign(axis=2.0 * tops["axis"]).sel(variant=["no-gyro[axis]"])
+    both = xr.concat([tops, worse.assign_coords(variant=["no-gyro-linear[axis]"])], "variant")
+    assert facts.facts(xr.DataTree.from_dict({"tops": both}))["wall"] == answers["wall"]
     assert answers["single_best"] > 1e-3
     assert PARTIAL not in checked("engines", measured, tmp_path)

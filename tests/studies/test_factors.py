@@ -215,6 +215,7 @@ def test_the_product_of_the_ratios_is_the_total_and_a_waterfall_with_a_missing_s
     total = facts.facts(quiet)["whole"]
     for order in (waterfall(part), waterfall(part, call_first=True)):
         seconds = order["time (s)"].to_numpy()
+        assert order["so far"].to_numpy() == pytest.approx(seconds[0] / seconds, rel=1e-12)
         assert total == pytest.approx(seconds[0] / seconds[-1], rel=1e-12)
         assert math.prod(order["times faster"].iloc[1:]) == pytest.approx(total, rel=1e-12)
     bars = waterfall(rows)
@@ -225,7 +226,7 @@ def test_the_product_of_the_ratios_is_the_total_and_a_waterfall_with_a_missing_s
 
 EFFECT = {
     DORMAND_PRINCE: 8.0, "rk4": 5.0, "Takahashi-Imada": 1.0, "angles": 3.0, "axis": 1.0, "attitude": 1.5,
-    SCIPY_PYTHON: 100.0, SCIPY_NUMBA: 90.0, NUMPY: 80.0, COMPILED: 1.0, SOLVE_IVP: 2.5, SIMULATE: 2.0, KERNEL: 1.0,
+    SCIPY_PYTHON: 100.0, SCIPY_NUMBA: 90.0, NUMPY: 0.5, COMPILED: 1.0, SOLVE_IVP: 2.5, SIMULATE: 2.0, KERNEL: 1.0,
 }  # fmt: skip
 
 
@@ -241,7 +242,7 @@ def synthetic(interaction=1.0):
     return pd.DataFrame(grid, columns=[*GOAL, *FACTORS, "variant", "seconds"])
 
 
-def test_effects_that_multiply_are_found_and_scipy_and_charts_compared_by_the_fastest():
+def test_effects_that_multiply_are_found_and_scipy_and_charts_compared_by_the_fastest(quiet, monkeypatch):
     for pair in pairs(synthetic()).to_dict("records"):
         assert pair["ratio"] == pytest.approx(EFFECT[pair["before"]] / EFFECT[pair["after"]], rel=1e-12)
     table = effects(synthetic(interaction=4.0)).set_index(["factor", "before", "after"])
@@ -258,6 +259,13 @@ def test_effects_that_multiply_are_found_and_scipy_and_charts_compared_by_the_fa
     assert list(table["family"]) == ["Dormand-Prince", "rk4", "splitting"]
     np.testing.assert_allclose(table["angles / axis"], 12.0)
     np.testing.assert_allclose(table["attitude / axis"], 1.5)
+    goals = [synthetic(interaction=2.0**k).assign(target=10.0**-k, spread=0.01) for k in range(3)]
+    for one, slower in zip(goals, (1.0, 2.0, 6.0), strict=True):
+        one.loc[one["language"] == SCIPY_PYTHON, "seconds"] *= slower
+    monkeypatch.setattr(facts, "compared", lambda _: pd.concat(goals, ignore_index=True))
+    answers = facts.facts(quiet)
+    assert [answers[f"user_{end}"] for end in ("least", "most")] == pytest.approx([1000.0, 6000.0])
+    assert [answers[f"angles_{family}"] for family in ("rk4", "splitting")] == pytest.approx([6.0, 6.0])
 
 
 @pytest.mark.parametrize(("attitude", "chart"), [(0.95, "axis"), (0.8, "attitude")])

@@ -14,7 +14,13 @@ from symtop_studies.stability.failures import (
     survives,
     surviving_displacements,
 )
-from symtop_studies.stability.linear_limits import linear_limits, sign_changes, sleep_margin, sleeping_threshold
+from symtop_studies.stability.linear_limits import (
+    linear_limits,
+    sign_changes,
+    sleep_margin,
+    sleeping_threshold,
+    surpasses,
+)
 from symtop_studies.stability.measures import narrow_window
 from symtop_studies.stability.solver_tolerance import solver_sweep, textbook_midpoint
 
@@ -28,7 +34,7 @@ from symtop.model import charts, scenes
 from symtop.model.charts import View, axis_of
 from symtop.model.scenes import Scene, closed_form, grazing, sleeping
 from symtop.model.top import Angles, SymmetricTop
-from symtop.run.linear_stability import trace, with_momenta
+from symtop.run.linear_stability import Trace, trace, with_momenta
 
 STEADY = scenes.scene("steady-fast")  # I1, I3, mgl, theta, w3 = 2, 1, 2, 60 degrees, 20
 OMEGA = STEADY.top.nutation_frequency(STEADY.top.momenta(STEADY.start))
@@ -147,6 +153,8 @@ def test_a_window_between_two_steps_of_the_grid_is_seen(name, phase, unstable):
     assert stays < 1e-5
     if unstable:
         assert window.start * OMEGA < phase < window.end * OMEGA
+        ends = [trace(method, STEADY, h) for h in window]
+        assert max(surpasses(at, at.doubt) for at in ends) <= 0.0
         assert (window.end - window.start) * OMEGA < 0.011
         own = trace(method, STEADY, phase / OMEGA).theta  # the precession itself is lost beside 2 pi
         centre = own if math.isfinite(own) else STEADY.start.theta
@@ -281,6 +289,9 @@ def test_solvers_of_one_iteration_drift_and_tight_ones_leave_the_method():
     assert measured[0].iterations == 1.0
     assert measured[0].momentum > 1e-9 > measured[1].momentum > measured[2].momentum
     assert measured[2].momentum < 1e-14
+    at = scene.start
+    mirrored = Scene("mirrored", scene.top, Angles(at.theta, phi_dot=-at.phi_dot, psi_dot=-at.psi_dot), scene.horizon)
+    assert solver_sweep(midpoint, mirrored, 0.1, 20_000, math.inf).momentum == measured[0].momentum
     coarse = solver_sweep(midpoint, scene, 0.3, 100_000, math.inf).energy
     assert coarse > 0.05 > 10.0 * solver_sweep(midpoint, scene, 0.3, 100_000, 1e-8).energy
 
@@ -362,5 +373,8 @@ def test_sign_changes_are_found_and_a_precession_next_to_a_pole_has_no_trace():
     holed = lambda x: math.nan if 1.0 < x < 2.0 else math.cos(x)
     assert sign_changes(holed, np.linspace(0.0, 6.0, 13)) == pytest.approx([3 * math.pi / 2])
     assert sign_changes(lambda x: 1.0 + x * x, np.linspace(-1.0, 1.0, 5)) == []
+    over = [(surpasses(Trace(t, 1.0, 1.0)) > 0.0, surpasses(Trace(t, 1.0, 1.0), 1e-6) > 0.0)
+            for t in (2.0 + 5e-8, 2.0 + 2e-7, 2.0 + 2e-6, -2.0 - 2e-7, -2.0 - 2e-6, -2.0 + 5e-7)]  # fmt: skip
+    assert over == [(False, False), (True, False), (True, True), (True, False), (True, True), (False, False)]
     tall = Scene("tall", SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(theta=1e-4, psi_dot=3.0), 1.0)
     assert math.isnan(trace(integrator("stormer-verlet"), tall, 0.1).trace)

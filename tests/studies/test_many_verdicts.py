@@ -104,4 +104,7 @@ def test_a_state_that_is_not_finite_and_a_pole_on_the_wrong_side_are_seen():
     turned = states.copy()  # by half a turn about the vertical
     turned[:, :4] = states[:, [3, 2, 1, 0]] * np.array([-1.0, -1.0, 1.0, 1.0])
     assert one_pass(near, times, turned, momenta)[0] == "bounded_but_wrong"
+    for place, word in ((SAMPLES // 2, "drifting"), (SAMPLES // 2 - 1, "bounded_but_wrong")):
+        (bent := turned.copy())[place, 4:] *= 1.5  # more energy at the first sample of the second half, or before it
+        assert one_pass(near, times, bent, momenta)[0] == word
     assert one_pass(near, times, turned, momenta - np.array([2e-3, 0.0]))[0] == "wrong_regime"

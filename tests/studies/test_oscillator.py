@@ -6,10 +6,11 @@ import math
 import mpmath
 import numpy as np
 import pytest
+import xarray as xr
 from symtop_studies.oscillators import facts, figures, study
 from symtop_studies.oscillators.damping import damped_truth, discrete_exponents
-from symtop_studies.oscillators.measures import convergence, damped_top_table, decay, notebook_history
-from symtop_studies.oscillators.quartic_measures import QUARTICS
+from symtop_studies.oscillators.measures import convergence, damped_top_table, decay, notebook_history, order
+from symtop_studies.oscillators.quartic_measures import ERROR, QUARTICS, STEP, quartic_order
 
 import symtop
 from symtop.measure import datasets
@@ -21,7 +22,8 @@ from symtop.methods.lagrangian.damped_oscillator import (
     notebook_positions,
     rule_sums,
 )
-from symtop.methods.lagrangian.damped_top import Friction, damped_run
+from symtop.methods.lagrangian.damped_top import Friction, damped_run, four_equations
+from symtop.methods.library.scipy_ivp import integrated
 from symtop.runner.study import Case
 from tests.templates import checked
 
@@ -72,6 +74,14 @@ def test_the_exponents_are_those_of_the_step_matrix(rule):
         matrix = step_matrix(oscillator, rule, h)
         assert eigenvalues.sum() == pytest.approx(np.trace(matrix), abs=1e-13)
         assert eigenvalues.prod() == pytest.approx(np.linalg.det(matrix), abs=1e-13)
+    four = Oscillator(damping=4.0)  # whose slow motion is exp(-0.268 t)
+    slow = math.log(max(np.linalg.eigvals(step_matrix(four, RULES["midpoint"], 0.1)))) / 0.1
+    one, measured = Oscillator(damping=1.0), convergence(four, "midpoint", [0.1], 25.0)
+    assert float(measured["exponent_error"][0]) == pytest.approx(slow / (math.sqrt(3.0) - 2.0) - 1.0, rel=1e-6)
+    times, position, _ = discrete_path(one, RULES["trapezoidal"], 1.0, 0.0, 25.0, 250)
+    off = position - one.exact(times, 1.0, 0.0)[0]
+    other = convergence(one, "trapezoidal", [0.1], 25.0)
+    assert 1.01 * off.max() < float(other["position_error"][0]) == pytest.approx(-off.min())
 
 
 def test_undamped_steps_are_symplectic_and_only_midpoint_leaves_critical_damping_in_place():
@@ -110,7 +120,7 @@ def test_the_midpoint_rule_conserves_the_undamped_energy_the_trapezoidal_bounds_
     assert 1e-3 < error.max() < 3e-3  # bounded by h^2/4
     assert error[error.size // 2 :].max() < 1.01 * error[: error.size // 2].max()
     rk45 = decay(free, "rk45", 0.05, 250.0)
-    assert float(rk45["evaluations"]) == pytest.approx(5000, rel=0.15)
+    assert 4250.0 < float(rk45["evaluations"]) <= 5000.0  # at no more cost
     loss = np.abs(rk45["energy_error"].values)
     assert loss[-1] > 5.0 * loss[loss.size // 10]  # a drift
 
@@ -146,12 +156,15 @@ def test_the_damped_top_has_order_two_and_both_integrations_of_its_truth_agree(m
     table = damped_top_table(symtop.scene("goldstein"), method, [500, 1000, 2000, 4000], 20.0)
     assert power_law(table["top_step_size"], table["theta_error"]).slope == pytest.approx(2.0, abs=0.02)
     assert float(table["top_bound"]) < 1e-10
+    assert np.abs(table["theta"] - table["true_theta"]).max() == pytest.approx(float(table["theta_error"][-1]))
 
 
 def test_the_power_of_the_friction_is_what_the_energy_loses_and_without_it_the_kernel_is_unreduced():
     scene = symtop.scene("goldstein")
     times = np.linspace(0.0, 10.0, 4001)
-    truth, _ = damped_truth(scene, FRICTION, times)
+    truth, bound = damped_truth(scene, FRICTION, times)
+    four = integrated(*four_equations(scene, FRICTION), times, "DOP853", 1e-13)
+    assert bound == np.abs(truth[:3] - four[:3]).max()  # of all three angles
     rates = np.gradient(truth[1], times, edge_order=2), np.gradient(truth[2], times, edge_order=2)
     power = FRICTION.precession * rates[0] ** 2 + FRICTION.spin * rates[1] ** 2
     spent = np.sum(0.5 * (power[1:] + power[:-1])) * times[1]
@@ -179,7 +192,7 @@ def test_the_page_says_what_friction_does_and_what_is_exact(data, tmp_path):
     answers = facts.facts(data)
     assert None not in answers.values()
     assert (answers["order_least"], answers["order_most"]) == pytest.approx((2.0, 2.0), abs=0.05)
-    assert answers["one_sided_least"] == pytest.approx(1.0, abs=0.1)
+    assert (answers["one_sided_least"], answers["one_sided_most"]) == pytest.approx((1.0, 1.0), abs=0.1)
     assert (answers["rate_midpoint"], answers["rate_trapezoidal"]) == pytest.approx((2.0, 1.0), abs=0.1)
     assert answers["rate_force_at_one_end"] == pytest.approx(0.5, abs=0.1)
     assert answers["balance"] < 1e-11
@@ -187,6 +200,18 @@ def test_the_page_says_what_friction_does_and_what_is_exact(data, tmp_path):
     assert answers["damped_midpoint"] > 1e-3
     assert max(answers["exact"], answers["update_gap"]) < 1e-11
     assert (answers["top_order_least"], answers["map_order_least"]) == pytest.approx((2.0, 2.0), abs=0.05)
+    turned = data.assign(energy_error=-data["energy_error"], balance_psi=data["balance_psi"] + 1e-3)
+    turned["quartic_error"].loc[{"scene": QUARTICS[1]}] += 1e-3
+    other = facts.facts(turned)
+    assert (other["damped_midpoint"], other["undamped_rk45"]) == (answers["damped_midpoint"], answers["undamped_rk45"])
+    assert (other["balance"], other["exact"]) == pytest.approx((1e-3, 1e-3), rel=1e-6)
+    step = 0.1 / 2.0 ** np.arange(8.0)  # errors at rounding have no part in an order
+    columns = {"step_size": step, "position_error": np.maximum(1e-4 * step**2, 5e-10), STEP: step,
+               ERROR: np.maximum(1e-8 * step**2, 5e-14)}  # fmt: skip
+    one = xr.Dataset({name: (("scene", "variant", "k"), row[None, None]) for name, row in columns.items()})
+    one = one.assign_coords(scene=["a"], variant=["b"])
+    fits = order(one, "a", "b", "position_error"), quartic_order(one, "a", "b")
+    assert [fit.slope for fit in fits] == pytest.approx([2.0, 2.0])
 
 
 @pytest.mark.parametrize(("name", "drawn"), [("midpoint", 2), ("rk45", 0), ("exact-discrete", 1)])

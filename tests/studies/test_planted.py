@@ -51,12 +51,13 @@ def test_a_property_that_could_not_be_decided_was_declared_and_a_part_without_th
     said = facts.facts(part)
     assert (said["planted"], said["caught"]) == (None, 0)
     assert "planted" not in facts.tables(part)
+    assert said["runs"] > 0 == (facts.facts(part.assign(steps_run=0 * part["steps_run"]))["runs"] or 0)  # a formula
     assert not any(" of " in text.get_text() for text in next(figures.pictures(part)).figure.axes[0].texts)
 
 
 def test_one_that_escapes_is_named_and_a_refuted_claim_comes_first(data):
     liar = (data["variant"] == LIAR) & (data["scene"] == SCENE)
-    verdict = xr.where(liar & (data["claim"] == "symmetric"), "confirmed", data["verdict"])
+    verdict = xr.where(liar & (data["claim"] == "symmetric"), "undecided", data["verdict"])
     fooled = data.assign(verdict=xr.where(liar & (data["claim"] == "order"), "refuted", verdict))
     said = facts.facts(fooled)
     assert (said["planted"], said["caught"]) == (1, 0)

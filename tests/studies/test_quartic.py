@@ -125,3 +125,7 @@ def test_mcmillans_map_keeps_a_biquadratic_and_a_map_that_leaves_ends():
     table = quartic_table("planar-hardening", "exact-discrete", (40.0, 2.1), 1.0)
     assert float(table["quartic_error"].max()) < 1e-14
     assert Map(0.0, 0.0, 1.0, 0.0).kick(3.0) == 0.0
+    oscillator, h = PLAIN["planar-softening"], PLAIN["planar-softening"].period / 40.0
+    off = discrete_path(oscillator, "midpoint", h, 40) - (true := true_path(oscillator, h * np.arange(41)))
+    table = quartic_table("planar-softening", "midpoint", (40.0,), 1.0)
+    assert table["quartic_error"][0] == pytest.approx(np.abs(off).max() / np.abs(true).max())

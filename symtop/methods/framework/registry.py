@@ -78,7 +78,7 @@ def split_name(name: str) -> tuple[str, str]:
 class Integrator:
     """One integrator: its name, its claims, and how to run it.
 
-    `solvers` maps a chart (angles, axis, attitude) to a function. `control` is what a user turns: ``step_size``,
+    `solvers` maps a chart (angles, axis, attitude, body) to a function. `control` is what a user turns: ``step_size``,
     ``tolerance`` or nothing. `implementation` says what executes the inner loop, so that languages are never ranked
     against each other unsaid, and `inner_loop` how. `needs` is one of `NEEDS`; `general` says whether the method exists
     for a body without symmetry; None where nobody has said so. `summary` is a line about it, `about` a paragraph; the

@@ -57,8 +57,9 @@ def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float 
     Variables ``I1``, ``I2``, ``I3``, ``mgl``, ``centre`` and ``omega_body`` (member, 3; principal axes),
     ``quaternion`` (member, 4; w, x, y, z, body to space), in any consistent units, and ``stratum``, its name. `kind` is
     a stratum (free: short-axis, long-axis, near-separatrix, near-symmetric, needle; heavy: regular, chaotic,
-    lagrange), "heavy" without asking for chaos, or "free" or "all" for such strata in turn. `epsilon`, from 0 to 1/2,
-    is how far heavy bodies are from a Lagrange top; without one it is drawn. Member i depends on the seed, not on n.
+    lagrange), "heavy" without asking for chaos, or "free" or "all" for such strata in turn. `epsilon` is how
+    far heavy bodies are from a Lagrange top, from 0, or with chaotic ones from 0.02, to 1/2; without one it is drawn.
+    Member i depends on the seed, not on n.
 
     Raises SymtopError for arguments that make no sense.
     """

@@ -103,8 +103,8 @@ def reference(
 ) -> xr.Dataset:
     """The true motion at the given times, each value with a bound on its error.
 
-    Variables as `simulate` (``theta``, ``phi``, ``psi``, ``axis``, ``quaternion``, ``energy``, ``p_phi``, ...), the
-    low halves ``theta_lo`` ... of what is known beyond double, and ``axis_error_bound``, ``attitude_error_bound``,
+    Variables as `simulate` (``theta``, ``phi``, ``psi``, ``axis``, ``quaternion``, ``energy``, ``p_phi``, ...), of an
+    integration their low halves ``theta_lo`` ..., and ``axis_error_bound``, ``attitude_error_bound``,
     ``theta_error_bound``, ``phi_error_bound``, ``psi_error_bound`` in radians, for the sum of both halves. All have the
     dimension ``time``, in the order of `times`; axis and quaternion have a second one. `precision` is "closed-form", or
     "double", "longdouble" or "quad" for heyoka's integration in that arithmetic.
@@ -118,7 +118,7 @@ def reference(
     are of the motion from the very doubles that are given.
 
     Of a body without symmetry: ``quaternion``, ``axis`` (its third), ``theta``, ``momentum`` (L in the space frame),
-    ``energy``, ``p_phi``, ``axis_error_bound`` and ``attitude_error_bound``.
+    ``energy``, ``p_phi``, ``quaternion_lo``, and the bounds of axis, attitude and theta.
 
     Raises SymtopError for times that are negative, not finite or none, and for a body's that is not known to 1e-9 rad.
     """
