@@ -103,13 +103,15 @@ def _flags(method: "Integrator") -> str:
 
 def _described(method: "Integrator") -> Record:
     """The record of an integrator, its paragraph, its tolerances and its source."""
+    from symtop.methods.framework.registry import integrator
     from symtop.model.charts import BODY
 
     described: Record = {**method.record()}
     if method.conserves and BODY in method.solvers:
         described["conserves"] += " of a top"  # of a body, Gauss methods lose p_phi, which Lie-group methods keep
-    if method.conserves is not None and len(method.charts()) > 1:
-        described["conserves"] += " in every one of its charts"  # some keep more in one of them
+    if method.conserves is not None and len(integrator(method.method).charts()) > 1:
+        where = "in every chart" if method.conserves else "common to all charts"  # some keep more in one of them
+        described["conserves"] += f" {where} of {method.method}"
     if method.default_tolerance is not None:
         described["default tolerance"] = f"{method.default_tolerance:g}"
     if method.least_tolerance > 0.0:

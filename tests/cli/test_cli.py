@@ -143,6 +143,7 @@ def test_a_variant_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_pa
     assert call(*words).output.startswith("rk4[angles] on spheroid: reached")
     assert "rk4[axis]" in call("run", "--help").output
     assert "NAME[CHART]" in call("integrators").output
+    assert "nothing common to all charts of rk4" in call("integrators", "rk4[axis]").output  # it keeps p_phi there
 
 
 @pytest.mark.parametrize(("line", "completion"), [
