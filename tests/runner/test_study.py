@@ -104,6 +104,9 @@ def test_differences_leave_out_times_and_nothing_else():
     assert differences(one, one.copy(deep=True)) == []
     assert differences(one, one.assign(seconds=one["seconds"] * 2)) == []
     assert differences(one, one.assign(axis=one["axis"] * 2)) == ["axis differs by up to 1"]
+    priced, steps = (one.rename(axis=name) for name in ("price", "sampled_steps"))
+    assert differences(priced, priced.assign(price=priced["price"] * 2)) == []
+    assert len(differences(steps, steps.assign(sampled_steps=steps["sampled_steps"] * 2))) == 1
     assert differences(one, one.drop_vars("axis")) == ["axis is in one of them only"]
     assert differences(one, one.assign_attrs(seed=1)) == ["attribute seed differs: 0 and 1"]
     beside = [one.assign_attrs(timed_at_once=n, timed_slowdown=x) for n, x in ((1, float("nan")), (2, 1.01))]
