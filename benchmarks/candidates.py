@@ -15,6 +15,7 @@ corrects its own, and their runs are timed against each other and against the ve
 in turn. That one, and the best of the table's, are compared with the least.
 """
 
+import argparse
 import functools
 import itertools
 import math
@@ -175,11 +176,16 @@ def excess(count: int) -> list[Row]:
 
 def main() -> int:
     """Make the table, or check the advice."""
-    if sys.argv[1] == "make":
-        Path(ranking.TABLE).write_text("\n".join(table(netcdf.read_any(Path(sys.argv[2])))) + "\n", encoding="utf-8")
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.candidates", description=__doc__.partition("\n")[0])
+    of = parser.add_subparsers(dest="action", required=True)
+    of.add_parser("make", help="write the table").add_argument("study", type=Path, help="dataset of the study cost")
+    of.add_parser("check", help="try the advice").add_argument("scenes", type=int, help="how many to draw")
+    arguments = parser.parse_args()
+    if arguments.action == "make":
+        Path(ranking.TABLE).write_text("\n".join(table(netcdf.read_any(arguments.study))) + "\n", encoding="utf-8")
         return 0
     settings.MOST_EVALUATIONS["compiled"] = LONGEST
-    rows = excess(int(sys.argv[2]))
+    rows = excess(arguments.scenes)
     for row in sorted(rows, key=lambda row: -row.advice):
         if row.advice > TIE:
             print(f"{row.question}: {row.advised} costs {row.advice:.2f} times {row.best}, the table's {row.table:.2f}")
