@@ -136,9 +136,11 @@ def test_inner_functions_get_no_machine_code_and_kernels_the_same_bits(monkeypat
         return total + np.sum(rows)
 
     rows, generated, generate = np.linspace(0.0, 3.0, 17), [], JITCodeLibrary._finalize_specific
+    whole, optimise = [], JITCodeLibrary._optimize_final_module
     expected = sum((tenth(x) for x in rows.tolist()), 0.1) + rows.sum()
     jit.register_jitable(tenth, jit.OPTIONS | jit.WITHIN)
     monkeypatch.setattr(JITCodeLibrary, "_finalize_specific", lambda one: (generated.append(one.name), generate(one)))
+    monkeypatch.setattr(JITCodeLibrary, "_optimize_final_module", lambda one: (whole.append(one.name), optimise(one)))
     kernel.__code__ = kernel.__code__.replace(co_filename=f"<{way}>")  # no file, and so no cache on disk
     compiled = compile_kernel(kernel)
     if way in PRIVATE:
@@ -147,6 +149,7 @@ def test_inner_functions_get_no_machine_code_and_kernels_the_same_bits(monkeypat
     if way == "numba alone":
         monkeypatch.setattr(compiled, "compile", compiled.compile.__wrapped__)
     assert compiled(rows) == pytest.approx(expected, rel=1e-15)
-    assert sum(name.endswith(".tenth") for name in generated) == (0 if way == "lean" else 1)
+    for names in (generated, whole):  # optimised with the kernel alone
+        assert sum(name.endswith(".tenth") for name in names) == (0 if way == "lean" else 1)
     with pytest.raises(ValueError, match="too large"):
         compiled(1e7 * rows)
