@@ -31,6 +31,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what run
 from symtop.core import files
 from symtop.methods.framework import registry
 from symtop.model import scenes
+from symtop.model.lazy_kernel import LAZY
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run import plugins
@@ -63,6 +64,14 @@ def pytest_collection_finish():
     """What was imported and collected stays: no collection of garbage has to look at it."""
     gc.collect()
     gc.freeze()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_runtestloop():
+    """The first of several processes compiles the closed form, which each would interpret for seconds before it did."""
+    if os.environ.get("PYTEST_XDIST_WORKER") == "gw0":
+        for kernel in LAZY:
+            kernel.compile()
 
 
 @pytest.fixture(scope="module")

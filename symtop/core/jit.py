@@ -26,7 +26,7 @@ from typing import Any
 import llvmlite
 import numba
 import numpy as np
-from llvmlite.binding import parse_bitcode
+from llvmlite.binding import ffi, parse_bitcode
 from numba import njit, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import compile_result
@@ -320,6 +320,10 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
             if gc.isenabled():
                 stack.callback(gc.enable)
                 gc.disable()
+            with contextlib.suppress(AttributeError):  # numba notes the begin and end of every call of LLVM: 4 %
+                noting = ffi.lib._lock._cblist
+                stack.callback(noting.extend, noting[:])
+                noting.clear()
             if isinstance(kernel._cache, _Cache) and not is_cached(kernel, signature):
                 with contextlib.suppress(SymtopError, OSError):  # a cache that cannot be written costs time and no run
                     make_private(kernel._cache.cache_path)
@@ -379,7 +383,7 @@ def _fma(typing, a, b, c):  # type: ignore[no-untyped-def]
     return types.float64(types.float64, types.float64, types.float64), emit
 
 
-@overload(fused, inline="always")
+@overload(fused, jit_options=INLINED, strict=False)
 def _fused(a, b, c):  # type: ignore[no-untyped-def]
     if not all(isinstance(value, types.Float) for value in (a, b, c)):
         return None
@@ -390,7 +394,7 @@ def _fused(a, b, c):  # type: ignore[no-untyped-def]
     return once
 
 
-@overload(two_product, inline="always")
+@overload(two_product, jit_options=INLINED, strict=False)
 def _two_product(a, b):  # type: ignore[no-untyped-def]
     def exactly(a, b):  # type: ignore[no-untyped-def]
         product = a * b

@@ -24,7 +24,7 @@ class LazyKernel:
         self.py_func, self.arguments, self.patience = function, arguments, patience  # the name that numba has for it
         self.compiled: Any = None
         self._kernel: Any = None
-        self._spent = 0.0
+        self._spent = self._look = 0.0  # seconds of interpreting, and after how many the cache is looked at again
         self._lock = threading.Lock()  # a kernel half made is not for a second thread
         LAZY.append(self)
 
@@ -58,14 +58,16 @@ class LazyKernel:
         return known
 
     def _worth(self) -> float:
-        """Seconds of interpreting that are worth the compiled function."""
+        """Seconds of interpreting that are worth the compiled function, which another process may have made since."""
+        from symtop.core.jit import compile_kernel, is_cached
+
         if self._kernel is None:
             from numba.core import sigutils  # 0.3 s
 
-            from symtop.core.jit import compile_kernel, is_cached
-
             self._kernel = compile_kernel(self.py_func)
             self._signature, _ = sigutils.normalize_signature(self.arguments)
+        if self._spent >= self._look:
+            self._look = 2.0 * self._spent
             on_disk = [is_cached(self._kernel, self._signature, bitcode=which) for which in (False, True)]
             self._price = 0.0 if on_disk[0] else self.patience * (GENERATING if on_disk[1] else 1.0)
         return self._price

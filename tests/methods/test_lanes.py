@@ -25,16 +25,14 @@ from symtop.model.top import flat
 
 SOLVERS = {row.name: solver for row in variants() for solver in filter(None, map(inside, row.solvers.values()))}
 IN_LANES = {name for name, solver in SOLVERS.items() if solver.in_lanes}
-ENDS = {  # how members end that step too far: numbers overflow, theta passes a pole, Newton finds no root
-    ("not_finite",): ("strang[axis]", "takahashi-imada[attitude]", "cayley[axis]", "srkn-14-6[attitude]",
-                      "rk4[attitude]", "series[axis]", "series[attitude]", "rkmk-se3-2[axis]",
-                      "crouch-grossman-3[attitude]"),
+# a method of each family, all of them in a slow test, and how members end that step too far: numbers overflow, theta
+# passes a pole, Newton finds no root
+ENDS = {
+    ("not_finite",): ("strang[axis]", "rk4[attitude]", "series[axis]", "rkmk-se3-2[axis]"),
     (): ("exact-discrete[attitude]",),  # whose steps are parts of a nutation, however long they are
     ("not_finite", "left_chart"): ("stormer-verlet[angles]",),
-    ("not_converged",): ("gauss-4[axis]", "gauss-8[axis]", "gauss-4[attitude]", "lie-variational[axis]",
-                         "generalised-alpha[attitude]"),
-    ("left_chart", "not_converged"): ("midpoint[angles]", "trapezoidal[angles]", "simpson-linear[angles]",
-                                      "galerkin-simpson[angles]"),
+    ("not_converged",): ("gauss-4[axis]", "lie-variational[axis]"),
+    ("left_chart", "not_converged"): ("midpoint[angles]", "galerkin-simpson[angles]"),
 }  # fmt: skip
 ALONE = ("midpoint-unreduced[angles]", "gauss-12[axis]", "collective-gauss-4[axis]")  # one after another
 EXPLICIT = ("rkmk-se3-2", "rkmk-se3-4", "crouch-grossman-3", "commutator-free-4")

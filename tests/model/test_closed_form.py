@@ -164,6 +164,16 @@ def test_a_few_forms_import_no_slow_library_and_many_samples_are_worth_compiling
     assert kernel.ready(0.0)
 
 
+def test_what_another_process_has_compiled_is_loaded_before_patience_ends(monkeypatch, tmp_path):
+    monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
+    waiting, other = (LazyKernel(charts._unwrap, charts._unwrapper.arguments, patience=100.0) for _ in range(2))
+    assert not waiting.ready(10.0)
+    other.compile()
+    assert not waiting.ready(1.0)  # it looks at the cache again when it has spent as much again
+    assert waiting.ready(10.0)
+    assert waiting.compiled is not None
+
+
 @pytest.mark.parametrize("rate", [2.0, -2.0])
 def test_the_exact_separatrix_climbs_for_ever(rate):
     """theta = 4 atan tanh(g t/2), g = sqrt(abs(mgl)/I1), in double and in 40 digits; a pole is passed at time 0."""

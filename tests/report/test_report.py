@@ -47,9 +47,9 @@ def results(tmp_path_factory):
 
 
 @pytest.fixture(scope="module")
-def browser(results):
-    with Browser(width=1280, height=900) as open_browser:
-        open_browser.open((results / "report.html").as_uri())
+def browser(request):
+    with Browser(width=1280, height=900) as open_browser:  # without one, nothing has to be computed
+        open_browser.open((request.getfixturevalue("results") / "report.html").as_uri())
         yield open_browser
 
 

@@ -118,6 +118,27 @@ def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, toleran
     return min(100.0 * trial, guess, end)
 
 
+# numba has an assignment of slices format the sentence of its error: a third of what a kernel takes to compile
+
+
+@register_jitable
+def rows_from(place: Any, first: int, memory: Any) -> None:
+    """The memory from where it stands in a place."""
+    rows, size = memory.shape
+    for j in range(rows):
+        for m in range(size):
+            memory[j, m] = place[first + j * size + m]
+
+
+@register_jitable
+def rows_to(place: Any, first: int, memory: Any) -> None:
+    """Write the memory to its part of a place."""
+    rows, size = memory.shape
+    for j in range(rows):
+        for m in range(size):
+            place[first + j * size + m] = memory[j, m]
+
+
 @functools.cache
 def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
     """The loop of ``method(field)``, a `Method` whose memory has so many rows, on a `Formulation`, compiled.
@@ -146,7 +167,7 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
         else:
             t, step = place[clock], place[clock + 1]
             state = row_of(place[:size].reshape(1, size), 0, state)
-            memory[:] = place[size:clock].reshape(rows, size)
+            rows_from(place, size, memory)
         while t < end and effort < budget:
             before, start = state, t
             state, t, step, work, outcome = advance(par, before, memory, tolerance, start, step, end)
@@ -169,7 +190,7 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
                 break
         for m in range(size):
             place[m] = state[m]
-        place[size:clock] = memory.ravel()
+        rows_to(place, size, memory)
         place[clock], place[clock + 1] = t, step
         return seen, steps, effort, outcome
 
