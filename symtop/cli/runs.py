@@ -76,7 +76,8 @@ def run(
         settings["step_size"] = h = common.step_of(scene, settings)
         problem = scenes.scene(scene, bodies=True)
         horizon = problem.horizon if settings["horizon"] is None else scenes.horizon_of(settings["horizon"])
-        if problem.of_body:  # one to which its motion is not known is refused before the run, and not after it
+    if problem.of_body:  # one to which its motion is not known is refused before the run, and not after it
+        with ticking("following the true motion"):
             judgeable(problem, "attitude", horizon)
     if h is not None and h > 0.0:
         few_steps = partial(simulate, scene, integrator, step_size=h, samples=2, guard=False)
