@@ -181,8 +181,14 @@ def main() -> int:
     of.add_parser("make", help="write the table").add_argument("study", type=Path, help="dataset of the study cost")
     of.add_parser("check", help="try the advice").add_argument("scenes", type=int, help="how many to draw")
     arguments = parser.parse_args()
+    if arguments.action == "check" and arguments.scenes < 1:
+        parser.error(f"scenes must be at least 1, not {arguments.scenes}")
     if arguments.action == "make":
-        Path(ranking.TABLE).write_text("\n".join(table(netcdf.read_any(arguments.study))) + "\n", encoding="utf-8")
+        try:
+            study = netcdf.read_any(arguments.study)
+        except symtop.SymtopError as error:
+            parser.error(str(error))
+        Path(ranking.TABLE).write_text("\n".join(table(study)) + "\n", encoding="utf-8")
         return 0
     settings.MOST_EVALUATIONS["compiled"] = LONGEST
     rows = excess(arguments.scenes)

@@ -5,7 +5,7 @@ import os
 import numpy as np
 import pytest
 
-from benchmarks import adaptive, ensemble, kernels, lanes, truth, twin
+from benchmarks import adaptive, candidates, ensemble, kernels, lanes, truth, twin
 from symtop.measure.timing import timings
 from symtop.methods.framework import loop as loops
 from symtop.methods.framework.lanes import Many
@@ -112,3 +112,14 @@ def test_the_adaptive_loop_in_c_takes_the_same_steps(chart):
 @pytest.mark.parametrize("chart", ["angles", "axis", "attitude"])
 def test_an_adaptive_evaluation_takes_at_most_six_tenths_more_than_in_c(chart):
     assert adaptive.measure(chart, 1e-6).ratio < 1.6
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    ("check 0", "scenes must be at least 1, not 0"), ("check few", "invalid int value: 'few'"),
+    ("make missing.nc", "cannot read missing.nc"), ("", "required: action"),
+])  # fmt: skip
+def test_a_wrong_call_of_the_table_of_candidates_is_one_sentence(arguments, words, monkeypatch, capsys):
+    monkeypatch.setattr("sys.argv", ["candidates", *arguments.split()])
+    with pytest.raises(SystemExit, match="2"):
+        candidates.main()
+    assert words in capsys.readouterr().err

@@ -100,20 +100,21 @@ def test_a_loop_makes_a_kernel_when_it_is_used(monkeypatch):
     assert len(compiled) == 1
 
 
-def test_garbage_is_collected_again_after_a_kernel_is_compiled_or_refused():
+def test_garbage_is_collected_and_calls_of_llvm_noted_again_after_a_kernel_is_compiled_or_refused():
     def kernel(x):
         return x + UNIQUE
 
     def refused(x):
         return x.no_such_thing
 
-    enabled, compiled = [], compile_kernel(kernel)
-    jit._once(compiled, lambda _: enabled.append(gc.isenabled()))((types.float64,))
-    assert enabled == [False]
-    assert gc.isenabled()
+    now = lambda: (gc.isenabled(), len(jit.ffi.lib._lock._cblist))
+    before, during, compiled = now(), [], compile_kernel(kernel)
+    jit._once(compiled, lambda _: during.append(now()))((types.float64,))
+    assert (before, during) == ((True, 1), [(False, 0)])
+    assert now() == before
     with pytest.raises(TypingError):
         compile_kernel(refused)(1.0)
-    assert gc.isenabled()
+    assert now() == before
 
 
 PRIVATE = {  # of numba's, without which it compiles as it does
