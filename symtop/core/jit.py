@@ -383,7 +383,7 @@ def _fma(typing, a, b, c):  # type: ignore[no-untyped-def]
     return types.float64(types.float64, types.float64, types.float64), emit
 
 
-@overload(fused, jit_options=INLINED, strict=False)
+@overload(fused, jit_options=INLINED)
 def _fused(a, b, c):  # type: ignore[no-untyped-def]
     if not all(isinstance(value, types.Float) for value in (a, b, c)):
         return None
@@ -394,7 +394,7 @@ def _fused(a, b, c):  # type: ignore[no-untyped-def]
     return once
 
 
-@overload(two_product, jit_options=INLINED, strict=False)
+@overload(two_product, jit_options=INLINED)
 def _two_product(a, b):  # type: ignore[no-untyped-def]
     def exactly(a, b):  # type: ignore[no-untyped-def]
         product = a * b
