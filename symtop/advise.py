@@ -370,13 +370,22 @@ def _same(variant: str, usable: Sequence[str]) -> str | None:
 
 
 def _menu(question: _Question) -> list[str]:
-    """Of the methods that the user can use, those that the table names; none where it does not answer."""
-    if question.step is not None or question.keeps or question.max_step < math.inf or question.pace < math.inf:
-        return []
+    """Of the methods that the user can use, those that the table names; none where it does not answer.
+
+    Where energy or momenta of a top are to be kept, the table's methods that do so come first, and then those of every
+    class; on bodies their order is another.
+    """
     scene, accuracy, quantity, horizon = question[:4]
+    if question.step is not None or question.max_step < math.inf or question.pace < math.inf:
+        return []
+    if question.keeps and scene.of_body:
+        return []
     nutations, usable = horizon / scene.time_scale(horizon), _everyone(question)
-    rows = cheapest(question.needs, quantity, accuracy, nutations, general=question.general or scene.of_body)
-    return list(dict.fromkeys(name for row in rows if (name := _same(row, usable))))
+    rows = list[str]()
+    for needs in (question.needs, OF_ANY)[: 2 if question.keeps and not question.needs else 1]:
+        rows += cheapest(needs, quantity, accuracy, nutations, general=question.general or scene.of_body)
+    menu = list(dict.fromkeys(name for row in rows if (name := _same(row, usable))))
+    return menu if len(menu) >= AGREED or not question.keeps else []
 
 
 def _candidates(question: _Question) -> tuple[list[str], str]:

@@ -216,8 +216,17 @@ def test_the_table_names_methods_for_every_class_and_none_where_a_user_limits_st
     both = advise._menu(ask(("derivative", "kicks")))
     assert {symtop.integrator(name).needs for name in both[:2]} == {"derivative", "kicks"}
     assert all(symtop.integrator(name).general for name in advise._menu(ask((), general=True)))
-    for limit in ({"step": 0.01}, {"max_step": 0.1}, {"keeps": ("energy",)}, {"pace": 1e-3}):
+    for limit in ({"step": 0.01}, {"max_step": 0.1}, {"pace": 1e-3}):
         assert advise._menu(ask((), **limit)) == []
+    for kept in (("energy",), ("energy", "momenta")):
+        menu = advise._menu(ask((), keeps=kept))
+        assert len(menu) >= 5
+        assert menu[0] == next(name for name in advise._menu(ask(())) if name in menu)  # the best of all that keep it
+        assert {*menu} <= {*advise._everyone(ask(advise.OF_ANY, keeps=kept))}
+        assert {symtop.integrator(name).needs for name in menu} >= {"kicks", "lagrangian"}
+    assert advise._menu(ask(("expression",), keeps=("energy",))) == []  # too few of the table's: all are tried
+    body = symtop.scene("heavy-brick", bodies=True)
+    assert advise._menu(ask(())._replace(scene=body, quantity="attitude", keeps=("energy",))) == []
     assert advise._menu(ask(())._replace(quantity="precession_rate")) == []  # the study has no such quantity
 
 
