@@ -27,7 +27,7 @@ SAMPLES = 200  # of a run
 DENSE = 40.0  # times a nutation on whose multiples an adaptive run is sampled
 FINER = {True: 1.03, False: 0.7}  # from one setting to the next, by whether the step is fixed
 DIGITS = {True: 3, False: 1}  # of a setting, in tables
-MOST = 4.0  # times as many steps as interpolated, or errors of the tolerance
+MOST = {True: 4.0, False: 10.0}  # times as many steps as interpolated, or as fine a tolerance, which has one digit
 
 
 def rounded(setting: float, fixed: bool) -> float:
@@ -63,7 +63,7 @@ def confirm(variant: Integrator, members: int, seed: int, nutations: float, star
                 break
             setting = rounded(setting * FINER[fixed], fixed)
             ratio = setting / first if fixed else first / setting
-            if ratio > MOST or not (fixed or setting >= variant.least_tolerance):
+            if ratio > MOST[fixed] or not (fixed or setting >= variant.least_tolerance):
                 setting = math.inf
         served[place] = setting
     variables = {"interpolated": np.array(start), "served": served, "share": share}

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 from symtop_studies.cost import cells, facts, figures, ladder, prices as pricing, ranking, study, tops as tops_module
 from symtop_studies.cost.cells import GENERAL, Cell
-from symtop_studies.cost.confirm import rounded, share_served
+from symtop_studies.cost.confirm import confirm, rounded, share_served
 from symtop_studies.cost.ranking import SAFE, Ladder, cost_to_reach, hindsight, run_lengths, safe, slowdowns, wins
 from symtop_studies.cost.tops import ASKED, FIRST, KINDS, MOMENTA, NATURAL, SCENE, natural, tops_of
 
@@ -531,6 +531,13 @@ def test_quick_results_hold_every_verdict_and_a_cost_holds_the_call(data):
             if np.isfinite(first.seconds):
                 assert served.loc[(first.name, target), "served"] == pytest.approx(first.setting)
                 assert served.loc[(first.name, target), "share"] >= SAFE
+
+
+def test_a_setting_is_made_finer_until_it_serves_but_no_tolerance_by_more_than_a_decade(monkeypatch):
+    shares = lambda variant, numbers, nutations, setting, target: float(setting <= 8e-10)  # noqa: E731
+    monkeypatch.setitem(confirm.__globals__, "share_served", shares)
+    served = confirm(integrator("rk45-compiled[axis]"), 4, 1, 1.0, [4.01e-9, 9e-9, NAN, 6e-10])["served"].values
+    np.testing.assert_allclose(served, [7e-10, INF, NAN, 6e-10])
 
 
 def test_an_advised_setting_was_run_on_other_tops_and_serves_them(small):
