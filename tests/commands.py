@@ -92,9 +92,8 @@ def contents(results: Path, *, provenance: bool = False) -> dict[str, xr.Dataset
     for path in sorted([*results.rglob("*.nc"), *results.rglob("cases/*/*.npz")]):
         data = netcdf.read(path) if path.suffix == ".nc" else store.load_case(path)
         assert data is not None, path
-        datasets[str(path.relative_to(results))] = data.drop_attrs().assign_attrs(
-            {key: value for key, value in data.attrs.items() if provenance or key not in netcdf.provenance()}
-        )
+        kept = {key: value for key, value in data.attrs.items() if provenance or key not in netcdf.provenance()}
+        datasets[str(path.relative_to(results))] = data.drop_attrs().assign_attrs(kept)
     return datasets
 
 

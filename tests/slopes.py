@@ -1,29 +1,33 @@
-"""The order of a method as an assertion, for the tests of every family."""
+"""The order of a method as an assertion, for the tests of every family, and slopes of discrete Lagrangians."""
 
 import numpy as np
 
 import symtop
 from symtop.measure.accuracy import error_table
-from symtop.measure.order import LEAST, Fit, power_law
+from symtop.measure.order import LEAST, power_law
 from symtop.methods.framework.registry import Integrator
-
-
-def measured_order(
-    scene: str, method: Integrator, steps: tuple[float, float], quantity: str, nutations: float = 3.0
-) -> Fit:
-    """Slope of the largest error over ten steps between two numbers of steps a nutation, where it can be judged."""
-    chosen = symtop.scene(scene)
-    settings = chosen.nutation_period / np.geomspace(*steps, 10)
-    table = error_table(chosen, method, list(settings), nutations * chosen.nutation_period, observe=quantity)
-    error = table[quantity].values
-    valid = np.isfinite(error) & (error > 10.0 * table[f"{quantity}_bound"].values) & (error < 1e-2)
-    return power_law(table["step_size"].values, error, valid)
 
 
 def assert_order(
     scene: str, method: Integrator, expected: float, band: float, steps: tuple[float, float], quantity: str = "axis"
 ) -> None:
-    """The order is within `band` of what is expected, from at least `LEAST` points."""
-    fit = measured_order(scene, method, steps, quantity)
+    """The largest error falls by a power within `band` of what is expected, from at least `LEAST` points.
+
+    Over three nutations, at ten steps between two numbers of steps a nutation, where it can be judged.
+    """
+    chosen = symtop.scene(scene)
+    settings = chosen.nutation_period / np.geomspace(*steps, 10)
+    table = error_table(chosen, method, list(settings), 3.0 * chosen.nutation_period, observe=quantity)
+    error = table[quantity].values
+    valid = np.isfinite(error) & (error > 10.0 * table[f"{quantity}_bound"].values) & (error < 1e-2)
+    fit = power_law(table["step_size"].values, error, valid)
     assert int(fit.used.sum()) >= LEAST, f"{method.name}: only {int(fit.used.sum())} points can be judged"
     assert abs(fit.slope - expected) < band, f"{method.name} on {scene}: order {fit}"
+
+
+def slopes(lagrangian, *given, width=1e-30):
+    """D1 L_d and D2 L_d, each of shape (2,), by complex steps, to rounding; the last two given are its points."""
+    *numbers, first, second = given
+    steps = 1j * width * np.eye(2)
+    left = [lagrangian(*numbers, first + step, second).imag / width for step in steps]
+    return np.array(left), np.array([lagrangian(*numbers, first, second + step).imag / width for step in steps])

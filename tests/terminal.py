@@ -10,22 +10,15 @@ import subprocess
 import sys
 import termios
 import time
-from itertools import pairwise
 from typing import NamedTuple
 
 
 class Recording(NamedTuple):
-    """What a command printed on both streams, and when."""
+    """What a command printed on both streams, and its longest silence."""
 
     text: str
     code: int
     silence: float  # seconds
-    drawings: list[tuple[float, str]]  # seconds since the start, and what was printed then
-
-    def longest_wait(self, pattern: str) -> float:
-        """Seconds between two drawings of what matches, so that the start of the process does not count."""
-        times = [when for when, text in self.drawings if re.search(pattern, text)]
-        return max(after - before for before, after in pairwise(times))
 
     @property
     def widest(self) -> int:
@@ -44,7 +37,7 @@ def recorded(words: list[str], limit: float = 300.0, code: str | None = None, **
     process = subprocess.Popen([sys.executable, *start, *words], stdin=theirs, stdout=theirs, stderr=theirs,
                                env={**os.environ, **shape, **environment})  # fmt: skip
     os.close(theirs)
-    output, silence, drawings = b"", 0.0, []
+    output, silence = b"", 0.0
     while time.monotonic() - began < limit:
         if not select.select([ours], [], [], 0.05)[0]:
             if process.poll() is not None:
@@ -56,8 +49,7 @@ def recorded(words: list[str], limit: float = 300.0, code: str | None = None, **
             break
         now = time.monotonic()
         silence, last, output = max(silence, now - last), now, output + part
-        drawings.append((now - began, part.decode(errors="replace")))
     os.close(ours)
     process.kill() if time.monotonic() - began >= limit else None
     ended = process.wait()
-    return Recording(output.decode(errors="replace"), ended, max(silence, time.monotonic() - last), drawings)
+    return Recording(output.decode(errors="replace"), ended, max(silence, time.monotonic() - last))

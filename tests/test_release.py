@@ -26,12 +26,8 @@ def project():
     return tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))
 
 
-@pytest.fixture(scope="module")
-def recipe():
-    return yaml.safe_load((ROOT / "docs" / "conda" / "recipe.yaml").read_text(encoding="utf-8"))
-
-
-def test_recipe_versions_and_commands_agree_with_the_project(project, recipe):
+def test_recipe_versions_and_commands_agree_with_the_project(project):
+    recipe = yaml.safe_load((ROOT / "docs" / "conda" / "recipe.yaml").read_text(encoding="utf-8"))
     ours = {CONDA.get(name, name): least for name, least in _needs(project["project"]["dependencies"]).items()}
     theirs = _needs(recipe["requirements"]["run"])
     assert theirs.pop("python") == "${{ python_min }}"

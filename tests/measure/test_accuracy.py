@@ -156,6 +156,5 @@ def test_added_steps_lie_where_the_error_is_a_power_and_only_plain_compositions_
     assert judged(table) >= 10 > judged(coarse)
     nothing = coarse.assign(attitude=coarse["attitude_bound"])
     assert asymptotic_steps(nothing, "attitude", 10) == []
-    scene = symtop.scene("goldstein")
     for name in ("takahashi-imada", "cayley", "gauss-4", "stormer-verlet", "rk4", "rk45"):
         assert extended_errors(scene, integrator(name)) is None

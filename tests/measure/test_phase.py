@@ -47,17 +47,15 @@ def test_lags_of_more_than_a_turn_and_wrong_frequencies_are_found():
     assert np.max(np.abs(parts.lag - (0.3 + 0.1 * run.time))) < 1e-11
     assert np.max(np.abs(parts.turn - 9.0)) < 1e-10
     assert parts.shape.max() < 1e-12
-    scene, run, truth = moved("spheroid", faster=1e-5)
-    parts = phase(scene, run, truth)
+    parts = phase(*moved("spheroid", faster=1e-5))
     assert parts.nutation_period == pytest.approx(1e-5, rel=1e-4)
     assert parts.precession_rate == pytest.approx(1e-5, rel=1e-4)  # it turns faster by as much
-    scene, run, truth = moved("spheroid", faster=0.01)
-    assert phase(scene, run, truth).nutation_period == pytest.approx(1.0 - 1.0 / 1.01, rel=1e-6)  # of the period
-    whole = closed_form(scene).phi_per_period / scene.nutation_period
-    parts = phase(*moved("spheroid", faster=1e-5, turning=-1e-5 * whole))
-    assert parts.precession_rate < 1e-8  # turned back by as much
-    scene, run, truth = moved("spheroid", turning=1e-5)
-    parts, form = phase(scene, run, truth), closed_form(scene)
+    parts = phase(*moved("spheroid", faster=0.01))
+    assert parts.nutation_period == pytest.approx(1.0 - 1.0 / 1.01, rel=1e-6)  # of the period
+    form = closed_form(symtop.scene("spheroid"))
+    turning = -1e-5 * form.phi_per_period / form.nutation_period
+    assert phase(*moved("spheroid", faster=1e-5, turning=turning)).precession_rate < 1e-8  # turned back by as much
+    parts = phase(*moved("spheroid", turning=1e-5))
     assert parts.nutation_period < 1e-14
     assert parts.precession_rate == pytest.approx(1e-5 * form.nutation_period / form.phi_per_period, rel=1e-9)
 

@@ -12,13 +12,6 @@ from symtop.model.scenes import closed_form, grazing
 from tests.commands import call
 
 
-def judged(scene, name, **controls):
-    run = symtop.simulate(scene, name, guard=False, **controls)
-    scene = symtop.scene(scene)
-    error = charts.axis_distance(run["axis"].values, closed_form(scene).axis(run["time"].values))
-    return judgement(scene, run, error)
-
-
 @pytest.mark.parametrize(("scene", "name", "controls", "word", "says"), [
     ("goldstein", "strang", {"step_size": 0.01}, "accurate", "accurate to"),
     ("goldstein", "strang", {"step_size": 0.3}, "bounded_but_wrong", "while the energy stayed within"),
@@ -27,10 +20,12 @@ def judged(scene, name, **controls):
     ("spheroid", "stormer-verlet", {"step_size": 1.0, "horizon": 50.0}, "left_chart", "stopped at"),
 ])  # fmt: skip
 def test_each_fate_is_judged_with_its_time_and_cause(scene, name, controls, word, says):
-    result = judged(scene, name, **controls)
+    run, scene = symtop.simulate(scene, name, guard=False, **controls), symtop.scene(scene)
+    error = charts.axis_distance(run["axis"].values, closed_form(scene).axis(run["time"].values))
+    result = judgement(scene, run, error)
     assert result.verdict == word, result
     assert says in result.sentence
-    assert 0.0 <= result.time <= controls.get("horizon", symtop.scene(scene).horizon) * (1.0 + 1e-12)
+    assert 0.0 <= result.time <= controls.get("horizon", scene.horizon) * (1.0 + 1e-12)
 
 
 def test_a_pole_passed_on_the_wrong_side_is_a_wrong_regime():

@@ -4,6 +4,8 @@ Nothing here knows of a symmetric body or of the axis. ``step(attitude, w, h, in
 SciPy's `Rotation` from body to space, w in space, the matrix of inertia in body axes and tau(attitude) in space.
 """
 
+from functools import partial
+
 import numpy as np
 from scipy.spatial.transform import Rotation
 
@@ -45,14 +47,12 @@ def _rescaled(attitude, w, h, inertia):
     return attitude.apply(np.linalg.solve(inertia, N * np.linalg.norm(L) / np.linalg.norm(N)))
 
 
-def no_gyro(attitude, w, h, inertia, tau):
+def _without(attitude, w, h, inertia, tau, turned):
     w = w + h * _inverse(attitude, inertia, tau(attitude))
-    return _exp(attitude, w, h), w
+    return turned(attitude, w, h), w
 
 
-def no_gyro_linear(attitude, w, h, inertia, tau):
-    w = w + h * _inverse(attitude, inertia, tau(attitude))
-    return _moved(attitude, w, h), w
+no_gyro, no_gyro_linear = (partial(_without, turned=one) for one in (_exp, _moved))
 
 
 def mujoco_euler(attitude, w, h, inertia, tau):
@@ -139,12 +139,7 @@ def _leapfrog(attitude, w, h, inertia, tau, published):
     return attitude, _inverse(attitude, inertia, L + 0.5 * h * tau(attitude))
 
 
-def yade(attitude, w, h, inertia, tau):
-    return _leapfrog(attitude, w, h, inertia, tau, published=False)
-
-
-def fincham(attitude, w, h, inertia, tau):
-    return _leapfrog(attitude, w, h, inertia, tau, published=True)
+yade, fincham = (partial(_leapfrog, published=one) for one in (False, True))
 
 
 def _three_stages(attitude, b, h, inertia, tau):
@@ -182,12 +177,7 @@ def _bernoulli(turn, b):
     return total
 
 
-def mujoco3_rk4(attitude, w, h, inertia, tau):
-    return _kutta(attitude, w, h, inertia, tau, lambda turn, b: b)
-
-
-def rkmk4(attitude, w, h, inertia, tau):
-    return _kutta(attitude, w, h, inertia, tau, _bernoulli)
+mujoco3_rk4, rkmk4 = (partial(_kutta, corrected=one) for one in (lambda turn, b: b, _bernoulli))
 
 
 def jsbsim_default(attitude, w, h, inertia, tau):

@@ -14,6 +14,7 @@ from symtop.methods.lagrangian.oscillators import Map, numbers as exact_map, on_
 from symtop.model import charts
 from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import closed_form
+from tests.slopes import slopes
 
 METHOD = symtop.integrator("exact-discrete")
 PERIODIC = [name for name in symtop.scenes() if name != "separatrix"]
@@ -25,14 +26,18 @@ def run(top, start, h, steps, chart="attitude", method=METHOD):
     return method.solvers[chart](top, start, Plan.steps(h, np.arange(steps + 1)))
 
 
-def true_orbit(scene, h, steps):
-    """Z_1 and Z_2 of the closed form at every step, in the frames that turn by delta, shapes (steps + 1,)."""
+def oscillators(scene, h, steps):
+    """Of both: A, B, r and J, and Z of the closed form at every step, in the frame that turns by delta."""
     times, rule = h * np.arange(steps + 1), exact_map(scene.top, scene.start, h)
-    par, _ = on_oscillators(scene.top, scene.start)
+    par, start = on_oscillators(scene.top, scene.start)
     w, x, y, z = closed_form(scene).quaternion(times).T
-    chi = w - 1j * z, y - 1j * x  # twist and all
-    turns = (np.exp(-2j * np.pi * turn * np.arange(steps + 1)) for turn in (rule.turn1, rule.turn2))
-    return rule, [value * np.exp(0.5j * par.twist * times) * turn for value, turn in zip(chi, turns, strict=True)]
+    J = start[0] * start[5] - start[1] * start[4], start[2] * start[7] - start[3] * start[6]
+    for chi, turn, aD, D, r, sigma, momentum in (
+        (w - 1j * z, rule.turn1, rule.aD1, rule.D1, rule.r1, par.kappa, J[0]),  # twist and all
+        (y - 1j * x, rule.turn2, rule.aD2, rule.D2, rule.r2, -par.kappa, J[1]),
+    ):
+        Z = chi * np.exp(0.5j * par.twist * times) * np.exp(-2j * np.pi * turn * np.arange(steps + 1))
+        yield 1.0 + aD / D, -sigma / D, r, momentum, Z
 
 
 @pytest.mark.parametrize("name", PERIODIC)
@@ -88,7 +93,6 @@ def test_a_step_agrees_with_fifty_digits_and_a_neighbour_of_the_map_is_no_motion
     for k in range(1, 4):
         quaternion = charts.quaternion_from_angles(*(float(value) for value in precise(k * h)[:3]))
         assert charts.attitude_distance(done.states[k, :4], quaternion) < 5e-15
-    scene = symtop.scene("spheroid")
     h = scene.nutation_period / 20.0
     kernel = inside(METHOD.solvers["axis"])
     par, _ = on_oscillators(scene.top, scene.start)
@@ -132,30 +136,18 @@ def lagrangian(A, B, r, q0, q1):
     return r * (0.5 * apart @ apart - 0.5 * sum(value - A / B * np.log(1.0 + B * value) for value in s))
 
 
-def slopes(A, B, r, q0, q1, width=1e-30):
-    """D1 L_d and D2 L_d by complex steps, to rounding."""
-    steps = 1j * width * np.eye(2)
-    first = [lagrangian(A, B, r, q0 + step, q1).imag / width for step in steps]
-    return np.array(first), np.array([lagrangian(A, B, r, q0, q1 + step).imag / width for step in steps])
-
-
 @pytest.mark.parametrize("name", ["spheroid", "goldstein", "grazing", "hairer-lubich-wanner"])
 @pytest.mark.parametrize("steps", [50, 4.37, 2.3])
 def test_the_true_motion_solves_the_discrete_euler_lagrange_equations(name, steps):
     scene = symtop.scene(name)
-    rule, orbits = true_orbit(scene, scene.nutation_period / steps, 12)
-    par, start = on_oscillators(scene.top, scene.start)
-    J = start[0] * start[5] - start[1] * start[4], start[2] * start[7] - start[3] * start[6]
-    for k, (aD, D, r, sigma) in enumerate(
-        ((rule.aD1, rule.D1, rule.r1, par.kappa), (rule.aD2, rule.D2, rule.r2, -par.kappa))
-    ):
-        A, B = 1.0 + aD / D, -sigma / D
-        q = np.stack([orbits[k].real, orbits[k].imag], axis=1)
+    for A, B, r, J, Z in oscillators(scene, scene.nutation_period / steps, 12):
+        q = np.stack([Z.real, Z.imag], axis=1)
         for before, here, after in zip(q, q[1:], q[2:], strict=False):
-            arrives, leaves = slopes(A, B, r, before, here)[1], slopes(A, B, r, here, after)[0]
+            arrives = slopes(lagrangian, A, B, r, before, here)[1]
+            leaves, wrong = (slopes(lagrangian, start, B, r, here, after)[0] for start in (A, 1.001 * A))
             assert np.abs(arrives + leaves).max() < 2e-14 * r
-            assert np.abs(arrives + slopes(1.001 * A, B, r, here, after)[0]).max() > 1e-8 * r
-            assert here[0] * arrives[1] - here[1] * arrives[0] == pytest.approx(J[k], abs=2e-14 * r)  # Noether
+            assert np.abs(arrives + wrong).max() > 1e-8 * r
+            assert here[0] * arrives[1] - here[1] * arrives[0] == pytest.approx(J, abs=2e-14 * r)  # Noether
 
 
 def test_reduction_commutes_with_the_step():
@@ -179,16 +171,11 @@ def test_the_discrete_routhians_of_both_oscillators_are_one_map_of_the_height(na
     """Reduced by J = r Im(conj(Z0) Z1), x = Re(conj(Z0) Z1): x+ + x- = 2 A s/(1 + B s), s+ = (x+^2 + (J/r)^2)/s."""
     scene = symtop.scene(name)
     h = scene.nutation_period / steps
-    rule, orbits = true_orbit(scene, h, 12)
-    par, start = on_oscillators(scene.top, scene.start)
     true = closed_form(scene).axis(h * np.arange(13))[:, 2]
-    J = start[0] * start[5] - start[1] * start[4], start[2] * start[7] - start[3] * start[6]
-    numbers = (rule.aD1, rule.D1, rule.r1, par.kappa, 1.0), (rule.aD2, rule.D2, rule.r2, -par.kappa, -1.0)
     for wrong in (0.0, 1e-6):
         gaps = []
-        for Z, momentum_of, (aD, D, r, sigma, sign) in zip(orbits, J, numbers, strict=True):
-            A, B, swept = 1.0 + aD / D, -sigma / D, (momentum_of / r * (1.0 + wrong)) ** 2
-            s, x = abs(Z[1]) ** 2, (np.conj(Z[0]) * Z[1]).real
+        for (A, B, r, J, Z), sign in zip(oscillators(scene, h, 12), (1.0, -1.0), strict=True):
+            s, x, swept = abs(Z[1]) ** 2, (np.conj(Z[0]) * Z[1]).real, (J / r * (1.0 + wrong)) ** 2
             heights = []
             for _ in range(11):
                 x = 2.0 * A * s / (1.0 + B * s) - x

@@ -95,9 +95,12 @@ def test_members_have_the_bits_of_runs_alone(name, ends):
     assert len(left) < 200
 
 
-@pytest.mark.parametrize("name", ALONE)
-def test_members_that_run_one_after_another_have_the_bits_of_runs_alone(name):
-    given = members(60, seed=7)
+@pytest.mark.parametrize(("name", "count", "seed"), [
+    *((name, 60, 7) for name in ALONE),
+    *(("strang[axis]", count, 3) for count in (1, LEAST - 1, LEAST, W - 1, W, W + 1, 2 * W + LEAST)),
+])  # fmt: skip
+def test_members_one_after_another_and_in_blocks_that_are_not_full_have_the_bits_of_runs_alone(name, count, seed):
+    given = members(count, seed=seed)
     assert_runs_alone(SOLVERS[name], *given, SOLVERS[name].many(*given))
 
 
@@ -120,12 +123,6 @@ def test_methods_that_have_lanes():
         assert {f"{name}[axis]", f"{name}[attitude]"} <= IN_LANES
     without = ("exact[", "rk45", "taylor", "series-adaptive", "collective-gauss", "gauss-12", "gauss-6[attitude]")
     assert not any(name.startswith(without) or "unreduced" in name for name in IN_LANES)
-
-
-@pytest.mark.parametrize("count", [1, LEAST - 1, LEAST, W - 1, W, W + 1, 2 * W + LEAST])
-def test_blocks_that_are_not_full(count):
-    given = members(count, seed=3)
-    assert_runs_alone(SOLVERS["strang[axis]"], *given, SOLVERS["strang[axis]"].many(*given))
 
 
 @pytest.mark.parametrize("name", ["strang[axis]", "kahan[axis]"])  # in lanes, and one after another
@@ -282,14 +279,11 @@ def test_tables_of_stages_run_in_lanes_and_kicks_left_out_change_no_bit():
         np.testing.assert_array_equal(one, other)
 
 
-CHARTS = ("axis", "attitude")
-
-
 def test_kernels_are_shared_by_charts_compositions_and_numbers():
     """Axis and attitude differ in what is shown, compositions in the table; other equations are other kernels."""
     kernels = {(name, chart): SOLVERS[f"{name}[{chart}]"]._whole.blocks().march
                for name in (*EXPLICIT, *ITERATED)
-               for chart in CHARTS}  # fmt: skip
+               for chart in ("axis", "attitude")}  # fmt: skip
     assert all(kernels[name, "axis"] is kernels[name, "attitude"] for name in (*EXPLICIT, *ITERATED))
     assert kernels["lie-variational", "axis"] is kernels["lie-variational-suzuki-4", "axis"]
     assert len(set(map(id, kernels.values()))) == 8

@@ -89,10 +89,8 @@ def test_the_interpolant_of_tsit5_has_order_four_and_costs_where_it_is_asked():
     b = np.array([np.polyval((*reversed(row), 0.0), scale) for row in TSIT5.dense]) / scale
     assert conditions(matrix / scale, b, 5).order == 4
     np.testing.assert_allclose(np.sum(TSIT5.dense, axis=1), weights(TSIT5.b, 7), atol=1e-14)
-    few, many = (
-        symtop.simulate("spheroid", "dop853-compiled[axis]", tolerance=1e-6, samples=n, guard=False).attrs
-        for n in (2, 2000)
-    )
+    few, many = (symtop.simulate("spheroid", "dop853-compiled[axis]", tolerance=1e-6, samples=n, guard=False).attrs
+                 for n in (2, 2000))  # fmt: skip
     assert few["steps"] == many["steps"]
     assert many["force_evaluations"] - few["force_evaluations"] == 3 * (many["steps"] - 2)  # the first and the last
 
@@ -259,10 +257,8 @@ def test_the_table_has_order_eight_its_estimate_six_and_it_needs_fewer_forces_th
     wrong[-3, 0] += 1e-8
     assert order_of(wrong, DPRKN8.b, DPRKN8.velocity) < 8
     for tolerance in (1e-6, 1e-9, 1e-12):
-        mine, theirs = (
-            symtop.simulate("spheroid", f"{name}[angles]", tolerance=tolerance, guard=False)
-            for name in ("dprkn8", "dop853-compiled")
-        )
-        error = float(symtop.errors(mine)["axis"].max())
+        mine, theirs = (symtop.simulate("spheroid", f"{name}[angles]", tolerance=tolerance, guard=False)
+                        for name in ("dprkn8", "dop853-compiled"))  # fmt: skip
+        error, other = (float(symtop.errors(run)["axis"].max()) for run in (mine, theirs))
         assert mine.attrs["force_evaluations"] < theirs.attrs["force_evaluations"]
-        assert error < min(tolerance, float(symtop.errors(theirs)["axis"].max()))
+        assert error < min(tolerance, other)

@@ -194,10 +194,8 @@ def test_coefficients_solve_the_equations_that_every_other_method_takes(chart):
 @pytest.mark.parametrize("scene", ["spheroid", "goldstein"])
 def test_it_takes_the_steps_of_heyoka(scene, tolerance, chart):
     pytest.importorskip("heyoka")
-    mine, theirs = (
-        symtop.simulate(scene, f"{name}[{chart}]", tolerance=tolerance, samples=33, guard=False)
-        for name in ("series-general-adaptive", "taylor")
-    )
+    mine, theirs = (symtop.simulate(scene, f"{name}[{chart}]", tolerance=tolerance, samples=33, guard=False)
+                    for name in ("series-general-adaptive", "taylor"))  # fmt: skip
     assert mine.attrs["steps"] == theirs.attrs["steps"]
     assert mine.attrs["force_evaluations"] == theirs.attrs["force_evaluations"] + 2  # f of the start, twice
     np.testing.assert_allclose(mine["axis"], theirs["axis"], rtol=0.0, atol=1e-11)

@@ -44,11 +44,6 @@ def test_tables_sum_to_one_read_the_same_from_both_ends_and_integrate_polynomial
     assert quadrature_defect(wrong, order) > 1e-10
 
 
-TOP = symtop.SymmetricTop(2.0, 0.7, 3.0)
-START = symtop.Angles(theta=0.7, phi=0.3, psi=-0.2, theta_dot=0.4, phi_dot=0.9, psi_dot=2.0)
-MAP = symtop.Scene("map", TOP, START, 1.0)
-
-
 @pytest.mark.parametrize("chart", ["space", "angles"])
 def test_a_table_without_a_last_kick_kicks_with_the_newest_axis(chart):
     # the force that the last drift leads to is the next step's first, whether or not the table kicks with it before
@@ -126,22 +121,23 @@ def largest_error(name, scene, h, horizon):
 
 
 def test_the_tuned_step_is_symplectic_but_for_its_number_and_strang_accurate_in_the_fast_top():
-    defect = symplectic_defect(one_step(METHODS["cayley-tuned"], "attitude", MAP, 0.2), START)
+    start = symtop.Angles(theta=0.7, phi=0.3, psi=-0.2, theta_dot=0.4, phi_dot=0.9, psi_dot=2.0)
+    scene = symtop.Scene("map", symtop.SymmetricTop(2.0, 0.7, 3.0), start, 1.0)
+    defect = symplectic_defect(one_step(METHODS["cayley-tuned"], "attitude", scene, 0.2), start)
     assert defect.size > 1e-4
     assert defect.rest < 1e-10
-    other = symplectic_defect(one_step(symtop.integrator("gauss-4"), "attitude", MAP, 0.2), START)
+    other = symplectic_defect(one_step(symtop.integrator("gauss-4"), "attitude", scene, 0.2), start)
     assert other.rest > 1e-7  # a number of the start explains nothing here
     euler = composition("euler", (1.0,), (1.0, 0.0), chart="space", order=1)
     assert not euler.symmetric
-    assert return_miss(one_step(euler, "attitude", MAP, 0.1), START) > 1e-3
+    assert return_miss(one_step(euler, "attitude", scene, 0.1), start) > 1e-3
     assert tables.exact_sum((1.0, 0.0)) == (1.0, 0.0)
     closed = tables.exact_sum((0.7, 0.2, 0.1 - 1e-10, 0.0))
     assert closed == pytest.approx((0.7, 0.2 + 5e-11, 0.1 - 5e-11, 0.0), abs=1e-15)
     for name, far in (("fast", True), ("goldstein", False)):
         scene = symtop.scene(name)
-        verlet, strang = (
-            largest_error(method, scene, scene.nutation_period / 193.7, 8.0) for method in ("stormer-verlet", "strang")
-        )
+        h = scene.nutation_period / 193.7
+        verlet, strang = (largest_error(method, scene, h, 8.0) for method in ("stormer-verlet", "strang"))
         assert (verlet > 50.0 * strang) is far
 
 

@@ -100,12 +100,8 @@ def test_newtons_jacobian_is_that_of_the_discrete_legendre_transform(rule):
     root = np.array(kernel._rates(par, state))
 
     def left_momenta(rate):
-        sums = kernel._node_sums(par, table, state[0], rate, h)
-        return (
-            par.I1 * rate[0] - h * sums.before,
-            sums.across * rate[1] + sums.mixed * rate[2],
-            sums.mixed * rate[1] + par.I3 * rate[2],
-        )
+        (w, v, u), sums = rate, kernel._node_sums(par, table, state[0], rate, h)
+        return par.I1 * w - h * sums.before, sums.across * v + sums.mixed * u, sums.mixed * v + par.I3 * u
 
     def miss(distance, spoil):
         rate = root + distance * np.array([1.0, -0.7, 0.4])
@@ -121,10 +117,8 @@ def test_newtons_jacobian_is_that_of_the_discrete_legendre_transform(rule):
 def test_long_horizons_do_not_slow_it_down():
     """phi beyond 1e4 rad has an ulp of 2e-12: a stop rule on the angle itself would run into its limit."""
     scene = symtop.scene("spheroid")
-    short, long = (
-        symtop.simulate(scene, "midpoint-unreduced", step_size=0.01, horizon=T, samples=11, guard=False)
-        for T in (10.0, 2000.0)
-    )
+    short, long = (symtop.simulate(scene, "midpoint-unreduced", step_size=0.01, horizon=T, samples=11, guard=False)
+                   for T in (10.0, 2000.0))  # fmt: skip
     assert abs(float(long["phi"][-1])) > 5e3
     per_step = [run.attrs["newton_iterations"] / run.attrs["steps"] for run in (short, long)]
     assert per_step[1] == pytest.approx(per_step[0], rel=0.05)

@@ -55,9 +55,8 @@ def test_double_arithmetic_in_place_of_double_double_is_seen(monkeypatch):
 def test_the_bound_sends_tops_to_quad_double_that_need_it(monkeypatch):
     """With double-double sums alone the rates of some of them are wrong; the bound says so of every one."""
     wrong, longer = 0, 0
-    for top, start in tops(
-        4, 23, ["nearly steady", "near the separatrix", "threshold of sleep", "pendulum to the top"]
-    ):
+    kinds = ["nearly steady", "near the separatrix", "threshold of sleep", "pendulum to the top"]
+    for top, start in tops(4, 23, kinds):
         ours, _ = short(top, start)
         if ours[at.ARITHMETIC] != at.QUAD_DOUBLE:
             continue
@@ -269,9 +268,8 @@ def _pairs(count):
 def implementation(request, monkeypatch):
     closed_form.compile_now()
     if request.param == "interpreted":
-        monkeypatch.setattr(closed_form._build, "ready", lambda _: False)
-        monkeypatch.setattr(closed_form._fill, "ready", lambda _: False)
-        monkeypatch.setattr(closed_form._compare, "ready", lambda _: False)
+        for kernel in (closed_form._build, closed_form._fill, closed_form._compare):
+            monkeypatch.setattr(kernel, "ready", lambda _: False)
 
 
 def test_a_member_has_the_bits_of_its_own_form(implementation):

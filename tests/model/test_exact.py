@@ -12,13 +12,8 @@ import pytest
 
 from benchmarks.families import REGIMES, random_top
 from symtop.core.errors import SymtopError
-from symtop.model.charts import (
-    attitude_distance,
-    axis_from_angles,
-    axis_from_quaternion,
-    quaternion_from_angles,
-    space_state,
-)
+from symtop.model import charts
+from symtop.model.charts import attitude_distance
 from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import Scene, scene
@@ -122,7 +117,7 @@ def test_as_many_digits_are_right_as_are_asked_for(kind):
 
 
 def _momentum(top, start):
-    return space_state("axis", top, start)[3:]
+    return charts.space_state("axis", top, start)[3:]
 
 
 @pytest.mark.parametrize("kind", [
@@ -141,18 +136,16 @@ def test_an_integration_of_the_attitude_ends_where_the_closed_form_says(kind):
     assert late > 1e-10
 
 
-def _woodhouse(I1, I3, mgl):
-    """Released at 60 degrees onto the separatrix; Woodhouse, Introduction to Analytical Dynamics, problem 5.3."""
-    g = mp.sqrt(mp.mpf(mgl) / I1)
-    return g, (mp.pi / 3, 0, 0, 0, 2 * g / mp.sqrt(3), (3 * mp.mpf(I1) - I3) * g / (I3 * mp.sqrt(3)))
-
-
 @pytest.mark.parametrize("body", [(2, 1, 2), (1, 2, 5), (3, 3, "0.7")])
 def test_elementary_separatrix(body):
-    """u = 1/(1 + sech gt); a start rounded in the 150th digit leaves it as exp(gt) times that."""
+    """Released at 60 degrees onto it: Woodhouse, Introduction to Analytical Dynamics, problem 5.3.
+
+    u = 1/(1 + sech gt); a start rounded in the 150th digit leaves it as exp(gt) times that.
+    """
     with mp.workdps(150):
         I1, I3, mgl = map(mp.mpf, body)
-        g, start = _woodhouse(I1, I3, mgl)
+        g = mp.sqrt(mgl / I1)
+        start = mp.pi / 3, 0, 0, 0, 2 * g / mp.sqrt(3), (3 * I1 - I3) * g / (I3 * mp.sqrt(3))
         form = PreciseForm((I1, I3, mgl), start, digits=60)
         assert form.m < 1 < form.m + mp.mpf(10) ** -100
         for gt in (mp.mpf("0.5"), 3, 20):
@@ -259,9 +252,9 @@ def test_views_of_one_motion_and_theta_functions_agree(kind):
     form, times = ClosedForm(top, start), np.linspace(-3.0, 9.0, 401)
     motion, attitude, axis, momentum = form(times), form.quaternion(times), form.axis(times), form.momentum(times)
     grain = 4 * EPS * (1.0 + np.abs([motion.phi, motion.psi]).max())
-    assert attitude_distance(quaternion_from_angles(*motion[:3]), attitude).max() < 2 * grain
-    np.testing.assert_allclose(axis_from_quaternion(attitude), axis, atol=8 * EPS)
-    np.testing.assert_allclose(axis_from_angles(motion.theta, motion.phi), axis, atol=2 * grain)
+    assert attitude_distance(charts.quaternion_from_angles(*motion[:3]), attitude).max() < 2 * grain
+    np.testing.assert_allclose(charts.axis_from_quaternion(attitude), axis, atol=8 * EPS)
+    np.testing.assert_allclose(charts.axis_from_angles(motion.theta, motion.phi), axis, atol=2 * grain)
     size = np.linalg.norm(momentum, axis=-1).max()
     momenta = top.momenta(start)
     np.testing.assert_allclose(momentum[:, 2], momenta.p_phi, atol=16 * EPS * size)

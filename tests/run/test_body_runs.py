@@ -261,6 +261,20 @@ def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
     assert sorted(points.moments) == pytest.approx([15.0, 30.0, 39.0])
 
 
+@functools.cache
+def bodies():
+    return symtop.body_population(40, seed=4)
+
+
+@functools.cache
+def scenes():
+    return scenes_of(bodies())
+
+
+def together(members):
+    return symtop.ensemble(members, "rk4", step_size=0.1, horizon=1.0)
+
+
 @pytest.mark.parametrize(("make", "words"), [
     (lambda: RigidBody(1.0, 1.0, 2.1), "I3 must be at most the sum of the other moments"),
     (lambda: RigidBody(1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0)), "centre must be a direction and of a length"),
@@ -272,6 +286,12 @@ def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
     (lambda: symtop.simulate("heavy-brick", "rk4", step_size=1, observe="nutation"), "known: axis, attitude"),
     (lambda: symtop.long_run("heavy-brick", "vern9", step_size=0.1, steps=9), "no compiled loop of fixed steps"),
     (lambda: symtop.reference("heavy-brick", [1.0], certify="digits"), "certify must be None on heavy-brick"),
+    (lambda: together(bodies().assign(I3=bodies().I3 + 9.0)), "member 0: I3 must be at most the sum of the other"),
+    (lambda: together(bodies().drop_vars("omega_body")), "must have the variables I1, I2, I3, omega_body, not lack"),
+    (lambda: together(bodies().assign(centre=bodies().I1)), "centre of members must be rows of 3 numbers over member"),
+    (lambda: together(bodies().assign(quaternion=2.0 * bodies().quaternion)), "0: quaternion must have unit length"),
+    (lambda: together(bodies().rename(mgl="MGL")), "members have no variable 'MGL'; did you mean mgl?"),
+    (lambda: together([*scenes()[:2], "spheroid"]), "members must be all tops or all bodies without symmetry"),
 ])  # fmt: skip
 def test_what_is_no_body_or_takes_none_is_refused(make, words: str) -> None:  # type: ignore[no-untyped-def]
     with pytest.raises(symtop.SymtopError) as refused:
@@ -279,30 +299,22 @@ def test_what_is_no_body_or_takes_none_is_refused(make, words: str) -> None:  # 
     assert words in str(refused.value)
 
 
-def test_a_stored_body_is_read_back_to_the_bit(tmp_path):  # type: ignore[no-untyped-def]
+def test_a_body_stored_or_of_plain_numbers_is_read_back_to_the_bit(tmp_path):  # type: ignore[no-untyped-def]
     """Numbers of length one but for their rounding are not scaled again; others are."""
+    scene = symtop.scene("heavy-chaotic", bodies=True)
+    assert from_flat(list(scene.top.flat(scene.start))) == (scene.top, scene.start)
     run = symtop.simulate("heavy-brick", "rk4", step_size=0.01, guard=False)
     stored = netcdf.read(netcdf.write(run, tmp_path / "run.nc"))
     for errors in (symtop.errors(stored), symtop.errors(run, "heavy-brick")):
         np.testing.assert_array_equal(errors["attitude"], symtop.errors(run)["attitude"])
     with pytest.raises(symtop.SymtopError, match="scene must be that of the data"):
-        symtop.errors(run, symtop.scene("heavy-chaotic", bodies=True))
+        symtop.errors(run, scene)
     draws = np.random.default_rng(0).normal(size=(500, 4))
     for w, x, y, z in draws:
         body = symtop.RigidBody(1.0, 1.2, 0.9, 1.0, (x, y, z))
         start = symtop.Attitude(np.array([w, x, y, z]) / np.linalg.norm([w, x, y, z]))
         assert (dataclasses.replace(body), dataclasses.replace(start)) == (body, start)
     assert symtop.RigidBody(1.0, 1.2, 0.9, 1.0, (0.0, 0.0, 1.0 + 1e-15)).centre == (0.0, 0.0, 1.0)
-
-
-@functools.cache
-def bodies():
-    return symtop.body_population(40, seed=4)
-
-
-@functools.cache
-def scenes():
-    return scenes_of(bodies())
 
 
 @pytest.mark.parametrize(("name", "execution"), [
@@ -342,25 +354,6 @@ def test_errors_are_those_of_each_member_against_its_own_truth():
     assert 20.0 < ratio[3] < 30.0  # five times the step: order 2
     with pytest.warns(symtop.SymtopWarning, match="is this the start of the scene"):  # of other members: the control
         assert symtop.errors(data.drop_vars("scene"), some[::-1]).attitude.max() > 1.0
-
-
-def test_plain_numbers_are_a_body_to_the_bit():
-    scene = symtop.scene("heavy-chaotic", bodies=True)
-    assert from_flat(list(scene.top.flat(scene.start))) == (scene.top, scene.start)
-
-
-@pytest.mark.parametrize(("change", "words"), [
-    (lambda data: data.assign(I3=data.I3 + 9.0), "member 0: I3 must be at most the sum of the other moments"),
-    (lambda data: data.drop_vars("omega_body"), "members must have the variables I1, I2, I3, omega_body, not lack"),
-    (lambda data: data.assign(centre=data.I1), "centre of members must be rows of 3 numbers over member"),
-    (lambda data: data.assign(quaternion=2.0 * data.quaternion), "member 0: quaternion must have unit length"),
-    (lambda data: data.rename(mgl="MGL"), "members have no variable 'MGL'; did you mean mgl?"),
-    (lambda data: [*scenes()[:2], "spheroid"], "members must be all tops or all bodies without symmetry"),
-])  # fmt: skip
-def test_bad_bodies_are_refused_in_one_sentence(change, words):
-    with pytest.raises(symtop.SymtopError) as refused:
-        symtop.ensemble(change(bodies()), "rk4", step_size=0.1, horizon=1.0)
-    assert words in str(refused.value)
 
 
 def test_methods_that_choose_their_steps_run_as_well_and_one_without_the_chart_is_refused():

@@ -235,13 +235,11 @@ def marching(solver):
     return march
 
 
-@pytest.mark.parametrize(
-    ("change", "execution"),
-    [(lambda solver: {"rule": solver.rule.__call__}, chunks.IN_PYTHON),
-     (lambda solver: {"loop": marching(solver)}, chunks.IN_PYTHON),
-     (lambda solver: {"loop": dataclasses.replace(solver.loop, lanes=lambda _: None)}, chunks.IN_TURN)],
-    ids=["rule of Python", "loop of Python", "without lanes"],
-)  # fmt: skip
+@pytest.mark.parametrize(("change", "execution"), [
+    (lambda solver: {"rule": solver.rule.__call__}, chunks.IN_PYTHON),
+    (lambda solver: {"loop": marching(solver)}, chunks.IN_PYTHON),
+    (lambda solver: {"loop": dataclasses.replace(solver.loop, lanes=lambda _: None)}, chunks.IN_TURN),
+], ids=["rule of Python", "loop of Python", "without lanes"])  # fmt: skip
 def test_the_dataset_says_how_members_were_run_and_they_are_the_same(change, execution):
     """Members of fewer steps than samples, too, whose rows of marks end before those of others."""
     strang = symtop.integrator("strang[axis]")

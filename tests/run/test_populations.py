@@ -12,6 +12,7 @@ from symtop.run.ensemble.population import STRATA, population
 
 COUNT = 3000
 HASH = "8afda6e1ae62a77eabc29ef01ffbbb0c0777d931e63e1ed78ae8aed761d678b2"  # of 1000 members of seed 1
+BODY_HASH = "db868dbc6447cfc999cf348d04fb7e241827773bc77f595a9064c2a658f8b795"  # of 64 members of seed 1
 
 
 class Motion:
@@ -109,9 +110,6 @@ def test_a_seed_has_all_its_digits_however_large_it_is(draw, tmp_path):
     assert draw(3, seed=4.0).attrs["seed"] == 4
 
 
-BODY_HASH = "db868dbc6447cfc999cf348d04fb7e241827773bc77f595a9064c2a658f8b795"  # of 64 members of seed 1
-
-
 class Bodies:
     """Members of one kind with their moments in order, momenta along those axes, and 2 E I2/L^2 without weight."""
 
@@ -179,12 +177,10 @@ def test_heavy_bodies_lie_at_their_distance_from_a_lagrange_top():
 
 
 def test_regular_and_chaotic_bodies_are_told_apart_by_the_growth_of_a_disturbance():
-    regular, chaotic = (
-        [growth(scene) for scene in scenes_of(body_population(6, seed=3, kind=kind, epsilon=0.3))]
-        for kind in ("regular", "chaotic")
-    )
+    growths = lambda count, **drawn: [growth(one) for one in scenes_of(body_population(count, seed=3, **drawn))]
+    regular, chaotic = (growths(6, kind=kind, epsilon=0.3) for kind in ("regular", "chaotic"))
     assert max(regular) < CHAOS < min(chaotic)
-    tops = [growth(scene) for scene in scenes_of(body_population(60, seed=3, kind="lagrange"))]
+    tops = growths(60, kind="lagrange")
     assert max(tops) < CHAOS  # an integrable motion shears
     assert np.median(tops) > 2.0
 
@@ -201,13 +197,11 @@ def test_a_population_is_the_beginning_of_a_larger_one_and_the_same_everywhere()
 
 def test_members_that_make_no_sense_are_refused_in_a_sentence():
     for words, sentence in (
-        ({"kind": "odd"}, "kind 'odd' is unknown"),
-        ({"seed": -1}, "seed"),
-        ({"n": 0}, "n must be"),
+        ({"kind": "odd"}, "kind 'odd' is unknown"), ({"seed": -1}, "seed"), ({"n": 0}, "n must be"),
         ({"epsilon": 0.6}, r"epsilon must be from 0.02 to 0.5, not 0.6"),
         ({"epsilon": 0.001, "kind": "chaotic"}, r"epsilon must be from 0.02 to 0.5, not 0.001"),
         ({"epsilon": float("nan"), "kind": "heavy"}, "epsilon must be"),
         ({"epsilon": 0.1, "kind": "needle"}, "epsilon is of heavy bodies, and not of the kind 'needle'"),
-    ):
+    ):  # fmt: skip
         with pytest.raises(symtop.SymtopError, match=sentence):
             symtop.body_population(**{"n": 1} | words)

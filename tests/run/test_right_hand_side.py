@@ -55,34 +55,29 @@ def measured(f, y0, horizon, name, **control):
     return float(np.linalg.norm(states - truth, axis=0).max())
 
 
-REGULAR = [
-    (kepler, at_pericentre(0.3), 20, "dop853", {"tolerance": 1e-8}),
-    (kepler, at_pericentre(0.6), 10, "rk4", {"step_size": 0.03}),
-    (henon_heiles, of_energy(1.0 / 12.0, -0.1), 20, "rk45", {"tolerance": 1e-7}),
-]  # fmt: skip
-
-
-@pytest.mark.parametrize(("f", "y0", "periods", "name", "control"), REGULAR)
-def test_a_regular_motion_is_forecast_within_a_factor_of_three(f, y0, periods, name, control):
-    horizon = 2.0 * math.pi * periods
-    expected = symtop.guard(f, 0.0, y0, horizon, name, **control)
-    assert 1.0 / 3.0 < expected.error / measured(f, y0, horizon, name, **control) < 3.0
-    assert expected.cause in ("", "step")
-
-
 def decay(rate):
     return lambda _, y: [-rate * y[0]]
 
 
-@pytest.mark.parametrize(("rate", "horizon", "name", "control"), [
-    (1.0, 10.0, "rk4", {"step_size": 0.1}), (1000.0, 5.0, "rk4", {"step_size": 0.002}),
-    (30.0, 10.0, "rk4", {"step_size": 0.1}), (1000.0, 5.0, "radau", {"tolerance": 1e-4}),
-    (1000.0, 5.0, "bdf", {"tolerance": 1e-4}), (1000.0, 5.0, "lsoda", {"tolerance": 1e-4}),
+@pytest.mark.parametrize(("f", "y0", "horizon", "name", "control", "causes"), [
+    (kepler, at_pericentre(0.3), 40.0 * math.pi, "dop853", {"tolerance": 1e-8}, ("", "step")),
+    (kepler, at_pericentre(0.6), 20.0 * math.pi, "rk4", {"step_size": 0.03}, ("", "step")),
+    (henon_heiles, of_energy(1.0 / 12.0, -0.1), 40.0 * math.pi, "rk45", {"tolerance": 1e-7}, ("", "step")),
+    (decay(1.0), [1.0], 10.0, "rk4", {"step_size": 0.1}, None),
+    (decay(1000.0), [1.0], 5.0, "rk4", {"step_size": 0.002}, None),
+    (decay(30.0), [1.0], 10.0, "rk4", {"step_size": 0.1}, None),
+    *((decay(1000.0), [1.0], 5.0, name, {"tolerance": 1e-4}, None) for name in ("radau", "bdf", "lsoda")),
+    *((swing, [1.0, 0.0], horizon, "rk4", {"step_size": step}, ("",))  # of few steps
+      for horizon, step in ((1.0, 0.3), (1.0, 0.4), (2.0, 0.32), (1.0, 0.21))),
 ])  # fmt: skip
-def test_an_error_in_a_transient_counts_and_one_that_grows_beyond_the_motion_goes_on(rate, horizon, name, control):
-    """Of exp(-1000 t) nothing is left at the first of even times; exp(-30 t) ends at 7e13 where h = 0.1."""
-    expected = symtop.guard(decay(rate), 0.0, [1.0], horizon, name, **control)
-    assert 1.0 / 3.0 < expected.error / measured(decay(rate), [1.0], horizon, name, **control) < 3.0
+def test_an_error_is_forecast_within_a_factor_of_three(f, y0, horizon, name, control, causes):
+    """In a transient, too: of exp(-1000 t) nothing is left at the first of even times.
+
+    And of one that grows beyond the motion: exp(-30 t) ends at 7e13 where h = 0.1.
+    """
+    expected = symtop.guard(f, 0.0, y0, horizon, name, **control)
+    assert 1.0 / 3.0 < expected.error / measured(f, y0, horizon, name, **control) < 3.0
+    assert causes is None or expected.cause in causes
 
 
 @pytest.mark.parametrize(("f", "y0", "step"), [
@@ -94,13 +89,6 @@ def test_steps_that_are_too_long_for_a_stiff_f_are_no_small_error(f, y0, step):
     assert expected.error > 1e10
     assert expected.cause == "stiffness"
     assert math.isnan(expected.setting)
-
-
-@pytest.mark.parametrize(("horizon", "step"), [(1.0, 0.3), (1.0, 0.4), (2.0, 0.32), (1.0, 0.21)])
-def test_a_run_of_few_steps_is_forecast_as_any_other(horizon, step):
-    expected = symtop.guard(swing, 0.0, [1.0, 0.0], horizon, "rk4", step_size=step)
-    assert 1.0 / 3.0 < expected.error / measured(swing, [1.0, 0.0], horizon, "rk4", step_size=step) < 3.0
-    assert expected.cause == ""
 
 
 def test_chaos_is_told_from_order_and_what_was_not_watched_says_so():
@@ -143,15 +131,12 @@ def test_a_forecast_has_the_units_of_the_motion():
 
 def test_a_motion_may_begin_at_zero():
     """Its size is that of what drives it: z'' = c sin t - 2 z is c (sin t - sin(t sqrt 2)/sqrt 2)."""
-    c, h, z = 1e-9, 0.1, np.zeros(2)
+    c, h, z, root, error = 1e-9, 0.1, np.zeros(2), math.sqrt(2.0), 0.0
     driven = lambda t, y: np.array([y[1], c * math.sin(t) - 2.0 * y[0]])
-    error = 0.0
     for k in range(200):
         z, t = rk4(driven, k * h, z, h), (k + 1) * h
-        slope = c * (math.cos(t) - math.cos(t * math.sqrt(2.0)))
-        error = max(
-            error, math.hypot(z[0] - c * (math.sin(t) - math.sin(t * math.sqrt(2.0)) / math.sqrt(2.0)), z[1] - slope)
-        )
+        place, slope = math.sin(t) - math.sin(t * root) / root, math.cos(t) - math.cos(t * root)
+        error = max(error, math.hypot(z[0] - c * place, z[1] - c * slope))
     expected = symtop.guard(driven, 0.0, [0.0, 0.0], 20.0, step_size=h, accuracy=1e-12)
     assert 1.0 / 3.0 < expected.error / error < 3.0
     assert symtop.guard(prothero_robinson(1e3), 0.0, [0.0], 0.5, step_size=0.01).cause == "stiffness"

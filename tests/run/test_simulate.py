@@ -269,10 +269,6 @@ def test_a_quaternion_that_leaves_length_one_has_failed_alone_and_in_an_ensemble
     np.testing.assert_array_equal(many["quaternion"].values[: shown.size], run["quaternion"].values)
 
 
-DOUBTFUL = symtop.Scene("doubtful", symtop.SymmetricTop(0.1862, 0.2285, 0.1828), symtop.Angles(0.00337, psi_dot=-1.61),
-                        87.0)  # fmt: skip
-
-
 def test_a_quaternion_that_keeps_its_length_has_not_failed_and_a_state_whose_squares_overflow_is_not_finite():
     run = symtop.simulate("spheroid", "strang[attitude]", step_size=0.5, guard=False)
     assert run.attrs["outcome"] == "ok"
@@ -282,14 +278,16 @@ def test_a_quaternion_that_keeps_its_length_has_not_failed_and_a_state_whose_squ
     far = charts.attitude_distance(np.array([3e116, 0.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0, 0.0]))
     assert far == np.pi
     # L is finite, about 1e160; the energy is the square of it.
-    run = symtop.simulate(DOUBTFUL, "rk4[axis]", step_size=43.5, horizon=130.5, guard=False)
+    top, start = symtop.SymmetricTop(0.1862, 0.2285, 0.1828), symtop.Angles(0.00337, psi_dot=-1.61)
+    doubtful = symtop.Scene("doubtful", top, start, 87.0)
+    run = symtop.simulate(doubtful, "rk4[axis]", step_size=43.5, horizon=130.5, guard=False)
     assert np.isfinite(run["axis"].values).all()
     assert not np.isfinite(run["energy"].values).all()
     assert (run.attrs["outcome"], run.attrs["reached_time"]) == ("not_finite", 87.0)
-    both = symtop.ensemble([DOUBTFUL] * 2, "rk4[axis]", step_size=43.5, horizon=130.5, quiet=True)
+    both = symtop.ensemble([doubtful] * 2, "rk4[axis]", step_size=43.5, horizon=130.5, quiet=True)
     assert both["outcome"].values.tolist() == ["not_finite"] * 2
     assert both["reached_time"].values.tolist() == [87.0] * 2
-    good = symtop.simulate(DOUBTFUL, "rk4[axis]", step_size=0.5, guard=False)  # the control
+    good = symtop.simulate(doubtful, "rk4[axis]", step_size=0.5, guard=False)  # the control
     assert good.attrs["outcome"] == "ok"
 
 

@@ -168,15 +168,13 @@ def test_gauss_methods_go_on_beyond_the_limit_of_their_sweeps(name):
         assert {VERDICTS[k] for k in np.unique(runs.verdict)} <= set(JUDGED)
 
 
-def hand_made(
-    words, control=(0.01, 0.1, 1.0), parameter=(0.3, 0.6, 5.0, 10.0), knob_name="step_size", scene_name="cusp"
-):
+def hand_made(words, control=(0.01, 0.1, 1.0), parameter=(0.3, 0.6, 5.0, 10.0), knob="step_size", on="cusp"):
     """A dataset with one integrator's map, from variants of words."""
     outcome = np.array([[VERDICTS.index(word) for word in line] for line in words], dtype=np.uint8)
     values = {"parameter_value": ("parameter", np.asarray(parameter, float)),
-              "control": ("setting", np.asarray(control, float)), "knob_name": knob_name}  # fmt: skip
+              "control": ("setting", np.asarray(control, float)), "knob_name": knob}  # fmt: skip
     data = xr.Dataset(values | {"outcome": (("parameter", "setting"), outcome), "checks": 0.0, "refuted": 0.0})
-    return datasets.combine([(Case(scene_name, "midpoint"), data)])
+    return datasets.combine([(Case(on, "midpoint"), data)])
 
 
 A, B, L = "accurate", "bounded_but_wrong", "left_chart"
@@ -225,7 +223,7 @@ def spins(**made):
     """Maps over three slow and three fast tops, at three settings, by variant."""
     cells = []
     for name, (control, lines) in made.items():
-        data = hand_made(lines, parameter=(0.2, 0.5, 0.8, 4.0, 8.0, 16.0), knob_name=control)
+        data = hand_made(lines, parameter=(0.2, 0.5, 0.8, 4.0, 8.0, 16.0), knob=control)
         chart = "angles" if name.startswith("angles_") else "axis"
         case = Case("cusp", f"{name.removeprefix('angles_')}[{chart}]")
         cells.append((case, data.sel(scene="cusp", variant="midpoint", drop=True)))
@@ -237,9 +235,9 @@ SLOW_FINER, FAST_FINER = [[A, L, L]] * 3 + [[A, A, L]] * 3, [[A, A, L]] * 3 + [[
 
 def test_a_pole_that_halves_the_reach_is_told_and_variants_that_reach_equally_far_are_all_named():
     gaps = (1e-6, 1e-5, 1e-4, 1e-2, 0.1)
-    near = hand_made([[L, L, L], [L, L, L], [A, A, L], [A, L, L], [A, A, L]], parameter=gaps, scene_name="grazing")
+    near = hand_made([[L, L, L], [L, L, L], [A, A, L], [A, L, L], [A, A, L]], parameter=gaps, on="grazing")
     assert atlas.halved_by_pole(atlas.maps(near, "grazing")["midpoint"]) is True
-    unspoiled = hand_made([[L, L, L], *[[A, A, L]] * 4], parameter=gaps, scene_name="grazing")
+    unspoiled = hand_made([[L, L, L], *[[A, A, L]] * 4], parameter=gaps, on="grazing")
     assert atlas.halved_by_pole(atlas.maps(unspoiled, "grazing")["midpoint"]) is False
     data = spins(rk4=("step_size", SLOW_FINER), strang=("step_size", SLOW_FINER), rk45=("tolerance", FAST_FINER),
                  angles_rk45=("tolerance", SLOW_FINER), angles_dop853=("tolerance", FAST_FINER))  # fmt: skip
@@ -318,7 +316,7 @@ def measured():
     return datasets.combine([(case, study.measure(case)) for case in smaller])
 
 
-def test_facts_are_those_of_the_mechanisms(measured):
+def test_facts_are_those_of_the_mechanisms_and_the_page_says_them_but_none_of_what_was_not_measured(measured, tmp_path):
     answers = facts.facts(measured)
     assert answers.keys() >= set(facts.NAMES)
     adaptive = {"fast_finer", "not_angles", "slow_finer", "in_angles"}  # there are none here
@@ -335,15 +333,10 @@ def test_facts_are_those_of_the_mechanisms(measured):
     table = facts.tables(measured)["atlas"]
     assert dict(zip(table["variant"], table["accurate (%)"] / 100.0, strict=True)) == pytest.approx(shares)
     assert table["accurate (%)"].is_monotonic_decreasing
-
-
-def test_the_page_says_what_was_measured_and_what_was_not_is_none(measured, tmp_path):
+    assert f"{answers['angles_halved']} of 2 variants in Euler's angles" in checked("stability", measured, tmp_path)
     answers = facts.facts(hand_made([[A, B, L]] * 4))
     assert (answers["settled"], answers["cells"], answers["resonant"], answers["others"]) == (0.0, 12, None, None)
     assert facts.tables(hand_made([[A, B, L]] * 4))["limits"].empty
-    text = checked("stability", measured, tmp_path)
-    answers = facts.facts(measured)
-    assert f"{answers['angles_halved']} of 2 variants in Euler's angles" in text
 
 
 def test_adaptive_methods_are_mapped_over_their_tolerance_to_their_budget():

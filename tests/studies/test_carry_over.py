@@ -23,20 +23,17 @@ from symtop.model.charts import BODY, attitude_distance
 from symtop.run.motion import CHECK, FINE, Integrated
 
 COUNT, PERIODS = 4, 5.0
+EVERYONE = np.arange(COUNT)
 
 
 def drawn(family):
     return bodies_of(family, COUNT, 2, PERIODS)
 
 
-def everyone():
-    return np.arange(COUNT)
-
-
 @pytest.mark.parametrize("family", [SYMMETRIC, "0.3", FREE])
 def test_errors_of_many_runs_are_those_of_each(family):
     bodies = drawn(family)
-    shown = bodies.errors("body", run_level(integrator("rk4[body]"), bodies, everyone(), 7, 1e6), everyone())
+    shown = bodies.errors("body", run_level(integrator("rk4[body]"), bodies, EVERYONE, 7, 1e6), EVERYONE)
     for k, scene in enumerate(bodies.scenes):
         run = symtop.simulate(scene, "rk4", step_size=bodies.period[k] / FIRST / 128, horizon=bodies.times[k, -1],
                               samples=int(bodies.marks[-1]) * 128 + 1, guard=False)  # fmt: skip
@@ -54,9 +51,8 @@ def test_errors_of_many_runs_are_those_of_each(family):
 def test_bodies_in_lanes_run_and_end_as_one_by_one(name, level, ends):
     variant, bodies = integrator(f"{name}[body]"), drawn("0.3")
     plans = [Plan.steps(float(period) / FIRST * 0.5**level, bodies.marks << level) for period in bodies.period]
-    lanes, each = (
-        run_level(variant, bodies, everyone(), level, 1e6), one_by_one(variant, bodies.members(everyone()), plans)
-    )  # fmt: skip
+    lanes = run_level(variant, bodies, EVERYONE, level, 1e6)
+    each = one_by_one(variant, bodies.members(EVERYONE), plans)
     for field in ("states", "work", "outcome"):
         np.testing.assert_array_equal(getattr(lanes, field), getattr(each, field))
     assert {*lanes.outcome.tolist()} == ends
@@ -100,8 +96,8 @@ def test_a_setting_that_meets_a_target_meets_it():
     at = np.ceil(np.log2(met / FIRST)).astype(int)
     tops = bodies[SYMMETRIC]
     for k, level in enumerate(at):
-        runs = (run_level(variant, tops, everyone(), place, 1e6) for place in (level, level - 1))
-        fine, coarse = (tops.errors("", run, everyone()) for run in runs)
+        runs = (run_level(variant, tops, EVERYONE, place, 1e6) for place in (level, level - 1))
+        fine, coarse = (tops.errors("", run, EVERYONE) for run in runs)
         assert fine["axis"][k] <= 1e-3 < coarse["axis"][k]
     own = own_table(integrator("rk4[axis]"), bodies, 2e3)
     ratio = own["met_at"].sel(quantity="axis").sel(target=1e-3, method="nearest").values / met
@@ -185,13 +181,10 @@ def test_a_planted_difference_of_rankings_is_seen_and_scatter_is_none_nor_prices
     assert partly.low <= partly.value <= partly.high < same.low
     turned = by.bootstrap_tau(costs_of(medians), costs_of(medians[::-1], seed=1), rows, paired=True)
     assert turned.value < -0.9
-    half, rows = 1e-6 * 1.6 ** np.arange(20), ([*range(20)],) * 2
-    half[10:] = np.inf
+    half = np.where(np.arange(20) < 10, medians, np.inf)
     first, second = costs_of(half), costs_of(np.roll(half, 5), seed=1)
-    free, noisy = (
-        by.bootstrap_tau(*(one._replace(errors=np.full(20, error)) for one in (first, second)), rows, paired=True)
-        for error in (0.0, 0.02)
-    )
+    free, noisy = (by.bootstrap_tau(*(one._replace(errors=np.full(20, error)) for one in (first, second)), rows,
+                                    paired=True) for error in (0.0, 0.02))  # fmt: skip
     assert free.low <= free.value <= free.high
     assert (noisy.low, noisy.high) == pytest.approx((free.low, free.high), abs=0.02)
 
@@ -216,9 +209,8 @@ def test_tau_is_kendalls_with_ties_and_verdicts_follow_limits_fixed_before():
     assert np.isnan(by.tau_of(reached[3:], reached[3:]))
     for ends, verdict in (((0.91, 0.99), by.YES), ((0.7, 0.95), by.PARTLY), ((0.6, 0.79), by.NO)):
         assert by.ranking_verdict(by.Interval(0.85, *ends)) == verdict
-    assert [by.factor_verdict(one) for one in (1.05, 1.0 / 1.05, 1.8, 0.6, 2.5, 0.3)] == [
-        by.YES, by.YES, by.FACTOR, by.FACTOR, by.NO, by.NO,
-    ]  # fmt: skip
+    told = [by.factor_verdict(one) for one in (1.05, 1.0 / 1.05, 1.8, 0.6, 2.5, 0.3)]
+    assert told == [by.YES] * 2 + [by.FACTOR] * 2 + [by.NO] * 2
     assert by.factor_verdict(4.0, by.SEVERAL) == by.FACTOR
     assert by.factor_verdict(facts.over(0.0, 0.0), by.SEVERAL) == by.YES  # no silent run of tops or bodies
     assert by.factor_verdict(facts.over(0.2, 0.0), by.SEVERAL) == by.NO
@@ -238,23 +230,20 @@ def planted(factor):
     status[:, :, 4, : members // 20] = status[:, families.index(FREE), 4, : int(factor * members / 20)] = 3.0
     over = ("variant", "family", "quantity", "target", "member")
     work = np.broadcast_to(setting * 10.0, (3, len(families), LEVELS))
-    short = xr.Dataset(
-        {
-            "cost": (over, np.broadcast_to((10.0 * met)[:, :, None], (3, len(families), 2, 3, members))),
-            "met_at": (over, np.broadcast_to(met[:, :, None], (3, len(families), 2, 3, members))),
-            "setting": (("variant", "family", "level"), np.broadcast_to(setting, work.shape)),
-            "work": (("variant", "family", "level"), work),
-            "status": (("variant", "family", "kept", "member"), status),
-            "control": ("variant", ["step_size"] * 3), "needs": ("variant", ["derivative", "kicks", "derivative"]),
-        },
-        {"variant": variants, "family": families, "quantity": ["axis", "attitude"], "target": [1e-3, 1e-6, 1e-9]},
-    ).expand_dims("scene")  # fmt: skip
-    prices = xr.Dataset(
-        {name: (("scene", "variant", "priced_at"), np.full((3, 3, 7), value)) for name, value in
-         (("price", 1e-7), ("call", 1e-6))} | {"sampled": (("scene", "variant"), np.full((3, 3), np.nan))},
-        {"variant": variants, "priced_at": 10.0 ** -np.arange(2.0, 16.0, 2.0),
-         "scene": ["first-0", "first-1", "first-2"]},
-    )  # fmt: skip
+    short = xr.Dataset({
+        "cost": (over, np.broadcast_to((10.0 * met)[:, :, None], (3, len(families), 2, 3, members))),
+        "met_at": (over, np.broadcast_to(met[:, :, None], (3, len(families), 2, 3, members))),
+        "setting": (("variant", "family", "level"), np.broadcast_to(setting, work.shape)),
+        "work": (("variant", "family", "level"), work), "status": (("variant", "family", "kept", "member"), status),
+        "control": ("variant", ["step_size"] * 3), "needs": ("variant", ["derivative", "kicks", "derivative"]),
+    }, {"variant": variants, "family": families, "quantity": ["axis", "attitude"],
+        "target": [1e-3, 1e-6, 1e-9]}).expand_dims("scene")  # fmt: skip
+    over = ("scene", "variant", "priced_at")
+    prices = xr.Dataset({
+        "price": (over, np.full((3, 3, 7), 1e-7)), "call": (over, np.full((3, 3, 7), 1e-6)),
+        "sampled": (over[:2], np.full((3, 3), np.nan)),
+    }, {"variant": variants, "priced_at": 10.0 ** -np.arange(2.0, 16.0, 2.0),
+        "scene": ["first-0", "first-1", "first-2"]})  # fmt: skip
     about = xr.Dataset({"growth": (("scene", "family", "member"), np.full((1, len(families), members), 10.0)),
                         "stratum": (("scene", "family", "member"), np.full((1, len(families), members), "heavy"))},
                        {"scene": ["short"], "family": families}).expand_dims("variant")  # fmt: skip

@@ -31,6 +31,7 @@ from symtop.runner.study import Case
 from tests.templates import checked
 
 INF, NAN = math.inf, math.nan
+QUIET = np.array([0.01, 0.01])
 EACH = ("strang[axis]", "midpoint[angles]", "stormer-verlet-reversible[angles]", "rk4[attitude]", "rk45-compiled[axis]")
 
 
@@ -66,9 +67,6 @@ def test_a_cost_lies_between_miss_and_hit_and_slowdowns_wins_and_run_lengths_fol
     assert level.tolist() == [[True, True, False], [True, False, True], [False, False, False]]
     budgets = np.array([0.5, 1.0, 2.0, 10.0])
     assert run_lengths(np.array([1.0, 2.0, 3.0, INF, NAN]), budgets).tolist() == [0.0, 0.25, 0.5, 0.75]
-
-
-QUIET = np.array([0.01, 0.01])
 
 
 def test_wins_and_what_is_met_have_one_denominator_each():
@@ -154,12 +152,11 @@ def tree_of(price, names=("a", "b", "c"), **others):
     price = np.asarray(price, dtype=float)
     shape = (*price.shape, len(pricing.TOLERANCES))
     dims = ("scene", "variant", "priced_at")
-    group = xr.Dataset(
-        {"price": (dims, np.broadcast_to(price[..., np.newaxis], shape)), "call": (dims, np.full(shape, 2e-6)),
-         "sampled": (dims[:2], np.full(price.shape, NAN))},
-        coords={"scene": [f"{pricing.BATCHES[k // 5]}-{k % 5}" for k in range(len(price))], "variant": list(names),
-                "priced_at": list(pricing.TOLERANCES)},
-    )  # fmt: skip
+    group = xr.Dataset({
+        "price": (dims, np.broadcast_to(price[..., np.newaxis], shape)), "call": (dims, np.full(shape, 2e-6)),
+        "sampled": (dims[:2], np.full(price.shape, NAN)),
+    }, {"scene": [f"{pricing.BATCHES[k // 5]}-{k % 5}" for k in range(len(price))], "variant": list(names),
+        "priced_at": list(pricing.TOLERANCES)})  # fmt: skip
     return xr.DataTree.from_dict({"prices": group} | others)
 
 
@@ -176,7 +173,6 @@ def test_a_price_is_the_median_and_a_process_that_is_slower_at_everything_no_spr
     dense["prices"]["sampled"] = 2.0 * dense["prices"]["price"].isel(priced_at=0, drop=True)
     assert pricing.prices(dense).sampled == pytest.approx(2.0)
     assert np.min(planted, axis=0)[0] == 4e-10  # the control: the least of them would be that
-    quiet = np.array([[5e-9, 6e-9, 7e-9]] * 5)
     quiet, names = np.tile(quiet, 4), "abcdefghijkl"
     together = quiet * np.array([1.0, 1.3, 1.1, 0.8, 1.0])[:, np.newaxis]
     apart = quiet * np.random.default_rng(1).uniform(0.7, 1.3, quiet.shape)
@@ -193,15 +189,12 @@ def test_a_price_is_the_median_and_a_process_that_is_slower_at_everything_no_spr
 
 
 def test_a_noisy_price_is_measured_again_and_marked_if_it_stays():
-    noisy = np.array([[5e-9, 6e-9, 7e-9]] * 5) * np.array([[1.0, 1.0, 1.0]] * 5)
+    noisy, again = np.array([[5e-9, 6e-9, 7e-9]] * 5), np.full((5, 3), NAN)
     noisy[:, 1] *= [1.0, 1.4, 0.7, 1.5, 1.1]
-    first = pricing.prices(tree_of(noisy))
-    assert first.marked == ["b"]
-    again = np.full((5, 3), NAN)
-    again[:, 1] = 6e-9
-    assert pricing.prices(tree_of(np.concatenate([noisy, again]))).marked == []
-    again[:, 1] = noisy[:, 1]
-    assert pricing.prices(tree_of(np.concatenate([noisy, again]))).marked == ["b"]
+    assert pricing.prices(tree_of(noisy)).marked == ["b"]
+    for second, marked in ((6e-9, []), (noisy[:, 1], ["b"])):
+        again[:, 1] = second
+        assert pricing.prices(tree_of(np.concatenate([noisy, again]))).marked == marked
 
 
 def test_a_price_is_the_slope_of_two_runs_and_the_guard_and_who_runs_long_are_counted(monkeypatch):
@@ -513,16 +506,15 @@ def test_quick_results_hold_every_verdict_and_a_cost_holds_the_call(data):
             assert best.low <= best.high
         if one["hindsight"]:
             assert one["solved"] <= one["asked"]
-    taken = cells.costs(data, Cell("short", "axis", 1e-3, NATURAL))
-    assert not any("[attitude]" in name for name in taken.names if f"{name.split('[')[0]}[axis]" in taken.names)
     cell = Cell("short", "axis", 1e-3, NATURAL)
     seconds, counted = cells.costs(data, cell), cells.costs(data, cell, cells.EVALUATIONS)
+    assert not any("[attitude]" in name for name in seconds.names if f"{name.split('[')[0]}[axis]" in seconds.names)
     row = seconds.names.index("rk4[axis]")
     price, call = pricing.prices(data).at("rk4[axis]", np.array([NAN]))
     good = np.isfinite(counted.values[row])
     assert call[0] > 2e-7
     assert seconds.values[row, good] == pytest.approx(counted.values[row, good] * price[0] + call[0])
-    cell = Cell("short", "axis", 1e-3, NATURAL, "derivative")
+    cell = cell._replace(needs="derivative")
     every, keeping = ({one.name for one in cells.safest(data, cell, only)[0]} for only in (False, True))
     assert keeping == {name for name in every if name.startswith("gauss-")} < every
     served = facts.confirmed(data).set_index(["variant", "error"])

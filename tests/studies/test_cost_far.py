@@ -32,11 +32,6 @@ def one_top(name="spheroid"):
     return Tops(np.array([flat(on.top, on.start)]), 10.0)
 
 
-def padded(errors):
-    """One run at all horizons, NaN where it was not measured."""
-    return np.append(errors, np.full(FAR.size - errors.size, np.nan))[np.newaxis]
-
-
 @pytest.fixture(scope="module")
 def data(quick_results):
     return netcdf.read_any(quick_results / "cost.nc")
@@ -59,7 +54,7 @@ def test_a_law_predicts_a_measured_horizon_that_was_left_out_of_the_fit(name):
     setting = {"srkn-14-6[axis]": 13.11, "series[axis]": 11.3}.get(name, 140.0)
     ((seen, _),) = runs.measured(row, tops, [runs.Asked(setting, ends, np.inf)])
     for place, quantity in enumerate(runs.QUANTITIES):
-        full = padded(seen[place, :, 0])
+        full = np.append(seen[place, :, 0], np.full(FAR.size - ends.size, np.nan))[np.newaxis]  # of one run
         known = np.where(SHORT, full, np.nan)
         if full[0, ends.size - 1] < 0.1:
             law = laws.fit(FAR, known, runs.MOST[quantity], drifts=runs.drifts_of(row))
@@ -170,6 +165,7 @@ def test_a_variant_whose_energy_drifts_loses_it_late_and_one_that_keeps_it_takes
 
 
 def test_costs_rise_with_horizon_and_accuracy_and_what_is_within_reach_is_measured(data):
+    reach = float(data["far"]["reach"].max())
     for quantity in runs.QUANTITIES:
         panel = diagram(data, quantity)
         cheapest = panel.costs.min(axis=0)
@@ -177,9 +173,6 @@ def test_costs_rise_with_horizon_and_accuracy_and_what_is_within_reach_is_measur
         assert finite.any()
         assert (finite[:, 1:] <= finite[:, :-1]).all()
         assert ((panel.winner >= 0) == finite).all()
-    reach = float(data["far"]["reach"].max())
-    for quantity in runs.QUANTITIES:
-        panel = diagram(data, quantity)
         beyond = (panel.horizons > 1.001 * reach) & (panel.winner >= 0)
         assert panel.predicted[beyond].all()
         assert not panel.predicted[:, 0].any()

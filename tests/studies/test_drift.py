@@ -167,22 +167,18 @@ def test_a_prediction_is_judged_by_what_was_measured():
     assert facts.loss_table(horizons)["variant"].tolist() == ["b", "a"]
 
 
-PER_NUTATION = 1000.37
-PARTS = ("least", "largest", "mean")
-
-
 @pytest.mark.parametrize("compensated", [True, False])
 @pytest.mark.parametrize("name", ["midpoint[angles]", "cayley[axis]"])
 def test_each_has_the_bits_of_a_long_run(name, compensated):
-    method, scenes = integrator(name), members(scene("spheroid"), 6)  # enough for lanes
-    gauges = gauges_of(scenes, method, PER_NUTATION)
-    ends, seen = side_by_side(scenes, gauges, method, 20_000, PER_NUTATION, compensated=compensated)
+    method, scenes, per_nutation = integrator(name), members(scene("spheroid"), 6), 1000.37  # six: enough for lanes
+    gauges = gauges_of(scenes, method, per_nutation)
+    ends, seen = side_by_side(scenes, gauges, method, 20_000, per_nutation, compensated=compensated)
     for i, one in ((0, scenes[0]), (5, scenes[5])):
-        h = one.nutation_period / PER_NUTATION
+        h = one.nutation_period / per_nutation
         alone = long_run(one, method, steps=20_000, step_size=h, compensated=compensated, quiet=True)
         np.testing.assert_array_equal(ends, alone["steps"])
         for quantity in QUANTITIES:
-            for k, part in enumerate(PARTS):
+            for k, part in enumerate(("least", "largest", "mean")):
                 np.testing.assert_array_equal(seen[quantity][i, :, k], alone[f"{quantity}_{part}"])
     others = [seen["modified_energy"][i] for i in range(6)]
     assert not any(np.array_equal(one, other) for one, other in pairwise(others))  # each is a run of its own
@@ -326,20 +322,15 @@ def test_a_steady_precession_and_a_failed_sample_have_no_phase():
 def test_laws_of_growth_of_a_symplectic_method_and_of_runge_kutta():
     where = symtop.scene("spheroid")
     period = where.nutation_period
-    found = {
-        name: history(where, symtop.integrator(name), horizon=6000.0 * period, samples=3001, **control)
-        for name, control in {
-            "stormer-verlet": {"step_size": period / 60.37},
-            "strang": {"step_size": period / 60.37},
-            "rk4": {"step_size": period / 60.37},  # a wrong frequency rules for the first 75 nutations, energy then
-            "rk45-compiled": {"tolerance": 1e-8},
-        }.items()
-    }
-    for name, energy, phase in (("stormer-verlet", 0.0, 1.0), ("strang", 0.0, 1.0), ("rk4", 1.0, 2.0),
-                                ("rk45-compiled", 1.0, 2.0)):  # fmt: skip
-        assert float(found[name]["energy_exponent"]) == pytest.approx(energy, abs=0.1), name
-        assert float(found[name]["phase_exponent"]) == pytest.approx(phase, abs=0.2), name
-        assert float(found[name]["phase_exponent_interval"]) < 0.2
+    step, loose = {"step_size": period / 60.37}, {"tolerance": 1e-8}
+    for name, control, energy, phase in (
+        ("stormer-verlet", step, 0.0, 1.0), ("strang", step, 0.0, 1.0), ("rk45-compiled", loose, 1.0, 2.0),
+        ("rk4", step, 1.0, 2.0),  # a wrong frequency rules for the first 75 nutations, energy then
+    ):  # fmt: skip
+        found = history(where, symtop.integrator(name), horizon=6000.0 * period, samples=3001, **control)
+        assert float(found["energy_exponent"]) == pytest.approx(energy, abs=0.1), name
+        assert float(found["phase_exponent"]) == pytest.approx(phase, abs=0.2), name
+        assert float(found["phase_exponent_interval"]) < 0.2
 
 
 @pytest.mark.parametrize("name", ["gauss-8", "kahan-li-6", "rk4"])

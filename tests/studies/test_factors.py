@@ -8,22 +8,8 @@ import numpy as np
 import pandas as pd
 import pytest
 from symtop_studies import fresh_process
-from symtop_studies.factors import facts, figures, measures, plain_numpy
-from symtop_studies.factors.cells import (
-    CALLS,
-    COMPILED,
-    DORMAND_PRINCE,
-    FAMILIES,
-    KERNEL,
-    LANGUAGES,
-    NUMPY,
-    SCIPY_NUMBA,
-    SCIPY_PYTHON,
-    SIMULATE,
-    SOLVE_IVP,
-    cells,
-    taylor_in_angles,
-)  # fmt: skip
+from symtop_studies.factors import cells as grid, facts, figures, measures, plain_numpy
+from symtop_studies.factors.cells import CALLS, COMPILED, DORMAND_PRINCE, KERNEL, LANGUAGES, NUMPY, SCIPY_PYTHON, cells
 from symtop_studies.factors.facts import FACTORS, GOAL, charts, effects, fastest, first_goal, pairs, timed, waterfall
 from symtop_studies.factors.measures import LEAST, Goal, factorial, settle
 
@@ -90,7 +76,7 @@ def test_a_cell_is_named_once_and_taylor_in_angles_solves_the_same_equations():
         assert (cell.method.implementation == "compiled") == (cell.language == COMPILED)
     schemes = {cell.scheme for cell in every}
     compiled = {cell.scheme for cell in every if cell.language == COMPILED}
-    assert {scheme for members in FAMILIES.values() for scheme in members} == compiled == schemes - {"DOP853"}
+    assert {scheme for members in grid.FAMILIES.values() for scheme in members} == compiled == schemes - {"DOP853"}
     hy = pytest.importorskip("heyoka")
     from symtop.methods.taylor.heyoka import equations
 
@@ -99,7 +85,7 @@ def test_a_cell_is_named_once_and_taylor_in_angles_solves_the_same_equations():
     names, sides = zip(*equations("angles"), strict=True)
     slopes = hy.cfunc(list(sides), list(names))(np.array(state), pars=np.array([1.0 / par.I1, par.mgl, par.I3]))
     np.testing.assert_allclose(slopes, FORMULATIONS["angles"].field(par, state), rtol=1e-14, atol=1e-14)
-    run = symtop.simulate(scene, taylor_in_angles(), horizon=10.0)
+    run = symtop.simulate(scene, grid.taylor_in_angles(), horizon=10.0)
     assert run.attrs["chart"] == "angles"
     assert float(symtop.errors(run)["attitude"].max()) < 1e-11
     assert 0.0 < float(np.ptp(run["p_phi"].values)) < 1e-12  # free to drift, by rounding
@@ -150,7 +136,7 @@ def test_every_timed_run_meets_its_target_and_its_time_is_the_median_of_its_proc
     gap = measured["spread"].values[np.isfinite(seconds.values)]
     np.testing.assert_allclose(gap, 0.5 * np.ptp(taken, axis=-1) / np.median(taken, axis=-1))
     assert set(rows["call"]) == set(CALLS)
-    assert set(rows["language"][rows["call"] == SOLVE_IVP]) == {SCIPY_PYTHON}
+    assert set(rows["language"][rows["call"] == grid.SOLVE_IVP]) == {SCIPY_PYTHON}
 
 
 def test_a_noisy_time_is_taken_again_and_the_fastest_processes_count(monkeypatch):
@@ -200,7 +186,7 @@ def test_neighbours_in_the_waterfall_differ_in_exactly_the_factor_they_name(rows
     known = {cell.name: cell.key for cell in cells()}
     bars = waterfall(rows, call_first=call_first).to_dict("records")
     levels = [(*known[bar["variant"]], bar["call"]) for bar in bars]
-    assert levels[0] == (DORMAND_PRINCE, "angles", SCIPY_PYTHON, SOLVE_IVP)
+    assert levels[0] == (DORMAND_PRINCE, "angles", SCIPY_PYTHON, grid.SOLVE_IVP)
     assert levels[-1] == tuple(fastest(rows)[FACTORS])
     assert len(bars) >= 5
     for before, after, bar in zip(levels, levels[1:], bars[1:], strict=False):
@@ -226,20 +212,21 @@ def test_the_product_of_the_ratios_is_the_total_and_a_waterfall_with_a_missing_s
 
 EFFECT = {
     DORMAND_PRINCE: 8.0, "rk4": 5.0, "Takahashi-Imada": 1.0, "angles": 3.0, "axis": 1.0, "attitude": 1.5,
-    SCIPY_PYTHON: 100.0, SCIPY_NUMBA: 90.0, NUMPY: 0.5, COMPILED: 1.0, SOLVE_IVP: 2.5, SIMULATE: 2.0, KERNEL: 1.0,
+    SCIPY_PYTHON: 100.0, grid.SCIPY_NUMBA: 90.0, NUMPY: 0.5, COMPILED: 1.0,
+    grid.SOLVE_IVP: 2.5, grid.SIMULATE: 2.0, KERNEL: 1.0,
 }  # fmt: skip
 
 
 def synthetic(interaction=1.0):
     """Times that are products of an effect a factor; an interaction makes angles slower in compiled loops alone."""
-    grid = []
+    rows = []
     schemes, chart_names = (DORMAND_PRINCE, "rk4", "Takahashi-Imada"), ("angles", "axis", "attitude")
     for levels in itertools.product(schemes, chart_names, LANGUAGES, CALLS):
         seconds = 1e-6 * math.prod(EFFECT[level] for level in levels)
         if levels[1:3] == ("angles", COMPILED):
             seconds *= interaction
-        grid.append(["spheroid", 10.0, 1e-6, *levels, "-".join(levels), seconds])
-    return pd.DataFrame(grid, columns=[*GOAL, *FACTORS, "variant", "seconds"])
+        rows.append(["spheroid", 10.0, 1e-6, *levels, "-".join(levels), seconds])
+    return pd.DataFrame(rows, columns=[*GOAL, *FACTORS, "variant", "seconds"])
 
 
 def test_effects_that_multiply_are_found_and_scipy_and_charts_compared_by_the_fastest(quiet, monkeypatch):
@@ -253,8 +240,8 @@ def test_effects_that_multiply_are_found_and_scipy_and_charts_compared_by_the_fa
     (row,) = facts.against_scipy(synthetic()).to_dict("records")
     assert (row["times, as called"], row["times, kernels"]) == (pytest.approx(1000.0), pytest.approx(800.0))
     ours = f"Takahashi-Imada-axis-{COMPILED}"
-    assert row["SciPy's"] == f"{DORMAND_PRINCE}-axis-{SCIPY_PYTHON}-{SOLVE_IVP}"
-    assert (row["fastest, as called"], row["fastest kernel"]) == (f"{ours}-{SIMULATE}", f"{ours}-{KERNEL}")
+    assert row["SciPy's"] == f"{DORMAND_PRINCE}-axis-{SCIPY_PYTHON}-{grid.SOLVE_IVP}"
+    assert (row["fastest, as called"], row["fastest kernel"]) == (f"{ours}-{grid.SIMULATE}", f"{ours}-{KERNEL}")
     table = charts(synthetic(interaction=4.0))
     assert list(table["family"]) == ["Dormand-Prince", "rk4", "splitting"]
     np.testing.assert_allclose(table["angles / axis"], 12.0)

@@ -21,18 +21,17 @@ def data():
 
 
 def test_a_liar_is_judged_beside_the_honest_and_claims_on_a_free_body_by_themselves(data):
-    said = facts.facts(data)
+    said, tables = facts.facts(data), facts.tables(data)
     assert (said["integrators"], said["refuted"]) == (1, 0)
     assert (said["planted"], said["caught"]) == (1, 1)
     assert not {LIAR, "hidden-kick"} & symtop.integrators().keys()
-    row = facts.tables(data)["planted"].iloc[0]
+    row = tables["planted"].iloc[0]
     assert (row["integrator"], row["claim"], row["verdict"]) == (LIAR, "symmetric", "refuted")
     shown = {text.get_text() for picture in figures.pictures(data) for text in picture.figure.axes[0].texts}
     assert "1 of 1" in shown
-    said, table = facts.facts(data), facts.tables(data)["body"]
     assert (said["free_methods"], said["free_confirmed"]) == (1, 3)
-    assert [*table["claim"]] == ["order", "energy", "momentum"]
-    assert {*facts.tables(data)["ledger"]["scene"]} == {SCENE}
+    assert [*tables["body"]["claim"]] == ["order", "energy", "momentum"]
+    assert {*tables["ledger"]["scene"]} == {SCENE}
     wrong = (data["scene"] == facts.FREE) & (data["claim"] == "momentum")
     refuted = facts.facts(data.assign(verdict=xr.where(wrong & (data["verdict"] != ""), "refuted", data["verdict"])))
     assert (refuted["free_refuted"], refuted["refuted"]) == (1, said["refuted"])

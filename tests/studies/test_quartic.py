@@ -4,33 +4,14 @@ import math
 
 import numpy as np
 import pytest
-from symtop_studies.oscillators.quartic import (
-    Map,
-    Quartic,
-    discrete_lagrangian,
-    discrete_path,
-    exact,
-    mcmillan,
-    of_top,
-    true_path,
-)
+from symtop_studies.oscillators import quartic
+from symtop_studies.oscillators.quartic import Quartic, discrete_lagrangian, discrete_path, exact, mcmillan, true_path
 from symtop_studies.oscillators.quartic_measures import MAPS, PLAIN, QUARTICS, oscillator_of, quartic_table
 
 import symtop
 from symtop.measure.order import power_law
 from symtop.model.scenes import closed_form
-
-
-def slopes(rule, first, second, width=1e-30):
-    """D1 L_d and D2 L_d by complex steps, each of shape (2,)."""
-    steps = 1j * width * np.eye(2)
-    left = [discrete_lagrangian(rule, first + step, second).imag / width for step in steps]
-    return np.array(left), np.array([discrete_lagrangian(rule, first, second + step).imag / width for step in steps])
-
-
-def plane(path):
-    """Complex positions as points, shape (n, 2)."""
-    return np.stack([path.real, path.imag], axis=1)
+from tests.slopes import slopes
 
 
 @pytest.mark.parametrize("name", QUARTICS)
@@ -61,13 +42,14 @@ def test_the_motion_solves_the_discrete_euler_lagrange_equations(name, steps):
     h = oscillator.period / steps
     rule = exact(oscillator, h)
     turned = true_path(oscillator, h * np.arange(6)) * np.exp(-1j * rule.delta * np.arange(6))
-    points = plane(turned)
+    points = np.stack([turned.real, turned.imag], axis=1)
     wrong = rule._replace(lift=rule.lift + 1e-6)
     for before, here, after in zip(points, points[1:], points[2:], strict=False):
-        arrives = slopes(rule, before, here)[1]
-        assert np.abs(arrives + slopes(rule, here, after)[0]).max() < 2e-14 * rule.r
+        arrives = slopes(discrete_lagrangian, rule, before, here)[1]
+        assert np.abs(arrives + slopes(discrete_lagrangian, rule, here, after)[0]).max() < 2e-14 * rule.r
         assert here[0] * arrives[1] - here[1] * arrives[0] == pytest.approx(oscillator.momentum, abs=1e-13)
-        assert np.abs(slopes(wrong, before, here)[1] + slopes(wrong, here, after)[0]).max() > 1e-8 * rule.r
+        off = slopes(discrete_lagrangian, wrong, before, here)[1] + slopes(discrete_lagrangian, wrong, here, after)[0]
+        assert np.abs(off).max() > 1e-8 * rule.r
 
 
 def test_without_the_quartic_term_it_is_the_exact_discrete_lagrangian_of_the_textbooks():
@@ -94,11 +76,12 @@ def test_the_constants_tend_to_those_of_stormer_verlet(name):
 def test_the_truth_is_the_closed_form_and_any_planar_oscillator_has_its_own_function():
     scene = symtop.scene("spheroid")
     times = np.linspace(0.0, 3.0, 40)
-    first, second = (true_path(oscillator, times) for oscillator in of_top(scene))
+    oscillators = quartic.of_top(scene)
+    first, second = (true_path(oscillator, times) for oscillator in oscillators)
     axis = closed_form(scene).axis(times)
     assert np.abs(np.abs(first) ** 2 - np.abs(second) ** 2 - axis[:, 2]).max() < 1e-14
     assert np.abs(2.0 * np.conj(first) * second - (axis[:, 0] + 1j * axis[:, 1])).max() < 1e-14
-    off = of_top(scene)[0]._replace(b=1.0001 * of_top(scene)[0].b)
+    off = oscillators[0]._replace(b=1.0001 * oscillators[0].b)
     assert np.abs(np.abs(true_path(off, times)) ** 2 - np.abs(first) ** 2).max() > 1e-5
     oscillator = Quartic(-0.7, 0.4, 0.9 + 0.1j, 0.2 + 0.6j)  # a potential with a hump in the middle
     assert 1.0 + exact(oscillator, 0.5 * oscillator.period).lift == pytest.approx(0.0, abs=1e-7)
@@ -118,13 +101,12 @@ def test_mcmillans_map_keeps_a_biquadratic_and_a_map_that_leaves_ends():
         s0, s1 = np.abs(first) ** 2, np.abs(second) ** 2
         invariant = s0 + s1 - 2.0 * (1.0 + rule.lift) * (np.conj(first) * second).real + rule.B * s0 * s1
         assert (np.ptp(invariant) < 1e-12) == kept
-    oscillator = oscillator_of("planar-hardening")
     path = discrete_path(oscillator, "stormer-verlet", oscillator.period / 2.1, 200)
     assert np.isnan(path[-1])
     assert np.isfinite(path[:3]).all()
     table = quartic_table("planar-hardening", "exact-discrete", (40.0, 2.1), 1.0)
     assert float(table["quartic_error"].max()) < 1e-14
-    assert Map(0.0, 0.0, 1.0, 0.0).kick(3.0) == 0.0
+    assert quartic.Map(0.0, 0.0, 1.0, 0.0).kick(3.0) == 0.0
     oscillator, h = PLAIN["planar-softening"], PLAIN["planar-softening"].period / 40.0
     off = discrete_path(oscillator, "midpoint", h, 40) - (true := true_path(oscillator, h * np.arange(41)))
     table = quartic_table("planar-softening", "midpoint", (40.0,), 1.0)
