@@ -22,7 +22,7 @@ from symtop.judging.claims import constants, constants as long, order, structure
 from symtop.judging.claims.constants import long_run
 from symtop.judging.claims.step_series import Series
 from symtop.judging.claims.subject import Subject, seconds_a_step
-from symtop.judging.findings import VERDICTS, Finding, Ledger, Measured, description, pace
+from symtop.judging.findings import VERDICTS, Finding, Measured, description, pace
 from symtop.judging.remote import Process, separated, solvers_of
 from symtop.measure.conservation import Changed, behaviour
 from symtop.measure.order import Fit
@@ -393,18 +393,13 @@ def test_a_time_has_the_unit_that_suits_what_is_printed_and_a_least_order_is_sai
 FREE, HEAVY = (body_scenes()[name] for name in ("check-case-2", "heavy-brick"))
 
 
-def ledger_of(method: Integrator, scene: symtop.Scene) -> Ledger:
-    """What the battery finds, quickly."""
-    return judge(method, scene, quick=True)
-
-
 @pytest.mark.parametrize(("name", "energy", "momentum"), [
     ("strang", "bounded", "kept"), ("commutator-free-4", "drift", "kept"), ("gauss-4", "kept", "bounded"),
     ("lammps-rigid", "drift", "kept"),
 ])  # fmt: skip
 def test_what_methods_claim_on_a_body_holds(name: str, energy: str, momentum: str) -> None:
     for free_or_heavy in (FREE, HEAVY):
-        ledger = ledger_of(symtop.integrator(name), free_or_heavy)
+        ledger = judge(symtop.integrator(name), free_or_heavy, quick=True)
         assert ledger.refuted == []
         assert ledger["order"].verdict == "confirmed"
         assert (ledger["energy"].measured.kind, ledger["momentum"].measured.kind) == (energy, momentum)
@@ -413,10 +408,11 @@ def test_what_methods_claim_on_a_body_holds(name: str, energy: str, momentum: st
 def test_false_claims_on_a_body_are_refuted() -> None:
     rk4 = symtop.integrator("rk4")
     lie = dataclasses.replace(rk4, name="lie", family="splitting", order=3, symplectic=True)
-    assert ledger_of(lie, FREE).refuted == ["energy", "momentum"]  # order 4 where 3 is claimed is no false claim
-    assert ledger_of(dataclasses.replace(rk4, name="higher", order=5), HEAVY).refuted == ["order"]
-    assert ledger_of(symtop.integrator("no-gyro"), FREE)["order"].measured.kind == "wrong limit"
-    assert ledger_of(symtop.integrator("stormer-verlet"), FREE)["energy"].verdict == "undecided"
+    higher = dataclasses.replace(rk4, name="higher", order=5)
+    assert judge(lie, FREE, quick=True).refuted == ["energy", "momentum"]  # order 4 where 3 is claimed is no false one
+    assert judge(higher, HEAVY, quick=True).refuted == ["order"]
+    assert judge(symtop.integrator("no-gyro"), FREE, quick=True)["order"].measured.kind == "wrong limit"
+    assert judge(symtop.integrator("stormer-verlet"), FREE, quick=True)["energy"].verdict == "undecided"
 
 
 def rotation_swapped(q: Any, w: Any, h: float, inertia: Any, torque: Any) -> Any:
@@ -486,15 +482,12 @@ def test_a_right_step_is_not_refuted_where_a_body_turns_over(only: Callable[...,
     assert ledger["energy"].measured.kind in ("growing", "drift")  # the length of its runs follows from its speed
 
 
-def seeing(below):
-    few, many = (symtop.integrator(name).solvers["axis"] for name in ("rk4", "gauss-4"))
-    solver = lambda top, start, plan: (few if plan.marks[-1] < below else many)(top, start, plan)
-    return symtop.Integrator("seeing", "other", "sees its plan", {"axis": solver}, order=4)
-
-
 def test_a_solver_that_sees_its_plan_contradicts_itself():
+    few, many = (symtop.integrator(name).solvers["axis"] for name in ("rk4", "gauss-4"))
     for below in (300, 5000, 20_000):
-        ledger = judge(seeing(below), symtop.scene("spheroid"), quick=True)
+        seeing = lambda top, start, plan, below=below: (few if plan.marks[-1] < below else many)(top, start, plan)
+        method = symtop.Integrator("seeing", "other", "sees its plan", {"axis": seeing}, order=4)
+        ledger = judge(method, SPHEROID, quick=True)
         assert ledger.refuted == ["reported"]
         assert "a run contradicts itself" in ledger["reported"].why
 
