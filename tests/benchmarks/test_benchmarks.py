@@ -38,22 +38,17 @@ def test_the_comparison_sees_one_wrong_rounding_and_a_twin_that_leaves_the_chart
     nudged = np.nextafter(kernel.rule.drift[0], 1.0)
     other = twin.Twin(kernel._replace(rule=kernel.rule._replace(drift=(nudged,))), twin.EXACT)
     assert np.any(other.shown(STEPS)[0] != twin.ours(kernel, STEPS)[0])
-    kernel = kernels.kernel(("stormer-verlet", "angles"))
     with pytest.raises(RuntimeError, match="stopped after"):
         twin.Twin(kernel._replace(state=(0.01, -9.0, 0.0, 0.0)), twin.EXACT)(STEPS)
 
 
 @needs_gcc
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    "key",
-    [
-        ("stormer-verlet", "angles"), ("strang", "axis"), ("midpoint", "angles"), ("rk4", "axis"),
-        ("dop853-compiled-fixed", "axis"), ("gauss-6", "axis"),
-        ("gauss-2", "attitude"),  # nine components: the widest state that the loop adds up
-    ],
-    ids="-".join,
-)  # fmt: skip
+@pytest.mark.parametrize("key", [
+    ("stormer-verlet", "angles"), ("strang", "axis"), ("midpoint", "angles"), ("rk4", "axis"),
+    ("dop853-compiled-fixed", "axis"), ("gauss-6", "axis"),
+    ("gauss-2", "attitude"),  # nine components: the widest state that the loop adds up
+], ids="-".join)  # fmt: skip
 def test_a_kernel_takes_at_most_a_quarter_more_than_its_twin(key):
     kernel, steps = kernels.kernel(key), 8000
     other = twin.Twin(kernel)
