@@ -12,19 +12,15 @@ from symtop.core.parallel import VARIABLES, OneThreadEach, StoppedError, heed, i
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
-def test_results_come_in_the_order_of_the_pieces(threads):
+def test_results_come_in_the_order_of_the_pieces_and_one_thread_is_the_callers(threads):
     def work(piece):
         time.sleep(0.001 * (7 - piece % 7))
         return piece * piece
 
     assert list(in_threads(work, range(30), threads)) == [k * k for k in range(30)]
     assert list(in_threads(work, [], threads)) == []
-
-
-def test_one_thread_is_the_callers_and_several_are_not():
-    who = lambda _: threading.current_thread() is threading.main_thread()
-    assert list(in_threads(who, range(3), 1)) == [True] * 3
-    assert list(in_threads(who, range(3), 2)) == [False] * 3
+    callers = lambda _: threading.current_thread() is threading.main_thread()
+    assert list(in_threads(callers, range(3), threads)) == [threads == 1] * 3
 
 
 @pytest.mark.parametrize("threads", [1, 2])

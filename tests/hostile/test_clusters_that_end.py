@@ -52,13 +52,8 @@ class Cluster:
 
 
 @pytest.fixture
-def log(tmp_path):
-    return tmp_path / "log"
-
-
-@pytest.fixture
-def cluster(log, processes_with_dask):
-    with contextlib.closing(Cluster(log)) as started:
+def cluster(tmp_path, processes_with_dask):
+    with contextlib.closing(Cluster(tmp_path / "log")) as started:
         yield started
 
 
@@ -91,14 +86,14 @@ def here(results):
     return out
 
 
-def test_a_worker_that_dies_costs_nothing(cluster, log, tmp_path):
+def test_a_worker_that_dies_costs_nothing(cluster, tmp_path):
     code, out, err, seconds = after(cluster, tmp_path / "r", cluster.workers[0].kill)
     print(f"a worker: {code} after {seconds:.1f} s, {err!r}")
     assert code == 0, err
     before = computed(tmp_path / "r")
     assert len(before) == 12
     assert seconds < SECONDS
-    count, calls = int(re.search(r"(\d+) of 12 cases computed", out)[1]), len(log.read_text().split())
+    count, calls = int(re.search(r"(\d+) of 12 cases computed", out)[1]), len((tmp_path / "log").read_text().split())
     # one at most is made twice, which the killed worker was computing, or found, which it had written and not told of
     assert calls >= 12
     assert 0 <= calls - count <= 1
@@ -111,8 +106,8 @@ def test_a_worker_that_dies_costs_nothing(cluster, log, tmp_path):
 
 @pytest.mark.parametrize("how", ["killed", "stopped", "without workers"])
 @pytest.mark.parametrize("what", ["study", "ensemble"])
-def test_a_cluster_that_is_gone_before_is_one_sentence(log, tmp_path, what, how):
-    with contextlib.closing(Cluster(log, workers=0)) as cluster:
+def test_a_cluster_that_is_gone_before_is_one_sentence(tmp_path, what, how):
+    with contextlib.closing(Cluster(tmp_path / "log", workers=0)) as cluster:
         if how != "without workers":
             cluster.scheduler.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
         words = ["study", PROBE, "--results", tmp_path / "r"]

@@ -33,8 +33,7 @@ from symtop.methods.splitting import composition
 from symtop.model import charts
 from symtop.model.scenes import body_scenes, scene
 from symtop.run.simulation import integrate
-from tests import commands
-from tests.commands import answer, call
+from tests.commands import answer, call, ended, symtop as command
 from tests.conftest import random_scenes
 from tests.judging.blind import right
 from tests.judging.blind.right import euler, implicit_euler
@@ -503,17 +502,13 @@ for solver in (nothing, leaves, crashes):
 """
 
 
-def claims(plugin, *names):
-    """Code, output and errors of `symtop claims`, which would end this process too if it called the plug-in there."""
-    return commands.ended(commands.symtop("claims", *names, "--plugin", plugin, "--quick"))
-
-
 @pytest.mark.slow
 def test_a_plug_in_that_fails_is_told_of(tmp_path):
     (tmp_path / "plugin.py").write_text(PLUGIN)
     expected = {"nothing": "must return a Run", "leaves": "ended with code 0", "crashes": "was ended by SIGSEGV"}
     names = [f"{name}-at-once" for name in expected]
-    code, out, _ = claims(tmp_path / "plugin.py", *names)
+    # in another process, which this one would end with if it called the plug-in
+    code, out, _ = ended(command("claims", *names, "--plugin", tmp_path / "plugin.py", "--quick"))
     assert code == 1
     for name, words in zip(names, expected.values(), strict=True):
         own = [line for line in out.splitlines() if line.startswith(f"{name}, ")]
@@ -522,7 +517,7 @@ def test_a_plug_in_that_fails_is_told_of(tmp_path):
 
 def test_a_plug_in_that_ends_its_process_when_it_is_loaded_is_told_of(tmp_path):
     (tmp_path / "plugin.py").write_text("import os\nos._exit(0)\n")
-    code, _, err = claims(tmp_path / "plugin.py")
+    code, _, err = ended(command("claims", "--plugin", tmp_path / "plugin.py", "--quick"))
     assert code == 2
     assert "plugin plugin.py cannot be loaded: its process ended with code 0" in err
 
@@ -593,7 +588,6 @@ def test_memory_that_grows_with_the_steps_is_seen():
 def test_a_step_that_blows_up_has_the_time_of_its_finite_steps():
     """A run that stops at infinity is over at once, however many steps it was asked for."""
     grows = lambda f, t, y, h: 2.0 * y + h * f(t, y)
-    euler = lambda f, t, y, h: y + h * f(t, y)
     seconds = [seconds_a_step(PythonStep(step, "axis"), SPHEROID) for step in (grows, euler)]
     assert 0.1 < seconds[0] / seconds[1] < 10.0
 

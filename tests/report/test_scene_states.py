@@ -60,12 +60,9 @@ def test_thirty_digits_agree_with_four_independent_evaluations(truth, name):
 def distances(data, true, name):
     """How far the reference's axis and theta are from the test set's, with low halves where there are any (rad)."""
     cell = data.sel(scene=name)
-    axis = cell["axis"].values - true["axis"].values + cell["axis_lo"].values
-    theta = cell["theta"].values - true["theta"].values + cell["theta_lo"].values
-    if "theta_lo" in true:
-        theta = theta - true["theta_lo"].values
-    if "axis_lo" in true:
-        axis = axis - true["axis_lo"].values
+    low = lambda part: true[f"{part}_lo"].values if f"{part}_lo" in true else 0.0
+    axis, theta = (cell[part].values - true[part].values + cell[f"{part}_lo"].values - low(part)
+                   for part in ("axis", "theta"))  # fmt: skip
     return np.linalg.norm(axis, axis=-1), np.abs(theta)
 
 
@@ -113,12 +110,10 @@ KINDS = ("near-separatrix", "regular", "lagrange")
 @pytest.fixture(scope="module")
 def bodies(tmp_path_factory):
     """A test set of three problems over one natural period, and their scenes."""
-    patch = pytest.MonkeyPatch()
-    patch.setattr(test_set, "PERIODS", 1.0)
     scenes = [scenes_of(body_population(1, seed=3, kind=kind))[0] for kind in KINDS]
-    folder = test_set.write(tmp_path_factory.mktemp("set") / "bodies", scenes)
-    patch.undo()
-    return folder, scenes
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(test_set, "PERIODS", 1.0)
+        return test_set.write(tmp_path_factory.mktemp("set") / "bodies", scenes), scenes
 
 
 def checked(folder, mine, reference="states-17.csv"):
@@ -130,7 +125,7 @@ def checked(folder, mine, reference="states-17.csv"):
 
 
 def own_file(path, scenes, times, change=lambda body: body):
-    """States of `series-general` on the bodies, `change` made to each."""
+    """States of `dop853` on the bodies, `change` made to each."""
     lines = [",".join(("name", "time", *test_set.STATE))]
     for scene in scenes:
         other = symtop.Scene(scene.name, change(scene.top), scene.start, scene.horizon)
@@ -154,7 +149,6 @@ def test_the_reference_has_nothing_beyond_its_bounds_and_what_is_printed_is_what
     assert all(beyond == 0 and 0.0 < attitude < 2e-16 for attitude, _, beyond in rows.values())
     with pytest.raises(subprocess.CalledProcessError):
         checked(folder, folder / "problems.csv")
-    folder, scenes = bodies
     data, rows = (netcdf.read(folder / "states.nc"), rows_of(folder / "states-30.csv"))
     for scene, given in zip(scenes, rows_of(folder / "problems.csv"), strict=True):
         printed = [float(row["time"]) for row in rows if row["name"] == scene.name]
