@@ -173,12 +173,10 @@ def test_a_kernel_is_told_by_what_it_calls():
     assert kernel_of(part_of("\n\n# moved\ndef part(x):\n    # said\n    return 2.0 * x\n")) == plain
     assert kernel_of(part_of("def part(x):\n    'Documented.'\n    return 2.0 * x\n")) == plain
     assert kernel_of(part_of("def part(x):\n    return 3.0 * x\n")) != plain
-    assert kernel_of(part_of("K = 2.0\ndef part(x):\n    return K * x\n")) != kernel_of(
-        part_of("K = 3.0\ndef part(x):\n    return K * x\n")
-    )
-    assert kernel_of(part_of("def deep(x):\n    return x\ndef part(x):\n    return deep(x)\n")) != kernel_of(
-        part_of("def deep(x):\n    return -x\ndef part(x):\n    return deep(x)\n")
-    )
+    constant = "K = {}\ndef part(x):\n    return K * x\n"
+    assert kernel_of(part_of(constant.format(2.0))) != kernel_of(part_of(constant.format(3.0)))
+    deep = "def deep(x):\n    return {}x\ndef part(x):\n    return deep(x)\n"
+    assert kernel_of(part_of(deep.format(""))) != kernel_of(part_of(deep.format("-")))
 
 
 def test_what_numba_compiles_in_place_of_a_function_counts():

@@ -249,8 +249,7 @@ def test_honest_claims_are_confirmed(name):
 
 
 @pytest.mark.parametrize(("main", "other", "verdict"), [
-    (5.5, 4.0, "confirmed"), (5.5, 3.0, "refuted"), (3.0, 4.0, "refuted"), (4.0, 3.0, "refuted"),
-])  # fmt: skip
+    (5.5, 4.0, "confirmed"), (5.5, 3.0, "refuted"), (3.0, 4.0, "refuted"), (4.0, 3.0, "refuted")])  # fmt: skip
 def test_a_slope_that_is_too_large_yields_to_the_terms_of_a_step_and_a_lower_one_stands(main, other, verdict):
     terms = Series(1.0, np.array([0.0] * 5 + [1e-3]), np.full(6, 1e-14), True, "axis")  # of order 4
     fits = [Fit(slope, 0.01, 1.0, np.ones(1, dtype=bool)) for slope in (main, other)]
@@ -258,8 +257,7 @@ def test_a_slope_that_is_too_large_yields_to_the_terms_of_a_step_and_a_lower_one
 
 
 @pytest.mark.parametrize(("orders", "lower"), [
-    ([4, 4, 4, 4], (math.inf, math.nan)), ([4, 4, 2, 2.5], (2.5, 0.25)), ([2, 8, 4, 4], (2.0, 1.0)),
-])  # fmt: skip
+    ([4, 4, 4, 4], (math.inf, math.nan)), ([4, 4, 2, 2.5], (2.5, 0.25)), ([2, 8, 4, 4], (2.0, 1.0))])  # fmt: skip
 def test_an_order_that_is_lower_at_the_finest_steps_or_jumps_below_one_that_is_lower_is_seen(orders, lower):
     misses = 1e-4 * np.cumprod([1.0, *(0.5 ** (power + 1.0) for power in orders)])
     found = order._lower(0.5 ** np.arange(5.0), misses, 4, 0.3, 1e-13)

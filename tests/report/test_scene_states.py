@@ -12,6 +12,7 @@ import pytest
 
 import symtop
 from symtop.core import netcdf
+from symtop.core.numbers import context
 from symtop.model.body import Attitude, RigidBody
 from symtop.model.exact.body_digits import body_digits
 from symtop.report import archive, test_set
@@ -104,13 +105,11 @@ def test_every_scene_has_ten_times_and_the_dataset_the_numbers_of_the_text():
         assert all("units" in data[name].attrs and data[name].attrs["long_name"] for name in data.data_vars)
 
 
-KINDS = ("near-separatrix", "regular", "lagrange")
-
-
 @pytest.fixture(scope="module")
 def bodies(tmp_path_factory):
     """A test set of three problems over one natural period, and their scenes."""
-    scenes = [scenes_of(body_population(1, seed=3, kind=kind))[0] for kind in KINDS]
+    kinds = ("near-separatrix", "regular", "lagrange")
+    scenes = [scenes_of(body_population(1, seed=3, kind=kind))[0] for kind in kinds]
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(test_set, "PERIODS", 1.0)
         return test_set.write(tmp_path_factory.mktemp("set") / "bodies", scenes), scenes
@@ -197,11 +196,13 @@ def test_the_digits_are_those_of_other_ways(bodies):
     pytest.importorskip("heyoka")
     folder, scenes = bodies
     data, rows = (netcdf.read(folder / "states.nc"), rows_of(folder / "states-30.csv"))
+    mp = context(100)  # in which the product of two doubles is exact
     for scene in scenes:
         times = data["time"].sel(problem=scene.name).values
         own = [row for row in rows if row["name"] == scene.name]
         if scene.top.free:
-            true = PreciseBody(scene.top.moments, scene.start.quaternion, exact_momentum(scene))
+            momentum = [mp.mpf(a) * mp.mpf(b) for a, b in zip(scene.top.moments, scene.start.omega_body, strict=True)]
+            true = PreciseBody(scene.top.moments, scene.start.quaternion, momentum)
             for row, state in zip(own, true.states(times), strict=True):
                 q = [true.mp.mpf(row[name]) for name in ("qw", "qx", "qy", "qz")]
                 gap = min(true.mp.norm([a - s * b for a, b in zip(q, state[:4], strict=True)]) for s in (1, -1))
@@ -211,14 +212,6 @@ def test_the_digits_are_those_of_other_ways(bodies):
             high, low = (data[f"quaternion{end}"].sel(problem=scene.name).values for end in ("", "_lo"))
             gap = (high - truth["quaternion"].values) + (low - truth["quaternion_lo"].values)
             assert 2.0 * np.abs(gap).max() < float(truth["attitude_error_bound"].max()) < 1e-26
-
-
-def exact_momentum(scene):
-    """M as exact numbers: products of two doubles."""
-    from symtop.core.numbers import context
-
-    mp = context(100)
-    return [mp.mpf(a) * mp.mpf(b) for a, b in zip(scene.top.moments, scene.start.omega_body, strict=True)]
 
 
 def test_a_start_that_is_moved_by_a_rounding_is_another_motion(monkeypatch):

@@ -61,12 +61,7 @@ def bring(request, tmp_path, monkeypatch):
         script.write_text(ROUNDS)
     study = runner.load(str(script))
     read, load = [], store.load_case
-
-    def reading(path):
-        read.append(path)
-        return load(path)
-
-    monkeypatch.setattr(store, "load_case", reading)
+    monkeypatch.setattr(store, "load_case", lambda path: read.append(path) or load(path))
 
     def brought(folder="r"):
         read.clear()
