@@ -372,10 +372,7 @@ def test_a_cache_that_cannot_be_written_and_a_wrong_number_are_seen(tmp_path, mo
 
 
 def test_a_check_that_fails_is_a_finding_and_the_code_is_1(monkeypatch, tmp_path):
-    def trouble(results):
-        raise OSError("the tools are gone")
-
-    monkeypatch.setitem(doctor.CHECKS, "machine", trouble)
+    monkeypatch.setitem(doctor.CHECKS, "machine", Mock(side_effect=OSError("the tools are gone")))
     monkeypatch.setitem(doctor.CHECKS, "self-check", lambda _: [])
     result = call("doctor", "--results", tmp_path, code=1)
     assert "BAD  machine" in result.output

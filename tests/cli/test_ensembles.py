@@ -14,8 +14,6 @@ from symtop.core import netcdf
 from tests import commands
 
 STEPS = ("--per-nutation", 30, "--nutations", 2)
-
-
 call = functools.partial(commands.call, "ensemble")
 
 

@@ -8,7 +8,7 @@ import pytest
 from terminal import recorded
 
 import symtop
-from symtop.core import netcdf
+from symtop.core import netcdf, progress
 from symtop.measure.verdicts import ACCURATE
 from symtop.methods.framework.registry import split_name
 from symtop.run.guard import EXPECTED
@@ -17,13 +17,8 @@ from tests.commands import call
 AXIS_ONLY = """\
 import symtop
 
-rk4 = symtop.integrator("rk4").solvers["axis"]
-symtop.register(
-    symtop.Integrator(
-        name="on-the-axis", family="other", summary="rk4 on the axis alone", solvers={"axis": rk4}, order=4,
-        implementation="python",
-    )
-)
+options = {"solvers": {"axis": symtop.integrator("rk4").solvers["axis"]}, "order": 4, "implementation": "python"}
+symtop.register(symtop.Integrator("on-the-axis", "other", "rk4 on the axis alone", **options))
 top, start = symtop.SymmetricTop(1.5, 1.0, 3.0), symtop.Angles(theta=1.0, psi_dot=4.0)
 symtop.register_scene(symtop.Scene("of-a-user", top, start, horizon=6.0))
 """
@@ -84,8 +79,6 @@ def test_a_proposed_step_is_of_use_and_the_guard_warns_of_what_the_verdict_calls
 
 
 def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
-    from symtop.core import progress
-
     refreshes = []
     monkeypatch.setattr(progress, "BEAT", 0.01)
     monkeypatch.setattr(progress, "is_terminal", lambda _: True)

@@ -81,9 +81,7 @@ def test_a_wheel_brings_the_kernels_of_first_runs(tmp_path):
     environment["PYTHONPATH"] = str(site)
     assert str(site) in here(sys.executable, "-c", "import symtop; print(symtop.__file__)")
 
-    lines = re.findall(
-        r"^(?:\$ )?symtop ((?:run|compare|recommend|ensemble|long) .*?)(?: +#.*)?$", README, re.MULTILINE
-    )
+    lines = re.findall(r"(?m)^(?:\$ )?symtop ((?:run|compare|recommend|ensemble|long) .*?)(?: +#.*)?$", README)
     assert len(lines) == 5
     cache = tmp_path / "cache"
     for line in lines:

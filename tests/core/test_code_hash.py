@@ -19,8 +19,8 @@ import symtop
 from symtop.core import code_hash, files, jit
 from symtop.core.code_hash import Code, by_file, changes, digest, merged
 from symtop.run.plugins import execute
-from symtop.runner import fingerprint
-from tests.commands import printed_by
+from symtop.runner import fingerprint, run as runner
+from tests.commands import PROBE, printed_by
 
 SCRIPT = """
 import math
@@ -66,10 +66,7 @@ def test_words_do_not_count_and_numbers_do():
 
 
 def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again(clean_registry):
-    from symtop.runner.scripts import load
-    from tests.commands import PROBE
-
-    study, plain = load(str(PROBE)), symtop.integrator("midpoint")
+    study, plain = runner.load(str(PROBE)), symtop.integrator("midpoint")
     case = next(case for case in study.cases(True) if case.integrator == "midpoint")
     digests = []
     for order in range(2, 12):
@@ -176,17 +173,13 @@ def test_a_kernel_is_told_by_what_it_calls():
     assert kernel_of(part_of("\n\n# moved\ndef part(x):\n    # said\n    return 2.0 * x\n")) == plain
     assert kernel_of(part_of("def part(x):\n    'Documented.'\n    return 2.0 * x\n")) == plain
     assert kernel_of(part_of("def part(x):\n    return 3.0 * x\n")) != plain
-    assert kernel_of(part_of("K = 2.0\ndef part(x):\n    return K * x\n")) != kernel_of(
-        part_of("K = 3.0\ndef part(x):\n    return K * x\n")
-    )
-    assert kernel_of(part_of("def deep(x):\n    return x\ndef part(x):\n    return deep(x)\n")) != kernel_of(
-        part_of("def deep(x):\n    return -x\ndef part(x):\n    return deep(x)\n")
-    )
+    constant = "K = {}\ndef part(x):\n    return K * x\n"
+    assert kernel_of(part_of(constant.format(2.0))) != kernel_of(part_of(constant.format(3.0)))
+    deep = "def deep(x):\n    return {}x\ndef part(x):\n    return deep(x)\n"
+    assert kernel_of(part_of(deep.format(""))) != kernel_of(part_of(deep.format("-")))
 
 
 def test_what_numba_compiles_in_place_of_a_function_counts():
-    from symtop.core import jit
-
     labels = {part.label.rpartition(":")[2] for part in jit.code_of(jit.fused)}
     assert {"fused", "_fused", "_fma"} <= labels
     plain = {part.label.rpartition(":")[2] for part in Code().reached("kernel", jit.fused)}

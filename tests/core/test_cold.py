@@ -9,7 +9,6 @@ import pty
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -25,8 +24,8 @@ from symtop.core import jit
 from symtop.core.jit import compile_kernel
 from symtop.methods.framework import loop
 from symtop.methods.framework.loop import Loop
+from tests.commands import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 UNIQUE = time.time()  # a constant that no kernel on disk was compiled with
 SCRIPT = """
 import sys

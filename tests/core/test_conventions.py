@@ -61,17 +61,15 @@ def test_what_lacks_a_name_a_unit_or_a_title_is_found(run):
 
 def test_units_are_those_of_the_scene():
     scenes = {name: symtop.scene(name).units for name in symtop.scenes()}
-    for name in ("SI", ""):
-        scene = next(key for key, units in scenes.items() if units == name)
-        body = "check-case-2" if name == "SI" else "heavy-brick"
+    SI = {"time": "s", "energy": "kg m2 s-2", "p_phi": "kg m2 s-1", "theta": "rad"}
+    none = dict.fromkeys(SI, "1") | {"theta": "rad"}
+    for name, body, units in (("SI", "check-case-2", SI), ("", "heavy-brick", none)):
+        scene = next(key for key, own in scenes.items() if own == name)
         run = symtop.simulate(scene, "strang", step_size=0.001, horizon=0.01)
         for data in (run, symtop.reference(scene, [0.0, 1.0]), symtop.reference(body, [0.0, 1.0])):
-            assert data["time"].attrs["units"] == ("s" if name == "SI" else "1")
-            assert data["energy"].attrs["units"] == ("kg m2 s-2" if name == "SI" else "1")
-            assert data["p_phi"].attrs["units"] == ("kg m2 s-1" if name == "SI" else "1")
-            assert data["theta"].attrs["units"] == "rad"
+            assert {key: data[key].attrs["units"] for key in units} == units
         wrong = symtop.errors({"time": run["time"], "theta": run["theta"]}, scene)
-        assert wrong["time"].attrs["units"] == ("s" if name == "SI" else "1")
+        assert wrong["time"].attrs["units"] == units["time"]
     with pytest.raises(symtop.SymtopError, match="units"):
         dataclasses.replace(symtop.scene("spheroid"), units="imperial")
 

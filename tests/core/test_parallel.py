@@ -12,19 +12,15 @@ from symtop.core.parallel import VARIABLES, OneThreadEach, StoppedError, heed, i
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
-def test_results_come_in_the_order_of_the_pieces(threads):
+def test_results_come_in_the_order_of_the_pieces_and_one_thread_is_the_callers(threads):
     def work(piece):
         time.sleep(0.001 * (7 - piece % 7))
         return piece * piece
 
     assert list(in_threads(work, range(30), threads)) == [k * k for k in range(30)]
     assert list(in_threads(work, [], threads)) == []
-
-
-def test_one_thread_is_the_callers_and_several_are_not():
-    who = lambda _: threading.current_thread() is threading.main_thread()
-    assert list(in_threads(who, range(3), 1)) == [True] * 3
-    assert list(in_threads(who, range(3), 2)) == [False] * 3
+    callers = lambda _: threading.current_thread() is threading.main_thread()
+    assert list(in_threads(callers, range(3), threads)) == [threads == 1] * 3
 
 
 @pytest.mark.parametrize("threads", [1, 2])
@@ -44,13 +40,8 @@ def test_an_error_is_raised_and_what_has_not_begun_is_dropped(threads):
 def test_pieces_are_taken_as_they_are_needed():
     """Results that nobody has asked for would take memory."""
     order = []
-
-    def pieces():
-        for k in range(100):
-            order.append(k)
-            yield k
-
-    results = in_threads(lambda piece: piece, pieces(), 2)
+    pieces = (order.append(k) or k for k in range(100))
+    results = in_threads(lambda piece: piece, pieces, 2)
     assert next(results) == 0
     assert len(order) < 10
     assert list(results) == list(range(1, 100))

@@ -22,7 +22,6 @@ from tests.pages import LANGUAGES, ROOT, Block, blocks, pages
 pytestmark = pytest.mark.usefixtures("clean_registry")  # what a page adds goes with its test
 TARGETS = set(re.findall(r"^([a-z-]+):", (ROOT / "Makefile").read_text(encoding="utf-8"), re.MULTILINE))
 PAGES = {path.relative_to(ROOT).as_posix(): blocks(path.read_text(encoding="utf-8")) for path in pages()}
-SLOW = [page for page, found in PAGES.items() if any(block.slow for block in found)]
 OTHERS = {"pip": {"install"}, "dask": {"scheduler", "worker"}}  # programs of bash blocks that are not ours
 
 
@@ -95,15 +94,12 @@ def follow(page, slow, folder, monkeypatch):
         reader.follow(block)
 
 
-@pytest.mark.parametrize("page", [page for page, found in PAGES.items() if found])
-def test_a_page_runs(page, tmp_path, monkeypatch):
-    follow(page, False, tmp_path, monkeypatch)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("page", SLOW)
-def test_a_page_runs_whole(page, tmp_path, monkeypatch):
-    follow(page, True, tmp_path, monkeypatch)
+@pytest.mark.parametrize(("page", "slow"), [
+    *((page, False) for page, found in PAGES.items() if found),
+    *(pytest.param(page, True, marks=pytest.mark.slow) for page, found in PAGES.items() if any(b.slow for b in found)),
+])  # fmt: skip
+def test_a_page_runs(page, slow, tmp_path, monkeypatch):
+    follow(page, slow, tmp_path, monkeypatch)
 
 
 def test_a_page_that_is_wrong_fails(tmp_path, monkeypatch):

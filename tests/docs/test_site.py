@@ -164,6 +164,5 @@ def test_a_docstring_says_the_same_in_restructured_text():
     assert shown("literal") == ["code", "more"]
     assert shown("emphasis") == ["this"]
     assert shown("literal_block") == ["x_1 = |L| *a\n\ny"]
-    assert [" ".join(words.split()) for words in shown("paragraph")] == [
-        "Of |a x b|, u_.", "With code, more, a* b* and this:", "The end <h>.",
-    ]  # fmt: skip
+    paragraphs = [" ".join(words.split()) for words in shown("paragraph")]
+    assert paragraphs == ["Of |a x b|, u_.", "With code, more, a* b* and this:", "The end <h>."]

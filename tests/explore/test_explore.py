@@ -247,6 +247,7 @@ def test_exports_over_http_and_a_bad_port_is_refused(site, tmp_path):
 
 
 PLOT = "document.querySelector('#plot-{}').toDataURL()"
+STATUS = "document.querySelector('#status').textContent"
 
 
 def answered(browser, selector, value):
@@ -254,15 +255,14 @@ def answered(browser, selector, value):
     count = browser.evaluate("+(document.body.dataset.answers || 0)")
     browser.set(selector, value)
     browser.wait_for(f"+document.body.dataset.answers > {count}")
-    browser.wait_for("!document.querySelector('#status').textContent.includes('computing')")
+    browser.wait_for(f"!{STATUS}.includes('computing')")
 
 
 def test_a_person_can_use_it(explorer, tmp_path):
     browser = explorer()
     browser.wait_for("document.body.dataset.answers === '2'")  # the page asks twice as it opens
     browser.click("#play")
-    status = "document.querySelector('#status').textContent"
-    browser.wait_for(f"{status}.includes('midpoint: reached t = 8')")
+    browser.wait_for(f"{STATUS}.includes('midpoint: reached t = 8')")
     names = ("theta", "axis_error", "energy", "p_phi", "p_psi")
     before = {name: browser.evaluate(PLOT.format(name)) for name in names}
     assert len(set(before.values())) == len(names)
@@ -289,11 +289,11 @@ def test_a_person_can_use_it(explorer, tmp_path):
 
     answered(browser, "#step_size", 0.6)  # a failing run shows its sentence
     browser.wait_for("document.body.dataset.answer === 'left_chart'")
-    assert "theta left (0, pi)" in browser.evaluate(status)
+    assert "theta left (0, pi)" in browser.evaluate(STATUS)
     assert browser.evaluate("document.querySelector('#status').className") == "failed"
     browser.set("#I3", 30)  # and so does a top that cannot be
     browser.wait_for("document.body.dataset.answer === 'refused'")
-    assert "no rigid body" in browser.evaluate(status)
+    assert "no rigid body" in browser.evaluate(STATUS)
     assert browser.evaluate("document.querySelector('#netcdf').disabled")
     browser.click("#reset")  # back to the scene as it is in the catalogue
     browser.wait_for("document.body.dataset.answer === 'ok'")
@@ -303,7 +303,7 @@ def test_a_person_can_use_it(explorer, tmp_path):
 
     answered(browser, "#scene", "goldstein")
     answered(browser, "#integrator", "rk45")
-    browser.wait_for(f"{status}.startsWith('rk45: reached t = 70')")
+    browser.wait_for(f"{STATUS}.startsWith('rk45: reached t = 70')")
     assert browser.evaluate("document.querySelector('#step_size').offsetParent") is None
     assert browser.evaluate("document.querySelector('#tolerance').offsetParent !== null")
     assert browser.too_wide == 0
@@ -330,13 +330,12 @@ LABELS = """(() => {  // texts on a canvas as it is drawn again
 @pytest.mark.slow
 def test_an_answer_of_another_scene_or_method_than_the_pages_is_not_shown(explorer):
     browser = explorer("#base=tennis-racket&scene=tennis-racket&integrator=gauss-4&second=rk4")
-    status = "document.querySelector('#status').textContent"
-    browser.wait_for(f"{status}.startsWith('gauss-4: reached t = 100')")
+    browser.wait_for(f"{STATUS}.startsWith('gauss-4: reached t = 100')")
     browser.evaluate(SLOWLY)
-    browser.evaluate(f"window.said = []; setInterval(() => window.said.push({status}), 5)")
+    browser.evaluate(f"window.said = []; setInterval(() => window.said.push({STATUS}), 5)")
     browser.set("#scene", "spheroid")
     browser.set("#second", "")  # before the answer is there
-    browser.wait_for(f"{status}.startsWith('gauss-4: reached t = 8')")
+    browser.wait_for(f"{STATUS}.startsWith('gauss-4: reached t = 8')")
     assert not browser.evaluate("window.said.some((words) => words.includes('does not answer'))")
     now = browser.evaluate("document.querySelector('#now').textContent")
     browser.wait_for(f"document.querySelector('#now').textContent !== {now!r}", 5.0)  # the clock goes
@@ -347,10 +346,9 @@ def test_an_answer_of_another_scene_or_method_than_the_pages_is_not_shown(explor
 
 def test_the_page_counts_and_labels_what_can_be_told_apart(explorer):
     browser = explorer("#base=spheroid&scene=spheroid&integrator=strang&step_size=8")
-    status = "document.querySelector('#status').textContent"
-    browser.wait_for(f"{status}.includes('; 1 step, 0.15 a nutation, 1 force evaluation, ')")
+    browser.wait_for(f"{STATUS}.includes('; 1 step, 0.15 a nutation, 1 force evaluation, ')")
     answered(browser, "#step_size", 0.02)
-    browser.wait_for(f"{status}.includes('; 400 steps, 59 a nutation, 400 force evaluations, ')")
+    browser.wait_for(f"{STATUS}.includes('; 400 steps, 59 a nutation, 400 force evaluations, ')")
     for scene in ("spheroid", "steady-fast"):  # theta nods, and is the same to 1e-5 rad
         answered(browser, "#scene", scene)
         labels = browser.evaluate(LABELS)
@@ -425,9 +423,8 @@ def test_the_run_of_the_page_is_a_point_on_the_line_of_its_method():
 
 
 def test_a_line_that_cannot_be_measured_says_why(monkeypatch):
-    refused = Mock(side_effect=SymtopError("the scene is <odd>"))
     monkeypatch.setattr(cost, "_charts", {})
-    monkeypatch.setattr(cost, "compare", refused)
+    monkeypatch.setattr(cost, "compare", Mock(side_effect=SymtopError("the scene is <odd>")))
     assert {line["message"] for line in costs(theta=0.41)["lines"]} == {"the scene is <odd>"}
 
 

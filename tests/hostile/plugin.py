@@ -2,7 +2,6 @@
 
 import os
 import signal
-import sys
 import warnings
 
 import numpy as np
@@ -66,16 +65,6 @@ def changed(**fields):
         return run._replace(**{name: change(getattr(run, name)) for name, change in fields.items()})
 
     return solve
-
-
-def leaves_early(top, start, plan):
-    """Ends its process, as a plug-in might that was a script."""
-    sys.exit(0)
-
-
-def interrupts(top, start, plan):
-    """Raises what Ctrl-C raises."""
-    raise KeyboardInterrupt
 
 
 def changes_arguments(top, start, plan):
@@ -156,8 +145,8 @@ REFUSED = {
     "returns-plain-tuple": lambda top, start, plan: tuple(midpoint(top, start, plan)),
     "raises-value-error": raising(ValueError("one\ntwo")), "raises-memory-error": raising(MemoryError()),
     "raises-generator-exit": raising(GeneratorExit()), "raises-unprintable": raising(UnprintableError()),
-    "raises-base": raising(OwnBaseError("of its own")), "raises-system-exit": leaves_early,
-    "raises-interrupt": interrupts, "recurses": recurses, "takes-two": lambda top, start: None,
+    "raises-base": raising(OwnBaseError("of its own")), "raises-system-exit": raising(SystemExit(0)),
+    "raises-interrupt": raising(KeyboardInterrupt()), "recurses": recurses, "takes-two": lambda top, start: None,
     "changes-arguments": changes_arguments, "changes-and-raises": changes_and_raises,
 }  # fmt: skip  # each must end in one sentence and code 2
 TOLERATED = {

@@ -99,17 +99,10 @@ def _fast(draw, least, most):
     return top, Angles(draw.uniform(0.05, 3.0), *_turns(draw), psi_dot=spin)
 
 
-def _upright(draw):
-    top = _top(draw)
-    spin = _swing(top) * draw.uniform(0.5, 6.0) * top.I1 / top.I3
-    return top, Angles(10.0 ** draw.uniform(-3.0, -0.7), *_turns(draw), psi_dot=spin)
-
-
-def _sleeper(draw):
-    """Let go almost upright, mostly below the spin from which the top sleeps."""
-    top = _top(draw, weight=10.0 ** draw.uniform(-1.0, 1.2))
-    spin = 2.0 * _swing(top) * draw.uniform(0.1, 1.1) * top.I1 / top.I3
-    return top, Angles(10.0 ** draw.uniform(-8.0, -2.0), *_turns(draw), psi_dot=spin)
+def _beside_pole(draw, top, spins, decades, pole=0.0):
+    """Let go beside a pole; a top of positive weight sleeps upright from a spin of 2 on."""
+    spin, tilt = _swing(top) * draw.uniform(*spins) * top.I1 / top.I3, 10.0 ** draw.uniform(*decades)
+    return top, Angles(abs(pole - tilt), *_turns(draw), psi_dot=spin)
 
 
 def _through_upright(draw, spin, energy):
@@ -137,13 +130,6 @@ def _aimed(draw):
     return top, Angles(theta, *_turns(draw), rate, turn, spin - turn * math.cos(theta))
 
 
-def _hanging(draw):
-    """Let go beside theta = pi, where a top of positive weight hangs and one of negative weight stands."""
-    top = _top(draw)
-    spin = _swing(top) * draw.uniform(0.0, 6.0) * top.I1 / top.I3
-    return top, Angles(math.pi - 10.0 ** draw.uniform(-9.0, -1.0), *_turns(draw), psi_dot=spin)
-
-
 def _steady(draw):
     top = _top(draw, weight=10.0 ** draw.uniform(-1.0, 1.2))
     theta, spin = draw.uniform(0.2, 1.4), _swing(top) * draw.uniform(3.0, 20.0) * top.I1 / top.I3
@@ -169,10 +155,14 @@ KINDS = {
     "weightless": lambda draw: _any_start(draw, _top(draw, weight=10.0 ** draw.uniform(-12.0, -3.0))),
     "heavy": lambda draw: _any_start(draw, _top(draw, weight=10.0 ** draw.uniform(2.0, 6.0))),
     "units": lambda draw: _scaled(draw, 9.0), "fast": lambda draw: _fast(draw, 0.0, 1.7),
-    "very-fast": lambda draw: _fast(draw, 2.0, 6.0), "upright": _upright, "sleeper": _sleeper,
+    "very-fast": lambda draw: _fast(draw, 2.0, 6.0),
+    "upright": lambda draw: _beside_pole(draw, _top(draw), (0.5, 6.0), (-3.0, -0.7)),
+    "sleeper": lambda draw: _beside_pole(  # mostly below the spin from which it sleeps
+        draw, _top(draw, weight=10.0 ** draw.uniform(-1.0, 1.2)), (0.2, 2.2), (-8.0, -2.0)),
     "separatrix": lambda draw: _through_upright(draw, draw.uniform(0.0, 0.99), _excess(draw, -1.0)),
-    "pendulum": lambda draw: _through_upright(draw, 0.0, _excess(draw, 0.0)), "aimed": _aimed, "hanging": _hanging,
-    "steady": _steady,
+    "pendulum": lambda draw: _through_upright(draw, 0.0, _excess(draw, 0.0)), "aimed": _aimed,
+    # at theta = pi a top of positive weight hangs, and one of negative weight stands
+    "hanging": lambda draw: _beside_pole(draw, _top(draw), (0.0, 6.0), (-9.0, -1.0), math.pi), "steady": _steady,
 }  # fmt: skip
 
 
@@ -186,9 +176,8 @@ def _at_pole(draw):
 HOSTILE = {  # drawn from by seeds below zero
     "near-sphere": lambda draw: _any_start(draw, _top(draw, 1.0 + _excess(draw, -1.0))),
     "flat-or-thin": lambda draw: _any_start(draw, _top(draw, draw.choice([10.0 ** draw.uniform(-3.0, 0.0), 1.999]))),
-    "scaled": lambda draw: _scaled(draw, 12.0),
-    "at-pole": _at_pole,
-}
+    "scaled": lambda draw: _scaled(draw, 12.0), "at-pole": _at_pole,
+}  # fmt: skip
 
 
 def draw_run(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outcome:

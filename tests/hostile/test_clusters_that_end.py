@@ -45,23 +45,16 @@ class Cluster:
                 return match[1]
         raise AssertionError("it ended")
 
-    def end(self):
+    def close(self):
         for process in self.started:
             process.kill()
             process.communicate()
 
 
 @pytest.fixture
-def log(tmp_path):
-    return tmp_path / "log"
-
-
-@pytest.fixture
-def cluster(log, processes_with_dask):
-    with contextlib.ExitStack() as stack:
-        cluster_ = Cluster(log)
-        stack.callback(cluster_.end)
-        yield cluster_
+def cluster(tmp_path, processes_with_dask):
+    with contextlib.closing(Cluster(tmp_path / "log")) as started:
+        yield started
 
 
 def computed(results):
@@ -69,7 +62,7 @@ def computed(results):
     return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in results.rglob("cases/*/*.npz")}
 
 
-def after(cluster, log, results, happens):
+def after(cluster, results, happens):
     """How a study's command ends to whose cluster something happens midway, and how many seconds later."""
     process = symtop("study", PROBE, "--results", results, "--scheduler", cluster.address)
     try:
@@ -86,36 +79,35 @@ def after(cluster, log, results, happens):
         stop(process)
 
 
-def assert_nothing_is_lost(log, results, before):
-    """The same command without a cluster computes the rest, and nothing again."""
+def here(results):
+    """What the command prints without a cluster."""
     code, out, err = ended(symtop("study", PROBE, "--results", results, "--jobs", 1))
     assert code == 0, err
-    assert f"{12 - len(before)} of 12 cases computed" in out
-    assert before.items() <= computed(results).items()
-    assert not leftovers(results)
+    return out
 
 
-def test_a_worker_that_dies_costs_nothing(cluster, log, tmp_path):
-    code, out, err, seconds = after(cluster, log, tmp_path / "r", cluster.workers[0].kill)
+def test_a_worker_that_dies_costs_nothing(cluster, tmp_path):
+    code, out, err, seconds = after(cluster, tmp_path / "r", cluster.workers[0].kill)
     print(f"a worker: {code} after {seconds:.1f} s, {err!r}")
     assert code == 0, err
-    assert len(computed(tmp_path / "r")) == 12
+    before = computed(tmp_path / "r")
+    assert len(before) == 12
     assert seconds < SECONDS
-    count, calls = int(re.search(r"(\d+) of 12 cases computed", out)[1]), len(log.read_text().split())
+    count, calls = int(re.search(r"(\d+) of 12 cases computed", out)[1]), len((tmp_path / "log").read_text().split())
     # one at most is made twice, which the killed worker was computing, or found, which it had written and not told of
     assert calls >= 12
     assert 0 <= calls - count <= 1
-    code, _, err = ended(symtop("study", PROBE, "--results", tmp_path / "here", "--jobs", 1))
-    assert code == 0, err
+    here(tmp_path / "here")
     same(tmp_path / "here", tmp_path / "r")
-    assert_nothing_is_lost(log, tmp_path / "r", computed(tmp_path / "r"))
+    assert "0 of 12 cases computed" in here(tmp_path / "r")
+    assert before.items() <= computed(tmp_path / "r").items()
+    assert not leftovers(tmp_path / "r")
 
 
 @pytest.mark.parametrize("how", ["killed", "stopped", "without workers"])
 @pytest.mark.parametrize("what", ["study", "ensemble"])
-def test_a_cluster_that_is_gone_before_is_one_sentence(log, tmp_path, what, how):
-    cluster = Cluster(log, workers=0)
-    try:
+def test_a_cluster_that_is_gone_before_is_one_sentence(tmp_path, what, how):
+    with contextlib.closing(Cluster(tmp_path / "log", workers=0)) as cluster:
         if how != "without workers":
             cluster.scheduler.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
         words = ["study", PROBE, "--results", tmp_path / "r"]
@@ -124,8 +116,6 @@ def test_a_cluster_that_is_gone_before_is_one_sentence(log, tmp_path, what, how)
         began = time.monotonic()
         code, _, err = ended(symtop(*words, "--scheduler", cluster.address), 300.0)
         seconds = time.monotonic() - began
-    finally:
-        cluster.end()
     print(f"{what}, {how}: {code} after {seconds:.1f} s, {err!r}")
     assert code == 2
     assert "scheduler must be the address of a dask scheduler that answers and has workers" in err

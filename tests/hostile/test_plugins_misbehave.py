@@ -91,9 +91,8 @@ def step(par, rule, state, carry, h):
 
 loop = symtop.kernel_loop(lambda par, rule, state, h: (0.0,), step, lambda par, rule, before, dstate, h: (0.0, 0.0))
 solver = symtop.FixedStep(loop, (0.0,), symtop.on_angles, 1, implicit=False)
-symtop.register(
-    symtop.Integrator(name="own-kernel", family="other", summary="", solvers={{"angles": solver}}), replace=True
-)
+method = symtop.Integrator(name="own-kernel", family="other", summary="", solvers={{"angles": solver}})
+symtop.register(method, replace=True)
 """
 
 
@@ -123,8 +122,8 @@ def test_a_kernel_that_does_not_compile_or_returns_no_outcome_is_one_sentence(re
 
 @pytest.mark.parametrize("count", [math.nan, math.inf, 1e30])
 def test_a_number_of_steps_that_is_none_is_refused(count, misbehaving):
-    solve = lambda top, start, plan: misbehaving.midpoint(top, start, plan)._replace(steps=count)
-    counted = symtop.Integrator(name="counted", family="other", summary="", solvers={"angles": solve})
+    solver = misbehaving.changed(steps=lambda _: count)
+    counted = symtop.Integrator(name="counted", family="other", summary="", solvers={"angles": solver})
     with pytest.raises(symtop.SymtopError, match="must return a finite number of steps, not"):
         symtop.simulate("spheroid", counted, step_size=0.01, horizon=0.5, guard=False)
     with pytest.raises(symtop.SymtopError, match="must return a finite number of steps, not"):
@@ -132,11 +131,8 @@ def test_a_number_of_steps_that_is_none_is_refused(count, misbehaving):
 
 
 def test_counts_of_numpy_are_numbers_in_a_dataset(misbehaving):
-    def solve(top, start, plan):
-        run = misbehaving.midpoint(top, start, plan)
-        return run._replace(steps=plan.marks[-1], force_evaluations=2 * plan.marks[-1], reached=np.float32(0.5))
-
-    counted = symtop.Integrator(name="counted", family="other", summary="", solvers={"angles": solve})
+    solver = misbehaving.changed(steps=np.int64, force_evaluations=lambda _: np.int64(100), reached=np.float32)
+    counted = symtop.Integrator(name="counted", family="other", summary="", solvers={"angles": solver})
     run = symtop.simulate("spheroid", counted, step_size=0.01, horizon=0.5, guard=False)
     counts = [run.attrs[name] for name in ("steps", "force_evaluations", "reached_time")]
     assert counts == [50, 100, 0.5]

@@ -51,9 +51,7 @@ def test_a_python_step_makes_the_steps_of_the_tableau_that_it_is(chart):
 
 
 def test_a_scipy_class_makes_the_steps_that_it_is_told_to():
-    class Mine(RK23):
-        pass
-
+    Mine = type("Mine", (RK23,), {})
     run = run_of(open_target(Mine, None, "axis"))
     assert run.attrs["steps"] == 200
     assert run.attrs["force_evaluations"] == pytest.approx(600, abs=5)  # it has one in hand at each end
@@ -154,6 +152,16 @@ def test_a_slow_program_has_the_time_that_earlier_runs_took_also_after_a_short_o
         fresh.march(SPHEROID.top, None, np.full(6, 5.0), 0.1, np.array([0, 200]))
 
 
+def hangs(f, t, y, h):
+    while True:
+        time.sleep(0.01)
+
+
+@pytest.fixture
+def impatient(monkeypatch):
+    monkeypatch.setattr("symtop.judging.adapters.adapter.QUICK_PATIENCE", 0.5)
+
+
 @pytest.mark.parametrize(("target", "options", "words"), [
     ("nothing.py:step", {}, "FILE.py:NAME with a file that is there"),
     ("no-such-program-anywhere -x", {"form": "program"}, "must be a command that can be run"),
@@ -164,8 +172,17 @@ def test_a_slow_program_has_the_time_that_earlier_runs_took_also_after_a_short_o
     (lambda y, h: y, {}, r"must take \(f, t, y, h\), not \(y, h\)"),
     (midpoint, {"adaptive": True}, "need a class derived from OdeSolver"),
     (dict, {}, "must be derived from scipy.integrate.OdeSolver, not dict"),
+    (hangs, {}, r"a step of h = \d.* had not returned after \d+ s"),
+    (lambda f, t, y, h: os.kill(os.getpid(), signal.SIGSEGV), {}, "its process was ended by SIGSEGV in a step of h = "),
+    (lambda f, t, y, h: 1 / 0, {}, r"a step of h = .* raises ZeroDivisionError: division by zero"),
+    (lambda f, t, y, h: sys.exit("so"), {}, r"a step of h = .* raises SystemExit: so"),
+    (lambda f, t, y, h: y.fill(0.0), {}, "step must return the new state, 6 real numbers, not None"),
+    (lambda f, t, y, h: y[:3], {}, r"6 real numbers, not ndarray of shape \(3,\)"),
+    (lambda f, t, y, h: (y, h), {}, "step must return the new state, 6 real numbers, not tuple$"),
+    (lambda f, t, y, h: (y, y), {}, r"6 real numbers, not tuple of shape \(2, 6\)"),
+    (lambda f, t, y, h: y * 1j, {}, "6 real numbers, not ndarray .* complex128"),
 ])  # fmt: skip
-def test_what_cannot_be_judged_is_refused_in_one_sentence(target, options, words):
+def test_what_cannot_be_judged_is_refused_in_one_sentence(target, options, words, impatient):
     with pytest.raises(symtop.SymtopError, match=words):
         symtop.judge(target, quick=True, **options)
 
@@ -181,25 +198,6 @@ def test_a_file_beside_others_one_that_fails_and_a_name_that_is_not_there(tmp_pa
     with pytest.raises(symtop.SymtopError, match=r"the file mine\.py failed: ModuleNotFoundError"):
         open_target(str(file), None, "axis")
     assert label_of("./my engine (new)") == "my-engine-new"
-
-
-def hangs(f, t, y, h):
-    while True:
-        time.sleep(0.01)
-
-
-def hangs_backwards(f, t, y, h):
-    while h < 0:
-        time.sleep(0.01)
-    return midpoint(f, t, y, h)
-
-
-def crashes(f, t, y, h):
-    os.kill(os.getpid(), signal.SIGSEGV)
-
-
-def raises(f, t, y, h):
-    raise RuntimeError("no luck")
 
 
 @pytest.mark.parametrize("claimed", [1000, *(pytest.param(claim, marks=pytest.mark.slow) for claim in (3, 10))])
@@ -310,10 +308,7 @@ def test_an_axis_that_stays_upright_is_refused_in_a_sentence_and_one_that_hangs_
 def test_a_motion_that_is_wrong_is_told_so_whatever_is_claimed(claimed, only):
     only("order")
     for factor, wrong in ((0.999, 2e-3), (0.0, None)):  # the second stands still
-
-        def slow(f, t, y, h, factor=factor):
-            return midpoint(f, t, y, factor * h)
-
+        slow = lambda f, t, y, h, factor=factor: midpoint(f, t, y, factor * h)
         finding = symtop.judge(slow, order=claimed, quick=True)["order"]
         assert finding.measured.kind == "wrong limit"
         assert wrong is None or finding.value == pytest.approx(wrong, rel=0.2)
@@ -328,27 +323,6 @@ def test_a_step_that_returns_nan_or_the_derivative_is_told_so(only):
         assert not ledger["order"].measured
         assert "nothing could be measured" in str(ledger)
     assert symtop.judge(midpoint, quick=True)["calls"].verdict == "measured"
-
-
-@pytest.fixture
-def impatient(monkeypatch):
-    monkeypatch.setattr("symtop.judging.adapters.adapter.QUICK_PATIENCE", 0.5)
-
-
-@pytest.mark.parametrize(("step", "words"), [
-    (hangs, r"a step of h = \d.* had not returned after \d+ s"),
-    (crashes, r"its process was ended by SIGSEGV in a step of h = "),
-    (raises, r"a step of h = .* raises RuntimeError: no luck"),
-    (lambda f, t, y, h: sys.exit("so"), r"a step of h = .* raises SystemExit: so"),
-    (lambda f, t, y, h: y.fill(0.0), "step must return the new state, 6 real numbers, not None"),
-    (lambda f, t, y, h: y[:3], r"6 real numbers, not ndarray of shape \(3,\)"),
-    (lambda f, t, y, h: (y, h), "step must return the new state, 6 real numbers, not tuple$"),
-    (lambda f, t, y, h: (y, y), r"6 real numbers, not tuple of shape \(2, 6\)"),
-    (lambda f, t, y, h: y * 1j, "6 real numbers, not ndarray .* complex128"),
-])  # fmt: skip
-def test_a_step_that_never_works_cannot_be_judged(step, words, impatient):
-    with pytest.raises(symtop.SymtopError, match=words):
-        symtop.judge(step, quick=True)
 
 
 @pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not count what waits")
@@ -375,7 +349,8 @@ def test_waiting_for_a_processor_takes_none_of_the_time_that_judging_has():
 @pytest.mark.slow
 def test_a_step_that_hangs_backwards_is_judged_forwards(impatient, only):
     only("calls", "order", "symplectic")
-    ledger = symtop.judge(hangs_backwards, quick=True, order=2)
+    backwards = lambda f, t, y, h: (hangs if h < 0 else midpoint)(f, t, y, h)
+    ledger = symtop.judge(backwards, quick=True, order=2)
     assert (ledger["calls"].measured.kind, ledger["order"].verdict) == ("forward only", "confirmed")
     assert "a step of -h did not return" in ledger["calls"].why
     assert ledger["symplectic"].measured.kind == "no"
@@ -509,12 +484,10 @@ def test_a_step_of_rotation_matrices_is_judged_as_one_of_quaternions_until_it_is
 def test_the_process_of_a_method_ends_with_a_judge_that_is_killed():
     """kill -9 leaves no process behind that waits for it; before the kill it does wait."""
     code = (
-        "import time\n"
-        "from symtop.judging.remote import Process\n"
-        "first, second = Process(lambda: {'ping': lambda: 1}), Process(lambda: {'ping': lambda: 1})\n"
+        "import time\nfrom symtop.judging.remote import Process\n"
+        "first, second = (Process(lambda: {'ping': lambda: 1}) for _ in range(2))\n"
         "first.call('ping'), second.call('ping')\n"
-        "print(first.process.pid, second.process.pid, flush=True)\n"
-        "time.sleep(600)\n"
+        "print(first.process.pid, second.process.pid, flush=True)\ntime.sleep(600)\n"
     )
     judge = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
     waiting = [int(pid) for pid in judge.stdout.readline().split()]

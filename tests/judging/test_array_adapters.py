@@ -14,6 +14,7 @@ from symtop.judging.adapters.external import field_of
 from symtop.judging.claims.subject import open_target
 from symtop.methods.framework.equations import FORMULATIONS
 from tests.commands import ROOT, ended, printed_by, symtop as command
+from tests.judging.blind.right import midpoint
 
 EXAMPLES = ROOT / "studies" / "examples"
 SPHEROID = symtop.scene("spheroid")
@@ -69,8 +70,6 @@ def first_row(f, t, y, h):
 def raises(f, t, y, h):
     return y + h * f(t, y) @ y
 """
-
-
 FORMS = [pytest.param(name, marks=needs(name)) for name in ("torch", "jax")]
 
 
@@ -109,15 +108,11 @@ def test_what_does_not_fit_is_told_so(tmp_path, form):
         assert REFUSED[name] in output
 
 
-def heun(f, t, y, h):
-    return y + h * f(t, y)
-
-
 @pytest.mark.parametrize("form", ["torch", "jax"])
 def test_what_is_not_installed_is_named_and_the_angles_are_refused(form):
     if importlib.util.find_spec(form) is None:
         with pytest.raises(symtop.SymtopError, match=f"form {form} needs the package {form}, which is not installed"):
-            open_target(heun, form, "axis")
+            open_target(midpoint, form, "axis")
     else:
         with pytest.raises(symtop.SymtopError, match=f"must be axis or attitude for the form {form}, not 'angles'"):
-            open_target(heun, form, "angles")
+            open_target(midpoint, form, "angles")

@@ -22,7 +22,7 @@ from symtop.judging.claims import constants, constants as long, order, structure
 from symtop.judging.claims.constants import long_run
 from symtop.judging.claims.step_series import Series
 from symtop.judging.claims.subject import Subject, seconds_a_step
-from symtop.judging.findings import VERDICTS, Finding, Ledger, Measured, description, pace
+from symtop.judging.findings import VERDICTS, Finding, Measured, description, pace
 from symtop.judging.remote import Process, separated, solvers_of
 from symtop.measure.conservation import Changed, behaviour
 from symtop.measure.order import Fit
@@ -33,8 +33,7 @@ from symtop.methods.splitting import composition
 from symtop.model import charts
 from symtop.model.scenes import body_scenes, scene
 from symtop.run.simulation import integrate
-from tests import commands
-from tests.commands import answer, call
+from tests.commands import answer, call, ended, symtop as command
 from tests.conftest import random_scenes
 from tests.judging.blind import right
 from tests.judging.blind.right import euler, implicit_euler
@@ -250,8 +249,7 @@ def test_honest_claims_are_confirmed(name):
 
 
 @pytest.mark.parametrize(("main", "other", "verdict"), [
-    (5.5, 4.0, "confirmed"), (5.5, 3.0, "refuted"), (3.0, 4.0, "refuted"), (4.0, 3.0, "refuted"),
-])  # fmt: skip
+    (5.5, 4.0, "confirmed"), (5.5, 3.0, "refuted"), (3.0, 4.0, "refuted"), (4.0, 3.0, "refuted")])  # fmt: skip
 def test_a_slope_that_is_too_large_yields_to_the_terms_of_a_step_and_a_lower_one_stands(main, other, verdict):
     terms = Series(1.0, np.array([0.0] * 5 + [1e-3]), np.full(6, 1e-14), True, "axis")  # of order 4
     fits = [Fit(slope, 0.01, 1.0, np.ones(1, dtype=bool)) for slope in (main, other)]
@@ -259,8 +257,7 @@ def test_a_slope_that_is_too_large_yields_to_the_terms_of_a_step_and_a_lower_one
 
 
 @pytest.mark.parametrize(("orders", "lower"), [
-    ([4, 4, 4, 4], (math.inf, math.nan)), ([4, 4, 2, 2.5], (2.5, 0.25)), ([2, 8, 4, 4], (2.0, 1.0)),
-])  # fmt: skip
+    ([4, 4, 4, 4], (math.inf, math.nan)), ([4, 4, 2, 2.5], (2.5, 0.25)), ([2, 8, 4, 4], (2.0, 1.0))])  # fmt: skip
 def test_an_order_that_is_lower_at_the_finest_steps_or_jumps_below_one_that_is_lower_is_seen(orders, lower):
     misses = 1e-4 * np.cumprod([1.0, *(0.5 ** (power + 1.0) for power in orders)])
     found = order._lower(0.5 ** np.arange(5.0), misses, 4, 0.3, 1e-13)
@@ -393,18 +390,13 @@ def test_a_time_has_the_unit_that_suits_what_is_printed_and_a_least_order_is_sai
 FREE, HEAVY = (body_scenes()[name] for name in ("check-case-2", "heavy-brick"))
 
 
-def ledger_of(method: Integrator, scene: symtop.Scene) -> Ledger:
-    """What the battery finds, quickly."""
-    return judge(method, scene, quick=True)
-
-
 @pytest.mark.parametrize(("name", "energy", "momentum"), [
     ("strang", "bounded", "kept"), ("commutator-free-4", "drift", "kept"), ("gauss-4", "kept", "bounded"),
     ("lammps-rigid", "drift", "kept"),
 ])  # fmt: skip
 def test_what_methods_claim_on_a_body_holds(name: str, energy: str, momentum: str) -> None:
     for free_or_heavy in (FREE, HEAVY):
-        ledger = ledger_of(symtop.integrator(name), free_or_heavy)
+        ledger = judge(symtop.integrator(name), free_or_heavy, quick=True)
         assert ledger.refuted == []
         assert ledger["order"].verdict == "confirmed"
         assert (ledger["energy"].measured.kind, ledger["momentum"].measured.kind) == (energy, momentum)
@@ -413,10 +405,11 @@ def test_what_methods_claim_on_a_body_holds(name: str, energy: str, momentum: st
 def test_false_claims_on_a_body_are_refuted() -> None:
     rk4 = symtop.integrator("rk4")
     lie = dataclasses.replace(rk4, name="lie", family="splitting", order=3, symplectic=True)
-    assert ledger_of(lie, FREE).refuted == ["energy", "momentum"]  # order 4 where 3 is claimed is no false claim
-    assert ledger_of(dataclasses.replace(rk4, name="higher", order=5), HEAVY).refuted == ["order"]
-    assert ledger_of(symtop.integrator("no-gyro"), FREE)["order"].measured.kind == "wrong limit"
-    assert ledger_of(symtop.integrator("stormer-verlet"), FREE)["energy"].verdict == "undecided"
+    higher = dataclasses.replace(rk4, name="higher", order=5)
+    assert judge(lie, FREE, quick=True).refuted == ["energy", "momentum"]  # order 4 where 3 is claimed is no false one
+    assert judge(higher, HEAVY, quick=True).refuted == ["order"]
+    assert judge(symtop.integrator("no-gyro"), FREE, quick=True)["order"].measured.kind == "wrong limit"
+    assert judge(symtop.integrator("stormer-verlet"), FREE, quick=True)["energy"].verdict == "undecided"
 
 
 def rotation_swapped(q: Any, w: Any, h: float, inertia: Any, torque: Any) -> Any:
@@ -486,15 +479,12 @@ def test_a_right_step_is_not_refuted_where_a_body_turns_over(only: Callable[...,
     assert ledger["energy"].measured.kind in ("growing", "drift")  # the length of its runs follows from its speed
 
 
-def seeing(below):
-    few, many = (symtop.integrator(name).solvers["axis"] for name in ("rk4", "gauss-4"))
-    solver = lambda top, start, plan: (few if plan.marks[-1] < below else many)(top, start, plan)
-    return symtop.Integrator("seeing", "other", "sees its plan", {"axis": solver}, order=4)
-
-
 def test_a_solver_that_sees_its_plan_contradicts_itself():
+    few, many = (symtop.integrator(name).solvers["axis"] for name in ("rk4", "gauss-4"))
     for below in (300, 5000, 20_000):
-        ledger = judge(seeing(below), symtop.scene("spheroid"), quick=True)
+        seeing = lambda top, start, plan, below=below: (few if plan.marks[-1] < below else many)(top, start, plan)
+        method = symtop.Integrator("seeing", "other", "sees its plan", {"axis": seeing}, order=4)
+        ledger = judge(method, SPHEROID, quick=True)
         assert ledger.refuted == ["reported"]
         assert "a run contradicts itself" in ledger["reported"].why
 
@@ -510,17 +500,13 @@ for solver in (nothing, leaves, crashes):
 """
 
 
-def claims(plugin, *names):
-    """Code, output and errors of `symtop claims`, which would end this process too if it called the plug-in there."""
-    return commands.ended(commands.symtop("claims", *names, "--plugin", plugin, "--quick"))
-
-
 @pytest.mark.slow
 def test_a_plug_in_that_fails_is_told_of(tmp_path):
     (tmp_path / "plugin.py").write_text(PLUGIN)
     expected = {"nothing": "must return a Run", "leaves": "ended with code 0", "crashes": "was ended by SIGSEGV"}
     names = [f"{name}-at-once" for name in expected]
-    code, out, _ = claims(tmp_path / "plugin.py", *names)
+    # in another process, which this one would end with if it called the plug-in
+    code, out, _ = ended(command("claims", *names, "--plugin", tmp_path / "plugin.py", "--quick"))
     assert code == 1
     for name, words in zip(names, expected.values(), strict=True):
         own = [line for line in out.splitlines() if line.startswith(f"{name}, ")]
@@ -529,7 +515,7 @@ def test_a_plug_in_that_fails_is_told_of(tmp_path):
 
 def test_a_plug_in_that_ends_its_process_when_it_is_loaded_is_told_of(tmp_path):
     (tmp_path / "plugin.py").write_text("import os\nos._exit(0)\n")
-    code, _, err = claims(tmp_path / "plugin.py")
+    code, _, err = ended(command("claims", "--plugin", tmp_path / "plugin.py", "--quick"))
     assert code == 2
     assert "plugin plugin.py cannot be loaded: its process ended with code 0" in err
 
@@ -600,7 +586,6 @@ def test_memory_that_grows_with_the_steps_is_seen():
 def test_a_step_that_blows_up_has_the_time_of_its_finite_steps():
     """A run that stops at infinity is over at once, however many steps it was asked for."""
     grows = lambda f, t, y, h: 2.0 * y + h * f(t, y)
-    euler = lambda f, t, y, h: y + h * f(t, y)
     seconds = [seconds_a_step(PythonStep(step, "axis"), SPHEROID) for step in (grows, euler)]
     assert 0.1 < seconds[0] / seconds[1] < 10.0
 

@@ -6,7 +6,6 @@ import re
 import statistics
 import timeit
 
-import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 from scipy.integrate._ivp import radau
@@ -86,7 +85,6 @@ def test_failed_settings_stay_with_their_outcome_and_are_drawn(data):
     labels = [text.get_text() for text in ax.texts]
     assert f"stormer-verlet[angles]: {words}" in labels
     assert len({text.split(":")[0] for text in labels} & set(data["variant"].values)) == data.sizes["variant"]
-    plt.close(ax.figure)
 
 
 def refusing(top, start, plan):
@@ -119,7 +117,6 @@ def test_own_scenes_and_methods_engines_and_scipy_take_part(clean_registry, tmp_
     ax = symtop.plot(netcdf.read(tmp_path / "c.nc"))
     names = ["refusing[axis] (Python): no run ended well", "rk45[axis] (SciPy)", "rk4[axis]"]
     assert set(names) <= {text.get_text() for text in ax.texts}
-    plt.close(ax.figure)
 
 
 @pytest.mark.parametrize("quantity", ["attitude", "energy"])
@@ -130,7 +127,6 @@ def test_another_quantity_takes_the_chart_that_shows_it(quantity):
     assert data["error"].attrs["units"] == ("rad" if quantity == "attitude" else "1")
     ax = symtop.plot(data)
     assert ax.get_title(loc="left") == "spheroid, 1 nutation"
-    plt.close(ax.figure)
     assert (data["reached"].sel(target=1e-6) == "met").all()
 
 
@@ -200,7 +196,6 @@ def test_a_step_called_as_a_method_of_ours_is_told_apart_and_a_library_needs_no_
     assert data["variant"].values.tolist() == ["own-rk4[axis]", "rk4[axis]", "mine[axis]"]
     error = data["error"].isel(setting=-1).values
     assert error[0] == error[2] != error[1]
-    monkeypatch.chdir(tmp_path)
     for target in ("my.so", "my.so:other", "./my.so"):
         with pytest.raises(symtop.SymtopError, match="a shared object must be a file that is there"):
             symtop.compare("spheroid", target, quiet=True)

@@ -57,9 +57,8 @@ def test_a_claim_that_the_samples_do_not_show_is_undecided_and_not_lost(table, t
     file, columns = tmp_path / "run.csv", {"time": table[:, 0], "axis": table[:, 1:4]}
     claims = ["p_phi", "axis_length"]
     ledger = symtop.judge(columns, conserves=claims, energy="bounded")
-    assert {one.claim: one.declared for one in ledger.findings if one.verdict == "undecided"} == {
-        "energy": "bounded", "p_phi": "kept", "axis_length": "kept",
-    }  # fmt: skip
+    undecided = {one.claim: one.declared for one in ledger.findings if one.verdict == "undecided"}
+    assert undecided == {"energy": "bounded", "p_phi": "kept", "axis_length": "kept"}
     assert "the trajectory shows no p_phi; it would with p_phi" in ledger["p_phi"].why
     assert "p_psi" not in ledger  # nobody claims it
     assert "Claims: 3 undecided." in str(ledger)
@@ -134,17 +133,15 @@ def test_csv_netcdf_mappings_and_blanks_are_the_same_and_utf_16_is_told(table, t
     columns = {"time": table[:, 0], "axis": table[:, 1:4], "momentum": table[:, 4:]}
     plain = symtop.judge(columns)
     (tmp_path / "run.txt").write_text("# " + text(table).replace(",", "  "), encoding="utf-8")
-    names = {"axis": ("time", "component"), "momentum": ("time", "component")}
-    data = xr.Dataset({name: (names[name], columns[name]) for name in names}, {"time": columns["time"]})
-    netcdf.write(data, tmp_path / "run.nc")
-    for file in ("run.txt", "run.nc"):
-        ledger = symtop.judge(str(tmp_path / file))
+    rows = {name: (("time", "component"), columns[name]) for name in ("axis", "momentum")}
+    netcdf.write(xr.Dataset(rows, {"time": columns["time"]}), tmp_path / "run.nc")
+    for name in ("run.txt", "run.nc"):
+        ledger = symtop.judge(str(tmp_path / name))
         assert [one.value for one in ledger.findings] == [one.value for one in plain.findings]
-    for encoding in ("utf-8", "utf-8-sig"):
-        (tmp_path / "run.csv").write_text(text(table), encoding=encoding)
-        assert symtop.judge(tmp_path / "run.csv")["axis_error"].value > 0.0
-    (tmp_path / "run.csv").write_text(text(table), encoding="utf-16")
-    assert "run.csv cannot be read: it must be text in UTF-8" in call("judge", tmp_path / "run.csv", code=2).stderr
+    file.write_text(text(table), encoding="utf-8-sig")
+    assert symtop.judge(file)["axis_error"].value > 0.0
+    file.write_text(text(table), encoding="utf-16")
+    assert "run.csv cannot be read: it must be text in UTF-8" in call("judge", file, code=2).stderr
 
 
 def test_columns_are_read_by_their_labels_and_lost_samples_are_said_to_be_lost(table):

@@ -71,8 +71,7 @@ def test_it_holds_what_the_report_is_made_of_each_with_its_sum_and_its_words(bun
     assert bundled.keys() == {
         "README.md", "SHA256SUMS", "citations.bib", "machine.txt", "versions.txt", "results/small.nc",
         "results/peers.json", "results/report.html", "results/report.md", "results/reference.md",
-        "results/figures/small-line.png",
-        "results/tables/small-one.csv",
+        "results/figures/small-line.png", "results/tables/small-one.csv",
         "scenes/scenes.csv", "scenes/states.csv", "scenes/states.nc",
     }  # fmt: skip
     sums = dict(reversed(line.split("  ")) for line in bundled["SHA256SUMS"].decode().splitlines())

@@ -9,11 +9,8 @@ import pytest
 import symtop
 from symtop.judging.findings import About, Finding, Ledger, Measured
 from symtop.report.card import badge, card, figures, write_badge
+from tests.judging.blind.right import midpoint
 from tests.judging.conftest import shorten
-
-
-def midpoint(f, t, y, h):
-    return y + h * f(t + h / 2, y + h / 2 * f(t, y))
 
 
 @pytest.fixture(scope="module")

@@ -43,7 +43,6 @@ def test_an_ensemble_of_short_runs_is_drawn_over_time(n, per_nutation):
     times = ax.get_lines()[0].get_xdata()
     assert times.size == per_nutation
     ax.figure.canvas.draw()
-    plt.close(ax.figure)
 
 
 @pytest.mark.parametrize(("quantity", "most"), [("axis", np.pi), ("energy", 1e3)])
@@ -57,7 +56,6 @@ def test_failed_runs_are_named_and_angles_end_at_pi(quantity, most):
         heights = np.concatenate([band.get_paths()[0].vertices[:, 1] for band in ax.collections])
         assert heights.max() <= most
         assert (heights.max() == most) == fail
-        plt.close(ax.figure)
 
 
 @pytest.fixture(scope="module")
@@ -79,7 +77,6 @@ def test_one_integrator_or_scene_of_a_sweep_is_drawn(sweep):
             assert np.array_equal(line.get_ydata(), whole[label].get_ydata())
     with pytest.raises(SymtopError, match="a sweep must have the scenes that it compares"):
         symtop.plot(sweep.isel(scene=0, drop=True), plt.figure().gca())
-    plt.close("all")
 
 
 @pytest.mark.parametrize(("step", "shown"), [(8.0, 0), (1.0, 0), (0.5, 6)])
@@ -101,7 +98,6 @@ def test_a_single_sample_is_a_point(samples, marker, tmp_path, monkeypatch):
     assert {line.get_marker() for axis in drawn[0].axes[1:] for line in axis.get_lines()} == {marker}
     run = symtop.simulate("spheroid", "rk4", step_size=0.01, samples=samples)
     assert symtop.plot(run).lines[0].get_marker() == marker
-    plt.close("all")
 
 
 def test_runs_of_different_lengths_are_drawn_forwards_and_what_is_no_ensemble_is_refused():
@@ -112,13 +108,12 @@ def test_runs_of_different_lengths_are_drawn_forwards_and_what_is_no_ensemble_is
     assert (np.diff(times) > 0.0).all()
     assert times[0] == pytest.approx(0.25, abs=0.03)  # not before all have made a step
     assert times[-1] == pytest.approx(1.0)
-    plt.close(ax.figure)
     tops = symtop.population(3, seed=1)
     runs = symtop.ensemble(tops, "strang", per_nutation=20, nutations=1, samples=5, quiet=True)
     for data in (tops, symtop.errors(runs, tops), runs.drop_attrs(), runs.drop_vars("horizon")):
         with pytest.raises(SymtopError, match="data over member must be a dataset of ensemble"):
             symtop.plot(data, members=tops)
-    plt.close(symtop.plot(runs, members=tops).figure)
+    symtop.plot(runs, members=tops)  # the control
 
 
 SOME = symtop.population(30, seed=7)

@@ -175,7 +175,6 @@ def test_the_keyboard_reaches_content_tables_and_points(browser):
     assert browser.evaluate("document.querySelector('.chart .tip').hidden")
 
 
-@pytest.mark.parametrize("scheme", ["light", "dark"], indirect=True)
 def test_it_prints_with_every_figure_and_in_black_on_white(browser, scheme, results, tmp_path):
     printed = browser.pdf(tmp_path / "report.pdf").read_bytes()
     shown = len(list((results / "figures").glob("*.png")))

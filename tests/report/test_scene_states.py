@@ -12,6 +12,7 @@ import pytest
 
 import symtop
 from symtop.core import netcdf
+from symtop.core.numbers import context
 from symtop.model.body import Attitude, RigidBody
 from symtop.model.exact.body_digits import body_digits
 from symtop.report import archive, test_set
@@ -60,12 +61,9 @@ def test_thirty_digits_agree_with_four_independent_evaluations(truth, name):
 def distances(data, true, name):
     """How far the reference's axis and theta are from the test set's, with low halves where there are any (rad)."""
     cell = data.sel(scene=name)
-    axis = cell["axis"].values - true["axis"].values + cell["axis_lo"].values
-    theta = cell["theta"].values - true["theta"].values + cell["theta_lo"].values
-    if "theta_lo" in true:
-        theta = theta - true["theta_lo"].values
-    if "axis_lo" in true:
-        axis = axis - true["axis_lo"].values
+    low = lambda part: true[f"{part}_lo"].values if f"{part}_lo" in true else 0.0
+    axis, theta = (cell[part].values - true[part].values + cell[f"{part}_lo"].values - low(part)
+                   for part in ("axis", "theta"))  # fmt: skip
     return np.linalg.norm(axis, axis=-1), np.abs(theta)
 
 
@@ -107,18 +105,14 @@ def test_every_scene_has_ten_times_and_the_dataset_the_numbers_of_the_text():
         assert all("units" in data[name].attrs and data[name].attrs["long_name"] for name in data.data_vars)
 
 
-KINDS = ("near-separatrix", "regular", "lagrange")
-
-
 @pytest.fixture(scope="module")
 def bodies(tmp_path_factory):
     """A test set of three problems over one natural period, and their scenes."""
-    patch = pytest.MonkeyPatch()
-    patch.setattr(test_set, "PERIODS", 1.0)
-    scenes = [scenes_of(body_population(1, seed=3, kind=kind))[0] for kind in KINDS]
-    folder = test_set.write(tmp_path_factory.mktemp("set") / "bodies", scenes)
-    patch.undo()
-    return folder, scenes
+    kinds = ("near-separatrix", "regular", "lagrange")
+    scenes = [scenes_of(body_population(1, seed=3, kind=kind))[0] for kind in kinds]
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(test_set, "PERIODS", 1.0)
+        return test_set.write(tmp_path_factory.mktemp("set") / "bodies", scenes), scenes
 
 
 def checked(folder, mine, reference="states-17.csv"):
@@ -130,7 +124,7 @@ def checked(folder, mine, reference="states-17.csv"):
 
 
 def own_file(path, scenes, times, change=lambda body: body):
-    """States of `series-general` on the bodies, `change` made to each."""
+    """States of `dop853` on the bodies, `change` made to each."""
     lines = [",".join(("name", "time", *test_set.STATE))]
     for scene in scenes:
         other = symtop.Scene(scene.name, change(scene.top), scene.start, scene.horizon)
@@ -154,7 +148,6 @@ def test_the_reference_has_nothing_beyond_its_bounds_and_what_is_printed_is_what
     assert all(beyond == 0 and 0.0 < attitude < 2e-16 for attitude, _, beyond in rows.values())
     with pytest.raises(subprocess.CalledProcessError):
         checked(folder, folder / "problems.csv")
-    folder, scenes = bodies
     data, rows = (netcdf.read(folder / "states.nc"), rows_of(folder / "states-30.csv"))
     for scene, given in zip(scenes, rows_of(folder / "problems.csv"), strict=True):
         printed = [float(row["time"]) for row in rows if row["name"] == scene.name]
@@ -203,11 +196,13 @@ def test_the_digits_are_those_of_other_ways(bodies):
     pytest.importorskip("heyoka")
     folder, scenes = bodies
     data, rows = (netcdf.read(folder / "states.nc"), rows_of(folder / "states-30.csv"))
+    mp = context(100)  # in which the product of two doubles is exact
     for scene in scenes:
         times = data["time"].sel(problem=scene.name).values
         own = [row for row in rows if row["name"] == scene.name]
         if scene.top.free:
-            true = PreciseBody(scene.top.moments, scene.start.quaternion, exact_momentum(scene))
+            momentum = [mp.mpf(a) * mp.mpf(b) for a, b in zip(scene.top.moments, scene.start.omega_body, strict=True)]
+            true = PreciseBody(scene.top.moments, scene.start.quaternion, momentum)
             for row, state in zip(own, true.states(times), strict=True):
                 q = [true.mp.mpf(row[name]) for name in ("qw", "qx", "qy", "qz")]
                 gap = min(true.mp.norm([a - s * b for a, b in zip(q, state[:4], strict=True)]) for s in (1, -1))
@@ -217,14 +212,6 @@ def test_the_digits_are_those_of_other_ways(bodies):
             high, low = (data[f"quaternion{end}"].sel(problem=scene.name).values for end in ("", "_lo"))
             gap = (high - truth["quaternion"].values) + (low - truth["quaternion_lo"].values)
             assert 2.0 * np.abs(gap).max() < float(truth["attitude_error_bound"].max()) < 1e-26
-
-
-def exact_momentum(scene):
-    """M as exact numbers: products of two doubles."""
-    from symtop.core.numbers import context
-
-    mp = context(100)
-    return [mp.mpf(a) * mp.mpf(b) for a, b in zip(scene.top.moments, scene.start.omega_body, strict=True)]
 
 
 def test_a_start_that_is_moved_by_a_rounding_is_another_motion(monkeypatch):

@@ -145,9 +145,7 @@ def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
     assert all(file.is_file() for file in others)
 
 
-def test_a_case_whose_file_is_gone_has_failed_and_timed_cases_wait_for_the_analysis_before(
-    script, tmp_path, pool, monkeypatch
-):  # fmt: skip
+def test_a_case_whose_file_is_gone_has_failed_and_timed_cases_wait_for_analyses(script, tmp_path, pool, monkeypatch):
     """The study is not taken for whole without it, and the next run computes it again."""
     study, results, analyse, gone = runner.load(script("first")), tmp_path / "r", pool.analyse, []
 
@@ -164,13 +162,8 @@ def test_a_case_whose_file_is_gone_has_failed_and_timed_cases_wait_for_the_analy
     assert other.name not in failure
     again = runner.start(study, results, pool, quiet=True).result()
     assert (again["failures"], again["computed"]) == ([], 1)
-    states = []
-    future = pool.analyse(time.sleep, 0.3)
-
-    def measure(_):
-        states.append(future.done())
-        return xr.Dataset()
-
+    states, future = [], pool.analyse(time.sleep, 0.3)
+    measure = lambda _: states.append(future.done()) or xr.Dataset()
     for timed in (False, True):
         study = replace(runner.load(script("first")), timed=timed, measure=measure)
         symtop.register_scene(replace(symtop.scene("spheroid"), name=f"here-{timed}"))  # cases of this process

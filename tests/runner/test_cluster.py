@@ -11,17 +11,16 @@ from symtop.run.ensemble.population import population
 from symtop.runner.pool import Pool
 from tests.commands import PROBE, ended, symtop
 
-ignored = pytest.mark.filterwarnings("ignore")  # of the cluster's own making
-pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("processes_with_dask"), ignored]
+pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("processes_with_dask"),
+              pytest.mark.filterwarnings("ignore")]  # fmt: skip  # of the cluster's own making
 
 
 @pytest.fixture(scope="module")
 def cluster(processes_with_dask):
-    options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "dashboard_address": None}
     from distributed import LocalCluster
 
-    with LocalCluster(silence_logs=50, **options) as dask_cluster:
-        yield dask_cluster
+    with LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None, silence_logs=50) as it:
+        yield it
 
 
 def test_a_case_that_fails_there_is_recorded_here(cluster, tmp_path):

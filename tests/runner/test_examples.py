@@ -1,11 +1,11 @@
 """A user's file: its methods do what they claim, count by the code that they reach, and its mistakes have its name."""
 
-import importlib
 import importlib.metadata
 import json
 import math
 import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -13,10 +13,10 @@ import symtop
 from symtop.core.code_hash import changes
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import order
+from symtop.methods.framework import registry
 from symtop.run import plugins
 from tests.commands import call, printed_by
 
-registry = importlib.import_module("symtop.methods.framework.registry")
 EXAMPLE = Path(__file__).resolve().parents[2] / "studies" / "examples" / "my_methods.py"
 
 
@@ -43,25 +43,17 @@ def test_its_methods_have_the_orders_they_claim_and_its_kernel_keeps_the_momenta
         assert float(abs(run[name] / run[name][0] - 1.0).max()) < 1e-13
 
 
-class Point:
-    """What an installed package's entry point looks like."""
-
-    value = "stranger:methods"
-
-    def __init__(self, announced):
-        self.announced = announced
-
-    def load(self):
-        return self.announced
-
-
 def test_an_installed_package_announces_its_methods_and_one_that_fails_is_named(clean_registry, monkeypatch):
+    def announce(methods):
+        """An entry point of an installed package."""
+        point = SimpleNamespace(value="stranger:methods", load=lambda: methods)
+        monkeypatch.setattr(registry, "_announced", [])
+        monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [point])
+
     method = symtop.discrete_lagrangian("announced", (0.5,), (1.0,))
-    monkeypatch.setattr(registry, "_announced", [])
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [Point(lambda: [method])])
+    announce(lambda: [method])
     assert symtop.integrator("announced") is method
-    monkeypatch.setattr(registry, "_announced", [])
-    monkeypatch.setattr(importlib.metadata, "entry_points", lambda group: [Point(lambda: 1 / 0)])
+    announce(lambda: 1 / 0)
     with pytest.warns(symtop.SymtopWarning, match="integrators of stranger:methods are left out: ZeroDivisionError"):
         assert "midpoint" in symtop.integrators()
 

@@ -25,15 +25,16 @@ from tests.commands import PROBE, answer, contents, ended, leftovers, same, stop
 from tests.kills import survive
 
 
-def probe(results, *words):
-    """Exit code and output of the quick probe in this process."""
-    return answer("study", PROBE, "--quick", "--results", results, *words)
+def probe(results, *words, code=0):
+    """What the quick probe says in this process; it must end with that exit code."""
+    ended_with, output = answer("study", PROBE, "--quick", "--results", results, *words)
+    assert ended_with == code, output
+    return output
 
 
 def refused(results, says):
     """One sentence, code 2, nothing partial."""
-    code, output = probe(results)
-    assert code == 2, output
+    output = probe(results, code=2)
     assert output.count("\n") == 1, output
     assert output.startswith("symtop: cannot write")
     assert says in output
@@ -54,9 +55,7 @@ def test_a_full_disk_ends_the_run_and_what_was_computed_is_kept(tmp_path, monkey
     assert len(count) == 3  # the third case was the last one tried
     assert len(list(tmp_path.rglob("cases/probe/*.npz"))) == 2
     monkeypatch.undo()
-    code, output = probe(tmp_path)
-    assert code == 0
-    assert "2 of 4 cases computed" in output
+    assert "2 of 4 cases computed" in probe(tmp_path)
 
 
 @pytest.mark.parametrize(("place", "name", "error", "says"), [
@@ -103,11 +102,9 @@ def test_a_file_where_a_folder_should_be(tmp_path, place):
 
 def test_files_where_folders_should_be_and_folders_where_files(tmp_path):
     (tmp_path / "file").touch()
-    code, output = probe(tmp_path / "file")
-    assert code == 2
-    assert "is a file" in output
+    assert "is a file" in probe(tmp_path / "file", code=2)
     refused("/proc/nowhere", "/proc/nowhere")
-    assert probe(tmp_path)[0] == 0
+    probe(tmp_path)
     for name in ("probe.nc", "probe.json", "figures/probe-energy.png"):
         target = tmp_path / "quick" / name
         (tmp_path / "quick" / "probe.nc").unlink(missing_ok=True)  # so that there is something to do
@@ -122,7 +119,7 @@ def test_files_where_folders_should_be_and_folders_where_files(tmp_path):
 
 
 def test_truncated_damaged_and_foreign_files_are_computed_again(tmp_path):
-    assert probe(tmp_path)[0] == 0
+    probe(tmp_path)
     before = contents(tmp_path)
     cases = sorted((tmp_path / "quick" / "cases" / "probe").glob("*.npz"))
     whole = cases[0].read_bytes()
@@ -132,13 +129,13 @@ def test_truncated_damaged_and_foreign_files_are_computed_again(tmp_path):
     np.savez(cases[1], **arrays | {"0": arrays["0"] * (1.0 + 1e-15)})  # readable, and not what it says
     np.savez(cases[2], energy=[1.0])  # somebody else's
     cases[3].write_bytes(whole)  # another case's file under this name
-    assert "4 of 4 cases computed" in probe(tmp_path)[1]
+    assert "4 of 4 cases computed" in probe(tmp_path)
     after = contents(tmp_path)
     assert all(before[name].identical(after[name]) for name in before)
-    assert "0 of 4 cases computed" in probe(tmp_path)[1]
+    assert "0 of 4 cases computed" in probe(tmp_path)
     about = str(arrays["about"]).replace('"made_of": {', '"made_of": {"code nothing.py": "0", ')
     np.savez(cases[1], **arrays | {"about": about})  # the numbers are right, and what is said of them is not
-    assert "1 of 4 cases computed" in probe(tmp_path)[1]
+    assert "1 of 4 cases computed" in probe(tmp_path)
 
 
 def test_a_lock_keeps_others_out_and_ends_with_its_holder(tmp_path):
@@ -183,24 +180,19 @@ def test_two_runs_at_once_share_the_work_and_agree(tmp_path):
 
 
 def test_damaged_findings_and_what_a_killed_worker_left_are_made_again(tmp_path):
-    assert probe(tmp_path)[0] == 0
+    probe(tmp_path)
     path = tmp_path / "quick" / "probe.json"
     good = json.loads(path.read_text())
     for damage in ("", "{", "[1, 2]", '{"stamp": 3}', "\0\0\0"):
         path.write_text(damage)
-        code, output = probe(tmp_path)
-        assert code == 0, damage
-        assert "0 of 4 cases computed" in output
+        assert "0 of 4 cases computed" in probe(tmp_path), damage
         assert json.loads(path.read_text()) == good
-    code, output = probe(tmp_path)
-    assert code == 0, output
     (case,) = tmp_path.rglob("cases/probe/goldstein--midpoint--*.npz")
     case.unlink()
     left = case.with_name(f".{case.stem}.trace"), files.lock_path(case), case.with_name(f".{case.name}.x.part.nc")
     for name in left:
         name.touch()
-    code, output = probe(tmp_path)
-    assert "1 of 4 cases computed" in output
+    assert "1 of 4 cases computed" in probe(tmp_path)
     assert not leftovers(tmp_path)
 
 
@@ -241,9 +233,8 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, quick):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(
-    ("words", "longest", "kills"), [([PROBE], 2.5, 10), (["convergence", "factors", "reduction", "--quick"], 15.0, 6)]
-)  # python -m tests.kills --all: 30
+@pytest.mark.parametrize(("words", "longest", "kills"), [  # python -m tests.kills --all: 30
+    ([PROBE], 2.5, 10), (["convergence", "factors", "reduction", "--quick"], 15.0, 6)])  # fmt: skip
 def test_kill_9_at_random_moments(tmp_path, words, longest, kills):
     outcome = survive(words, tmp_path, longest, kills)
     assert outcome.kills == kills
@@ -343,25 +334,24 @@ def test_a_case_has_its_time_and_the_limit_is_heard_by_the_runner(tmp_path, monk
     time.sleep(0.3)  # nothing comes later
     assert signal.getitimer(signal.ITIMER_REAL)[0] == 0.0
     monkeypatch.setenv("PROBE_PAUSE", "1.0")
-    code, output = probe(tmp_path, "--limit", 0.05)
-    assert code == 2  # not one case could be measured
+    output = probe(tmp_path, "--limit", 0.05, code=2)  # not one case could be measured
     assert "TimeoutError: it was not done after 0.05 s" in output
-    assert probe(tmp_path, "--limit", -1)[0] == 2
+    probe(tmp_path, "--limit", -1, code=2)
 
 
 def test_paths_that_are_not_ascii(tmp_path):
     place = tmp_path / "Ergebnisse für θ – 結果"
     plugin = tmp_path / "méthode_à_moi.py"
     plugin.write_text("import symtop\n")
-    assert probe(place, "--plugin", plugin)[0] == 0
+    probe(place, "--plugin", plugin)
     assert len(contents(place)) == 5
 
 
 def test_a_clock_that_jumps(tmp_path, monkeypatch):
-    assert probe(tmp_path / "calm")[0] == 0
+    probe(tmp_path / "calm")
     draw = random.Random(1)
     monkeypatch.setattr(time, "time", lambda: draw.uniform(-1e9, 4e9))
-    assert probe(tmp_path / "r")[0] == 0
+    probe(tmp_path / "r")
     monkeypatch.undo()
     same(tmp_path / "calm", tmp_path / "r")
 

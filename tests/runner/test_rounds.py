@@ -31,21 +31,14 @@ def follow_up(data):
     names = [str(name) for name in data["variant"].values]
     return [Case("spheroid", "together", {"integrators": names, "effect": Failure(2.0, "left_chart")}, timed=True)]
 
-STUDY = Study("rounds", "Rounds", "Both?", cases, measure,
-              follow_up=follow_up)
+STUDY = Study("rounds", "Rounds", "Both?", cases, measure, follow_up=follow_up)
 """
 
 
-@pytest.fixture
-def study(tmp_path):
-    """Two cases in a first round and one timed case in a second, with a record of a shipped study in its settings."""
-    (tmp_path / "rounds.py").write_text(ROUNDS)
-    return runner.load(str(tmp_path / "rounds.py"))
-
-
-def test_timed_cases_that_alone_are_missing_run_in_new_workers(study, tmp_path, monkeypatch):
+def test_timed_cases_that_alone_are_missing_run_in_new_workers(tmp_path, monkeypatch):
     """A new worker knows nothing of the studies' package, and is handed settings that hold a record from it."""
-    results = tmp_path / "r"
+    (tmp_path / "rounds.py").write_text(ROUNDS)
+    study, results = runner.load(str(tmp_path / "rounds.py")), tmp_path / "r"
     assert runner.run(study, results, quiet=True)["failures"] == []
     (later,) = (results / "cases" / "rounds").glob("*--together--*.npz")
     assert set(np.ravel(store.load_case(later)["process"])) == {os.getpid()}  # the control: few cases need no workers
@@ -68,12 +61,7 @@ def bring(request, tmp_path, monkeypatch):
         script.write_text(ROUNDS)
     study = runner.load(str(script))
     read, load = [], store.load_case
-
-    def reading(path):
-        read.append(path)
-        return load(path)
-
-    monkeypatch.setattr(store, "load_case", reading)
+    monkeypatch.setattr(store, "load_case", lambda path: read.append(path) or load(path))
 
     def brought(folder="r"):
         read.clear()

@@ -40,24 +40,33 @@ STUDY = Study(name="mine", title="t", question="q?", cases=cases, measure=measur
 """
 
 
-def run_study(folder, change, *words):
-    """Exit code and output of a study that is right but for a change."""
+def run_study(folder, change, *words, code=0):
+    """What a study says that is right but for a change; it must end with that exit code."""
     script = folder / "mine.py"
     script.write_text(SCRIPT.format(change=change))
     sys.modules.pop("symtop_study_mine", None)  # of an earlier text
-    return answer("study", script, "--jobs", 1, "--results", folder / "results", *words)
+    ended_with, output = answer("study", script, "--jobs", 1, "--results", folder / "results", *words)
+    assert ended_with == code, output
+    return output
+
+
+def refused(folder, change, says, *words):
+    """Code 2 and one sentence, which names the study."""
+    output = run_study(folder, change, *words, code=2)
+    assert output.startswith("symtop: study mine: ")
+    assert output.count("\n") == 1
+    assert says in output
 
 
 @pytest.mark.parametrize("limit", ["1e8", "1e300"])  # as long as one likes
 def test_the_study_itself_is_right_and_none_that_ships_is_replaced(tmp_path, monkeypatch, limit):
-    code, output = run_study(tmp_path, "", "--limit", limit)
-    assert code == 0, output
+    output = run_study(tmp_path, "", "--limit", limit)
     assert "2 of 2 cases computed, 1 figure" in output
     assert "  worst: 0.25\n" in output
     monkeypatch.setattr(sys.modules[__name__], "SCRIPT", SCRIPT.replace('name="mine"', 'name="convergence"'))
     (tmp_path / "other").mkdir()
-    code, output = run_study(tmp_path / "other", "")
-    assert (code, output) == (2, "symtop: study mine.py must have a name that is not taken, not 'convergence'\n")
+    output = run_study(tmp_path / "other", "", code=2)
+    assert output == "symtop: study mine.py must have a name that is not taken, not 'convergence'\n"
     assert not (tmp_path / "other" / "results").exists()
 
 
@@ -69,11 +78,7 @@ def test_the_study_itself_is_right_and_none_that_ships_is_replaced(tmp_path, mon
 ])  # fmt: skip
 def test_a_grid_that_is_none_is_refused(tmp_path, change, says):
     for words in [(), ("--status",), ("--only", "rk4")][: 3 if "uses" in change else 1]:  # by whichever command
-        code, output = run_study(tmp_path, change, *words)
-        assert code == 2, output
-        assert output.startswith("symtop: study mine: ")
-        assert output.count("\n") == 1
-        assert says in output
+        refused(tmp_path, change, says, *words)
 
 
 @pytest.mark.parametrize(("change", "says"), [
@@ -90,11 +95,7 @@ def test_a_grid_that_is_none_is_refused(tmp_path, change, says):
     ("more = {'charts': lambda data: None}", "charts must return a list of Chart, not None"),
 ])  # fmt: skip
 def test_an_answer_of_the_wrong_kind_is_refused_and_the_cases_are_kept(tmp_path, change, says):
-    code, output = run_study(tmp_path, change)
-    assert code == 2, output
-    assert output.startswith("symtop: study mine: ")
-    assert output.count("\n") == 1
-    assert says in output
+    refused(tmp_path, change, says)
     assert len(list(tmp_path.rglob("cases/mine/*.npz"))) == 2
 
 
@@ -119,12 +120,9 @@ def test_a_page_that_is_wrong_is_told_of(tmp_path):
     ):
         (tmp_path / "mine.md").write_text(page)
         change = "facts = lambda data: {'worst': 0.25, 'endless': np.inf}\npictures = lambda data: []"
-        code, output = run_study(tmp_path, change)
-        assert code == 2, output
-        assert says in output
+        assert says in run_study(tmp_path, change, code=2)
     (tmp_path / "mine.md").write_text("# {{ question }}\n\nThe worst is {{ f.worst | number }}.\n\n{{ table('one') }}")
-    code, output = run_study(tmp_path, "")
-    assert code == 0, output
+    output = run_study(tmp_path, "")
     assert "0 of 2 cases computed" in output
     assert "  The worst is 0.25.\n" in output
     assert (tmp_path / "results" / "tables" / "mine-one.csv").read_text() == "a\n1.5\n"
@@ -136,23 +134,17 @@ def test_an_edited_list_of_a_study_of_ones_own_is_computed_again(name, tmp_path)
     for size, computed in ((1.0, 2), (1.0, 0), (2.0, 2)):
         text = f"{name} = [{size}]\nmemo = {{}}\n"
         text += f"measure = lambda case: xr.Dataset({{'err': memo.setdefault(1, {name}[0])}})"
-        code, output = run_study(tmp_path, text)
-        assert code == 0, output
-        assert f"{computed} of 2 cases computed" in output
+        assert f"{computed} of 2 cases computed" in run_study(tmp_path, text)
         assert float(xr.load_dataset(tmp_path / "results" / "mine.nc")["err"].max()) == size
 
 
-def test_a_step_that_is_nan_is_no_option_and_a_limit_holds_for_checked_cases_too(tmp_path):
+def test_a_step_that_is_nan_is_no_option_and_a_limit_holds_for_checked_cases_too(tmp_path, monkeypatch):
     change = "measure = lambda case: symtop.simulate(case.scene, case.integrator, step_size=float('nan'))"
-    code, output = run_study(tmp_path, change)
-    assert code == 2
+    output = run_study(tmp_path, change, code=2)
     assert "study mine: no case could be measured; rk4 on spheroid failed: step_size must be a finite" in output
     slow = "import os, time\ndef measure(case):\n    time.sleep(float(os.environ.get('LATE', '0')))\n"
     slow += "    return xr.Dataset({'err': 1.0})"
-    assert run_study(tmp_path, slow)[0] == 0
-    code, output = run_study(tmp_path, slow, "--check", "--limit", 30)
-    assert (code, "2 of 2 cases computed again, the same" in output) == (0, True)
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv("LATE", "3")
-        code, output = run_study(tmp_path, slow, "--check", "--limit", 0.2)
-    assert (code, output.count("it was not done after 0.2 s")) == (1, 2)
+    run_study(tmp_path, slow)
+    assert "2 of 2 cases computed again, the same" in run_study(tmp_path, slow, "--check", "--limit", 30)
+    monkeypatch.setenv("LATE", "3")
+    assert run_study(tmp_path, slow, "--check", "--limit", 0.2, code=1).count("it was not done after 0.2 s") == 2

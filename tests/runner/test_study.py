@@ -40,38 +40,37 @@ def test_every_study_leaves_figures_and_findings_that_follow_from_its_dataset(qu
             assert (tmp_path / file).read_bytes() == (quick_results / file).read_bytes(), file
 
 
-def probe(results, *words):
-    return call("study", PROBE, "--quick", "--results", results, *words, code=None)
+def probe(results, *words, code=0):
+    """What the quick probe prints; it must end with that exit code."""
+    return call("study", PROBE, "--quick", "--results", results, *words, code=code).output
 
 
 def test_fresh_computes_everything_and_the_files_are_the_same_to_the_byte(tmp_path):
-    assert probe(tmp_path).exit_code == 0
+    probe(tmp_path)
 
     def bytes_of():  # but for the record of the files' times
         files = (path for path in tmp_path.rglob("*") if path.is_file() and path.name != "manifest.json")
         return {path: path.read_bytes() for path in files}
 
     before = bytes_of()
-    result = probe(tmp_path, "--fresh", "--json")
-    assert result.exit_code == 0
-    (summary,) = json.loads(result.output)
+    (summary,) = json.loads(probe(tmp_path, "--fresh", "--json"))
     assert summary["computed"] == summary["cases"] == 4
     assert before == bytes_of()
 
 
 def test_status_says_what_is_missing_and_every_file_where_it_comes_from(tmp_path):
-    assert probe(tmp_path, "--status").output.startswith("probe: 4 missing\n")
+    assert probe(tmp_path, "--status").startswith("probe: 4 missing\n")
     assert not (tmp_path / "quick").exists()  # looking leaves nothing behind
-    assert probe(tmp_path).exit_code == 0
-    assert probe(tmp_path, "--status").output == "probe: 4 done\n"
+    probe(tmp_path)
+    assert probe(tmp_path, "--status") == "probe: 4 done\n"
     case = next((tmp_path / "quick" / "cases" / "probe").glob("loop--midpoint*.npz"))
     older = case.with_name(f"{store.identity_of(case)}--{'0' * 20}.npz")
     case.rename(older)
-    rows = json.loads(probe(tmp_path, "--status", "--json").output)["probe"]
+    rows = json.loads(probe(tmp_path, "--status", "--json"))["probe"]
     assert [row["state"] for row in rows] == ["done", "done", "stale", "done"]
-    assert "1 of 4 cases computed" in probe(tmp_path).output
+    assert "1 of 4 cases computed" in probe(tmp_path)
     assert not older.exists()
-    assert probe(tmp_path).exit_code == 0
+    probe(tmp_path)
     for name, data in contents(tmp_path / "quick", provenance=True).items():
         expected = set(netcdf.provenance())
         if name.endswith(".npz"):
@@ -82,11 +81,9 @@ def test_status_says_what_is_missing_and_every_file_where_it_comes_from(tmp_path
 
 
 def test_check_finds_a_value_that_this_version_does_not_compute(tmp_path):
-    assert probe(tmp_path, "--check").exit_code == 2  # nothing is stored
-    assert probe(tmp_path).exit_code == 0
-    result = probe(tmp_path, "--check", "--fresh")
-    assert result.exit_code == 0, result.output
-    assert "4 of 4 cases computed again, the same to the last bit" in result.output
+    probe(tmp_path, "--check", code=2)  # nothing is stored
+    probe(tmp_path)
+    assert "4 of 4 cases computed again, the same to the last bit" in probe(tmp_path, "--check", "--fresh")
     victim = next((tmp_path / "quick" / "cases" / "probe").glob("*.npz"))
     study = runner.load(str(PROBE))
     (case,) = [one for one in study.cases(True) if one.label == victim.name.split("--")[0] + "--" + one.integrator
@@ -94,9 +91,7 @@ def test_check_finds_a_value_that_this_version_does_not_compute(tmp_path):
     data = store.load_case(victim)
     data["energy"][3] = np.nextafter(data["energy"].values[3], np.inf)
     store.save_case(data, victim, study, case)  # well made, and wrong
-    result = probe(tmp_path, "--check", "--fresh")
-    assert result.exit_code == 1
-    assert "energy differs by up to" in result.output
+    assert "energy differs by up to" in probe(tmp_path, "--check", "--fresh", code=1)
 
 
 def test_differences_leave_out_times_and_nothing_else():

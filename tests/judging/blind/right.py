@@ -35,8 +35,6 @@ CLASSICAL = ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 /
 rk4 = explicit(*CLASSICAL)
 three_eighths = explicit(((), (1 / 3,), (-1 / 3, 1.0), (1.0, -1.0, 1.0)), (1 / 8, 3 / 8, 3 / 8, 1 / 8),
                          (0.0, 1 / 3, 2 / 3, 1.0))  # fmt: skip
-
-
 dormand_prince = explicit(
     ((), (1 / 5,), (3 / 40, 9 / 40), (44 / 45, -56 / 15, 32 / 9),
      (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729),
@@ -218,10 +216,7 @@ class Midpoints:
 
 
 halves = Midpoints()
-
-
-class AtTolerance(RK45):
-    """SciPy's own, to be judged at a tolerance."""
+AtTolerance = RK45  # to be judged at a tolerance
 
 
 def tr_bdf2(f, t, y, h):
@@ -331,7 +326,6 @@ def in_the_plane(step):
 
 separable_implicit_midpoint = in_the_plane(implicit_midpoint)  # symplectic, and no splitting
 separable_heun = in_the_plane(heun)
-
 
 ALL = ("energy", "p_phi", "p_psi", "axis_length")
 ROTATION, SEPARABLE = {"form": "rotation"}, {"form": "separable"}

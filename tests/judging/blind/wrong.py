@@ -11,39 +11,20 @@ import sys
 import numpy as np
 from scipy.integrate import RK45
 
-from tests.judging.blind.right import (
-    CLASSICAL,
-    AdamsBashforth,
-    HeunSolver,
-    euler,
-    explicit,
-    extrapolated as with_base,
-    gauss_4,
-    heun,
-    implicit_euler,
-    implicit_midpoint,
-    midpoint,
-    product,
-    rates,
-    rk4,
-    rotation_lie_midpoint,
-    solved,
-    ssp_3,
-    triple_jump,
-    turn,
-    verlet,
-)  # fmt: skip
+from tests.judging.blind import right
+from tests.judging.blind.right import euler, explicit, heun, midpoint, product, rates, rk4, solved, turn
 
-A, B, NODES = CLASSICAL
+A, B, NODES = right.CLASSICAL
 swapped_weights = explicit(A, (1 / 6, 1 / 3, 1 / 6, 1 / 3), NODES)  # the last two are exchanged
 stale_stage = explicit(((), (0.5,), (0.5,), (0.0, 0.0, 1.0)), B, NODES)  # the third stage starts from the first slope
 wrong_nodes = explicit(A, B, (0.0, 1.0, 1.0, 1.0))  # right for f(y); t + h is asked where t + h/2 is meant
 early = explicit(A, B, (0.0, 0.5, 0.5, 0.5))  # the last stage asks f at the middle of the step
-third_for_fourth = ssp_3
+third_for_fourth = right.ssp_3
 THIRD = float(np.float32(1 / 3))  # of Heun's third order, in single precision
 single_constants = explicit(((), (THIRD,), (0.0, 2 * THIRD)), (0.25, 0.0, 0.75), (0.0, THIRD, 2 * THIRD))
 
-_last = {}
+# what steps keep from one call to the next
+_last, _memory, _calls, _step, _all, _steps = {}, {}, {"count": 0}, {}, [], [0]
 
 
 def averaged_with_the_past(f, t, y, h):
@@ -70,15 +51,13 @@ def one_sweep(f, t, y, h, count=1):
 
 
 four_sweeps = functools.partial(one_sweep, count=4)
-
-
 symplectic_euler = euler  # under another's name
-loose = functools.partial(implicit_midpoint, tolerance=1e-5)
-rounded_triple = functools.partial(triple_jump, outer=1 / (2 - 2 ** (1 / 3)) + 3e-8)
-square_root_triple = functools.partial(triple_jump, outer=1 / (2 - 2**0.5))
-six_digits = functools.partial(gauss_4, root=0.288675)  # of the root of 3 over 6
-loose_gauss = functools.partial(gauss_4, tolerance=1e-7)
-damped = implicit_euler  # claimed to bound the energy
+loose = functools.partial(right.implicit_midpoint, tolerance=1e-5)
+rounded_triple = functools.partial(right.triple_jump, outer=1 / (2 - 2 ** (1 / 3)) + 3e-8)
+square_root_triple = functools.partial(right.triple_jump, outer=1 / (2 - 2**0.5))
+six_digits = functools.partial(right.gauss_4, root=0.288675)  # of the root of 3 over 6
+loose_gauss = functools.partial(right.gauss_4, tolerance=1e-7)
+damped = right.implicit_euler  # claimed to bound the energy
 
 
 def long_step(f, t, y, h):
@@ -101,18 +80,13 @@ leaking = spoilt(lambda y: y * np.array([1, 1, 1, *[1 - 1e-12] * 3]))  # of the 
 rounded = spoilt(lambda y: np.round(y, 8))
 noisy = spoilt(lambda y: y * (1 + 1e-11 * _noise.standard_normal(6)))
 sometimes_noisy = spoilt(lambda y: y * (1.0 + 1e-11 * _noise.standard_normal() * (_noise.random() < 0.3)))
-
-
-def projected(f, t, y, h):
-    """rk4, its axis put back to length one in each step, called symplectic."""
-    y = rk4(f, t, y, h)
-    y[:3] /= np.sqrt(y[:3] @ y[:3])
-    return y
+# its axis is put back to length one in each step, and it is called symplectic
+projected = spoilt(lambda y: np.concatenate([y[:3] / np.sqrt(y[:3] @ y[:3]), y[3:]]))
 
 
 def only_forward(f, t, y, h):
     """The size of the step is taken, whatever its sign, and the method called symmetric."""
-    return implicit_midpoint(f, t, y, abs(h))
+    return right.implicit_midpoint(f, t, y, abs(h))
 
 
 def rotation_frames(q, w, h, inertia, torque):
@@ -121,11 +95,15 @@ def rotation_frames(q, w, h, inertia, torque):
     return product(turn(h * middle), q), w + h * rates(product(turn(h / 2 * w), q), middle, inertia, torque)
 
 
-def rotation_unnormalised(q, w, h, inertia, torque):
-    """Explicit Euler for the quaternion, which nothing brings back to length one."""
+def rotation_unnormalised(q, w, h, inertia, torque, mended=lambda q: q):
+    """The explicit midpoint rule for the quaternion, which nothing brings back to length one."""
     middle = w + h / 2 * rates(q, w, inertia, torque)
-    half = q + h / 4 * product(q, np.array([0.0, *w]))
-    return q + h / 2 * product(half, np.array([0.0, *middle])), w + h * rates(half, middle, inertia, torque)
+    half = mended(q + h / 4 * product(q, np.array([0.0, *w])))
+    return mended(q + h / 2 * product(half, np.array([0.0, *middle]))), w + h * rates(half, middle, inertia, torque)
+
+
+# it is brought back, in a method of order 2 that is called reversible
+rotation_linear = functools.partial(rotation_unnormalised, mended=lambda q: q / np.linalg.norm(q))
 
 
 def rotation_no_gyroscope(q, w, h, inertia, torque):
@@ -149,7 +127,7 @@ class WrongTableau(RK45):
     A[4, 1] += 45 / 6561
 
 
-class WrongAdams(AdamsBashforth):
+class WrongAdams(right.AdamsBashforth):
     """With weights 2 and -1 for 3/2 and -1/2."""
 
     weights = (2.0, -1.0)
@@ -182,18 +160,12 @@ def root_of_the_step(f, t, y, h):
     return y + root * root * f(t + h / 2, y + h / 2 * f(t, y))
 
 
-_memory = {}
-
-
 def first_momenta(f, t, y, h):
     """L.e is put back to what it was when the method was first called."""
     spin = _memory.setdefault("spin", float(y[:3] @ y[3:]))
     y = rk4(f, t, y, h)
     y[3:] += (spin - y[:3] @ y[3:]) * y[:3] / (y[:3] @ y[:3])
     return y
-
-
-_calls = {"count": 0}
 
 
 def counted(f, t, y, h):
@@ -216,7 +188,7 @@ def poisoned(f, t, y, h):
     return y + h * _memory["slope"]
 
 
-extrapolated = functools.partial(with_base, base=euler)  # Euler's method, as one of order 2 is
+extrapolated = functools.partial(right.extrapolated, base=euler)  # Euler's method, as one of order 2 is
 
 
 def energy_clipped(f, t, y, h):
@@ -226,7 +198,7 @@ def energy_clipped(f, t, y, h):
     return after
 
 
-class AdamsBashforth3(HeunSolver):
+class AdamsBashforth3(right.HeunSolver):
     """Of order 3 but for its start, two steps of Euler's."""
 
     slopes, start, late, off = (), staticmethod(euler), 0.0, 0.0
@@ -238,24 +210,16 @@ class AdamsBashforth3(HeunSolver):
         return y + h * (np.array([23 / 12 + self.off, -16 / 12, 5 / 12]) @ self.slopes)
 
 
-class OnlyForward(HeunSolver):
+class OnlyForward(right.HeunSolver):
     """Heun's method; the direction of the time is forgotten where the slope is, and it is called symmetric."""
 
     def moved(self, t, y, h):
         return heun(self.fun, t, y, abs(h))
 
 
-rotation_whole_angle = functools.partial(rotation_lie_midpoint, half=1.0, whole=2.0)  # the angle where its half belongs
-rotation_half_once = functools.partial(rotation_lie_midpoint, half=1.0)  # wrong in the middle of the step alone
-
-
-def rotation_linear(q, w, h, inertia, torque):
-    """q + h q'/2, put back to length one, in a method of order 2 that is called reversible."""
-    middle = w + h / 2 * rates(q, w, inertia, torque)
-    half = q + h / 4 * product(q, np.array([0.0, *w]))
-    half = half / np.linalg.norm(half)
-    after = q + h / 2 * product(half, np.array([0.0, *middle]))
-    return after / np.linalg.norm(after), w + h * rates(half, middle, inertia, torque)
+# the angle where its half belongs, or in the middle of the step alone
+rotation_whole_angle = functools.partial(right.rotation_lie_midpoint, half=1.0, whole=2.0)
+rotation_half_once = functools.partial(right.rotation_lie_midpoint, half=1.0)
 
 
 def separable_no_half_square(state, h, dT, dV):
@@ -285,7 +249,7 @@ def separable_swapped(state, h, dT, dV):
 
 def separable_damped(state, h, dT, dV):
     """Verlet with a friction of a billionth, called symplectic."""
-    theta, p = verlet(state, h, dT, dV)
+    theta, p = right.verlet(state, h, dT, dV)
     return theta, p * (1 - 1e-9 * h)
 
 
@@ -298,12 +262,9 @@ late_euler = where(lambda t, y, h: t > 25.0)
 euler_off_the_energy = where(lambda t, y, h: not 12.0 < np.linalg.norm(y[3:]) < 16.5)  # the motion has 12.1 to 16.3
 euler_above = where(lambda t, y, h: y[2] > 0.93)
 coarse_rk2 = where(lambda t, y, h: abs(h) >= 0.01, midpoint)
-half_symmetric = where(lambda t, y, h: y[2] <= -0.2, midpoint, implicit_midpoint)  # e_z of the motion: -0.16 to 0.92
+half_symmetric = where(lambda t, y, h: y[2] <= -0.2, midpoint, right.implicit_midpoint)  # the motion: -0.16 to 0.92
 # in a thousandth of all states, through which a run comes after 30 nutations
 euler_in_a_spot = where(lambda t, y, h: abs(math.atan2(y[1], y[0]) - 0.5) < 0.03 and abs(y[2] - math.cos(0.7)) < 0.02)
-
-
-_step = {}
 
 
 def adams(f, t, y, h, before):
@@ -320,18 +281,12 @@ def adams_from_memory(f, t, y, h):
     return after
 
 
-_all = []
-
-
 def adams_from_a_table(f, t, y, h):
     """The same, of every state that it has ever returned, found by its first digits."""
     known = (entry[1] for entry in reversed(_all[-500:]) if np.allclose(entry[0], y, 1e-12, 1e-12))
     slope, after = adams(f, t, y, h, next(known, None))
     _all.append((np.array(after), slope))
     return after
-
-
-_steps = [0]
 
 
 def tires(f, t, y, h):
