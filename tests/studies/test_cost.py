@@ -526,7 +526,7 @@ def test_quick_results_hold_every_verdict_and_a_cost_holds_the_call(data):
 
 
 def test_a_setting_is_made_finer_until_it_serves_but_no_tolerance_by_more_than_a_decade(monkeypatch):
-    shares = lambda variant, numbers, nutations, setting, target: float(setting <= 8e-10)  # noqa: E731
+    shares = lambda variant, numbers, nutations, setting, target: float(setting <= 8e-10)
     monkeypatch.setitem(confirm.__globals__, "share_served", shares)
     served = confirm(integrator("rk45-compiled[axis]"), 4, 1, 1.0, [4.01e-9, 9e-9, NAN, 6e-10])["served"].values
     np.testing.assert_allclose(served, [7e-10, INF, NAN, 6e-10])
