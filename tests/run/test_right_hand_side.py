@@ -7,6 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import symtop
+from symtop.run import right_hand_side
 from tests.judging.blind.right import rk4
 
 
@@ -78,6 +79,16 @@ def test_an_error_is_forecast_within_a_factor_of_three(f, y0, horizon, name, con
     expected = symtop.guard(f, 0.0, y0, horizon, name, **control)
     assert 1.0 / 3.0 < expected.error / measured(f, y0, horizon, name, **control) < 3.0
     assert causes is None or expected.cause in causes
+
+
+def test_an_error_that_has_halved_goes_on_as_it_was_and_one_that_has_faded_as_it_is():
+    times = np.arange(1.0, 11.0)
+    whole, halved, faded = (
+        right_hand_side._expected(times, 1e-9 * np.where(times < 5.0, 1.0, left), 1000.0, 1.0, math.inf)
+        for left in (1.0, 0.5, 0.05)
+    )
+    assert halved == pytest.approx(whole, rel=1e-9)
+    assert faded == pytest.approx(0.05 * whole, rel=1e-9)
 
 
 @pytest.mark.parametrize(("f", "y0", "step"), [
