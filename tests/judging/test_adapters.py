@@ -48,6 +48,7 @@ def test_a_python_step_makes_the_steps_of_the_tableau_that_it_is(chart):
     np.testing.assert_allclose(mine["p_psi"].values, ours["p_psi"].values, rtol=1e-12)
     ended = run_of(PythonStep(lambda f, t, y, h: midpoint(f, t, y, h) * (1.0 if t < 0.45 else np.nan), chart))
     assert [ended.attrs[key] for key in ("outcome", "reached_time", "steps")] == ["not_finite", 0.4, 100]
+    assert run_of(PythonStep(lambda f, t, y, h: -abs(y) if t > 0.3 else y, "angles"))["theta"].count() == 2  # has left
 
 
 def test_a_scipy_class_makes_the_steps_that_it_is_told_to():
@@ -112,8 +113,8 @@ def program(folder, body):
     return f"{sys.executable} {file}"
 
 
-STILL = "n, stride = map(int, numbers[4:6])\nfor k in range(0, n + 1, stride): print(*numbers[6:12])"
-RAW = "from array import array\nprint = lambda *x: sys.stdout.buffer.write(array('d', map(float, x)))\n" + STILL
+STILL = "n, stride = map(int, numbers[4:6])\nfor k in range(0, n + 1, stride): print(*numbers[6:12], sep=',')"
+RAW = "from array import array\nprint = lambda *x, sep: sys.stdout.buffer.write(array('d', map(float, x)))\n" + STILL
 
 
 @pytest.mark.parametrize("body", [STILL, RAW, STILL.replace("*numbers[6:12]", "*(-float(x) for x in numbers[6:12])")])

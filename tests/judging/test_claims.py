@@ -384,8 +384,7 @@ def test_the_series_of_a_step_beside_a_pole_is_not_taken():
 def test_a_time_has_the_unit_that_suits_what_is_printed_and_a_least_order_is_said_to_be_one():
     assert [pace(seconds) for seconds in (5.4321e-6, 999.4e-6, 999.7e-6, 0.0)] == ["5.43 us", "999 us", "1 ms", "0 ns"]
     for text, words in (("2 or more", "order 2 or more"), ("2: the h^3 term is off", "order 2"), ("", "order 2.4")):
-        slope = Measured("by a term", 2.0 if text else 2.4, text=text)
-        assert description([Finding("order", "", slope, "measured", "")]) == words
+        assert description([Finding("order", "", Measured("", 2 if text else 2.4, text), "measured", "")]) == words
     walks = Finding("p_psi", "", Measured("random walk", 1e-11), "measured", "", math.inf)
     runs = {"step_size": np.array([1.0, 0.5, 0.25]), "error": np.array([np.nan, np.nan, 1e-3])}
     told = str(Ledger("mine", "any", (walks,), runs, About(nutation=8.0)))
