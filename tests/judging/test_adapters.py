@@ -48,6 +48,7 @@ def test_a_python_step_makes_the_steps_of_the_tableau_that_it_is(chart):
     np.testing.assert_allclose(mine["p_psi"].values, ours["p_psi"].values, rtol=1e-12)
     ended = run_of(PythonStep(lambda f, t, y, h: midpoint(f, t, y, h) * (1.0 if t < 0.45 else np.nan), chart))
     assert [ended.attrs[key] for key in ("outcome", "reached_time", "steps")] == ["not_finite", 0.4, 100]
+    assert run_of(PythonStep(lambda f, t, y, h: -abs(y) if t > 0.3 else y, "angles"))["theta"].count() == 2  # has left
 
 
 def test_a_scipy_class_makes_the_steps_that_it_is_told_to():
@@ -112,22 +113,23 @@ def program(folder, body):
     return f"{sys.executable} {file}"
 
 
-STILL = "n, stride = map(int, numbers[4:6])\nfor k in range(0, n + 1, stride): print(*numbers[6:12])"
-RAW = "from array import array\nprint = lambda *x: sys.stdout.buffer.write(array('d', map(float, x)))\n" + STILL
+STILL = "n, stride = map(int, numbers[4:6])\nfor k in range(0, n + 1, stride): print(*numbers[6:12], sep=',')"
+RAW = "from array import array\nprint = lambda *x, sep: sys.stdout.buffer.write(array('d', map(float, x)))\n" + STILL
 
 
-@pytest.mark.parametrize("body", [STILL, RAW])
+@pytest.mark.parametrize("body", [STILL, RAW, STILL.replace("*numbers[6:12]", "*(-float(x) for x in numbers[6:12])")])
 def test_a_program_gets_one_line_and_writes_states(tmp_path, body):
     stepper = open_target(program(tmp_path, body), "program", "axis")
     par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
     states, _ = stepper.march(SPHEROID.top, par, np.array(state), 0.5, np.array([0, 6, 9]))
-    np.testing.assert_array_equal(states, [state] * 3)
+    np.testing.assert_array_equal(np.abs(states), np.abs([state] * 3))  # of a quaternion, either sign
 
 
 @pytest.mark.parametrize(("body", "words"), [
     ("print(1, 2, 3)", "must write 4 states of 6 numbers .* 24 in all, not 3"),
     ("print('moved to', *numbers)", "must write numbers, as text or as raw doubles, not 'moved to"),
     ("sys.exit('no licence')", "ended with code 1: no licence"),
+    (f"{STILL}\nsys.stdout.flush()\nimport os; os.kill(os.getpid(), 9)", "ended with code -9: it said nothing"),
     ("print(*range(24))", "must write the start that it was given as the first of its states, not 0, 1, 2"),
     ("import time; time.sleep(9)", "had not ended 1 s after it was asked for 3 steps of 0.1"),
 ])  # fmt: skip
@@ -469,6 +471,8 @@ def test_a_step_of_rotation_matrices_is_judged_as_one_of_quaternions_until_it_is
     assert matrices.attrs["outcome"] == quaternions.attrs["outcome"] == "ok"
     np.testing.assert_allclose(matrices["axis"].values, quaternions["axis"].values, atol=1e-11)
     np.testing.assert_allclose(matrices["p_phi"].values, quaternions["p_phi"].values, rtol=1e-10)
+    longer = lambda q, w, h, inertia, torque: euler_of_quaternions(q, w, h, inertia, lambda at: torque(2.0 * at))
+    np.testing.assert_allclose(of_rotation(longer, 0.01, 2.0)["axis"], quaternions["axis"], atol=1e-11)
     errors = [float(symtop.errors(of_rotation(euler_of_matrices, h, 0.5))["axis"].max()) for h in (2e-3, 1e-3)]
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)  # order 1
     # SciPy raises an error of its own where one is left-handed, as a step that blows up may return it.

@@ -22,7 +22,7 @@ from symtop.judging.claims import constants, constants as long, order, structure
 from symtop.judging.claims.constants import long_run
 from symtop.judging.claims.step_series import Series
 from symtop.judging.claims.subject import Subject, seconds_a_step
-from symtop.judging.findings import VERDICTS, Finding, Measured, description, pace
+from symtop.judging.findings import VERDICTS, About, Finding, Ledger, Measured, description, pace
 from symtop.judging.remote import Process, separated, solvers_of
 from symtop.measure.conservation import Changed, behaviour
 from symtop.measure.order import Fit
@@ -383,8 +383,13 @@ def test_the_series_of_a_step_beside_a_pole_is_not_taken():
 
 def test_a_time_has_the_unit_that_suits_what_is_printed_and_a_least_order_is_said_to_be_one():
     assert [pace(seconds) for seconds in (5.4321e-6, 999.4e-6, 999.7e-6, 0.0)] == ["5.43 us", "999 us", "1 ms", "0 ns"]
-    for text, words in (("2 or more", "order 2 or more"), ("2: the h^3 term is off", "order 2")):
-        assert description([Finding("order", "", Measured("by a term", 2.0, text=text), "measured", "")]) == words
+    for text, words in (("2 or more", "order 2 or more"), ("2: the h^3 term is off", "order 2"), ("", "order 2.4")):
+        assert description([Finding("order", "", Measured("", 2 if text else 2.4, text), "measured", "")]) == words
+    walks = Finding("p_psi", "", Measured("random walk", 1e-11), "measured", "", math.inf)
+    runs = {"step_size": np.array([1.0, 0.5, 0.25]), "error": np.array([np.nan, np.nan, 1e-3])}
+    told = str(Ledger("mine", "any", (walks,), runs, About(nutation=8.0)))
+    assert re.search(r" 8 to 32 steps .* order \(16 and fewer fail\)(.|\n)*; does not keep p_psi\.", told)
+    assert walks.plain()["value"] is None
 
 
 FREE, HEAVY = (body_scenes()[name] for name in ("check-case-2", "heavy-brick"))

@@ -82,6 +82,9 @@ def test_failed_settings_stay_with_their_outcome_and_are_drawn(data):
     assert failed_setting(cell).startswith(words)
     assert failed_setting(data.sel(variant="taylor[axis]")) == ""
     ax = symtop.plot(data)
+    crosses = np.vstack([one.get_offsets() for one in ax.collections])
+    np.testing.assert_array_equal(crosses[:, 0], cell["force_evaluations"].values[failed])
+    np.testing.assert_array_equal([text.xy[1] for text in ax.texts], data["error"].min("setting"))
     labels = [text.get_text() for text in ax.texts]
     assert f"stormer-verlet[angles]: {words}" in labels
     assert len({text.split(":")[0] for text in labels} & set(data["variant"].values)) == data.sizes["variant"]
@@ -117,6 +120,7 @@ def test_own_scenes_and_methods_engines_and_scipy_take_part(clean_registry, tmp_
     ax = symtop.plot(netcdf.read(tmp_path / "c.nc"))
     names = ["refusing[axis] (Python): no run ended well", "rk45[axis] (SciPy)", "rk4[axis]"]
     assert set(names) <= {text.get_text() for text in ax.texts}
+    assert data["exact_seconds"].item() in [one.get_xdata()[0] for one in ax.get_lines() if len(one.get_xdata())]
 
 
 @pytest.mark.parametrize("quantity", ["attitude", "energy"])

@@ -67,6 +67,8 @@ def test_a_sweep_that_was_stopped_goes_on_from_its_file(tmp_path, monkeypatch):
     assert ran == []
     symtop.sweep(["spheroid", "goldstein"], METHODS, **{**call, "tolerance": [1e-5]})
     assert ran == [("spheroid", "rk45-compiled"), ("goldstein", "rk45-compiled")]
+    symtop.sweep(["spheroid", "goldstein"], METHODS, **call, observe="axis")
+    assert len(ran) == 2 + 8
 
 
 def test_failures_are_rows():
@@ -174,6 +176,9 @@ def test_times_are_those_of_runs_that_ended_well_and_are_kept(tmp_path):
     assert "one call of the method's solver" in data.attrs["timed"]
     again = symtop.sweep("spheroid", ["rk4", "strang"], **options)
     np.testing.assert_array_equal(again["seconds"].values, data["seconds"].values)
+    solvers = {"attitude": lambda *_: pytest.fail("another chart"), "axis": symtop.integrator("rk4").solvers["axis"]}
+    both, asked = symtop.Integrator("both", "other", "", solvers), options | {"path": None, "observe": "axis"}
+    assert symtop.sweep("spheroid", both, **asked)["seconds"].values[0, 0, 0] > 0.0
     untimed = symtop.sweep("spheroid", "rk4", step_size=0.1, quiet=True)
     assert "seconds" not in untimed
     assert untimed.attrs["timed"].startswith("nothing")

@@ -78,6 +78,8 @@ def test_a_figure_that_cannot_be_read_is_found(monkeypatch):
         axes[0, 0].plot([0.0, k], color="C0", label=f"line {k}")
     style.legend_below(figure, axes)
     assert {"a legend of 12 entries", "12 coloured lines"} <= set(faults("factors", figure))
+    style.slope_guide(axes[0, 0], 2.0, (1.0, 10.0), 1e-3, "order 2")
+    assert axes[0, 0].get_lines()[-1].get_ydata() == pytest.approx([1e-3, 1e-1])
     figure.suptitle("")
     assert "no message" in faults("factors", figure)
 
@@ -137,6 +139,7 @@ def test_no_two_integrators_look_alike_and_a_formula_has_one_colour():
     for name in symtop.integrators():
         colors.setdefault(name.replace("-compiled", "").removesuffix("-fixed"), set()).add(style.look(name).color)
     assert [formula for formula, several in colors.items() if len(several) > 1] == []
+    assert [style.look(f"rk4[{chart}]").fill for chart in ("angles", "axis", "attitude")] == ["none", "full", "left"]
     assert len({*colors["vern9"], *colors["tsit5"], *colors["rk45"], *colors["dop853"], *colors["rk4"]}) == 5
 
 

@@ -6,6 +6,7 @@ import pytest
 
 import symtop
 from symtop.core.errors import SymtopError
+from symtop.report.plot import draw_ensemble
 from symtop.report.spread import LEVELS, at_places, largest, member_errors, spread
 from symtop.report.style import save
 from tests.commands import call
@@ -41,7 +42,9 @@ def test_an_ensemble_of_short_runs_is_drawn_over_time(n, per_nutation):
     ax = symtop.plot(runs, members=tops)
     assert ax.get_title() == ("strang on 1 top" if n == 1 else "strang on 40 tops")
     times = ax.get_lines()[0].get_xdata()
-    assert times.size == per_nutation
+    assert (times.size, times[-1]) == (per_nutation, pytest.approx(runs["horizon"].item() if n == 1 else 1.0))
+    middle = spread(at_places(runs, member_errors(tops, runs, "axis"))[1], (0.5,))[0, -per_nutation:]
+    np.testing.assert_array_equal(ax.get_lines()[0].get_ydata(), middle)
     ax.figure.canvas.draw()
 
 
@@ -67,6 +70,7 @@ def sweep():
 def test_one_integrator_or_scene_of_a_sweep_is_drawn(sweep):
     whole = {line.get_label(): line for line in symtop.plot(sweep, plt.figure().gca(), x="steps").get_lines()}
     assert len(whole) == 4
+    assert {key.split()[-1]: one.get_linestyle() for key, one in whole.items()} == {"spheroid": "-", "goldstein": "--"}
     for part in (sweep.isel(variant=0), sweep.isel(scene=1), sweep.isel(variant=0, scene=1)):
         lines = symtop.plot(part, plt.figure().gca(), x="steps").get_lines()
         assert len(lines) == (2 if "scene" in part.dims else 1) * (2 if "variant" in part.dims else 1)
@@ -87,6 +91,10 @@ def test_a_run_that_fails_in_its_first_step_is_drawn(step, shown, tmp_path, monk
     call("run", "spheroid", "midpoint", "--step-size", step, "--no-guard", "--figure", tmp_path / "f.png", code=3)
     errors = [line for line in drawn[0].axes[1].get_lines() if line.get_label() != "stopped here"]
     assert [np.isfinite(line.get_ydata()).sum() for line in errors] == [shown] * (3 if shown else 0)
+    lines = {one.get_label(): one for axis in drawn[0].axes for one in axis.get_lines()}
+    assert lines["true theta"].get_ydata()[0] == pytest.approx(np.degrees(symtop.scene("spheroid").start.theta))
+    assert lines["stopped here"].get_xdata()[0] == (3.0 if shown else 0.0)
+    assert not shown or np.nanmin(lines["residual of energy, relative"].get_ydata()) > 1e-3  # the energy is less
 
 
 @pytest.mark.parametrize(("samples", "marker"), [(2, "o"), (3, "None")])
@@ -120,12 +128,15 @@ SOME = symtop.population(30, seed=7)
 ASKED = {"per_nutation": 30, "nutations": 2, "samples": 41, "quiet": True}
 
 
-def test_quantiles_are_members_failed_ones_infinitely_wrong_and_samples_a_run_has_not_no_errors():
+def test_quantiles_are_members_failed_ones_infinitely_wrong_and_samples_a_run_has_not_no_errors(monkeypatch):
     data = symtop.ensemble(symtop.population(200, seed=3), "stormer-verlet", **ASKED)
     errors = member_errors(symtop.population(200, seed=3), data, "axis")
     failed = data.outcome.values != "ok"
     assert 0 < failed.sum() < 100
     np.testing.assert_array_equal(np.isinf(largest(errors)), failed)
+    monkeypatch.setattr("symtop.report.plot.save", lambda *_: None)
+    draw_ensemble(data, {"axis": errors}, "f.png")
+    assert f"{100.0 * (1.0 - failed.mean()):.4g} % of the runs ended ok" in " ".join(plt.gcf().get_suptitle().split())
     quantiles = spread(errors)
     assert quantiles.shape == (len(LEVELS), 41)
     assert np.isfinite(quantiles[2]).all()

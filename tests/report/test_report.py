@@ -267,7 +267,10 @@ def test_words_follow_from_the_stored_data_and_findings_that_are_not_whole_are_t
     shutil.copytree(results, tmp_path, dirs_exist_ok=True)
     for file in tmp_path.glob("*.json"):  # findings may be of an earlier day
         file.write_text(re.sub(r'"symtop_version": "[^"]+"', '"symtop_version": "0.0.1"', file.read_text("utf-8")))
+    last = tmp_path / f"{page.gather(tmp_path)[-1]['study']}.json"
+    last.write_text(last.read_text("utf-8").replace("0.0.1", "0.0.2").replace('"quick": false', '"quick": true'))
     text = page.write(tmp_path).read_text(encoding="utf-8")
+    assert (page.QUICK in text, "0.0.2" in (tmp_path / "reference.md").read_text("utf-8")) == (True, True)
     assert f"by symtop {symtop.__version__}, revision " in text
 
 
