@@ -370,7 +370,7 @@ def _same(variant: str, usable: Sequence[str]) -> str | None:
 
 
 def _menu(question: _Question) -> list[str]:
-    """Of the methods that the user can use, those that the table names; none where it does not answer.
+    """Of the methods that the user can use, the first six that the table names; none where it does not answer.
 
     Where energy or momenta of a top are to be kept, the table's methods that do so come first, and then those of every
     class; on bodies their order is another.
@@ -380,11 +380,11 @@ def _menu(question: _Question) -> list[str]:
         return []
     if question.keeps and scene.of_body:
         return []
-    nutations, usable = horizon / scene.time_scale(horizon), _everyone(question)
-    rows = list[str]()
-    for needs in (question.needs, OF_ANY)[: 2 if question.keeps and not question.needs else 1]:
-        rows += cheapest(needs, quantity, accuracy, nutations, general=question.general or scene.of_body)
-    menu = list(dict.fromkeys(name for row in rows if (name := _same(row, usable))))
+    asked, general = (quantity, accuracy, horizon / scene.time_scale(horizon)), question.general or scene.of_body
+    rows, usable = cheapest(question.needs, *asked, general=general), _everyone(question)
+    if question.keeps and not question.needs:
+        rows += cheapest(OF_ANY, *asked, general=general)
+    menu = list(dict.fromkeys(name for row in rows if (name := _same(row, usable))))[: FEW + 1]
     return menu if len(menu) >= AGREED or not question.keeps else []
 
 

@@ -214,6 +214,7 @@ def test_the_table_names_methods_for_every_class_and_none_where_a_user_limits_st
         assert {symtop.integrator(name).needs for name in advise._menu(ask((need,)))} == {need}
     both = advise._menu(ask(("derivative", "kicks")))
     assert {symtop.integrator(name).needs for name in both[:2]} == {"derivative", "kicks"}
+    assert len(both) == 6  # all that are tried before all methods are: none is left out then
     assert all(symtop.integrator(name).general for name in advise._menu(ask((), general=True)))
     for limit in ({"step": 0.01}, {"max_step": 0.1}, {"pace": 1e-3}):
         assert advise._menu(ask((), **limit)) == []

@@ -23,8 +23,8 @@ from .tops import NATURAL, named, tops_of
 SEED = 1
 SHORT, LONG, TOPS, PRICES, FAR, CHECKS = "short", "long", "tops", "prices", "far", "checks"  # groups of cases
 SAFE = cells.CONFIRMED
-# Of 1400 tops (410 in the long runs) half, drawn twice, called 97 and 96 of the same 102 winners and no other in their
-# place; intervals of the shares were a tenth wider: most of their width is the error of the prices.
+# Twice as many tops would make the intervals of shares a tenth narrower and call 5 more of 100 winners, none of them
+# another: most of the width is the error of the prices.
 FULL = {
     SHORT: {"strata": 400, "natural": 400, "seed": SEED, "nutations": 10.0, "budget": 4e4, "guarded": 60},
     LONG: {"strata": 150, "natural": 100, "seed": SEED, "nutations": 1000.0, "budget": 5e5, "guarded": 0},

@@ -117,12 +117,19 @@ STILL = "n, stride = map(int, numbers[4:6])\nfor k in range(0, n + 1, stride): p
 RAW = "from array import array\nprint = lambda *x, sep: sys.stdout.buffer.write(array('d', map(float, x)))\n" + STILL
 
 
-@pytest.mark.parametrize("body", [STILL, RAW, STILL.replace("*numbers[6:12]", "*(-float(x) for x in numbers[6:12])")])
-def test_a_program_gets_one_line_and_writes_states(tmp_path, body):
-    stepper = open_target(program(tmp_path, body), "program", "axis")
+FLIPPED = STILL.replace("*numbers[6:12]", "*(-float(x) for x in numbers[6:10]), *numbers[10:]")
+TURNED = STILL.replace("*numbers[6:12]", "numbers[6], float(numbers[7]) + 6.283185307179586, *numbers[8:]")
+
+
+@pytest.mark.parametrize(("body", "chart", "changed"), [
+    (STILL, "axis", lambda y: y), (RAW, "axis", lambda y: y), (FLIPPED, "attitude", lambda y: [*-y[:4], *y[4:]]),
+    (TURNED, "angles", lambda y: [y[0], y[1] + 2.0 * np.pi, *y[2:]]),
+])  # fmt: skip
+def test_a_program_gets_one_line_and_writes_states(tmp_path, body, chart, changed):
+    stepper = open_target(program(tmp_path, body), "program", chart)
     par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
     states, _ = stepper.march(SPHEROID.top, par, np.array(state), 0.5, np.array([0, 6, 9]))
-    np.testing.assert_array_equal(np.abs(states), np.abs([state] * 3))  # of a quaternion, either sign
+    np.testing.assert_array_equal(states, [changed(np.array(state))] * 3)
 
 
 @pytest.mark.parametrize(("body", "words"), [
@@ -131,6 +138,7 @@ def test_a_program_gets_one_line_and_writes_states(tmp_path, body):
     ("sys.exit('no licence')", "ended with code 1: no licence"),
     (f"{STILL}\nsys.stdout.flush()\nimport os; os.kill(os.getpid(), 9)", "ended with code -9: it said nothing"),
     ("print(*range(24))", "must write the start that it was given as the first of its states, not 0, 1, 2"),
+    ("print(*[-5] * 24)", "must write the start that it was given as the first of its states, not -5, -5"),
     ("import time; time.sleep(9)", "had not ended 1 s after it was asked for 3 steps of 0.1"),
 ])  # fmt: skip
 def test_a_program_that_writes_anything_else_is_told_so(tmp_path, body, words, monkeypatch):

@@ -44,7 +44,7 @@ from symtop.core.errors import SymtopError, at_home
 from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat, in_runs, label_of, relative_gap, repeat
 from symtop.judging.adapters.python_step import MOST_NEWTON, state_like
 from symtop.methods.framework.equations import FORMULATIONS
-from symtop.methods.framework.plan import Array
+from symtop.methods.framework.plan import QUATERNIONS, Array
 from symtop.model.top import SymmetricTop
 
 MOST = 20_000  # steps of one call, so that a call that hangs is told from a long run
@@ -121,9 +121,12 @@ class Program(Stepper):
         numbers = [top.I1, top.I3, top.mgl, h, last, stride, *y.tolist()]
         answer = self._answer(" ".join(map(repr, numbers)) + "\n", h, last)
         states = _states(answer, last // stride + 1, y.size, self.name)
-        # the start, but for rounding, the sign of a quaternion and whole turns
-        near = np.abs([states[0] - y, states[0] + y, np.sin(0.5 * (states[0] - y))]).min(axis=0)
-        if np.isfinite(states[0]).all() and not (near <= SHORT * np.abs(y).max()).all():
+        off = states[0] - y  # the start, but for rounding, the sign of a quaternion and whole turns of an angle
+        if self.chart in QUATERNIONS and states[0, :4] @ y[:4] < 0.0:
+            off[:4] = states[0, :4] + y[:4]
+        if self.chart == "angles":
+            off[:3] = np.sin(0.5 * off[:3])
+        if np.isfinite(states[0]).all() and not (np.abs(off) <= SHORT * np.abs(y).max()).all():
             first = ", ".join(f"{value:.4g}" for value in states[0])
             words = f"{self.name} must write the start that it was given as the first of its states, not {first}"
             raise SymtopError(words)
