@@ -132,6 +132,12 @@ def test_a_program_gets_one_line_and_writes_states(tmp_path, body, chart, change
     np.testing.assert_array_equal(states, [changed(np.array(state))] * 3)
 
 
+def test_text_as_long_as_raw_doubles_is_text(tmp_path):
+    stepper = open_target(program(tmp_path, "print(*['5.00000'] * 24)"), "program", "axis")
+    states, _ = stepper.march(SPHEROID.top, None, np.full(6, 5.0), 0.1, np.array([0, 1, 2, 3]))
+    np.testing.assert_array_equal(states, np.full((4, 6), 5.0))
+
+
 @pytest.mark.parametrize(("body", "words"), [
     ("print(1, 2, 3)", "must write 4 states of 6 numbers .* 24 in all, not 3"),
     ("print('moved to', *numbers)", "must write numbers, as text or as raw doubles, not 'moved to"),
