@@ -7,9 +7,9 @@ from typing import Any
 import click
 
 from symtop.cli import common
-from symtop.cli.clock import ticking
 from symtop.cli.common import File, as_text, check_outputs, completing, json_option, plugin_option, say, say_written
 from symtop.core.errors import SymtopError
+from symtop.core.progress import ticking
 from symtop.judging import FORMS
 
 BESIDE, NUTATIONS, MOST_BESIDE = ("rk4", "strang", "dop853", "taylor"), 10.0, 2e4  # of runs, and their evaluations

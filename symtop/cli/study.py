@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from symtop.cli import common
-from symtop.cli.clock import ticking
 from symtop.cli.common import File, as_text, completing, json_option, plugin_option, results_option, separated
 from symtop.core.errors import SymtopError, positive
+from symtop.core.progress import ticking
 from symtop.core.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
 from symtop.report.formats import abridged, counted
 

@@ -187,10 +187,7 @@ class Part:
 
 
 class Code:
-    """Functions, classes and constants that things lead to, each looked at once.
-
-    `also` says what stands for a function once it is compiled.
-    """
+    """Functions, classes and constants that things lead to, each looked at once; `also`: what a function becomes."""
 
     def __init__(self, also: Parts = lambda _: ()) -> None:
         self._also = also
@@ -235,7 +232,6 @@ class Code:
         self._at.values.extend(values)
 
     def _lead_to(self, kind: str, name: str, file: str, thing: object) -> None:
-        """Let the present part lead to another one."""
         label = f"{kind} {file}:{name}"
         part = self._parts.get((label, id(thing)))
         if part is None:
@@ -309,7 +305,6 @@ class Code:
                 self._add_all(getattr(thing, name, None) for name in names)
 
     def _add_code(self, function: FunctionType) -> None:
-        """The code of a function, what it holds, the globals that it names and what it imports."""
         for part in codes(function.__code__):
             constants = [value for value in part.co_consts if not isinstance(value, CodeType)]
             if part is function.__code__ and constants[:1] == [function.__doc__]:

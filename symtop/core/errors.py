@@ -25,7 +25,6 @@ class SymtopError(ValueError):
 
     The message is one sentence that names the argument, the value it had and what is allowed. `parameters` are the
     names of arguments in the sentence, in whose places the command line writes its options.
-    The command line prints the sentence without a traceback and exits with code 2.
     """
 
     def __init__(self, sentence: object = "", *parameters: str) -> None:

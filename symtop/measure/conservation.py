@@ -111,10 +111,7 @@ def tops(
 
 
 def law(fit: Fit) -> str:
-    """The name of the exponent that a fit agrees with, within its interval or `SLACK`; otherwise the exponent.
-
-    "undecided" if another law lies within the interval as well.
-    """
+    """The name of the exponent that a fit agrees with, within its interval or `SLACK`; otherwise the exponent."""
     if not math.isfinite(fit.slope):
         return "not judged"
     nearest = min(LAWS, key=lambda exponent: abs(exponent - fit.slope))

@@ -252,10 +252,8 @@ def _stored(run: xr.Dataset | Mapping[str, Any], name: str) -> Any:
 
 
 def sampled(run: xr.Dataset) -> xr.Dataset:
-    """A run without the samples that it does not have: a member of an ensemble fills its row with times that are NaN.
-
-    Of other data times are left as they are, so that one that is no number is refused.
-    """
+    """A run without the samples that it does not have: members of an ensemble fill their rows with times of NaN."""
+    # of other data a time that is no number is refused later
     if "integrator" not in run.attrs or "time" not in run or run["time"].dims != ("time",):
         return run
     there = np.isfinite(doubles("time", run["time"]))
@@ -263,10 +261,7 @@ def sampled(run: xr.Dataset) -> xr.Dataset:
 
 
 def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
-    """The known variables of a foreign trajectory; an axis and a quaternion are scaled to length one.
-
-    Raises SymtopError for anything that is not such a trajectory.
-    """
+    """The known variables of a foreign trajectory, an axis and a quaternion at length one; SymtopError for all else."""
     if not isinstance(data, Mapping):  # a Dataset is one
         raise SymtopError(
             f"data must be a Dataset or a mapping with time and axis, quaternion or theta, not {type(data).__name__}"
@@ -337,11 +332,8 @@ def doubles(name: str, values: Any) -> charts.Array:
 
 
 def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:
-    """Refuse quaternions that are the true attitude only when they are read in another convention.
-
-    That is judged where they are first `FAR` from the truth: a scene may begin where two conventions agree.
-    """
-    true = truth["quaternion"].values
+    """Refuse quaternions that are the true attitude only when they are read in another convention."""
+    true = truth["quaternion"].values  # near which a scene may begin where two conventions agree
     far = np.flatnonzero(charts.attitude_distance(quaternion, true) > FAR)
     if not far.size:
         return
@@ -365,10 +357,7 @@ def elsewhere(time: charts.Array, errors: Mapping[str, charts.Array]) -> list[st
 
 
 def doubts(time: charts.Array, errors: Mapping[str, charts.Array], horizon: float) -> list[str]:
-    """What is wrong with a foreign trajectory as a whole: another clock, samples that are not numbers.
-
-    `horizon` is that of the scene: times far beyond it may be in another unit.
-    """
+    """What is wrong with a foreign trajectory as a whole: times far beyond the scene's horizon, samples of NaN."""
     sentences = []
     if time[-1] > BEYOND * horizon:
         sentences.append(

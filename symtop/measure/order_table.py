@@ -41,10 +41,7 @@ def observable(method: Integrator) -> str:
 
 
 def asymptotic_steps(table: xr.Dataset, quantity: str, power: int) -> list[float]:
-    """More steps where an error table's errors are a power of the step: from above rounding `DECADES` upwards.
-
-    A ladder over all decades has few steps there if the order `power` is high. Empty if every error is near its bound.
-    """
+    """More steps where errors are a power of the step, from above rounding `DECADES` up; none if all are rounding."""
     h, error, bound = (table[name].values for name in ("step_size", quantity, f"{quantity}_bound"))
     judged = np.flatnonzero(np.isfinite(error) & (error > 2.5 * ABOVE_ROUNDING * bound))
     if judged.size == 0:

@@ -189,10 +189,7 @@ def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, qu
 
 
 def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
-    """The least error of a quantity that the reference can judge over a horizon; NaN if the motion does not show it.
-
-    Raises SymtopError for a horizon to which the motion of a body is not known.
-    """
+    """The least error of a quantity that the reference can judge over a horizon; NaN if the motion does not show it."""
     if not scene.of_body:
         return attempt(scene, integrators()["exact"], math.nan, horizon, quantity).bound
     try:  # a few steps of any method, as the reference and its bound know none
@@ -207,9 +204,8 @@ def search(
 ) -> Met | str:  # fmt: skip
     """The coarsest setting found that meets the accuracy over the horizon, or the reason why there is none.
 
-    It begins at an error of about (h/period)^p, or of the tolerance, unless there is a guess. It ends with an error
-    between `least` of the accuracy and the accuracy, if that takes few runs. No run is begun that is foreseen to take
-    more than `patience` force evaluations, and none has a setting above `longest`.
+    It begins at an error of about (h/period)^p, or of the tolerance, unless there is a guess; no setting is above
+    `longest`. `patience` and `least` are those of `seek`.
     """
     finest, coarsest = limits(scene, method, horizon, quantity)
     ends, patience = (finest, min(coarsest, longest)), min(patience, MOST_EVALUATIONS[method.implementation])

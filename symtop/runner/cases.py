@@ -121,10 +121,7 @@ class StudyCases:
 def status(
     study: Study, results: Path, *, quick: bool = False, full: bool = False, why: bool = False
 ) -> list[dict[str, Any]]:
-    """Scene, integrator, state and message of every case; with `why` also what has changed since it was computed.
-
-    The second round of a study is known only when its first is done.
-    """
+    """Scene, integrator, state and message of every case; with `why` also what has changed since it was computed."""
     cases = StudyCases.stored(study, results, quick=quick, full=full)
     stored = store.stored(cases.results, study)
     older: dict[str, list[Path]] = {}

@@ -172,10 +172,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
         return self._analyses[-1]
 
     def run(self, study: Study, tasks: Sequence[Task], on_result: OnResult) -> None:
-        """Compute all tasks, timed ones last, and call `on_result` with each as it ends.
-
-        Timed cases run one at a time, or one on each core where a trial shows that they do not disturb each other.
-        """
+        """Compute all tasks, timed ones last, and call `on_result` with each as it ends."""
         for timed in (False, True):
             part = in_order([task for task in tasks if study.is_timed(task.case) == timed])
             if part and timed:

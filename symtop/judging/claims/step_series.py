@@ -88,10 +88,7 @@ class Series(NamedTuple):
 
 
 def step_series(step: StepMap, start: Angles, period: float) -> Series:
-    """The series of a step from `start`, a point of a motion with that nutation period.
-
-    Raises SymtopError if no step succeeds.
-    """
+    """The series of a step from a point of a motion with that nutation period; SymtopError if no step succeeds."""
     z, before = step.point(start), step.at(start)
     return compared(lambda h: aligned(step.chart, step.image(z, h), before), step.motion(start), period, step.chart)
 

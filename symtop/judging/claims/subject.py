@@ -91,16 +91,14 @@ class Subject:
         return not np.max(np.abs(end - y)) <= AT_REST * np.max(np.abs(y))
 
     def elsewhere(self, draws: tuple[int, int], seconds: tuple[float, float]) -> Iterator[tuple[str, Scene]]:
-        """Starts that are drawn, with a name for each, while there are draws and seconds; the second with --quick.
-
-        Between one and the next, runs of every other one begin at a late time.
-        """
+        """Starts that are drawn, with a name for each, while there are draws and seconds; the second with --quick."""
         began, draw, stepper = time.monotonic(), np.random.default_rng(self.seed), self.stepper or Stepper()
         scenes = drawn(self.scene, draws[self.quick], self.seed, same_top=self.knows_top)
         try:
             for k, scene in enumerate(scenes, start=1):
                 if time.monotonic() - began > seconds[self.quick]:  # a program that takes long to start
                     return
+                # what is run before the next one is drawn begins at a late time, every other time
                 stepper.since = 0.0 if k % 2 else scene.time_scale() * 10.0 ** draw.uniform(0.0, 3.0)
                 yield f"start {k} of seed {self.seed}" + f", t = {stepper.since:.3g}" * (k % 2 == 0), scene
         finally:
@@ -201,11 +199,8 @@ def declared(method: Integrator, claim: str) -> str:
 def open_target(
     target: Any, form: str | None, chart: str, *, on: Scene | None = None, adaptive: bool = False
 ) -> Stepper:  # fmt: skip
-    """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command; SymtopError for all else.
-
-    On the scene of a body without symmetry it steps the chart of bodies, whatever `chart` says.
-    """
-    chart = BODY if on is not None and on.of_body else one_of("chart", chart, CHARTS)
+    """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command; SymtopError for all else."""
+    chart = BODY if on is not None and on.of_body else one_of("chart", chart, CHARTS)  # a body has no other
     path, _, symbol = str(target).partition(":")
     shared = isinstance(target, (str, Path)) and path.endswith(LIBRARIES)
     kind = one_of("form", ("shared" if shared else "ode") if form is None else form, FORMS)
@@ -219,7 +214,6 @@ def open_target(
 
 
 def _python_step(thing: Any, name: str, chart: str, kind: str, *, adaptive: bool) -> Stepper:
-    """The stepper of something in Python."""
     if kind == "diffrax" or is_solver(thing):
         return DiffraxSolver(thing, chart, name)
     if isinstance(thing, type):
