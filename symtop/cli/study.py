@@ -177,11 +177,8 @@ def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str
         drawn = counted(summary["figures"], "figure")
         click.echo("{study}: {computed} of {cases} cases computed, {drawn}".format(drawn=drawn, **summary))
         files = [f"dataset {results / name}.nc", f"facts {results / name}.json"]
-        files += [
-            f"{kind} {results / kind / name}-*"
-            for kind, key in (("figures", "pictures"), ("tables", "tables"))
-            if findings[key]
-        ]
+        for kind, key in (("figures", "pictures"), ("tables", "tables")):
+            files += [f"{kind} {results / kind / name}-*"] * bool(findings[key])
         for line in (answer(findings, results), ", ".join(files)):
             if line:
                 click.echo(common.filled(f"  {line}"))

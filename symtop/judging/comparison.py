@@ -95,9 +95,8 @@ def compare(
             bar.set_description("timing")
             post("timing the runs")
             pairs = zip([exact, *variants], [rows, *(runs for runs, _ in results)], strict=True)
-            timed_rows(
-                [(problem, method, end, runs) for method, runs in pairs if method is not exact or not problem.of_body]
-            )
+            timed = [(problem, method, end, runs) for method, runs in pairs]
+            timed_rows(timed[1:] if problem.of_body else timed)
     size = max(len(runs) for runs, _ in results)
     blank: dict[str, Any] = {**SPENT, "message": "", "setting_value": math.nan}
     tables = [
@@ -112,9 +111,7 @@ def compare(
         reached=(("variant", "target"), [reached for _, reached in results]),
     )  # fmt: skip
     data = data.assign_coords(variant=names, target=list(settings.TARGETS), scene=problem.name)
-    entries = {
-        name: columns.ERROR_TABLE[f"{quantity}{name.removeprefix('error')}"] for name in ("error", "error_bound")
-    }
+    entries = {f"error{end}": columns.ERROR_TABLE[f"{quantity}{end}"] for end in ("", "_bound")}
     entries["target"] = "error that is accepted, largest over the run", *entries["error"][1:]
     own = {name: netcdf.Column(entry, {}) for name, entry in entries.items()}
     columns.described(data, problem.units, own, [problem.of_body])

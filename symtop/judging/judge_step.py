@@ -187,23 +187,17 @@ def read(target: Any) -> dict[str, Any]:
         raise SymtopError(f"{begin}, but of {head[:60]!r} {', '.join(wrong[:SHOWN])}{' ...' * (len(wrong) > SHOWN)}")
     if not any(one.partition("#")[0].strip() for one in lines):
         raise SymtopError(f"{path.name} must have a line of numbers below its names, and has none")
-    columns = _numbers(path.name, names, lines)
-    for name, parts in VECTORS.items():
-        if set(parts) <= set(columns):
-            columns[name] = np.stack([columns[part] for part in parts], axis=-1)
-    return {name: values for name, values in columns.items() if name in (*VECTORS, *SCALARS)}
-
-
-def _numbers(file: str, names: list[str], lines: list[str]) -> dict[str, np.ndarray]:
-    """Columns by name of the lines of a file."""
-    must = f"{file} must have {len(names)} numbers in each line"
+    must = f"{path.name} must have {len(names)} numbers in each line"
     try:
         rows = np.loadtxt(lines, ndmin=2)
     except ValueError as error:
         raise SymtopError(f"{must}: {str(error).partition(';')[0]}") from None
     if rows.shape[1] != len(names):
         raise SymtopError(f"{must}, not {rows.shape[1]}")
-    return dict(zip(names, rows.T, strict=True))
+    columns = dict(zip(names, rows.T, strict=True))
+    rows_of = {name: [columns[part] for part in parts] for name, parts in VECTORS.items() if parts[0] in names}
+    columns |= {name: np.stack(rows, axis=-1) for name, rows in rows_of.items()}
+    return {name: values for name, values in columns.items() if name in (*VECTORS, *SCALARS)}
 
 
 def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy: str | None) -> list[Finding]:

@@ -64,9 +64,8 @@ def compared(observe: str) -> list[Integrator]:
 
 def least_tolerance(method: Integrator) -> float:
     """The least tolerance that an adaptive method is tried with."""
-    return max(
-        method.least_tolerance, TEDIOUS if method.implementation == "python" and method.explicit is False else 0.0
-    )
+    tedious = method.implementation == "python" and method.explicit is False
+    return max(method.least_tolerance, TEDIOUS * tedious)
 
 
 def limits(scene: Scene, method: Integrator, horizon: float, quantity: str = "axis") -> tuple[float, float]:

@@ -91,11 +91,8 @@ def sweep(
     for words, names in (("scenes", [one.name for one in chosen]), ("integrators", [one.name for one in methods])):
         if not names or len(set(names)) < len(names):
             raise SymtopError(f"{words} must be one or more, each once, not {names!r}")
-    given = {
-        name: _settings(name, values)
-        for name, values in (("step_size", step_size), ("per_nutation", per_nutation), ("tolerance", tolerance))
-        if values is not None
-    }
+    asked = {"step_size": step_size, "per_nutation": per_nutation, "tolerance": tolerance}
+    given = {name: _settings(name, values) for name, values in asked.items() if values is not None}
     clock = boolean("timed", timed)
     grid = [[_cell(one, method, given, horizon, observe, clock) for method in methods] for one in chosen]
     cells = [cell for row in grid for cell in row]

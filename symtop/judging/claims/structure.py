@@ -52,7 +52,7 @@ Answer = tuple[bool | None, float, float, str]  # of a chart: yes, no or neither
 
 def measure(subject: Subject) -> list[Finding]:
     """The findings on symplectic and symmetric."""
-    by_chart = []
+    by_claim: dict[str, list[Finding]] = {"symplectic": [], "symmetric": []}
     for chart in subject.charts:
         answers: list[Answer] = []
         try:
@@ -67,13 +67,10 @@ def measure(subject: Subject) -> list[Finding]:
             answers = [_above(level, *answer) for level, answer in zip(hidden, answers, strict=True)]
         except SymtopError as error:
             answers += [(None, math.nan, math.nan, undecided("", "", str(error)).why)] * (2 - len(answers))
-        by_chart.append(
-            [
-                agreement(claim, getattr(subject.method, claim), yes, f"{why}, in the {chart} chart", value, least)
-                for claim, (yes, value, least, why) in zip(("symplectic", "symmetric"), answers, strict=True)
-            ]
-        )
-    return [max(findings, key=_badness) for findings in zip(*by_chart, strict=True)]
+        for claim, (yes, value, least, why) in zip(by_claim, answers, strict=True):
+            claimed, words = getattr(subject.method, claim), f"{why}, in the {chart} chart"
+            by_claim[claim].append(agreement(claim, claimed, yes, words, value, least))
+    return [max(findings, key=_badness) for findings in by_claim.values()]
 
 
 @dataclass(frozen=True)
