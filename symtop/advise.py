@@ -40,16 +40,8 @@ from symtop.measure import settings
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import FREQUENCIES
 from symtop.measure.ranking import cheapest
-from symtop.methods.framework.registry import (
-    NEEDS,
-    Integrator,
-    engines,
-    integrator,
-    integrators,
-    is_built_in,
-    methods,
-    split_name,
-)
+from symtop.methods.framework import registry
+from symtop.methods.framework.registry import NEEDS, Integrator, integrator, is_built_in, split_name
 from symtop.model import scenes
 from symtop.model.charts import BODY
 from symtop.model.exact import closed_form
@@ -138,8 +130,6 @@ class Advice:
 
 
 class _Question(NamedTuple):
-    """What is asked for."""
-
     scene: Scene
     accuracy: float
     quantity: str
@@ -152,7 +142,6 @@ class _Question(NamedTuple):
     pace: float = math.inf  # most seconds of a step
 
     def advice(self, **facts: Any) -> Advice:
-        """An answer."""
         return Advice(self.scene.name, self.quantity, self.accuracy, self.horizon, **facts)
 
     def trial(self, run: settings.Met) -> "_Trial":
@@ -249,8 +238,8 @@ def recommend(
     elif search.of_table:
         source = f"tried the {search.of_table} methods that {source}"
     # Times of the user's own methods in plain Python say nothing beside those of compiled ones.
-    own = [one.name for one in integrators().values() if one.implementation == "python" and not is_built_in(one.name)]
-    if own:
+    every = registry.integrators().values()
+    if own := [one.name for one in every if one.implementation == "python" and not is_built_in(one.name)]:
         fails["Not tried, as only compiled methods are timed"] = own
     errors = [f"{name} {error:.2e}" for name, error in sorted(search.errors_at_step.items(), key=lambda one: one[1])]
     fails = {MISSES_AT_STEP: errors} | fails if errors else fails
@@ -348,9 +337,9 @@ class _Search:
 
 
 def _everyone(question: _Question) -> list[str]:
-    """Every compiled method that the user can use, in the charts that show the quantity, which its name then has."""
+    """Every compiled method that the user can use, in each chart that shows the quantity."""
     if question.scene.of_body:
-        names = [method.name for method in methods().values() if BODY in method.solvers]
+        names = [method.name for method in registry.methods().values() if BODY in method.solvers]
     else:
         rows = settings.compared(settings.observed(question.quantity))
         names = [row.name if len(integrator(row.method).charts()) > 1 else row.method for row in rows]
@@ -495,7 +484,6 @@ def _times(ratio: float) -> str:
 
 
 def _the_motion(question: _Question, limit: float) -> Advice:
-    """The answer to whoever has the motion itself, whose error is below a limit."""
     scene, accuracy, quantity, horizon = question[:4]
     closed_form.compile_now()  # its time is the answer
     exact, seconds = integrator("exact"), _exact_seconds(question)
@@ -527,7 +515,6 @@ def _solvers(method: Integrator) -> Collection[str]:
 
 
 def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
-    """The best of what is made for this top."""
     times = [f", {_times(one.seconds / best)} the time" if math.isfinite(best) else "" for one in trials]
     return "".join(f"Made for this top: {one.words()}{time}." for one, time in zip(trials, times, strict=True))
 
@@ -553,7 +540,6 @@ def command_of(scene: Scene, name: str, control: str, setting: float | None, hor
 
 
 def _exact_seconds(question: _Question) -> float:
-    """Seconds of the exact motion at the horizon, once it is compiled."""
     scene, _, quantity, horizon = question[:4]
     exact = settings.Met(integrator("exact"), math.nan, 0.0, 0.0, horizon, 0.0)
     return settings.seconds(scene, [exact], quantity, horizon)[0]
@@ -623,7 +609,7 @@ class EngineAdvice:
 
 def _settings() -> dict[str, dict[str, str]]:
     """The maps by the settings of each engine, and each map by itself where no engine has its name."""
-    return SETTINGS | {name: {name: name} for name in engines() if name not in SETTINGS}
+    return SETTINGS | {name: {name: name} for name in registry.engines() if name not in SETTINGS}
 
 
 def i_use(

@@ -135,8 +135,7 @@ def scenes(name: Any, wide: bool, as_json: bool) -> None:
     """
     from symtop.model import scenes as catalogue
 
-    listed = list(catalogue.all_scenes().values())
-    entries = [catalogue.scene(name, bodies=True)] if name is not None else listed
+    entries = [*catalogue.all_scenes().values()] if name is None else [catalogue.scene(name, bodies=True)]
     records: list[Record] = [scene.record() for scene in entries]
     keys = {"name": "name", "horizon": "horizon", "nutation": "nutation period", "purpose": "purpose"}
     short: list[Record] = [{column: record[key] for column, key in keys.items()} for record in records]

@@ -121,8 +121,7 @@ def run_all(
 
     save = style.sketch if grid["quick"] else style.publish  # quick figures are to look at, not to print
     options |= {"save": save, "beside": len(studies) > 1, **grid}
-    ended = _in_order(pool, studies, results, options)
-    summaries = [_summary(findings, results, as_json) for findings in ended]
+    summaries = [_summary(findings, results, as_json) for findings in _in_order(pool, studies, results, options)]
     if as_json:
         click.echo(as_text(summaries))
     elif summaries:

@@ -187,7 +187,7 @@ class Part:
 
 
 class Code:
-    """Functions, classes and constants that things lead to, each looked at once; `also`: what a function becomes."""
+    """Functions, classes and constants that things lead to, each looked at once; `also`: what is compiled for one."""
 
     def __init__(self, also: Parts = lambda _: ()) -> None:
         self._also = also

@@ -38,7 +38,7 @@ class Column(NamedTuple):
 
 
 def read_columns(file: Path | None) -> dict[str, Column]:
-    """The table in a file, as `symtop.measure.columns` describes it, empty without one; SymtopError for another."""
+    """The table in a file, as `symtop.measure.columns` describes it, empty without one; SymtopError for a wrong one."""
     table: dict[str, Column] = {}
     lines = [] if file is None else file.read_text(encoding="utf-8").splitlines()
     for place, line in enumerate(lines[1:], 2):
@@ -69,8 +69,7 @@ def _git(*arguments: str) -> str:
     command = ["git", "-C", str(ROOT), *arguments]
     with contextlib.suppress(OSError, subprocess.SubprocessError):
         if (ROOT / ".git").exists():  # git would take that of a folder above
-            result = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)  # noqa: S603
-            return result.stdout.strip()
+            return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True).stdout.strip()  # noqa: S603
     return ""
 
 

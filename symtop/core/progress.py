@@ -12,7 +12,7 @@ from typing import Any
 
 from symtop.core.files import is_terminal
 
-BEAT = 1.0  # seconds from one drawing to the next
+BEAT = 1.0  # seconds from one drawing to the next, although nothing is finished
 FIRST, EVERY = 2.0, 9.0  # seconds to the first line of a command in a pipe, and from one to the next
 listeners: list[Callable[[str], object]] = []  # of the command that runs
 
@@ -25,10 +25,7 @@ def post(words: str) -> None:
 
 @contextlib.contextmanager
 def progress_bar(words: str, *, quiet: bool = False, **options: Any) -> Iterator[Any]:
-    """A progress bar of tqdm, or without options the words and the time since, where somebody is watching.
-
-    It is drawn again each second although nothing is finished, and closed at the end.
-    """
+    """A progress bar of tqdm, or without options the words and the time since, where somebody is watching."""
     from tqdm import tqdm
 
     options = options or {"total": 1, "bar_format": "{desc}: {elapsed}"}

@@ -136,7 +136,6 @@ def find(method: Any, on: Scene) -> Integrator:
 def _runs(
     scene: Scene, method: Integrator, horizon: float, budget: float, quantity: str
 ) -> tuple[list[dict[str, Any]], list[str]]:
-    """All runs of a variant, coarse to fine, and whether each target was met, or why not."""
     rows: dict[float, dict[str, Any]] = {}
     observe = settings.observed(quantity)
 

@@ -1,8 +1,5 @@
 """judge(): anybody's integrator against its claims in a process of its own; or a trajectory, as far as it shows them.
 
-*A step* runs in a process of its own (`symtop.judging.remote`); one that hangs, crashes or takes too long costs the
-verdicts of one stage, which stay undecided and say why.
-
 *A trajectory without a method*: its errors are against the true motion of the scene (`symtop.measure.errors`). Where
 the angular momentum L in space is there, energy and momenta are recomputed from it, whatever the file reports,
 
@@ -224,7 +221,11 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
     deviation = errors(columns, scene)
     time = deviation["time"].values
     if rates is not None and scene.of_body:
-        deviation = deviation.assign({name: ("time", values) for name, values in _of_rates(scene, time, rates).items()})
+        truth, moments = reference(scene, time), np.array(scene.top.moments)
+        inside = rotated(truth["quaternion"].values * CONJUGATE, truth["momentum"].values)
+        bound = scene.momentum_scale / moments.min() * (truth["attitude_error_bound"].values + 4.0 * EPSILON)
+        off = np.linalg.norm(rates - inside / moments, axis=1)
+        deviation = deviation.assign(rates=("time", off), rates_bound=("time", bound))
     findings = [_error(name, scene, time, deviation) for name in OF_STATES if name in deviation]
     own = _from_states(scene, states)
     for name in (*CONSTANTS, *sorted({*conserves} - {*CONSTANTS})):
@@ -251,14 +252,6 @@ def _refuse_contradiction(states: Trajectory, scene: Scene) -> None:
             f"axis and quaternion must show one attitude within {AGREE:g} rad, but at t = {states.time[k]:.6g} the "
             f"axis is {apart[k]:.2g} rad from that of the quaternion"
         )
-
-
-def _of_rates(scene: Scene, time: np.ndarray, rates: np.ndarray) -> dict[str, np.ndarray]:
-    """The error of the rates (n, 3) of a body, rad per unit time, and its bound."""
-    truth, moments = reference(scene, time), np.array(scene.top.moments)
-    inside = rotated(truth["quaternion"].values * CONJUGATE, truth["momentum"].values)
-    bound = scene.momentum_scale / moments.min() * (truth["attitude_error_bound"].values + 4.0 * EPSILON)
-    return {"rates": np.linalg.norm(rates - inside / moments, axis=1), "rates_bound": bound}
 
 
 def _from_states(scene: Scene, states: Trajectory) -> dict[str, np.ndarray]:

@@ -88,11 +88,8 @@ def residuals(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
 
 
 def growth(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> Fit:
-    """The exponent of |residual| ~ t^exponent, from the largest values in logarithmic windows of the last `decades`.
-
-    What happens within the first nutations is an oscillation that switches on, not growth.
-    """
-    return power_law(*tops(time, residual, decades))
+    """The exponent of |residual| ~ t^exponent, from the largest values in logarithmic windows of the last `decades`."""
+    return power_law(*tops(time, residual, decades))  # within the first nutations an oscillation only switches on
 
 
 def tops(

@@ -28,7 +28,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.core import netcdf
-from symtop.core.errors import SymtopError, SymtopWarning, one_of, positive
+from symtop.core.errors import SymtopError, SymtopWarning, one_of
 from symtop.core.numbers import EPSILON
 from symtop.measure.conservation import CONSTANTS
 from symtop.methods.framework.lanes import members_of
@@ -222,10 +222,7 @@ def scene_of(run: xr.Dataset | Mapping[str, Any]) -> Scene:
     """The scene that a dataset of `simulate` says that it was made of; SymtopError for any other data."""
     attributes = getattr(run, "attrs", {})
     try:
-        top, start = (json.loads(attributes[name]) for name in ("top", "start"))
-        name, horizon = str(attributes["scene"]), positive("horizon", attributes["horizon"])
-        kinds = (RigidBody, Attitude) if "I2" in top else (SymmetricTop, Angles)
-        return Scene(name, kinds[0](**top), kinds[1](**start), horizon)
+        return Scene(str(attributes["scene"]), _stored(run, "top"), _stored(run, "start"), attributes["horizon"])
     except (KeyError, TypeError, ValueError) as error:
         raise SymtopError(
             "scene is missing: these data do not say of which top and start they are, so give errors(data, scene)"

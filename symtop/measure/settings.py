@@ -41,11 +41,8 @@ TRIED = f"Not within {TRIES} runs"
 
 
 def smallest_charts(observe: str) -> list[Integrator]:
-    """Every method in each chart that shows `observe`, but for the attitude's where it has a chart of the axis alone.
-
-    The attitude's costs more and steps the same axis and angular momentum.
-    """
-    return [
+    """Every method in each chart that shows `observe`, but for the attitude's where it has one of the axis alone."""
+    return [  # the attitude's costs more for the same axis and angular momentum
         variant
         for variant in variants(observe)
         if variant.charts() != ("attitude",) or "axis" not in integrator(variant.method).charts()
@@ -53,13 +50,9 @@ def smallest_charts(observe: str) -> list[Integrator]:
 
 
 def compared(observe: str) -> list[Integrator]:
-    """Every method in each chart that shows the "axis", the smallest, or the "attitude".
-
-    A method whose steps are exact at any size (`exact_steps`) is left out: it steps the solution of this problem in
-    closed form, and a comparison is made for problems that have none.
-    """
+    """Every method in each chart that shows the "axis", the smallest, or the "attitude", but for `exact_steps`."""
     every = smallest_charts(observe) if observe == "axis" else variants(observe)
-    return [variant for variant in every if not variant.exact_steps]
+    return [one for one in every if not one.exact_steps]  # they step a solution that other problems do not have
 
 
 def least_tolerance(method: Integrator) -> float:
@@ -101,12 +94,9 @@ def ladder(method: Integrator, scene: Scene, horizon: float, count: int = 9, mos
 
 
 def between(fine: float, low: float, coarse: float, high: float, goal: float) -> float:
-    """The setting between two whose errors are `low` and `high` at which the line through both in logs has `goal`.
-
-    At most nine tenths of the way to either; half the way where the errors show no line.
-    """
+    """The setting between two whose errors are `low` and `high` at which the line through both in logs has `goal`."""
     if math.isinf(high) or low <= 0.0 or high > 1e6 * low:
-        part = 0.5
+        part = 0.5  # the errors show no line
     else:
         part = min(max(math.log(goal / low) / math.log(high / low), 0.1), 0.9)
     return float(fine * (coarse / fine) ** part)

@@ -183,8 +183,7 @@ def drawn(scene: Scene, count: int, seed: int, *, same_top: bool) -> Iterator[Sc
 
 def moved(step: StepMap, scene: Scene) -> StepMap:
     """The map on another scene's top, of a step that is coarse there."""
-    other = replace(step, top=scene.top, unit=unit_of(scene), h=SHARE * scene.time_scale())
-    return coarsest(other, scene.start)
+    return coarsest(replace(step, top=scene.top, unit=unit_of(scene), h=SHARE * scene.time_scale()), scene.start)
 
 
 def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Angles]:

@@ -1,8 +1,7 @@
 """sweep(): scenes x integrators x steps or tolerances -> one dataset of errors, work and outcomes.
 
-A cell, one integrator on one scene, is an error table (`symtop.measure.accuracy`). Cells are computed on threads, which
-compiled kernels let run at once. With a file, cells are kept in it as they are done, each with the digest of all that
-its numbers depend on (`symtop.core.code_hash`), as the cases of a study are: what is up to date is not run again.
+A cell, one integrator on one scene, is an error table (`symtop.measure.accuracy`). In a file it stands with the digest
+of all that its numbers depend on (`symtop.core.code_hash`), as the cases of a study do.
 """
 
 import contextlib
@@ -190,7 +189,6 @@ def _cell(
 
 
 def _table(cell: _Cell) -> xr.Dataset:
-    """The error table of a cell; a run that raises is a row that says so."""
     runs = [error_row_or_message(*cell[:2], setting, cell.horizon, cell.observe) for setting in cell.settings]
     return as_table([run | (SPENT if cell.timed else {}) for run in runs])
 
@@ -202,8 +200,7 @@ def error_row_or_message(
     try:
         return error_row(scene, method, setting, horizon, observe, budget=budget) | {"message": ""}
     except SymtopError as error:
-        blank = blank_row(method) | {"outcome": RAISED, "message": str(error)}
-        return blank | method.given(setting)
+        return blank_row(method) | {"outcome": RAISED, "message": str(error)} | method.given(setting)
 
 
 def _time(cells: list[_Cell], done: dict[str, xr.Dataset]) -> bool:

@@ -78,10 +78,7 @@ def prepare(script: str, files_of_plugins: tuple[str, ...]) -> Study:
 
 
 def execute_case(task: Task, study: Study | None = None) -> Result:
-    """Compute a case and store it, or record how it failed; SymtopError where the machine is the cause.
-
-    A worker loads the study by name. Compiled code hears no limit: the pool ends its process `GRACE` seconds later.
-    """
+    """Compute a case and store it, or record how it failed; SymtopError where the machine is the cause."""
     study = study or prepare(task.study, task.plugins)
     path, case = task.path, task.case
     if fingerprint.digest(study, case) != store.digest_of(path):
@@ -96,7 +93,7 @@ def execute_case(task: Task, study: Study | None = None) -> Result:
             return Result("found")
         files.sweep(path)  # of a worker that was killed
         try:
-            with at_most(task.limit, processor=False), _traced(task):
+            with at_most(task.limit, processor=False), _traced(task):  # compiled code hears no limit: see `GRACE`
                 data = study.measure(case)
             if not isinstance(data, xr.Dataset):
                 raise SymtopError(f"the measure of a study must return a Dataset, not {type(data).__name__}")  # noqa: TRY301

@@ -119,7 +119,6 @@ def compared(
 
 
 def _steps(image: Callable[[float], Array], h: float) -> bool:
-    """Does it make a step of h?"""
     with contextlib.suppress(SymtopError):
         image(h)
         return True

@@ -64,7 +64,9 @@ def measure(subject: Subject) -> list[Finding]:
                 answers = _elsewhere(subject, step, answers)
             finest = maps.WIDEST / 2.0 ** (maps.WIDTHS - 1)
             hidden = subject.rounding(BRACKET_UNITS) / finest, subject.rounding(RETURN_UNITS)
-            answers = [_above(level, *answer) for level, answer in zip(hidden, answers, strict=True)]
+            for k, (yes, value, _, why) in enumerate(answers):
+                if yes is False and value <= hidden[k]:
+                    answers[k] = None, value, hidden[k], hidden_by_single(hidden[k], why)
         except SymtopError as error:
             answers += [(None, math.nan, math.nan, undecided("", "", str(error)).why)] * (2 - len(answers))
         for claim, (yes, value, least, why) in zip(by_claim, answers, strict=True):
@@ -119,13 +121,6 @@ def _answer_at(ask: Callable[..., Answer], step: maps.StepMap, start: Angles, *t
             finer = ask(replace(step, h=0.5 * step.h), start)
             return finer if finer[0] and GONE * finer[1] < answer[1] else answer
     return answer
-
-
-def _above(hidden: float, yes: bool | None, value: float, least: float, why: str) -> Answer:
-    """The answer, or none where single precision hides the difference."""
-    if yes is False and value <= hidden:
-        return None, value, hidden, hidden_by_single(hidden, why)
-    return yes, value, least, why
 
 
 def _bracket(step: maps.StepMap, start: Angles, traces: dict[str, Any] | None = None) -> Answer:

@@ -185,8 +185,7 @@ def declared(method: Integrator, claim: str) -> str:
     if claim == "energy" and "energy" not in conserves:
         return "bounded" if method.symplectic and method.fixed_step else ""
     if claim == "momentum":
-        keeps = method.family in KEEPING or (method.family == ENGINE and "p_phi" in conserves)
-        return "kept" if keeps else ""
+        return "kept" if method.family in KEEPING or (method.family == ENGINE and "p_phi" in conserves) else ""
     if claim in CONSTANTS:
         return "kept" if claim in conserves else ""
     if claim == "invariant":
