@@ -275,7 +275,6 @@ class _Search:
         self.fails: dict[str, list[str]] = {}  # names of methods by why they are no answer
         self.errors_at_step: dict[str, float] = {}  # errors of those that run with the user's step
         self.widened = 0  # methods that there are, if all had to be tried
-        of_top = [] if question.needs else [name for name in names if integrator(name).needs in THIS_TOP]
         self._try(names)
         costs = {name: one.cost(question) for one in self.trials if (name := one.run.integrator.name) in menu}
         first, second, *_ = [*costs.values(), math.inf, math.inf]
@@ -283,8 +282,9 @@ class _Search:
         if menu and (len(costs) < AGREED or menu.index(next(iter(costs))) >= AGREED or second < TIED * first):
             self._try(menu[FEW : FEW + 1])
             self.of_table = len(menu[: FEW + 1])
-        self._of_top = [name for name in self._names() if name in of_top][:1]
-        self._general = [name for name in self._names() if name not in of_top]
+        no_answer = () if question.needs else THIS_TOP
+        self._of_top = [one for one in self.trials if one.run.integrator.needs in no_answer][:1]
+        self._general = [one for one in self.trials if one.run.integrator.needs not in no_answer]
 
     def answers(self) -> list[_Trial]:
         """The finalists that were run to the end, the fastest first."""
@@ -293,15 +293,12 @@ class _Search:
             everyone = _everyone(self.question._replace(needs=self.question.needs or OF_ANY))
             self.widened, rest = len(everyone), {*everyone} - {*self.names, *self.menu}
             self._try(rest)
-            ranked = self._confirmed([name for name in self._names() if name in rest], FINALISTS)
+            ranked = self._confirmed([one for one in self.trials if one.run.integrator.name in rest], FINALISTS)
         return _timed(self.question, ranked, self.fails, ROUNDS)
 
     def beside(self) -> list[_Trial]:
         """The fastest that is made for this very top, run to the end."""
         return _timed(self.question, self._confirmed(self._of_top, 1), self.fails)
-
-    def _names(self) -> list[str]:
-        return [one.run.integrator.name for one in self.trials]
 
     def _try(self, names: Collection[str]) -> None:
         """Those of high order first: they are the cheapest at most accuracies, and their cost ends other searches."""
@@ -316,10 +313,9 @@ class _Search:
         timed = _timed(self.question, self.trials, self.fails)
         self.trials = sorted(timed, key=lambda one: one.cost(self.question))
 
-    def _confirmed(self, names: Sequence[str], most: int) -> list[_Trial]:
-        """Of the trials with these names, so many of the first, or as many as it takes to have one, run to the end."""
+    def _confirmed(self, trials: Sequence[_Trial], most: int) -> list[_Trial]:
+        """Of these trials so many of the first, or as many as it takes to have one, run to the end."""
         ranked: list[_Trial] = []
-        trials = [one for one in self.trials if one.run.integrator.name in names]
         costs = [one.cost(self.question) for one in trials]
         for number, trial in enumerate(trials):
             if number < most or not ranked or costs[number] <= LEVEL * costs[0]:

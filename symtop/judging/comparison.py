@@ -191,7 +191,7 @@ def cheapest(data: xr.Dataset, target: float) -> np.ndarray:
 
 def ranked(data: xr.Dataset) -> tuple[float, dict[str, float]]:
     """Force evaluations that every variant can spend, and the least error of each within them, the best first."""
-    work = data["force_evaluations"].where((data["outcome"] == "ok") & (data["force_evaluations"] > 0.0))  # counted
+    work = data["force_evaluations"].where((data["outcome"] == "ok") & (data["force_evaluations"] > 0.0))  # 0: unknown
     most = float(work.max("setting").min())
     errors = data["error"].where(work <= most).min("setting").to_series().dropna()
     return most, {str(name): float(error) for name, error in errors.sort_values().items()}

@@ -114,8 +114,7 @@ def law(fit: Fit) -> str:
     nearest = min(LAWS, key=lambda exponent: abs(exponent - fit.slope))
     if any(abs(exponent - fit.slope) <= fit.interval for exponent in LAWS if exponent != nearest):
         return "undecided"
-    agrees = abs(nearest - fit.slope) <= max(fit.interval, SLACK)
-    return LAWS[nearest] if agrees else f"t^{fit.slope:.2f}"
+    return LAWS[nearest] if abs(nearest - fit.slope) <= max(fit.interval, SLACK) else f"t^{fit.slope:.2f}"
 
 
 def behaviour(size: float, slope: float, interval: float, grain: float = 1.0, rounding: float = 0.0) -> str:

@@ -15,7 +15,6 @@ momenta.
 
 A trajectory of another program is checked first. A quaternion shows the attitude, the axis and theta; theta, phi and
 psi the same; theta and phi the axis; an axis shows theta. Vectors that are not quite of length one are scaled to it.
-Samples that hold a NaN stay NaN.
 """
 
 import contextlib

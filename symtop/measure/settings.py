@@ -165,8 +165,7 @@ def observed(quantity: str) -> str:
 
 def growth(method: Integrator, quantity: str) -> int:
     """The exponent a of the error's growth with the horizon that the method's traits promise."""
-    structured = bool(method.symplectic) or bool(method.symmetric)
-    return (1 if quantity in ANGLES else 0) + (0 if structured else 1)
+    return (quantity in ANGLES) + (not (method.symplectic or method.symmetric))
 
 
 def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, quantity: str) -> Met:

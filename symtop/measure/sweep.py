@@ -8,7 +8,7 @@ import contextlib
 import functools
 import math
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -38,7 +38,6 @@ TIMED = (
 )
 MOST_NAMED = 4  # cells that a message lists
 _code = functools.cache(code)
-Stored = tuple[list[tuple[str, str]], dict[str, xr.Dataset]]
 
 
 class _Cell(NamedTuple):
@@ -97,7 +96,8 @@ def sweep(
     cells = [cell for row in grid for cell in row]
     pairs = [(cell.scene.name, cell.method.name) for cell in cells]
     file = None if path is None else file_path("path", path)
-    with _opened(file) as (stored, done):
+    with contextlib.nullcontext() if file is None else files.only_writer(file):
+        stored, done = _stored(file)
         if others := [f"{name} on {of}" for of, name in stored if (of, name) not in pairs]:
             few = ", ".join(others[:MOST_NAMED]) + f" and {len(others) - MOST_NAMED} more" * bool(others[MOST_NAMED:])
             must = f"{few}: ask for these as well, or name another path"
@@ -240,19 +240,12 @@ def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:
     return whole.assign(made_of=((), cell.made_of))
 
 
-@contextlib.contextmanager
-def _opened(file: Path | None) -> Iterator[Stored]:
-    """What an earlier sweep left in a file, which nobody else writes meanwhile; SymtopError if somebody does."""
-    if file is None:
-        yield [], {}
-        return
-    with files.only_writer(file):
-        files.sweep(file)
-        yield _stored(file) if file.exists() else ([], {})
-
-
-def _stored(file: Path) -> Stored:
+def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Dataset]]:
     """Scenes and variants of an earlier sweep, and its error tables by their digests; SymtopError for another file."""
+    if file is not None:
+        files.sweep(file)
+    if file is None or not file.exists():
+        return [], {}
     data = netcdf.read(file)
     if "made_of" not in data:
         raise SymtopError(f"path must be a new file or that of a sweep, not {str(file)!r}")
