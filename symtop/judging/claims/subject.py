@@ -91,14 +91,13 @@ class Subject:
         return not np.max(np.abs(end - y)) <= AT_REST * np.max(np.abs(y))
 
     def elsewhere(self, draws: tuple[int, int], seconds: tuple[float, float]) -> Iterator[tuple[str, Scene]]:
-        """Starts that are drawn, with a name for each, while there are draws and seconds; the second with --quick."""
+        """Starts that are drawn, named, every other one late, while draws and seconds last; the second with --quick."""
         began, draw, stepper = time.monotonic(), np.random.default_rng(self.seed), self.stepper or Stepper()
         scenes = drawn(self.scene, draws[self.quick], self.seed, same_top=self.knows_top)
         try:
             for k, scene in enumerate(scenes, start=1):
                 if time.monotonic() - began > seconds[self.quick]:  # a program that takes long to start
                     return
-                # what is run before the next one is drawn begins at a late time, every other time
                 stepper.since = 0.0 if k % 2 else scene.time_scale() * 10.0 ** draw.uniform(0.0, 3.0)
                 yield f"start {k} of seed {self.seed}" + f", t = {stepper.since:.3g}" * (k % 2 == 0), scene
         finally:
