@@ -470,7 +470,7 @@ def _advice(
         reason="\n".join(filter(None, sentences)),
         runner_up="".join(runners), beside=_beside(beside, best.seconds),
         closed_form=_without_steps(question, best.seconds), **setting,
-        **_lines(question, best.run.integrator, best.run.setting),
+        **_lines(question, best.run.integrator, **setting),
     )  # fmt: skip
 
 
@@ -490,7 +490,7 @@ def _the_motion(question: _Question, limit: float) -> Advice:
     )
     return question.advice(
         integrator=exact.name, expected_error=limit, seconds=seconds, confidence="at the reference's limit",
-        reason=reason, **_lines(question, exact, None),
+        reason=reason, **_lines(question, exact),
     )  # fmt: skip
 
 
@@ -515,21 +515,21 @@ def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
     return "".join(f"Made for this top: {one.words()}{time}." for one, time in zip(trials, times, strict=True))
 
 
-def _lines(question: _Question, method: Integrator, setting: float | None) -> dict[str, str]:
+def _lines(question: _Question, method: Integrator, **setting: float) -> dict[str, str]:
     """The command and the Python line that make the recommended run; no command for a scene that has no name here."""
     scene, _, _, horizon = question[:4]
     in_catalogue = scenes.all_scenes().get(scene.name) == scene
     of, until = f'"{scene.name}"' if in_catalogue else "scene", f", horizon={horizon!r}" * (horizon != scene.horizon)
-    option = "" if setting is None else f", {method.control}={float(setting)!r}"
+    option = "".join(f", {name}={float(value)!r}" for name, value in setting.items())
     python = f'symtop.simulate({of}, "{method.name}"{option}{until})'
-    command = command_of(scene, method.name, str(method.control), setting, horizon)
-    return {"command": command if in_catalogue else "", "python": python}
+    return {"command": command_of(scene, method.name, horizon, **setting) if in_catalogue else "", "python": python}
 
 
-def command_of(scene: Scene, name: str, control: str, setting: float | None, horizon: float) -> str:
+def command_of(scene: Scene, method: str, horizon: float, **setting: float | None) -> str:
     """The command that runs a method on a scene."""
-    label = f'"{name}"' if "[" in name else name
-    option = "" if setting is None else f" --{control.replace('_', '-')} {float(setting)!r}"
+    label = f'"{method}"' if "[" in method else method
+    given = ((name.replace("_", "-"), value) for name, value in setting.items() if value is not None)
+    option = "".join(f" --{name} {float(value)!r}" for name, value in given)
     until = "" if horizon == scene.horizon else f" --horizon {horizon!r}"
     files = "".join(f" --plugin {shlex.quote(file)}" for file in loaded())
     return f"symtop run {scene.name} {label}{option}{until}{files}"

@@ -221,10 +221,8 @@ def recommend(scene: Any, accuracy: float | None, engine: str | None, as_json: b
         else:
             answer = advice = advise.recommend(scene, accuracy=accuracy or 0.0, **options)
             if advice.integrator and (own := common.given_body()):
-                control, setting = "step_size", advice.step_size
-                if setting is None:
-                    control, setting = "tolerance", advice.tolerance
-                command = advise.command_of(scene, advice.integrator, control, setting, advice.horizon)
+                setting = {"step_size": advice.step_size, "tolerance": advice.tolerance}
+                command = advise.command_of(scene, advice.integrator, advice.horizon, **setting)
                 answer = advice = dataclasses.replace(advice, command=f"{command} {own}")
     click.echo(as_text(dataclasses.asdict(answer))) if as_json else say(str(answer))
     if advice is not None and advice.integrator is None:
