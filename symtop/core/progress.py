@@ -50,7 +50,7 @@ def progress_bar(words: str, *, quiet: bool = False, **options: Any) -> Iterator
 def ticking(words: str) -> contextlib.AbstractContextManager[Any]:
     """Some words and the time since, posted, and drawn each second on a terminal until the end."""
     post(words)
-    return progress_bar(words)
+    return progress_bar(words) if is_terminal(sys.stderr) else contextlib.nullcontext()  # without importing tqdm
 
 
 @contextlib.contextmanager
