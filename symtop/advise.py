@@ -258,9 +258,8 @@ def _needs(choice: Collection[object]) -> tuple[str, ...]:
     """Names of `NEEDS`, by these or by words: a word that completes no need stands for all that have it."""
     parts = {name: set(COMMA.split(words)) for name, words in NEEDS.items()}
     terms = dict.fromkeys([*NEEDS, *sorted(set().union(*parts.values()))])
-    words = {
-        one_of("needs", word, terms) for word in COMMA.split(", ".join(str(one).strip() for one in choice)) if choice
-    }
+    given = COMMA.split(", ".join(str(one).strip() for one in choice)) if choice else []
+    words = {one_of("needs", word, terms) for word in given}
     whole = [name for name in NEEDS if name in words or parts[name] <= words]
     rest = words.difference(NEEDS, *(parts[name] for name in whole))
     return tuple(name for name in NEEDS if name in whole or parts[name] & rest)

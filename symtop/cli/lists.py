@@ -169,9 +169,8 @@ def _scene_page(numbers: Record) -> str:
     lines = {key: ", ".join(f"{name}={_digits(value)}" for name, value in part.items()) for key, part in parts.items()}
     if angles:
         low, high = angles
-        lines["theta"] = (
-            f"from {low:.6g} to {high:.6g} rad ({math.degrees(low):.4g} to {math.degrees(high):.4g} degrees)"
-        )
+        degrees = f"{math.degrees(low):.4g} to {math.degrees(high):.4g} degrees"
+        lines["theta"] = f"from {low:.6g} to {high:.6g} rad ({degrees})"
     for key in ("horizon", "nutation period"):
         numbers[key] += " s" if numbers["units"] == "SI" else ""
     if "I2" in parts["top"]:

@@ -221,9 +221,8 @@ class Code:
             self._add_code(thing)
         elif isinstance(thing, type):
             own = ((name, getattr(part, "__func__", part)) for name, part in sorted(vars(thing).items()))
-            self._add_all(
-                part for name, part in own if isinstance(part, (FunctionType, property)) or not name.startswith("__")
-            )
+            kinds = FunctionType, property
+            self._add_all(part for name, part in own if isinstance(part, kinds) or not name.startswith("__"))
             self._add_all(thing.__bases__)
         else:
             self._add(thing)

@@ -141,9 +141,8 @@ def label(name: str, value: object) -> str:
     """Return `value` if it can name a scene or an integrator in a file, a table and a command."""
     if isinstance(value, str) and re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}", value):
         return value
-    raise SymtopError(
-        f"{name} must be 1 to 64 letters, digits or ._+- (a letter or digit first), not {shown(value)}", name
-    )
+    must = "1 to 64 letters, digits or ._+- (a letter or digit first)"
+    raise SymtopError(f"{name} must be {must}, not {shown(value)}", name)
 
 
 def one_of(name: str, value: object, allowed: Iterable[str]) -> str:

@@ -248,10 +248,8 @@ def _refuse_contradiction(states: Trajectory, scene: Scene) -> None:
     if (apart > AGREE).any():  # false where it is NaN
         refuse_other_order(states.quaternion, reference(scene, states.time))
         k = int(np.nanargmax(apart))
-        raise SymtopError(
-            f"axis and quaternion must show one attitude within {AGREE:g} rad, but at t = {states.time[k]:.6g} the "
-            f"axis is {apart[k]:.2g} rad from that of the quaternion"
-        )
+        must = f"axis and quaternion must show one attitude within {AGREE:g} rad, but at t = {states.time[k]:.6g}"
+        raise SymtopError(f"{must} the axis is {apart[k]:.2g} rad from that of the quaternion")
 
 
 def _from_states(scene: Scene, states: Trajectory) -> dict[str, np.ndarray]:
@@ -302,9 +300,8 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
     words = f"in {count}; it begins {abs(values[0] - true) / scale:.1e} from the scene's"
     finding = constant.finding(name, declared, constant.words(words))
     if finding.verdict != "refuted" and time.size < FEWEST and np.ptp(time) < scene.time_scale():
-        finding = undecided(
-            name, declared, f"{finding.why}; fewer than {FEWEST}, over less than a {scene.period_word}, say nothing"
-        )
+        few = f"fewer than {FEWEST}, over less than a {scene.period_word}, say nothing"
+        finding = undecided(name, declared, f"{finding.why}; {few}")
     beyond = blows_up(scene, (values - values[0]) / scale) if name == "energy" else np.empty(0)
     return blow_up_finding(finding, time[beyond[0]]) if beyond.size else finding
 

@@ -74,10 +74,9 @@ class Changed(NamedTuple):
 def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> Changed:
     """Size, trend and growth over the last `decades` of a residual (n,) at times (n,); samples may be NaN."""
     size, power = np.abs(np.asarray(residual, float)), growth(time, residual, decades)
-    largest = float(np.max(size[np.isfinite(size)], initial=-1.0))
-    return Changed(
-        largest if largest >= 0.0 else math.nan, *trend(time, residual), power.slope, power.interval, law(power)
-    )
+    good = size[np.isfinite(size)]
+    largest = float(good.max()) if good.size else math.nan
+    return Changed(largest, *trend(time, residual), power.slope, power.interval, law(power))
 
 
 def residuals(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:

@@ -223,9 +223,8 @@ def scene_of(run: xr.Dataset | Mapping[str, Any]) -> Scene:
     try:
         return Scene(str(attributes["scene"]), _stored(run, "top"), _stored(run, "start"), attributes["horizon"])
     except (KeyError, TypeError, ValueError) as error:
-        raise SymtopError(
-            "scene is missing: these data do not say of which top and start they are, so give errors(data, scene)"
-        ) from error
+        words = "these data do not say of which top and start they are, so give errors(data, scene)"
+        raise SymtopError(f"scene is missing: {words}") from error
 
 
 def refuse_other_scene(run: xr.Dataset | Mapping[str, Any], scene: Scene) -> None:
@@ -233,10 +232,9 @@ def refuse_other_scene(run: xr.Dataset | Mapping[str, Any], scene: Scene) -> Non
     attributes = getattr(run, "attrs", {})
     for name, own in (("top", scene.top), ("start", scene.start)):
         if _stored(run, name) not in (None, own):
-            raise SymtopError(
-                f"scene must be that of the data, {attributes.get('scene', 'of another name')}, whose {name} is "
-                f"{attributes[name]}, not {scene.name}; drop_attrs() makes them a trajectory that is compared with any"
-            )
+            must = f"that of the data, {attributes.get('scene', 'of another name')}, whose {name} is {attributes[name]}"
+            remedy = "drop_attrs() makes them a trajectory that is compared with any"
+            raise SymtopError(f"scene must be {must}, not {scene.name}; {remedy}")
 
 
 def _stored(run: xr.Dataset | Mapping[str, Any], name: str) -> Any:
@@ -259,9 +257,8 @@ def sampled(run: xr.Dataset) -> xr.Dataset:
 def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
     """The known variables of a foreign trajectory, an axis and a quaternion at length one; SymtopError for all else."""
     if not isinstance(data, Mapping):  # a Dataset is one
-        raise SymtopError(
-            f"data must be a Dataset or a mapping with time and axis, quaternion or theta, not {type(data).__name__}"
-        )
+        must = "a Dataset or a mapping with time and axis, quaternion or theta"
+        raise SymtopError(f"data must be {must}, not {type(data).__name__}")
     if "time" not in data:
         raise SymtopError("data must hold time, elapsed since the start of the scene; there is none")
     time = doubles("time", data["time"])
@@ -336,11 +333,9 @@ def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:
     given, k = quaternion[far[0]], far[0]
     for other, moved in (("x, y, z, w", np.roll(given, 1)), ("from space to body", given * [1.0, -1.0, -1.0, -1.0])):
         if float(charts.attitude_distance(moved, true[k])) < NEAR:
-            raise SymtopError(
-                "quaternion must be in the order w, x, y, z and from body to space, but its "
-                f"{'first sample' if k == 0 else f'sample at t = {truth.time.values[k]:.6g}'} is the true "
-                f"one if it is read as {other}"
-            )
+            place = "first sample" if k == 0 else f"sample at t = {truth.time.values[k]:.6g}"
+            must = "quaternion must be in the order w, x, y, z and from body to space"
+            raise SymtopError(f"{must}, but its {place} is the true one if it is read as {other}")
 
 
 def elsewhere(time: charts.Array, errors: Mapping[str, charts.Array]) -> list[str]:
@@ -356,10 +351,8 @@ def doubts(time: charts.Array, errors: Mapping[str, charts.Array], horizon: floa
     """What is wrong with a foreign trajectory as a whole: times far beyond the scene's horizon, samples of NaN."""
     sentences = []
     if time[-1] > BEYOND * horizon:
-        sentences.append(
-            f"times reach to {time[-1]:.6g}, {time[-1] / horizon:.3g} times the horizon {horizon:.6g}: are they in the "
-            "scene's unit of time?"
-        )
+        far = f"{time[-1]:.6g}, {time[-1] / horizon:.3g} times the horizon {horizon:.6g}"
+        sentences.append(f"times reach to {far}: are they in the scene's unit of time?")
     for name, values in errors.items():
         if np.isnan(values).any():
             since = time[int(np.argmax(np.isnan(values)))]

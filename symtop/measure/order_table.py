@@ -128,9 +128,7 @@ def _composition(scene: Scene, method: Integrator) -> Stages | None:
 def _ends(scene: Scene, stages: Stages, horizon: float, counts: NDArray[np.int64]) -> Any:
     """The axes (n, 3) after each of the ascending `counts` of steps, in long double; all runs take a step together."""
     top, start, step = scene.top, scene.start, Wide(horizon) / counts.astype(Wide)
-    theta, phi, *rates = (
-        Wide(value) for value in (start.theta, start.phi, start.theta_dot, start.phi_dot, start.psi_dot)
-    )
+    theta, phi, *rates = map(Wide, (start.theta, start.phi, start.theta_dot, start.phi_dot, start.psi_dot))
     axes = np.tile(np.array(charts.axis_parts(np, theta, phi))[:, np.newaxis], counts.size)
     momenta = np.tile(np.array(charts.momentum_parts(np, top, theta, phi, *rates))[:, np.newaxis], counts.size)
     drifts, kicks = ([Wide(value) for value in part] for part in (stages.drift, stages.kick))

@@ -144,10 +144,8 @@ def listed(things: Any) -> list[Any]:
     if isinstance(things, (str, Scene, Integrator)) or not isinstance(things, Iterable):
         return [things]
     if hasattr(things, "keys"):  # a dataset, a table or a dict, which goes through its names
-        raise SymtopError(
-            f"scenes and integrators must be names, objects or lists of them, not a {type(things).__name__}; for a "
-            "dataset of tops there is ensemble"
-        )
+        must = f"scenes and integrators must be names, objects or lists of them, not a {type(things).__name__}"
+        raise SymtopError(f"{must}; for a dataset of tops there is ensemble")
     try:
         return list(things)
     except TypeError:  # an array without dimensions

@@ -82,10 +82,9 @@ def execute_case(task: Task, study: Study | None = None) -> Result:
     study = study or prepare(task.study, task.plugins)
     path, case = task.path, task.case
     if fingerprint.digest(study, case) != store.digest_of(path):
-        raise SymtopError(
-            f"the sources or dependencies of {case.integrator} on {case.scene} are not those that the study was "
-            "started with; if a file was edited meanwhile, run the study again"
-        )
+        of = f"the sources or dependencies of {case.integrator} on {case.scene}"
+        remedy = "if a file was edited meanwhile, run the study again"
+        raise SymtopError(f"{of} are not those that the study was started with; {remedy}")
     with files.locked(path, wait=False) as ours:
         if not ours:
             return Result("busy")

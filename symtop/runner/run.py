@@ -216,8 +216,7 @@ def _saved(study: Study, data: Combined, results: Path, save: Save, *, quick: bo
         names.add(picture.name)
         file = f"{study.name}-{picture.name}.{getattr(picture.figure, 'suffix', 'png')}"  # a film is a GIF
         if quick and hasattr(picture.figure, "text"):
-            picture.figure.text(
-                0.998, 0.01, QUICK, rotation=90.0, ha="right", va="bottom", fontsize=6.0, color="#AD4A00"
-            )
+            look = {"ha": "right", "va": "bottom", "fontsize": 6.0, "color": "#AD4A00"}
+            picture.figure.text(0.998, 0.01, QUICK, rotation=90.0, **look)
         save(picture.figure, results / "figures" / file)
         yield {"name": picture.name, "file": file}
