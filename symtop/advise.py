@@ -553,10 +553,9 @@ def _without_steps(question: _Question, best: float) -> str:
     if not best > seconds:
         more = f", {_times(seconds / best)} that" if math.isfinite(best) else ""
         return f"The closed form, integrator exact, takes {seconds * 1e6:.2g} us{more}{error}, and no step."
-    return (
-        f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us, "
-        f"{_times(best / seconds)} less{error}. Integrators are compared for what they do where it does not exist."
-    )
+    fastest = f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us"
+    why = "Integrators are compared for what they do where it does not exist."
+    return f"{fastest}, {_times(best / seconds)} less{error}. {why}"
 
 
 @dataclass(frozen=True)

@@ -42,11 +42,8 @@ TRIED = f"Not within {TRIES} runs"
 
 def smallest_charts(observe: str) -> list[Integrator]:
     """Every method in each chart that shows `observe`, but for the attitude's where it has one of the axis alone."""
-    return [  # the attitude's costs more for the same axis and angular momentum
-        variant
-        for variant in variants(observe)
-        if variant.charts() != ("attitude",) or "axis" not in integrator(variant.method).charts()
-    ]
+    larger = ("attitude",)  # it costs more for the same axis and angular momentum
+    return [one for one in variants(observe) if one.charts() != larger or "axis" not in integrator(one.method).charts()]
 
 
 def compared(observe: str) -> list[Integrator]:
