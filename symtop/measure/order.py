@@ -119,7 +119,7 @@ def order(
     rank = np.unique(h, return_index=True)[1]  # a step that was taken twice is one point
     finest = e[rank][np.isfinite(e[rank])][:2]
     if finest.size == 0:
-        return _unjudged(e, "every run failed")
+        return _unjudged(np.isfinite(e), "every run failed")
     judged, b = b, np.maximum(b, _round_off(h[rank], e[rank]))
     used = np.isfinite(e) & (e > 10.0 * b) & (e < LARGEST_ERROR)
     used &= h * omega < LARGEST_PHASE * max(claim or 2, 2) / 2.0
