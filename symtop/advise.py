@@ -40,16 +40,8 @@ from symtop.measure import settings
 from symtop.measure.errors import QUANTITIES
 from symtop.measure.phase import FREQUENCIES
 from symtop.measure.ranking import cheapest
-from symtop.methods.framework.registry import (
-    NEEDS,
-    Integrator,
-    engines,
-    integrator,
-    integrators,
-    is_built_in,
-    methods,
-    split_name,
-)
+from symtop.methods.framework import registry
+from symtop.methods.framework.registry import NEEDS, Integrator, integrator, is_built_in, split_name
 from symtop.model import scenes
 from symtop.model.charts import BODY
 from symtop.model.exact import closed_form
@@ -138,8 +130,6 @@ class Advice:
 
 
 class _Question(NamedTuple):
-    """What is asked for."""
-
     scene: Scene
     accuracy: float
     quantity: str
@@ -152,7 +142,6 @@ class _Question(NamedTuple):
     pace: float = math.inf  # most seconds of a step
 
     def advice(self, **facts: Any) -> Advice:
-        """An answer."""
         return Advice(self.scene.name, self.quantity, self.accuracy, self.horizon, **facts)
 
     def trial(self, run: settings.Met) -> "_Trial":
@@ -249,8 +238,8 @@ def recommend(
     elif search.of_table:
         source = f"tried the {search.of_table} methods that {source}"
     # Times of the user's own methods in plain Python say nothing beside those of compiled ones.
-    own = [one.name for one in integrators().values() if one.implementation == "python" and not is_built_in(one.name)]
-    if own:
+    every = registry.integrators().values()
+    if own := [one.name for one in every if one.implementation == "python" and not is_built_in(one.name)]:
         fails["Not tried, as only compiled methods are timed"] = own
     errors = [f"{name} {error:.2e}" for name, error in sorted(search.errors_at_step.items(), key=lambda one: one[1])]
     fails = {MISSES_AT_STEP: errors} | fails if errors else fails
@@ -269,9 +258,8 @@ def _needs(choice: Collection[object]) -> tuple[str, ...]:
     """Names of `NEEDS`, by these or by words: a word that completes no need stands for all that have it."""
     parts = {name: set(COMMA.split(words)) for name, words in NEEDS.items()}
     terms = dict.fromkeys([*NEEDS, *sorted(set().union(*parts.values()))])
-    words = {
-        one_of("needs", word, terms) for word in COMMA.split(", ".join(str(one).strip() for one in choice)) if choice
-    }
+    given = COMMA.split(", ".join(str(one).strip() for one in choice)) if choice else []
+    words = {one_of("needs", word, terms) for word in given}
     whole = [name for name in NEEDS if name in words or parts[name] <= words]
     rest = words.difference(NEEDS, *(parts[name] for name in whole))
     return tuple(name for name in NEEDS if name in whole or parts[name] & rest)
@@ -286,7 +274,6 @@ class _Search:
         self.fails: dict[str, list[str]] = {}  # names of methods by why they are no answer
         self.errors_at_step: dict[str, float] = {}  # errors of those that run with the user's step
         self.widened = 0  # methods that there are, if all had to be tried
-        of_top = [] if question.needs else [name for name in names if integrator(name).needs in THIS_TOP]
         self._try(names)
         costs = {name: one.cost(question) for one in self.trials if (name := one.run.integrator.name) in menu}
         first, second, *_ = [*costs.values(), math.inf, math.inf]
@@ -294,8 +281,9 @@ class _Search:
         if menu and (len(costs) < AGREED or menu.index(next(iter(costs))) >= AGREED or second < TIED * first):
             self._try(menu[FEW : FEW + 1])
             self.of_table = len(menu[: FEW + 1])
-        self._of_top = [name for name in self._names() if name in of_top][:1]
-        self._general = [name for name in self._names() if name not in of_top]
+        no_answer = () if question.needs else THIS_TOP
+        self._of_top = [one for one in self.trials if one.run.integrator.needs in no_answer][:1]
+        self._general = [one for one in self.trials if one.run.integrator.needs not in no_answer]
 
     def answers(self) -> list[_Trial]:
         """The finalists that were run to the end, the fastest first."""
@@ -304,15 +292,12 @@ class _Search:
             everyone = _everyone(self.question._replace(needs=self.question.needs or OF_ANY))
             self.widened, rest = len(everyone), {*everyone} - {*self.names, *self.menu}
             self._try(rest)
-            ranked = self._confirmed([name for name in self._names() if name in rest], FINALISTS)
+            ranked = self._confirmed([one for one in self.trials if one.run.integrator.name in rest], FINALISTS)
         return _timed(self.question, ranked, self.fails, ROUNDS)
 
     def beside(self) -> list[_Trial]:
         """The fastest that is made for this very top, run to the end."""
         return _timed(self.question, self._confirmed(self._of_top, 1), self.fails)
-
-    def _names(self) -> list[str]:
-        return [one.run.integrator.name for one in self.trials]
 
     def _try(self, names: Collection[str]) -> None:
         """Those of high order first: they are the cheapest at most accuracies, and their cost ends other searches."""
@@ -327,10 +312,9 @@ class _Search:
         timed = _timed(self.question, self.trials, self.fails)
         self.trials = sorted(timed, key=lambda one: one.cost(self.question))
 
-    def _confirmed(self, names: Sequence[str], most: int) -> list[_Trial]:
-        """Of the trials with these names, so many of the first, or as many as it takes to have one, run to the end."""
+    def _confirmed(self, trials: Sequence[_Trial], most: int) -> list[_Trial]:
+        """Of these trials so many of the first, or as many as it takes to have one, run to the end."""
         ranked: list[_Trial] = []
-        trials = [one for one in self.trials if one.run.integrator.name in names]
         costs = [one.cost(self.question) for one in trials]
         for number, trial in enumerate(trials):
             if number < most or not ranked or costs[number] <= LEVEL * costs[0]:
@@ -348,9 +332,9 @@ class _Search:
 
 
 def _everyone(question: _Question) -> list[str]:
-    """Every compiled method that the user can use, in the charts that show the quantity, which its name then has."""
+    """Every compiled method that the user can use, in each chart that shows the quantity."""
     if question.scene.of_body:
-        names = [method.name for method in methods().values() if BODY in method.solvers]
+        names = [method.name for method in registry.methods().values() if BODY in method.solvers]
     else:
         rows = settings.compared(settings.observed(question.quantity))
         names = [row.name if len(integrator(row.method).charts()) > 1 else row.method for row in rows]
@@ -485,7 +469,7 @@ def _advice(
         reason="\n".join(filter(None, sentences)),
         runner_up="".join(runners), beside=_beside(beside, best.seconds),
         closed_form=_without_steps(question, best.seconds), **setting,
-        **_lines(question, best.run.integrator, best.run.setting),
+        **_lines(question, best.run.integrator, **setting),
     )  # fmt: skip
 
 
@@ -495,7 +479,6 @@ def _times(ratio: float) -> str:
 
 
 def _the_motion(question: _Question, limit: float) -> Advice:
-    """The answer to whoever has the motion itself, whose error is below a limit."""
     scene, accuracy, quantity, horizon = question[:4]
     closed_form.compile_now()  # its time is the answer
     exact, seconds = integrator("exact"), _exact_seconds(question)
@@ -506,7 +489,7 @@ def _the_motion(question: _Question, limit: float) -> Advice:
     )
     return question.advice(
         integrator=exact.name, expected_error=limit, seconds=seconds, confidence="at the reference's limit",
-        reason=reason, **_lines(question, exact, None),
+        reason=reason, **_lines(question, exact),
     )  # fmt: skip
 
 
@@ -527,33 +510,31 @@ def _solvers(method: Integrator) -> Collection[str]:
 
 
 def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
-    """The best of what is made for this top."""
     times = [f", {_times(one.seconds / best)} the time" if math.isfinite(best) else "" for one in trials]
     return "".join(f"Made for this top: {one.words()}{time}." for one, time in zip(trials, times, strict=True))
 
 
-def _lines(question: _Question, method: Integrator, setting: float | None) -> dict[str, str]:
+def _lines(question: _Question, method: Integrator, **setting: float) -> dict[str, str]:
     """The command and the Python line that make the recommended run; no command for a scene that has no name here."""
     scene, _, _, horizon = question[:4]
     in_catalogue = scenes.all_scenes().get(scene.name) == scene
     of, until = f'"{scene.name}"' if in_catalogue else "scene", f", horizon={horizon!r}" * (horizon != scene.horizon)
-    option = "" if setting is None else f", {method.control}={float(setting)!r}"
+    option = "".join(f", {name}={float(value)!r}" for name, value in setting.items())
     python = f'symtop.simulate({of}, "{method.name}"{option}{until})'
-    command = command_of(scene, method.name, str(method.control), setting, horizon)
-    return {"command": command if in_catalogue else "", "python": python}
+    return {"command": command_of(scene, method.name, horizon, **setting) if in_catalogue else "", "python": python}
 
 
-def command_of(scene: Scene, name: str, control: str, setting: float | None, horizon: float) -> str:
+def command_of(scene: Scene, method: str, horizon: float, **setting: float | None) -> str:
     """The command that runs a method on a scene."""
-    label = f'"{name}"' if "[" in name else name
-    option = "" if setting is None else f" --{control.replace('_', '-')} {float(setting)!r}"
+    label = f'"{method}"' if "[" in method else method
+    given = ((name.replace("_", "-"), value) for name, value in setting.items() if value is not None)
+    option = "".join(f" --{name} {float(value)!r}" for name, value in given)
     until = "" if horizon == scene.horizon else f" --horizon {horizon!r}"
     files = "".join(f" --plugin {shlex.quote(file)}" for file in loaded())
     return f"symtop run {scene.name} {label}{option}{until}{files}"
 
 
 def _exact_seconds(question: _Question) -> float:
-    """Seconds of the exact motion at the horizon, once it is compiled."""
     scene, _, quantity, horizon = question[:4]
     exact = settings.Met(integrator("exact"), math.nan, 0.0, 0.0, horizon, 0.0)
     return settings.seconds(scene, [exact], quantity, horizon)[0]
@@ -572,10 +553,9 @@ def _without_steps(question: _Question, best: float) -> str:
     if not best > seconds:
         more = f", {_times(seconds / best)} that" if math.isfinite(best) else ""
         return f"The closed form, integrator exact, takes {seconds * 1e6:.2g} us{more}{error}, and no step."
-    return (
-        f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us, "
-        f"{_times(best / seconds)} less{error}. Integrators are compared for what they do where it does not exist."
-    )
+    fastest = f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us"
+    why = "Integrators are compared for what they do where it does not exist."
+    return f"{fastest}, {_times(best / seconds)} less{error}. {why}"
 
 
 @dataclass(frozen=True)
@@ -623,7 +603,7 @@ class EngineAdvice:
 
 def _settings() -> dict[str, dict[str, str]]:
     """The maps by the settings of each engine, and each map by itself where no engine has its name."""
-    return SETTINGS | {name: {name: name} for name in engines() if name not in SETTINGS}
+    return SETTINGS | {name: {name: name} for name in registry.engines() if name not in SETTINGS}
 
 
 def i_use(

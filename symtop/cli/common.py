@@ -17,18 +17,9 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from symtop.cli.clock import telling
-from symtop.core import files
-from symtop.core.errors import (
-    SymtopError,
-    SymtopWarning,
-    UnknownNameError,
-    at_home,
-    check_replaceable,
-    file_path,
-    positive,
-    words_of,
-)
+from symtop.core import errors, files
+from symtop.core.errors import SymtopError, SymtopWarning, UnknownNameError, at_home, file_path, positive, words_of
+from symtop.core.progress import telling
 from symtop.core.signals import INTERRUPTED, UNREAD, told_apart
 
 if TYPE_CHECKING:
@@ -312,7 +303,7 @@ def check_outputs(**files: str | None) -> None:
         if name == "output":
             if path.suffix.lower() in TEXT:
                 raise SymtopError(f"{option} is written as netCDF, such as run.nc, not as {file!r}")
-            check_replaceable(path)
+            errors.check_replaceable(path)
         try:
             tempfile.TemporaryFile(dir=path.parent).close()
         except OSError as error:
@@ -339,8 +330,8 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], width: int | Non
     return "\n".join(lines)
 
 
-def facts(pairs: dict[str, str], width: int) -> str:
-    """Names and values, one a line; long values are broken and indented."""
-    formatter = click.HelpFormatter(width=width)
+def facts(pairs: dict[str, str]) -> str:
+    """Names and values, one a line; values that do not fit the terminal are broken and indented."""
+    formatter = click.HelpFormatter(width=terminal_width())
     formatter.write_dl(list(pairs.items()))
     return formatter.getvalue().rstrip()

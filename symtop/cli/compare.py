@@ -5,8 +5,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from symtop.cli.clock import ticking
 from symtop.cli.common import File, as_text, check_outputs, completing, say, say_written, scene_options, table, warn
+from symtop.core.progress import ticking
 
 if TYPE_CHECKING:
     import xarray as xr

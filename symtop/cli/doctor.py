@@ -86,7 +86,6 @@ def _packages(_: Path) -> list[Finding]:
 
 
 def _heyoka(_: Path) -> list[Finding]:
-    """The precisions that this build of heyoka has."""
     if importlib.util.find_spec("heyoka") is None:
         words = "no Taylor series: heyoka is absent; it has wheels for Linux only, elsewhere try conda-forge"
         return [Finding("precisions", words)]  # where it is required, `_packages` says that it lacks

@@ -7,9 +7,9 @@ from typing import Any
 import click
 
 from symtop.cli import common
-from symtop.cli.clock import ticking
 from symtop.cli.common import File, as_text, check_outputs, completing, json_option, plugin_option, say, say_written
 from symtop.core.errors import SymtopError
+from symtop.core.progress import ticking
 from symtop.judging import FORMS
 
 BESIDE, NUTATIONS, MOST_BESIDE = ("rk4", "strang", "dop853", "taylor"), 10.0, 2e4  # of runs, and their evaluations
@@ -82,11 +82,9 @@ def judge(
 
     _check(options["form"], output=output, card=card, badge=badge, figure=figure)
     ledger = judged(target, scene=scene, tell=None if as_json else tell, **options)
-    _refuse_of_trajectory(ledger, card, figure)
-    if as_json:
-        click.echo(as_text([finding.plain() for finding in ledger.findings]))
-    else:
-        click.echo(findings.summary(ledger))
+    if not ledger.about.chart and (card or figure):
+        raise SymtopError("a card or a figure shows a method: there is none of a trajectory")
+    click.echo(as_text([one.plain() for one in ledger.findings]) if as_json else findings.summary(ledger))
     if output is not None:
         from symtop.core import netcdf
 
@@ -108,11 +106,6 @@ def _check(form: str | None, **files: str | None) -> None:
     check_outputs(**files)
     if files["figure"] is not None and form == "separable":
         raise SymtopError("--figure shows errors of the axis, of which a map of (theta, p_theta) has none")
-
-
-def _refuse_of_trajectory(ledger: Any, *files: str | None) -> None:
-    if not ledger.about.chart and any(files):
-        raise SymtopError("a card or a figure shows a method: there is none of a trajectory")
 
 
 def _draw_beside(
@@ -138,11 +131,10 @@ def _draw_beside(
         draw_compare(data, file)
     most, errors = ranked(data)
     if not quiet and errors:
-        rest = [str(name) for name in data["variant"].values if name not in errors]
-        words = ", ".join(
-            [*(f"{name} {error:.0e}" for name, error in errors.items()), *(f"{name} none" for name in rest)]
-        )
-        say(f"Axis error (rad) for {most:.0f} force evaluations in {NUTATIONS:g} {period_word(data)}s: {words}.")
+        words = [f"{name} {error:.0e}" for name, error in errors.items()]
+        words += [f"{name} none" for name in data["variant"].values if name not in errors]
+        span = f"{NUTATIONS:g} {period_word(data)}s"
+        say(f"Axis error (rad) for {most:.0f} force evaluations in {span}: {', '.join(words)}.")
 
 
 @click.command(short_help="Measure what integrators claim about themselves.")
@@ -229,10 +221,8 @@ def recommend(scene: Any, accuracy: float | None, engine: str | None, as_json: b
         else:
             answer = advice = advise.recommend(scene, accuracy=accuracy or 0.0, **options)
             if advice.integrator and (own := common.given_body()):
-                control, setting = "step_size", advice.step_size
-                if setting is None:
-                    control, setting = "tolerance", advice.tolerance
-                command = advise.command_of(scene, advice.integrator, control, setting, advice.horizon)
+                setting = {"step_size": advice.step_size, "tolerance": advice.tolerance}
+                command = advise.command_of(scene, advice.integrator, advice.horizon, **setting)
                 answer = advice = dataclasses.replace(advice, command=f"{command} {own}")
     click.echo(as_text(dataclasses.asdict(answer))) if as_json else say(str(answer))
     if advice is not None and advice.integrator is None:

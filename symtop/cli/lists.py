@@ -9,17 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from symtop.cli.common import (
-    File,
-    as_text,
-    completing,
-    facts,
-    json_option,
-    plugin_option,
-    scene_options,
-    table,
-    terminal_width,
-)
+from symtop.cli import common
+from symtop.cli.common import File, as_text, completing, facts, table, terminal_width
 from symtop.core import __version__
 from symtop.core.errors import SymtopError
 from symtop.report import formats
@@ -59,10 +50,10 @@ def _print(
 @click.command(short_help="List the integrators, or show one in full.")
 @click.argument("name", required=False, shell_complete=completing("integrators"))
 @wide_option
-@json_option
+@common.json_option
 @click.option("--markdown", is_flag=True, help="Print a Markdown table of every column.")
 @click.option("--engines", is_flag=True, help="List the maps of physics engines instead.")
-@plugin_option
+@common.plugin_option
 def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, engines: bool) -> None:
     """List every integrator with what it claims about itself, or show the one called NAME in full.
 
@@ -124,7 +115,7 @@ def _integrator_page(described: Record) -> str:
 
     name, summary, about = (described.pop(key, "") for key in ("name", "summary", "about"))
     paragraphs = filter(None, (f"{name}: {summary}", *about.split("\n\n")))
-    parts = [*(textwrap.fill(text, terminal_width()) for text in paragraphs), facts(described, terminal_width())]
+    parts = [*(textwrap.fill(text, terminal_width()) for text in paragraphs), facts(described)]
     with contextlib.suppress(SymtopError):  # a method of the user's own may name a source that is not known here
         parts.append(citation(name))
     return "\n\n".join(parts)
@@ -133,7 +124,7 @@ def _integrator_page(described: Record) -> str:
 @click.command(short_help="List the scenes, or show one in full.")
 @click.argument("name", required=False, shell_complete=completing("all scenes"))
 @wide_option
-@scene_options
+@common.scene_options
 def scenes(name: Any, wide: bool, as_json: bool) -> None:
     """List every scene with its purpose, or show the one called NAME: its top, start, horizon and motion.
 
@@ -144,8 +135,7 @@ def scenes(name: Any, wide: bool, as_json: bool) -> None:
     """
     from symtop.model import scenes as catalogue
 
-    listed = list(catalogue.all_scenes().values())
-    entries = [catalogue.scene(name, bodies=True)] if name is not None else listed
+    entries = [*catalogue.all_scenes().values()] if name is None else [catalogue.scene(name, bodies=True)]
     records: list[Record] = [scene.record() for scene in entries]
     keys = {"name": "name", "horizon": "horizon", "nutation": "nutation period", "purpose": "purpose"}
     short: list[Record] = [{column: record[key] for column, key in keys.items()} for record in records]
@@ -179,15 +169,14 @@ def _scene_page(numbers: Record) -> str:
     lines = {key: ", ".join(f"{name}={_digits(value)}" for name, value in part.items()) for key, part in parts.items()}
     if angles:
         low, high = angles
-        lines["theta"] = (
-            f"from {low:.6g} to {high:.6g} rad ({math.degrees(low):.4g} to {math.degrees(high):.4g} degrees)"
-        )
+        degrees = f"{math.degrees(low):.4g} to {math.degrees(high):.4g} degrees"
+        lines["theta"] = f"from {low:.6g} to {high:.6g} rad ({degrees})"
     for key in ("horizon", "nutation period"):
         numbers[key] += " s" if numbers["units"] == "SI" else ""
     if "I2" in parts["top"]:
         numbers = {"natural period" if key == "nutation period" else key: value for key, value in numbers.items()}
     title = textwrap.fill(f"{name}: {purpose}" if purpose else name, terminal_width())
-    return f"{title}\n\n{facts(lines | numbers, terminal_width())}"
+    return f"{title}\n\n{facts(lines | numbers)}"
 
 
 @click.command(short_help="BibTeX of the package and of what a dataset used.")

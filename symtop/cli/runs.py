@@ -10,11 +10,10 @@ from typing import Any
 import click
 
 from symtop.cli import common
-from symtop.cli.clock import ticking
 from symtop.cli.common import File, as_text, check_outputs, completing, say, say_written, separated, table, warn
 from symtop.core import files
 from symtop.core.errors import SymtopError, whole
-from symtop.core.progress import post
+from symtop.core.progress import post, ticking
 from symtop.report.formats import FIRM, counted, duration
 
 FEWEST, FEW, MANY = 1000, 100_000, 20  # steps that are timed before a run of many times as many

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from symtop.cli import common
-from symtop.cli.clock import ticking
 from symtop.cli.common import File, as_text, completing, json_option, plugin_option, results_option, separated
 from symtop.core.errors import SymtopError, positive
+from symtop.core.progress import ticking
 from symtop.core.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
 from symtop.report.formats import abridged, counted
 
@@ -121,8 +121,7 @@ def run_all(
 
     save = style.sketch if grid["quick"] else style.publish  # quick figures are to look at, not to print
     options |= {"save": save, "beside": len(studies) > 1, **grid}
-    ended = _in_order(pool, studies, results, options)
-    summaries = [_summary(findings, results, as_json) for findings in ended]
+    summaries = [_summary(findings, results, as_json) for findings in _in_order(pool, studies, results, options)]
     if as_json:
         click.echo(as_text(summaries))
     elif summaries:
@@ -177,11 +176,8 @@ def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str
         drawn = counted(summary["figures"], "figure")
         click.echo("{study}: {computed} of {cases} cases computed, {drawn}".format(drawn=drawn, **summary))
         files = [f"dataset {results / name}.nc", f"facts {results / name}.json"]
-        files += [
-            f"{kind} {results / kind / name}-*"
-            for kind, key in (("figures", "pictures"), ("tables", "tables"))
-            if findings[key]
-        ]
+        for kind, key in (("figures", "pictures"), ("tables", "tables")):
+            files += [f"{kind} {results / kind / name}-*"] * bool(findings[key])
         for line in (answer(findings, results), ", ".join(files)):
             if line:
                 click.echo(common.filled(f"  {line}"))

@@ -187,10 +187,7 @@ class Part:
 
 
 class Code:
-    """Functions, classes and constants that things lead to, each looked at once.
-
-    `also` says what stands for a function once it is compiled.
-    """
+    """Functions, classes and constants that things lead to, each looked at once; `also`: what is compiled for one."""
 
     def __init__(self, also: Parts = lambda _: ()) -> None:
         self._also = also
@@ -224,9 +221,8 @@ class Code:
             self._add_code(thing)
         elif isinstance(thing, type):
             own = ((name, getattr(part, "__func__", part)) for name, part in sorted(vars(thing).items()))
-            self._add_all(
-                part for name, part in own if isinstance(part, (FunctionType, property)) or not name.startswith("__")
-            )
+            kinds = FunctionType, property
+            self._add_all(part for name, part in own if isinstance(part, kinds) or not name.startswith("__"))
             self._add_all(thing.__bases__)
         else:
             self._add(thing)
@@ -235,7 +231,6 @@ class Code:
         self._at.values.extend(values)
 
     def _lead_to(self, kind: str, name: str, file: str, thing: object) -> None:
-        """Let the present part lead to another one."""
         label = f"{kind} {file}:{name}"
         part = self._parts.get((label, id(thing)))
         if part is None:
@@ -309,7 +304,6 @@ class Code:
                 self._add_all(getattr(thing, name, None) for name in names)
 
     def _add_code(self, function: FunctionType) -> None:
-        """The code of a function, what it holds, the globals that it names and what it imports."""
         for part in codes(function.__code__):
             constants = [value for value in part.co_consts if not isinstance(value, CodeType)]
             if part is function.__code__ and constants[:1] == [function.__doc__]:

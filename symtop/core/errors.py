@@ -25,7 +25,6 @@ class SymtopError(ValueError):
 
     The message is one sentence that names the argument, the value it had and what is allowed. `parameters` are the
     names of arguments in the sentence, in whose places the command line writes its options.
-    The command line prints the sentence without a traceback and exits with code 2.
     """
 
     def __init__(self, sentence: object = "", *parameters: str) -> None:
@@ -142,9 +141,8 @@ def label(name: str, value: object) -> str:
     """Return `value` if it can name a scene or an integrator in a file, a table and a command."""
     if isinstance(value, str) and re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}", value):
         return value
-    raise SymtopError(
-        f"{name} must be 1 to 64 letters, digits or ._+- (a letter or digit first), not {shown(value)}", name
-    )
+    must = "1 to 64 letters, digits or ._+- (a letter or digit first)"
+    raise SymtopError(f"{name} must be {must}, not {shown(value)}", name)
 
 
 def one_of(name: str, value: object, allowed: Iterable[str]) -> str:

@@ -243,7 +243,6 @@ def _words(kind: Any) -> Any:
 
 
 def _type(words: Any) -> Any:
-    """The type of what a kernel returns."""
     if isinstance(words, str):
         return RETURNED[words]
     return types.BaseTuple.from_types(tuple(map(_type, words[-1])), getattr(sys.modules[words[0]], words[1]))
@@ -338,7 +337,6 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
 def compile_kernel(function: Callable[..., Any]) -> Any:
     """``njit`` with the disk cache; division by zero gives infinity, as in C.
 
-    A cache that somebody else may write is not used, with a warning (`is_trusted`).
     A kernel with functions typed at a prompt, which have no source file, compiles without the cache. The constructor of
     a NamedTuple has none either, but follows from the fields, which are part of what the kernel is made of.
     """

@@ -38,10 +38,7 @@ class Column(NamedTuple):
 
 
 def read_columns(file: Path | None) -> dict[str, Column]:
-    """The table in a file, empty without one; SymtopError for a line that declares no column, or one again.
-
-    Each line has five cells between tabs: `symtop.measure.columns` says what they are.
-    """
+    """The table in a file, as `symtop.measure.columns` describes it, empty without one; SymtopError for a wrong one."""
     table: dict[str, Column] = {}
     lines = [] if file is None else file.read_text(encoding="utf-8").splitlines()
     for place, line in enumerate(lines[1:], 2):
@@ -72,8 +69,7 @@ def _git(*arguments: str) -> str:
     command = ["git", "-C", str(ROOT), *arguments]
     with contextlib.suppress(OSError, subprocess.SubprocessError):
         if (ROOT / ".git").exists():  # git would take that of a folder above
-            result = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)  # noqa: S603
-            return result.stdout.strip()
+            return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True).stdout.strip()  # noqa: S603
     return ""
 
 
@@ -162,7 +158,6 @@ def read_json(path: Path) -> Any:
 
 
 def _encoding(data: xr.Dataset) -> dict[Any, dict[str, Any]]:
-    """No fill value in coordinates; bytes and single precision compressed."""
     bare = {name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"}
     return bare | {
         name: {"zlib": True} for name, values in data.data_vars.items()
@@ -223,12 +218,9 @@ def _netcdf(path: str | os.PathLike[str]) -> Iterator[None]:
 
 
 def read(path: str | os.PathLike[str]) -> xr.Dataset:
-    """Load a netCDF file completely into memory and close it.
-
-    Without its encoding, which has the length of the longest text there: longer ones would be written cut.
-    """
+    """Load a netCDF file completely into memory and close it."""
     with _netcdf(path), xr.open_dataset(path, engine="netcdf4") as data:
-        return data.load().drop_encoding()
+        return data.load().drop_encoding()  # which has the length of its longest text: longer ones would be cut
 
 
 def read_any(path: str | os.PathLike[str]) -> xr.Dataset | xr.DataTree:

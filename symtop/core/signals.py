@@ -58,10 +58,7 @@ def _handling(number: int, usual: Any, handler: Callable[..., None]) -> Iterator
 
 @contextlib.contextmanager
 def ending_on_sigterm() -> Iterator[None]:
-    """Raise TerminatedError on SIGTERM, and on SIGHUP, of a terminal that was closed, in the main thread.
-
-    A handler that is there already is left in place, also that of ``nohup``.
-    """
+    """Raise TerminatedError on SIGTERM, and on SIGHUP, of a terminal that was closed; a handler of ``nohup`` stays."""
     with _handling(signal.SIGTERM, signal.SIG_DFL, _end), _handling(HANGUP, signal.SIG_DFL, _end):
         yield
 

@@ -95,9 +95,8 @@ def compare(
             bar.set_description("timing")
             post("timing the runs")
             pairs = zip([exact, *variants], [rows, *(runs for runs, _ in results)], strict=True)
-            timed_rows(
-                [(problem, method, end, runs) for method, runs in pairs if method is not exact or not problem.of_body]
-            )
+            timed = [(problem, method, end, runs) for method, runs in pairs]
+            timed_rows(timed[1:] if problem.of_body else timed)
     size = max(len(runs) for runs, _ in results)
     blank: dict[str, Any] = {**SPENT, "message": "", "setting_value": math.nan}
     tables = [
@@ -112,9 +111,7 @@ def compare(
         reached=(("variant", "target"), [reached for _, reached in results]),
     )  # fmt: skip
     data = data.assign_coords(variant=names, target=list(settings.TARGETS), scene=problem.name)
-    entries = {
-        name: columns.ERROR_TABLE[f"{quantity}{name.removeprefix('error')}"] for name in ("error", "error_bound")
-    }
+    entries = {f"error{end}": columns.ERROR_TABLE[f"{quantity}{end}"] for end in ("", "_bound")}
     entries["target"] = "error that is accepted, largest over the run", *entries["error"][1:]
     own = {name: netcdf.Column(entry, {}) for name, entry in entries.items()}
     columns.described(data, problem.units, own, [problem.of_body])
@@ -139,7 +136,6 @@ def find(method: Any, on: Scene) -> Integrator:
 def _runs(
     scene: Scene, method: Integrator, horizon: float, budget: float, quantity: str
 ) -> tuple[list[dict[str, Any]], list[str]]:
-    """All runs of a variant, coarse to fine, and whether each target was met, or why not."""
     rows: dict[float, dict[str, Any]] = {}
     observe = settings.observed(quantity)
 
@@ -194,11 +190,8 @@ def cheapest(data: xr.Dataset, target: float) -> np.ndarray:
 
 
 def ranked(data: xr.Dataset) -> tuple[float, dict[str, float]]:
-    """Force evaluations that every variant can spend, and the least error of each within them, the best first.
-
-    A variant whose evaluations nobody counts has no place.
-    """
-    work = data["force_evaluations"].where((data["outcome"] == "ok") & (data["force_evaluations"] > 0.0))
+    """Force evaluations that every variant can spend, and the least error of each within them, the best first."""
+    work = data["force_evaluations"].where((data["outcome"] == "ok") & (data["force_evaluations"] > 0.0))  # 0: unknown
     most = float(work.max("setting").min())
     errors = data["error"].where(work <= most).min("setting").to_series().dropna()
     return most, {str(name): float(error) for name, error in errors.sort_values().items()}

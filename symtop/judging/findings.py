@@ -208,10 +208,8 @@ def line(finding: Finding, width: int = WIDTH) -> str:
 def description(findings: Sequence[Finding]) -> str:
     """What the method is, whatever is claimed of it: "order 2, symplectic, reversible, keeps p_phi; not p_psi"."""
     measured = {one.claim: one.measured for one in findings}
-    errors = {
-        one.claim.removesuffix("_error"): one.value for one in findings if one.claim.endswith("_error") and one.measured
-    }
-    words = [f"{name} within {value:.1e}{error_units(name)} of the truth" for name, value in errors.items()]
+    errors = ((one.claim.removesuffix("_error"), one) for one in findings if one.claim.endswith("_error"))
+    words = [f"{name} within {one.value:.1e}{error_units(name)} of the truth" for name, one in errors if one.measured]
     if order := measured.get("order"):
         wrong, p = order.kind == "wrong limit", order.number
         whole = not wrong and abs(p - round(p)) < 0.3

@@ -1,8 +1,5 @@
 """judge(): anybody's integrator against its claims in a process of its own; or a trajectory, as far as it shows them.
 
-*A step* runs in a process of its own (`symtop.judging.remote`); one that hangs, crashes or takes too long costs the
-verdicts of one stage, which stay undecided and say why.
-
 *A trajectory without a method*: its errors are against the true motion of the scene (`symtop.measure.errors`). Where
 the angular momentum L in space is there, energy and momenta are recomputed from it, whatever the file reports,
 
@@ -187,23 +184,17 @@ def read(target: Any) -> dict[str, Any]:
         raise SymtopError(f"{begin}, but of {head[:60]!r} {', '.join(wrong[:SHOWN])}{' ...' * (len(wrong) > SHOWN)}")
     if not any(one.partition("#")[0].strip() for one in lines):
         raise SymtopError(f"{path.name} must have a line of numbers below its names, and has none")
-    columns = _numbers(path.name, names, lines)
-    for name, parts in VECTORS.items():
-        if set(parts) <= set(columns):
-            columns[name] = np.stack([columns[part] for part in parts], axis=-1)
-    return {name: values for name, values in columns.items() if name in (*VECTORS, *SCALARS)}
-
-
-def _numbers(file: str, names: list[str], lines: list[str]) -> dict[str, np.ndarray]:
-    """Columns by name of the lines of a file."""
-    must = f"{file} must have {len(names)} numbers in each line"
+    must = f"{path.name} must have {len(names)} numbers in each line"
     try:
         rows = np.loadtxt(lines, ndmin=2)
     except ValueError as error:
         raise SymtopError(f"{must}: {str(error).partition(';')[0]}") from None
     if rows.shape[1] != len(names):
         raise SymtopError(f"{must}, not {rows.shape[1]}")
-    return dict(zip(names, rows.T, strict=True))
+    columns = dict(zip(names, rows.T, strict=True))
+    rows_of = {name: [columns[part] for part in parts] for name, parts in VECTORS.items() if parts[0] in names}
+    columns |= {name: np.stack(rows, axis=-1) for name, rows in rows_of.items()}
+    return {name: values for name, values in columns.items() if name in (*VECTORS, *SCALARS)}
 
 
 def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy: str | None) -> list[Finding]:
@@ -230,7 +221,11 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
     deviation = errors(columns, scene)
     time = deviation["time"].values
     if rates is not None and scene.of_body:
-        deviation = deviation.assign({name: ("time", values) for name, values in _of_rates(scene, time, rates).items()})
+        truth, moments = reference(scene, time), np.array(scene.top.moments)
+        inside = rotated(truth["quaternion"].values * CONJUGATE, truth["momentum"].values)
+        bound = scene.momentum_scale / moments.min() * (truth["attitude_error_bound"].values + 4.0 * EPSILON)
+        off = np.linalg.norm(rates - inside / moments, axis=1)
+        deviation = deviation.assign(rates=("time", off), rates_bound=("time", bound))
     findings = [_error(name, scene, time, deviation) for name in OF_STATES if name in deviation]
     own = _from_states(scene, states)
     for name in (*CONSTANTS, *sorted({*conserves} - {*CONSTANTS})):
@@ -253,18 +248,8 @@ def _refuse_contradiction(states: Trajectory, scene: Scene) -> None:
     if (apart > AGREE).any():  # false where it is NaN
         refuse_other_order(states.quaternion, reference(scene, states.time))
         k = int(np.nanargmax(apart))
-        raise SymtopError(
-            f"axis and quaternion must show one attitude within {AGREE:g} rad, but at t = {states.time[k]:.6g} the "
-            f"axis is {apart[k]:.2g} rad from that of the quaternion"
-        )
-
-
-def _of_rates(scene: Scene, time: np.ndarray, rates: np.ndarray) -> dict[str, np.ndarray]:
-    """The error of the rates (n, 3) of a body, rad per unit time, and its bound."""
-    truth, moments = reference(scene, time), np.array(scene.top.moments)
-    inside = rotated(truth["quaternion"].values * CONJUGATE, truth["momentum"].values)
-    bound = scene.momentum_scale / moments.min() * (truth["attitude_error_bound"].values + 4.0 * EPSILON)
-    return {"rates": np.linalg.norm(rates - inside / moments, axis=1), "rates_bound": bound}
+        must = f"axis and quaternion must show one attitude within {AGREE:g} rad, but at t = {states.time[k]:.6g}"
+        raise SymtopError(f"{must} the axis is {apart[k]:.2g} rad from that of the quaternion")
 
 
 def _from_states(scene: Scene, states: Trajectory) -> dict[str, np.ndarray]:
@@ -315,9 +300,8 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
     words = f"in {count}; it begins {abs(values[0] - true) / scale:.1e} from the scene's"
     finding = constant.finding(name, declared, constant.words(words))
     if finding.verdict != "refuted" and time.size < FEWEST and np.ptp(time) < scene.time_scale():
-        finding = undecided(
-            name, declared, f"{finding.why}; fewer than {FEWEST}, over less than a {scene.period_word}, say nothing"
-        )
+        few = f"fewer than {FEWEST}, over less than a {scene.period_word}, say nothing"
+        finding = undecided(name, declared, f"{finding.why}; {few}")
     beyond = blows_up(scene, (values - values[0]) / scale) if name == "energy" else np.empty(0)
     return blow_up_finding(finding, time[beyond[0]]) if beyond.size else finding
 

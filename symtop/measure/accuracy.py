@@ -71,10 +71,7 @@ def error_row(
     scene: Scene, method: Integrator, setting: float, horizon: float, observe: str | None = None, *,
     phases: bool = False, budget: float | None = None,
 ) -> dict[str, float | str]:  # fmt: skip
-    """One run's entries in an error table; with `phases` also the errors of its frequencies (see `phase`).
-
-    `budget` is that of `simulate`.
-    """
+    """One run's entries in an error table; with `phases` the errors of its frequencies, too; `budget` of `simulate`."""
     control: dict[str, Any] = {"horizon": horizon, "samples": enough_samples(scene, horizon), "observe": observe}
     run = integrate(scene, method, budget=budget, **control | method.given(setting))
     truth = reference(scene, run.time, precision="closed-form")

@@ -45,8 +45,7 @@ def described(
         for name, variable in variables.items():
             column = own.get(f"{group}/{name}", own.get(str(name)))
             if column or (name in known and "long_name" not in variable.attrs):
-                entry = column.entry if column else known[str(name)]
-                words, *choice = entry
+                words, *choice = column.entry if column else known[str(name)]
                 variable.attrs.update(netcdf.label((against(words, of_body), *choice), units, " in units of the scene"))
             if column and column.flags:
                 values = np.array(list(column.flags), variable.dtype)

@@ -74,10 +74,9 @@ class Changed(NamedTuple):
 def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> Changed:
     """Size, trend and growth over the last `decades` of a residual (n,) at times (n,); samples may be NaN."""
     size, power = np.abs(np.asarray(residual, float)), growth(time, residual, decades)
-    largest = float(np.max(size[np.isfinite(size)], initial=-1.0))
-    return Changed(
-        largest if largest >= 0.0 else math.nan, *trend(time, residual), power.slope, power.interval, law(power)
-    )
+    good = size[np.isfinite(size)]
+    largest = float(good.max()) if good.size else math.nan
+    return Changed(largest, *trend(time, residual), power.slope, power.interval, law(power))
 
 
 def residuals(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
@@ -88,11 +87,8 @@ def residuals(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
 
 
 def growth(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> Fit:
-    """The exponent of |residual| ~ t^exponent, from the largest values in logarithmic windows of the last `decades`.
-
-    What happens within the first nutations is an oscillation that switches on, not growth.
-    """
-    return power_law(*tops(time, residual, decades))
+    """The exponent of |residual| ~ t^exponent, from the largest values in logarithmic windows of the last `decades`."""
+    return power_law(*tops(time, residual, decades))  # within the first nutations an oscillation only switches on
 
 
 def tops(
@@ -111,17 +107,13 @@ def tops(
 
 
 def law(fit: Fit) -> str:
-    """The name of the exponent that a fit agrees with, within its interval or `SLACK`; otherwise the exponent.
-
-    "undecided" if another law lies within the interval as well.
-    """
+    """The name of the exponent that a fit agrees with, within its interval or `SLACK`; otherwise the exponent."""
     if not math.isfinite(fit.slope):
         return "not judged"
     nearest = min(LAWS, key=lambda exponent: abs(exponent - fit.slope))
     if any(abs(exponent - fit.slope) <= fit.interval for exponent in LAWS if exponent != nearest):
         return "undecided"
-    agrees = abs(nearest - fit.slope) <= max(fit.interval, SLACK)
-    return LAWS[nearest] if agrees else f"t^{fit.slope:.2f}"
+    return LAWS[nearest] if abs(nearest - fit.slope) <= max(fit.interval, SLACK) else f"t^{fit.slope:.2f}"
 
 
 def behaviour(size: float, slope: float, interval: float, grain: float = 1.0, rounding: float = 0.0) -> str:

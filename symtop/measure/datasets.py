@@ -58,10 +58,9 @@ def _dense(cases: list[tuple[Any, xr.Dataset]]) -> xr.Dataset:
         place = scenes.index(scene), methods.index(method)
         for name, variable in data.data_vars.items():
             if (scene, method, str(name)) in keys:
-                raise SymtopError(
-                    f"two cases of {method} on {scene} measure {name}, and one would replace the other: "
-                    "give each a group, or measure all settings in one case, over a dimension of the dataset"
-                )
+                words = f"two cases of {method} on {scene} measure {name}, and one would replace the other"
+                remedy = "give each a group, or measure all settings in one case, over a dimension of the dataset"
+                raise SymtopError(f"{words}: {remedy}")
             keys.add((scene, method, str(name)))
             dims = tuple(str(dim) for dim in variable.dims)
             if str(name) not in filled:

@@ -15,7 +15,6 @@ momenta.
 
 A trajectory of another program is checked first. A quaternion shows the attitude, the axis and theta; theta, phi and
 psi the same; theta and phi the axis; an axis shows theta. Vectors that are not quite of length one are scaled to it.
-Samples that hold a NaN stay NaN.
 """
 
 import contextlib
@@ -28,7 +27,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.core import netcdf
-from symtop.core.errors import SymtopError, SymtopWarning, one_of, positive
+from symtop.core.errors import SymtopError, SymtopWarning, one_of
 from symtop.core.numbers import EPSILON
 from symtop.measure.conservation import CONSTANTS
 from symtop.methods.framework.lanes import members_of
@@ -222,14 +221,10 @@ def scene_of(run: xr.Dataset | Mapping[str, Any]) -> Scene:
     """The scene that a dataset of `simulate` says that it was made of; SymtopError for any other data."""
     attributes = getattr(run, "attrs", {})
     try:
-        top, start = (json.loads(attributes[name]) for name in ("top", "start"))
-        name, horizon = str(attributes["scene"]), positive("horizon", attributes["horizon"])
-        kinds = (RigidBody, Attitude) if "I2" in top else (SymmetricTop, Angles)
-        return Scene(name, kinds[0](**top), kinds[1](**start), horizon)
+        return Scene(str(attributes["scene"]), _stored(run, "top"), _stored(run, "start"), attributes["horizon"])
     except (KeyError, TypeError, ValueError) as error:
-        raise SymtopError(
-            "scene is missing: these data do not say of which top and start they are, so give errors(data, scene)"
-        ) from error
+        words = "these data do not say of which top and start they are, so give errors(data, scene)"
+        raise SymtopError(f"scene is missing: {words}") from error
 
 
 def refuse_other_scene(run: xr.Dataset | Mapping[str, Any], scene: Scene) -> None:
@@ -237,10 +232,9 @@ def refuse_other_scene(run: xr.Dataset | Mapping[str, Any], scene: Scene) -> Non
     attributes = getattr(run, "attrs", {})
     for name, own in (("top", scene.top), ("start", scene.start)):
         if _stored(run, name) not in (None, own):
-            raise SymtopError(
-                f"scene must be that of the data, {attributes.get('scene', 'of another name')}, whose {name} is "
-                f"{attributes[name]}, not {scene.name}; drop_attrs() makes them a trajectory that is compared with any"
-            )
+            must = f"that of the data, {attributes.get('scene', 'of another name')}, whose {name} is {attributes[name]}"
+            remedy = "drop_attrs() makes them a trajectory that is compared with any"
+            raise SymtopError(f"scene must be {must}, not {scene.name}; {remedy}")
 
 
 def _stored(run: xr.Dataset | Mapping[str, Any], name: str) -> Any:
@@ -252,10 +246,8 @@ def _stored(run: xr.Dataset | Mapping[str, Any], name: str) -> Any:
 
 
 def sampled(run: xr.Dataset) -> xr.Dataset:
-    """A run without the samples that it does not have: a member of an ensemble fills its row with times that are NaN.
-
-    Of other data times are left as they are, so that one that is no number is refused.
-    """
+    """A run without the samples that it does not have: members of an ensemble fill their rows with times of NaN."""
+    # of other data a time that is no number is refused later
     if "integrator" not in run.attrs or "time" not in run or run["time"].dims != ("time",):
         return run
     there = np.isfinite(doubles("time", run["time"]))
@@ -263,14 +255,10 @@ def sampled(run: xr.Dataset) -> xr.Dataset:
 
 
 def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
-    """The known variables of a foreign trajectory; an axis and a quaternion are scaled to length one.
-
-    Raises SymtopError for anything that is not such a trajectory.
-    """
+    """The known variables of a foreign trajectory, an axis and a quaternion at length one; SymtopError for all else."""
     if not isinstance(data, Mapping):  # a Dataset is one
-        raise SymtopError(
-            f"data must be a Dataset or a mapping with time and axis, quaternion or theta, not {type(data).__name__}"
-        )
+        must = "a Dataset or a mapping with time and axis, quaternion or theta"
+        raise SymtopError(f"data must be {must}, not {type(data).__name__}")
     if "time" not in data:
         raise SymtopError("data must hold time, elapsed since the start of the scene; there is none")
     time = doubles("time", data["time"])
@@ -337,22 +325,17 @@ def doubles(name: str, values: Any) -> charts.Array:
 
 
 def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:
-    """Refuse quaternions that are the true attitude only when they are read in another convention.
-
-    That is judged where they are first `FAR` from the truth: a scene may begin where two conventions agree.
-    """
-    true = truth["quaternion"].values
+    """Refuse quaternions that are the true attitude only when they are read in another convention."""
+    true = truth["quaternion"].values  # near which a scene may begin where two conventions agree
     far = np.flatnonzero(charts.attitude_distance(quaternion, true) > FAR)
     if not far.size:
         return
     given, k = quaternion[far[0]], far[0]
     for other, moved in (("x, y, z, w", np.roll(given, 1)), ("from space to body", given * [1.0, -1.0, -1.0, -1.0])):
         if float(charts.attitude_distance(moved, true[k])) < NEAR:
-            raise SymtopError(
-                "quaternion must be in the order w, x, y, z and from body to space, but its "
-                f"{'first sample' if k == 0 else f'sample at t = {truth.time.values[k]:.6g}'} is the true "
-                f"one if it is read as {other}"
-            )
+            place = "first sample" if k == 0 else f"sample at t = {truth.time.values[k]:.6g}"
+            must = "quaternion must be in the order w, x, y, z and from body to space"
+            raise SymtopError(f"{must}, but its {place} is the true one if it is read as {other}")
 
 
 def elsewhere(time: charts.Array, errors: Mapping[str, charts.Array]) -> list[str]:
@@ -365,16 +348,11 @@ def elsewhere(time: charts.Array, errors: Mapping[str, charts.Array]) -> list[st
 
 
 def doubts(time: charts.Array, errors: Mapping[str, charts.Array], horizon: float) -> list[str]:
-    """What is wrong with a foreign trajectory as a whole: another clock, samples that are not numbers.
-
-    `horizon` is that of the scene: times far beyond it may be in another unit.
-    """
+    """What is wrong with a foreign trajectory as a whole: times far beyond the scene's horizon, samples of NaN."""
     sentences = []
     if time[-1] > BEYOND * horizon:
-        sentences.append(
-            f"times reach to {time[-1]:.6g}, {time[-1] / horizon:.3g} times the horizon {horizon:.6g}: are they in the "
-            "scene's unit of time?"
-        )
+        far = f"{time[-1]:.6g}, {time[-1] / horizon:.3g} times the horizon {horizon:.6g}"
+        sentences.append(f"times reach to {far}: are they in the scene's unit of time?")
     for name, values in errors.items():
         if np.isnan(values).any():
             since = time[int(np.argmax(np.isnan(values)))]

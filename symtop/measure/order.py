@@ -24,7 +24,6 @@ One rule, `order_verdict`, says for every study whether a measured slope confirm
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, theorem II.3.2 (even powers of a symmetric method).
 """
 
-import functools
 import math
 from collections.abc import Iterable
 from itertools import pairwise
@@ -85,7 +84,6 @@ def line(x: Array, y: Array) -> Line:
     return Line(slope, error, middle, rest)
 
 
-@functools.lru_cache(maxsize=256)
 def student(freedom: int) -> float:
     """By how much a standard error is multiplied for a 95 % interval."""
     from scipy.special import stdtrit  # what scipy.stats asks, which takes a second to import
@@ -121,13 +119,12 @@ def order(
     rank = np.unique(h, return_index=True)[1]  # a step that was taken twice is one point
     finest = e[rank][np.isfinite(e[rank])][:2]
     if finest.size == 0:
-        return _unjudged(e, "every run failed")
+        return _unjudged(np.isfinite(e), "every run failed")
     judged, b = b, np.maximum(b, _round_off(h[rank], e[rank]))
     used = np.isfinite(e) & (e > 10.0 * b) & (e < LARGEST_ERROR)
     used &= h * omega < LARGEST_PHASE * max(claim or 2, 2) / 2.0
     places = rank[used[rank]]
-    points = (values[places].tobytes() for values in (h, e, b))
-    series = _widest(*points, 2 if symmetric else 1)
+    series = _widest(h[places], e[places], b[places], 2 if symmetric else 1)
     if series is None:
         if np.min(finest) > FLOOR * np.max(judged):
             return _unjudged(used, "the error does not fall to rounding as a power of the step")
@@ -173,10 +170,8 @@ def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> s
     return "confirmed" if off <= BESIDE else "undecided"
 
 
-@functools.lru_cache(maxsize=4096)  # the words, tables and figures of a study ask for the same 1,600
-def _widest(steps: bytes, errors: bytes, bounds: bytes, power: int) -> tuple[float, float, float, slice] | None:
+def _widest(h: Array, e: Array, b: Array, power: int) -> tuple[float, float, float, slice] | None:
     """Slope, interval and constant of the series over the widest window of points that it describes; the window."""
-    h, e, b = (np.frombuffer(values) for values in (steps, errors, bounds))
     first, last = 0, h.size
     while last - first >= LEAST:
         window = slice(first, last)

@@ -12,6 +12,7 @@ decades of error. The coefficients are doubles, summed to 1 again. The error is 
 both halves of a reference in long double. Methods with a modified potential or another rotation are not run.
 """
 
+import functools
 import math
 from typing import Any
 
@@ -41,10 +42,7 @@ def observable(method: Integrator) -> str:
 
 
 def asymptotic_steps(table: xr.Dataset, quantity: str, power: int) -> list[float]:
-    """More steps where an error table's errors are a power of the step: from above rounding `DECADES` upwards.
-
-    A ladder over all decades has few steps there if the order `power` is high. Empty if every error is near its bound.
-    """
+    """More steps where errors are a power of the step, from above rounding `DECADES` up; none if all are rounding."""
     h, error, bound = (table[name].values for name in ("step_size", quantity, f"{quantity}_bound"))
     judged = np.flatnonzero(np.isfinite(error) & (error > 2.5 * ABOVE_ROUNDING * bound))
     if judged.size == 0:
@@ -61,9 +59,8 @@ def order_table(
     table = error_table(scene, method, settings, horizon, observe=quantity)
     if not method.fixed_step or not dense or math.isfinite(order_fit(scene, method, table, quantity, horizon).slope):
         return table
-    steps = asymptotic_steps(table, quantity, method.order or 2)
-    more = error_table(scene, method, steps, horizon, observe=quantity) if steps else None
-    table = table if more is None else xr.concat([table, more], "setting")
+    if steps := asymptotic_steps(table, quantity, method.order or 2):
+        table = xr.concat([table, error_table(scene, method, steps, horizon, observe=quantity)], "setting")
     if math.isfinite(order_fit(scene, method, table, quantity, horizon).slope):
         return table
     extended = None if scene.of_body else extended_errors(scene, method)
@@ -77,25 +74,18 @@ def order_fit(scene: Scene, method: Integrator, table: xr.Dataset, quantity: str
     it cannot be judged, the error at the end is, which is smooth in h; and for axis and attitude, last, that of a run
     in long double, whose steps are not among those of the table.
     """
-    largest = _fit(scene, method, table, quantity, horizon)
+    step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
+    bound, omega = table[f"{quantity.removesuffix('_end')}_bound"].values, 2.0 * math.pi / scene.nutation_period
+    fit = functools.partial(order, omega=omega, claim=method.order, symmetric=method.symmetric)
+    largest = fit(step, table[quantity].values, bound)
     if math.isfinite(largest.slope) or f"{quantity}_end" not in table:
         return largest
-    end = _fit(scene, method, table, f"{quantity}_end", horizon)
-    if math.isfinite(end.slope) or quantity not in ("axis", "attitude"):
-        return end if math.isfinite(end.slope) else largest
-    extended = extended_order_data(table)
-    if extended is None:
-        return largest
-    omega = 2.0 * math.pi / scene.nutation_period
-    fit = order(*extended, omega, method.order, symmetric=method.symmetric)
-    return fit._replace(used=np.zeros_like(largest.used)) if math.isfinite(fit.slope) else largest
-
-
-def _fit(scene: Scene, method: Integrator, table: xr.Dataset, quantity: str, horizon: float) -> Fit:
-    step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
-    omega = 2.0 * math.pi / scene.nutation_period
-    error, bound = (table[column].values for column in (quantity, f"{quantity.removesuffix('_end')}_bound"))
-    return order(step, error, bound, omega, method.order, symmetric=method.symmetric)
+    end = fit(step, table[f"{quantity}_end"].values, bound)
+    if math.isfinite(end.slope):
+        return end
+    extended = extended_order_data(table) if quantity in ("axis", "attitude") else None
+    last = fit(*extended) if extended else end
+    return last._replace(used=np.zeros_like(largest.used)) if math.isfinite(last.slope) else largest
 
 
 Wide = np.longdouble
@@ -138,9 +128,7 @@ def _composition(scene: Scene, method: Integrator) -> Stages | None:
 def _ends(scene: Scene, stages: Stages, horizon: float, counts: NDArray[np.int64]) -> Any:
     """The axes (n, 3) after each of the ascending `counts` of steps, in long double; all runs take a step together."""
     top, start, step = scene.top, scene.start, Wide(horizon) / counts.astype(Wide)
-    theta, phi, *rates = (
-        Wide(value) for value in (start.theta, start.phi, start.theta_dot, start.phi_dot, start.psi_dot)
-    )
+    theta, phi, *rates = map(Wide, (start.theta, start.phi, start.theta_dot, start.phi_dot, start.psi_dot))
     axes = np.tile(np.array(charts.axis_parts(np, theta, phi))[:, np.newaxis], counts.size)
     momenta = np.tile(np.array(charts.momentum_parts(np, top, theta, phi, *rates))[:, np.newaxis], counts.size)
     drifts, kicks = ([Wide(value) for value in part] for part in (stages.drift, stages.kick))

@@ -41,32 +41,21 @@ TRIED = f"Not within {TRIES} runs"
 
 
 def smallest_charts(observe: str) -> list[Integrator]:
-    """Every method in each chart that shows `observe`, but for the attitude's where it has a chart of the axis alone.
-
-    The attitude's costs more and steps the same axis and angular momentum.
-    """
-    return [
-        variant
-        for variant in variants(observe)
-        if variant.charts() != ("attitude",) or "axis" not in integrator(variant.method).charts()
-    ]
+    """Every method in each chart that shows `observe`, but for the attitude's where it has one of the axis alone."""
+    larger = ("attitude",)  # it costs more for the same axis and angular momentum
+    return [one for one in variants(observe) if one.charts() != larger or "axis" not in integrator(one.method).charts()]
 
 
 def compared(observe: str) -> list[Integrator]:
-    """Every method in each chart that shows the "axis", the smallest, or the "attitude".
-
-    A method whose steps are exact at any size (`exact_steps`) is left out: it steps the solution of this problem in
-    closed form, and a comparison is made for problems that have none.
-    """
+    """Every method in each chart that shows the "axis", the smallest, or the "attitude", but for `exact_steps`."""
     every = smallest_charts(observe) if observe == "axis" else variants(observe)
-    return [variant for variant in every if not variant.exact_steps]
+    return [one for one in every if not one.exact_steps]  # they step a solution that other problems do not have
 
 
 def least_tolerance(method: Integrator) -> float:
     """The least tolerance that an adaptive method is tried with."""
-    return max(
-        method.least_tolerance, TEDIOUS if method.implementation == "python" and method.explicit is False else 0.0
-    )
+    tedious = method.implementation == "python" and method.explicit is False
+    return max(method.least_tolerance, TEDIOUS * tedious)
 
 
 def limits(scene: Scene, method: Integrator, horizon: float, quantity: str = "axis") -> tuple[float, float]:
@@ -102,12 +91,9 @@ def ladder(method: Integrator, scene: Scene, horizon: float, count: int = 9, mos
 
 
 def between(fine: float, low: float, coarse: float, high: float, goal: float) -> float:
-    """The setting between two whose errors are `low` and `high` at which the line through both in logs has `goal`.
-
-    At most nine tenths of the way to either; half the way where the errors show no line.
-    """
+    """The setting between two whose errors are `low` and `high` at which the line through both in logs has `goal`."""
     if math.isinf(high) or low <= 0.0 or high > 1e6 * low:
-        part = 0.5
+        part = 0.5  # the errors show no line
     else:
         part = min(max(math.log(goal / low) / math.log(high / low), 0.1), 0.9)
     return float(fine * (coarse / fine) ** part)
@@ -176,8 +162,7 @@ def observed(quantity: str) -> str:
 
 def growth(method: Integrator, quantity: str) -> int:
     """The exponent a of the error's growth with the horizon that the method's traits promise."""
-    structured = bool(method.symplectic) or bool(method.symmetric)
-    return (1 if quantity in ANGLES else 0) + (0 if structured else 1)
+    return (quantity in ANGLES) + (not (method.symplectic or method.symmetric))
 
 
 def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, quantity: str) -> Met:
@@ -189,10 +174,7 @@ def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, qu
 
 
 def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
-    """The least error of a quantity that the reference can judge over a horizon; NaN if the motion does not show it.
-
-    Raises SymtopError for a horizon to which the motion of a body is not known.
-    """
+    """The least error of a quantity that the reference can judge over a horizon; NaN if the motion does not show it."""
     if not scene.of_body:
         return attempt(scene, integrators()["exact"], math.nan, horizon, quantity).bound
     try:  # a few steps of any method, as the reference and its bound know none
@@ -207,9 +189,8 @@ def search(
 ) -> Met | str:  # fmt: skip
     """The coarsest setting found that meets the accuracy over the horizon, or the reason why there is none.
 
-    It begins at an error of about (h/period)^p, or of the tolerance, unless there is a guess. It ends with an error
-    between `least` of the accuracy and the accuracy, if that takes few runs. No run is begun that is foreseen to take
-    more than `patience` force evaluations, and none has a setting above `longest`.
+    It begins at an error of about (h/period)^p, or of the tolerance, unless there is a guess; no setting is above
+    `longest`. `patience` and `least` are those of `seek`.
     """
     finest, coarsest = limits(scene, method, horizon, quantity)
     ends, patience = (finest, min(coarsest, longest)), min(patience, MOST_EVALUATIONS[method.implementation])

@@ -170,10 +170,7 @@ def generic_start(scene: Scene) -> Angles:
 
 
 def drawn(scene: Scene, count: int, seed: int, *, same_top: bool) -> Iterator[Scene]:
-    """Starts whose axes are spread over all heights but the poles, on other tops unless they are to be the same.
-
-    Sizes and rates are about those of the scene; one of these `Scene` after another.
-    """
+    """Starts whose axes are spread over all heights but the poles, on other tops unless they are to be the same."""
     draw, rate = np.random.default_rng(seed), 2.0 * math.pi / scene.time_scale()
     for height in draw.permutation(count):
         cosine, top = 0.99 * (2.0 * (height + draw.uniform()) / count - 1.0), scene.top
@@ -186,20 +183,13 @@ def drawn(scene: Scene, count: int, seed: int, *, same_top: bool) -> Iterator[Sc
 
 def moved(step: StepMap, scene: Scene) -> StepMap:
     """The map on another scene's top, of a step that is coarse there."""
-    other = replace(step, top=scene.top, unit=unit_of(scene), h=SHARE * scene.time_scale())
-    return coarsest(other, scene.start)
+    return coarsest(replace(step, top=scene.top, unit=unit_of(scene), h=SHARE * scene.time_scale()), scene.start)
 
 
 def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Angles]:
-    """The map at a step so large that its structure shows above rounding, and the point to judge it at.
-
-    Raises SymtopError if no step succeeds.
-    """
-    start = generic_start(scene)
-    trial = one_step(method, chart, scene, SHARE * scene.time_scale())
-    if not method.fixed_step:
-        return trial, start
-    return coarsest(trial, start), start
+    """The map at a step so large that its structure shows, and the point to judge it at; SymtopError without one."""
+    start, trial = generic_start(scene), one_step(method, chart, scene, SHARE * scene.time_scale())
+    return coarsest(trial, start) if method.fixed_step else trial, start
 
 
 def coarsest(trial: StepMap, start: Angles) -> StepMap:

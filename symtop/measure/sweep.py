@@ -1,15 +1,14 @@
 """sweep(): scenes x integrators x steps or tolerances -> one dataset of errors, work and outcomes.
 
-A cell, one integrator on one scene, is an error table (`symtop.measure.accuracy`). Cells are computed on threads, which
-compiled kernels let run at once. With a file, cells are kept in it as they are done, each with the digest of all that
-its numbers depend on (`symtop.core.code_hash`), as the cases of a study are: what is up to date is not run again.
+A cell, one integrator on one scene, is an error table (`symtop.measure.accuracy`). In a file it stands with the digest
+of all that its numbers depend on (`symtop.core.code_hash`), as the cases of a study do.
 """
 
 import contextlib
 import functools
 import math
 import time
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,7 +38,6 @@ TIMED = (
 )
 MOST_NAMED = 4  # cells that a message lists
 _code = functools.cache(code)
-Stored = tuple[list[tuple[str, str]], dict[str, xr.Dataset]]
 
 
 class _Cell(NamedTuple):
@@ -91,17 +89,15 @@ def sweep(
     for words, names in (("scenes", [one.name for one in chosen]), ("integrators", [one.name for one in methods])):
         if not names or len(set(names)) < len(names):
             raise SymtopError(f"{words} must be one or more, each once, not {names!r}")
-    given = {
-        name: _settings(name, values)
-        for name, values in (("step_size", step_size), ("per_nutation", per_nutation), ("tolerance", tolerance))
-        if values is not None
-    }
+    asked = {"step_size": step_size, "per_nutation": per_nutation, "tolerance": tolerance}
+    given = {name: _settings(name, values) for name, values in asked.items() if values is not None}
     clock = boolean("timed", timed)
     grid = [[_cell(one, method, given, horizon, observe, clock) for method in methods] for one in chosen]
     cells = [cell for row in grid for cell in row]
     pairs = [(cell.scene.name, cell.method.name) for cell in cells]
     file = None if path is None else file_path("path", path)
-    with _opened(file) as (stored, done):
+    with contextlib.nullcontext() if file is None else files.only_writer(file):
+        stored, done = _stored(file)
         if others := [f"{name} on {of}" for of, name in stored if (of, name) not in pairs]:
             few = ", ".join(others[:MOST_NAMED]) + f" and {len(others) - MOST_NAMED} more" * bool(others[MOST_NAMED:])
             must = f"{few}: ask for these as well, or name another path"
@@ -148,10 +144,8 @@ def listed(things: Any) -> list[Any]:
     if isinstance(things, (str, Scene, Integrator)) or not isinstance(things, Iterable):
         return [things]
     if hasattr(things, "keys"):  # a dataset, a table or a dict, which goes through its names
-        raise SymtopError(
-            f"scenes and integrators must be names, objects or lists of them, not a {type(things).__name__}; for a "
-            "dataset of tops there is ensemble"
-        )
+        must = f"scenes and integrators must be names, objects or lists of them, not a {type(things).__name__}"
+        raise SymtopError(f"{must}; for a dataset of tops there is ensemble")
     try:
         return list(things)
     except TypeError:  # an array without dimensions
@@ -193,7 +187,6 @@ def _cell(
 
 
 def _table(cell: _Cell) -> xr.Dataset:
-    """The error table of a cell; a run that raises is a row that says so."""
     runs = [error_row_or_message(*cell[:2], setting, cell.horizon, cell.observe) for setting in cell.settings]
     return as_table([run | (SPENT if cell.timed else {}) for run in runs])
 
@@ -205,8 +198,7 @@ def error_row_or_message(
     try:
         return error_row(scene, method, setting, horizon, observe, budget=budget) | {"message": ""}
     except SymtopError as error:
-        blank = blank_row(method) | {"outcome": RAISED, "message": str(error)}
-        return blank | method.given(setting)
+        return blank_row(method) | {"outcome": RAISED, "message": str(error)} | method.given(setting)
 
 
 def _time(cells: list[_Cell], done: dict[str, xr.Dataset]) -> bool:
@@ -246,19 +238,12 @@ def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:
     return whole.assign(made_of=((), cell.made_of))
 
 
-@contextlib.contextmanager
-def _opened(file: Path | None) -> Iterator[Stored]:
-    """What an earlier sweep left in a file, which nobody else writes meanwhile; SymtopError if somebody does."""
-    if file is None:
-        yield [], {}
-        return
-    with files.only_writer(file):
-        files.sweep(file)
-        yield _stored(file) if file.exists() else ([], {})
-
-
-def _stored(file: Path) -> Stored:
+def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Dataset]]:
     """Scenes and variants of an earlier sweep, and its error tables by their digests; SymtopError for another file."""
+    if file is not None:
+        files.sweep(file)
+    if file is None or not file.exists():
+        return [], {}
     data = netcdf.read(file)
     if "made_of" not in data:
         raise SymtopError(f"path must be a new file or that of a sweep, not {str(file)!r}")

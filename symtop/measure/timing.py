@@ -81,10 +81,9 @@ def timings(
 
     Those that are `warm`, called before, have no first call (NaN), and a call that turns out to be longer than a batch
     is the first sample of its function: a long run costs no more calls than it has samples. A function has no more
-    samples, but two at least, if they have taken `patience` seconds together: a long one meets both fast and slow
-    moments of the machine. It has no more either once its two least differ by less than the part `close`: noise only
-    adds, and seldom adds the same twice. The closed form is compiled before anything is timed, whoever calls it; if
-    nothing that is timed does (not `exact`), it stays as it is.
+    samples, but `least` of them, if they have taken `patience` seconds together: a long one meets both fast and slow
+    moments of the machine. It has no more either once they `agree` within the part `close`. The closed form is compiled
+    before anything is timed, whoever calls it; if nothing that is timed does (not `exact`), it stays as it is.
     """
     if exact:
         closed_form.compile_now()

@@ -79,9 +79,8 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         return Judgement(ended, float(run.attrs["reached_time"]), str(run.attrs["outcome_message"]))
     truth, worst = barriers(scene), float(np.max(axis_error))
     if worst <= truth.accurate:
-        return Judgement(
-            "accurate", float(times[-1]), f"accurate to {worst:.2g} rad up to t = {times[-1]:.6g}{scene.second}"
-        )
+        sentence = f"accurate to {worst:.2g} rad up to t = {times[-1]:.6g}{scene.second}"
+        return Judgement("accurate", float(times[-1]), sentence)
     theta, energy = run["theta"].values, np.abs(run["energy"].values - run["energy"].values[0]) / scene.energy_scale
     beyond = ~((theta >= truth.highest - truth.margin) & (theta <= truth.lowest + truth.margin))
     strays = beyond | pole_passed(scene, run["p_phi"].values, run.get("p_psi", run["p_phi"]).values)

@@ -87,10 +87,8 @@ class StudyCases:
 
     def compute(self, missing: dict[Path, Case], pool: Pool, limit: float, *, fresh: bool, quiet: bool) -> None:
         """Have cases computed, with a progress bar where somebody is watching."""
-        script = str(file_of(self.study.name))
-        tasks = [
-            Task(script, case, path, plugins.loaded(), min(limit, LONGEST), fresh) for path, case in missing.items()
-        ]
+        script, files, most = str(file_of(self.study.name)), plugins.loaded(), min(limit, LONGEST)
+        tasks = [Task(script, case, path, files, most, fresh) for path, case in missing.items()]
         before = self.computed + len(self.failures)
         with progress_bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case") as bar:
 
@@ -121,10 +119,7 @@ class StudyCases:
 def status(
     study: Study, results: Path, *, quick: bool = False, full: bool = False, why: bool = False
 ) -> list[dict[str, Any]]:
-    """Scene, integrator, state and message of every case; with `why` also what has changed since it was computed.
-
-    The second round of a study is known only when its first is done.
-    """
+    """Scene, integrator, state and message of every case; with `why` also what has changed since it was computed."""
     cases = StudyCases.stored(study, results, quick=quick, full=full)
     stored = store.stored(cases.results, study)
     older: dict[str, list[Path]] = {}

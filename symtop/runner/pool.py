@@ -78,17 +78,13 @@ def prepare(script: str, files_of_plugins: tuple[str, ...]) -> Study:
 
 
 def execute_case(task: Task, study: Study | None = None) -> Result:
-    """Compute a case and store it, or record how it failed; SymtopError where the machine is the cause.
-
-    A worker loads the study by name. Compiled code hears no limit: the pool ends its process `GRACE` seconds later.
-    """
+    """Compute a case and store it, or record how it failed; SymtopError where the machine is the cause."""
     study = study or prepare(task.study, task.plugins)
     path, case = task.path, task.case
     if fingerprint.digest(study, case) != store.digest_of(path):
-        raise SymtopError(
-            f"the sources or dependencies of {case.integrator} on {case.scene} are not those that the study was "
-            "started with; if a file was edited meanwhile, run the study again"
-        )
+        of = f"the sources or dependencies of {case.integrator} on {case.scene}"
+        remedy = "if a file was edited meanwhile, run the study again"
+        raise SymtopError(f"{of} are not those that the study was started with; {remedy}")
     with files.locked(path, wait=False) as ours:
         if not ours:
             return Result("busy")
@@ -96,7 +92,7 @@ def execute_case(task: Task, study: Study | None = None) -> Result:
             return Result("found")
         files.sweep(path)  # of a worker that was killed
         try:
-            with at_most(task.limit, processor=False), _traced(task):
+            with at_most(task.limit, processor=False), _traced(task):  # compiled code hears no limit: see `GRACE`
                 data = study.measure(case)
             if not isinstance(data, xr.Dataset):
                 raise SymtopError(f"the measure of a study must return a Dataset, not {type(data).__name__}")  # noqa: TRY301
@@ -172,10 +168,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
         return self._analyses[-1]
 
     def run(self, study: Study, tasks: Sequence[Task], on_result: OnResult) -> None:
-        """Compute all tasks, timed ones last, and call `on_result` with each as it ends.
-
-        Timed cases run one at a time, or one on each core where a trial shows that they do not disturb each other.
-        """
+        """Compute all tasks, timed ones last, and call `on_result` with each as it ends."""
         for timed in (False, True):
             part = in_order([task for task in tasks if study.is_timed(task.case) == timed])
             if part and timed:

@@ -171,7 +171,6 @@ def findings_of(
 
 
 def _answers(study: Study, function: str, data: Combined, form: str) -> Iterator[tuple[Any, Any]]:
-    """What the facts or the tables of a study return, by name."""
     with failing(study.name, function):
         values = getattr(study, function)(data)
     if not isinstance(values, Mapping):
@@ -205,7 +204,6 @@ def _tables(study: Study, data: Combined, results: Path) -> Iterator[dict[str, A
 
 
 def _saved(study: Study, data: Combined, results: Path, save: Save, *, quick: bool) -> Iterator[dict[str, str]]:
-    """Save the pictures one by one; StudyError for what is none, and for a second one of a name."""
     names = set[str]()
     for picture in each(study.name, "pictures", lambda: study.pictures(data), Picture, "or yield Pictures"):
         if not hasattr(picture.figure, "savefig"):
@@ -218,8 +216,7 @@ def _saved(study: Study, data: Combined, results: Path, save: Save, *, quick: bo
         names.add(picture.name)
         file = f"{study.name}-{picture.name}.{getattr(picture.figure, 'suffix', 'png')}"  # a film is a GIF
         if quick and hasattr(picture.figure, "text"):
-            picture.figure.text(
-                0.998, 0.01, QUICK, rotation=90.0, ha="right", va="bottom", fontsize=6.0, color="#AD4A00"
-            )
+            look = {"ha": "right", "va": "bottom", "fontsize": 6.0, "color": "#AD4A00"}
+            picture.figure.text(0.998, 0.01, QUICK, rotation=90.0, **look)
         save(picture.figure, results / "figures" / file)
         yield {"name": picture.name, "file": file}

@@ -269,11 +269,11 @@ def test_without_a_file_the_package_is_cited_and_a_method_without_a_known_source
 
 SLOW = """\
 import sys, time
-from symtop.cli import clock
-clock.FIRST, clock.EVERY = 0.1, 0.15
-with clock.telling("judge"):
+from symtop.core import progress
+progress.FIRST, progress.EVERY = 0.1, 0.15
+with progress.telling("judge"):
     time.sleep(float(sys.argv[1]))
-    with clock.ticking("trying methods"):
+    with progress.ticking("trying methods"):
         time.sleep(float(sys.argv[1]))
 """
 
@@ -293,7 +293,7 @@ def test_a_command_that_waits_says_what_it_does_and_one_that_is_quick_nothing():
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
 def test_the_lines_end_with_a_command_that_is_killed():
-    code = SLOW.replace("with clock", "print('on', flush=True)\nwith clock", 1)
+    code = SLOW.replace("with progress", "print('on', flush=True)\nwith progress", 1)
     process = subprocess.Popen([sys.executable, "-c", code, "60"], stdout=subprocess.PIPE, stderr=subprocess.PIPE)
     process.stdout.readline()
     time.sleep(0.5)

@@ -151,7 +151,6 @@ class Program(Stepper):
 
 
 def _states(answer: bytes, rows: int, size: int, name: str) -> Array:
-    """The states that a program wrote, shape (rows, size)."""
     if len(answer) == 8 * rows * size and answer.translate(None, TEXT):
         return np.frombuffer(answer).reshape(rows, size).copy()
     try:
@@ -306,8 +305,7 @@ class DiffraxSolver(Stepper):
                 now, memory = at
                 start = t + k * h
                 after, _, _, memory, result = solver.step(term, start, start + h, now, par, memory, False)
-                failed = result != diffrax.RESULTS.successful
-                return jax.numpy.where(failed, jax.numpy.nan, after), memory
+                return jax.numpy.where(result != diffrax.RESULTS.successful, jax.numpy.nan, after), memory
 
             return jax.lax.fori_loop(0, count, once, (y, memory))
 

@@ -164,10 +164,8 @@ class ScipySolver(PythonStep):
             with heartbeat.call(h):
                 solver.step()
             if abs(solver.t - (t + (k + 1) * h)) > SAME * size * (k + 1):
-                raise SymtopError(
-                    f"{self.name} must make steps of max_step = first_step = {size:.3g} where the tolerance accepts "
-                    f"any error, and made one of {solver.t - t - k * h:.3g}"
-                )
+                must = f"steps of max_step = first_step = {size:.3g} where the tolerance accepts any error"
+                raise SymtopError(f"{self.name} must make {must}, and made one of {solver.t - t - k * h:.3g}")
             return state_like(y, solver.y, "a solver")
 
         with contextlib.ExitStack() as undo:  # Newton's iteration goes on until it is solved

@@ -1,15 +1,14 @@
 """What a million steps do to the constants of the motion, and what a step costs; the worst chart of a method decides.
 
 A constant is kept, bounded, a random walk, a drift or just growing by the rule of every study,
-`symtop.measure.conservation.behaviour`: by its size, and by the exponent of its growth (0, 1/2, 1) if the 95 % interval
-excludes the others. Somebody else's sums may be plain. So a change that grows is rounding, too, while it is no more
-than `KEPT`, relative, or than the random walk that the rounding seen in one step makes, n^1/2 times as much, or than a
-bias of a unit of rounding a step, as of products of quaternions that nothing brings back to length one. A drift that
-hides below a bounded oscillation shows in the means of 24 equal stretches, and counts if the line through them exceeds
-`SURE` of its own intervals. A random walk passes a plain test of the slope in one case in three, and not this one; at
-the size of rounding only the size is judged. While it has changed little, no constant changes from one sample to the
-next by `SUDDEN` times what as many of the largest steps at the beginning add up to: else the step is another one
-somewhere, whatever is claimed of it.
+`symtop.measure.conservation.behaviour`. Somebody else's sums may be plain. So a change that grows is rounding, too,
+while it is no more than `KEPT`, relative, or than the random walk that the rounding seen in one step makes, n^1/2 times
+as much, or than a bias of a unit of rounding a step, as of products of quaternions that nothing brings back to length
+one. A drift that hides below a bounded oscillation shows in the means of 24 equal stretches, and counts if the line
+through them exceeds `SURE` of its own intervals. A random walk passes a plain test of the slope in one case in three,
+and not this one; at the size of rounding only the size is judged. While it has changed little, no constant changes from
+one sample to the next by `SUDDEN` times what as many of the largest steps at the beginning add up to: else the step is
+another one somewhere, whatever is claimed of it.
 
 A run blows up when its energy has risen by more than that of the nutation and all that the weight can give, 2 |mgl|: no
 friction does that, and nothing after it is of the top. The constants are judged over the run until then, made again.
@@ -242,7 +241,6 @@ def _contradiction(
 def _reported(
     method: Integrator, scene: Scene, chart: str, trajectory: Trajectory, long: tuple[Run, Plan]
 ) -> Difference | None:
-    """How far the reported momenta are from those of the states, over the long run."""
     run, plan = long
     if chart == "angles":
         return from_increments(method, scene, plan) if method.fixed_step else None
@@ -315,8 +313,7 @@ def measure(subject: Subject) -> list[Finding]:
             runs.append(long_run(method, scene, chart, **options))
             findings = of_run(method, runs[-1])
         except SymtopError as error:
-            every = (*OF_A_RUN, "momentum")
-            findings = [undecided(claim, declared(method, claim), str(error)) for claim in every]
+            findings = [undecided(claim, declared(method, claim), str(error)) for claim in (*OF_A_RUN, "momentum")]
         for k, one in enumerate(findings):  # the chart, where the reason does not speak of it already
             if one.verdict != "inapplicable" and not one.why.endswith(" chart"):
                 findings[k] = one._replace(why=f"{one.why}, in the {chart} chart")
@@ -395,7 +392,6 @@ def _invariant(method: Integrator, run: LongRun) -> Finding:
 
 
 def _costs(method: Integrator, run: LongRun) -> list[Finding]:
-    """The findings on explicit and work."""
     claimed, iterates = declared(method, "explicit"), run.iterations > 0.0
     if method.control is None or not run.evaluations:
         why = "it makes no steps" if method.control is None else "its forces are not counted"

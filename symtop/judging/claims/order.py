@@ -148,10 +148,7 @@ def _lower(sizes: Array, misses: Array, power: int, short: float, seen: float) -
 
 
 def on_body(subject: Subject) -> list[Finding]:
-    """The finding on a body without symmetry: the slope of attitude errors, or that they stay however small the step.
-
-    A method may be of higher order on one body than on others, as Fasso's is: that refutes nothing.
-    """
+    """The finding on a body without symmetry: the slope of attitude errors, or that they stay as the step falls."""
     claim, scene = subject.method.order, subject.scene
     fitted = measured_order(subject.method, scene, quick=subject.quick, finest=subject.finest, main="attitude")
     subject.traces.update(fitted.traces())
@@ -165,13 +162,12 @@ def on_body(subject: Subject) -> list[Finding]:
             verdict = "measured" if claim is None else "refuted"
             return [Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)]
         return [undecided("order", yes_no(claim), _hidden(subject, fit.reason))]
-    if verdict == "refuted" and fit.slope - fit.interval > (claim or 0) + CLEARLY:
+    if verdict == "refuted" and fit.slope - fit.interval > (claim or 0) + CLEARLY:  # as Fasso's method on some bodies
         verdict, why = "measured", f"{why}: here the error falls with a higher power"
     return [Finding("order", yes_no(claim), fitted.measured, verdict, why, fit.slope, fit.interval)]
 
 
 def _terms(series: Series) -> Measured:
-    """The order that a series shows, or the least that it can be."""
     text, term = f"{series.order} or more", series.order + 1
     if series.is_exact:
         miss = f"{series.defect[term]:.1g} +- {series.noise[term]:.0g} of it"
@@ -243,7 +239,6 @@ def measured_order(
 
 
 def _by_steps(subject: Subject) -> Finding:
-    """What steps and runs show of the order."""
     method, scene, finest = subject.method, subject.scene, subject.finest
     series, claim = series_of(subject), method.order
     options: dict[str, Any] = {"quick": subject.quick, "finest": finest, "main": "theta" if subject.in_plane else ""}

@@ -93,12 +93,10 @@ def conditions(a: ArrayLike, b: ArrayLike, most: int = MOST) -> Conditions:
             phi = phi * (matrix @ weight(branch))
         return phi
 
-    return Conditions(
-        tuple(
-            max(abs(math.fsum(weights * weight(tree)) - 1.0 / density(tree)) for tree in trees(vertices))
-            for vertices in range(1, most + 1)
-        )
-    )
+    def miss(tree: Tree) -> float:
+        return abs(math.fsum(weights * weight(tree)) - 1.0 / density(tree))
+
+    return Conditions(tuple(max(map(miss, trees(vertices))) for vertices in range(1, most + 1)))
 
 
 def triangle(entries: ArrayLike, stages: int) -> np.ndarray:
@@ -204,8 +202,5 @@ def splitting_conditions(
         step = product(product(ends[0], step), ends[1])
     defects = logarithm(step)
     defects[1] = defects[1] - 1.0
-    rest = []
-    for length, row in enumerate(defects[1:], start=1):
-        none = vanishing(length)
-        rest.append(float(np.max(np.abs(row - none @ (none.T @ row)))))
-    return Conditions(tuple(rest))
+    pairs = [(row, vanishing(length)) for length, row in enumerate(defects[1:], start=1)]
+    return Conditions(tuple(float(np.max(np.abs(row - none @ (none.T @ row)))) for row, none in pairs))

@@ -88,10 +88,7 @@ class Series(NamedTuple):
 
 
 def step_series(step: StepMap, start: Angles, period: float) -> Series:
-    """The series of a step from `start`, a point of a motion with that nutation period.
-
-    Raises SymtopError if no step succeeds.
-    """
+    """The series of a step from a point of a motion with that nutation period; SymtopError if no step succeeds."""
     z, before = step.point(start), step.at(start)
     return compared(lambda h: aligned(step.chart, step.image(z, h), before), step.motion(start), period, step.chart)
 
@@ -122,7 +119,6 @@ def compared(
 
 
 def _steps(image: Callable[[float], Array], h: float) -> bool:
-    """Does it make a step of h?"""
     with contextlib.suppress(SymtopError):
         image(h)
         return True
@@ -143,9 +139,8 @@ def _fitted(
         raise SymtopError("a step is not finite")
     scatter, degree = _degree(nodes, error)
     power = max(degree, LEAST_POWER)
-    terms, finer = (
-        _monomials(chebyshev.chebfit(nodes, error, one), backward=backward) for one in (power, power + FURTHER)
-    )
+    fits = (chebyshev.chebfit(nodes, error, one) for one in (power, power + FURTHER))
+    terms, finer = (_monomials(fit, backward=backward) for fit in fits)
     _, top = _degree(nodes, exact)
     true = _monomials(chebyshev.chebfit(nodes, exact, max(top, power)), backward=backward)[: power + 1]
     size = np.maximum(np.max(np.abs(true), axis=1), np.finfo(float).tiny)

@@ -52,7 +52,7 @@ Answer = tuple[bool | None, float, float, str]  # of a chart: yes, no or neither
 
 def measure(subject: Subject) -> list[Finding]:
     """The findings on symplectic and symmetric."""
-    by_chart = []
+    by_claim: dict[str, list[Finding]] = {"symplectic": [], "symmetric": []}
     for chart in subject.charts:
         answers: list[Answer] = []
         try:
@@ -64,16 +64,15 @@ def measure(subject: Subject) -> list[Finding]:
                 answers = _elsewhere(subject, step, answers)
             finest = maps.WIDEST / 2.0 ** (maps.WIDTHS - 1)
             hidden = subject.rounding(BRACKET_UNITS) / finest, subject.rounding(RETURN_UNITS)
-            answers = [_above(level, *answer) for level, answer in zip(hidden, answers, strict=True)]
+            for k, (yes, value, _, why) in enumerate(answers):
+                if yes is False and value <= hidden[k]:
+                    answers[k] = None, value, hidden[k], hidden_by_single(hidden[k], why)
         except SymtopError as error:
             answers += [(None, math.nan, math.nan, undecided("", "", str(error)).why)] * (2 - len(answers))
-        by_chart.append(
-            [
-                agreement(claim, getattr(subject.method, claim), yes, f"{why}, in the {chart} chart", value, least)
-                for claim, (yes, value, least, why) in zip(("symplectic", "symmetric"), answers, strict=True)
-            ]
-        )
-    return [max(findings, key=_badness) for findings in zip(*by_chart, strict=True)]
+        for claim, (yes, value, least, why) in zip(by_claim, answers, strict=True):
+            claimed, words = getattr(subject.method, claim), f"{why}, in the {chart} chart"
+            by_claim[claim].append(agreement(claim, claimed, yes, words, value, least))
+    return [max(findings, key=_badness) for findings in by_claim.values()]
 
 
 @dataclass(frozen=True)
@@ -122,13 +121,6 @@ def _answer_at(ask: Callable[..., Answer], step: maps.StepMap, start: Angles, *t
             finer = ask(replace(step, h=0.5 * step.h), start)
             return finer if finer[0] and GONE * finer[1] < answer[1] else answer
     return answer
-
-
-def _above(hidden: float, yes: bool | None, value: float, least: float, why: str) -> Answer:
-    """The answer, or none where single precision hides the difference."""
-    if yes is False and value <= hidden:
-        return None, value, hidden, hidden_by_single(hidden, why)
-    return yes, value, least, why
 
 
 def _bracket(step: maps.StepMap, start: Angles, traces: dict[str, Any] | None = None) -> Answer:

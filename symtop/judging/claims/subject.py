@@ -91,10 +91,7 @@ class Subject:
         return not np.max(np.abs(end - y)) <= AT_REST * np.max(np.abs(y))
 
     def elsewhere(self, draws: tuple[int, int], seconds: tuple[float, float]) -> Iterator[tuple[str, Scene]]:
-        """Starts that are drawn, with a name for each, while there are draws and seconds; the second with --quick.
-
-        Between one and the next, runs of every other one begin at a late time.
-        """
+        """Starts that are drawn, named, every other one late, while draws and seconds last; the second with --quick."""
         began, draw, stepper = time.monotonic(), np.random.default_rng(self.seed), self.stepper or Stepper()
         scenes = drawn(self.scene, draws[self.quick], self.seed, same_top=self.knows_top)
         try:
@@ -187,8 +184,7 @@ def declared(method: Integrator, claim: str) -> str:
     if claim == "energy" and "energy" not in conserves:
         return "bounded" if method.symplectic and method.fixed_step else ""
     if claim == "momentum":
-        keeps = method.family in KEEPING or (method.family == ENGINE and "p_phi" in conserves)
-        return "kept" if keeps else ""
+        return "kept" if method.family in KEEPING or (method.family == ENGINE and "p_phi" in conserves) else ""
     if claim in CONSTANTS:
         return "kept" if claim in conserves else ""
     if claim == "invariant":
@@ -201,11 +197,8 @@ def declared(method: Integrator, claim: str) -> str:
 def open_target(
     target: Any, form: str | None, chart: str, *, on: Scene | None = None, adaptive: bool = False
 ) -> Stepper:  # fmt: skip
-    """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command; SymtopError for all else.
-
-    On the scene of a body without symmetry it steps the chart of bodies, whatever `chart` says.
-    """
-    chart = BODY if on is not None and on.of_body else one_of("chart", chart, CHARTS)
+    """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command; SymtopError for all else."""
+    chart = BODY if on is not None and on.of_body else one_of("chart", chart, CHARTS)  # a body has no other
     path, _, symbol = str(target).partition(":")
     shared = isinstance(target, (str, Path)) and path.endswith(LIBRARIES)
     kind = one_of("form", ("shared" if shared else "ode") if form is None else form, FORMS)
@@ -219,7 +212,6 @@ def open_target(
 
 
 def _python_step(thing: Any, name: str, chart: str, kind: str, *, adaptive: bool) -> Stepper:
-    """The stepper of something in Python."""
     if kind == "diffrax" or is_solver(thing):
         return DiffraxSolver(thing, chart, name)
     if isinstance(thing, type):
