@@ -300,9 +300,10 @@ def _close(step: Any, end: Any) -> Any:
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, p_theta, phi, psi); the work counted is the number of Newton iterations."""
     equation = _equation(par, rule, state, _steady(par, h), opening(par, rule, state[0]))
-    solution = newton(_evaluate, _correct, _free_flight, equation, _predict(equation, carry), rule.iterations)
-    step, newest, outcome = _close(equation, _keep(solution.trial, solution.correction))
-    return step, newest + carry[:-1], solution.evaluations, outcome if solution.converged else NOT_CONVERGED
+    guess = _predict(equation, carry)
+    _, trial, last, work, converged = newton(_evaluate, _correct, _free_flight, equation, guess, rule.iterations)
+    step, newest, outcome = _close(equation, _keep(trial, last))
+    return step, newest + carry[:-1], work, outcome if converged else NOT_CONVERGED
 
 
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:

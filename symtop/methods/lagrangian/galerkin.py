@@ -241,9 +241,10 @@ def _close(step: Any, end: Any) -> Any:
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, p_theta, phi, psi); the work counted is the number of Newton iterations."""
     equations = _equations(par, rule, state, _steady(par, h), _open(par, rule, state[0]))
-    solution = newton(_at, _correct, _free_flight, equations, _predict(equations, carry), rule.iterations)
-    step, newest, outcome = _close(equations, _keep(solution.trial, solution.correction))
-    return step, newest + carry[:-2], solution.evaluations, outcome if solution.converged else NOT_CONVERGED
+    guess = _predict(equations, carry)
+    _, trial, last, work, converged = newton(_at, _correct, _free_flight, equations, guess, rule.iterations)
+    step, newest, outcome = _close(equations, _keep(trial, last))
+    return step, newest + carry[:-2], work, outcome if converged else NOT_CONVERGED
 
 
 @register_jitable

@@ -37,7 +37,7 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework import body
@@ -116,17 +116,14 @@ def by_either(x: float) -> Any:
     return by_series(x) if x * x < 1.0 else by_library(x)
 
 
-class _Turns(NamedTuple):
-    """The flows that a drift is made of, ``(state, d, turn)``: what d becomes, and whether the rotor could be used."""
-
-    first: Callable[..., Any]
-    second: Callable[..., Any]
-    third: Callable[..., Any]
-    momentum: Callable[..., Any]
+_Turns = tuple[Callable[..., Any], ...]
 
 
 def _turns(sine: Callable[..., Any], rotor: Callable[..., Any]) -> _Turns:
-    """The turns by M_k `turn` about the axes of the body, and the flow of turn |M|^2/2 by a rotor of `rotor`."""
+    """The turns by M_k `turn` about the three axes of the body, and the flow of turn |M|^2/2 by a rotor of `rotor`.
+
+    Each is ``(state, d, turn)``: what d becomes, and whether the series, or the rotor, could be used.
+    """
 
     def about(k: int) -> Callable[..., Any]:
         """The turn about axis k and what it does to the two that follow: numbers of q, and of M three further."""
@@ -160,7 +157,7 @@ def _turns(sine: Callable[..., Any], rotor: Callable[..., Any]) -> _Turns:
         )  # fmt: skip
         return moved, square < 1.0
 
-    return _Turns(about(0), about(1), about(2), momentum)
+    return about(0), about(1), about(2), momentum
 
 
 ALONE, TOGETHER = _turns(by_either, exact), _turns(by_series, near)  # with a branch, and without it for lanes

@@ -117,12 +117,6 @@ def stages(rule: Any, drift: float, kick: float, bend: float, boost: float) -> A
     return Stages(drifts, kicks, times(rule.gradient, bend), rule.forces, rule.turn, boost)
 
 
-def closed(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float]) -> Composition:
-    """A composition whose sums are exactly 1."""
-    forces = sum(b != 0.0 for b in kick) - (kick[0] != 0.0 and kick[-1] != 0.0)
-    return Composition(exact_sum(drift), exact_sum(kick), tuple(gradient), forces)
-
-
 @register_jitable
 def compose(force: Any, kick: Any, drift: Any, par: Any, rule: Any, state: Any, at_start: Any) -> Any:
     """Increment of one step and the force at its end. A force nobody kicks with is not evaluated."""
