@@ -181,7 +181,7 @@ def long_run(
     chart, solver = chart_of(method, of_body=chosen.of_body)
     assert isinstance(solver.loop, Loop)  # noqa: S101
     compensated = boolean("compensated", compensated)
-    loop = solver.loop if compensated else solver.loop.plain()
+    loop = solver.loop if compensated else solver.loop.plain
     par, rule, state = solver.setup(chosen.top, chosen.start, h)
     checkpoints = _Checkpoint(checkpoint, _identity(chosen, method, h, count, compensated))
     result = None if output is None else checkpoints.checked(file_path("output", output))

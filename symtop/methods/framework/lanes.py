@@ -33,7 +33,7 @@ calls and that has a loop of its own, which is made into vectors before it is in
 
 *Who stands beside whom.* A block takes as long as its longest member and about as long as `LEAST` members alone.
 Members enter in the order of their numbers of steps, the longest first, and `W` neighbours in it that together make
-fewer steps than `LEAST` times the longest are left to the loop for one, a call of `loop.Loop.whole` without Python's
+fewer steps than `LEAST` times the longest are left to the loop for one, a call of `loop.whole_run` without Python's
 lock. A step that iterates takes as many passes as its slowest lane: there, members whose steps are alike in number
 enter in the order of
 
@@ -128,16 +128,6 @@ class Lanes:
             if part is not None:
                 register_jitable(part)
 
-    @property
-    def tops(self) -> int:
-        """How many numbers of the top there are."""
-        return len(self.top._fields)
-
-    @property
-    def flag(self) -> int:
-        """Which number of a lane says that it has to be run alone."""
-        return 3 * self.dimension
-
 
 def preparing(
     lanes: Lanes, begin: Any, enter: Any, kind: Any, numbers: Any, scale: Any, opened: Any, momenta_at: Any, width: int
@@ -186,9 +176,9 @@ def marching(lanes: Lanes, observe: Any, present: Any, write: Any) -> Any:  # no
     about `most` steps of members were made, or when all members have ended, with `at[1]` at -1.
     """
     step, read, kind = lanes.step, lanes.read, lanes.top
-    size, flag = lanes.dimension, lanes.flag
-    state_like, top_like = (0.0,) * size, (0.0,) * lanes.tops
-    tops, carry_begin = lanes.tops, flag + 2
+    size, tops = lanes.dimension, len(kind._fields)
+    state_like, top_like = (0.0,) * size, (0.0,) * tops
+    flag, carry_begin = 3 * size, 3 * size + 2
 
     @register_jitable
     def fill(block, table, j, i, prepared):  # type: ignore[no-untyped-def]
@@ -332,17 +322,6 @@ class Many(NamedTuple):
         return cls(states, momenta, *(np.zeros(n, dtype=np.int64) for _ in range(3)))
 
 
-def in_turn(
-    run: Callable[..., tuple[int, int, int]], chosen: Whole, numbers: Array, rule: Any, h: Array, marks: Whole,
-    done: Many,
-) -> None:  # fmt: skip
-    """The chosen members one after another, by ``run(numbers, rule, h, marks, states, momenta)``."""
-    momenta = np.empty((2, marks.shape[1]))
-    for i, plain, step in zip(chosen.tolist(), map(tuple, numbers[chosen].tolist()), h[chosen].tolist(), strict=True):
-        done.steps[i], done.work[i], done.outcome[i] = run(plain, rule, step, marks[i], done.states[i], momenta)
-        done.momenta[i] = momenta.T
-
-
 def of_bodies(numbers: Array) -> bool:
     """Are these rows of bodies without symmetry, and not of tops?"""
     return int(numbers.shape[1]) != len(NUMBERS)
@@ -383,8 +362,8 @@ class Blocks:
         lanes, steps = self.lanes, marks[:, -1]
         counts_itself = lanes.effort(rule) == 0  # the step iterates
         chosen, left = divided(members, steps, turns(numbers, h) if counts_itself else None)
-        widths = lanes.tops, lanes.size(rule), lanes.dimension, lanes.carry
-        per_lane = lanes.flag + 2 + lanes.carry + lanes.room(rule), lanes.tops + lanes.size(rule), lanes.dimension
+        tops, fields, size, carry = widths = len(lanes.top._fields), lanes.size(rule), lanes.dimension, lanes.carry
+        per_lane = 3 * size + 2 + carry + lanes.room(rule), tops + fields, size
         room = *(aligned(n * W) for n in per_lane), np.full(W, NEVER), *np.zeros((3, W), dtype=np.int64)
         coefficients, chosen = lanes.pack(rule)[1], np.ascontiguousarray(chosen[::-1])  # the longest begin first
         alone = [left]

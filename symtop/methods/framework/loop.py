@@ -15,7 +15,7 @@ and two more where what is stepped is not what is shown (a processed method, a m
 returns the *increment* of the state; the loop adds it with Knuth's two-sum and carries the rounding error to the next
 step. That costs nothing, for the loop is bound by the latency of the kernel. Time is k h, never accumulated.
 
-A run that nobody interrupts is one compiled call from plain numbers to samples (`Loop.whole`), the preparation of the
+A run that nobody interrupts is one compiled call from plain numbers to samples (`whole_run`), the preparation of the
 kernel included. A loop can stop after any step and go on, in another process too, to the same bits: a `Position` is all
 that the next step depends on (`symtop.run.long_run`).
 Source: Hairer, McLachlan, Razakarivony, BIT 48 (2008) 231 (Brouwer's law).
@@ -35,7 +35,7 @@ from symtop.core.parallel import heed
 from symtop.methods.framework import lanes as many, preparation
 from symtop.methods.framework.lanes import Blocks, Lanes, Many, Whole
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUTCOMES, Plan, Run, ending
-from symtop.methods.framework.preparation import Preparation, Shown, as_it_steps, momenta_at, opened
+from symtop.methods.framework.preparation import Preparation, Shown, as_it_steps
 from symtop.methods.framework.registry import Solver
 from symtop.methods.vectors import accumulate, accumulate_plainly, zero
 from symtop.model import charts
@@ -73,7 +73,8 @@ def no_carry(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 
 @register_jitable
-def _as_given(par: Any, rule: Any, state: Any, h: float) -> Any:
+def as_given(par: Any, rule: Any, state: Any, h: float) -> Any:
+    """`enter` of a kernel that steps the start as it is."""
     return state
 
 
@@ -88,70 +89,47 @@ class Loop:
     """The loop around one kernel family, compiled when it is first used: ``loop(par, rule, state, h, marks)``.
 
     A run records the state after ``marks[j]`` steps for each j (increasing; 0 is the start). `start` and `advance` do
-    the same in stretches, and the bits do not depend on where a stretch ends. ``whole(kind, prepare, scale, sample)``
-    is a run in one compiled call, from plain numbers (`preparation`) to filled arrays: ``run(numbers, rule, h, marks,
-    states, momenta)``, with momenta (2, samples), returns steps, work and outcome. `lanes` is what the family has for a
-    rule to run many members in lanes, or None, and ``blocks(lanes, ...)`` the kernels of that, from the same parts.
+    the same in stretches, and the bits do not depend on where a stretch ends. `add` is how increments are summed, and
+    `lanes` what the family has for a rule to run many members in lanes, or None.
     """
 
     begin: Callable[..., Any]
-    parts: tuple[Callable[..., Any], Callable[..., Any]]  # `prepare` and `march` as they are written
-    whole: Callable[..., Callable[..., tuple[int, int, int]]]
-    lanes: Callable[[Any], Lanes | None]
-    blocks: Callable[..., Blocks]
-    plain: Callable[[], "Loop"]  # the same kernel with sums that are not compensated
+    increment: Callable[..., Any]
+    observe: Callable[..., Any]
+    enter: Callable[..., Any] = as_given
+    present: Callable[..., Any] = as_stepped
+    add: Callable[..., Any] = accumulate
+    lanes: Callable[[Any], Lanes | None] = lambda _: None
+
+    def __post_init__(self) -> None:
+        for part in (self.begin, self.increment, self.observe, self.enter, self.present):
+            register_jitable(part)
+
+    @cached_property
+    def plain(self) -> "Loop":
+        """The same kernel with sums that are not compensated."""
+        return Loop(self.begin, self.increment, self.observe, self.enter, self.present, accumulate_plainly)
 
     @cached_property  # few processes need it, and each would hash the parts of a hundred loops
     def prepare(self) -> Callable[..., Any]:
         """The state as the kernel steps it and its carry, of (par, rule, state, h)."""
-        return compile_kernel(self.parts[0])  # type: ignore[no-any-return]
+        begin, enter = self.begin, self.enter
+
+        def prepare(par, rule, state, h):  # type: ignore[no-untyped-def]
+            state = enter(par, rule, state, h)
+            return state, begin(par, rule, state, h)
+
+        return compile_kernel(prepare)  # type: ignore[no-any-return]
 
     @cached_property
     def march(self) -> Callable[..., Any]:
         """A stretch of the run."""
-        return compile_kernel(self.parts[1])  # type: ignore[no-any-return]
+        return compile_kernel(self.marching(as_it_steps))  # type: ignore[no-any-return]
 
-    def __call__(self, par: Any, rule: Any, state: tuple[float, ...], h: float, marks: Marks) -> March:
-        """From the start to the last mark."""
-        return self.advance(par, rule, self.start(par, rule, state, h), h, marks)[0]
+    def marching(self, sample: Callable[..., Any]) -> Callable[..., Any]:
+        """`march` before it is compiled, with samples as `sample` shows them."""
+        increment, observe, present, add = self.increment, self.observe, self.present, self.add
 
-    def start(self, par: Any, rule: Any, state: tuple[float, ...], h: float) -> Position:
-        """A run before its first step."""
-        state, carry = self.prepare(par, rule, state, h)
-        return Position(state, (0.0,) * len(state), carry, 0)
-
-    def advance(self, par: Any, rule: Any, at: Position, h: float, marks: Marks) -> tuple[March, Position]:
-        """On to the last mark; the marks lie beyond `at`, or begin with 0 at the start."""
-        state, low, carry, k = at
-        if isinstance(carry, np.ndarray):  # a kernel's working space: `at` stays what it is
-            carry = carry.copy()
-        states, momenta = np.empty((len(marks), len(state))), np.empty((2, len(marks)))
-        states.fill(np.nan)
-        momenta.fill(np.nan)
-        j = work = outcome = 0
-        while j < len(marks) and outcome == OK:
-            stop = min(k + BLOCK, int(marks[-1]))
-            state, low, carry, k, j, effort, outcome = self.march(
-                par, rule, state, low, carry, h, k, j, stop, marks, states, momenta
-            )
-            work += effort
-        return March(states, momenta.T, k, work, outcome), Position(state, low, carry, k)
-
-
-def kernel_loop(  # noqa: C901  (one loop, read in one piece)
-    begin: Callable[..., Any], increment: Callable[..., Any], observe: Callable[..., Any],
-    enter: Callable[..., Any] = _as_given, present: Callable[..., Any] = as_stepped,
-    add: Callable[..., Any] = accumulate, lanes: Callable[[Any], Lanes | None] = lambda _: None,
-) -> Loop:  # fmt: skip
-    """The loop around one kernel family; `add` is how increments are summed, `lanes` how it steps many, by its rule."""
-    for part in (begin, increment, observe, enter, present):
-        register_jitable(part)
-
-    def prepare(par, rule, state, h):  # type: ignore[no-untyped-def]
-        state = enter(par, rule, state, h)
-        return state, begin(par, rule, state, h)
-
-    def marching(sample: Callable[..., Any]) -> Callable[..., Any]:
         def march(par, rule, state, low, carry, h, k, j, stop, marks, states, momenta):  # type: ignore[no-untyped-def]
             work = 0
             outcome = 0
@@ -178,44 +156,68 @@ def kernel_loop(  # noqa: C901  (one loop, read in one piece)
 
         return march
 
-    @functools.cache
-    def whole(
-        kind: Callable[..., Any], numbers: Callable[..., Any], scale: Callable[..., Any], sample: Callable[..., Any],
-        opened: Callable[..., Any] = opened, momenta_at: Callable[..., Any] = momenta_at,
-    ) -> Callable[..., tuple[int, int, int]]:  # fmt: skip
-        march = register_jitable(marching(sample))
+    def __call__(self, par: Any, rule: Any, state: tuple[float, ...], h: float, marks: Marks) -> March:
+        """From the start to the last mark."""
+        return self.advance(par, rule, self.start(par, rule, state, h), h, marks)[0]
 
-        def run(plain, coefficients, h, marks, states, momenta):  # type: ignore[no-untyped-def]
-            top, at = opened(plain)
-            par, state = numbers(top, at)
-            rule = scale(kind(coefficients), top, at, h)
-            state = enter(par, rule, state, h)
-            if marks[0] == 0:
-                momenta[0, 0], momenta[1, 0] = momenta_at(top, at)
-            carry, stop = begin(par, rule, state, h), marks[-1]
-            _, _, _, k, j, work, outcome = march(
-                par, rule, state, zero(state), carry, h, 0, 0, stop, marks, states, momenta
+    def start(self, par: Any, rule: Any, state: tuple[float, ...], h: float) -> Position:
+        """A run before its first step."""
+        state, carry = self.prepare(par, rule, state, h)
+        return Position(state, (0.0,) * len(state), carry, 0)
+
+    def advance(self, par: Any, rule: Any, at: Position, h: float, marks: Marks) -> tuple[March, Position]:
+        """On to the last mark; the marks lie beyond `at`, or begin with 0 at the start."""
+        state, low, carry, k = at
+        if isinstance(carry, np.ndarray):  # a kernel's working space: `at` stays what it is
+            carry = carry.copy()
+        states, momenta = np.full((len(marks), len(state)), np.nan), np.full((2, len(marks)), np.nan)
+        j = work = outcome = 0
+        while j < len(marks) and outcome == OK:
+            stop = min(k + BLOCK, int(marks[-1]))
+            state, low, carry, k, j, effort, outcome = self.march(
+                par, rule, state, low, carry, h, k, j, stop, marks, states, momenta
             )
-            states[j:] = np.nan
-            momenta[:, max(j, int(marks[0] == 0)) :] = np.nan
-            return k, work, outcome
+            work += effort
+        return March(states, momenta.T, k, work, outcome), Position(state, low, carry, k)
 
-        compiled: Callable[..., tuple[int, int, int]] = compile_kernel(run)
-        return compiled
 
-    @functools.cache
-    def together(family: Lanes, show: Any, *parts: Any) -> Blocks:
-        prepare = many.preparing(family, begin, enter, *parts)
-        return Blocks(family, prepare, many.marching(family, observe, present, show))
+kernel_loop = Loop  # its public name
 
-    def blocks(family: Lanes, kind: Any, numbers: Any, scale: Any, sample: Any, *plain: Any) -> Blocks:
-        return together(family, family.show or many.showing(sample), kind, numbers, scale, *plain)
 
-    @functools.cache
-    def plain() -> Loop:
-        return kernel_loop(begin, increment, observe, enter, present, accumulate_plainly)
+@functools.cache
+def whole_run(
+    loop: Loop, sample: Callable[..., Any], kind: Callable[..., Any], numbers: Callable[..., Any],
+    scale: Callable[..., Any], opened: Callable[..., Any], momenta_at: Callable[..., Any],
+) -> Callable[..., tuple[int, int, int]]:  # fmt: skip
+    """A run in one compiled call, from plain numbers (`preparation`) to filled arrays.
 
-    return Loop(begin, (prepare, marching(as_it_steps)), whole, lanes, blocks, plain)
+    ``run(plain, coefficients, h, marks, states, momenta)``, with momenta (2, samples), returns steps, work and outcome.
+    """
+    begin, enter, march = loop.begin, loop.enter, register_jitable(loop.marching(sample))
+
+    def run(plain, coefficients, h, marks, states, momenta):  # type: ignore[no-untyped-def]
+        top, at = opened(plain)
+        par, state = numbers(top, at)
+        rule = scale(kind(coefficients), top, at, h)
+        state = enter(par, rule, state, h)
+        if marks[0] == 0:
+            momenta[0, 0], momenta[1, 0] = momenta_at(top, at)
+        carry, stop = begin(par, rule, state, h), marks[-1]
+        _, _, _, k, j, work, outcome = march(
+            par, rule, state, zero(state), carry, h, 0, 0, stop, marks, states, momenta
+        )
+        states[j:] = np.nan
+        momenta[:, max(j, int(marks[0] == 0)) :] = np.nan
+        return k, work, outcome
+
+    return compile_kernel(run)  # type: ignore[no-any-return]
+
+
+@functools.cache
+def blocks_of(loop: Loop, lanes: Lanes, show: Callable[..., None], *parts: Any) -> Blocks:
+    """The kernels of a loop in lanes, from the parts that `lanes.preparing` takes."""
+    prepare = many.preparing(lanes, loop.begin, loop.enter, *parts)
+    return Blocks(lanes, prepare, many.marching(lanes, loop.observe, loop.present, show))
 
 
 Prepare = Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]
@@ -225,9 +227,8 @@ Present = Callable[[Any, Array, Array], Array]
 class _Whole(NamedTuple):
     """The parts of a run in one compiled call."""
 
-    rule: Any  # what compiled code makes the rule from
-    size: int  # of a sample
     alone: tuple[Any, ...]  # what a run of one takes, for a plain tuple comes apart quicker than a NamedTuple
+    size: int  # of a sample
     blocks: Callable[[], Blocks] | None  # many members in lanes
     table: Any  # the rule as the method has it
 
@@ -236,10 +237,13 @@ class _Whole(NamedTuple):
         most = min(many.GROUP, BLOCK)
         if self.blocks is not None:
             members = self.blocks().run(members, numbers, self.table, h, marks, done, most)
-        short = marks[members, -1] <= BLOCK
+        run, rule, short, momenta = *self.alone[:2], marks[members, -1] <= BLOCK, np.empty((2, marks.shape[1]))
         for chosen in many.groups(members[short], marks[:, -1], most):
             heed()
-            many.in_turn(self.alone[0], chosen, numbers, self.rule, h, marks, done)
+            plain = map(tuple, numbers[chosen].tolist())
+            for i, one, step in zip(chosen.tolist(), plain, h[chosen].tolist(), strict=True):
+                done.steps[i], done.work[i], done.outcome[i] = run(one, rule, step, marks[i], done.states[i], momenta)
+                done.momenta[i] = momenta.T
         longer: Whole = members[~short]
         return longer
 
@@ -354,15 +358,13 @@ class FixedStep:
         if not isinstance(rule, tuple) or not rule:  # a function of Python, or numbers in an array
             return None
         kind, numbers = pack(rule)
-        parts = kind, prepare.numbers, scale, sample
-        lanes = loop.lanes(rule)
-        plain = prepare.opened, prepare.momenta
-        given = *parts[1:], *plain, prepare.given
-        blocks = None if lanes is None else partial(loop.blocks, lanes, lanes.pack(rule)[0], *given)
-        costs = self.evaluations, self.each_step, int(self.implicit)
-        whole = loop.whole(*parts, *plain)
-        alone = whole, numbers, prepare.check, size, *costs
-        return _Whole(numbers, size, alone, blocks, rule)
+        parts = prepare.numbers, scale, prepare.opened, prepare.momenta
+        run = whole_run(loop, sample, kind, *parts)
+        alone = run, numbers, prepare.check, size, self.evaluations, self.each_step, int(self.implicit)
+        if (lanes := loop.lanes(rule)) is None:
+            return _Whole(alone, size, None, rule)
+        show, made = lanes.show or many.showing(sample), lanes.pack(rule)[0]
+        return _Whole(alone, size, partial(blocks_of, loop, lanes, show, made, *parts, prepare.given), rule)
 
 
 def inside(solver: Solver | None) -> FixedStep | None:

@@ -5,7 +5,7 @@
     sample(par, t, state) -> state           a sample at the time t, in the chart that a user sees
 
 A `Preparation`, a `Scaled` rule and a `Shown` chart each hold one such function and can be called like it. A run takes
-the function itself and compiles it into the loop (`loop.Loop.whole`): what surrounds a kernel costs more than a few
+the function itself and compiles it into the loop (`loop.whole_run`): what surrounds a kernel costs more than a few
 steps of it, above all a NamedTuple that is handed to compiled code.
 """
 
@@ -28,8 +28,8 @@ Pack = Callable[[Any], tuple[Callable[[Any], Any], Any]]  # of a rule: what comp
 conserved = register_jitable(model.conserved)
 
 
-class Body(NamedTuple):
-    """A top in compiled code, with the names of `SymmetricTop`."""
+class BareTop(NamedTuple):
+    """A top in compiled code, with the names of `SymmetricTop`; no momenta."""
 
     I1: float
     I3: float
@@ -50,7 +50,7 @@ class Start(NamedTuple):
 @register_jitable
 def opened(plain: Any) -> Any:
     """A top and a start, of their nine numbers."""
-    return Body(*plain[:3]), Start(*plain[3:])
+    return BareTop(*plain[:3]), Start(*plain[3:])
 
 
 @register_jitable
