@@ -64,7 +64,7 @@ def _body_momenta(_: Any, states: Array) -> tuple[Array, Array]:
 
 
 FORMS = FORMULATIONS | {
-    BODY: Formulation(body.field_body, body.ended_body, body.observe_body, body.on_body, None, _body_momenta)
+    BODY: Formulation(body.field_body, space.ended_space, body.observe_body, body.on_body, None, _body_momenta)
 }  # with the body that has no symmetry
 
 

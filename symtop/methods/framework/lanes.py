@@ -95,33 +95,20 @@ def none_left(block: Any, live: int) -> bool:
 
 @dataclass(frozen=True)
 class Lanes:
-    """What a family needs to run in lanes.
+    """What a family needs to run in lanes. All compiles but what takes a `method`, a rule before it is scaled."""
 
-        step(block, table)               one step of W members, compensated sums included
-        lay(par, rule, h, numbers)       the numbers of a member's rule that a step reads, into an array
-        read(numbers) -> rule            a rule as the kernel's `observe` and `present` see it
-        begin(par, rule, state, h)       the carry in lanes, a flat tuple; None where the kernel's own is one
-        size(rule)                       how many numbers `lay` writes
-        effort(rule)                     work of a step that is known beforehand
-        room(rule)                       numbers of working space that a lane has beside its carry
-        pack(rule)                       how a rule travels into compiled code
-        show(par, t, state, out)         write a sample at the time t; None where there is a kernel for each chart
-
-    The first four and the last compile; the others take the rule of a method before it is scaled.
-    """
-
-    step: Callable[[Any, Any], None]
-    lay: Callable[..., None]
-    read: Callable[[Any], Any]
-    size: Callable[[Any], int]
+    step: Callable[[Any, Any], None]  # (block, table): one step of W members, compensated sums included
+    lay: Callable[..., None]  # (par, rule, h, numbers): the numbers of a member's rule that a step reads, into an array
+    read: Callable[[Any], Any]  # (numbers): a rule as the kernel's `observe` and `present` see it
+    size: Callable[[Any], int]  # (method): how many numbers `lay` writes
     top: Any  # the NamedTuple of the numbers of the top
     dimension: int  # of the state
     carry: int  # numbers in the carry, a flat tuple
-    effort: Callable[[Any], int] = lambda _: 0
-    room: Callable[[Any], int] = lambda _: 0
-    begin: Callable[..., Any] | None = None
-    show: Callable[..., None] | None = None  # of charts that differ in how many numbers a sample has
-    pack: Pack = as_fields
+    effort: Callable[[Any], int] = lambda _: 0  # (method): work of a step that is known beforehand
+    room: Callable[[Any], int] = lambda _: 0  # (method): numbers of working space of a lane beside its carry
+    begin: Callable[..., Any] | None = None  # (par, rule, state, h): the carry; None where the kernel's own is flat
+    show: Callable[..., None] | None = None  # (par, t, state, out): write a sample; None: a kernel for each chart
+    pack: Pack = as_fields  # (method): how it travels into compiled code
 
     def __post_init__(self) -> None:
         for part in (self.step, self.lay, self.read, self.begin, self.show):  # at once, as in `preparation.Preparation`

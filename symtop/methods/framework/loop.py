@@ -30,15 +30,15 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from symtop.core.errors import SymtopError
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.parallel import heed
 from symtop.methods.framework import lanes as many, preparation
 from symtop.methods.framework.lanes import Blocks, Lanes, Many, Whole
-from symtop.methods.framework.plan import LEFT_CHART, OK, OUTCOMES, Plan, Run, ending
+from symtop.methods.framework.plan import LEFT_CHART, OK, Plan, Run, ending
 from symtop.methods.framework.preparation import Preparation, Shown, as_it_steps
 from symtop.methods.framework.registry import Solver
 from symtop.methods.vectors import accumulate, accumulate_plainly, zero
-from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop, flat
 
 Array = NDArray[np.float64]
@@ -228,24 +228,8 @@ class _Whole(NamedTuple):
     """The parts of a run in one compiled call."""
 
     alone: tuple[Any, ...]  # what a run of one takes, for a plain tuple comes apart quicker than a NamedTuple
-    size: int  # of a sample
     blocks: Callable[[], Blocks] | None  # many members in lanes
     table: Any  # the rule as the method has it
-
-    def run(self, members: Whole, numbers: Array, h: Array, marks: Whole, done: Many) -> Whole:
-        """Run members in lanes or by one call each; returns those that take a call of Python."""
-        most = min(many.GROUP, BLOCK)
-        if self.blocks is not None:
-            members = self.blocks().run(members, numbers, self.table, h, marks, done, most)
-        run, rule, short, momenta = *self.alone[:2], marks[members, -1] <= BLOCK, np.empty((2, marks.shape[1]))
-        for chosen in many.groups(members[short], marks[:, -1], most):
-            heed()
-            plain = map(tuple, numbers[chosen].tolist())
-            for i, one, step in zip(chosen.tolist(), plain, h[chosen].tolist(), strict=True):
-                done.steps[i], done.work[i], done.outcome[i] = run(one, rule, step, marks[i], done.states[i], momenta)
-                done.momenta[i] = momenta.T
-        longer: Whole = members[~short]
-        return longer
 
 
 @dataclass(frozen=True)
@@ -275,7 +259,9 @@ class FixedStep:
         """Start to horizon, in one compiled call where that is possible."""
         whole, h, marks = self._whole, plan.step_size, plan.marks
         if whole is None or marks.item(-1) > BLOCK:
-            return self._in_stretches(top, start, plan)
+            done = self._in_stretches(top, start, plan)
+            counts = done.steps, *self.counts(done.steps, done.work), ending(done.outcome), done.steps * h
+            return Run(done.states, done.momenta[:, 0], done.momenta[:, 1], *counts)
         # a run of few steps takes as long as what follows: no fields one at a time, no `counts`, no constructor
         run, rule, check, size, evaluations, each_step, counted = whole.alone
         if check is not None:
@@ -287,43 +273,43 @@ class FixedStep:
         fields = states, momenta[0], momenta[1], steps, spent, work * counted, ended, steps * h
         return tuple.__new__(Run, fields)
 
-    def _in_stretches(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+    def _in_stretches(self, top: SymmetricTop, start: Angles, plan: Plan) -> March:
         """The same with the preparation in Python, and a return to Python after every `BLOCK` steps."""
         par, rule, state = self.setup(top, start, plan.step_size)
         done = self.loop(par, rule, state, plan.step_size, plan.marks)
         if plan.marks[0] == 0:
             done.momenta[0] = top.momenta(start)[:2]
-        states = done.states if self.present is None else self.present(par, plan.times, done.states)
-        counts = done.steps, *self.counts(done.steps, done.work), ending(done.outcome), done.steps * plan.step_size
-        return Run(states, done.momenta[:, 0], done.momenta[:, 1], *counts)
+        return done if self.present is None else done._replace(states=self.present(par, plan.times, done.states))
 
     def many(self, numbers: Array, h: Array, marks: Whole) -> Many:
         """The runs of n members: `numbers` (n, 9) as `flat` has them, steps `h` (n,), `marks` (n, samples).
 
         Each has the bits of a run alone, in lanes too, and fails alone, as does one whose start the kernel cannot step.
         Threads may call it at the same time; after every `GROUP` steps, or a stretch of a longer member, it heeds an
-        interrupt.
+        interrupt. Raises SymtopError for a solver `in_python`, which runs one member at a time.
         """
         # writable too: a kernel is compiled again for an array that is not, as a broadcast one
-        numbers, h = np.require(numbers, requirements=("C", "W")), np.require(h, requirements=("C", "W"))
-        marks = np.require(marks, requirements=("C", "W"))
-        whole, check = self._whole, getattr(self.prepare, "check", None)
-        out = many.refused(check, numbers)
-        left, done = np.flatnonzero(~out), None
-        if whole is not None:
-            done = Many.empty(len(numbers), marks.shape[1], whole.size)
-            left = whole.run(left, numbers, h, marks, done)
-        for i, top in zip(left.tolist(), many.members_of(numbers[left]), strict=True):
-            heed()
-            run = self(*top, Plan.steps(float(h[i]), marks[i]))
-            if done is None:
-                done = Many.empty(len(numbers), *run.states.shape)
-            done.states[i], done.momenta[i, :, 0], done.momenta[i, :, 1] = run.states, run.p_phi, run.p_psi
-            done.steps[i], done.outcome[i] = run.steps, OUTCOMES.index(run.outcome)
-            done.work[i] = (run.force_evaluations - run.steps * self.each_step) // self.evaluations
-        if done is None:  # nobody ran, and only angles refuse a start
-            done = Many.empty(len(numbers), marks.shape[1], charts.DIMENSIONS["angles"])
+        numbers, h, marks = (np.require(one, requirements=("C", "W")) for one in (numbers, h, marks))
+        whole, most = self._whole, min(many.GROUP, BLOCK)
+        if whole is None:
+            raise SymtopError("many needs a solver whose parts all compile")
+        run, rule, check, size, *_ = whole.alone
+        done, out = Many.empty(len(numbers), marks.shape[1], size), many.refused(check, numbers)
         done.outcome[out] = LEFT_CHART
+        left = np.flatnonzero(~out)
+        if whole.blocks is not None:
+            left = whole.blocks().run(left, numbers, whole.table, h, marks, done, most)
+        short, momenta = marks[left, -1] <= BLOCK, np.empty((2, marks.shape[1]))
+        for chosen in many.groups(left[short], marks[:, -1], most):
+            heed()
+            plain = map(tuple, numbers[chosen].tolist())
+            for i, one, step in zip(chosen.tolist(), plain, h[chosen].tolist(), strict=True):
+                done.steps[i], done.work[i], done.outcome[i] = run(one, rule, step, marks[i], done.states[i], momenta)
+                done.momenta[i] = momenta.T
+        for i, top in zip(left[~short].tolist(), many.members_of(numbers[left[~short]]), strict=True):
+            heed()
+            alone = self._in_stretches(*top, Plan.steps(float(h[i]), marks[i]))
+            done.states[i], done.momenta[i], done.steps[i], done.work[i], done.outcome[i] = alone
         return done
 
     @property
@@ -362,9 +348,9 @@ class FixedStep:
         run = whole_run(loop, sample, kind, *parts)
         alone = run, numbers, prepare.check, size, self.evaluations, self.each_step, int(self.implicit)
         if (lanes := loop.lanes(rule)) is None:
-            return _Whole(alone, size, None, rule)
+            return _Whole(alone, None, rule)
         show, made = lanes.show or many.showing(sample), lanes.pack(rule)[0]
-        return _Whole(alone, size, partial(blocks_of, loop, lanes, show, made, *parts, prepare.given), rule)
+        return _Whole(alone, partial(blocks_of, loop, lanes, show, made, *parts, prepare.given), rule)
 
 
 def inside(solver: Solver | None) -> FixedStep | None:

@@ -62,18 +62,14 @@ def momenta_at(top: Any, at: Any) -> Any:
 
 @dataclass(frozen=True)
 class Preparation:
-    """What a kernel steps: `numbers(top, at)` compiles, `check` refuses a start that the kernel cannot step.
+    """What a kernel steps, of a top and a start."""
 
-    `opened` makes the records that `numbers` takes of the `given` plain numbers of a run, and `momenta` is what these
-    conserve.
-    """
-
-    numbers: Callable[..., tuple[Any, Numbers]]
+    numbers: Callable[..., tuple[Any, Numbers]]  # (top, at): the parameters and the state; compiles
     size: int  # of the state
-    check: Callable[[Any], None] | None = None  # raises SymtopError
-    opened: Callable[..., Any] = opened
-    momenta: Callable[..., Any] = momenta_at
-    given: int = 9
+    check: Callable[[Any], None] | None = None  # refuses a start that the kernel cannot step: raises SymtopError
+    opened: Callable[..., Any] = opened  # (plain): the records that `numbers` takes
+    momenta: Callable[..., Any] = momenta_at  # (top, at): what these conserve
+    given: int = 9  # how many plain numbers a run has
 
     def __post_init__(self) -> None:
         register_jitable(self.numbers)  # at once: what a kernel is made of must not hang on what has run

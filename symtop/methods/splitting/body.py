@@ -42,9 +42,10 @@ from typing import Any
 from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework import body
 from symtop.methods.framework.lanes import Lanes, W, column, put
-from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.preparation import Scaled, opened
 from symtop.methods.framework.registry import Integrator
+from symtop.methods.framework.space import ended_space
 from symtop.methods.simd import wide_vectors
 from symtop.methods.splitting.coefficients import BLANES_MOAN_6, METHODS, STRANG, Table
 from symtop.methods.splitting.loop import Composition, compose, composed, no_rest, packed, stages
@@ -166,29 +167,28 @@ PAR, STATE, STEP, FLAG = (0.0,) * 9, (0.0,) * 7, 14, 21  # numbers of a block, a
 
 @register_jitable
 def _ended(state: Any, step: Any) -> int:
-    return body.ended_body(step)
+    return ended_space(step)
 
 
 def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return _force(par, state, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
-def _march(drift: Callable[..., Any], in_lanes: Callable[..., Any] | None, rest: Any = no_rest) -> Loop:
+def _march(drift: Callable[..., Any], in_lanes: Callable[..., Any], rest: Any = no_rest) -> Loop:
     kick = _kicking(None)
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
         step, force = compose(_force, kick, drift, par, rule, state, carry)
-        return step, force, rule.forces, body.ended_body(step)
+        return step, force, rule.forces, ended_space(step)
 
     @functools.cache
     def lanes(gradient: bool) -> Lanes:
-        assert in_lanes is not None  # noqa: S101
         return composed(_force, _kicking(gradient), in_lanes, _ended, top=body.General, dimension=7, carry=3, rest=rest)
 
-    return kernel_loop(
-        _begin, increment, body.observe_body,
-        lanes=lambda rule: None if in_lanes is None or rule.turn != AS_GIVEN else lanes(any(rule.gradient)),
-    )  # fmt: skip
+    def lanes_of(rule: Composition) -> Lanes | None:
+        return lanes(any(rule.gradient)) if rule.turn == AS_GIVEN else None
+
+    return Loop(_begin, increment, body.observe_body, lanes=lanes_of)
 
 
 @functools.cache
@@ -301,7 +301,8 @@ def _five_in_lanes() -> Callable[..., Any]:
     return drift
 
 
-march_five, march_five_of_top = _march(_five(ALONE), _five_in_lanes()), _march(_five(_turns(by_library, exact)), None)
+march_five = _march(_five(ALONE), _five_in_lanes())
+march_five_of_top = replace(_march(_five(_turns(by_library, exact)), _five_in_lanes()), lanes=lambda _: None)
 
 
 def five_rotations(order_of_axes: int) -> FixedStep:

@@ -76,8 +76,7 @@ def composition(
     free = body.free_motion(rule, order) if chart == "space" and rotation == "exact" and not boost else None
     if free is not None:
         solvers[BODY] = FixedStep(body.march(free), body.scaled(table), on_body, 1, implicit=False)
-    closed_forms = _KICK_DRIFT_KICK.get((chart, rotation)) if kick_drift_kick else None
-    modified, sleeps = closed_forms or (None, None)
+    modified, sleeps = (kick_drift_kick and _KICK_DRIFT_KICK.get((chart, rotation))) or (None, None)
     return Integrator(
         name=name, family="splitting",
         summary=summary or f"splitting with {len(rule.drift)} drifts and {rule.forces} forces a step",
