@@ -77,7 +77,7 @@ def left_alone(solver, numbers, h, marks):
     """The members that the lanes give back."""
     whole = solver._whole
     done = Many.empty(len(h), marks.shape[1], whole.alone[3])
-    return whole.blocks().run(np.arange(len(h)), numbers, whole.table, h, marks, done, loops.BLOCK)
+    return whole.blocks().run(np.arange(len(h)), numbers, whole.rule, h, marks, done, loops.BLOCK)
 
 
 @pytest.mark.parametrize(("name", "ends"), [

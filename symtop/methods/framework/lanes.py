@@ -54,7 +54,6 @@ from symtop.core.jit import compile_kernel, register_jitable, set_item, to_fixed
 from symtop.core.parallel import heed
 from symtop.methods.framework.angles import in_chart
 from symtop.methods.framework.plan import OK
-from symtop.methods.framework.preparation import Pack, as_fields
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 from symtop.model.body import from_flat
@@ -108,7 +107,6 @@ class Lanes:
     room: Callable[[Any], int] = lambda _: 0  # (method): numbers of working space of a lane beside its carry
     begin: Callable[..., Any] | None = None  # (par, rule, state, h): the carry; None where the kernel's own is flat
     show: Callable[..., None] | None = None  # (par, t, state, out): write a sample; None: a kernel for each chart
-    pack: Pack = as_fields  # (method): how it travels into compiled code
 
     def __post_init__(self) -> None:
         for part in (self.step, self.lay, self.read, self.begin, self.show):  # at once, as in `preparation.Preparation`
@@ -345,14 +343,17 @@ class Blocks:
     march: Any
 
     def run(self, members: Whole, numbers: Array, rule: Any, h: Array, marks: Whole, done: Many, most: int) -> Whole:
-        """Run the chosen members, about `most` steps between returns to Python; return those to be run alone."""
-        lanes, steps = self.lanes, marks[:, -1]
+        """Run the chosen members, about `most` steps between returns to Python; return those to be run alone.
+
+        `rule` is a pair: as the method has it, and as it travels into compiled code.
+        """
+        (rule, coefficients), lanes, steps = rule, self.lanes, marks[:, -1]
         counts_itself = lanes.effort(rule) == 0  # the step iterates
         chosen, left = divided(members, steps, turns(numbers, h) if counts_itself else None)
         tops, fields, size, carry = widths = len(lanes.top._fields), lanes.size(rule), lanes.dimension, lanes.carry
         per_lane = 3 * size + 2 + carry + lanes.room(rule), tops + fields, size
         room = *(aligned(n * W) for n in per_lane), np.full(W, NEVER), *np.zeros((3, W), dtype=np.int64)
-        coefficients, chosen = lanes.pack(rule)[1], np.ascontiguousarray(chosen[::-1])  # the longest begin first
+        chosen = np.ascontiguousarray(chosen[::-1])  # the longest begin first
         alone = [left]
         for first in range(0, len(chosen), BATCH):
             batch = chosen[first : first + BATCH]

@@ -229,7 +229,7 @@ class _Whole(NamedTuple):
 
     alone: tuple[Any, ...]  # what a run of one takes, for a plain tuple comes apart quicker than a NamedTuple
     blocks: Callable[[], Blocks] | None  # many members in lanes
-    table: Any  # the rule as the method has it
+    rule: tuple[Any, Any]  # as the method has it, and as it travels into compiled code
 
 
 @dataclass(frozen=True)
@@ -298,7 +298,7 @@ class FixedStep:
         done.outcome[out] = LEFT_CHART
         left = np.flatnonzero(~out)
         if whole.blocks is not None:
-            left = whole.blocks().run(left, numbers, whole.table, h, marks, done, most)
+            left = whole.blocks().run(left, numbers, whole.rule, h, marks, done, most)
         short, momenta = marks[left, -1] <= BLOCK, np.empty((2, marks.shape[1]))
         for chosen in many.groups(left[short], marks[:, -1], most):
             heed()
@@ -336,7 +336,7 @@ class FixedStep:
             return None
         sample, size = (as_it_steps, prepare.size) if present is None else (present.sample, present.size)
         scale = preparation.as_it_is
-        pack = getattr(rule, "pack", None) or preparation.as_fields
+        pack = getattr(rule, "pack", preparation.as_fields)
         if isinstance(rule, preparation.Scaled):
             scale, rule = rule.scale, rule.rule
         elif isinstance(rule, preparation.Later):
@@ -348,9 +348,9 @@ class FixedStep:
         run = whole_run(loop, sample, kind, *parts)
         alone = run, numbers, prepare.check, size, self.evaluations, self.each_step, int(self.implicit)
         if (lanes := loop.lanes(rule)) is None:
-            return _Whole(alone, None, rule)
-        show, made = lanes.show or many.showing(sample), lanes.pack(rule)[0]
-        return _Whole(alone, partial(blocks_of, loop, lanes, show, made, *parts, prepare.given), rule)
+            return _Whole(alone, None, (rule, numbers))
+        show = lanes.show or many.showing(sample)
+        return _Whole(alone, partial(blocks_of, loop, lanes, show, kind, *parts, prepare.given), (rule, numbers))
 
 
 def inside(solver: Solver | None) -> FixedStep | None:

@@ -81,6 +81,26 @@ class Preparation:
         return self.numbers(*self.opened(flat(top, at)))
 
 
+@register_jitable
+def plain(values: Any) -> Any:
+    """A rule that is no NamedTuple, as it is."""
+    return values
+
+
+@functools.cache
+def _made_of_fields(kind: Any) -> Callable[[Any], Any]:
+    def made(fields: Any) -> Any:
+        return kind(*fields)
+
+    return register_jitable(made)
+
+
+def as_fields(rule: Any) -> tuple[Callable[[Any], Any], Any]:
+    """A rule as its fields, which a call takes sooner than a NamedTuple."""
+    kind: Any = type(rule)
+    return plain if kind is tuple else _made_of_fields(kind), tuple(rule)
+
+
 @functools.cache
 def _on_numbers(scale: Callable[..., Any], table: Callable[[Any], Any], opened: Callable[[Any], Any]) -> Any:
     """`scale` by itself, compiled; `table` makes the table from plain numbers, `opened` the top and the start."""
@@ -94,11 +114,11 @@ def _on_numbers(scale: Callable[..., Any], table: Callable[[Any], Any], opened: 
 
 @dataclass(frozen=True)
 class Scaled:
-    """A rule whose numbers hang on the run, ``scale(rule, top, start, h)``, compiled; `pack` is `as_fields` if None."""
+    """A rule whose numbers hang on the run, ``scale(rule, top, start, h)``, compiled."""
 
     rule: Any  # a NamedTuple
     scale: Callable[..., Any]
-    pack: Pack | None = None
+    pack: Pack = as_fields
     opened: Callable[..., Any] = opened  # as `Preparation` has it
 
     def __post_init__(self) -> None:
@@ -106,7 +126,7 @@ class Scaled:
 
     def __call__(self, top: SymmetricTop, at: Angles, h: float) -> Any:
         """The rule of one run."""
-        made, table = (self.pack or as_fields)(self.rule)
+        made, table = self.pack(self.rule)
         return _on_numbers(self.scale, made, self.opened)(flat(top, at), table, h)
 
 
@@ -115,7 +135,7 @@ class Later:
     """A rule that hangs on nothing, made when it is first used."""
 
     make: Callable[[], Any]
-    pack: Pack | None = None
+    pack: Pack = as_fields
 
     def __call__(self, *_run: object) -> Any:
         """The rule of any run."""
@@ -150,26 +170,6 @@ class Shown:
         shown = _on_samples(self.sample, kind)
         shown(tuple(par), np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states), out)
         return out
-
-
-@register_jitable
-def plain(values: Any) -> Any:
-    """A rule that is no NamedTuple, as it is."""
-    return values
-
-
-@functools.cache
-def _made_of_fields(kind: Any) -> Callable[[Any], Any]:
-    def made(fields: Any) -> Any:
-        return kind(*fields)
-
-    return register_jitable(made)
-
-
-def as_fields(rule: Any) -> tuple[Callable[[Any], Any], Any]:
-    """A rule as its fields, which a call takes sooner than a NamedTuple."""
-    kind: Any = type(rule)
-    return plain if kind is tuple else _made_of_fields(kind), tuple(rule)
 
 
 @register_jitable

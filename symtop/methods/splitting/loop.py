@@ -27,7 +27,6 @@ from numpy.typing import NDArray
 from symtop.core.jit import register_jitable, to_fixed_tuple
 from symtop.methods.framework.lanes import Lanes, W, column, put
 from symtop.methods.framework.plan import OK
-from symtop.methods.framework.preparation import as_fields
 from symtop.methods.simd import times, wide_vectors, with_item
 from symtop.methods.vectors import accumulate, zero
 
@@ -75,12 +74,6 @@ def packed(rule: Any) -> tuple[Callable[[Any], Composition], NDArray[np.float64]
     drift, kick, gradient = rule[:3]
     opened = _opened(len(drift)) if len(drift) <= SHORT else _of_any_length
     return opened, np.array([*drift, *kick, *gradient, *rule[3:]], dtype=float)
-
-
-def packed_for_lanes(rule: Any) -> tuple[Callable[[Any], Any], Any]:
-    """The same of many members: short tables travel as they are, for to open an array takes longer."""
-    short = type(rule) is not Composition or len(rule.drift) <= SHORT
-    return as_fields(rule) if short else packed(rule)
 
 
 class Stages(NamedTuple):
@@ -221,7 +214,5 @@ def composed(
         for j in range(W):
             last(block, row, table, j)
 
-    return Lanes(
-        step, lay, read, lambda rule: 3 * len(rule.kick), top, dimension, carry,
-        effort=lambda rule: int(rule.forces), pack=packed_for_lanes,
-    )  # fmt: skip
+    size, effort = lambda rule: 3 * len(rule.kick), lambda rule: int(rule.forces)
+    return Lanes(step, lay, read, size, top, dimension, carry, effort)
