@@ -8,16 +8,22 @@ the result does not hang on the processor.
 `Components` writes the same operations on four scalars each, to the same bits: inside a loop over many members LLVM
 makes vectors of the members, and a component that nobody reads is not computed.
 
+A kernel in plain Python steps two runs at once on tuples of `two()`, two doubles in one register: +, - and * of such
+act on both, to the bits of each alone.
+
 `times` and `with_item` take a row that is an array, or a tuple, if it is short: LLVM unrolls a loop over a tuple up to
 about 16 elements and copies the tuple in each pass beyond.
 """
 
+import functools
+import operator
 from collections.abc import Callable, Sequence
 from typing import Any
 
 from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic, overload
+from numba.core.cgutils import unpack_tuple
+from numba.extending import intrinsic, models, overload, register_model
 
 from symtop.core.jit import INLINED, register_jitable, set_item
 
@@ -131,6 +137,83 @@ class Components(Vectors):
         return self.builder.fma(a, b, c)
 
 
+_PAIR = ir.VectorType(_DOUBLE, 2)
+
+
+def _paired(builder: Any, first: Any, second: Any) -> Any:
+    """Two scalars in one register; what is there stays there."""
+    if first.type == _PAIR:
+        return first
+    half = builder.insert_element(ir.Constant(_PAIR, ir.Undefined), first, ir.Constant(_INDEX, 0))
+    return builder.insert_element(half, second, ir.Constant(_INDEX, 1))
+
+
+def _of_both(name: str) -> Any:
+    """An operation of LLVM on two values of which a scalar stands for twice the same."""
+
+    @intrinsic
+    def operation(typing, a, b):  # type: ignore[no-untyped-def]
+        def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+            return getattr(builder, name)(*(_paired(builder, one, one) for one in arguments))
+
+        return two()(a, b), emit
+
+    return operation
+
+
+class _Two(types.Type):  # type: ignore[misc]
+    """Two doubles in one register, as numba knows them; a kernel hangs on its operations, too."""
+
+    def __init__(self) -> None:
+        super().__init__("two doubles")
+        self.operations = tuple(map(_of_both, ("fadd", "fsub", "fmul")))
+
+
+@functools.cache
+def two() -> Any:
+    """The one `_Two`; a call, so that no kernel's hash hangs on the number that numba gives a type in this process."""
+    return _Two()
+
+
+register_model(_Two)(lambda manager, kind: models.PrimitiveModel(manager, kind, _PAIR))
+
+
+def _overload(operation: Any, emitted: Any) -> None:
+    def chosen(a: Any, b: Any) -> Any:
+        return (lambda a, b: emitted(a, b)) if two() in (a, b) else None  # noqa: PLW0108  (numba takes functions of Python)
+
+    overload(operation, jit_options=INLINED, strict=False)(chosen)
+
+
+for _operation, _emitted in zip((operator.add, operator.sub, operator.mul), two().operations, strict=True):
+    _overload(_operation, _emitted)
+overload(operator.neg, jit_options=INLINED)(lambda a: (lambda a: -1.0 * a) if a is two() else None)
+
+
+@intrinsic
+def side_by_side(typing, first, second):  # type: ignore[no-untyped-def]
+    """A tuple of `two()` of two tuples of doubles."""
+
+    def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        numbers = zip(*(unpack_tuple(builder, one) for one in arguments), strict=True)
+        return context.make_tuple(builder, signature.return_type, [_paired(builder, *two) for two in numbers])
+
+    return types.UniTuple(two(), len(first))(first, second), emit
+
+
+@intrinsic
+def apart(typing, both):  # type: ignore[no-untyped-def]
+    """The two tuples of doubles that a tuple of `two()` is made of."""
+    one = types.UniTuple(types.float64, len(both))
+
+    def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
+        values = unpack_tuple(builder, arguments[0])
+        lanes = ([builder.extract_element(value, ir.Constant(_INDEX, k)) for value in values] for k in range(2))
+        return context.make_tuple(builder, signature.return_type, [*map(Vectors(builder).array, lanes)])
+
+    return types.UniTuple(one, 2)(both), emit
+
+
 @intrinsic
 def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
     """place + h w_0 terms_0 + h w_1 terms_1 + ... of tuples, in this order and without the terms whose weight is None.
@@ -142,10 +225,13 @@ def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
     def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         result, rows, numbers, step = arguments
         factors = [(j, builder.fmul(step, builder.extract_value(numbers, j))) for j in used]
+        as_place = _paired if place.dtype is two() else lambda _, one, __: one
         for m in range(len(place)):
             total = builder.extract_value(result, m)
             for j, factor in factors:
-                total = builder.fadd(total, builder.fmul(factor, builder.extract_value(rows, [j, m])))
+                term = builder.extract_value(rows, [j, m])
+                product = builder.fmul(*(as_place(builder, one, one) for one in (factor, term)))
+                total = builder.fadd(total, product)
             result = builder.insert_value(result, total, m)
         return result
 

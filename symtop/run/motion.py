@@ -20,14 +20,15 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from symtop.core.errors import SymtopError
+from symtop.core.jit import register_jitable
 from symtop.core.numbers import EPSILON
-from symtop.methods.framework.plan import Plan, off_length
+from symtop.methods.framework.plan import LENGTH, Plan
 from symtop.methods.framework.registry import integrator
-from symtop.methods.runge_kutta.pairs import DOP8
+from symtop.methods.runge_kutta.pairs import DOP8, two_runs
 from symtop.model.charts import BODY, Array, attitude_distance, axes, axis_distance
 from symtop.model.exact.free_body import FreeBody
 from symtop.model.scenes import Scene, closed_form
-from symtop.model.top import Angles
+from symtop.model.top import Angles, flat
 from symtop.run.reference.sensitivity import displacement
 
 SERIES = {BODY: "series-general-adaptive", "axis": "series-adaptive"}
@@ -104,18 +105,18 @@ class Growth(NamedTuple):
         return float(self.size[-1]) * math.exp(min(folds, MOST_FOLDS))
 
 
-@functools.cache
-def _stepper(chart: str) -> Any:
-    """Steps of one length, of order 8."""
-    return DOP8.fixed().solvers[chart]
-
-
-def _apart(near: Array, far: Array, units: tuple[float, float]) -> Array:
-    """How far states (n, dimension) are apart, in place or in momentum; NaN of what is lost, as a quaternion off 1."""
-    place, momentum = (np.sqrt((part**2).sum(axis=1)) for part in np.split(far - near, [-3], axis=1))
-    apart = np.maximum(place * units[0], momentum * units[1])
-    lost = off_length(BODY, np.stack([near, far])).any(axis=0) if near.shape[1] == 7 else False
-    return np.where(lost | ~np.isfinite(apart), math.nan, apart)
+@register_jitable
+def _apart(near: Any, far: Any, units: Any) -> Any:
+    """How far two states are apart, in place or in momentum; NaN of what is lost, as a quaternion not of length one."""
+    first = len(near) - 3  # of the momentum
+    place, momentum, one, other = 0.0, 0.0, 0.0, 0.0
+    for m in range(first):
+        place, one, other = place + (far[m] - near[m]) ** 2, one + near[m] ** 2, other + far[m] ** 2
+    for m in range(first, len(near)):
+        momentum += (far[m] - near[m]) ** 2
+    long = max(abs(math.sqrt(one) - 1.0), abs(math.sqrt(other) - 1.0)) if first == 4 else 0.0
+    sound = place + momentum < math.inf and long <= LENGTH
+    return max(math.sqrt(place) * units[0], math.sqrt(momentum) * units[1]) if sound else math.nan
 
 
 class Integrated:
@@ -178,12 +179,11 @@ class Integrated:
         until = min(horizon, WATCHED[self.chart] * self.marks.period, MOST_WATCHED * step)
         if until not in self.growths:
             steps = max(math.ceil(until / step), POINTS)
-            plan = Plan.steps(until / steps, np.arange(1, POINTS + 1) * steps // POINTS)
+            h, marks, apart = until / steps, np.arange(1, POINTS + 1) * steps // POINTS, np.empty(POINTS)
+            given = (flat(self.scene.top, start) for start in (self.scene.start, self.moved()))
             units = (2.0 if self.chart == BODY else 1.0) / MOVED, 1.0 / (MOVED * self.inertia * self.marks.frequency)
-            times, moved, top, solver = plan.times, MOVED, self.scene.top, _stepper(self.chart)
-            with np.errstate(all="ignore"):  # a motion may blow up
-                near, far = (solver(top, start, plan).states for start in (self.scene.start, self.moved()))
-                apart = _apart(near, far, units)
+            two_runs(self.chart, DOP8, _apart)(*given, h, marks, units, apart)
+            times, moved, top = np.multiply(marks, h, dtype=float), MOVED, self.scene.top
             if self.chart == BODY and top.free and not apart.max() < SATURATED / MOVED:
                 starts = self.scene.start, self.moved(FINELY_MOVED)
                 with contextlib.suppress(SymtopError):  # of momenta that the closed form does not take

@@ -2,20 +2,24 @@
 
 import functools
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy import integrate
 
 import symtop
-from symtop.core.jit import compile_kernel
+from symtop.core.jit import compile_kernel, register_jitable
 from symtop.judging.claims.order_conditions import conditions
 from symtop.methods.framework.equations import FORMULATIONS
+from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
 from symtop.methods.runge_kutta import nystrom, pairs
 from symtop.methods.runge_kutta.nystrom import DPRKN8, REDUCED
 from symtop.methods.runge_kutta.pair_tables import DOP853, DORMAND_PRINCE, TSIT5, VERN9
+from symtop.model import scenes as models
 from symtop.model.scenes import closed_form
+from symtop.model.top import flat
 from symtop.run.simulation import make_plan
 
 PAIRS = {pair.name: pair for pair in pairs.PAIRS}
@@ -115,6 +119,25 @@ def test_one_fixed_step_is_the_table(name):
     moved = h * sum(b * k for b, k in zip(table.b, slopes, strict=False))
     np.testing.assert_allclose(run.states[-1], y + moved, rtol=1e-14, atol=1e-14)
     assert run.force_evaluations == len(table.b)
+
+
+@register_jitable
+def number(near, far, which):
+    """Of both states, one after the other."""
+    return near[which] if which < len(near) else far[which - len(near)]
+
+
+@pytest.mark.parametrize(("name", "chart"), [("spheroid", "axis"), ("heavy-chaotic", "body")])
+def test_two_runs_in_one_register_have_the_bits_of_each_alone(name, chart):
+    scene, h, marks = models.scene(name, bodies=True), 0.03, np.array([1, 50, 400])
+    moved = replace(scene.start, **({"psi_dot": 1.0} if chart == "axis" else {"omega_body": (0.1, 0.2, 0.3)}))
+    run, fixed = pairs.two_runs(chart, pairs.DOP8, number), integrator("dop853-compiled-fixed").solvers[chart]
+    near, far = (fixed(scene.top, start, Plan.steps(h, marks)).states for start in (scene.start, moved))
+    out = np.empty((near.shape[1] + far.shape[1], marks.size))
+    for which, row in enumerate(out):
+        run(flat(scene.top, scene.start), flat(scene.top, moved), h, marks, which, row)
+    np.testing.assert_array_equal(out.T, np.hstack([near, far]))
+    assert not np.array_equal(near, far)
 
 
 NODES = np.array([0.0, *DPRKN8.c])

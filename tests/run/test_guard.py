@@ -361,12 +361,12 @@ def test_passages_of_a_pole_add_up_and_what_was_lost_is_not_compared():
         run = symtop.simulate(scene, name, step_size=step, guard=False)
         assert (float(symtop.errors(run)["axis"].max()) > EXPECTED) is lost
         assert bool(caution(scene, name, step_size=step)) is lost
-    whole, apart = (1.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0), lambda *two: _apart(*np.array(two)[:, None], (1.0, 1.0))[0]
+    whole, units = (1.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0), (1.0, 1.0)
     for lost in ((math.nan, *whole[1:]), (1.002, *whole[1:]), (*whole[:6], math.inf)):
-        assert math.isnan(apart(whole, lost))
-        assert math.isnan(apart(lost, whole))
-    assert apart(whole, (*whole[:6], 3.5)) == 0.5
-    assert apart(whole[1:], (1.002, *whole[2:])) == 1.002  # an axis
+        assert math.isnan(_apart(whole, lost, units))
+        assert math.isnan(_apart(lost, whole, units))
+    assert _apart(whole, (*whole[:6], 3.5), units) == 0.5
+    assert _apart(whole[1:], (1.002, *whole[2:]), units) == 1.002  # an axis
 
 
 def test_beside_a_pole_no_growth_is_seen_where_there_is_none_and_a_length_that_drifts_away_is():

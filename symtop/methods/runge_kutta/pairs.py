@@ -38,8 +38,8 @@ from symtop.methods.framework.preparation import as_it_steps
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import Tableau, add, row_of, store, weighted, written_out
 from symtop.methods.runge_kutta.pair_tables import DOP853, DORMAND_PRINCE, TSIT5, VERN9, Row, Table
-from symtop.methods.simd import combined
-from symtop.methods.vectors import summed, zero
+from symtop.methods.simd import apart, combined, side_by_side
+from symtop.methods.vectors import accumulate, summed, zero
 
 BLOCK = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second
 EVALUATIONS = 1_000_000_000  # a run's limit: about half a minute
@@ -371,6 +371,32 @@ def fixed_loop(chart: str, pair: Pair) -> Loop:
         return step, carry, cost, ended_at(summed(state, step))
 
     return kernel_loop(begin, increment, form.observe)
+
+
+@functools.cache
+def two_runs(chart: str, pair: Pair, compare: Callable[..., float]) -> Callable[..., None]:
+    """``run(near, far, h, marks, given, seen)``: two starts by the same steps, in the time of one and to the same bits.
+
+    `near` and `far` are the plain numbers (`preparation`) of one top or body with each start. After each mark `seen`
+    has ``compare(state, other state, given)``. What overflows goes on without a sign.
+    """
+    form: Any = FORMS[chart]
+    field, numbers, opened = form.field, form.prepare.numbers, form.prepare.opened
+    stages, total = _stages(field, pair.table.a[: len(pair.table.b) - 1], _forget), combination(pair.table.b)
+
+    def run(near, far, h, marks, given, seen):  # type: ignore[no-untyped-def]
+        par, first = numbers(*opened(near))
+        nothing, state = zero(first), side_by_side(first, numbers(*opened(far))[1])
+        none = low = side_by_side(nothing, nothing)
+        k = 0
+        for j in range(len(marks)):
+            while k < marks[j]:
+                state, low = accumulate(state, low, total(none, stages(par, state, field(par, state), 0.0, h), h))
+                k += 1
+            seen[j] = compare(*apart(state), given)
+
+    compiled: Callable[..., None] = compile_kernel(run)
+    return compiled
 
 
 RK45 = Pair("rk45-compiled", DORMAND_PRINCE, 5, 4, "Dormand-Prince", "dormand-prince-1980")
