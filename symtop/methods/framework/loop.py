@@ -25,7 +25,7 @@ import functools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 from numpy.typing import NDArray
@@ -104,6 +104,9 @@ class Loop:
     def __post_init__(self) -> None:
         for part in (self.begin, self.increment, self.observe, self.enter, self.present):
             register_jitable(part)
+
+    def __getstate__(self) -> NoReturn:
+        raise TypeError("a loop cannot be pickled: numba knows its parts in the process that made it")
 
     @cached_property
     def plain(self) -> "Loop":
