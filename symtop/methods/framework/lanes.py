@@ -53,13 +53,12 @@ from numpy.typing import NDArray
 from symtop.core.jit import compile_kernel, register_jitable, set_item, to_fixed_tuple
 from symtop.core.parallel import heed
 from symtop.methods.framework.angles import in_chart
-from symtop.methods.framework.plan import OK
+from symtop.methods.framework.plan import OK, Array
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 from symtop.model.body import from_flat
 from symtop.model.top import NUMBERS, Angles, SymmetricTop
 
-Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 W = 32  # lanes of a block: four vectors of eight doubles

@@ -28,21 +28,17 @@ from functools import cached_property, partial
 from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.parallel import heed
 from symtop.methods.framework import lanes as many, preparation
 from symtop.methods.framework.lanes import Blocks, Lanes, Many, Whole
-from symtop.methods.framework.plan import LEFT_CHART, OK, Plan, Run, ending
+from symtop.methods.framework.plan import LEFT_CHART, OK, Array, Plan, Run, ending
 from symtop.methods.framework.preparation import Preparation, Shown, as_it_steps
 from symtop.methods.framework.registry import Solver
 from symtop.methods.vectors import accumulate, accumulate_plainly, zero
 from symtop.model.top import Angles, SymmetricTop, flat
-
-Array = NDArray[np.float64]
-Marks = NDArray[np.int64]
 
 BLOCK = 5_000_000  # steps between returns to Python, so that an interrupt is heard within a second
 
@@ -159,7 +155,7 @@ class Loop:
 
         return march
 
-    def __call__(self, par: Any, rule: Any, state: tuple[float, ...], h: float, marks: Marks) -> March:
+    def __call__(self, par: Any, rule: Any, state: tuple[float, ...], h: float, marks: Whole) -> March:
         """From the start to the last mark."""
         return self.advance(par, rule, self.start(par, rule, state, h), h, marks)[0]
 
@@ -168,7 +164,7 @@ class Loop:
         state, carry = self.prepare(par, rule, state, h)
         return Position(state, (0.0,) * len(state), carry, 0)
 
-    def advance(self, par: Any, rule: Any, at: Position, h: float, marks: Marks) -> tuple[March, Position]:
+    def advance(self, par: Any, rule: Any, at: Position, h: float, marks: Whole) -> tuple[March, Position]:
         """On to the last mark; the marks lie beyond `at`, or begin with 0 at the start."""
         state, low, carry, k = at
         if isinstance(carry, np.ndarray):  # a kernel's working space: `at` stays what it is
@@ -292,7 +288,8 @@ class FixedStep:
         interrupt. Raises SymtopError for a solver `in_python`, which runs one member at a time.
         """
         # writable too: a kernel is compiled again for an array that is not, as a broadcast one
-        numbers, h, marks = (np.require(one, requirements=("C", "W")) for one in (numbers, h, marks))
+        numbers, h = np.require(numbers, requirements=("C", "W")), np.require(h, requirements=("C", "W"))
+        marks = np.require(marks, requirements=("C", "W"))
         whole, most = self._whole, min(many.GROUP, BLOCK)
         if whole is None:
             raise SymtopError("many needs a solver whose parts all compile")

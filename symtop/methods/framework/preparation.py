@@ -15,13 +15,12 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symtop.core.jit import compile_kernel, register_jitable
+from symtop.methods.framework.plan import Array
 from symtop.model import top as model
 from symtop.model.top import Angles, SymmetricTop, flat
 
-Array = NDArray[np.float64]
 Numbers = tuple[float, ...]  # I1, I3, mgl, theta, phi, psi, theta', phi', psi'
 Pack = Callable[[Any], tuple[Callable[[Any], Any], Any]]  # of a rule: what compiled code makes it with, and from what
 

@@ -41,8 +41,8 @@ from symtop.methods.framework.angles import ReducedTop, chart_outcome, on_angles
 from symtop.methods.framework.lanes import Lanes
 from symtop.methods.framework.loop import FixedStep, inside, kernel_loop
 from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
-from symtop.methods.framework.plan import NOT_CONVERGED
-from symtop.methods.framework.registry import Array, Integrator
+from symtop.methods.framework.plan import NOT_CONVERGED, Array
+from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import View
 from symtop.model.top import Momenta
 

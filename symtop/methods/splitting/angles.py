@@ -19,7 +19,7 @@ from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import ReducedTop, chart_outcome
 from symtop.methods.framework.loop import kernel_loop
-from symtop.methods.framework.registry import Array
+from symtop.methods.framework.plan import Array
 from symtop.methods.splitting.loop import compose, composed, stages
 from symtop.model.charts import View
 from symtop.model.top import Momenta, half_angle_force

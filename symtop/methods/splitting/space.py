@@ -41,7 +41,7 @@ import numpy as np
 from symtop.core.jit import register_jitable
 from symtop.core.jit_functions import shared
 from symtop.methods.framework.loop import Loop
-from symtop.methods.framework.registry import Array
+from symtop.methods.framework.plan import Array
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, observe_attitude, observe_axis, with_spin
 from symtop.methods.splitting.loop import compose, composed, stages
 from symtop.methods.splitting.rotor import EXACT, half_square, rotor, without_branch
