@@ -20,7 +20,7 @@ A lane is given up when its step does what lanes cannot: an outcome that is not 
 one has. It is then run alone from its start; its neighbours do not notice. With 100 steps a nutation a fifth of random
 tops leaves the chart of the angles, mostly early: a step of Newton's iteration says itself how it ends (`newton`).
 
-How a family joins: it hands a `Lanes` to `loop.kernel_loop`. Its `step` makes one step of all lanes, as one loop or
+How a family joins: its `loop.Loop` has a function `lanes`. Its `step` makes one step of all lanes, as one loop or
 several over ``range(W)``; in each, `column` makes the tuple that a kernel takes and `put` writes what it returns. LLVM
 turns such a loop into vectors only if
     all that a loop writes lies in `block`, at ``(constant) W + j``, and it reads `table` at ``(same for all j) W + j``;

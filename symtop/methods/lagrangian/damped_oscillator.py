@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.loop import kernel_loop, no_carry
+from symtop.methods.framework.loop import Loop, no_carry
 from symtop.methods.lagrangian.discrete_lagrangian import RULES, quadrature
 from symtop.model.charts import Array
 
@@ -129,7 +129,7 @@ def legendre(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     return first * dstate[0] + rule.left * push, last * dstate[0] - rule.right * push
 
 
-_march = kernel_loop(no_carry, _increment, legendre)
+_march = Loop(no_carry, _increment, legendre)
 
 
 def discrete_path(

@@ -39,7 +39,7 @@ from symtop.core.jit_functions import fused
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import ReducedTop, chart_outcome, on_angles
 from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import FixedStep, inside, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop, inside
 from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
 from symtop.methods.framework.plan import NOT_CONVERGED, Array
 from symtop.methods.framework.registry import Integrator
@@ -325,7 +325,7 @@ def _in_lanes(rule: Quadrature) -> Lanes:
     )  # fmt: skip
 
 
-march = kernel_loop(begin, increment, observe, lanes=_in_lanes)
+march = Loop(begin, increment, observe, lanes=_in_lanes)
 
 
 def rule_of(method: Integrator) -> Quadrature | None:

@@ -37,7 +37,7 @@ from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import ReducedTop, chart_outcome, on_angles
 from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import FixedStep, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
 from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.framework.registry import Integrator
@@ -281,7 +281,7 @@ def _in_lanes(rule: Iteration) -> Lanes:
     )  # fmt: skip
 
 
-march = kernel_loop(begin, increment, observe, lanes=_in_lanes)
+march = Loop(begin, increment, observe, lanes=_in_lanes)
 
 
 def built_in() -> list[Integrator]:

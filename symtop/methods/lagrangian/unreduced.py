@@ -26,7 +26,7 @@ import numpy as np
 from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.angles import chart_outcome, require_chart
-from symtop.methods.framework.loop import FixedStep, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.newton import Correction, newton
 from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.framework.preparation import Preparation, Shown, conserved
@@ -176,7 +176,7 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     return before[4] + dstate[4], before[5] + dstate[5]
 
 
-march = kernel_loop(begin, increment, observe)
+march = Loop(begin, increment, observe)
 
 
 class DampedTop(NamedTuple):
