@@ -349,14 +349,14 @@ class Blocks:
         (rule, coefficients), lanes, steps = rule, self.lanes, marks[:, -1]
         counts_itself = lanes.effort(rule) == 0  # the step iterates
         chosen, left = divided(members, steps, turns(numbers, h) if counts_itself else None)
-        tops, fields, size, carry = widths = len(lanes.top._fields), lanes.size(rule), lanes.dimension, lanes.carry
-        per_lane = 3 * size + 2 + carry + lanes.room(rule), tops + fields, size
+        tops, fields, dimension, carry = len(lanes.top._fields), lanes.size(rule), lanes.dimension, lanes.carry
+        per_lane = 3 * dimension + 2 + carry + lanes.room(rule), tops + fields, dimension
         room = *(aligned(n * W) for n in per_lane), np.full(W, NEVER), *np.zeros((3, W), dtype=np.int64)
         chosen = np.ascontiguousarray(chosen[::-1])  # the longest begin first
         alone = [left]
         for first in range(0, len(chosen), BATCH):
             batch = chosen[first : first + BATCH]
-            prepared = tuple(np.empty((len(batch), width)) for width in widths)
+            prepared = tuple(np.empty((len(batch), width)) for width in (tops, fields, dimension, carry))
             self.prepare(batch, numbers, coefficients, h, marks, prepared, done.momenta)
             at = np.array([0, 0])
             while at[1] >= 0:
