@@ -342,5 +342,5 @@ def test_tables_and_compositions_travel_as_arrays_and_arrive_whole():
     drift, kick = [0.1, 0.2, 0.4, 0.2, 0.1], [0.05, 0.15, 0.3, 0.3, 0.15, 0.05]
     for more in ({"rotation": "cayley-tuned"}, {"gradient": [0.0, 1e-3, 0.0, 0.0, 1e-3, 0.0], "processor": 0.01}):
         for solver in symtop.composition("long", drift, kick, chart="space", **more).solvers.values():
-            assert solver._whole.alone[1].tolist()[:11] == [*solver.rule.rule.drift, *solver.rule.rule.kick]
+            assert solver._whole.rule[1].tolist()[:11] == [*solver.rule.rule.drift, *solver.rule.rule.kick]
             assert_the_same_run(solver, scene.top, scene.start, Plan.steps(0.02, [0, 1, 300]))
