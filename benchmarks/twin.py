@@ -12,13 +12,13 @@ import hashlib
 import math
 import shutil
 import subprocess
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.methods.framework.loop import inside
+from symtop.methods.framework.loop import Loop, inside
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian import discrete_lagrangian, exact_discrete, galerkin, unreduced
 from symtop.methods.lie_group import energy_momentum, generalised_alpha, runge_kutta, variational
@@ -38,7 +38,7 @@ EXACT = (*FAST, "-ffp-contract=off")  # gcc fuses nothing by itself: rounds like
 class Kernel(NamedTuple):
     """What one solver gives its compiled loop for one run."""
 
-    march: Callable[..., Any]
+    march: Loop
     par: Any
     rule: Any
     state: tuple[float, ...]
@@ -63,7 +63,7 @@ def _macros(rule: Any, chart: str = "") -> dict[str, int]:
 
 
 # the loop of a family: its C file, and the macro for its chart
-FAMILIES: dict[Callable[..., Any], tuple[str, str]] = {
+FAMILIES: dict[Loop, tuple[str, str]] = {
     discrete_lagrangian.march: ("discrete_lagrangian", ""),
     unreduced.march: ("unreduced", ""),
     galerkin.march: ("galerkin", ""),
@@ -86,14 +86,6 @@ FAMILIES: dict[Callable[..., Any], tuple[str, str]] = {
     energy_momentum.march: ("lie_group", "ENERGY_MOMENTUM"),
     generalised_alpha.march: ("lie_group", "ALPHA"),
     collective_gauss.march: ("lie_group", "COLLECTIVE"),
-}
-# maps between the variables that are stepped and those that are shown, once a run
-SHOWN: dict[Callable[..., Any], tuple[Callable[..., Any], Callable[..., Any]]] = {
-    space.march_axis: (space.AXIS.enter, space.AXIS.present),
-    space.march_attitude: (space.ATTITUDE.enter, space.ATTITUDE.present),
-    exact_discrete.march_axis: (exact_discrete.enter, exact_discrete.present_axis),
-    exact_discrete.march_attitude: (exact_discrete.enter, exact_discrete.present_attitude),
-    series.march_attitude(DEFAULT_ORDER): (lambda _par, _rule, state, _h: state, series.present),
 }
 
 
@@ -138,15 +130,13 @@ class Twin:
     def __init__(self, kernel: Kernel, flags: Sequence[str] = FAST) -> None:
         name, chart = FAMILIES[kernel.march]
         self.kernel = kernel
-        self._enter, self._present = SHOWN.get(kernel.march, (None, None))
         self._march = library(name, tuple(_macros(kernel.rule, chart).items()), tuple(flags)).march
         self._march.restype = ctypes.c_long
         pointer = ctypes.c_void_p
         self._march.argtypes = [pointer, pointer, pointer, ctypes.c_double, ctypes.c_long, pointer]
         rule = kernel.rule if kernel.march is not collective_gauss.march else (*kernel.rule[:2], kernel.rule.shares)
         self._par, self._rule = np.array(numbers(kernel.par)), np.array(numbers(rule))
-        start = kernel.state if self._enter is None else self._enter(kernel.par, kernel.rule, kernel.state, kernel.h)
-        self._start = np.array(start)
+        self._start = np.array(kernel.march.enter(kernel.par, kernel.rule, kernel.state, kernel.h))
 
     def __call__(self, steps: int) -> tuple[np.ndarray, int]:
         """The state after so many steps, as the kernel steps it, and the work it took."""
@@ -160,11 +150,8 @@ class Twin:
 
     def shown(self, steps: int) -> tuple[np.ndarray, int]:
         """The state after so many steps, as the Python kernel shows it, and the work it took."""
-        state, work = self(steps)
-        if self._present is None:
-            return state, work
-        kernel = self.kernel
-        return np.array(self._present(kernel.par, kernel.rule, tuple(state.tolist()), steps, kernel.h)), work
+        (state, work), kernel = self(steps), self.kernel
+        return np.array(kernel.march.present(kernel.par, kernel.rule, tuple(state.tolist()), steps, kernel.h)), work
 
 
 def ours(kernel: Kernel, steps: int) -> tuple[np.ndarray, int]:

@@ -123,7 +123,7 @@ def at_tolerance(variant: Integrator, tops: Tops, chosen: Members, tolerance: fl
 def stepped(variant: Integrator, numbers: Array, h: Array, marks: NDArray[np.int64]) -> Level:
     """Runs of steps `h` (n,), sampled at `marks` (n, samples): in one call where the variant has a loop to share."""
     solver = inside(next(iter(variant.solvers.values())))
-    if solver is None:
+    if solver is None or solver.in_python:
         return in_turn(variant, numbers, [Plan.steps(float(step), ends) for step, ends in zip(h, marks, strict=True)])
     many = solver.many(numbers, h, marks)
     work = np.asarray(solver.counts(many.steps, many.work)[0], dtype=float)

@@ -72,7 +72,7 @@ def side_by_side(
     _, solver = chart_of(method)
     if not compensated:
         assert isinstance(solver.loop, Loop)  # noqa: S101
-        solver = replace(solver, loop=solver.loop.plain())
+        solver = replace(solver, loop=solver.loop.plain)
     h = np.array([one.nutation_period / per_nutation for one in scenes])
     ends = windows_until(steps)
     stretches = [scattered(begin, end) for begin, end in pairwise([0, *ends])]

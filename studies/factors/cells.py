@@ -18,9 +18,10 @@ top and gravity), with the same coefficients. The implicit midpoint rule is `mid
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from symtop.methods.framework.angles import BareTop, sampled_momenta, to_angles
+from symtop.methods.framework.angles import sampled_momenta, to_angles
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Array
+from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.registry import Integrator, integrators
 from symtop.methods.library.scipy_ivp import RightHandSide, scipy_method
 from symtop.methods.taylor import heyoka

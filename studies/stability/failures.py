@@ -57,7 +57,7 @@ def survives(
     marks = np.unique(np.linspace(0, steps, 400).astype(np.int64))
     solver = method.solvers[chart]
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
-        if isinstance(solver, FixedStep):
+        if isinstance(solver, FixedStep) and not solver.in_python:
             numbers = np.array([flat(scene.top, start) for start in starts])
             done = solver.many(numbers, h.ravel(), np.tile(marks, (len(starts), 1)))
             theta, well = View(chart, scene.top, done.states).theta, done.outcome == OUTCOMES.index("ok")

@@ -38,7 +38,8 @@ from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
 from symtop.core.progress import progress_bar
 from symtop.core.signals import ending_on_sigterm
-from symtop.methods.framework.loop import FixedStep, Loop, Marks, Position, inside
+from symtop.methods.framework.lanes import Whole
+from symtop.methods.framework.loop import FixedStep, Loop, Position, inside
 from symtop.methods.framework.plan import NOT_NORMALISED, OK, ending, off_length, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.charts import BODY, Array, View, body_energy
@@ -68,7 +69,7 @@ def windows(steps: int) -> list[int]:
     return ends
 
 
-def scattered(begin: int, end: int, samples: int = SAMPLES) -> Marks:
+def scattered(begin: int, end: int, samples: int = SAMPLES) -> Whole:
     """At most `samples` whole steps in (begin, end], `end` among them, with strides of no fixed ratio."""
     place = np.arange(samples, dtype=float)
     place += np.mod(GOLDEN * place, 1.0)
@@ -181,7 +182,7 @@ def long_run(
     chart, solver = chart_of(method, of_body=chosen.of_body)
     assert isinstance(solver.loop, Loop)  # noqa: S101
     compensated = boolean("compensated", compensated)
-    loop = solver.loop if compensated else solver.loop.plain()
+    loop = solver.loop if compensated else solver.loop.plain
     par, rule, state = solver.setup(chosen.top, chosen.start, h)
     checkpoints = _Checkpoint(checkpoint, _identity(chosen, method, h, count, compensated))
     result = None if output is None else checkpoints.checked(file_path("output", output))

@@ -60,7 +60,7 @@ def test_the_tops_that_lanes_are_timed_on_stay_in_lanes_and_reach_the_error():
     solver, numbers, steps = lanes.solver_of(*lanes.RIVAL), lanes.members(), 45
     h, marks = np.full(lanes.MEMBERS, lanes.HORIZON / steps), np.full((lanes.MEMBERS, 1), steps)
     done, whole = Many.empty(lanes.MEMBERS, 1, 6), solver._whole
-    left = whole.blocks().run(np.arange(lanes.MEMBERS), numbers, whole.table, h, marks, done, loops.BLOCK)
+    left = whole.blocks().run(np.arange(lanes.MEMBERS), numbers, whole.rule, h, marks, done, loops.BLOCK)
     assert left.size == 0
     true = ClosedForms(numbers).axis(np.full((lanes.MEMBERS, 1), lanes.HORIZON))[:, 0]
     errors = charts.axis_distance(done.states[:, 0, :3], true)

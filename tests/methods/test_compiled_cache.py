@@ -19,7 +19,7 @@ from symtop.methods.framework import loop, loop as loops
 from symtop.methods.framework.angles import on_angles, with_rates
 from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.framework.plan import Plan
-from symtop.methods.framework.preparation import Body, Start
+from symtop.methods.framework.preparation import BareTop, Start
 from symtop.methods.framework.space import on_attitude, on_axis, on_frame
 from symtop.methods.lagrangian.unreduced import with_momenta
 from symtop.methods.splitting.coefficients import METHODS
@@ -246,7 +246,7 @@ def tops(count, seed=3):
 @pytest.mark.parametrize("prepare", PREPARATIONS, ids=lambda one: one.numbers.__name__)
 def test_a_preparation_compiles_to_its_own_bits(prepare):
     numbers = prepare.numbers
-    prepared = lambda plain: numbers(Body(*plain[:3]), Start(*plain[3:]))
+    prepared = lambda plain: numbers(BareTop(*plain[:3]), Start(*plain[3:]))
     compiled = compile_kernel(prepared)
     for top, at in tops(3000):
         par, state = compiled(flat(top, at))
@@ -342,5 +342,5 @@ def test_tables_and_compositions_travel_as_arrays_and_arrive_whole():
     drift, kick = [0.1, 0.2, 0.4, 0.2, 0.1], [0.05, 0.15, 0.3, 0.3, 0.15, 0.05]
     for more in ({"rotation": "cayley-tuned"}, {"gradient": [0.0, 1e-3, 0.0, 0.0, 1e-3, 0.0], "processor": 0.01}):
         for solver in symtop.composition("long", drift, kick, chart="space", **more).solvers.values():
-            assert solver._whole.rule.tolist()[:11] == [*solver.rule.rule.drift, *solver.rule.rule.kick]
+            assert solver._whole.rule[1].tolist()[:11] == [*solver.rule.rule.drift, *solver.rule.rule.kick]
             assert_the_same_run(solver, scene.top, scene.start, Plan.steps(0.02, [0, 1, 300]))

@@ -76,8 +76,8 @@ def assert_runs_alone(solver, numbers, h, marks, done):
 def left_alone(solver, numbers, h, marks):
     """The members that the lanes give back."""
     whole = solver._whole
-    done = Many.empty(len(h), marks.shape[1], whole.size)
-    return whole.blocks().run(np.arange(len(h)), numbers, whole.table, h, marks, done, loops.BLOCK)
+    done = Many.empty(len(h), marks.shape[1], whole.alone[3])
+    return whole.blocks().run(np.arange(len(h)), numbers, whole.rule, h, marks, done, loops.BLOCK)
 
 
 @pytest.mark.parametrize(("name", "ends"), [

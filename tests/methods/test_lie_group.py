@@ -12,7 +12,7 @@ import symtop
 from symtop.measure.published import published_values
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Plan
-from symtop.methods.framework.preparation import Body
+from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.registry import integrator
 from symtop.methods.framework.space import SpaceTop, field_axis, on_axis
 from symtop.methods.lie_group import variational
@@ -141,7 +141,7 @@ def test_the_scalar_equations_are_solved_and_the_discrete_rigid_body_ends_at_a_r
         assert solve(integrator(name), "axis", top, start, Plan.steps(3.0, [1])).outcome == outcome
     random = np.random.default_rng(3)
     for _ in range(2000):
-        top = Body(1.0, random.uniform(0.02, 1.98), 1.0)
+        top = BareTop(1.0, random.uniform(0.02, 1.98), 1.0)
         size = 10.0 ** random.uniform(-8, 4)
         A, square = size * random.normal(), size**2 * random.exponential()
         first, after, rates = variational.RETRACTION

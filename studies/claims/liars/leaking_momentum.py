@@ -3,13 +3,13 @@
 import dataclasses
 
 import symtop
-from symtop.methods.framework.loop import FixedStep, kernel_loop
-from symtop.methods.framework.space import observe_axis, on_axis
+from symtop.methods.framework.loop import FixedStep
+from symtop.methods.framework.space import on_axis
 from symtop.methods.splitting import space as family
 from symtop.methods.splitting.coefficients import STRANG
 from symtop.methods.splitting.loop import Stages
 
-whole_step = family.AXIS.increment  # numba finds a name of this module, not an attribute of another one's
+whole_step = family.march_axis.increment  # numba finds a name of this module, not an attribute of another one's
 
 
 def increment(par, rule, state, carry, h):
@@ -18,7 +18,7 @@ def increment(par, rule, state, carry, h):
     return (step[0], step[1], step[2], step[3], step[4], step[5] + 1e-10), axis, forces, outcome
 
 
-march = kernel_loop(family.AXIS.begin, increment, observe_axis, family.AXIS.enter, family.AXIS.present)
+march = dataclasses.replace(family.march_axis, increment=increment, lanes=lambda _: None)
 
 
 def solve(top, start, plan):

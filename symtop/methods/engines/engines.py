@@ -77,7 +77,7 @@ import numpy as np
 from symtop.core.jit import by_length, register_jitable, set_item
 from symtop.methods.framework.body import prepared
 from symtop.methods.framework.loop import FixedStep, Loop, as_stepped, kernel_loop, no_carry
-from symtop.methods.framework.preparation import Body, Preparation
+from symtop.methods.framework.preparation import BareTop, Preparation
 from symtop.methods.framework.registry import ENGINE, Integrator
 from symtop.methods.framework.space import L_at, e_at, finite_outcome, observe_attitude, observe_axis, q_at
 from symtop.methods.splitting.body import SORTED, five_rotations
@@ -130,7 +130,7 @@ def _top_prepared(place_at: Callable[..., Any], size: int, *, rates: bool) -> Pr
     """A start as (e, L) or (q, L), or with `rates` w for L: the angular momentum of a body whose moments are one."""
 
     def prepare(top, at):  # type: ignore[no-untyped-def]
-        body: Any = Body(1.0, 1.0, 0.0) if rates else Body(top.I1, top.I3, top.mgl)
+        body: Any = BareTop(1.0, 1.0, 0.0) if rates else BareTop(top.I1, top.I3, top.mgl)
         return EngineTop(top.I1, top.I3, top.mgl, 0.0, 0.5, 1.0), (*place_at(at), *L_at(body, at))
 
     return Preparation(prepare, size)

@@ -22,7 +22,7 @@ from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, Array
-from symtop.methods.framework.preparation import Preparation, Shown, conserved
+from symtop.methods.framework.preparation import BareTop, Preparation, Shown, conserved
 
 
 class ReducedTop(NamedTuple):
@@ -34,14 +34,6 @@ class ReducedTop(NamedTuple):
     p_psi: float
     north: float  # p_phi - p_psi
     south: float  # p_phi + p_psi
-
-
-class BareTop(NamedTuple):
-    """The top without its momenta, for kernels whose state has them or the rates."""
-
-    I1: float
-    I3: float
-    mgl: float
 
 
 @register_jitable

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.preparation import Preparation, Shown
-from symtop.methods.framework.space import L_at, finite_outcome, observe_attitude, q_at
+from symtop.methods.framework.space import L_at, observe_attitude, q_at
 from symtop.methods.vectors import rotated
 from symtop.model.body import vertical
 
@@ -107,12 +107,6 @@ def field_body(par: Any, y: Any) -> Any:
         w * h2 - x * h3 + z * h1, w * h3 + x * h2 - y1 * h1,
         M2 * w3 - M3 * w2 + t1, M3 * w1 - M1 * w3 + t2, M1 * w2 - M2 * w1 + t3,
     )  # fmt: skip
-
-
-@register_jitable
-def ended_body(y: Any) -> int:
-    """Is the state finite?"""
-    return finite_outcome(y[0] + y[1] + y[2] + y[3] + y[4] + y[5] + y[6])
 
 
 def observe_body(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:

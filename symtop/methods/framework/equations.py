@@ -21,8 +21,9 @@ from symtop.core.errors import SymtopError, one_of
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.numbers import real_numbers
 from symtop.methods.framework import angles, body, space
-from symtop.methods.framework.angles import BareTop, field_angles
+from symtop.methods.framework.angles import field_angles
 from symtop.methods.framework.plan import OUTCOMES, Array, Run
+from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.space import SpaceTop, axis_of, field_attitude, field_axis
 from symtop.methods.vectors import dot
 from symtop.model import charts
@@ -63,7 +64,7 @@ def _body_momenta(_: Any, states: Array) -> tuple[Array, Array]:
 
 
 FORMS = FORMULATIONS | {
-    BODY: Formulation(body.field_body, body.ended_body, body.observe_body, body.on_body, None, _body_momenta)
+    BODY: Formulation(body.field_body, space.ended_space, body.observe_body, body.on_body, None, _body_momenta)
 }  # with the body that has no symmetry
 
 

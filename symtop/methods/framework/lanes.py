@@ -20,7 +20,7 @@ A lane is given up when its step does what lanes cannot: an outcome that is not 
 one has. It is then run alone from its start; its neighbours do not notice. With 100 steps a nutation a fifth of random
 tops leaves the chart of the angles, mostly early: a step of Newton's iteration says itself how it ends (`newton`).
 
-How a family joins: it hands a `Lanes` to `loop.kernel_loop`. Its `step` makes one step of all lanes, as one loop or
+How a family joins: its `loop.Loop` has a function `lanes`. Its `step` makes one step of all lanes, as one loop or
 several over ``range(W)``; in each, `column` makes the tuple that a kernel takes and `put` writes what it returns. LLVM
 turns such a loop into vectors only if
     all that a loop writes lies in `block`, at ``(constant) W + j``, and it reads `table` at ``(same for all j) W + j``;
@@ -33,7 +33,7 @@ calls and that has a loop of its own, which is made into vectors before it is in
 
 *Who stands beside whom.* A block takes as long as its longest member and about as long as `LEAST` members alone.
 Members enter in the order of their numbers of steps, the longest first, and `W` neighbours in it that together make
-fewer steps than `LEAST` times the longest are left to the loop for one, a call of `loop.Loop.whole` without Python's
+fewer steps than `LEAST` times the longest are left to the loop for one, a call of `loop.whole_run` without Python's
 lock. A step that iterates takes as many passes as its slowest lane: there, members whose steps are alike in number
 enter in the order of
 
@@ -53,14 +53,12 @@ from numpy.typing import NDArray
 from symtop.core.jit import compile_kernel, register_jitable, set_item, to_fixed_tuple
 from symtop.core.parallel import heed
 from symtop.methods.framework.angles import in_chart
-from symtop.methods.framework.plan import OK
-from symtop.methods.framework.preparation import Pack, as_fields
+from symtop.methods.framework.plan import OK, Array
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 from symtop.model.body import from_flat
 from symtop.model.top import NUMBERS, Angles, SymmetricTop
 
-Array = NDArray[np.float64]
 Whole = NDArray[np.int64]
 
 W = 32  # lanes of a block: four vectors of eight doubles
@@ -95,48 +93,24 @@ def none_left(block: Any, live: int) -> bool:
 
 @dataclass(frozen=True)
 class Lanes:
-    """What a family needs to run in lanes.
+    """What a family needs to run in lanes. All compiles but what takes a `method`, a rule before it is scaled."""
 
-        step(block, table)               one step of W members, compensated sums included
-        lay(par, rule, h, numbers)       the numbers of a member's rule that a step reads, into an array
-        read(numbers) -> rule            a rule as the kernel's `observe` and `present` see it
-        begin(par, rule, state, h)       the carry in lanes, a flat tuple; None where the kernel's own is one
-        size(rule)                       how many numbers `lay` writes
-        effort(rule)                     work of a step that is known beforehand
-        room(rule)                       numbers of working space that a lane has beside its carry
-        pack(rule)                       how a rule travels into compiled code
-        show(par, t, state, out)         write a sample at the time t; None where there is a kernel for each chart
-
-    The first four and the last compile; the others take the rule of a method before it is scaled.
-    """
-
-    step: Callable[[Any, Any], None]
-    lay: Callable[..., None]
-    read: Callable[[Any], Any]
-    size: Callable[[Any], int]
+    step: Callable[[Any, Any], None]  # (block, table): one step of W members, compensated sums included
+    lay: Callable[..., None]  # (par, rule, h, numbers): the numbers of a member's rule that a step reads, into an array
+    read: Callable[[Any], Any]  # (numbers): a rule as the kernel's `observe` and `present` see it
+    size: Callable[[Any], int]  # (method): how many numbers `lay` writes
     top: Any  # the NamedTuple of the numbers of the top
     dimension: int  # of the state
     carry: int  # numbers in the carry, a flat tuple
-    effort: Callable[[Any], int] = lambda _: 0
-    room: Callable[[Any], int] = lambda _: 0
-    begin: Callable[..., Any] | None = None
-    show: Callable[..., None] | None = None  # of charts that differ in how many numbers a sample has
-    pack: Pack = as_fields
+    effort: Callable[[Any], int] = lambda _: 0  # (method): work of a step that is known beforehand
+    room: Callable[[Any], int] = lambda _: 0  # (method): numbers of working space of a lane beside its carry
+    begin: Callable[..., Any] | None = None  # (par, rule, state, h): the carry; None where the kernel's own is flat
+    show: Callable[..., None] | None = None  # (par, t, state, out): write a sample; None: a kernel for each chart
 
     def __post_init__(self) -> None:
         for part in (self.step, self.lay, self.read, self.begin, self.show):  # at once, as in `preparation.Preparation`
             if part is not None:
                 register_jitable(part)
-
-    @property
-    def tops(self) -> int:
-        """How many numbers of the top there are."""
-        return len(self.top._fields)
-
-    @property
-    def flag(self) -> int:
-        """Which number of a lane says that it has to be run alone."""
-        return 3 * self.dimension
 
 
 def preparing(
@@ -186,9 +160,9 @@ def marching(lanes: Lanes, observe: Any, present: Any, write: Any) -> Any:  # no
     about `most` steps of members were made, or when all members have ended, with `at[1]` at -1.
     """
     step, read, kind = lanes.step, lanes.read, lanes.top
-    size, flag = lanes.dimension, lanes.flag
-    state_like, top_like = (0.0,) * size, (0.0,) * lanes.tops
-    tops, carry_begin = lanes.tops, flag + 2
+    size, tops = lanes.dimension, len(kind._fields)
+    state_like, top_like = (0.0,) * size, (0.0,) * tops
+    flag, carry_begin = 3 * size, 3 * size + 2
 
     @register_jitable
     def fill(block, table, j, i, prepared):  # type: ignore[no-untyped-def]
@@ -332,17 +306,6 @@ class Many(NamedTuple):
         return cls(states, momenta, *(np.zeros(n, dtype=np.int64) for _ in range(3)))
 
 
-def in_turn(
-    run: Callable[..., tuple[int, int, int]], chosen: Whole, numbers: Array, rule: Any, h: Array, marks: Whole,
-    done: Many,
-) -> None:  # fmt: skip
-    """The chosen members one after another, by ``run(numbers, rule, h, marks, states, momenta)``."""
-    momenta = np.empty((2, marks.shape[1]))
-    for i, plain, step in zip(chosen.tolist(), map(tuple, numbers[chosen].tolist()), h[chosen].tolist(), strict=True):
-        done.steps[i], done.work[i], done.outcome[i] = run(plain, rule, step, marks[i], done.states[i], momenta)
-        done.momenta[i] = momenta.T
-
-
 def of_bodies(numbers: Array) -> bool:
     """Are these rows of bodies without symmetry, and not of tops?"""
     return int(numbers.shape[1]) != len(NUMBERS)
@@ -379,18 +342,21 @@ class Blocks:
     march: Any
 
     def run(self, members: Whole, numbers: Array, rule: Any, h: Array, marks: Whole, done: Many, most: int) -> Whole:
-        """Run the chosen members, about `most` steps between returns to Python; return those to be run alone."""
-        lanes, steps = self.lanes, marks[:, -1]
+        """Run the chosen members, about `most` steps between returns to Python; return those to be run alone.
+
+        `rule` is a pair: as the method has it, and as it travels into compiled code.
+        """
+        (rule, coefficients), lanes, steps = rule, self.lanes, marks[:, -1]
         counts_itself = lanes.effort(rule) == 0  # the step iterates
         chosen, left = divided(members, steps, turns(numbers, h) if counts_itself else None)
-        widths = lanes.tops, lanes.size(rule), lanes.dimension, lanes.carry
-        per_lane = lanes.flag + 2 + lanes.carry + lanes.room(rule), lanes.tops + lanes.size(rule), lanes.dimension
+        tops, fields, dimension, carry = len(lanes.top._fields), lanes.size(rule), lanes.dimension, lanes.carry
+        per_lane = 3 * dimension + 2 + carry + lanes.room(rule), tops + fields, dimension
         room = *(aligned(n * W) for n in per_lane), np.full(W, NEVER), *np.zeros((3, W), dtype=np.int64)
-        coefficients, chosen = lanes.pack(rule)[1], np.ascontiguousarray(chosen[::-1])  # the longest begin first
+        chosen = np.ascontiguousarray(chosen[::-1])  # the longest begin first
         alone = [left]
         for first in range(0, len(chosen), BATCH):
             batch = chosen[first : first + BATCH]
-            prepared = tuple(np.empty((len(batch), width)) for width in widths)
+            prepared = tuple(np.empty((len(batch), width)) for width in (tops, fields, dimension, carry))
             self.prepare(batch, numbers, coefficients, h, marks, prepared, done.momenta)
             at = np.array([0, 0])
             while at[1] >= 0:

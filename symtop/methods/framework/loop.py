@@ -15,7 +15,7 @@ and two more where what is stepped is not what is shown (a processed method, a m
 returns the *increment* of the state; the loop adds it with Knuth's two-sum and carries the rounding error to the next
 step. That costs nothing, for the loop is bound by the latency of the kernel. Time is k h, never accumulated.
 
-A run that nobody interrupts is one compiled call from plain numbers to samples (`Loop.whole`), the preparation of the
+A run that nobody interrupts is one compiled call from plain numbers to samples (`whole_run`), the preparation of the
 kernel included. A loop can stop after any step and go on, in another process too, to the same bits: a `Position` is all
 that the next step depends on (`symtop.run.long_run`).
 Source: Hairer, McLachlan, Razakarivony, BIT 48 (2008) 231 (Brouwer's law).
@@ -25,24 +25,20 @@ import functools
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import cached_property, partial
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
-from numpy.typing import NDArray
 
+from symtop.core.errors import SymtopError
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.parallel import heed
 from symtop.methods.framework import lanes as many, preparation
 from symtop.methods.framework.lanes import Blocks, Lanes, Many, Whole
-from symtop.methods.framework.plan import LEFT_CHART, OK, OUTCOMES, Plan, Run, ending
-from symtop.methods.framework.preparation import Preparation, Shown, as_it_steps, momenta_at, opened
+from symtop.methods.framework.plan import LEFT_CHART, OK, Array, Plan, Run, ending
+from symtop.methods.framework.preparation import Preparation, Shown, as_it_steps
 from symtop.methods.framework.registry import Solver
 from symtop.methods.vectors import accumulate, accumulate_plainly, zero
-from symtop.model import charts
 from symtop.model.top import Angles, SymmetricTop, flat
-
-Array = NDArray[np.float64]
-Marks = NDArray[np.int64]
 
 BLOCK = 5_000_000  # steps between returns to Python, so that an interrupt is heard within a second
 
@@ -73,7 +69,8 @@ def no_carry(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 
 @register_jitable
-def _as_given(par: Any, rule: Any, state: Any, h: float) -> Any:
+def as_given(par: Any, rule: Any, state: Any, h: float) -> Any:
+    """`enter` of a kernel that steps the start as it is."""
     return state
 
 
@@ -88,70 +85,50 @@ class Loop:
     """The loop around one kernel family, compiled when it is first used: ``loop(par, rule, state, h, marks)``.
 
     A run records the state after ``marks[j]`` steps for each j (increasing; 0 is the start). `start` and `advance` do
-    the same in stretches, and the bits do not depend on where a stretch ends. ``whole(kind, prepare, scale, sample)``
-    is a run in one compiled call, from plain numbers (`preparation`) to filled arrays: ``run(numbers, rule, h, marks,
-    states, momenta)``, with momenta (2, samples), returns steps, work and outcome. `lanes` is what the family has for a
-    rule to run many members in lanes, or None, and ``blocks(lanes, ...)`` the kernels of that, from the same parts.
+    the same in stretches, and the bits do not depend on where a stretch ends. `add` is how increments are summed, and
+    `lanes` what the family has for a rule to run many members in lanes, or None.
     """
 
     begin: Callable[..., Any]
-    parts: tuple[Callable[..., Any], Callable[..., Any]]  # `prepare` and `march` as they are written
-    whole: Callable[..., Callable[..., tuple[int, int, int]]]
-    lanes: Callable[[Any], Lanes | None]
-    blocks: Callable[..., Blocks]
-    plain: Callable[[], "Loop"]  # the same kernel with sums that are not compensated
+    increment: Callable[..., Any]
+    observe: Callable[..., Any]
+    enter: Callable[..., Any] = as_given
+    present: Callable[..., Any] = as_stepped
+    add: Callable[..., Any] = accumulate
+    lanes: Callable[[Any], Lanes | None] = lambda _: None
+
+    def __post_init__(self) -> None:
+        for part in (self.begin, self.increment, self.observe, self.enter, self.present):
+            register_jitable(part)
+
+    def __getstate__(self) -> NoReturn:
+        raise TypeError("a loop cannot be pickled: numba knows its parts in the process that made it")
+
+    @cached_property
+    def plain(self) -> "Loop":
+        """The same kernel with sums that are not compensated."""
+        return Loop(self.begin, self.increment, self.observe, self.enter, self.present, accumulate_plainly)
 
     @cached_property  # few processes need it, and each would hash the parts of a hundred loops
     def prepare(self) -> Callable[..., Any]:
         """The state as the kernel steps it and its carry, of (par, rule, state, h)."""
-        return compile_kernel(self.parts[0])  # type: ignore[no-any-return]
+        begin, enter = self.begin, self.enter
+
+        def prepare(par, rule, state, h):  # type: ignore[no-untyped-def]
+            state = enter(par, rule, state, h)
+            return state, begin(par, rule, state, h)
+
+        return compile_kernel(prepare)  # type: ignore[no-any-return]
 
     @cached_property
     def march(self) -> Callable[..., Any]:
         """A stretch of the run."""
-        return compile_kernel(self.parts[1])  # type: ignore[no-any-return]
+        return compile_kernel(self.marching(as_it_steps))  # type: ignore[no-any-return]
 
-    def __call__(self, par: Any, rule: Any, state: tuple[float, ...], h: float, marks: Marks) -> March:
-        """From the start to the last mark."""
-        return self.advance(par, rule, self.start(par, rule, state, h), h, marks)[0]
+    def marching(self, sample: Callable[..., Any]) -> Callable[..., Any]:
+        """`march` before it is compiled, with samples as `sample` shows them."""
+        increment, observe, present, add = self.increment, self.observe, self.present, self.add
 
-    def start(self, par: Any, rule: Any, state: tuple[float, ...], h: float) -> Position:
-        """A run before its first step."""
-        state, carry = self.prepare(par, rule, state, h)
-        return Position(state, (0.0,) * len(state), carry, 0)
-
-    def advance(self, par: Any, rule: Any, at: Position, h: float, marks: Marks) -> tuple[March, Position]:
-        """On to the last mark; the marks lie beyond `at`, or begin with 0 at the start."""
-        state, low, carry, k = at
-        if isinstance(carry, np.ndarray):  # a kernel's working space: `at` stays what it is
-            carry = carry.copy()
-        states, momenta = np.empty((len(marks), len(state))), np.empty((2, len(marks)))
-        states.fill(np.nan)
-        momenta.fill(np.nan)
-        j = work = outcome = 0
-        while j < len(marks) and outcome == OK:
-            stop = min(k + BLOCK, int(marks[-1]))
-            state, low, carry, k, j, effort, outcome = self.march(
-                par, rule, state, low, carry, h, k, j, stop, marks, states, momenta
-            )
-            work += effort
-        return March(states, momenta.T, k, work, outcome), Position(state, low, carry, k)
-
-
-def kernel_loop(  # noqa: C901  (one loop, read in one piece)
-    begin: Callable[..., Any], increment: Callable[..., Any], observe: Callable[..., Any],
-    enter: Callable[..., Any] = _as_given, present: Callable[..., Any] = as_stepped,
-    add: Callable[..., Any] = accumulate, lanes: Callable[[Any], Lanes | None] = lambda _: None,
-) -> Loop:  # fmt: skip
-    """The loop around one kernel family; `add` is how increments are summed, `lanes` how it steps many, by its rule."""
-    for part in (begin, increment, observe, enter, present):
-        register_jitable(part)
-
-    def prepare(par, rule, state, h):  # type: ignore[no-untyped-def]
-        state = enter(par, rule, state, h)
-        return state, begin(par, rule, state, h)
-
-    def marching(sample: Callable[..., Any]) -> Callable[..., Any]:
         def march(par, rule, state, low, carry, h, k, j, stop, marks, states, momenta):  # type: ignore[no-untyped-def]
             work = 0
             outcome = 0
@@ -178,44 +155,68 @@ def kernel_loop(  # noqa: C901  (one loop, read in one piece)
 
         return march
 
-    @functools.cache
-    def whole(
-        kind: Callable[..., Any], numbers: Callable[..., Any], scale: Callable[..., Any], sample: Callable[..., Any],
-        opened: Callable[..., Any] = opened, momenta_at: Callable[..., Any] = momenta_at,
-    ) -> Callable[..., tuple[int, int, int]]:  # fmt: skip
-        march = register_jitable(marching(sample))
+    def __call__(self, par: Any, rule: Any, state: tuple[float, ...], h: float, marks: Whole) -> March:
+        """From the start to the last mark."""
+        return self.advance(par, rule, self.start(par, rule, state, h), h, marks)[0]
 
-        def run(plain, coefficients, h, marks, states, momenta):  # type: ignore[no-untyped-def]
-            top, at = opened(plain)
-            par, state = numbers(top, at)
-            rule = scale(kind(coefficients), top, at, h)
-            state = enter(par, rule, state, h)
-            if marks[0] == 0:
-                momenta[0, 0], momenta[1, 0] = momenta_at(top, at)
-            carry, stop = begin(par, rule, state, h), marks[-1]
-            _, _, _, k, j, work, outcome = march(
-                par, rule, state, zero(state), carry, h, 0, 0, stop, marks, states, momenta
+    def start(self, par: Any, rule: Any, state: tuple[float, ...], h: float) -> Position:
+        """A run before its first step."""
+        state, carry = self.prepare(par, rule, state, h)
+        return Position(state, (0.0,) * len(state), carry, 0)
+
+    def advance(self, par: Any, rule: Any, at: Position, h: float, marks: Whole) -> tuple[March, Position]:
+        """On to the last mark; the marks lie beyond `at`, or begin with 0 at the start."""
+        state, low, carry, k = at
+        if isinstance(carry, np.ndarray):  # a kernel's working space: `at` stays what it is
+            carry = carry.copy()
+        states, momenta = np.full((len(marks), len(state)), np.nan), np.full((2, len(marks)), np.nan)
+        j = work = outcome = 0
+        while j < len(marks) and outcome == OK:
+            stop = min(k + BLOCK, int(marks[-1]))
+            state, low, carry, k, j, effort, outcome = self.march(
+                par, rule, state, low, carry, h, k, j, stop, marks, states, momenta
             )
-            states[j:] = np.nan
-            momenta[:, max(j, int(marks[0] == 0)) :] = np.nan
-            return k, work, outcome
+            work += effort
+        return March(states, momenta.T, k, work, outcome), Position(state, low, carry, k)
 
-        compiled: Callable[..., tuple[int, int, int]] = compile_kernel(run)
-        return compiled
 
-    @functools.cache
-    def together(family: Lanes, show: Any, *parts: Any) -> Blocks:
-        prepare = many.preparing(family, begin, enter, *parts)
-        return Blocks(family, prepare, many.marching(family, observe, present, show))
+kernel_loop = Loop  # its public name
 
-    def blocks(family: Lanes, kind: Any, numbers: Any, scale: Any, sample: Any, *plain: Any) -> Blocks:
-        return together(family, family.show or many.showing(sample), kind, numbers, scale, *plain)
 
-    @functools.cache
-    def plain() -> Loop:
-        return kernel_loop(begin, increment, observe, enter, present, accumulate_plainly)
+@functools.cache
+def whole_run(
+    loop: Loop, sample: Callable[..., Any], kind: Callable[..., Any], numbers: Callable[..., Any],
+    scale: Callable[..., Any], opened: Callable[..., Any], momenta_at: Callable[..., Any],
+) -> Callable[..., tuple[int, int, int]]:  # fmt: skip
+    """A run in one compiled call, from plain numbers (`preparation`) to filled arrays.
 
-    return Loop(begin, (prepare, marching(as_it_steps)), whole, lanes, blocks, plain)
+    ``run(plain, coefficients, h, marks, states, momenta)``, with momenta (2, samples), returns steps, work and outcome.
+    """
+    begin, enter, march = loop.begin, loop.enter, register_jitable(loop.marching(sample))
+
+    def run(plain, coefficients, h, marks, states, momenta):  # type: ignore[no-untyped-def]
+        top, at = opened(plain)
+        par, state = numbers(top, at)
+        rule = scale(kind(coefficients), top, at, h)
+        state = enter(par, rule, state, h)
+        if marks[0] == 0:
+            momenta[0, 0], momenta[1, 0] = momenta_at(top, at)
+        carry, stop = begin(par, rule, state, h), marks[-1]
+        _, _, _, k, j, work, outcome = march(
+            par, rule, state, zero(state), carry, h, 0, 0, stop, marks, states, momenta
+        )
+        states[j:] = np.nan
+        momenta[:, max(j, int(marks[0] == 0)) :] = np.nan
+        return k, work, outcome
+
+    return compile_kernel(run)  # type: ignore[no-any-return]
+
+
+@functools.cache
+def blocks_of(loop: Loop, lanes: Lanes, show: Callable[..., None], *parts: Any) -> Blocks:
+    """The kernels of a loop in lanes, from the parts that `lanes.preparing` takes."""
+    prepare = many.preparing(lanes, loop.begin, loop.enter, *parts)
+    return Blocks(lanes, prepare, many.marching(lanes, loop.observe, loop.present, show))
 
 
 Prepare = Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]
@@ -225,23 +226,9 @@ Present = Callable[[Any, Array, Array], Array]
 class _Whole(NamedTuple):
     """The parts of a run in one compiled call."""
 
-    rule: Any  # what compiled code makes the rule from
-    size: int  # of a sample
     alone: tuple[Any, ...]  # what a run of one takes, for a plain tuple comes apart quicker than a NamedTuple
     blocks: Callable[[], Blocks] | None  # many members in lanes
-    table: Any  # the rule as the method has it
-
-    def run(self, members: Whole, numbers: Array, h: Array, marks: Whole, done: Many) -> Whole:
-        """Run members in lanes or by one call each; returns those that take a call of Python."""
-        most = min(many.GROUP, BLOCK)
-        if self.blocks is not None:
-            members = self.blocks().run(members, numbers, self.table, h, marks, done, most)
-        short = marks[members, -1] <= BLOCK
-        for chosen in many.groups(members[short], marks[:, -1], most):
-            heed()
-            many.in_turn(self.alone[0], chosen, numbers, self.rule, h, marks, done)
-        longer: Whole = members[~short]
-        return longer
+    rule: tuple[Any, Any]  # as the method has it, and as it travels into compiled code
 
 
 @dataclass(frozen=True)
@@ -271,7 +258,9 @@ class FixedStep:
         """Start to horizon, in one compiled call where that is possible."""
         whole, h, marks = self._whole, plan.step_size, plan.marks
         if whole is None or marks.item(-1) > BLOCK:
-            return self._in_stretches(top, start, plan)
+            done = self._in_stretches(top, start, plan)
+            counts = done.steps, *self.counts(done.steps, done.work), ending(done.outcome), done.steps * h
+            return Run(done.states, done.momenta[:, 0], done.momenta[:, 1], *counts)
         # a run of few steps takes as long as what follows: no fields one at a time, no `counts`, no constructor
         run, rule, check, size, evaluations, each_step, counted = whole.alone
         if check is not None:
@@ -283,43 +272,44 @@ class FixedStep:
         fields = states, momenta[0], momenta[1], steps, spent, work * counted, ended, steps * h
         return tuple.__new__(Run, fields)
 
-    def _in_stretches(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+    def _in_stretches(self, top: SymmetricTop, start: Angles, plan: Plan) -> March:
         """The same with the preparation in Python, and a return to Python after every `BLOCK` steps."""
         par, rule, state = self.setup(top, start, plan.step_size)
         done = self.loop(par, rule, state, plan.step_size, plan.marks)
         if plan.marks[0] == 0:
             done.momenta[0] = top.momenta(start)[:2]
-        states = done.states if self.present is None else self.present(par, plan.times, done.states)
-        counts = done.steps, *self.counts(done.steps, done.work), ending(done.outcome), done.steps * plan.step_size
-        return Run(states, done.momenta[:, 0], done.momenta[:, 1], *counts)
+        return done if self.present is None else done._replace(states=self.present(par, plan.times, done.states))
 
     def many(self, numbers: Array, h: Array, marks: Whole) -> Many:
         """The runs of n members: `numbers` (n, 9) as `flat` has them, steps `h` (n,), `marks` (n, samples).
 
         Each has the bits of a run alone, in lanes too, and fails alone, as does one whose start the kernel cannot step.
         Threads may call it at the same time; after every `GROUP` steps, or a stretch of a longer member, it heeds an
-        interrupt.
+        interrupt. Raises SymtopError for a solver `in_python`, which runs one member at a time.
         """
         # writable too: a kernel is compiled again for an array that is not, as a broadcast one
         numbers, h = np.require(numbers, requirements=("C", "W")), np.require(h, requirements=("C", "W"))
         marks = np.require(marks, requirements=("C", "W"))
-        whole, check = self._whole, getattr(self.prepare, "check", None)
-        out = many.refused(check, numbers)
-        left, done = np.flatnonzero(~out), None
-        if whole is not None:
-            done = Many.empty(len(numbers), marks.shape[1], whole.size)
-            left = whole.run(left, numbers, h, marks, done)
-        for i, top in zip(left.tolist(), many.members_of(numbers[left]), strict=True):
-            heed()
-            run = self(*top, Plan.steps(float(h[i]), marks[i]))
-            if done is None:
-                done = Many.empty(len(numbers), *run.states.shape)
-            done.states[i], done.momenta[i, :, 0], done.momenta[i, :, 1] = run.states, run.p_phi, run.p_psi
-            done.steps[i], done.outcome[i] = run.steps, OUTCOMES.index(run.outcome)
-            done.work[i] = (run.force_evaluations - run.steps * self.each_step) // self.evaluations
-        if done is None:  # nobody ran, and only angles refuse a start
-            done = Many.empty(len(numbers), marks.shape[1], charts.DIMENSIONS["angles"])
+        whole, most = self._whole, min(many.GROUP, BLOCK)
+        if whole is None:
+            raise SymtopError("many needs a solver whose parts all compile")
+        run, rule, check, size, *_ = whole.alone
+        done, out = Many.empty(len(numbers), marks.shape[1], size), many.refused(check, numbers)
         done.outcome[out] = LEFT_CHART
+        left = np.flatnonzero(~out)
+        if whole.blocks is not None:
+            left = whole.blocks().run(left, numbers, whole.rule, h, marks, done, most)
+        short, momenta = marks[left, -1] <= BLOCK, np.empty((2, marks.shape[1]))
+        for chosen in many.groups(left[short], marks[:, -1], most):
+            heed()
+            plain = map(tuple, numbers[chosen].tolist())
+            for i, one, step in zip(chosen.tolist(), plain, h[chosen].tolist(), strict=True):
+                done.steps[i], done.work[i], done.outcome[i] = run(one, rule, step, marks[i], done.states[i], momenta)
+                done.momenta[i] = momenta.T
+        for i, top in zip(left[~short].tolist(), many.members_of(numbers[left[~short]]), strict=True):
+            heed()
+            alone = self._in_stretches(*top, Plan.steps(float(h[i]), marks[i]))
+            done.states[i], done.momenta[i], done.steps[i], done.work[i], done.outcome[i] = alone
         return done
 
     @property
@@ -346,7 +336,7 @@ class FixedStep:
             return None
         sample, size = (as_it_steps, prepare.size) if present is None else (present.sample, present.size)
         scale = preparation.as_it_is
-        pack = getattr(rule, "pack", None) or preparation.as_fields
+        pack = getattr(rule, "pack", preparation.as_fields)
         if isinstance(rule, preparation.Scaled):
             scale, rule = rule.scale, rule.rule
         elif isinstance(rule, preparation.Later):
@@ -354,15 +344,13 @@ class FixedStep:
         if not isinstance(rule, tuple) or not rule:  # a function of Python, or numbers in an array
             return None
         kind, numbers = pack(rule)
-        parts = kind, prepare.numbers, scale, sample
-        lanes = loop.lanes(rule)
-        plain = prepare.opened, prepare.momenta
-        given = *parts[1:], *plain, prepare.given
-        blocks = None if lanes is None else partial(loop.blocks, lanes, lanes.pack(rule)[0], *given)
-        costs = self.evaluations, self.each_step, int(self.implicit)
-        whole = loop.whole(*parts, *plain)
-        alone = whole, numbers, prepare.check, size, *costs
-        return _Whole(numbers, size, alone, blocks, rule)
+        parts = prepare.numbers, scale, prepare.opened, prepare.momenta
+        run = whole_run(loop, sample, kind, *parts)
+        alone = run, numbers, prepare.check, size, self.evaluations, self.each_step, int(self.implicit)
+        if (lanes := loop.lanes(rule)) is None:
+            return _Whole(alone, None, (rule, numbers))
+        show = lanes.show or many.showing(sample)
+        return _Whole(alone, partial(blocks_of, loop, lanes, show, kind, *parts, prepare.given), (rule, numbers))
 
 
 def inside(solver: Solver | None) -> FixedStep | None:

@@ -42,16 +42,6 @@ class Correction(NamedTuple):
     grain: float  # at this size or below, a correction that does not halve is rounding
 
 
-class Solution(NamedTuple):
-    """Where the iteration ended; `x` lacks the last correction."""
-
-    x: Any
-    trial: Any  # at x
-    correction: Correction
-    evaluations: int
-    converged: bool
-
-
 @register_jitable
 def settled(correction: Any, last: float) -> Any:
     """Is this correction the last one, after one of size `last`?"""
@@ -61,17 +51,18 @@ def settled(correction: Any, last: float) -> Any:
 
 @register_jitable
 def newton(evaluate: Any, correct: Any, restart: Any, problem: Any, guess: Any, most: int) -> Any:
-    """Solve from a first guess with at most so many evaluations."""
-    x = guess
-    trial = evaluate(problem, x)
-    evaluations = 1
-    size = np.inf
+    """Solve from a first guess with at most so many evaluations: x, the trial at x, the correction that x lacks.
+
+    The evaluations that it took, and whether it converged, follow.
+    """
+    x, trial = guess, evaluate(problem, guess)
+    evaluations, size = 1, np.inf
     while True:
         correction = correct(problem, trial, x)
         last, size = size, correction.size
         converged = settled(correction, last)
         if converged or evaluations >= most:
-            return Solution(x, trial, correction, evaluations, converged)
+            return x, trial, correction, evaluations, converged
         x = restart(problem) if evaluations == most // 2 else correction.after
         trial = evaluate(problem, x)
         evaluations += 1

@@ -5,7 +5,7 @@
     sample(par, t, state) -> state           a sample at the time t, in the chart that a user sees
 
 A `Preparation`, a `Scaled` rule and a `Shown` chart each hold one such function and can be called like it. A run takes
-the function itself and compiles it into the loop (`loop.Loop.whole`): what surrounds a kernel costs more than a few
+the function itself and compiles it into the loop (`loop.whole_run`): what surrounds a kernel costs more than a few
 steps of it, above all a NamedTuple that is handed to compiled code.
 """
 
@@ -15,21 +15,20 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, cast
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symtop.core.jit import compile_kernel, register_jitable
+from symtop.methods.framework.plan import Array
 from symtop.model import top as model
 from symtop.model.top import Angles, SymmetricTop, flat
 
-Array = NDArray[np.float64]
 Numbers = tuple[float, ...]  # I1, I3, mgl, theta, phi, psi, theta', phi', psi'
 Pack = Callable[[Any], tuple[Callable[[Any], Any], Any]]  # of a rule: what compiled code makes it with, and from what
 
 conserved = register_jitable(model.conserved)
 
 
-class Body(NamedTuple):
-    """A top in compiled code, with the names of `SymmetricTop`."""
+class BareTop(NamedTuple):
+    """A top in compiled code, with the names of `SymmetricTop`; no momenta."""
 
     I1: float
     I3: float
@@ -50,7 +49,7 @@ class Start(NamedTuple):
 @register_jitable
 def opened(plain: Any) -> Any:
     """A top and a start, of their nine numbers."""
-    return Body(*plain[:3]), Start(*plain[3:])
+    return BareTop(*plain[:3]), Start(*plain[3:])
 
 
 @register_jitable
@@ -62,18 +61,14 @@ def momenta_at(top: Any, at: Any) -> Any:
 
 @dataclass(frozen=True)
 class Preparation:
-    """What a kernel steps: `numbers(top, at)` compiles, `check` refuses a start that the kernel cannot step.
+    """What a kernel steps, of a top and a start."""
 
-    `opened` makes the records that `numbers` takes of the `given` plain numbers of a run, and `momenta` is what these
-    conserve.
-    """
-
-    numbers: Callable[..., tuple[Any, Numbers]]
+    numbers: Callable[..., tuple[Any, Numbers]]  # (top, at): the parameters and the state; compiles
     size: int  # of the state
-    check: Callable[[Any], None] | None = None  # raises SymtopError
-    opened: Callable[..., Any] = opened
-    momenta: Callable[..., Any] = momenta_at
-    given: int = 9
+    check: Callable[[Any], None] | None = None  # refuses a start that the kernel cannot step: raises SymtopError
+    opened: Callable[..., Any] = opened  # (plain): the records that `numbers` takes
+    momenta: Callable[..., Any] = momenta_at  # (top, at): what these conserve
+    given: int = 9  # how many plain numbers a run has
 
     def __post_init__(self) -> None:
         register_jitable(self.numbers)  # at once: what a kernel is made of must not hang on what has run
@@ -83,6 +78,26 @@ class Preparation:
         if self.check is not None:
             self.check(at)
         return self.numbers(*self.opened(flat(top, at)))
+
+
+@register_jitable
+def plain(values: Any) -> Any:
+    """A rule that is no NamedTuple, as it is."""
+    return values
+
+
+@functools.cache
+def _made_of_fields(kind: Any) -> Callable[[Any], Any]:
+    def made(fields: Any) -> Any:
+        return kind(*fields)
+
+    return register_jitable(made)
+
+
+def as_fields(rule: Any) -> tuple[Callable[[Any], Any], Any]:
+    """A rule as its fields, which a call takes sooner than a NamedTuple."""
+    kind: Any = type(rule)
+    return plain if kind is tuple else _made_of_fields(kind), tuple(rule)
 
 
 @functools.cache
@@ -98,11 +113,11 @@ def _on_numbers(scale: Callable[..., Any], table: Callable[[Any], Any], opened: 
 
 @dataclass(frozen=True)
 class Scaled:
-    """A rule whose numbers hang on the run, ``scale(rule, top, start, h)``, compiled; `pack` is `as_fields` if None."""
+    """A rule whose numbers hang on the run, ``scale(rule, top, start, h)``, compiled."""
 
     rule: Any  # a NamedTuple
     scale: Callable[..., Any]
-    pack: Pack | None = None
+    pack: Pack = as_fields
     opened: Callable[..., Any] = opened  # as `Preparation` has it
 
     def __post_init__(self) -> None:
@@ -110,7 +125,7 @@ class Scaled:
 
     def __call__(self, top: SymmetricTop, at: Angles, h: float) -> Any:
         """The rule of one run."""
-        made, table = (self.pack or as_fields)(self.rule)
+        made, table = self.pack(self.rule)
         return _on_numbers(self.scale, made, self.opened)(flat(top, at), table, h)
 
 
@@ -119,7 +134,7 @@ class Later:
     """A rule that hangs on nothing, made when it is first used."""
 
     make: Callable[[], Any]
-    pack: Pack | None = None
+    pack: Pack = as_fields
 
     def __call__(self, *_run: object) -> Any:
         """The rule of any run."""
@@ -154,26 +169,6 @@ class Shown:
         shown = _on_samples(self.sample, kind)
         shown(tuple(par), np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states), out)
         return out
-
-
-@register_jitable
-def plain(values: Any) -> Any:
-    """A rule that is no NamedTuple, as it is."""
-    return values
-
-
-@functools.cache
-def _made_of_fields(kind: Any) -> Callable[[Any], Any]:
-    def made(fields: Any) -> Any:
-        return kind(*fields)
-
-    return register_jitable(made)
-
-
-def as_fields(rule: Any) -> tuple[Callable[[Any], Any], Any]:
-    """A rule as its fields, which a call takes sooner than a NamedTuple."""
-    kind: Any = type(rule)
-    return plain if kind is tuple else _made_of_fields(kind), tuple(rule)
 
 
 @register_jitable

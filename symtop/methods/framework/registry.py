@@ -22,18 +22,16 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from symtop.core import errors
 from symtop.core.code_hash import by_name
 from symtop.core.errors import SymtopError, SymtopWarning, one_of, shown, words_of
 from symtop.core.signals import is_of_user
-from symtop.methods.framework.plan import Plan, Run
+from symtop.methods.framework.plan import Array, Plan, Run
 from symtop.model.charts import BODY, DIMENSIONS, View
 from symtop.model.scenes import Catalogue
 from symtop.model.top import Angles, Momenta, SymmetricTop
 
-Array = NDArray[np.float64]
 Solver = Callable[[SymmetricTop, Angles, Plan], Run]
 ModifiedEnergy = Callable[[View, Momenta, float], Array]  # of states (n, dimension), momenta of the start and h: (n,)
 

@@ -97,9 +97,8 @@ def _frame_to_attitude(par: Any, t: float, y: Any) -> Any:
         if rows[i][i] > largest:
             best, largest = rows[i], rows[i][i]
     length = math.sqrt(best[0] * best[0] + best[1] * best[1] + best[2] * best[2] + best[3] * best[3])
-    qw, qx, qy, qz = best[0] / length, best[1] / length, best[2] / length, best[3] / length
-    c, s = math.cos(0.5 * par.twist * t), math.sin(0.5 * par.twist * t)
-    return qw * c - qz * s, qx * c + qy * s, qy * c - qx * s, qz * c + qw * s, y[3], y[4], y[5]
+    q = best[0] / length, best[1] / length, best[2] / length, best[3] / length
+    return with_spin(par, (*q, y[3], y[4], y[5]), t)
 
 
 frame_to_attitude = Shown(_frame_to_attitude, 7)

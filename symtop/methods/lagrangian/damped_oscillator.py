@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import Loop, no_carry
 from symtop.methods.lagrangian.discrete_lagrangian import RULES, quadrature
 from symtop.model.charts import Array
 
@@ -106,10 +106,6 @@ def rule_sums(method: str) -> Sums:
     return Sums(left, right, float(np.sum(w * a * (1.0 - a))), float(np.sum(w * a * a)), push, pull)
 
 
-def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    return (0.0,)
-
-
 @register_jitable
 def _stiffnesses(par: Any, rule: Any, h: float) -> Any:
     """Coefficients of d in p0 and in p1."""
@@ -133,7 +129,7 @@ def legendre(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     return first * dstate[0] + rule.left * push, last * dstate[0] - rule.right * push
 
 
-_march = kernel_loop(_begin, _increment, legendre)
+_march = Loop(no_carry, _increment, legendre)
 
 
 def discrete_path(

@@ -22,7 +22,8 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.errors import SymtopError
-from symtop.methods.framework.loop import March, Marks
+from symtop.methods.framework.lanes import Whole
+from symtop.methods.framework.loop import March
 from symtop.methods.lagrangian.discrete_lagrangian import RULES, quadrature
 from symtop.methods.lagrangian.unreduced import march, with_momenta
 from symtop.methods.library.scipy_ivp import integrated
@@ -40,7 +41,7 @@ class Friction(NamedTuple):
     spin: float
 
 
-def damped_run(scene: Scene, friction: Friction, rule: str, h: float, marks: Marks) -> March:
+def damped_run(scene: Scene, friction: Friction, rule: str, h: float, marks: Whole) -> March:
     """States (theta, phi, psi, p_theta, p_phi, p_psi) after the numbers of steps in `marks`, shape (samples, 6).
 
     `rule` is a name of `discrete_lagrangian.RULES`. SymtopError for a start at a pole.

@@ -39,10 +39,10 @@ from symtop.core.jit_functions import fused
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import ReducedTop, chart_outcome, on_angles
 from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import FixedStep, inside, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop, inside
 from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
-from symtop.methods.framework.plan import NOT_CONVERGED
-from symtop.methods.framework.registry import Array, Integrator
+from symtop.methods.framework.plan import NOT_CONVERGED, Array
+from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import View
 from symtop.model.top import Momenta
 
@@ -300,9 +300,10 @@ def _close(step: Any, end: Any) -> Any:
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, p_theta, phi, psi); the work counted is the number of Newton iterations."""
     equation = _equation(par, rule, state, _steady(par, h), opening(par, rule, state[0]))
-    solution = newton(_evaluate, _correct, _free_flight, equation, _predict(equation, carry), rule.iterations)
-    step, newest, outcome = _close(equation, _keep(solution.trial, solution.correction))
-    return step, newest + carry[:-1], solution.evaluations, outcome if solution.converged else NOT_CONVERGED
+    guess = _predict(equation, carry)
+    _, trial, last, work, converged = newton(_evaluate, _correct, _free_flight, equation, guess, rule.iterations)
+    step, newest, outcome = _close(equation, _keep(trial, last))
+    return step, newest + carry[:-1], work, outcome if converged else NOT_CONVERGED
 
 
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
@@ -324,7 +325,7 @@ def _in_lanes(rule: Quadrature) -> Lanes:
     )  # fmt: skip
 
 
-march = kernel_loop(begin, increment, observe, lanes=_in_lanes)
+march = Loop(begin, increment, observe, lanes=_in_lanes)
 
 
 def rule_of(method: Integrator) -> Quadrature | None:

@@ -65,7 +65,7 @@ import numpy as np
 from symtop.core.jit import register_jitable, set_item
 from symtop.core.jit_functions import fused, two_product
 from symtop.methods.framework.lanes import one_loop
-from symtop.methods.framework.loop import FixedStep, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import finite_outcome
@@ -250,7 +250,7 @@ def _side_by_side(par: Any, rule: Any, state: Any, carry: Any) -> Any:
 
 _LANES = one_loop(_side_by_side, Map, top=OscillatorTop, dimension=8, carry=12, add=accumulate_plainly)
 march_axis, march_attitude = (
-    kernel_loop(begin, increment, observe, enter, present, accumulate_plainly, lanes=lambda _: _LANES)
+    Loop(begin, increment, observe, enter, present, accumulate_plainly, lanes=lambda _: _LANES)
     for present in (present_axis, present_attitude)
 )
 

@@ -37,7 +37,7 @@ from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import ReducedTop, chart_outcome, on_angles
 from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import FixedStep, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
 from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.framework.registry import Integrator
@@ -241,9 +241,10 @@ def _close(step: Any, end: Any) -> Any:
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (theta, p_theta, phi, psi); the work counted is the number of Newton iterations."""
     equations = _equations(par, rule, state, _steady(par, h), _open(par, rule, state[0]))
-    solution = newton(_at, _correct, _free_flight, equations, _predict(equations, carry), rule.iterations)
-    step, newest, outcome = _close(equations, _keep(solution.trial, solution.correction))
-    return step, newest + carry[:-2], solution.evaluations, outcome if solution.converged else NOT_CONVERGED
+    guess = _predict(equations, carry)
+    _, trial, last, work, converged = newton(_at, _correct, _free_flight, equations, guess, rule.iterations)
+    step, newest, outcome = _close(equations, _keep(trial, last))
+    return step, newest + carry[:-2], work, outcome if converged else NOT_CONVERGED
 
 
 @register_jitable
@@ -280,7 +281,7 @@ def _in_lanes(rule: Iteration) -> Lanes:
     )  # fmt: skip
 
 
-march = kernel_loop(begin, increment, observe, lanes=_in_lanes)
+march = Loop(begin, increment, observe, lanes=_in_lanes)
 
 
 def built_in() -> list[Integrator]:

@@ -172,28 +172,23 @@ def _turned(e: Any, above: Any, par: Any, sigma: float, b: float, J: float, sign
     return aD, D, r, 1.0 / r, delta / (2.0 * math.pi)
 
 
-@register_jitable
-def _least(above: Any, par: Any) -> Any:
-    """The least of P - e2 and of both D, the last small at half a nutation of an axis that comes near a pole."""
-    P = (above[0] + above[1] + above[2]) / 3.0
-    return min(above[1], P - par.b1, P - par.b2)
-
-
 def _mapped(rule: Any, top: Any, at: Any, h: float) -> Any:
     """The numbers of the step h from a start; `rule` says nothing but their type."""
     par, s = oscillator_numbers(top, at)
     e = roots(par.g2, par.g3)
     # two roots that are neighbours lose digits: e1 and e2 beside a separatrix, both turning points in a steady motion
     half = half_period(e) if e.e1 - e.e2 > e.e2 - e.e3 else 0.5 * nutation_period(top, at)
-    nutations = np.rint(0.5 * h / half)
-    rest = h - 2.0 * nutations * half if nutations != 0.0 else h
     parts = 1
-    above = differences(e, max(abs(rest), SHORTEST))
-    while above[2] > STEEPEST * _least(above, par) and parts < MOST_PARTS:
-        parts += 1
+    while True:
         nutations = np.rint(0.5 * h / parts / half)
         rest = h / parts - 2.0 * nutations * half if nutations != 0.0 else h / parts
         above = differences(e, max(abs(rest), SHORTEST))
+        P = (above[0] + above[1] + above[2]) / 3.0
+        # P - e2 or a D, which is small at half a nutation of an axis that comes near a pole
+        least = min(above[1], P - par.b1, P - par.b2)
+        if not above[2] > STEEPEST * least or parts >= MOST_PARTS:
+            break
+        parts += 1
     sign = 1.0 if rest >= 0.0 else -1.0
     J1, J2 = s[0] * s[5] - s[1] * s[4], s[2] * s[7] - s[3] * s[6]
     aD1, D1, r1, q1, turn1 = _turned(e, above, par, par.kappa, par.b1, J1, sign, nutations)

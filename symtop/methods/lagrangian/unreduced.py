@@ -26,7 +26,7 @@ import numpy as np
 from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.angles import chart_outcome, require_chart
-from symtop.methods.framework.loop import FixedStep, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.newton import Correction, newton
 from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.framework.preparation import Preparation, Shown, conserved
@@ -161,13 +161,14 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
         3.0 * (near[1] - far[1]) + farther[1],
         3.0 * (near[2] - far[2]) + farther[2],
     )
-    solution = newton(_evaluate, _correct, _from_the_start, _Step(par, rule, state, h), guess, rule.iterations)
-    (w, v, u), sums = solution.x, solution.trial
-    outcome = chart_outcome(state[0] + h * w) if solution.converged else NOT_CONVERGED
+    equations = _Step(par, rule, state, h)
+    rate, sums, _, work, converged = newton(_evaluate, _correct, _from_the_start, equations, guess, rule.iterations)
+    w, v, u = rate
+    outcome = chart_outcome(state[0] + h * w) if converged else NOT_CONVERGED
     p_phi = sums.across * v + sums.mixed * u - 0.5 * h * par.c_phi * v
     p_psi = sums.mixed * v + par.I3 * u - 0.5 * h * par.c_psi * u
     step = (h * w, h * v, h * u, par.I1 * w + h * sums.after - state[3], p_phi - state[4], p_psi - state[5])
-    return step, ((w, v, u), carry[0], carry[1]), solution.evaluations, outcome
+    return step, (rate, carry[0], carry[1]), work, outcome
 
 
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
@@ -175,7 +176,7 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     return before[4] + dstate[4], before[5] + dstate[5]
 
 
-march = kernel_loop(begin, increment, observe)
+march = Loop(begin, increment, observe)
 
 
 class DampedTop(NamedTuple):

@@ -24,9 +24,10 @@ import numpy as np
 
 from symtop.core.errors import SymtopError, one_of
 from symtop.core.jit import compile_kernel
-from symtop.methods.framework.angles import LEAST_TOLERANCE, BareTop
+from symtop.methods.framework.angles import LEAST_TOLERANCE
 from symtop.methods.framework.equations import FORMS, FORMULATIONS, as_run
 from symtop.methods.framework.plan import NOT_FINITE, OK, OUT_OF_BUDGET, STEP_TOO_SMALL, Array, Plan, Run
+from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.registry import Integrator, Solver
 from symtop.methods.framework.space import SpaceTop
 from symtop.model.top import Angles, SymmetricTop

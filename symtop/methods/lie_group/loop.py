@@ -32,7 +32,7 @@ from symtop.methods.framework.body import turned, turned_back
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
-from symtop.methods.framework.preparation import Body, Preparation, Shown, as_it_steps
+from symtop.methods.framework.preparation import BareTop, Preparation, Shown, as_it_steps
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, observe_attitude, on_attitude, with_spin
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate, cross, dot, plus, scaled
@@ -42,7 +42,7 @@ _attitude_numbers = on_attitude.numbers
 
 
 def _on_body(top: Any, at: Any) -> Any:
-    return Body(top.I1, top.I3, top.mgl), _attitude_numbers(top, at)[1]
+    return BareTop(top.I1, top.I3, top.mgl), _attitude_numbers(top, at)[1]
 
 
 class Carried(NamedTuple):
@@ -54,7 +54,7 @@ class Carried(NamedTuple):
 
 
 UNSPUN = Carried(on_attitude, Shown(lambda par, t, y: with_spin(par, y, t), 7), SpaceTop)
-SPUN = Carried(Preparation(_on_body, 7), None, Body)
+SPUN = Carried(Preparation(_on_body, 7), None, BareTop)
 _AXIS = Shown(lambda _par, _t, y: (*axis_of(y[0], y[1], y[2], y[3]), y[4], y[5], y[6]), 6)
 STILL = (0.0,) * 7  # no increment
 

@@ -27,12 +27,12 @@ from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError, row
 from symtop.core.jit import register_jitable, set_item
-from symtop.methods.framework.angles import BareTop
 from symtop.methods.framework.body import General
 from symtop.methods.framework.equations import FORMS, Formulation
 from symtop.methods.framework.lanes import Lanes, W, column, put, reading
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import OK
+from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop
 from symtop.methods.simd import combined, wide_vectors

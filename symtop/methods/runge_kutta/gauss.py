@@ -56,9 +56,9 @@ from symtop.core.numbers import context
 from symtop.methods.framework import body, space
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
-from symtop.methods.framework.plan import NOT_CONVERGED, OK
+from symtop.methods.framework.plan import NOT_CONVERGED, OK, Array
 from symtop.methods.framework.preparation import Later
-from symtop.methods.framework.registry import Array, Integrator
+from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop, field_axis, field_frame, observe_axis
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate, zero

@@ -18,8 +18,8 @@ import numpy as np
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import ReducedTop, chart_outcome
-from symtop.methods.framework.loop import kernel_loop
-from symtop.methods.framework.registry import Array
+from symtop.methods.framework.loop import Loop
+from symtop.methods.framework.plan import Array
 from symtop.methods.splitting.loop import compose, composed, stages
 from symtop.model.charts import View
 from symtop.model.top import Momenta, half_angle_force
@@ -97,7 +97,7 @@ def _ended(state: Any, step: Any) -> int:
 
 
 _LANES = composed(force_angles, kick_angles, _drift_in_lanes, _ended, top=ReducedTop, dimension=4, carry=3)
-march = kernel_loop(_begin, _increment, observe, lanes=lambda _: _LANES)
+march = Loop(_begin, _increment, observe, lanes=lambda _: _LANES)
 
 
 def verlet_energy(view: View, momenta: Momenta, h: float) -> Array:

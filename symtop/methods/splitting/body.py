@@ -37,14 +37,15 @@ import functools
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any
 
 from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework import body
 from symtop.methods.framework.lanes import Lanes, W, column, put
-from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.preparation import Scaled, opened
 from symtop.methods.framework.registry import Integrator
+from symtop.methods.framework.space import ended_space
 from symtop.methods.simd import wide_vectors
 from symtop.methods.splitting.coefficients import BLANES_MOAN_6, METHODS, STRANG, Table
 from symtop.methods.splitting.loop import Composition, compose, composed, no_rest, packed, stages
@@ -116,17 +117,14 @@ def by_either(x: float) -> Any:
     return by_series(x) if x * x < 1.0 else by_library(x)
 
 
-class _Turns(NamedTuple):
-    """The flows that a drift is made of, ``(state, d, turn)``: what d becomes, and whether the rotor could be used."""
-
-    first: Callable[..., Any]
-    second: Callable[..., Any]
-    third: Callable[..., Any]
-    momentum: Callable[..., Any]
+_Turns = tuple[Callable[..., Any], ...]
 
 
 def _turns(sine: Callable[..., Any], rotor: Callable[..., Any]) -> _Turns:
-    """The turns by M_k `turn` about the axes of the body, and the flow of turn |M|^2/2 by a rotor of `rotor`."""
+    """The turns by M_k `turn` about the three axes of the body, and the flow of turn |M|^2/2 by a rotor of `rotor`.
+
+    Each is ``(state, d, turn)``: what d becomes, and whether the series, or the rotor, could be used.
+    """
 
     def about(k: int) -> Callable[..., Any]:
         """The turn about axis k and what it does to the two that follow: numbers of q, and of M three further."""
@@ -160,7 +158,7 @@ def _turns(sine: Callable[..., Any], rotor: Callable[..., Any]) -> _Turns:
         )  # fmt: skip
         return moved, square < 1.0
 
-    return _Turns(about(0), about(1), about(2), momentum)
+    return about(0), about(1), about(2), momentum
 
 
 ALONE, TOGETHER = _turns(by_either, exact), _turns(by_series, near)  # with a branch, and without it for lanes
@@ -169,29 +167,28 @@ PAR, STATE, STEP, FLAG = (0.0,) * 9, (0.0,) * 7, 14, 21  # numbers of a block, a
 
 @register_jitable
 def _ended(state: Any, step: Any) -> int:
-    return body.ended_body(step)
+    return ended_space(step)
 
 
 def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return _force(par, state, (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0))
 
 
-def _march(drift: Callable[..., Any], in_lanes: Callable[..., Any] | None, rest: Any = no_rest) -> Loop:
+def _march(drift: Callable[..., Any], in_lanes: Callable[..., Any], rest: Any = no_rest) -> Loop:
     kick = _kicking(None)
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
         step, force = compose(_force, kick, drift, par, rule, state, carry)
-        return step, force, rule.forces, body.ended_body(step)
+        return step, force, rule.forces, ended_space(step)
 
     @functools.cache
     def lanes(gradient: bool) -> Lanes:
-        assert in_lanes is not None  # noqa: S101
         return composed(_force, _kicking(gradient), in_lanes, _ended, top=body.General, dimension=7, carry=3, rest=rest)
 
-    return kernel_loop(
-        _begin, increment, body.observe_body,
-        lanes=lambda rule: None if in_lanes is None or rule.turn != AS_GIVEN else lanes(any(rule.gradient)),
-    )  # fmt: skip
+    def lanes_of(rule: Composition) -> Lanes | None:
+        return lanes(any(rule.gradient)) if rule.turn == AS_GIVEN else None
+
+    return Loop(_begin, increment, body.observe_body, lanes=lanes_of)
 
 
 @functools.cache
@@ -304,7 +301,8 @@ def _five_in_lanes() -> Callable[..., Any]:
     return drift
 
 
-march_five, march_five_of_top = _march(_five(ALONE), _five_in_lanes()), _march(_five(_turns(by_library, exact)), None)
+march_five = _march(_five(ALONE), _five_in_lanes())
+march_five_of_top = replace(_march(_five(_turns(by_library, exact)), _five_in_lanes()), lanes=lambda _: None)
 
 
 def five_rotations(order_of_axes: int) -> FixedStep:

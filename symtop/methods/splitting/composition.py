@@ -23,7 +23,7 @@ from symtop.methods.framework.registry import Integrator, ModifiedEnergy
 from symtop.methods.framework.space import on_attitude, on_axis
 from symtop.methods.splitting import angles, body, space
 from symtop.methods.splitting.coefficients import METHODS
-from symtop.methods.splitting.loop import Composition, closed, packed
+from symtop.methods.splitting.loop import Composition, exact_sum, packed
 from symtop.methods.splitting.rotor import ROTATIONS, TUNED
 from symtop.model.charts import BODY
 
@@ -76,8 +76,7 @@ def composition(
     free = body.free_motion(rule, order) if chart == "space" and rotation == "exact" and not boost else None
     if free is not None:
         solvers[BODY] = FixedStep(body.march(free), body.scaled(table), on_body, 1, implicit=False)
-    closed_forms = _KICK_DRIFT_KICK.get((chart, rotation)) if kick_drift_kick else None
-    modified, sleeps = closed_forms or (None, None)
+    modified, sleeps = (kick_drift_kick and _KICK_DRIFT_KICK.get((chart, rotation))) or (None, None)
     return Integrator(
         name=name, family="splitting",
         summary=summary or f"splitting with {len(rule.drift)} drifts and {rule.forces} forces a step",
@@ -92,7 +91,7 @@ def composition(
 
 
 def _checked(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] | None) -> Composition:
-    """Coefficients that fit together and sum to 1."""
+    """Coefficients that fit together, their sums closed to exactly 1."""
     drifts, kicks = row("drift", drift), row("kick", kick)
     if len(kicks) != len(drifts) + 1 or not drifts:
         raise SymtopError(f"kick must have one coefficient more than drift, not {len(kicks)} against {len(drifts)}")
@@ -104,7 +103,8 @@ def _checked(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[f
             raise SymtopError(f"{name} coefficients must sum to 1, not {math.fsum(values)!r}")
     if any(c != 0.0 and b == 0.0 for b, c in zip(kicks, slopes, strict=True)):
         raise SymtopError(f"gradient must be zero where kick is, not {slopes} with {kicks}")
-    return closed(drifts, kicks, slopes)
+    forces = sum(b != 0.0 for b in kicks) - (kicks[0] != 0.0 and kicks[-1] != 0.0)
+    return Composition(exact_sum(drifts), exact_sum(kicks), tuple(slopes), forces)
 
 
 def built_in() -> list[Integrator]:

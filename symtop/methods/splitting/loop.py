@@ -27,7 +27,6 @@ from numpy.typing import NDArray
 from symtop.core.jit import register_jitable, to_fixed_tuple
 from symtop.methods.framework.lanes import Lanes, W, column, put
 from symtop.methods.framework.plan import OK
-from symtop.methods.framework.preparation import as_fields
 from symtop.methods.simd import times, wide_vectors, with_item
 from symtop.methods.vectors import accumulate, zero
 
@@ -77,12 +76,6 @@ def packed(rule: Any) -> tuple[Callable[[Any], Composition], NDArray[np.float64]
     return opened, np.array([*drift, *kick, *gradient, *rule[3:]], dtype=float)
 
 
-def packed_for_lanes(rule: Any) -> tuple[Callable[[Any], Any], Any]:
-    """The same of many members: short tables travel as they are, for to open an array takes longer."""
-    short = type(rule) is not Composition or len(rule.drift) <= SHORT
-    return as_fields(rule) if short else packed(rule)
-
-
 class Stages(NamedTuple):
     """What one run of a kernel drifts and kicks by, in tuples, or in arrays where the table is long."""
 
@@ -115,12 +108,6 @@ def stages(rule: Any, drift: float, kick: float, bend: float, boost: float) -> A
     """The coefficients of a `Composition` times what a whole step drifts, kicks, bends and boosts by."""
     drifts, kicks = close(times(rule.drift, drift), drift), close(times(rule.kick, kick), kick)
     return Stages(drifts, kicks, times(rule.gradient, bend), rule.forces, rule.turn, boost)
-
-
-def closed(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float]) -> Composition:
-    """A composition whose sums are exactly 1."""
-    forces = sum(b != 0.0 for b in kick) - (kick[0] != 0.0 and kick[-1] != 0.0)
-    return Composition(exact_sum(drift), exact_sum(kick), tuple(gradient), forces)
 
 
 @register_jitable
@@ -227,7 +214,5 @@ def composed(
         for j in range(W):
             last(block, row, table, j)
 
-    return Lanes(
-        step, lay, read, lambda rule: 3 * len(rule.kick), top, dimension, carry,
-        effort=lambda rule: int(rule.forces), pack=packed_for_lanes,
-    )  # fmt: skip
+    size, effort = lambda rule: 3 * len(rule.kick), lambda rule: int(rule.forces)
+    return Lanes(step, lay, read, size, top, dimension, carry, effort)

@@ -34,18 +34,16 @@ Sources: Touma, Wisdom, Astron. J. 107 (1994) 1189 (splitting); Bobenko, Suris, 
 """
 
 import math
-from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from symtop.core.jit import register_jitable
 from symtop.core.jit_functions import shared
-from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import kernel_loop
-from symtop.methods.framework.registry import Array
+from symtop.methods.framework.loop import Loop
+from symtop.methods.framework.plan import Array
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, observe_attitude, observe_axis, with_spin
-from symtop.methods.splitting.loop import Composition, compose, composed, stages
+from symtop.methods.splitting.loop import compose, composed, stages
 from symtop.methods.splitting.rotor import EXACT, half_square, rotor, without_branch
 from symtop.model.charts import View, space_energy
 from symtop.model.top import Momenta, SymmetricTop, mean_nutation, nutation_cubic, turning_cosines
@@ -160,18 +158,8 @@ def process_attitude(s: float, w: float, x: float, y: float, z: float, Lx: float
     return up * w, down * x, down * y, up * z, D * Lx - d * Lz * ex, D * Ly - d * Lz * ey, Lz
 
 
-class Kernel(NamedTuple):
-    """What `kernel_loop` takes of a chart, and how a rule runs in lanes."""
-
-    begin: Callable[..., Any]
-    increment: Callable[..., Any]
-    enter: Callable[..., Any]
-    present: Callable[..., Any]
-    lanes: Callable[[Composition], Lanes]
-
-
-def _kernel(force: Any, turned: Any, process: Any, spun: Any, dimension: int) -> Kernel:
-    """The functions of a chart; `process` is the flow of G, `spun` adds the spin to a sample."""
+def _loop(force: Any, turned: Any, process: Any, spun: Any, observe: Any, dimension: int) -> Loop:
+    """The loop of a chart; `process` is the flow of G, `spun` adds the spin to a sample."""
     zeros = (0.0,) * dimension
     for part in (force, turned, process, spun):
         register_jitable(part)
@@ -207,13 +195,11 @@ def _kernel(force: Any, turned: Any, process: Any, spun: Any, dimension: int) ->
     def present(par, rule, state, k, h):  # type: ignore[no-untyped-def]
         return spun(par, state if rule.boost == 0.0 else process(-rule.boost, *state), k * h)
 
-    return Kernel(begin, increment, enter, present, lambda rule: exact if rule.turn == EXACT else cayley)
+    return Loop(begin, increment, observe, enter, present, lanes=lambda rule: exact if rule.turn == EXACT else cayley)
 
 
-AXIS = _kernel(force_axis, turn_axis, process_axis, lambda _par, state, _t: state, 6)
-ATTITUDE = _kernel(force_attitude, turn_attitude, process_attitude, with_spin, 7)
-march_axis = kernel_loop(*AXIS[:2], observe_axis, *AXIS[2:4], lanes=AXIS.lanes)
-march_attitude = kernel_loop(*ATTITUDE[:2], observe_attitude, *ATTITUDE[2:4], lanes=ATTITUDE.lanes)
+march_axis = _loop(force_axis, turn_axis, process_axis, lambda _par, state, _t: state, observe_axis, 6)
+march_attitude = _loop(force_attitude, turn_attitude, process_attitude, with_spin, observe_attitude, 7)
 
 
 def strang_energy(view: View, momenta: Momenta, h: float) -> Array:

@@ -24,8 +24,8 @@ import numpy as np
 
 from symtop.core.numbers import EPSILON, context
 from symtop.methods.framework.equations import FORMS
-from symtop.methods.framework.plan import Plan, Run
-from symtop.methods.framework.registry import Array, Integrator, Solver
+from symtop.methods.framework.plan import Array, Plan, Run
+from symtop.methods.framework.registry import Integrator, Solver
 from symtop.model import charts
 from symtop.model.charts import BODY, space_momenta
 from symtop.model.exact import heavy_body

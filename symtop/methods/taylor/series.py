@@ -66,7 +66,7 @@ from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.lanes import Lanes, one_loop
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_FINITE, STEP_TOO_SMALL
-from symtop.methods.framework.preparation import Body, Scaled, Start
+from symtop.methods.framework.preparation import BareTop, Scaled, Start
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, with_spin
 from symtop.methods.simd import Components, Vectors
@@ -328,7 +328,7 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
         return set_item(dstate, size - 1, 0.0), last
 
     def run(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]  # noqa: C901
-        body = Body(*numbers[:3])
+        body = BareTop(*numbers[:3])
         par, state = prepare(body, Start(*numbers[3:]))
         low, t, rest = zero(state), 0.0, 0.0
         turn = (state[size - 3] ** 2 + state[size - 2] ** 2 + state[size - 1] ** 2) / body.I1**2

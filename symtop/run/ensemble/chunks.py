@@ -27,7 +27,7 @@ from symtop.core.jit import compile_kernel, to_fixed_tuple
 from symtop.core.parallel import cores, heed, in_threads
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.lanes import Array, W, Whole, column, divided, members_of, of_bodies, put, turns
+from symtop.methods.framework.lanes import W, Whole, column, divided, members_of, of_bodies, put, turns
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, ending, off_length
 from symtop.methods.framework.preparation import opened
@@ -35,7 +35,7 @@ from symtop.methods.framework.registry import Integrator, integrator as find_int
 from symtop.methods.library import exact
 from symtop.methods.simd import wide_vectors
 from symtop.model import charts, top as model
-from symtop.model.charts import BODY, DIMENSIONS, View
+from symtop.model.charts import BODY, DIMENSIONS, Array, View
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import NUMBERS, SymmetricTop
 from symtop.run.simulation import WIDEST_GAP, places, unseen
