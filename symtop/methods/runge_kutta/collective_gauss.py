@@ -31,12 +31,10 @@ from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Later
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group.loop import UNSPUN, in_both_charts, lie_loop
+from symtop.methods.lie_group.loop import UNSPUN, in_charts, lie_loop
 from symtop.methods.runge_kutta.gauss import ROUND_OFF, SWEEPS, gauss_rule, packed, stage_weights
 from symtop.methods.vectors import conjugate
 from symtop.model.body import product
-
-ORIGIN = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
 @register_jitable
@@ -62,8 +60,7 @@ def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 @register_jitable
 def _swept(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
     """Fill in the increments of the stages; the sweeps that it took, and the outcome."""
-    stages, start = len(rule.b), ORIGIN
-    start = set_item(set_item(set_item(start, 5, 2.0 * L[0]), 6, 2.0 * L[1]), 7, 2.0 * L[2])
+    stages, start = len(rule.b), (1.0, 0.0, 0.0, 0.0, 0.0, 2.0 * L[0], 2.0 * L[1], 2.0 * L[2])
     unit = 1.0 / (abs(L[0]) + abs(L[1]) + abs(L[2]) + np.sqrt(par.I1 * abs(par.mgl)) + 1e-300)
     slope = _field(par, e, start)
     stage_weights(rule, h, work[:, 8])
@@ -94,7 +91,7 @@ def _swept(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
 def turn(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
     """One step; the work counted is the number of sweeps over the stages."""
     effort, outcome = _swept(par, rule, e, L, work, h)
-    step = ORIGIN
+    step = (0.0,) * 8
     for m in range(8):
         total = 0.0
         for i in range(len(rule.b)):
@@ -118,7 +115,7 @@ def collective_gauss(stages: int) -> Integrator:
         name=f"collective-gauss-{2 * stages}",
         family="lie-group",
         summary=f"Gauss collocation with {stages} stage{'s' if stages > 1 else ''} on quaternions: Lie-Poisson",
-        solvers=in_both_charts(march, rule, UNSPUN, stages, implicit=True),
+        solvers=in_charts(march, rule, UNSPUN, stages, implicit=True),
         order=2 * stages,
         explicit=False,
         symplectic=True,

@@ -68,16 +68,6 @@ def rms(vector: Any, state: Any, other: Any, tolerance: float) -> float:
 
 
 @register_jitable
-def interpolate(dense: Any, state: Any, slopes: Any, h: float, x: float) -> Any:
-    """The state at a fraction x of the step."""
-    weights = dense[0] + dense[1][:3]  # a tuple of seven
-    for i in range(len(dense)):
-        row = dense[i]
-        weights = set_item(weights, i, x * (row[0] + x * (row[1] + x * (row[2] + x * row[3]))))
-    return summed(state, weighted(weights, state, slopes, h))
-
-
-@register_jitable
 def nothing_more(par: Any, state: Any, slopes: Any, h: float) -> int:
     """Samples need no further evaluations."""
     return 0
@@ -118,27 +108,6 @@ def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, toleran
     return min(100.0 * trial, guess, end)
 
 
-# numba has an assignment of slices format the sentence of its error: a third of what a kernel takes to compile
-
-
-@register_jitable
-def rows_from(place: Any, first: int, memory: Any) -> None:
-    """The memory from where it stands in a place."""
-    rows, size = memory.shape
-    for j in range(rows):
-        for m in range(size):
-            memory[j, m] = place[first + j * size + m]
-
-
-@register_jitable
-def rows_to(place: Any, first: int, memory: Any) -> None:
-    """Write the memory to its part of a place."""
-    rows, size = memory.shape
-    for j in range(rows):
-        for m in range(size):
-            place[first + j * size + m] = memory[j, m]
-
-
 @functools.cache
 def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
     """The loop of ``method(field)``, a `Method` whose memory has so many rows, on a `Formulation`, compiled.
@@ -158,16 +127,16 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
         numbers, tolerance, times, budget, seen, place, states, momenta
     ):
         par, state = prepare(*opened(numbers))
-        memory, nothing, end = np.zeros((rows, size)), zero(state), times[-1]
+        memory, nothing, end = place[size:clock].reshape(rows, size), zero(state), times[-1]
         steps = effort = outcome = 0
         if seen < 0:
             slope = field(par, state)
+            memory.fill(0.0)
             store(memory, 0, slope)
             seen, t, step, effort = 0, 0.0, first_step(field, par, state, slope, end, tolerance, power), 2
         else:
             t, step = place[clock], place[clock + 1]
             state = row_of(place[:size].reshape(1, size), 0, state)
-            rows_from(place, size, memory)
         while t < end and effort < budget:
             before, start = state, t
             state, t, step, work, outcome = advance(par, before, memory, tolerance, start, step, end)
@@ -190,7 +159,6 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
                 break
         for m in range(size):
             place[m] = state[m]
-        rows_to(place, size, memory)
         place[clock], place[clock + 1] = t, step
         return seen, steps, effort, outcome
 
@@ -289,7 +257,11 @@ class Pair(NamedTuple):
 
         @register_jitable
         def polynomial(par, state, new, slopes, h, x):  # type: ignore[no-untyped-def]
-            return interpolate(dense, state, slopes, h, x)
+            weights = dense[0] + dense[1][:3]  # a tuple of seven
+            for i in range(len(dense)):
+                row = dense[i]
+                weights = set_item(weights, i, x * (row[0] + x * (row[1] + x * (row[2] + x * row[3]))))
+            return summed(state, weighted(weights, state, slopes, h))
 
         @register_jitable
         def shorter(par, state, new, slopes, h, x):  # type: ignore[no-untyped-def]
