@@ -127,16 +127,18 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
         numbers, tolerance, times, budget, seen, place, states, momenta
     ):
         par, state = prepare(*opened(numbers))
-        memory, nothing, end = place[size:clock].reshape(rows, size), zero(state), times[-1]
+        memory, nothing, end = np.zeros((rows, size)), zero(state), times[-1]
+        kept = place[size:clock].reshape(rows, size)  # copied, for there it lies across lines of the cache
         steps = effort = outcome = 0
         if seen < 0:
             slope = field(par, state)
-            memory.fill(0.0)
             store(memory, 0, slope)
             seen, t, step, effort = 0, 0.0, first_step(field, par, state, slope, end, tolerance, power), 2
         else:
             t, step = place[clock], place[clock + 1]
             state = row_of(place[:size].reshape(1, size), 0, state)
+            for j in range(rows):
+                store(memory, j, row_of(kept, j, state))
         while t < end and effort < budget:
             before, start = state, t
             state, t, step, work, outcome = advance(par, before, memory, tolerance, start, step, end)
@@ -159,6 +161,8 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
                 break
         for m in range(size):
             place[m] = state[m]
+        for j in range(rows):
+            store(kept, j, row_of(memory, j, state))
         place[clock], place[clock + 1] = t, step
         return seen, steps, effort, outcome
 
