@@ -277,9 +277,6 @@ def farthest(sweeps: int) -> float:
     return FARTHEST * PACE**sweeps
 
 
-Row = tuple[float, ...]
-
-
 def _after(first: Any, then: Any) -> Any:
     """Both, one after the other."""
 
@@ -293,7 +290,7 @@ def _after(first: Any, then: Any) -> Any:
 
 
 def _swept(  # noqa: C901  (the loops of one step, read in one piece)
-    field: Callable[..., Any], mu: tuple[Row, ...], predict: tuple[Row, ...], dimension: int
+    field: Callable[..., Any], mu: tuple[tuple[float, ...], ...], predict: tuple[tuple[float, ...], ...], dimension: int
 ) -> Lanes:
     """A Gauss method in lanes: `mu` and `predict` as `GaussRule` has them."""
     stages, zeros, numbers = len(mu), (0.0,) * dimension, (0.0,) * len(SpaceTop._fields)

@@ -108,6 +108,14 @@ def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, toleran
     return min(100.0 * trial, guess, end)
 
 
+@register_jitable
+def copy(rows: Any, to: Any) -> None:
+    """Write rows to others; numba has an assignment of slices format an error: a third of compiling a kernel."""
+    for j in range(len(rows)):
+        for m in range(rows.shape[1]):
+            to[j, m] = rows[j, m]
+
+
 @functools.cache
 def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
     """The loop of ``method(field)``, a `Method` whose memory has so many rows, on a `Formulation`, compiled.
@@ -137,8 +145,7 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
         else:
             t, step = place[clock], place[clock + 1]
             state = row_of(place[:size].reshape(1, size), 0, state)
-            for j in range(rows):
-                store(memory, j, row_of(kept, j, state))
+            copy(kept, memory)
         while t < end and effort < budget:
             before, start = state, t
             state, t, step, work, outcome = advance(par, before, memory, tolerance, start, step, end)
@@ -161,8 +168,7 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
                 break
         for m in range(size):
             place[m] = state[m]
-        for j in range(rows):
-            store(kept, j, row_of(memory, j, state))
+        copy(memory, kept)
         place[clock], place[clock + 1] = t, step
         return seen, steps, effort, outcome
 

@@ -66,7 +66,7 @@ from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.lanes import Lanes, one_loop
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_FINITE, STEP_TOO_SMALL
-from symtop.methods.framework.preparation import Body, Scaled, Start
+from symtop.methods.framework.preparation import Body, Scaled, Shown, Start, as_it_steps
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, with_spin
 from symtop.methods.simd import Components, Vectors
@@ -240,14 +240,7 @@ def attitude_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..
     return intrinsic(series)  # type: ignore[no-any-return]
 
 
-def present(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """The spin since the start."""
-    return with_spin(par, state, k * h)
-
-
-def _loop(
-    series_of: Callable[..., Any], size: int, observe: Callable[..., Any], **present: Any
-) -> Callable[[int], Loop]:
+def _loop(series_of: Callable[..., Any], size: int, observe: Callable[..., Any]) -> Callable[[int], Loop]:
     """The loop of an order on states of `size` numbers, of which the last, L_z, does not move."""
     still = size - 1
 
@@ -282,24 +275,23 @@ def _loop(
             step, outcome = stepped(rule, state)
             return step, carry, 1, outcome
 
-        return kernel_loop(no_carry, increment, observe, lanes=lambda _: in_lanes(order), **present)
+        return kernel_loop(no_carry, increment, observe, lanes=lambda _: in_lanes(order))
 
     return loop
 
 
 march_axis = _loop(axis_sum, 6, space.observe_axis)
-march_attitude = _loop(attitude_sum, 7, space.observe_attitude, present=present)
-
+march_attitude = _loop(attitude_sum, 7, space.observe_attitude)
+spun = Shown(lambda par, t, state: with_spin(par, state, t), 7)  # with the spin since the start
 
 ORDERS = (8, 12, 16, 20)
 BLOCK = 1_000_000  # series between returns to Python
 SERIES = 200_000_000  # of one run: about half a minute
 ACCEPTED, SAFETY, GROW, EARLIER = 4.0, 0.95, 4.0, 0.25
 
-
-CHARTS: dict[str, tuple[Any, ...]] = {  # preparation, series, sample(par, state, t), axis of a state
-    "axis": (space.on_axis, axis_sum, lambda _par, state, _t: state, lambda state: state[:3]),
-    "attitude": (space.on_attitude, attitude_sum, with_spin, lambda state: axis_of(*state[:4])),
+CHARTS: dict[str, tuple[Any, ...]] = {  # preparation, series, sample(par, t, state), axis of a state
+    "axis": (space.on_axis, axis_sum, as_it_steps, lambda state: state[:3]),
+    "attitude": (space.on_attitude, attitude_sum, spun.sample, lambda state: axis_of(*state[:4])),
 }
 
 
@@ -316,7 +308,7 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
     """
     preparation, series_of, sample, axis = CHARTS[chart]
     prepare, size, series = preparation.numbers, preparation.size, series_of(order)
-    sample, axis = register_jitable(sample), register_jitable(axis)
+    register_jitable(axis)
 
     @register_jitable
     def terms(state, body, h):  # type: ignore[no-untyped-def]
@@ -349,7 +341,7 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
                 while seen < len(times) and (times[seen] - ahead) - after <= 0.0:
                     part, _ = terms(state, body, (times[seen] - t) - rest)
                     shown, _ = accumulate(state, low, part)
-                    shown = sample(par, shown, times[seen])
+                    shown = sample(par, times[seen], shown)
                     for i in range(size):
                         states[seen, i] = shown[i]
                     e = axis(shown)
@@ -399,7 +391,7 @@ def series(name: str, order: int = DEFAULT_ORDER) -> Integrator:
         summary=f"Taylor series on the space-frame equations, order {order}, by products of vectors",
         solvers={
             "axis": FixedStep(march_axis(order), rule, space.on_axis, order, implicit=False),
-            "attitude": FixedStep(march_attitude(order), rule, space.on_attitude, order, implicit=False),
+            "attitude": FixedStep(march_attitude(order), rule, space.on_attitude, order, implicit=False, present=spun),
         },
         order=order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi"}),
         reference="biscani-izzo-2021", needs="this-top", general=False, inner_loop="vector registers",
