@@ -120,11 +120,8 @@ NUMBERS = (0.0,) * len(TOP._fields)
 
 
 def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
-    i = 0
-    for share in rule.shares:
-        for weight in rule.weights:
-            numbers[i] = (h * share) * weight
-            i += 1
+    for i in range(len(rule.weights)):
+        numbers[i] = h * rule.weights[i]
 
 
 def _product(count: int, terms: int, first: int, stages: int) -> Part:
@@ -182,8 +179,7 @@ def _of_shape(counts: tuple[int, ...], bent: bool) -> Lanes:
             left(block, j, q, m, v, dL)
             give_up(block, j, max(far, too_far) != 0.0)
 
-    each = sum(counts) * stages
-    return stepped(part, _lay, 0, each, carried=UNSPUN, effort=lambda rule: len(rule.counts) * len(rule.shares))
+    return stepped(part, _lay, 0, sum(counts) * stages, carried=UNSPUN, effort=lambda rule: len(rule.counts))
 
 
 class LieTable(NamedTuple):
@@ -192,7 +188,7 @@ class LieTable(NamedTuple):
     weights: tuple[float, ...]  # row by row, one entry a stage
     counts: tuple[float, ...]  # exponentials of each stage from the second on, and of the step
     bent: float = 0.0  # 1 for Munthe-Kaas
-    shares: tuple[float, ...] = (1.0,)
+    shares: tuple[float, ...] = (1.0,)  # the step in one part: lanes lay out no other
 
 
 def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:

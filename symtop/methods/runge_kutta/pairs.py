@@ -127,16 +127,13 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
     opened = form.prepare.opened
     sample = as_it_steps if form.present is None else form.present.sample
     register_jitable(observe)
-    made: Method = method(field)
-    advance, refine, between, last, power = made
+    advance, refine, between, last, power = method(field)
     clock = size + rows * size
 
-    def march(  # type: ignore[no-untyped-def]
-        numbers, tolerance, times, budget, seen, place, states, momenta
-    ):
+    def march(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]
         par, state = prepare(*opened(numbers))
         memory, nothing, end = np.zeros((rows, size)), zero(state), times[-1]
-        kept = place[size:clock].reshape(rows, size)  # copied, for there it lies across lines of the cache
+        kept = place[:clock].reshape(1 + rows, size)  # the state, and the memory, there across lines of the cache
         steps = effort = outcome = 0
         if seen < 0:
             slope = field(par, state)
@@ -144,8 +141,8 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
             seen, t, step, effort = 0, 0.0, first_step(field, par, state, slope, end, tolerance, power), 2
         else:
             t, step = place[clock], place[clock + 1]
-            state = row_of(place[:size].reshape(1, size), 0, state)
-            copy(kept, memory)
+            state = row_of(kept, 0, state)
+            copy(kept[1:], memory)
         while t < end and effort < budget:
             before, start = state, t
             state, t, step, work, outcome = advance(par, before, memory, tolerance, start, step, end)
@@ -162,13 +159,11 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
                 momenta[seen, 0], momenta[seen, 1] = observe(par, memory, place_then, nothing, h)
                 seen += 1
             outcome = ended(state)
-            for m in range(size):
-                memory[0, m] = memory[last, m]
+            store(memory, 0, row_of(memory, last, state))
             if outcome != OK:
                 break
-        for m in range(size):
-            place[m] = state[m]
-        copy(memory, kept)
+        store(kept, 0, state)
+        copy(memory, kept[1:])
         place[clock], place[clock + 1] = t, step
         return seen, steps, effort, outcome
 
