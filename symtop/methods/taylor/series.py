@@ -138,12 +138,6 @@ def axis_terms(v: Vectors, first: First, a: Any, m: Any, last: int) -> tuple[lis
     return S, U
 
 
-def slope(v: Vectors, S: list[Any], last: int) -> Any:
-    """Sum of n S_n for 1 < n <= last, which is odd."""
-    pairs = ((S[n + 1], v.constant(n + 1), v.builder.fmul(S[n], v.constant(n))) for n in range(2, last, 2))
-    return v.total([v.fma(*pair) for pair in pairs])
-
-
 def size(v: Vectors, S: list[Any], n: int) -> Any:
     """Square of the length of the terms u_n and -i n y_n, of which the second is that of z one order lower."""
     b = v.builder
@@ -164,7 +158,9 @@ def axis_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..., A
             norm = b.fma(x, x, b.fma(y, y, b.fmul(u, u)))
             first = first_terms(v, (x, y), u, norm, (wx, wy), a, p, m)
             S, _ = axis_terms(v, first, v.pack(a), v.pack(m), order + 1)
-            whole, bent = b.fadd(S[1], v.total(S[2 : order + 1])), slope(v, S, order + 1)
+            whole = b.fadd(S[1], v.total(S[2 : order + 1]))
+            pairs = ((S[n + 1], v.constant(n + 1), b.fmul(S[n], v.constant(n))) for n in range(2, order + 1, 2))
+            bent = v.total([v.fma(*pair) for pair in pairs])  # the sum of n S_n from 2 on
             turned = v.lane(bent, 1), b.fneg(v.lane(bent, 0)), v.lane(whole, 2)
             momentum = b.fmul(m, v.lane(whole, 0)), b.fmul(m, v.lane(whole, 1))
             return v.array([*turned, *momentum, size(v, S, order), size(v, S, order - 1)])
@@ -172,23 +168,6 @@ def axis_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..., A
         return types.UniTuple(types.float64, 7)(state, a, m), emit
 
     return intrinsic(series)  # type: ignore[no-any-return]
-
-
-def _first_halves(v: Vectors, q: Any, w: Any, a: Any, P: Any) -> tuple[Any, Any]:
-    """X_0 and X_1: chi' = -(i/2) (P chi_1 + conj(a w) chi_2), -(i/2) (a w chi_1 - P chi_2)."""
-    b = v.builder
-    mul, fma, neg, half = b.fmul, b.fma, b.fneg, v.number(0.5)
-    qw, qx, qy, qz = q
-    ar, ai = mul(a, w[0]), mul(a, w[1])
-    real1 = fma(P, qw, fma(ar, qy, neg(mul(ai, qx))))
-    imag1 = neg(fma(P, qz, fma(ar, qx, mul(ai, qy))))
-    real2 = b.fsub(fma(ar, qw, mul(ai, qz)), mul(P, qy))
-    imag2 = fma(ai, qw, fma(P, qx, neg(mul(ar, qz))))
-    minus = v.number(-0.5)
-    return (
-        v.pack(qw, neg(qz), qy, neg(qx)),
-        v.pack(mul(half, imag1), mul(minus, real1), mul(half, imag2), mul(minus, real2)),
-    )
 
 
 def _size(v: Vectors, term: Any) -> Any:
@@ -222,7 +201,14 @@ def attitude_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..
             rest1 = b.fsub(first.ku, fma(c(0.5), pull, base))
             rest2 = b.fsub(first.ku, fma(c(-0.5), pull, base))
             rest = v.pack(rest1, rest1, rest2, rest2)
-            X = list(_first_halves(v, (qw, qx, qy, qz), (wx, wy), a, first.P))
+            # chi' = -(i/2) (P chi_1 + conj(a w) chi_2), -(i/2) (a w chi_1 - P chi_2)
+            ar, ai, half, minus = mul(a, wx), mul(a, wy), c(0.5), c(-0.5)
+            real1 = fma(first.P, qw, fma(ar, qy, neg(mul(ai, qx))))
+            imag1 = neg(fma(first.P, qz, fma(ar, qx, mul(ai, qy))))
+            real2 = b.fsub(fma(ar, qw, mul(ai, qz)), mul(first.P, qy))
+            imag2 = fma(ai, qw, fma(first.P, qx, neg(mul(ar, qz))))
+            X = [v.pack(qw, neg(qz), qy, neg(qx))]
+            X.append(v.pack(mul(half, imag1), mul(minus, real1), mul(half, imag2), mul(minus, real2)))
             X.append(mul(mul(rest, X[0]), v.constant(0.5)))
             av, mv = v.pack(a), v.pack(m)
             for n in range(1, order - 1):
