@@ -93,7 +93,6 @@ SHOWN: dict[Callable[..., Any], tuple[Callable[..., Any], Callable[..., Any]]] =
     space.march_attitude: (space.ATTITUDE.enter, space.ATTITUDE.present),
     exact_discrete.march_axis: (exact_discrete.enter, exact_discrete.present_axis),
     exact_discrete.march_attitude: (exact_discrete.enter, exact_discrete.present_attitude),
-    series.march_attitude(DEFAULT_ORDER): (lambda _par, _rule, state, _h: state, series.present),
 }
 
 

@@ -45,7 +45,7 @@ from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group.loop import UNSPUN, entered, give_up, in_charts, left, lie_loop, moved, stepped
 from symtop.methods.runge_kutta.explicit import add, row_of, store, weighted_in_lanes
 from symtop.methods.simd import wide_vectors
-from symtop.methods.splitting.rotor import COSINE, SINE, series
+from symtop.methods.splitting import rotor
 from symtop.methods.vectors import cross, dot, plus, scaled
 
 CUBIC = tuple(1.0 / math.factorial(2 * k + 3) for k in range(9))  # C in powers of -a^2
@@ -61,8 +61,7 @@ def half_square(element: Any) -> Any:
 @register_jitable
 def near(square: float) -> Any:
     """s, m and C of an exponential that turns by less than two radians, of the square of half the angle."""
-    s, m = 0.5 * series(square, SINE), -square * series(square, COSINE)
-    return s, m, series(4.0 * square, CUBIC)
+    return (*rotor.near(square, 0.5), rotor.series(4.0 * square, CUBIC))
 
 
 @register_jitable
