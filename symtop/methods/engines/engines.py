@@ -258,8 +258,7 @@ def _presenting(chart: str) -> Callable[..., Any]:
 @register_jitable
 def _in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     """A momentum in the axes of the body."""
-    q = state[0], state[1], state[2], state[3]
-    return (*q, *rotated(par, conjugate(q), state[4:]))
+    return (*state[:4], *rotated(par, conjugate(state[:4]), state[4:]))
 
 
 def _momentum_in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
@@ -593,10 +592,9 @@ def _five_turns(outer: Any, inner: Any, par: Any, q: Any, L: Any, h: float) -> A
 
 def _increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (q, L); the free rotation leaves L in space as it is."""
-    q, half = (state[0], state[1], state[2], state[3]), 0.5 * h
+    q, half = state[:4], 0.5 * h
     kick = scaled(half, torque(par, axis(q)))
-    kicked = state[4] + kick[0], state[5] + kick[1], state[6] + kick[2]
-    L = plus(kicked, 1.0, turned((q[0], -q[1], -q[2], -q[3]), kicked))
+    L = rotated(par, conjugate(q), plus(state[4:], 1.0, kick))
     if par.I3 < par.I1:
         q, L = _five_turns(_first_turn, _third_turn, par, q, L, h)
     else:

@@ -40,17 +40,14 @@ from symtop.model.body import product
 @register_jitable
 def _field(par: Any, e: Any, y: Any) -> Any:
     """Time derivative of (g, r)."""
-    g, r = (y[0], y[1], y[2], y[3]), (y[4], y[5], y[6], y[7])
+    g, r = y[:4], y[4:]
     quarter = 0.25 / par.I1
     L = product(r, conjugate(g))  # its vector is 2 L
     w = 0.0, quarter * L[1], quarter * L[2], quarter * L[3]
     moves, turns = product(w, g), product(w, r)
     a, b, c, d = product(g, (0.0, e[0], e[1], e[2]))
     twice = 2.0 * par.mgl
-    return (
-        moves[0], moves[1], moves[2], moves[3],
-        turns[0] - twice * d, turns[1] - twice * c, turns[2] + twice * b, turns[3] + twice * a,
-    )  # fmt: skip
+    return (*moves, turns[0] - twice * d, turns[1] - twice * c, turns[2] + twice * b, turns[3] + twice * a)
 
 
 def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
@@ -98,11 +95,10 @@ def turn(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
             total += work[i, m]
         step = set_item(step, m, total)
     # Im(r g*)/2 - L with g = 1 + dg, r = 2 L + dr: no difference of large numbers
-    dg, dr = (step[0], step[1], step[2], step[3]), (step[4], step[5], step[6], step[7])
-    back = conjugate(dg)
+    dr, back = step[4:], conjugate(step[:4])
     linear, bent = product((0.0, L[0], L[1], L[2]), back), product(dr, back)
     dL = (0.5 * (dr[1] + bent[1]) + linear[1], 0.5 * (dr[2] + bent[2]) + linear[2], 0.5 * (dr[3] + bent[3]) + linear[3])
-    return step[0], (step[1], step[2], step[3]), dL, work, effort, outcome
+    return step[0], step[1:4], dL, work, effort, outcome
 
 
 march = lie_loop(turn, _begin)

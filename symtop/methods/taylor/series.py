@@ -69,6 +69,7 @@ from symtop.methods.framework.plan import NOT_FINITE, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import Body, Scaled, Shown, Start, as_it_steps
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, with_spin
+from symtop.methods.runge_kutta.explicit import row_of, store
 from symtop.methods.simd import Components, Vectors
 from symtop.methods.vectors import accumulate, zero
 
@@ -305,15 +306,15 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
         last = max(math.sqrt(out[size - 1]), EARLIER * math.sqrt(out[size]))
         return set_item(dstate, size - 1, 0.0), last
 
-    def run(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]  # noqa: C901
+    def run(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]
         body = Body(*numbers[:3])
         par, state = prepare(body, Start(*numbers[3:]))
         low, t, rest = zero(state), 0.0, 0.0
         turn = (state[size - 3] ** 2 + state[size - 2] ** 2 + state[size - 1] ** 2) / body.I1**2
         h = 1.0 / math.sqrt(turn + 4.0 * abs(body.mgl) / body.I1 + 1.0 / times[-1] ** 2)
+        kept = place[: 2 * size].reshape(2, size)
         if seen >= 0:
-            for i in range(size):
-                state, low = set_item(state, i, place[i]), set_item(low, i, place[size + i])
+            state, low = row_of(kept, 0, state), row_of(kept, 1, low)
             t, rest, h = place[2 * size], place[2 * size + 1], place[2 * size + 2]
         seen = max(seen, 0)
         steps = effort = outcome = 0
@@ -328,8 +329,7 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
                     part, _ = terms(state, body, (times[seen] - t) - rest)
                     shown, _ = accumulate(state, low, part)
                     shown = sample(par, times[seen], shown)
-                    for i in range(size):
-                        states[seen, i] = shown[i]
+                    store(states, seen, shown)
                     e = axis(shown)
                     momenta[seen, 0] = shown[size - 1]
                     momenta[seen, 1] = shown[size - 3] * e[0] + shown[size - 2] * e[1] + shown[size - 1] * e[2]
@@ -346,8 +346,8 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
             if not np.isfinite(state[0] + state[size - 2]):
                 outcome = NOT_FINITE
                 break
-        for i in range(size):
-            place[i], place[size + i] = state[i], low[i]
+        store(kept, 0, state)
+        store(kept, 1, low)
         place[2 * size], place[2 * size + 1], place[2 * size + 2] = t, rest, h
         return seen, steps, effort, outcome
 
