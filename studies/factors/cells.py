@@ -18,15 +18,11 @@ top and gravity), with the same coefficients. The implicit midpoint rule is `mid
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
-from symtop.methods.framework.angles import sampled_momenta, to_angles
 from symtop.methods.framework.equations import FORMULATIONS
-from symtop.methods.framework.plan import Array
-from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.registry import Integrator, integrators
 from symtop.methods.library.scipy_ivp import RightHandSide, scipy_method
 from symtop.methods.taylor import heyoka
 from symtop.model.scenes import Scene
-from symtop.model.top import SymmetricTop
 from symtop.run.simulation import make_plan, simulate
 
 from . import plain_numpy
@@ -100,13 +96,8 @@ def cells(schemes: Sequence[str] | None = None) -> list[Cell]:
 
 def taylor_in_angles() -> Integrator:
     """The variant ``taylor[angles]``: heyoka on the Euler-Lagrange equations, from the same formulas as the others."""
-
-    def read(top: SymmetricTop, times: Array, states: Array) -> tuple[Array, Array, Array]:
-        par = BareTop(top.I1, top.I3, top.mgl)
-        return to_angles(par, times, states), *sampled_momenta(par, states)
-
-    method, solvers = integrators()["taylor"], {"angles": heyoka.solver("angles", "double", read)}
-    return replace(method, name="taylor[angles]", solvers=solvers)
+    solvers = {"angles": heyoka.solver("angles", "double")}
+    return replace(integrators()["taylor"], name="taylor[angles]", solvers=solvers)
 
 
 def caller(scene: Scene, cell: Cell, call: str, setting: float, horizon: float) -> Callable[[], object] | None:

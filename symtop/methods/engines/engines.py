@@ -70,6 +70,7 @@ Ndirango, Newns, Martyna, J. Chem. Phys. 116 (2002) 8649.
 """
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -79,7 +80,7 @@ from symtop.methods.framework.body import prepared
 from symtop.methods.framework.loop import FixedStep, Loop, as_stepped, kernel_loop, no_carry
 from symtop.methods.framework.preparation import BareTop, Preparation
 from symtop.methods.framework.registry import ENGINE, Integrator
-from symtop.methods.framework.space import L_at, e_at, finite_outcome, observe_attitude, observe_axis, q_at
+from symtop.methods.framework.space import L_at, e_at, ended_space, observe_attitude, observe_axis, q_at
 from symtop.methods.splitting.body import SORTED, five_rotations
 from symtop.methods.vectors import conjugate, cross, dot, plus, scaled, summed
 from symtop.model.body import product
@@ -226,42 +227,30 @@ def _nothing(par: Any, e: Any, v: Any) -> Any:
     return 0.0
 
 
-@register_jitable
-def _axis_placed(y: Any) -> Any:
-    """What a map takes for the orientation of a state, and its axis."""
-    e = y[0], y[1], y[2]
-    return e, e
+ORIENTATION: dict[str, Callable[..., Any]] = {  # of a state, what a map takes for it
+    "axis": lambda y: y[:3], "attitude": axis, BODY: lambda y: y[:4],
+}  # fmt: skip
+pointing = by_length((3, lambda _par, e: e), (4, lambda _par, q: axis(q)))  # the axis of it
 
 
-@register_jitable
-def _attitude_placed(y: Any) -> Any:
-    e = axis(y)
-    return e, e
-
-
-@register_jitable
-def _body_placed(y: Any) -> Any:
-    q = y[0], y[1], y[2], y[3]
-    return q, axis(q)
-
-
-def _observing(placed: Callable[..., Any]) -> Callable[..., Any]:
+def _observing(chart: str) -> Callable[..., Any]:
     """p_phi = L_z and p_psi = L.e of a state with rates."""
+    orientation = register_jitable(ORIENTATION[chart])
 
     def observe(par, rule, before, dstate, h):  # type: ignore[no-untyped-def]
         y = summed(before, dstate)
-        orientation, e = placed(y)
-        L = momentum(par, orientation, y[-3:])
-        return L[2], dot(L, e)
+        L = momentum(par, orientation(y), y[-3:])
+        return L[2], dot(L, pointing(par, orientation(y)))
 
     return observe
 
 
-def _presenting(placed: Callable[..., Any]) -> Callable[..., Any]:
+def _presenting(chart: str) -> Callable[..., Any]:
     """Momenta in the place of rates."""
+    orientation = register_jitable(ORIENTATION[chart])
 
     def present(par, rule, state, k, h):  # type: ignore[no-untyped-def]
-        return (*state[:-3], *momentum(par, placed(state)[0], state[-3:]))
+        return (*state[:-3], *momentum(par, orientation(state), state[-3:]))
 
     return present
 
@@ -269,8 +258,7 @@ def _presenting(placed: Callable[..., Any]) -> Callable[..., Any]:
 @register_jitable
 def _in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     """A momentum in the axes of the body."""
-    q = state[0], state[1], state[2], state[3]
-    return (*q, *rotated(par, conjugate(q), state[4:]))
+    return (*state[:4], *rotated(par, conjugate(state[:4]), state[4:]))
 
 
 def _momentum_in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
@@ -287,11 +275,9 @@ class Carried(NamedTuple):
 
 
 VELOCITY = {
-    "axis": Carried(_top_prepared(e_at, 6, rates=True), _observing(_axis_placed), _presenting(_axis_placed)),
-    "attitude": Carried(
-        _top_prepared(q_at, 7, rates=True), _observing(_attitude_placed), _presenting(_attitude_placed)
-    ),
-    BODY: Carried(_body_prepared(rates=True), _observing(_body_placed), _momentum_in_body),
+    "axis": Carried(_top_prepared(e_at, 6, rates=True), _observing("axis"), _presenting("axis")),
+    "attitude": Carried(_top_prepared(q_at, 7, rates=True), _observing("attitude"), _presenting("attitude")),
+    BODY: Carried(_body_prepared(rates=True), _observing(BODY), _momentum_in_body),
 }
 ANGULAR_MOMENTUM = {
     "axis": Carried(_top_prepared(e_at, 6, rates=False), observe_axis),
@@ -300,75 +286,64 @@ ANGULAR_MOMENTUM = {
 }
 
 
-def axis_loop(step: Callable[..., Any], carried: Carried, reused: Callable[..., Any] = _nothing) -> Loop:
-    """The loop on the axis around a map; `reused` is what its first step takes for the one before."""
-    register_jitable(step)
-
-    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
-        return reused(par, (state[0], state[1], state[2]), (state[3], state[4], state[5]))
-
-    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        e, v = (state[0], state[1], state[2]), (state[3], state[4], state[5])
-        p, new, carry = step(par, rule, e, v, carry, h)
-        x, y, z = turned(p, e)
-        r, s, t = e[0] + x, e[1] + y, e[2] + z
-        lost = 0.5 * (1.0 - (r * r + s * s + t * t))  # |e| = 1 to rounding, as engines keep |q|
-        dstate = x + lost * r, y + lost * s, z + lost * t, new[0] - v[0], new[1] - v[1], new[2] - v[2]
-        total = dstate[0] + dstate[1] + dstate[2] + dstate[3] + dstate[4] + dstate[5]
-        return dstate, carry, 1, finite_outcome(total)
-
-    return kernel_loop(begin, increment, carried.observe, present=carried.present)
-
-
-def _narrowing(number: Any, count: int) -> Callable[..., Any]:
-    """The first `count` numbers of a record in a precision."""
-    if count == 0:
-
-        def narrowed(par):  # type: ignore[no-untyped-def]
-            return ()
-    else:
-        before, last = _narrowing(number, count - 1), count - 1
-
-        def narrowed(par):  # type: ignore[no-untyped-def]
-            return (*before(par), number(par[last]))
-
-    return register_jitable(narrowed)
-
-
-def attitude_loop(
-    step: Callable[..., Any], carried: Carried, reused: Callable[..., Any] = _nothing,
-    number: Any = np.float64, *, body: bool = False,
-) -> Loop:  # fmt: skip
-    """The loop on the attitude around a map, of a top or of a `body` without symmetry, in the precision of `number`."""
-    register_jitable(step)
-    kind: Any = EngineBody if body else EngineTop
-    narrowed, placed = _narrowing(number, len(kind._fields)), _body_placed if body else _attitude_placed
-
-    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
-        return reused(par, placed(state)[0], (state[4], state[5], state[6]))
-
-    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        there, cut = kind(*narrowed(par)), Substeps(rule.parts, number(rule.share))
-        q = number(state[0]), number(state[1]), number(state[2]), number(state[3])
-        v = number(state[4]), number(state[5]), number(state[6])
-        p, v, carry = step(there, cut, placed(q)[0], v, carry, number(h))
-        q = normalised(there, product(p, q))
-        dstate = (
-            np.float64(q[0]) - state[0], np.float64(q[1]) - state[1], np.float64(q[2]) - state[2],
-            np.float64(q[3]) - state[3], np.float64(v[0]) - state[4], np.float64(v[1]) - state[5],
-            np.float64(v[2]) - state[6],
-        )  # fmt: skip
-        total = dstate[0] + dstate[1] + dstate[2] + dstate[3] + dstate[4] + dstate[5] + dstate[6]
-        return dstate, carry, 1, finite_outcome(total)
-
-    return kernel_loop(begin, increment, carried.observe, present=carried.present)
-
-
 class Substeps(NamedTuple):
     """How many equal parts an engine cuts a step into, and the share of each."""
 
     parts: int = 1
     share: float = 1.0
+
+
+WHOLE = Substeps()
+
+
+@register_jitable
+def _gap(after: Any, before: Any) -> Any:
+    """How far numbers of any precision have come from those of a state, in double."""
+    gap = before
+    for i in range(len(before)):
+        gap = set_item(gap, i, np.float64(after[i]) - before[i])
+    return gap
+
+
+def _axis_moved(par: Any, e: Any, p: Any, start: Any) -> Any:
+    x, y, z = turned(p, e)
+    r, s, t = e[0] + x, e[1] + y, e[2] + z
+    lost = 0.5 * (1.0 - (r * r + s * s + t * t))  # |e| = 1 to rounding, as engines keep |q|
+    return x + lost * r, y + lost * s, z + lost * t
+
+
+# how far the rotation p moves an axis, in double, or an attitude, from the one in a state
+moved = by_length((3, _axis_moved), (4, lambda par, q, p, start: _gap(normalised(par, product(p, q)), start)))
+
+
+def engine_loop(
+    step: Callable[..., Any], chart: str, carried: Carried, reused: Callable[..., Any] = _nothing,
+    number: Any = np.float64,
+) -> Loop:  # fmt: skip
+    """The loop around a map in a chart; `reused` is what its first step takes for the one before.
+
+    `number` is a precision, single in charts with a quaternion alone.
+    """
+    orientation, step = register_jitable(ORIENTATION[chart]), register_jitable(step)
+    kind: Any = EngineBody if chart == BODY else EngineTop
+    numbers, zeros = (number(0.0),) * len(kind._fields), (number(0.0),) * carried.prepare.size
+
+    @register_jitable
+    def narrowed(values, like):  # type: ignore[no-untyped-def]
+        for i in range(len(like)):
+            like = set_item(like, i, number(values[i]))
+        return like
+
+    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
+        return reused(par, orientation(state), state[-3:])
+
+    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+        there, cut, y = kind(*narrowed(par, numbers)), Substeps(rule.parts, number(rule.share)), narrowed(state, zeros)
+        p, v, carry = step(there, cut, orientation(y), y[-3:], carry, number(h))
+        dstate = (*moved(there, y[:-3], p, state[:-3]), *_gap(v, state[-3:]))
+        return dstate, carry, 1, ended_space(dstate)
+
+    return kernel_loop(begin, increment, carried.observe, present=carried.present)
 
 
 @register_jitable
@@ -617,65 +592,45 @@ def _five_turns(outer: Any, inner: Any, par: Any, q: Any, L: Any, h: float) -> A
 
 def _increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (q, L); the free rotation leaves L in space as it is."""
-    q, half = (state[0], state[1], state[2], state[3]), 0.5 * h
+    q, half = state[:4], 0.5 * h
     kick = scaled(half, torque(par, axis(q)))
-    kicked = state[4] + kick[0], state[5] + kick[1], state[6] + kick[2]
-    L = plus(kicked, 1.0, turned((q[0], -q[1], -q[2], -q[3]), kicked))
+    L = rotated(par, conjugate(q), plus(state[4:], 1.0, kick))
     if par.I3 < par.I1:
         q, L = _five_turns(_first_turn, _third_turn, par, q, L, h)
     else:
         q, L = _five_turns(_third_turn, _first_turn, par, q, L, h)
     q = normalised(par, q)
     kick = plus(kick, half, torque(par, axis(q)))
-    dstate = (q[0] - state[0], q[1] - state[1], q[2] - state[2], q[3] - state[3], *kick)
-    total = dstate[0] + dstate[1] + dstate[2] + dstate[3] + dstate[4] + dstate[5]
-    return dstate, carry, 1, finite_outcome(total)
+    dstate = (*_gap(q, state[:4]), *kick)
+    return dstate, carry, 1, ended_space(dstate)
 
 
 march_no_squish = kernel_loop(no_carry, _increment_no_squish, observe_attitude)
 
 
-def _entry(
-    name: str, loops: dict[str, Loop], order: int | None, summary: str, reference: str, keeps: str = "", *,
-    carried: Mapping[str, Carried] = VELOCITY, rule: Any = None, forces: int = 1, symplectic: bool = False,
-    energy_error: str | None = None, precision: str = "double", needs: str = "group", on_body: FixedStep | None = None,
+def _engine(
+    name: str, step: Callable[..., Any], order: int | None, summary: str, reference: str, keeps: str = "", *,
+    carried: Mapping[str, Carried] = VELOCITY, reused: Callable[..., Any] = _nothing, rule: Substeps = WHOLE,
+    forces: int = 1, energy_error: str | None = None, number: Any = np.float64,
 ) -> Integrator:  # fmt: skip
-    """The record of a map from its loops, by chart; `keeps` names the momenta that it conserves."""
+    """A map in every chart, in single precision on quaternions alone; `keeps` names the momenta that it conserves."""
+    charts = [chart for chart in carried if chart != "axis" or number is np.float64]
+    loops = {chart: engine_loop(step, chart, carried[chart], reused, number) for chart in charts}
     return Integrator(
-        name=name, family=ENGINE, summary=summary, reference=reference, order=order, explicit=True,
-        symplectic=symplectic, symmetric=symplectic, conserves=frozenset(keeps.split()), energy_error=energy_error,
-        precision=precision, needs=needs, general=True,
-        solvers={
-            chart: FixedStep(loop, rule or Substeps(), carried[chart].prepare, forces, implicit=False)
-            for chart, loop in loops.items()
-        } | ({} if on_body is None else {BODY: on_body}),
+        name=name, family=ENGINE, summary=summary, reference=reference, order=order, explicit=True, symplectic=False,
+        symmetric=False, conserves=frozenset(keeps.split()), energy_error=energy_error, needs="group", general=True,
+        solvers={at: FixedStep(loops[at], rule, carried[at].prepare, forces, implicit=False) for at in charts},
     )  # fmt: skip
 
 
-def _engine(
-    name: str, step: Callable[..., Any], order: int | None, summary: str, reference: str, keeps: str = "", *,
-    carried: Mapping[str, Carried] = VELOCITY, reused: Callable[..., Any] = _nothing, **more: Any,
-) -> Integrator:  # fmt: skip
-    """A map in double, on the axis, on the attitude, and of a body without symmetry."""
-    loops = {
-        "axis": axis_loop(step, carried["axis"], reused),
-        "attitude": attitude_loop(step, carried["attitude"], reused),
-        BODY: attitude_loop(step, carried[BODY], reused, body=True),
-    }
-    return _entry(name, loops, order, summary, reference, keeps, carried=carried, **more)
-
-
-def _both(
-    name: str, step: Callable[..., Any], order: int | None, summary: str, reference: str, keeps: str = "",
-    rule: Any = None, energy_error: str | None = None,
-) -> list[Integrator]:  # fmt: skip
-    """A map in double and in the single precision of the engine, there on the attitude as the engine steps it."""
-    words, charts = f"{summary}, in single precision", ("attitude", BODY)
-    rounded = {at: attitude_loop(step, VELOCITY[at], number=np.float32, body=at == BODY) for at in charts}
-    return [
-        _engine(name, step, order, summary, reference, keeps, rule=rule, energy_error=energy_error),
-        _entry(f"{name}-float32", rounded, None, words, reference, rule=rule, precision="single"),
-    ]
+def _both(*given: Any, **more: Any) -> list[Integrator]:
+    """A map in double and in the single precision of the engine."""
+    double, single = _engine(*given, **more), _engine(*given, **more, number=np.float32)
+    rounded = replace(
+        single, name=f"{single.name}-float32", summary=f"{single.summary}, in single precision", order=None,
+        conserves=frozenset(), energy_error=None, precision="single",
+    )  # fmt: skip
+    return [double, rounded]
 
 
 def built_in() -> list[Integrator]:
@@ -704,9 +659,14 @@ def built_in() -> list[Integrator]:
                 "ODE by default: gyroscopic term implicit in the velocity", "ode lacoursiere-2006"),
         _engine("lammps-rigid", richardson, 2, "LAMMPS fix rigid: half kicks around an extrapolated rotation",
                 "lammps", "p_phi", carried=ANGULAR_MOMENTUM),
-        _entry("no-squish", {"attitude": march_no_squish}, 2, "LAMMPS fix rigid/nve: turns about the body's axes",
-               "miller-2002 lammps", "p_phi", carried=ANGULAR_MOMENTUM, symplectic=True, needs="kicks",
-               on_body=five_rotations(SORTED)),
+        Integrator(
+            name="no-squish", family=ENGINE, summary="LAMMPS fix rigid/nve: turns about the body's axes", order=2,
+            reference="miller-2002 lammps", explicit=True, symplectic=True, symmetric=True,
+            conserves=frozenset({"p_phi"}), needs="kicks", general=True, solvers={
+                "attitude": FixedStep(march_no_squish, WHOLE, ANGULAR_MOMENTUM["attitude"].prepare, 1, implicit=False),
+                BODY: five_rotations(SORTED),
+            },
+        ),
         _engine("yade", _leapfrog(published=False), 1, "YADE: rotational leapfrog with the axes of the start of a step",
                 "yade", "p_phi", carried=ANGULAR_MOMENTUM),
         _engine("fincham", _leapfrog(published=True), 2, "the rotational leapfrog as published", "fincham-1992",

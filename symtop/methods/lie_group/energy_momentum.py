@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, inertia, iterated_loop
+from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_charts, inertia, iterated_loop
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
 MOST = 30  # iterations of a step; 3 or 4 are the rule
@@ -55,16 +55,16 @@ def _mean(e: Any, u: Any) -> Any:
     return scaled(part, plus(plus(e, 1.0, cross(u, e)), dot(u, e), u))
 
 
-@register_jitable
-def _guess(par: Any, e: Any, a: Any, quarter: float) -> Any:
-    start = plus(a, quarter, gravity(par, e))
-    along = dot(start, e)
-    return plus(scaled(1.0 / par.I1, start), along / par.I3 - along / par.I1, e)
+def _start(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
+    a = scaled(0.5 * h, L)
+    pulled = plus(a, 0.25 * h * h, gravity(par, e))
+    along = dot(pulled, e)
+    return (*e, *a), plus(scaled(1.0 / par.I1, pulled), along / par.I3 - along / par.I1, e)
 
 
-@register_jitable
-def _corrected(par: Any, e: Any, a: Any, quarter: float, u: Any) -> Any:
-    """Newton's next u, and whether it is the last."""
+def _again(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:
+    """Newton's next u."""
+    e, a, quarter = opened[:3], opened[3:], 0.25 * h * h
     mean = _mean(e, u)
     pull, Ju = gravity(par, mean), inertia(par, e, u)
     rest = plus(plus(a, -1.0, Ju), -1.0, cross(u, Ju))
@@ -75,16 +75,7 @@ def _corrected(par: Any, e: Any, a: Any, quarter: float, u: Any) -> Any:
     change = solve3(first, second, third, rest)
     u = plus(u, 1.0, change)
     size = abs(change[0]) + abs(change[1]) + abs(change[2])
-    return u, size <= ENOUGH * (1.0 + abs(u[0]) + abs(u[1]) + abs(u[2]))
-
-
-def _start(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
-    a = scaled(0.5 * h, L)
-    return (*e, *a), _guess(par, e, a, 0.25 * h * h)
-
-
-def _again(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:
-    return (*_corrected(par, opened[:3], opened[3:], 0.25 * h * h, u), False)
+    return u, size <= ENOUGH * (1.0 + abs(u[0]) + abs(u[1]) + abs(u[2])), False
 
 
 def _close(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:
@@ -103,7 +94,7 @@ def built_in() -> list[Integrator]:
             name="simo-wong", family="lie-group", order=2, explicit=False, symplectic=False, symmetric=True,
             summary="Simo and Wong's midpoint rule on the rotation group: the energy and p_phi exactly",
             conserves=frozenset({"energy", "p_phi", "axis_length"}),
-            solvers=in_both_charts(march, Midpoint(), SPUN, 1, implicit=True),
+            solvers=in_charts(march, Midpoint(), SPUN, 1, implicit=True),
             reference="simo-wong-1991 gonzalez-1996", needs="group", general=True,
         )
     ]  # fmt: skip

@@ -23,7 +23,7 @@ from symtop.core.errors import SymtopError, finite
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import axis_of
-from symtop.methods.lie_group.loop import SPUN, Parts, gravity, in_both_charts, inertia, iterated_loop, moved
+from symtop.methods.lie_group.loop import SPUN, Parts, gravity, in_charts, inertia, iterated_loop, moved
 from symtop.methods.splitting.rotor import exact, near
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
@@ -142,7 +142,7 @@ def generalised_alpha(name: str, spectral_radius: float, *, summary: str = "") -
         name=name, family="lie-group", order=2, explicit=False, symplectic=False, symmetric=False,
         summary=summary or f"Lie-group generalised-alpha method of spectral radius {r:g}",
         conserves=frozenset({"p_psi", "axis_length"}),
-        solvers=in_both_charts(march, rule, SPUN, 1, implicit=True),
+        solvers=in_charts(march, rule, SPUN, 1, implicit=True),
         reference="bruls-cardona-arnold-2012 chung-hulbert-1993", needs="group", general=True,
     )  # fmt: skip
 

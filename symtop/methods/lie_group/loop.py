@@ -23,6 +23,7 @@ until no lane is live. A lane that is live after half of the passes that a run a
 whose equation cannot be solved.
 """
 
+import functools
 import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
@@ -33,9 +34,9 @@ from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, rea
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import BareTop, Preparation, Shown, as_it_steps
-from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, observe_attitude, on_attitude, with_spin
+from symtop.methods.framework.space import SpaceTop, axis_of, ended_space, observe_attitude, on_attitude, with_spin
 from symtop.methods.simd import wide_vectors
-from symtop.methods.vectors import accumulate, cross, dot, plus, scaled
+from symtop.methods.vectors import accumulate, cross, dot, plus, scaled, summed
 from symtop.model.charts import BODY
 
 _attitude_numbers = on_attitude.numbers
@@ -81,13 +82,6 @@ def cayley(u: Any) -> Any:
 
 
 @register_jitable
-def reached(state: Any, step: Any) -> Any:
-    """The quaternion and the momentum that an increment leads to."""
-    q = state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3]
-    return q, (state[4] + step[4], state[5] + step[5], state[6] + step[6])
-
-
-@register_jitable
 def composed(step: Any, q: Any, m: float, v: Any, dL: Any) -> Any:
     """The increment with one more rotation, of the quaternion q that it has led to."""
     a, b, c, d, X, Y, Z = step
@@ -98,13 +92,6 @@ def composed(step: Any, q: Any, m: float, v: Any, dL: Any) -> Any:
     c += m * y + (v[1] * w + v[2] * x - v[0] * z)
     d += m * z + (v[2] * w + v[0] * y - v[1] * x)
     return a, b, c, d, X + dL[0], Y + dL[1], Z + dL[2]
-
-
-@register_jitable
-def ended(step: Any) -> int:
-    """The outcome of a step that was solved."""
-    a, b, c, d, X, Y, Z = step
-    return finite_outcome(a + b + c + d + X + Y + Z)
 
 
 def lie_loop(
@@ -118,30 +105,30 @@ def lie_loop(
         step = STILL
         effort = outcome = 0
         for share in rule.shares:
-            q, L = reached(state, step)
-            m, v, dL, carry, work, outcome = turn(par, rule, axis_of(*q), L, carry, h * share)
+            y = summed(state, step)
+            m, v, dL, carry, work, outcome = turn(par, rule, axis_of(*y[:4]), y[4:], carry, h * share)
             effort += work
             if outcome != OK:
                 break
-            step = composed(step, q, m, v, dL)
+            step = composed(step, y[:4], m, v, dL)
         if outcome == OK:
-            outcome = ended(step)
+            outcome = ended_space(step)
         return step, carry, effort, outcome
 
     return kernel_loop(begin, increment, observe, lanes=lanes)
 
 
-def in_both_charts(loop: Loop, rule: Any, carried: Carried, forces: int, *, implicit: bool) -> dict[str, FixedStep]:
-    """Solvers on the axis and on the attitude; a unit of work is so many force evaluations."""
-    return {
-        chart: FixedStep(loop, rule, carried.prepare, forces, implicit=implicit, present=shown)
-        for chart, shown in (("axis", _AXIS), ("attitude", carried.present))
-    }
+def in_charts(
+    loop: Loop, rule: Any, carried: Carried, forces: int, *, implicit: bool, of_body: Loop | None = None
+) -> dict[str, FixedStep]:
+    """Solvers on the axis and on the attitude, and of a body around a loop on (q*, M) with `observe_turned`.
 
-
-def on_body(loop: Loop, rule: Any, *, implicit: bool) -> dict[str, FixedStep]:
-    """The solver of a body without symmetry around a map of Gamma and M, whose loop has `observe_turned`."""
-    return {BODY: FixedStep(loop, rule, turned, 1, implicit=implicit, present=turned_back)}
+    A unit of work is so many force evaluations.
+    """
+    made = functools.partial(FixedStep, rule=rule, evaluations=forces, implicit=implicit)
+    shown = {"axis": _AXIS, "attitude": carried.present}
+    of_top = {chart: made(loop, prepare=carried.prepare, present=present) for chart, present in shown.items()}
+    return of_top if of_body is None else of_top | {BODY: made(of_body, prepare=turned, present=turned_back)}
 
 
 @register_jitable
@@ -157,8 +144,8 @@ LOW, STEP, FLAG, WORK, CARRY = SIZE, 2 * SIZE, 3 * SIZE, 3 * SIZE + 1, 3 * SIZE 
 @register_jitable
 def entered(block: Any, j: int) -> Any:
     """The quaternion that lane j has come to, its axis, and the momentum."""
-    q, L = reached(column(block, 0, j, STILL), column(block, STEP, j, STILL))
-    return q, axis_of(*q), L
+    y = summed(column(block, 0, j, STILL), column(block, STEP, j, STILL))
+    return y[:4], axis_of(*y[:4]), y[4:]
 
 
 @register_jitable
@@ -193,7 +180,7 @@ def stepped(
             part(block, table, table[(shares_at + share * each) * W :])
         for j in range(W):
             state, step = column(block, 0, j, STILL), column(block, STEP, j, STILL)
-            give_up(block, j, ended(step) != OK)
+            give_up(block, j, ended_space(step) != OK)
             moved, low = accumulate(state, column(block, LOW, j, STILL), step)
             put(block, 0, j, moved)
             put(block, LOW, j, low)
@@ -237,45 +224,33 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
     def given(block, table, row, j):  # type: ignore[no-untyped-def]
         return body(*top_of(table, 0, j)), rule_of(table, tops, j), carried(block, CARRY, j), row[j]
 
-    @register_jitable
-    def prepare(block, table, row, j):  # type: ignore[no-untyped-def]
-        par, rule, carry, h = given(block, table, row, j)
-        _, e, L = entered(block, j)
-        fixed, x = start(par, rule, e, L, carry, h)
-        put(block, first, j, fixed)
-        put(block, x_at, j, x)
-        block[live_at * W + j] = 1.0 - block[FLAG * W + j]
-
-    @register_jitable
-    def passed(block, table, row, j):  # type: ignore[no-untyped-def]
-        par, rule, carry, h = given(block, table, row, j)
-        x, live = unknown(block, x_at, j), block[live_at * W + j]
-        after, ended, lost = again(par, rule, carry, h, opens(block, first, j), x)
-        for i in range(unknowns):
-            block[(x_at + i) * W + j] = after[i] if live != 0.0 else x[i]
-        block[FLAG * W + j] = max(block[FLAG * W + j], live if lost else 0.0)
-        block[WORK * W + j] += live
-        block[live_at * W + j] = 0.0 if ended or lost else live
-
-    @register_jitable
-    def closed(block, table, row, j):  # type: ignore[no-untyped-def]
-        par, rule, carry, h = given(block, table, row, j)
-        m, v, dL, after = close(par, rule, carry, h, opens(block, first, j), unknown(block, x_at, j))
-        left(block, j, entered(block, j)[0], m, v, dL)
-        put(block, CARRY, j, after)
-        give_up(block, j, block[live_at * W + j] != 0.0)
-
     def part(block, table, row):  # type: ignore[no-untyped-def]
         wide_vectors()
         for j in range(W):
-            prepare(block, table, row, j)
+            par, rule, carry, h = given(block, table, row, j)
+            _, e, L = entered(block, j)
+            fixed, x = start(par, rule, e, L, carry, h)
+            put(block, first, j, fixed)
+            put(block, x_at, j, x)
+            block[live_at * W + j] = 1.0 - block[FLAG * W + j]
         for _ in range(most // 2):
             for j in range(W):
-                passed(block, table, row, j)
+                par, rule, carry, h = given(block, table, row, j)
+                x, live = unknown(block, x_at, j), block[live_at * W + j]
+                after, ended, lost = again(par, rule, carry, h, opens(block, first, j), x)
+                for i in range(unknowns):
+                    block[(x_at + i) * W + j] = after[i] if live != 0.0 else x[i]
+                block[FLAG * W + j] = max(block[FLAG * W + j], live if lost else 0.0)
+                block[WORK * W + j] += live
+                block[live_at * W + j] = 0.0 if ended or lost else live
             if none_left(block, live_at):
                 break
         for j in range(W):
-            closed(block, table, row, j)
+            par, rule, carry, h = given(block, table, row, j)
+            m, v, dL, newest = close(par, rule, carry, h, opens(block, first, j), unknown(block, x_at, j))
+            left(block, j, entered(block, j)[0], m, v, dL)
+            put(block, CARRY, j, newest)
+            give_up(block, j, block[live_at * W + j] != 0.0)
 
     def lay(par, rule, h, out):  # type: ignore[no-untyped-def]
         values, i = numbers(rule), count

@@ -42,28 +42,26 @@ from symtop.methods.framework.body import observe_turned
 from symtop.methods.framework.lanes import Lanes, W, column
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group import loop
-from symtop.methods.lie_group.loop import UNSPUN, entered, give_up, in_both_charts, left, lie_loop, moved, stepped
+from symtop.methods.lie_group.loop import UNSPUN, entered, give_up, in_charts, left, lie_loop, moved, stepped
+from symtop.methods.runge_kutta.explicit import add, row_of, store, weighted_in_lanes
 from symtop.methods.simd import wide_vectors
-from symtop.methods.splitting.rotor import COSINE, SINE, series
+from symtop.methods.splitting import rotor
 from symtop.methods.vectors import cross, dot, plus, scaled
 
 CUBIC = tuple(1.0 / math.factorial(2 * k + 3) for k in range(9))  # C in powers of -a^2
-NOUGHT = (0.0, 0.0, 0.0)
+NOUGHT, NO_SLOPE = (0.0,) * 3, (0.0,) * 6
 
 
 @register_jitable
-def half_square(w: Any) -> float:
+def half_square(element: Any) -> Any:
     """The square of half the angle of exp(w, f)."""
-    square: float = 0.25 * dot(w, w)
-    return square
+    return 0.25 * dot(element[:3], element[:3])
 
 
 @register_jitable
 def near(square: float) -> Any:
     """s, m and C of an exponential that turns by less than two radians, of the square of half the angle."""
-    s, m = 0.5 * series(square, SINE), -square * series(square, COSINE)
-    return s, m, series(4.0 * square, CUBIC)
+    return (*rotor.near(square, 0.5), rotor.series(4.0 * square, CUBIC))
 
 
 @register_jitable
@@ -78,9 +76,9 @@ def any_angle(square: float) -> Any:
 
 
 @register_jitable
-def acted(so_far: Any, L: Any, w: Any, f: Any, turned: Any) -> Any:
+def acted(so_far: Any, L: Any, element: Any, turned: Any) -> Any:
     """A product of exponentials with one more, exp(w, f) of s, m and C: its rotation, the axis and the change of L."""
-    (total, v, x, dL), (s, m, cubic) = so_far, turned
+    (total, v, x, dL), (s, m, cubic), w, f = so_far, turned, element[:3], element[3:]
     u, bent = scaled(s, w), cross(w, f)
     b = plus(plus(f, 2.0 * s * s, bent), cubic, cross(w, bent))
     x = plus(x, 1.0, moved(m, u, x))
@@ -90,17 +88,29 @@ def acted(so_far: Any, L: Any, w: Any, f: Any, turned: Any) -> Any:
 
 
 @register_jitable
-def _bracket(w: Any, f: Any, x: Any, g: Any) -> Any:
+def _bracket(element: Any, other: Any) -> Any:
     """[(w, f), (x, g)] = (w x x, w x g + f x x)."""
-    return cross(w, x), plus(cross(w, g), 1.0, cross(f, x))
+    w, f, x, g = element[:3], element[3:], other[:3], other[3:]
+    return (*cross(w, x), *plus(cross(w, g), 1.0, cross(f, x)))
 
 
 @register_jitable
-def bent_back(w: Any, f: Any, slope: Any, g: Any) -> Any:
-    """dexp^-1 of (w, f), two brackets of it, on an element of the algebra."""
-    once, once_f = _bracket(w, f, slope, g)
-    twice, twice_f = _bracket(w, f, once, once_f)
-    return plus(plus(slope, -0.5, once), 1.0 / 12.0, twice), plus(plus(g, -0.5, once_f), 1.0 / 12.0, twice_f)
+def bent_back(element: Any, slope: Any) -> Any:
+    """dexp^-1 of an element of the algebra, two brackets of it, on another one."""
+    once = _bracket(element, slope)
+    return add(add(slope, once, -0.5), _bracket(element, once), 1.0 / 12.0)
+
+
+@register_jitable
+def _of_top(par: Any, L: Any) -> Any:
+    """The element of se(3) that the field is at L."""
+    return (*scaled(1.0 / par.I1, L), 0.0, 0.0, par.mgl)
+
+
+@register_jitable
+def _of_body(par: Any, M: Any) -> Any:
+    """That of a body, seen from itself."""
+    return -par.a1 * M[0], -par.a2 * M[1], -par.a3 * M[2], -par.c1, -par.c2, -par.c3
 
 
 Part = Callable[..., Any]
@@ -109,27 +119,8 @@ NUMBERS = (0.0,) * len(TOP._fields)
 
 
 def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
-    i = 0
-    for share in rule.shares:
-        for weight in rule.weights:
-            numbers[i] = (h * share) * weight
-            i += 1
-
-
-def _sum(terms: int, first: int) -> Part:
-    """``(slopes, row, j)`` to the sum of so many slopes, whose weights begin at this number of the row."""
-    if terms == 0:
-
-        def summed(slopes, row, j):  # type: ignore[no-untyped-def]
-            return NOUGHT, NOUGHT
-    else:
-        before, last, at = _sum(terms - 1, first), terms - 1, first + terms - 1
-
-        def summed(slopes, row, j):  # type: ignore[no-untyped-def]
-            (w, f), weight = before(slopes, row, j), row[at * W + j]
-            return plus(w, weight, slopes[last][0]), plus(f, weight, slopes[last][1])
-
-    return register_jitable(summed)
+    for i in range(len(rule.weights)):
+        numbers[i] = h * rule.weights[i]
 
 
 def _product(count: int, terms: int, first: int, stages: int) -> Part:
@@ -137,15 +128,16 @@ def _product(count: int, terms: int, first: int, stages: int) -> Part:
     if count == 0:
 
         def made(e, L, slopes, row, j):  # type: ignore[no-untyped-def]
-            return (0.0, NOUGHT, e, NOUGHT), NOUGHT, NOUGHT, 0.0
+            return (0.0, NOUGHT, e, NOUGHT), NO_SLOPE, 0.0
     else:
-        before, summed = _product(count - 1, terms, first, stages), _sum(terms, first + (count - 1) * stages)
+        before = _product(count - 1, terms, first, stages)
+        summed = weighted_in_lanes(terms, first + (count - 1) * stages)
 
         def made(e, L, slopes, row, j):  # type: ignore[no-untyped-def]
-            so_far, _, _, far = before(e, L, slopes, row, j)
-            w, f = summed(slopes, row, j)
-            square = half_square(w)
-            return acted(so_far, L, w, f, near(square)), w, f, far if square < 1.0 else 1.0
+            so_far, _, far = before(e, L, slopes, row, j)
+            element = summed(NO_SLOPE, slopes, row, j)
+            square = half_square(element)
+            return acted(so_far, L, element, near(square)), element, far if square < 1.0 else 1.0
 
     return register_jitable(made)
 
@@ -155,18 +147,18 @@ def _stages(counts: tuple[int, ...], stages: int, bent: bool) -> Part:
     if not counts:
 
         def slopes(par, e, L, row, j):  # type: ignore[no-untyped-def]
-            return ((scaled(1.0 / par.I1, L), (0.0, 0.0, par.mgl)),), 0.0
+            return (_of_top(par, L),), 0.0
     else:
         before = _stages(counts[:-1], stages, bent)
         made = _product(counts[-1], len(counts), sum(counts[:-1]) * stages, stages)
 
         def slopes(par, e, L, row, j):  # type: ignore[no-untyped-def]
             known, far = before(par, e, L, row, j)
-            so_far, w, f, too_far = made(e, L, known, row, j)
-            slope, g = scaled(1.0 / par.I1, plus(L, 1.0, so_far[3])), (0.0, 0.0, par.mgl)
+            so_far, element, too_far = made(e, L, known, row, j)
+            slope = _of_top(par, plus(L, 1.0, so_far[3]))
             if bent:
-                slope, g = bent_back(w, f, slope, g)
-            return (*known, (slope, g)), max(far, too_far)
+                slope = bent_back(element, slope)
+            return (*known, slope), max(far, too_far)
 
     return register_jitable(slopes)
 
@@ -182,12 +174,11 @@ def _of_shape(counts: tuple[int, ...], bent: bool) -> Lanes:
         for j in range(W):
             par, (q, e, L) = TOP(*column(table, 0, j, NUMBERS)), entered(block, j)
             known, far = slopes(par, e, L, row, j)
-            (m, v, _, dL), _, _, too_far = whole(e, L, known, row, j)
+            (m, v, _, dL), _, too_far = whole(e, L, known, row, j)
             left(block, j, q, m, v, dL)
             give_up(block, j, max(far, too_far) != 0.0)
 
-    each = sum(counts) * stages
-    return stepped(part, _lay, 0, each, carried=UNSPUN, effort=lambda rule: len(rule.counts) * len(rule.shares))
+    return stepped(part, _lay, 0, sum(counts) * stages, carried=UNSPUN, effort=lambda rule: len(rule.counts))
 
 
 class LieTable(NamedTuple):
@@ -196,53 +187,31 @@ class LieTable(NamedTuple):
     weights: tuple[float, ...]  # row by row, one entry a stage
     counts: tuple[float, ...]  # exponentials of each stage from the second on, and of the step
     bent: float = 0.0  # 1 for Munthe-Kaas
-    shares: tuple[float, ...] = (1.0,)
-
-
-@register_jitable
-def _store(slopes: Any, i: int, w: Any, f: Any) -> None:
-    for k in range(3):
-        slopes[i, k], slopes[i, 3 + k] = w[k], f[k]
+    shares: tuple[float, ...] = (1.0,)  # the step in one part: lanes lay out no other
 
 
 def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return np.empty((len(rule.counts), 6))
 
 
-@register_jitable
-def _of_top(par: Any, L: Any) -> Any:
-    """The element of se(3) that the field is at L."""
-    return scaled(1.0 / par.I1, L), (0.0, 0.0, par.mgl)
-
-
-@register_jitable
-def _of_body(par: Any, M: Any) -> Any:
-    """That of a body, seen from itself."""
-    return (-par.a1 * M[0], -par.a2 * M[1], -par.a3 * M[2]), (-par.c1, -par.c2, -par.c3)
-
-
-def _turning(element: Callable[..., Any]) -> Callable[..., Any]:
-    """One step, with ``element(par, L)`` of se(3); the work counted is the number of force evaluations."""
+def _turning(field: Callable[..., Any]) -> Callable[..., Any]:
+    """One step, with ``field(par, L)`` in se(3); the work counted is the number of force evaluations."""
 
     def turn(par, rule, e, L, slopes, h):  # type: ignore[no-untyped-def]
         stages, row = len(rule.counts), 0
-        _store(slopes, 0, *element(par, L))
+        store(slopes, 0, field(par, L))
         made = 0.0, NOUGHT, e, NOUGHT
         for i in range(1, stages + 1):
-            made, w, f = (0.0, NOUGHT, e, NOUGHT), NOUGHT, NOUGHT
+            made, element = (0.0, NOUGHT, e, NOUGHT), NO_SLOPE
             for _ in range(int(rule.counts[i - 1])):
-                w, f = NOUGHT, NOUGHT
+                element = NO_SLOPE
                 for j in range(i):
-                    weight = h * rule.weights[row + j]
-                    w = plus(w, weight, (slopes[j, 0], slopes[j, 1], slopes[j, 2]))
-                    f = plus(f, weight, (slopes[j, 3], slopes[j, 4], slopes[j, 5]))
+                    element = add(element, row_of(slopes, j, NO_SLOPE), h * rule.weights[row + j])
                 row += stages
-                made = acted(made, L, w, f, any_angle(half_square(w)))
+                made = acted(made, L, element, any_angle(half_square(element)))
             if i < stages:
-                slope, g = element(par, plus(L, 1.0, made[3]))
-                if rule.bent != 0.0:
-                    slope, g = bent_back(w, f, slope, g)
-                _store(slopes, i, slope, g)
+                slope = field(par, plus(L, 1.0, made[3]))
+                store(slopes, i, bent_back(element, slope) if rule.bent != 0.0 else slope)
         return made[0], made[1], made[3], slopes, stages, OK
 
     return turn
@@ -263,8 +232,7 @@ def lie_runge_kutta(
     return Integrator(
         name=name, family="lie-group", summary=summary, reference=reference, order=order, explicit=True,
         symplectic=False, symmetric=False, conserves=frozenset({"p_psi", "axis_length"}),
-        solvers=in_both_charts(march, rule, UNSPUN, 1, implicit=False)
-        | loop.on_body(march_body, rule, implicit=False),
+        solvers=in_charts(march, rule, UNSPUN, 1, implicit=False, of_body=march_body),
         needs="group", general=True,
     )  # fmt: skip
 

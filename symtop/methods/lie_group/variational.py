@@ -38,8 +38,7 @@ from symtop.methods.framework.body import observe_turned, torque
 from symtop.methods.framework.loop import Loop
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group import loop
-from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_both_charts, iterated_loop, lie_loop, moved
+from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_charts, iterated_loop, lie_loop, moved
 from symtop.methods.splitting.coefficients import SUZUKI_4
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
@@ -93,32 +92,16 @@ RETRACTION = (  # k from 0 in the interval that it lies in
 )
 
 
-@register_jitable
-def _kicked(par: Any, e: Any, L: Any, half: float) -> Any:
-    """Half a step's momentum after half of the kick, a: what is across the axis and what is along it."""
-    a = scaled(half, plus(L, 1.0, scaled(half, gravity(par, e))))
-    A = dot(a, e)
-    return plus(a, -A, e), A
-
-
-@register_jitable
-def _rotated(par: Any, e: Any, across: Any, half: float, n: float, i: float, x: float) -> Any:
-    """The rotation of n, i and x, and the change of L with both halves of the kick."""
-    bent = (par.I3 - par.I1) * x
-    side = plus(scaled(i, across), -bent, cross(across, e))
-    u = plus(scaled(x, e), n / (i * i + bent * bent), side)
-    m, v = cayley(u)
-    kick = scaled(half, gravity(par, e))
-    return m, v, plus(kick, half, gravity(par, plus(e, 1.0, moved(m, v, e))))
-
-
 def _loop(first: Callable[..., Any], after: Callable[..., Any], rates: Callable[..., Any], unknowns: int) -> Loop:
     """The step by one of the two equations, with so many numbers in x: for one, and in lanes."""
     for function in (first, after, rates):
         register_jitable(function)
 
     def start(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
-        across, A = _kicked(par, e, L, 0.5 * h)
+        """Half a step's momentum after half of the kick, a: across the axis and along it."""
+        a = scaled(0.5 * h, plus(L, 1.0, scaled(0.5 * h, gravity(par, e))))
+        A = dot(a, e)
+        across = plus(a, -A, e)
         square = dot(across, across)
         return (*e, *across, A, square), first(par, A, square)
 
@@ -126,8 +109,13 @@ def _loop(first: Callable[..., Any], after: Callable[..., Any], rates: Callable[
         return after(par, opened[6], opened[7], x)
 
     def close(par, rule, carry, h, opened, x):  # type: ignore[no-untyped-def]
-        n, i, along = rates(par, opened[6], x)
-        return (*_rotated(par, opened[:3], opened[3:6], 0.5 * h, n, i, along), carry)
+        """The rotation, and the change of L with both halves of the kick."""
+        (n, i, along), e, across, half = rates(par, opened[6], x), opened[:3], opened[3:6], 0.5 * h
+        bent = (par.I3 - par.I1) * along
+        side = plus(scaled(i, across), -bent, cross(across, e))
+        m, v = cayley(plus(scaled(along, e), n / (i * i + bent * bent), side))
+        kick = scaled(half, gravity(par, e))
+        return m, v, plus(kick, half, gravity(par, plus(e, 1.0, moved(m, v, e)))), carry
 
     return iterated_loop((start, again, close), MOST, opened=8, unknowns=unknowns)
 
@@ -174,8 +162,7 @@ def lie_variational(name: str, rule: Variational, order: int, summary: str, refe
     return Integrator(
         name=name, family="discrete-lagrangian", summary=summary, reference=reference, order=order, explicit=False,
         symplectic=True, symmetric=True, conserves=frozenset({"p_phi", "p_psi", "axis_length"}),
-        solvers=in_both_charts(MARCH[rule.kind], rule, SPUN, 1, implicit=True)
-        | loop.on_body(march_body, rule, implicit=True),
+        solvers=in_charts(MARCH[rule.kind], rule, SPUN, 1, implicit=True, of_body=march_body),
         needs="kicks", general=True,
     )  # fmt: skip
 

@@ -31,28 +31,23 @@ from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import Later
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group.loop import UNSPUN, in_both_charts, lie_loop
+from symtop.methods.lie_group.loop import UNSPUN, in_charts, lie_loop
 from symtop.methods.runge_kutta.gauss import ROUND_OFF, SWEEPS, gauss_rule, packed, stage_weights
 from symtop.methods.vectors import conjugate
 from symtop.model.body import product
-
-ORIGIN = 1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
 
 
 @register_jitable
 def _field(par: Any, e: Any, y: Any) -> Any:
     """Time derivative of (g, r)."""
-    g, r = (y[0], y[1], y[2], y[3]), (y[4], y[5], y[6], y[7])
+    g, r = y[:4], y[4:]
     quarter = 0.25 / par.I1
     L = product(r, conjugate(g))  # its vector is 2 L
     w = 0.0, quarter * L[1], quarter * L[2], quarter * L[3]
     moves, turns = product(w, g), product(w, r)
     a, b, c, d = product(g, (0.0, e[0], e[1], e[2]))
     twice = 2.0 * par.mgl
-    return (
-        moves[0], moves[1], moves[2], moves[3],
-        turns[0] - twice * d, turns[1] - twice * c, turns[2] + twice * b, turns[3] + twice * a,
-    )  # fmt: skip
+    return (*moves, turns[0] - twice * d, turns[1] - twice * c, turns[2] + twice * b, turns[3] + twice * a)
 
 
 def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
@@ -62,8 +57,7 @@ def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 @register_jitable
 def _swept(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
     """Fill in the increments of the stages; the sweeps that it took, and the outcome."""
-    stages, start = len(rule.b), ORIGIN
-    start = set_item(set_item(set_item(start, 5, 2.0 * L[0]), 6, 2.0 * L[1]), 7, 2.0 * L[2])
+    stages, start = len(rule.b), (1.0, 0.0, 0.0, 0.0, 0.0, 2.0 * L[0], 2.0 * L[1], 2.0 * L[2])
     unit = 1.0 / (abs(L[0]) + abs(L[1]) + abs(L[2]) + np.sqrt(par.I1 * abs(par.mgl)) + 1e-300)
     slope = _field(par, e, start)
     stage_weights(rule, h, work[:, 8])
@@ -94,18 +88,17 @@ def _swept(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
 def turn(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
     """One step; the work counted is the number of sweeps over the stages."""
     effort, outcome = _swept(par, rule, e, L, work, h)
-    step = ORIGIN
+    step = (0.0,) * 8
     for m in range(8):
         total = 0.0
         for i in range(len(rule.b)):
             total += work[i, m]
         step = set_item(step, m, total)
     # Im(r g*)/2 - L with g = 1 + dg, r = 2 L + dr: no difference of large numbers
-    dg, dr = (step[0], step[1], step[2], step[3]), (step[4], step[5], step[6], step[7])
-    back = conjugate(dg)
+    dr, back = step[4:], conjugate(step[:4])
     linear, bent = product((0.0, L[0], L[1], L[2]), back), product(dr, back)
     dL = (0.5 * (dr[1] + bent[1]) + linear[1], 0.5 * (dr[2] + bent[2]) + linear[2], 0.5 * (dr[3] + bent[3]) + linear[3])
-    return step[0], (step[1], step[2], step[3]), dL, work, effort, outcome
+    return step[0], step[1:4], dL, work, effort, outcome
 
 
 march = lie_loop(turn, _begin)
@@ -118,7 +111,7 @@ def collective_gauss(stages: int) -> Integrator:
         name=f"collective-gauss-{2 * stages}",
         family="lie-group",
         summary=f"Gauss collocation with {stages} stage{'s' if stages > 1 else ''} on quaternions: Lie-Poisson",
-        solvers=in_both_charts(march, rule, UNSPUN, stages, implicit=True),
+        solvers=in_charts(march, rule, UNSPUN, stages, implicit=True),
         order=2 * stages,
         explicit=False,
         symplectic=True,

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from symtop.core.errors import SymtopError, row
 from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework.body import General
-from symtop.methods.framework.equations import FORMS, Formulation
+from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.lanes import Lanes, W, column, put, reading
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import OK
@@ -68,7 +68,7 @@ def written_out(count: int, stage: Callable[[int], Callable[..., Any]]) -> Calla
     return register_jitable(slopes)
 
 
-def _sum(terms: int, first: int) -> Callable[..., Any]:
+def weighted_in_lanes(terms: int, first: int) -> Callable[..., Any]:
     """``(place, slopes, table, j)`` to place + w_1 k_1 + ... of so many terms, whose weights begin at this number."""
     weights = reading(terms)
 
@@ -76,42 +76,6 @@ def _sum(terms: int, first: int) -> Callable[..., Any]:
         return combined(place, slopes, weights(table, first, j), 1.0)
 
     return register_jitable(added)
-
-
-def explicit_in_lanes(
-    field: Callable[..., Any], ended: Callable[..., Any], *, top: Any, dimension: int
-) -> Callable[[Any], Lanes]:
-    """Explicit tableaux in lanes; ``ended(state, step)`` is a step's outcome."""
-    d, zeros, numbers = dimension, (0.0,) * dimension, (0.0,) * len(top._fields)
-    tops, step_at, flag = len(numbers), 2 * d, 3 * d
-
-    def stage(i: int) -> Callable[..., Any]:
-        place = _sum(i, tops + i * (i - 1) // 2)
-
-        def slope(par, state, made, table, j):  # type: ignore[no-untyped-def]
-            return field(par, place(state, made, table, j))
-
-        return slope
-
-    @functools.cache
-    def lanes(count: int) -> Lanes:
-        stages, total = written_out(count, stage), _sum(count, tops + count * (count - 1) // 2)
-
-        def step(block, table):  # type: ignore[no-untyped-def]
-            wide_vectors()
-            for j in range(W):
-                state, par = column(block, 0, j, zeros), top(*column(table, 0, j, numbers))
-                step = total(zeros, stages(par, state, field(par, state), table, j), table, j)
-                block[flag * W + j] = block[flag * W + j] if ended(state, step) == OK else 1.0
-                moved, low = accumulate(state, column(block, d, j, zeros), step)
-                put(block, 0, j, moved)
-                put(block, d, j, low)
-                put(block, step_at, j, step)
-
-        size = count * (count + 1) // 2
-        return Lanes(step, _lay, lambda _: 0.0, lambda _: size, top, d, 1, lambda _: count, begin=no_carry)
-
-    return lambda rule: lanes(len(rule.b))
 
 
 Row = Sequence[float] | NDArray[Any]
@@ -171,31 +135,52 @@ def weighted(weights: Any, state: Any, slopes: Any, h: float) -> Any:
     return step
 
 
-def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """Working space for the slopes of any tableau, (stages, dimension)."""
-    return np.empty((len(rule.b), len(state)))
+def _loop(form: Any, top: Any) -> Loop:
+    """The loop in one chart, for one and in lanes; the work counted is the number of force evaluations."""
+    field, ended, d = form.field, form.ended, form.prepare.size
+    zeros, numbers, step_at, flag = (0.0,) * d, (0.0,) * len(top._fields), 2 * d, 3 * d
+    tops = len(numbers)
 
-
-def _loop(form: Formulation, top: Any, dimension: int) -> Loop:
-    """The work counted is the number of force evaluations."""
-    field, ended_at = form.field, form.ended
-
-    @register_jitable
-    def ended(state, step):  # type: ignore[no-untyped-def]
-        return ended_at(summed(state, step))
+    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
+        return np.empty((len(rule.b), len(state)))
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
         store(carry, 0, field(par, state))
         later_stages(field, par, rule.a, len(rule.b), state, carry, h)
         step = weighted(rule.b, state, carry, h)
-        return step, carry, len(rule.b), ended(state, step)
+        return step, carry, len(rule.b), ended(summed(state, step))
 
-    lanes = explicit_in_lanes(field, ended, top=top, dimension=dimension)
-    return kernel_loop(begin, increment, form.observe, lanes=lanes)
+    def stage(i: int) -> Callable[..., Any]:
+        place = weighted_in_lanes(i, tops + i * (i - 1) // 2)
+
+        def slope(par, state, made, table, j):  # type: ignore[no-untyped-def]
+            return field(par, place(state, made, table, j))
+
+        return slope
+
+    @functools.cache
+    def lanes(count: int) -> Lanes:
+        stages, total = written_out(count, stage), weighted_in_lanes(count, tops + count * (count - 1) // 2)
+
+        def step(block, table):  # type: ignore[no-untyped-def]
+            wide_vectors()
+            for j in range(W):
+                state, par = column(block, 0, j, zeros), top(*column(table, 0, j, numbers))
+                step = total(zeros, stages(par, state, field(par, state), table, j), table, j)
+                block[flag * W + j] = block[flag * W + j] if ended(summed(state, step)) == OK else 1.0
+                moved, low = accumulate(state, column(block, d, j, zeros), step)
+                put(block, 0, j, moved)
+                put(block, d, j, low)
+                put(block, step_at, j, step)
+
+        size = count * (count + 1) // 2
+        return Lanes(step, _lay, lambda _: 0.0, lambda _: size, top, d, 1, lambda _: count, begin=no_carry)
+
+    return kernel_loop(begin, increment, form.observe, lanes=lambda rule: lanes(len(rule.b)))
 
 
-_STEPPED = {"angles": (BareTop, 6), "axis": (SpaceTop, 6), "attitude": (SpaceTop, 7), BODY: (General, 7)}
-LOOPS = {chart: _loop(form, *_STEPPED[chart]) for chart, form in FORMS.items()}
+_TOPS = {"angles": BareTop, "axis": SpaceTop, "attitude": SpaceTop, BODY: General}
+LOOPS = {chart: _loop(form, _TOPS[chart]) for chart, form in FORMS.items()}
 
 
 def _explicit(a: Rows, b: Row) -> tuple[list[list[float]], list[float]]:

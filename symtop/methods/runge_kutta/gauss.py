@@ -83,15 +83,6 @@ def _at_stage(state: Any, work: Any, stages: int, i: int) -> Any:
 
 
 @register_jitable
-def _pull(field: Any, par: Any, state: Any, work: Any, stages: int, share: float) -> None:
-    """The increments of L that belong to those of e."""
-    for i in range(stages):
-        slope = field(par, _at_stage(state, work, stages, i))
-        for m in range(3, 5):
-            work[i, m] = share * work[i, len(state)] * slope[m]
-
-
-@register_jitable
 def _linearise(field: Any, par: Any, state: Any, work: Any, stages: int, share: float, first: int, mgl: float) -> None:
     """The equations for corrections of the three components from `first` on, and what they must make up for."""
     base = 4 * stages + 1
@@ -143,7 +134,10 @@ def _iterate(
     """Newton from the increments as they are, for a share of the step: iterations, and did they converge."""
     base, effort, converged = 4 * stages + 1, 0, False
     while True:
-        _pull(field, par, state, work, stages, share)
+        for i in range(stages):  # the increments of L that belong to those of e
+            slope = field(par, _at_stage(state, work, stages, i))
+            for m in range(3, 5):
+                work[i, m] = share * work[i, len(state)] * slope[m]
         if converged or effort == DIRECT:
             return effort, converged
         _linearise(field, par, state, work, stages, share, first, mgl)
@@ -171,7 +165,7 @@ def _twice(work: Any, dimension: int, stages: int) -> None:
 
 @register_jitable
 def solve_stages(field: Any, par: Any, state: Any, work: Any, stages: int) -> Any:
-    """Solve a step in the array of `working_space`: iterations, and did they converge. `_iterate` is inlined: once."""
+    """Solve a step in the array of `_loop`: iterations, and did they converge. `_iterate` is inlined: once."""
     effort, rung, first, mgl, grown = 0, RUNGS, 0, par.mgl, False
     _twice(work, len(state), stages)
     for i in range(stages):
@@ -278,104 +272,9 @@ def _unit_of_body(par: Any, state: Any) -> float:
 
 
 @register_jitable
-def working_space(field: Any, unit: Any, par: Any, rule: Any, state: Any, h: float) -> Any:
-    """One array for all that a step reads and writes, because numba counts references to each.
-
-    Of its rows 0 .. s-1 hold L_i and then h b_i; s .. 2s-1 are room for the prediction; 2s .. 3s-1 hold mu, and then
-    have room for what Newton makes of it; 3s .. 4s-1 hold the predictor; row 4s begins with 1/|L|, the unit in which
-    corrections of L are judged; the last 3s are room for Newton's equations. L_i starts as h b_i f(y).
-    """
-    stages, dimension = len(rule.b), len(state)
-    work = np.empty((7 * stages + 1, max(dimension + 1, 3 * stages + 1)))
-    stage_weights(rule, h, work[:stages, dimension])
-    work[4 * stages, 0] = unit(par, state)
-    slope = field(par, state)
-    for i in range(stages):
-        for m in range(dimension):
-            work[i, m] = work[i, dimension] * slope[m]
-        for j in range(stages):
-            work[2 * stages + i, j] = rule.mu[i, j]
-            work[3 * stages + i, j] = rule.predict[i, j]
-    return work
-
-
-@register_jitable
 def farthest(sweeps: int) -> float:
     """A correction beyond this, after so many sweeps, that does not fall will not converge."""
     return FARTHEST * PACE**sweeps
-
-
-def _stepping(field: Any, first: int, still: int, solve: Any) -> Any:  # noqa: C901
-    """``(par, state, work)`` to the increment of a step, sweeps and iterations of Newton that it took, and the outcome.
-
-    Three components from `first` on are a momentum; `still` has no slope. All of it is one function, for an array that
-    is handed to another one is counted once more. The largest correction is kept for the momentum and for the rest, not
-    for each component, for which there are not registers enough.
-    """
-
-    @register_jitable
-    def gauss_step(par, state, work):  # type: ignore[no-untyped-def]  # noqa: C901  (one loop, read in one piece)
-        stages, dimension = len(work) // 7, len(state)
-        nothing = zero(state)
-        for i in range(stages):  # the last step's polynomial, evaluated at this step's nodes
-            ahead = nothing
-            for j in range(stages):
-                weight = work[3 * stages + i, j]
-                for m in range(dimension):
-                    if m != still:
-                        ahead = set_item(ahead, m, ahead[m] + weight * work[j, m])
-            for m in range(dimension):
-                work[stages + i, m] = ahead[m]
-        for i in range(stages):
-            for m in range(dimension):
-                work[i, m] = work[stages + i, m]
-        last, effort, outcome = np.inf, 0, NOT_CONVERGED
-        while effort < SWEEPS:
-            gap = gap_momentum = 0.0
-            for i in range(stages):
-                place = nothing
-                for j in range(stages):
-                    weight = work[2 * stages + i, j]
-                    for m in range(dimension):
-                        if m != still:
-                            place = set_item(place, m, place[m] + weight * work[j, m])
-                for m in range(dimension):
-                    place = set_item(place, m, state[m] + place[m])
-                slope = field(par, place)
-                for m in range(dimension):
-                    if m == still:
-                        continue
-                    value = work[i, dimension] * slope[m]
-                    change = abs(value - work[i, m])
-                    if first <= m < first + 3:
-                        gap_momentum = max(gap_momentum, change)
-                    else:
-                        gap = max(gap, change)
-                    work[i, m] = value
-            effort += 1
-            correction = max(gap, gap_momentum * work[4 * stages, 0])
-            if not 0.0 < correction < last:
-                if correction < ROUND_OFF:
-                    outcome = OK
-                    break
-                if not correction <= farthest(effort):
-                    break
-            last = correction
-        if outcome != OK:
-            iterations, converged = solve(field, par, state, work, stages)
-            effort += iterations
-            if converged:
-                outcome = OK
-        step = nothing
-        for i in range(stages):
-            for m in range(dimension):
-                step = set_item(step, m, step[m] + work[i, m])
-        return step, effort, outcome if np.isfinite(step[0]) else NOT_CONVERGED
-
-    return gauss_step
-
-
-Row = tuple[float, ...]
 
 
 def _after(first: Any, then: Any) -> Any:
@@ -391,7 +290,7 @@ def _after(first: Any, then: Any) -> Any:
 
 
 def _swept(  # noqa: C901  (the loops of one step, read in one piece)
-    field: Callable[..., Any], mu: tuple[Row, ...], predict: tuple[Row, ...], dimension: int
+    field: Callable[..., Any], mu: tuple[tuple[float, ...], ...], predict: tuple[tuple[float, ...], ...], dimension: int
 ) -> Lanes:
     """A Gauss method in lanes: `mu` and `predict` as `GaussRule` has them."""
     stages, zeros, numbers = len(mu), (0.0,) * dimension, (0.0,) * len(SpaceTop._fields)
@@ -455,30 +354,6 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
     extrapolate = functools.reduce(_after, [ahead(m) for m in range(dimension) if m != STILL])
     sweep = functools.reduce(_after, map(stage, range(stages)))
 
-    @register_jitable
-    def judge(block, j, largest):  # type: ignore[no-untyped-def]
-        correction = max(block[gap_at * W + j], block[pull_at * W + j] * block[unit_at * W + j])
-        live, falls = block[live_at * W + j], 0.0 < correction < block[last_at * W + j]
-        goes_on = falls or (correction >= ROUND_OFF and correction <= largest)
-        good = goes_on or correction < ROUND_OFF
-        block[work * W + j] += live
-        block[last_at * W + j] = correction
-        block[flag * W + j] = block[flag * W + j] if good or live == 0.0 else 1.0
-        block[live_at * W + j] = live if goes_on else 0.0
-
-    @register_jitable
-    def finish(block, j):  # type: ignore[no-untyped-def]
-        step = zeros
-        for i in range(stages):
-            for m in range(dimension):
-                step = set_item(step, m, step[m] + block[(carry_at + i * dimension + m) * W + j])
-        healthy = np.isfinite(step[0]) and block[live_at * W + j] == 0.0
-        moved, low = accumulate(column(block, 0, j, zeros), column(block, dimension, j, zeros), step)
-        put(block, 0, j, moved)
-        put(block, dimension, j, low)
-        put(block, 2 * dimension, j, step)
-        block[flag * W + j] = block[flag * W + j] if healthy else 1.0
-
     def step(block, table):  # type: ignore[no-untyped-def]
         wide_vectors()
         extrapolate(block, table)
@@ -491,11 +366,27 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
             effort += 1
             largest = farthest(effort)
             for j in range(W):
-                judge(block, j, largest)
+                correction = max(block[gap_at * W + j], block[pull_at * W + j] * block[unit_at * W + j])
+                live, falls = block[live_at * W + j], 0.0 < correction < block[last_at * W + j]
+                goes_on = falls or (correction >= ROUND_OFF and correction <= largest)
+                good = goes_on or correction < ROUND_OFF
+                block[work * W + j] += live
+                block[last_at * W + j] = correction
+                block[flag * W + j] = block[flag * W + j] if good or live == 0.0 else 1.0
+                block[live_at * W + j] = live if goes_on else 0.0
             if none_left(block, live_at):
                 break
         for j in range(W):
-            finish(block, j)
+            dstate = zeros
+            for i in range(stages):
+                for m in range(dimension):
+                    dstate = set_item(dstate, m, dstate[m] + block[(carry_at + i * dimension + m) * W + j])
+            healthy = np.isfinite(dstate[0]) and block[live_at * W + j] == 0.0
+            moved, low = accumulate(column(block, 0, j, zeros), column(block, dimension, j, zeros), dstate)
+            put(block, 0, j, moved)
+            put(block, dimension, j, low)
+            put(block, 2 * dimension, j, dstate)
+            block[flag * W + j] = block[flag * W + j] if healthy else 1.0
 
     def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
         stage_weights(rule, h, numbers)
@@ -508,25 +399,96 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
                 values = set_item(values, i * dimension + m, shares[i] * slope[m])
         return set_item(values, carry - 1, momentum_unit(par, state))
 
-    def read(numbers):  # type: ignore[no-untyped-def]
-        return 0.0
-
-    return Lanes(step, lay, read, lambda _: stages, SpaceTop, dimension, carry, room=lambda _: 4, begin=begin)
+    return Lanes(step, lay, lambda _: 0.0, lambda _: stages, SpaceTop, dimension, carry, room=lambda _: 4, begin=begin)
 
 
-def _loop(
+def _loop(  # noqa: C901
     field: Any, dimension: int, first: int = 3, still: int = STILL, unit: Any = momentum_unit,
     solve: Any = solve_stages, observe: Any = observe_axis,
 ) -> Loop:  # fmt: skip
-    """The loop on states that move by `field`, a momentum from `first` on; it counts sweeps and iterations."""
-    gauss_step = _stepping(field, first, still, solve)
+    """The loop on states that move by `field`, a momentum from `first` on and, in `still`, a number that has no slope.
+
+    It counts sweeps and iterations of Newton. A step is one function, for an array that is handed to another one is
+    counted once more. The largest correction is kept for the momentum and for the rest, not for each component, for
+    which there are not registers enough.
+    """
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
-        return working_space(field, unit, par, rule, state, h)
+        """One array for all that a step reads and writes, because numba counts references to each.
 
-    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        step, effort, outcome = gauss_step(par, state, carry)
-        return step, carry, effort, outcome
+        Of its rows 0 .. s-1 hold L_i and then h b_i; s .. 2s-1 are room for the prediction; 2s .. 3s-1 hold mu, and
+        then have room for what Newton makes of it; 3s .. 4s-1 hold the predictor; row 4s begins with 1/|L|, the unit in
+        which corrections of L are judged; the last 3s are room for Newton's equations. L_i starts as h b_i f(y).
+        """
+        stages = len(rule.b)
+        work = np.empty((7 * stages + 1, max(dimension + 1, 3 * stages + 1)))
+        stage_weights(rule, h, work[:stages, dimension])
+        work[4 * stages, 0] = unit(par, state)
+        slope = field(par, state)
+        for i in range(stages):
+            for m in range(dimension):
+                work[i, m] = work[i, dimension] * slope[m]
+            for j in range(stages):
+                work[2 * stages + i, j] = rule.mu[i, j]
+                work[3 * stages + i, j] = rule.predict[i, j]
+        return work
+
+    def increment(par, rule, state, work, h):  # type: ignore[no-untyped-def]  # noqa: C901  (one loop, read in one piece)
+        stages, nothing = len(work) // 7, zero(state)
+        for i in range(stages):  # the last step's polynomial, evaluated at this step's nodes
+            ahead = nothing
+            for j in range(stages):
+                weight = work[3 * stages + i, j]
+                for m in range(dimension):
+                    if m != still:
+                        ahead = set_item(ahead, m, ahead[m] + weight * work[j, m])
+            for m in range(dimension):
+                work[stages + i, m] = ahead[m]
+        for i in range(stages):
+            for m in range(dimension):
+                work[i, m] = work[stages + i, m]
+        last, effort, outcome = np.inf, 0, NOT_CONVERGED
+        while effort < SWEEPS:
+            gap = gap_momentum = 0.0
+            for i in range(stages):
+                place = nothing
+                for j in range(stages):
+                    weight = work[2 * stages + i, j]
+                    for m in range(dimension):
+                        if m != still:
+                            place = set_item(place, m, place[m] + weight * work[j, m])
+                for m in range(dimension):
+                    place = set_item(place, m, state[m] + place[m])
+                slope = field(par, place)
+                for m in range(dimension):
+                    if m == still:
+                        continue
+                    value = work[i, dimension] * slope[m]
+                    change = abs(value - work[i, m])
+                    if first <= m < first + 3:
+                        gap_momentum = max(gap_momentum, change)
+                    else:
+                        gap = max(gap, change)
+                    work[i, m] = value
+            effort += 1
+            correction = max(gap, gap_momentum * work[4 * stages, 0])
+            if not 0.0 < correction < last:
+                if correction < ROUND_OFF:
+                    outcome = OK
+                    break
+                if not correction <= farthest(effort):
+                    break
+            last = correction
+        if outcome != OK:
+            iterations, converged = solve(field, par, state, work, stages)
+            effort += iterations
+            if converged:
+                outcome = OK
+        step = nothing
+        for i in range(stages):
+            for m in range(dimension):
+                step = set_item(step, m, step[m] + work[i, m])
+        return step, work, effort, outcome if np.isfinite(step[0]) else NOT_CONVERGED
 
     @functools.cache
     def of_rows(mu: Any, predict: Any) -> Lanes:

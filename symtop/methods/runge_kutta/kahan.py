@@ -56,14 +56,14 @@ def _axis_step(par: Any, e: Any, L: Any, h: float) -> Any:
 
 
 def _increment_axis(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    d, D = _axis_step(par, (state[0], state[1], state[2]), (state[3], state[4], state[5]), h)
+    d, D = _axis_step(par, state[:3], state[3:], h)
     return (*d, *D), carry, 1, finite_outcome(d[0] + d[1] + d[2])
 
 
 def _increment_frame(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """a is turned by the same rule, with L known at both ends."""
-    L, a = (state[3], state[4], state[5]), (state[6], state[7], state[8])
-    d, D = _axis_step(par, (state[0], state[1], state[2]), L, h)
+    L, a = state[3:6], state[6:]
+    d, D = _axis_step(par, state[:3], L, h)
     half = scaled(0.5 * h / par.I1, L)
     right = plus(scaled(2.0, cross(half, a)), 0.5 * h / par.I1, cross(D, a))
     turned = plus(plus(right, 1.0, cross(half, right)), dot(half, right), half)

@@ -13,7 +13,7 @@ start. It ends at theta = 0 and pi. Not to be confused with `srkn`, splittings, 
 estimate. Source: Dormand, El-Mikkawy, Prince, IMA J. Numer. Anal. 7 (1987) 423, the pair RKN8(6)9FM.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
@@ -72,21 +72,6 @@ def kicks(par: Any, theta: Any) -> Any:
     return -slope, precession, par.p_psi / par.I3 - turn, theta
 
 
-def _stages(nodes: Sequence[float], rows: Sequence[Row]) -> Any:
-    """``(par, state, first, slopes, h)`` to the k of a step, a tuple of tuples; nothing is read from `slopes`."""
-
-    def stage(i: int) -> Callable[..., Any]:
-        bend, node = combination(rows[i - 1]), nodes[i - 1]
-
-        def k(par, state, made, slopes, h):  # type: ignore[no-untyped-def]
-            flown = state[0] + node * h * state[1] / par.I1
-            return kicks(par, bend((flown,), made, h * h / par.I1)[0])
-
-        return k
-
-    return written_out(len(rows) + 1, stage)
-
-
 def _total(weights: Row, velocity: Row) -> Any:
     """``(par, made, h)`` to what the forces add to (theta, p_theta, phi, psi)."""
     bend, turn = combination(weights), combination(velocity)
@@ -122,7 +107,17 @@ class Nystrom(NamedTuple):
     def __call__(self, _: Callable[..., Any]) -> Method:
         """Attempts, their error, and samples."""
         table, velocity = self.table, self.table.velocity
-        stages, cost, count = _stages(table.c, table.a), len(table.a), len(velocity)
+
+        def stage(i: int) -> Callable[..., Any]:
+            bend, node = combination(table.a[i - 1]), table.c[i - 1]
+
+            def k(par, state, made, slopes, h):  # type: ignore[no-untyped-def]
+                flown = state[0] + node * h * state[1] / par.I1
+                return kicks(par, bend((flown,), made, h * h / par.I1)[0])
+
+            return k
+
+        stages, cost, count = written_out(len(table.a) + 1, stage), len(table.a), len(velocity)
         total, error = _total(table.b, velocity), _total(table.error, table.velocity_error)
 
         @register_jitable

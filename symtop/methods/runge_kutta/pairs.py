@@ -68,16 +68,6 @@ def rms(vector: Any, state: Any, other: Any, tolerance: float) -> float:
 
 
 @register_jitable
-def interpolate(dense: Any, state: Any, slopes: Any, h: float, x: float) -> Any:
-    """The state at a fraction x of the step."""
-    weights = dense[0] + dense[1][:3]  # a tuple of seven
-    for i in range(len(dense)):
-        row = dense[i]
-        weights = set_item(weights, i, x * (row[0] + x * (row[1] + x * (row[2] + x * row[3]))))
-    return summed(state, weighted(weights, state, slopes, h))
-
-
-@register_jitable
 def nothing_more(par: Any, state: Any, slopes: Any, h: float) -> int:
     """Samples need no further evaluations."""
     return 0
@@ -118,25 +108,12 @@ def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, toleran
     return min(100.0 * trial, guess, end)
 
 
-# numba has an assignment of slices format the sentence of its error: a third of what a kernel takes to compile
-
-
 @register_jitable
-def rows_from(place: Any, first: int, memory: Any) -> None:
-    """The memory from where it stands in a place."""
-    rows, size = memory.shape
-    for j in range(rows):
-        for m in range(size):
-            memory[j, m] = place[first + j * size + m]
-
-
-@register_jitable
-def rows_to(place: Any, first: int, memory: Any) -> None:
-    """Write the memory to its part of a place."""
-    rows, size = memory.shape
-    for j in range(rows):
-        for m in range(size):
-            place[first + j * size + m] = memory[j, m]
+def copy(rows: Any, to: Any) -> None:
+    """Write rows to others; numba has an assignment of slices format an error: a third of compiling a kernel."""
+    for j in range(len(rows)):
+        for m in range(rows.shape[1]):
+            to[j, m] = rows[j, m]
 
 
 @functools.cache
@@ -150,15 +127,13 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
     opened = form.prepare.opened
     sample = as_it_steps if form.present is None else form.present.sample
     register_jitable(observe)
-    made: Method = method(field)
-    advance, refine, between, last, power = made
+    advance, refine, between, last, power = method(field)
     clock = size + rows * size
 
-    def march(  # type: ignore[no-untyped-def]
-        numbers, tolerance, times, budget, seen, place, states, momenta
-    ):
+    def march(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]
         par, state = prepare(*opened(numbers))
         memory, nothing, end = np.zeros((rows, size)), zero(state), times[-1]
+        kept = place[:clock].reshape(1 + rows, size)  # the state, and the memory, there across lines of the cache
         steps = effort = outcome = 0
         if seen < 0:
             slope = field(par, state)
@@ -166,8 +141,8 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
             seen, t, step, effort = 0, 0.0, first_step(field, par, state, slope, end, tolerance, power), 2
         else:
             t, step = place[clock], place[clock + 1]
-            state = row_of(place[:size].reshape(1, size), 0, state)
-            rows_from(place, size, memory)
+            state = row_of(kept, 0, state)
+            copy(kept[1:], memory)
         while t < end and effort < budget:
             before, start = state, t
             state, t, step, work, outcome = advance(par, before, memory, tolerance, start, step, end)
@@ -184,13 +159,11 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
                 momenta[seen, 0], momenta[seen, 1] = observe(par, memory, place_then, nothing, h)
                 seen += 1
             outcome = ended(state)
-            for m in range(size):
-                memory[0, m] = memory[last, m]
+            store(memory, 0, row_of(memory, last, state))
             if outcome != OK:
                 break
-        for m in range(size):
-            place[m] = state[m]
-        rows_to(place, size, memory)
+        store(kept, 0, state)
+        copy(memory, kept[1:])
         place[clock], place[clock + 1] = t, step
         return seen, steps, effort, outcome
 
@@ -289,7 +262,11 @@ class Pair(NamedTuple):
 
         @register_jitable
         def polynomial(par, state, new, slopes, h, x):  # type: ignore[no-untyped-def]
-            return interpolate(dense, state, slopes, h, x)
+            weights = dense[0] + dense[1][:3]  # a tuple of seven
+            for i in range(len(dense)):
+                row = dense[i]
+                weights = set_item(weights, i, x * (row[0] + x * (row[1] + x * (row[2] + x * row[3]))))
+            return summed(state, weighted(weights, state, slopes, h))
 
         @register_jitable
         def shorter(par, state, new, slopes, h, x):  # type: ignore[no-untyped-def]

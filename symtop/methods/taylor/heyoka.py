@@ -17,7 +17,7 @@ Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, 
 import functools
 import importlib.util
 import sys
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,9 +25,10 @@ import numpy as np
 from symtop.core.numbers import EPSILON, context
 from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.plan import Array, Plan, Run
+from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.registry import Integrator, Solver
 from symtop.model import charts
-from symtop.model.charts import BODY, space_momenta
+from symtop.model.charts import BODY
 from symtop.model.exact import heavy_body
 from symtop.model.top import Angles, SymmetricTop
 
@@ -156,18 +157,20 @@ def propagate(
     return Flight(states[grid.size - times.size :], int(steps), order, outcome.name, time)
 
 
-def solver(chart: str, precision: str, read: Callable[..., tuple[Array, Array, Array]] | None = None) -> Solver:
-    """A solver of one chart and precision, samples in double; ``read(top, times, states)`` adds momenta where it is."""
+def solver(chart: str, precision: str) -> Solver:
+    """A solver of one chart and precision, samples in double."""
+    form = FORMS[chart]
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         most = max(1, int(min(plan.most(MOST_STEPS[precision]), sys.maxsize)))  # infinity is a budget, too
         flight = propagate(chart, precision, plan.tolerance, top, start, plan.times, most)
         count, size = len(flight.states), plan.times.size
         states = _padded(flight.states, size)
-        if read is None:
-            p_phi, p_psi = (_padded(values, size) for values in space_momenta(chart, flight.states))
-        else:
-            states, p_phi, p_psi = read(top, plan.times, states)
+        par = BareTop(top.I1, top.I3, top.mgl) if chart == "angles" else None
+        whole = flight.states if chart in ("axis", "attitude") else states  # the others work in double
+        p_phi, p_psi = (_padded(values, size) for values in form.momenta(par, whole))
+        if form.present is not None:
+            states = form.present(par, plan.times, states)
         good: Any = np.isfinite(states).all(axis=1)
         word = "ok" if good.all() and "time_limit" in flight.outcome else "not_finite"
         if "step_limit" in flight.outcome and good[:count].all():
@@ -208,8 +211,7 @@ def built_in() -> list[Integrator]:
         Integrator(
             name="taylor" if precision == "double" else f"taylor-{precision}",
             family="taylor", summary=_SUMMARIES[precision],
-            solvers={chart: solver(chart, precision) for chart in ("axis", "attitude")}
-            | {BODY: solver(BODY, precision, lambda _, __, states: (states, *FORMS[BODY].momenta(None, states)))},
+            solvers={chart: solver(chart, precision) for chart in ("axis", "attitude", BODY)},
             control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
             least_tolerance=arithmetic(precision).epsilon / 1000.0,
             default_tolerance=arithmetic(precision).epsilon / 100.0,

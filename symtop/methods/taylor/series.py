@@ -66,9 +66,10 @@ from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.lanes import Lanes, one_loop
 from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
 from symtop.methods.framework.plan import NOT_FINITE, STEP_TOO_SMALL
-from symtop.methods.framework.preparation import BareTop, Scaled, Start
+from symtop.methods.framework.preparation import BareTop, Scaled, Shown, Start, as_it_steps
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, with_spin
+from symtop.methods.runge_kutta.explicit import row_of, store
 from symtop.methods.simd import Components, Vectors
 from symtop.methods.vectors import accumulate, zero
 
@@ -138,12 +139,6 @@ def axis_terms(v: Vectors, first: First, a: Any, m: Any, last: int) -> tuple[lis
     return S, U
 
 
-def slope(v: Vectors, S: list[Any], last: int) -> Any:
-    """Sum of n S_n for 1 < n <= last, which is odd."""
-    pairs = ((S[n + 1], v.constant(n + 1), v.builder.fmul(S[n], v.constant(n))) for n in range(2, last, 2))
-    return v.total([v.fma(*pair) for pair in pairs])
-
-
 def size(v: Vectors, S: list[Any], n: int) -> Any:
     """Square of the length of the terms u_n and -i n y_n, of which the second is that of z one order lower."""
     b = v.builder
@@ -164,7 +159,9 @@ def axis_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..., A
             norm = b.fma(x, x, b.fma(y, y, b.fmul(u, u)))
             first = first_terms(v, (x, y), u, norm, (wx, wy), a, p, m)
             S, _ = axis_terms(v, first, v.pack(a), v.pack(m), order + 1)
-            whole, bent = b.fadd(S[1], v.total(S[2 : order + 1])), slope(v, S, order + 1)
+            whole = b.fadd(S[1], v.total(S[2 : order + 1]))
+            pairs = ((S[n + 1], v.constant(n + 1), b.fmul(S[n], v.constant(n))) for n in range(2, order + 1, 2))
+            bent = v.total([v.fma(*pair) for pair in pairs])  # the sum of n S_n from 2 on
             turned = v.lane(bent, 1), b.fneg(v.lane(bent, 0)), v.lane(whole, 2)
             momentum = b.fmul(m, v.lane(whole, 0)), b.fmul(m, v.lane(whole, 1))
             return v.array([*turned, *momentum, size(v, S, order), size(v, S, order - 1)])
@@ -172,23 +169,6 @@ def axis_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..., A
         return types.UniTuple(types.float64, 7)(state, a, m), emit
 
     return intrinsic(series)  # type: ignore[no-any-return]
-
-
-def _first_halves(v: Vectors, q: Any, w: Any, a: Any, P: Any) -> tuple[Any, Any]:
-    """X_0 and X_1: chi' = -(i/2) (P chi_1 + conj(a w) chi_2), -(i/2) (a w chi_1 - P chi_2)."""
-    b = v.builder
-    mul, fma, neg, half = b.fmul, b.fma, b.fneg, v.number(0.5)
-    qw, qx, qy, qz = q
-    ar, ai = mul(a, w[0]), mul(a, w[1])
-    real1 = fma(P, qw, fma(ar, qy, neg(mul(ai, qx))))
-    imag1 = neg(fma(P, qz, fma(ar, qx, mul(ai, qy))))
-    real2 = b.fsub(fma(ar, qw, mul(ai, qz)), mul(P, qy))
-    imag2 = fma(ai, qw, fma(P, qx, neg(mul(ar, qz))))
-    minus = v.number(-0.5)
-    return (
-        v.pack(qw, neg(qz), qy, neg(qx)),
-        v.pack(mul(half, imag1), mul(minus, real1), mul(half, imag2), mul(minus, real2)),
-    )
 
 
 def _size(v: Vectors, term: Any) -> Any:
@@ -222,7 +202,14 @@ def attitude_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..
             rest1 = b.fsub(first.ku, fma(c(0.5), pull, base))
             rest2 = b.fsub(first.ku, fma(c(-0.5), pull, base))
             rest = v.pack(rest1, rest1, rest2, rest2)
-            X = list(_first_halves(v, (qw, qx, qy, qz), (wx, wy), a, first.P))
+            # chi' = -(i/2) (P chi_1 + conj(a w) chi_2), -(i/2) (a w chi_1 - P chi_2)
+            ar, ai, half, minus = mul(a, wx), mul(a, wy), c(0.5), c(-0.5)
+            real1 = fma(first.P, qw, fma(ar, qy, neg(mul(ai, qx))))
+            imag1 = neg(fma(first.P, qz, fma(ar, qx, mul(ai, qy))))
+            real2 = b.fsub(fma(ar, qw, mul(ai, qz)), mul(first.P, qy))
+            imag2 = fma(ai, qw, fma(first.P, qx, neg(mul(ar, qz))))
+            X = [v.pack(qw, neg(qz), qy, neg(qx))]
+            X.append(v.pack(mul(half, imag1), mul(minus, real1), mul(half, imag2), mul(minus, real2)))
             X.append(mul(mul(rest, X[0]), v.constant(0.5)))
             av, mv = v.pack(a), v.pack(m)
             for n in range(1, order - 1):
@@ -240,14 +227,7 @@ def attitude_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..
     return intrinsic(series)  # type: ignore[no-any-return]
 
 
-def present(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """The spin since the start."""
-    return with_spin(par, state, k * h)
-
-
-def _loop(
-    series_of: Callable[..., Any], size: int, observe: Callable[..., Any], **present: Any
-) -> Callable[[int], Loop]:
+def _loop(series_of: Callable[..., Any], size: int, observe: Callable[..., Any]) -> Callable[[int], Loop]:
     """The loop of an order on states of `size` numbers, of which the last, L_z, does not move."""
     still = size - 1
 
@@ -282,24 +262,23 @@ def _loop(
             step, outcome = stepped(rule, state)
             return step, carry, 1, outcome
 
-        return kernel_loop(no_carry, increment, observe, lanes=lambda _: in_lanes(order), **present)
+        return kernel_loop(no_carry, increment, observe, lanes=lambda _: in_lanes(order))
 
     return loop
 
 
 march_axis = _loop(axis_sum, 6, space.observe_axis)
-march_attitude = _loop(attitude_sum, 7, space.observe_attitude, present=present)
-
+march_attitude = _loop(attitude_sum, 7, space.observe_attitude)
+spun = Shown(lambda par, t, state: with_spin(par, state, t), 7)  # with the spin since the start
 
 ORDERS = (8, 12, 16, 20)
 BLOCK = 1_000_000  # series between returns to Python
 SERIES = 200_000_000  # of one run: about half a minute
 ACCEPTED, SAFETY, GROW, EARLIER = 4.0, 0.95, 4.0, 0.25
 
-
-CHARTS: dict[str, tuple[Any, ...]] = {  # preparation, series, sample(par, state, t), axis of a state
-    "axis": (space.on_axis, axis_sum, lambda _par, state, _t: state, lambda state: state[:3]),
-    "attitude": (space.on_attitude, attitude_sum, with_spin, lambda state: axis_of(*state[:4])),
+CHARTS: dict[str, tuple[Any, ...]] = {  # preparation, series, sample(par, t, state), axis of a state
+    "axis": (space.on_axis, axis_sum, as_it_steps, lambda state: state[:3]),
+    "attitude": (space.on_attitude, attitude_sum, spun.sample, lambda state: axis_of(*state[:4])),
 }
 
 
@@ -316,7 +295,7 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
     """
     preparation, series_of, sample, axis = CHARTS[chart]
     prepare, size, series = preparation.numbers, preparation.size, series_of(order)
-    sample, axis = register_jitable(sample), register_jitable(axis)
+    register_jitable(axis)
 
     @register_jitable
     def terms(state, body, h):  # type: ignore[no-untyped-def]
@@ -327,15 +306,15 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
         last = max(math.sqrt(out[size - 1]), EARLIER * math.sqrt(out[size]))
         return set_item(dstate, size - 1, 0.0), last
 
-    def run(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]  # noqa: C901
+    def run(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]
         body = BareTop(*numbers[:3])
         par, state = prepare(body, Start(*numbers[3:]))
         low, t, rest = zero(state), 0.0, 0.0
         turn = (state[size - 3] ** 2 + state[size - 2] ** 2 + state[size - 1] ** 2) / body.I1**2
         h = 1.0 / math.sqrt(turn + 4.0 * abs(body.mgl) / body.I1 + 1.0 / times[-1] ** 2)
+        kept = place[: 2 * size].reshape(2, size)
         if seen >= 0:
-            for i in range(size):
-                state, low = set_item(state, i, place[i]), set_item(low, i, place[size + i])
+            state, low = row_of(kept, 0, state), row_of(kept, 1, low)
             t, rest, h = place[2 * size], place[2 * size + 1], place[2 * size + 2]
         seen = max(seen, 0)
         steps = effort = outcome = 0
@@ -349,9 +328,8 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
                 while seen < len(times) and (times[seen] - ahead) - after <= 0.0:
                     part, _ = terms(state, body, (times[seen] - t) - rest)
                     shown, _ = accumulate(state, low, part)
-                    shown = sample(par, shown, times[seen])
-                    for i in range(size):
-                        states[seen, i] = shown[i]
+                    shown = sample(par, times[seen], shown)
+                    store(states, seen, shown)
                     e = axis(shown)
                     momenta[seen, 0] = shown[size - 1]
                     momenta[seen, 1] = shown[size - 3] * e[0] + shown[size - 2] * e[1] + shown[size - 1] * e[2]
@@ -368,8 +346,8 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
             if not np.isfinite(state[0] + state[size - 2]):
                 outcome = NOT_FINITE
                 break
-        for i in range(size):
-            place[i], place[size + i] = state[i], low[i]
+        store(kept, 0, state)
+        store(kept, 1, low)
         place[2 * size], place[2 * size + 1], place[2 * size + 2] = t, rest, h
         return seen, steps, effort, outcome
 
@@ -399,7 +377,7 @@ def series(name: str, order: int = DEFAULT_ORDER) -> Integrator:
         summary=f"Taylor series on the space-frame equations, order {order}, by products of vectors",
         solvers={
             "axis": FixedStep(march_axis(order), rule, space.on_axis, order, implicit=False),
-            "attitude": FixedStep(march_attitude(order), rule, space.on_attitude, order, implicit=False),
+            "attitude": FixedStep(march_attitude(order), rule, space.on_attitude, order, implicit=False, present=spun),
         },
         order=order, explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi"}),
         reference="biscani-izzo-2021", needs="this-top", general=False, inner_loop="vector registers",
