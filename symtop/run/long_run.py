@@ -105,7 +105,6 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     par, rule, state = solver.setup(scene.top, scene.start, h)
     assert isinstance(solver.loop, Loop)  # noqa: S101
     energy_unit, momentum_unit, start = scene.energy_scale, scene.momentum_scale, scene.top.momenta(scene.start)
-
     conserved = {"p_phi", "p_psi"} <= set(method.conserves or ())
 
     def energies(states: Array, momenta: Array) -> tuple[Array, Array]:
@@ -116,10 +115,8 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     head = solver.loop(par, rule, state, h, scattered(0, FIRST, 8 * SAMPLES))
     first, momenta = presented(solver, par, head.states), head.momenta
     ran = np.isfinite(first).all(axis=1) & np.isfinite(momenta).all(axis=1)  # a run may fail in its first steps
-    at_start, momenta_start = (
-        presented(solver, par, solver.loop(par, rule, state, h, np.array([0])).states),
-        np.array([start[:2]]),
-    )
+    at_start = presented(solver, par, solver.loop(par, rule, state, h, np.array([0])).states)
+    momenta_start = np.array([start[:2]])
     first, momenta = (first[ran], momenta[ran]) if ran.any() else (at_start, momenta_start)
     energy_start = float(energies(at_start, momenta_start)[0][0])
     rest = modified.oscillation(*modified.section(chart, first), energies(first, momenta)[1])

@@ -321,6 +321,5 @@ def checked_numbers(numbers: ArrayLike, names: Any = None) -> Array:
         try:
             SymmetricTop(*row[:3]), Angles(*row[3:])
         except SymtopError as error:
-            called = member if names is None else names[member]
-            raise SymtopError(f"member {called}: {error}") from None
+            raise SymtopError(f"member {member if names is None else names[member]}: {error}") from None
     return rows

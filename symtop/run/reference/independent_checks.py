@@ -149,10 +149,7 @@ def envelope(checks: Checks, name: str, times: Array) -> Array:
 def _unwrapped(angle: Any, near: Array) -> Any:
     """`angle` on the branch nearest `near`, without rounding 2 pi to double."""
     turns = np.rint((near - angle.astype(np.float64)) / (2.0 * math.pi))
-    if angle.dtype == np.float64:
-        return angle + turns * (2.0 * math.pi)
-    kind = angle.dtype.type
-    return angle + turns.astype(angle.dtype) * kind("6.283185307179586476925286766559005768394")
+    return angle + turns.astype(angle.dtype) * angle.dtype.type("6.283185307179586476925286766559005768394")
 
 
 class Integration(NamedTuple):

@@ -109,9 +109,8 @@ def reference(
     dimension ``time``, in the order of `times`; axis and quaternion have a second one. `precision` is "closed-form", or
     "double", "longdouble" or "quad" for heyoka's integration in that arithmetic.
 
-    `certify` is for the closed form: "digits" holds it against 40 digits at times up to a million nutations,
-    "discrete-map" also against `exact-discrete` iterated over a hundred, "integration" moreover against heyoka in long
-    double. Each is done once a scene and kept on disk.
+    `certify`, for the closed form: "digits" holds it against 40 digits, "discrete-map" also against `exact-discrete`
+    iterated, "integration" moreover against heyoka in long double; each once a scene, and kept on disk.
     Attributes say what was done: ``bound`` what the bounds follow from, ``certificate`` what the closed form of this
     scene has been held against, and how it fared, ``arithmetic`` in which its constants were computed,
     ``conditioning`` how much the motion amplifies a change of its start (`symtop.run.reference.sensitivity`): bounds
@@ -136,8 +135,7 @@ def reference(
     source = precision if have_heyoka() else "closed-form"
     if not have_heyoka() and (source != precision or certify == "integration"):
         missing = "is certified without an integration" if source == precision else f"stands in for {precision!r}"
-        sentence = f"heyoka is not installed: the closed form in double {missing}"
-        warnings.warn(sentence, SymtopWarning, stacklevel=2)
+        warnings.warn(f"heyoka is not installed: the closed form in double {missing}", SymtopWarning, stacklevel=2)
     if source == "closed-form":
         data, words = _by_closed_form(chosen, moments, certify)
     else:
@@ -203,7 +201,7 @@ def _by_closed_form(scene: Scene, times: Array, certify: str | None) -> tuple[xr
     """Values and bounds in double, and words on both."""
     values, known = closed_values(scene, times), certificate(scene, certify)
     bounds = closed_bounds(scene, times, values)
-    if known is not None and (known.factor, known.doubt) != (1.0, 0.0):
+    if known is not None:
         bounds = {name: known.factor * bound + known.doubt for name, bound in bounds.items()}
     words = {
         "bound": "from the arithmetic of the closed form, its views and integrals compared at every time",
