@@ -404,8 +404,7 @@ def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expec
     if not limited and (coarse := _coarse(motion, method, chart, plan, expected, size)) is not None:
         return coarse
     if expected.outcome != "ok":
-        end = sentence(expected.outcome, expected.reached, plan.horizon, second)
-        return Trouble(f"expect the run to be {end}")
+        return Trouble(f"expect the run to be {sentence(expected.outcome, expected.reached, plan.horizon, second)}")
     if method.adaptive:
         tolerance = max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance)
         advice = f"try tolerance {tolerance:.1g}"

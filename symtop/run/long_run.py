@@ -295,7 +295,6 @@ class _Checkpoint:
             self.save()
 
     def save(self) -> None:
-        """Write what is not yet on disk."""
         if self.file is None or self.latest is None:
             return
         at, rows = self.latest
@@ -336,6 +335,5 @@ class _Checkpoint:
             raise SymtopError(f"{error}{left}") from error
 
     def close(self) -> None:
-        """The run is done."""
         if self.file is not None:
             self.file.unlink(missing_ok=True)

@@ -191,5 +191,4 @@ def growth(scene: Scene) -> float:
     others = (w - SMALL * x, x + SMALL * w, y, z), start.omega_body
     changed = [Attitude(*others), Attitude(start.quaternion, (a + scale, b - scale, c + scale))]
     runs = [solver(scene.top, at, plan).states[:, :4] for at in (start, *changed)]
-    grown = max(float(np.nanmax(attitude_distance(run, runs[0]))) for run in runs[1:])
-    return grown / (2.0 * SMALL)
+    return max(float(np.nanmax(attitude_distance(run, runs[0]))) for run in runs[1:]) / (2.0 * SMALL)

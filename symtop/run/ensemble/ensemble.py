@@ -185,7 +185,6 @@ def _observables(variables: Iterable[str] | None, chart: str) -> tuple[str, ...]
 
 
 def _check_memory(n: int, samples: int, observables: tuple[str, ...]) -> None:
-    """Refuse a dataset that does not fit into memory."""
     values = n * samples * (1 + sum({"axis": 3, "momentum": 3, "quaternion": 4}.get(name, 1) for name in observables))
     if values > MOST_VALUES:
         size = f"{n} members with {samples} samples are {values:.3g} numbers, more than the {MOST_VALUES:.3g} that are"
@@ -354,7 +353,6 @@ class Stream:
         return self.folder / f"{chunk.start}-{chunk.stop}.npz"
 
     def _columns(self, chunk: slice, *names: str) -> dict[str, Any]:
-        """The columns of a chunk, or some of them."""
         path = self._part(chunk)
         try:
             with path.open("rb") as file, np.load(file) as columns:

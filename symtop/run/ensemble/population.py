@@ -191,7 +191,6 @@ def _scaled(start: _Start, draw: Array, mgl: float) -> dict[str, Array]:
 
 
 def _fill(columns: dict[str, Any], draw: Array, kind: str) -> None:
-    """Fill in the members of these draws."""
     names, ends = list(STRATA), np.cumsum([share for share, _ in STRATA.values()])[:-1]
     strata = np.searchsorted(ends, draw[0], side="right")
     strata = strata if kind == "all" else np.full_like(strata, names.index(kind))

@@ -25,6 +25,7 @@ from symtop.methods.framework.registry import integrator
 from symtop.methods.taylor import heyoka
 from symtop.model import charts
 from symtop.model.charts import Array
+from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 
@@ -105,10 +106,8 @@ def check_times(scene: Scene, horizon: float) -> Array:
 
 
 @functools.lru_cache(maxsize=8)
-def precise_form(top: SymmetricTop, start: Angles, digits: int) -> Any:
+def precise_form(top: SymmetricTop, start: Angles, digits: int) -> PreciseForm:
     """The closed form in so many digits."""
-    from symtop.model.exact.digits import PreciseForm
-
     return PreciseForm(top, start, digits)
 
 

@@ -44,7 +44,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 from reprlib import repr as short
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -59,6 +59,8 @@ from symtop.model import charts
 from symtop.model.body import Attitude, RigidBody
 from symtop.model.charts import Array
 from symtop.model.exact.closed_form import ClosedForm
+from symtop.model.exact.free_body import BodyMotion, FreeBody
+from symtop.model.exact.heavy_body import HeavyBody
 from symtop.model.exact.turning_points import RATE
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
 from symtop.run.reference.independent_checks import (
@@ -78,10 +80,6 @@ from symtop.run.reference.independent_checks import (
 )
 from symtop.run.reference.sensitivity import FAR, LEAST, conditioning
 from symtop.run.trajectory import dataset
-
-if TYPE_CHECKING:
-    from symtop.model.exact.free_body import BodyMotion, FreeBody
-    from symtop.model.exact.heavy_body import HeavyBody
 
 PRECISIONS = ("closed-form", "double", "longdouble", "quad")
 KINDS = ("digits", "discrete-map", "integration")  # of certificates
@@ -145,19 +143,13 @@ def reference(
 
 
 @functools.lru_cache(maxsize=64)
-def _motion(body: RigidBody, start: Attitude) -> "FreeBody | HeavyBody":
+def _motion(body: RigidBody, start: Attitude) -> FreeBody | HeavyBody:
     at = start.quaternion, body.momentum(start), body.momentum_lo(start)
-    if body.free:
-        from symtop.model.exact.free_body import FreeBody
-
-        return FreeBody(body.moments, *at)
-    from symtop.model.exact.heavy_body import HeavyBody
-
-    return HeavyBody(body.moments, body.torque, *at)
+    return FreeBody(body.moments, *at) if body.free else HeavyBody(body.moments, body.torque, *at)
 
 
 @functools.lru_cache(maxsize=16)
-def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> "BodyMotion":
+def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> BodyMotion:
     """The motion of a body of that name at times, kept for a while; SymtopError if it is lost before, as in chaos."""
     motion, times = _motion(body, start), np.frombuffer(plain).copy()
     sampled = motion.samples if body.free else functools.partial(motion.samples, precise=precise)  # type: ignore[call-arg]
@@ -175,7 +167,6 @@ def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, prec
 
 
 def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) -> xr.Dataset:
-    """The motion of a body without symmetry."""
     body, start = scene.top, scene.start
     known = ("closed-form",) if body.free else ("closed-form", "longdouble", "quad")
     one_of(f"precision on {scene.name}", precision, known)
