@@ -163,6 +163,7 @@ class PreciseForm:
                 words = f"the turning points must be separable with {MOST_DIGITS} digits"
                 raise SymtopError(f"{words}; these values are too extreme")
         self._set_periods(body, state)
+        self._last: tuple[Fraction, tuple[Any, Any, Any, Any, Any]] | None = None  # a time and its state
 
     def _resolve(self, body: list[Fraction], state: list[Fraction]) -> bool:
         """Invariants and turning points; False if the present precision does not tell all gaps from zero."""
@@ -293,7 +294,13 @@ class PreciseForm:
 
     def _state(self, time: Any) -> tuple[Any, Any, Any, Any, Any]:
         """sqrt((1 + u)/2) and sqrt((1 - u)/2), signed, phi + psi, phi - psi and theta', all in the upright picture."""
-        ctx, curve, elapsed = self.ctx, self.curve, self._real(rational("time", time))
+        exact, last = rational("time", time), self._last
+        if last is None or last[0] != exact:  # angles, axis and attitude of one time are asked for one after the other
+            self._last = last = exact, self._after(self._real(exact))
+        return last[1]
+
+    def _after(self, elapsed: Any) -> tuple[Any, Any, Any, Any, Any]:
+        ctx, curve = self.ctx, self.curve
         if curve.swing == 0:
             angles = [angle + rate * elapsed for angle, rate in zip(self.angles0, self.mean_rates, strict=True)]
             return ctx.sqrt(curve.floor.low / 2), ctx.sqrt(curve.crown.low / 2), angles[0], angles[1], ctx.zero
