@@ -237,8 +237,7 @@ def leaves(carry: Any) -> list[float]:
     """The floats in a kernel's carry: tuples of tuples, or one array."""
     if isinstance(carry, tuple):
         return [value for part in carry for value in leaves(part)]
-    values: list[float] = np.ravel(carry).astype(float).tolist()
-    return values
+    return [float(value) for value in np.ravel(carry)]
 
 
 def regrown(carry: Any, values: Iterator[float]) -> Any:

@@ -148,8 +148,7 @@ class ClosedForm(_Form):
     def __call__(self, times: ArrayLike) -> Motion[Array]:
         """Angles and rates at `times`; every field has their shape."""
         flat_times, shape = _in_a_row(times)
-        motion = fill(self._all, flat_times, samples.MOTION)[0]
-        return Motion(*motion) if len(shape) == 1 else Motion(*(row.reshape(shape) for row in motion))
+        return Motion(*(row.reshape(shape) for row in fill(self._all, flat_times, samples.MOTION)[0]))
 
     def turns(self, times: Array) -> Array:
         """phi and psi alone (2, n) at a row of times, with the bits of a call."""
@@ -169,8 +168,7 @@ class ClosedForm(_Form):
 
     def _view(self, times: ArrayLike, view: int) -> Array:
         flat_times, shape = _in_a_row(times)
-        values = fill(self._all, flat_times, view)
-        return values[0] if len(shape) == 1 else values.reshape(*shape, samples.WIDTHS[view])
+        return fill(self._all, flat_times, view).reshape(*shape, samples.WIDTHS[view])
 
 
 def compile_now() -> None:
@@ -221,7 +219,7 @@ def distances(constants: Array, times: Array, axes: Array) -> Array:
 
 
 def _put(kernel: LazyKernel, seconds: float, constants: Array, times: Array, *others: Any) -> None:
-    """Let a kernel fill in the last of its arguments, in so many seconds where it is interpreted."""
+    """Let a kernel fill in the last argument, in so many seconds if interpreted; refuse the time that it names."""
     if kernel.ready(seconds):
         bad = kernel.compiled(constants, times, *others)
     else:

@@ -251,12 +251,7 @@ class Job:
             if self.chart == "angles" and not 0.0 < start.theta < np.pi:
                 runs.outcome[i] = LEFT_CHART
                 continue
-            count, tolerance = plan.counts[i], np.nan if self.tolerance is None else float(self.tolerance[i])
-            if self.steps is None:  # what `simulate` would ask for
-                one = Plan.until(plan.times[i, :count], tolerance, self.budget)
-            else:
-                horizon = float(self.horizon[i])
-                one = Plan.steps(float(plan.step_size[i]), plan.marks[i, :count], horizon, self.budget)
+            one = self._plan(i, plan)
             try:
                 name = self.first + i if self.names is None else self.names[i]
                 run = solve(self.method, self.chart, top, start, one, f" on member {name}")
@@ -271,6 +266,14 @@ class Job:
             runs.steps[i], runs.force_evaluations[i], runs.newton_iterations[i] = run[3:6]
             runs.outcome[i], runs.reached[i] = OUTCOMES.index(run.outcome), run.reached
         return runs
+
+    def _plan(self, i: int, plan: Schedule) -> Plan:
+        """What `simulate` would ask a solver for."""
+        count, horizon = plan.counts[i], float(self.horizon[i])
+        if self.steps is not None:
+            return Plan.steps(float(plan.step_size[i]), plan.marks[i, :count], horizon, self.budget)
+        tolerance = np.nan if self.tolerance is None else float(self.tolerance[i])
+        return Plan.until(plan.times[i, :count], tolerance, self.budget)
 
     def _observables(self, view: View, times: Array) -> dict[str, Any]:
         """Of what a `Trajectory` shows of one run, what is asked for, of all."""
@@ -367,9 +370,7 @@ def _ended(runs: _Runs, plan: Schedule, lost: NDArray[np.bool_], outcome: int) -
 
 def same_times(times: Any, row: Any) -> bool:
     """Are these times of members (n, samples) all that row? NaN is what both have beyond runs of few steps."""
-    if (times == row).all():
-        return True
-    return bool(np.isnan(row).any() and np.array_equal(times, np.broadcast_to(row, times.shape), equal_nan=True))
+    return np.array_equal(times, np.broadcast_to(row, times.shape), equal_nan=True)
 
 
 def as_dataset(

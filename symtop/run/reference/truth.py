@@ -211,15 +211,13 @@ def _by_integration(scene: Scene, times: Array, precision: str) -> tuple[xr.Data
     else:
         path = place(_integration, scene.top, scene.start, precision, CHECKS, DIGITS, SAFETY, data=distinct.tobytes())
         data = cached(path, lambda: _integration(scene, distinct, precision), 5)
-    if not np.array_equal(times, distinct):
-        data = data.isel(time=order)
     words = {
         "bound": f"{SAFETY:g} times the largest error seen up to the next check",
         "certificate": f"{DIGITS} digits at times up to t = {distinct[-1]:.3g}",
         "arithmetic": precision,
         "conditioning": conditioned(scene, float(distinct[-1])),
     }
-    return data, words
+    return data.isel(time=order), words
 
 
 def conditioned(scene: Scene, horizon: float) -> str:
@@ -300,7 +298,7 @@ def closed_bounds(scene: Scene, times: Array, values: dict[str, Any]) -> dict[st
     for name in ("phi", "psi"):
         bounds[name] = ROUNDING[name] + 2.0 * EPSILON * np.abs(values[name]) + 2.0 * drift / sine
     wrong = ~(disagreement(form, times, values) <= SUSPICIOUS)
-    return {name: np.where(wrong, math.pi, bound) for name, bound in bounds.items()} if wrong.any() else bounds
+    return {name: np.where(wrong, math.pi, bound) for name, bound in bounds.items()}
 
 
 def disagreement(form: ClosedForm, times: Array, values: dict[str, Any]) -> Array:
@@ -317,8 +315,7 @@ def disagreement(form: ClosedForm, times: Array, values: dict[str, Any]) -> Arra
     spinning, lifting = 0.5 * form.p_psi**2 / top.I3, top.mgl * z
     energy = np.abs(moving + spinning + lifting - form.energy) / (moving + spinning + abs(top.mgl) + TINY)
     p_phi = np.abs(turning + form.p_psi * z - form.p_phi) / (np.abs(turning) + abs(form.p_psi) + TINY)
-    largest: Array = np.maximum(apart, np.maximum(energy, p_phi))
-    return largest
+    return np.asarray(np.maximum(apart, np.maximum(energy, p_phi)))
 
 
 class Certificate(NamedTuple):
