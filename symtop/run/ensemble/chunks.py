@@ -370,7 +370,9 @@ def _ended(runs: _Runs, plan: Schedule, lost: NDArray[np.bool_], outcome: int) -
 
 def same_times(times: Any, row: Any) -> bool:
     """Are these times of members (n, samples) all that row? NaN is what both have beyond runs of few steps."""
-    return np.array_equal(times, np.broadcast_to(row, times.shape), equal_nan=True)
+    if (times == row).all():
+        return True
+    return bool(np.isnan(row).any() and np.array_equal(times, np.broadcast_to(row, times.shape), equal_nan=True))
 
 
 def as_dataset(
