@@ -67,6 +67,8 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
         return marks * (horizon / steps), marks, False
     long_enough = math.isfinite(period) and horizon > 2.0 * period
     for dithered in (False, True):
+        if long_enough and not dithered and samples * WIDEST_GAP <= 1.0:
+            continue  # so few leave a wider stretch unseen, wherever they fall
         place = places(samples, dithered=dithered)
         if steps is None:
             marks, times = np.empty(0, dtype=np.int64), horizon * place
