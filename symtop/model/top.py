@@ -397,17 +397,25 @@ def _steady_theta(top: SymmetricTop, momenta: Momenta) -> float:
 
 @shared
 def turning_cosines(top: Any, at: Any) -> tuple[float, float]:
-    """`SymmetricTop.turning_cosines` of any records with these fields, by bisection."""
+    """`SymmetricTop.turning_cosines` of any records with these fields: bisections of both at a time."""
     cubic, start = nutation_cubic(top, at), math.cos(at.theta)
     rests = top.mgl == 0.0 and at.theta_dot == 0.0 and at.phi_dot * math.sin(at.theta) == 0.0
     if rests and cubic[2] * cubic[2] == 0.0:  # nothing turns the axis, and the cubic vanishes at every cosine
         return start, start
     low, high, below, above = -1.0, 1.0, start, start
     for _ in range(BISECTIONS):
-        u, v = 0.5 * (low + below), 0.5 * (high + above)
-        low, below = (u, below) if _climb(cubic, start, u) < 0.0 else (low, u)
-        high, above = (v, above) if _climb(cubic, start, v) < 0.0 else (high, v)
+        low, below, high, above = bisected(cubic, start, low, below, high, above)
     return 0.5 * (low + below), 0.5 * (high + above)
+
+
+@inlined
+def bisected(
+    cubic: tuple[float, float, float, float], start: float, low: float, below: float, high: float, above: float
+) -> tuple[float, float, float, float]:
+    """Half of the two intervals that hold the turning cosines, `low` to `below` and `above` to `high`."""
+    u, v = 0.5 * (low + below), 0.5 * (high + above)
+    beyond, past = _climb(cubic, start, u) < 0.0, _climb(cubic, start, v) < 0.0
+    return (u if beyond else low), (below if beyond else u), (v if past else high), (above if past else v)
 
 
 @inlined
@@ -421,7 +429,12 @@ def _climb(cubic: tuple[float, float, float, float], start: float, u: float) -> 
 @shared
 def nutation_period(top: Any, at: Any) -> float:
     """`SymmetricTop.nutation_period` of any records with these fields."""
-    low, high = turning_cosines(top, at)
+    return period_between(top, at, *turning_cosines(top, at))
+
+
+@shared
+def period_between(top: Any, at: Any, low: float, high: float) -> float:
+    """The period of a nutation between two turning cosines that are known."""
     frequency, _ = mean_nutation(top, at, low, high)
     return 2.0 * math.pi / frequency if frequency > 0.0 else math.inf
 
