@@ -92,8 +92,7 @@ class RigidBody:
 
     def __post_init__(self) -> None:
         for name in ("I1", "I2", "I3"):
-            moment = bounded(name, positive(name, getattr(self, name)), 1.0 / LARGEST)
-            object.__setattr__(self, name, moment)
+            object.__setattr__(self, name, bounded(name, positive(name, getattr(self, name)), 1.0 / LARGEST))
         least, middle, most = sorted(self.moments)
         if most > (least + middle) * (1.0 + SLACK):
             name = ("I1", "I2", "I3")[self.moments.index(most)]

@@ -352,8 +352,7 @@ class Catalogue(dict[str, Any]):
         import pandas as pd  # 0.2 s
 
         with pd.option_context("display.max_colwidth", None):
-            html: str = pd.DataFrame([entry.record() for entry in self.values()]).to_html(index=False)
-        return html
+            return str(pd.DataFrame([entry.record() for entry in self.values()]).to_html(index=False))
 
 
 @by_name

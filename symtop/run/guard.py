@@ -92,8 +92,6 @@ class Forecast(NamedTuple):
 
     axis_error: float  # expected largest, rad; inf if the probe did not get through, 0 if there is nothing to probe
     rounding: float  # what rounding alone will make of it, rad: large on a separatrix, whatever the method
-    steps_per_nutation: float  # nan for an adaptive method
-    passage: float  # rad of precession in one step at the closest approach to a pole; nan for an adaptive method
     outcome: str  # of the probe
     reached: float
     marks: Landmarks
@@ -128,8 +126,7 @@ def _probe(
     run = solve(method, chart, motion.scene.top, motion.start(since), piece)
     with np.errstate(all="ignore"):
         error = motion.error(piece.times, chart, run.states, since, plan.horizon)
-        lengths = np.linalg.norm(run.states[:, :4], axis=1) if chart in QUATERNIONS else None
-        stray = NO_LENGTHS if lengths is None else np.abs(lengths - 1.0)
+        stray = np.abs(np.linalg.norm(run.states[:, :4], axis=1) - 1.0) if chart in QUATERNIONS else NO_LENGTHS
     outcome = run.outcome
     if not math.isfinite(error.sum()):  # no angle is more than pi
         error[~np.isfinite(error)] = math.inf
@@ -258,16 +255,14 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: I
     """
     motion = motion or (Integrated if scene.of_body else Exact)(scene)
     marks = motion.marks
-    steps, passage = marks.period / plan.step_size, marks.rate * plan.step_size
     if method.control is None:
-        return Forecast(0.0, 0.0, steps, passage, "ok", plan.horizon, marks)
+        return Forecast(0.0, 0.0, "ok", plan.horizon, marks)
     error, probe = _expected(motion, method, chart, plan)
     partly = method.adaptive and method.implementation == "python" and not probe.times[-1] >= plan.horizon
     if partly and chart == "angles" and marks.gap < CLOSE:
         error = max(error, float(np.nan_to_num(motion.displacement(PASSING * plan.tolerance, plan.horizon))))
     unstable = _grown_tolerance(motion, method, plan) if partly else 0.0
-    whole = bool(probe.times[-1] >= plan.horizon * (1.0 - 1e-9))
-    growth = 1.0
+    whole, growth = bool(probe.times[-1] >= plan.horizon * (1.0 - 1e-9)), 1.0
     if not isinstance(motion, Exact) and not whole and plan.step_size * marks.frequency > SMALL_TURN:
         growth = _own_growth(motion, method, chart, plan, float(probe.times[-1]))
         pieces = plan.horizon / float(probe.times[-1]) - 1.0
@@ -280,7 +275,7 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: I
         reached = float(probe.times[-1]) * limit(plan) / max(probe.evaluations, 1)
         if reached < plan.horizon:
             error, ended = math.inf, ("out_of_budget", reached)
-    return Forecast(max(error, unstable), rounding, steps, passage, *ended, marks, unstable, whole, growth)
+    return Forecast(max(error, unstable), rounding, *ended, marks, unstable, whole, growth)
 
 
 def _length_lost(probe: Probe, horizon: float) -> tuple[str, float] | None:
@@ -409,8 +404,7 @@ def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expec
     if not limited and (coarse := _coarse(motion, method, chart, plan, expected, size)) is not None:
         return coarse
     if expected.outcome != "ok":
-        end = sentence(expected.outcome, expected.reached, plan.horizon, second)
-        return Trouble(f"expect the run to be {end}")
+        return Trouble(f"expect the run to be {sentence(expected.outcome, expected.reached, plan.horizon, second)}")
     if method.adaptive:
         tolerance = max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance)
         advice = f"try tolerance {tolerance:.1g}"
@@ -420,7 +414,7 @@ def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expec
     if method.order is None:
         return Trouble(f"{size}: it has no order, and smaller steps need not help; take another method, such as strang")
     return Trouble(
-        f"{size}: a step is 1/{expected.steps_per_nutation:.3g} of a {period}, and errors add up over "
+        f"{size}: a step is 1/{marks.period / plan.step_size:.3g} of a {period}, and errors add up over "
         f"{plan.horizon / marks.period:.3g} {period}s", _smaller(method, plan, expected),
     )  # fmt: skip
 
@@ -433,13 +427,13 @@ def _coarse(
     if expected.growth > 1.0:
         words = f"steps of {step:.4g} multiply a small change {expected.growth:.1g} times as much as the motion does"
         return Trouble(f"{size}: {words} in a short run", SMALL_TURN / frequency)
-    if chart == "angles" and expected.passage > COARSE:
+    if chart == "angles" and marks.rate * step > COARSE:
         return Trouble(
             f"{size}: the axis passes the {marks.pole} pole at {marks.gap:.2g} rad and precesses there by "
-            f"{expected.passage:.2g} rad in a step", PRECESSED / marks.rate,
+            f"{marks.rate * step:.2g} rad in a step", PRECESSED / marks.rate,
             "an integrator whose chart has no poles, such as strang",
         )  # fmt: skip
-    if expected.steps_per_nutation < 2.0:
+    if marks.period / step < 2.0:
         words = f"a step of {step:.4g} jumps over the nutation, whose period is {marks.period:.4g}"
         return Trouble(f"{size}: {words}", marks.period / 20.0)
     if step * frequency > SMALL_TURN and isinstance(motion, Exact):
@@ -456,4 +450,4 @@ def _coarse(
 def _smaller(method: Integrator, plan: Plan, expected: Forecast) -> float:
     """The step at which the forecast would be `AIM`, if the method keeps its order."""
     step = plan.step_size * math.pow(AIM / (min(expected.axis_error, 1.0) or AIM), 1.0 / (method.order or 1))
-    return min(step, plan.step_size * expected.steps_per_nutation / 20.0) if expected.axis_error > 1.0 else step
+    return min(step, expected.marks.period / 20.0) if expected.axis_error > 1.0 else step

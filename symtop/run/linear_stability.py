@@ -93,8 +93,7 @@ def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None) 
     for _ in range(ROUNDS):
         if not 1e-3 < theta < math.pi - 1e-3:
             return NO_TRACE
-        start = with_momenta(top, theta + NUDGE, momenta)
-        run = few_steps(method, chart, top, start, h)
+        run = few_steps(method, chart, top, with_momenta(top, theta + NUDGE, momenta), h)
         with np.errstate(over="ignore"):  # the run may have blown up
             y = np.asarray(View(chart, top, run.states).theta) - theta
         if run.outcome != "ok" or not np.isfinite(y).all():

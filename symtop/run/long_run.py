@@ -106,7 +106,6 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     par, rule, state = solver.setup(scene.top, scene.start, h)
     assert isinstance(solver.loop, Loop)  # noqa: S101
     energy_unit, momentum_unit, start = scene.energy_scale, scene.momentum_scale, scene.top.momenta(scene.start)
-
     conserved = {"p_phi", "p_psi"} <= set(method.conserves or ())
 
     def energies(states: Array, momenta: Array) -> tuple[Array, Array]:
@@ -117,10 +116,8 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     head = solver.loop(par, rule, state, h, scattered(0, FIRST, 8 * SAMPLES))
     first, momenta = presented(solver, par, head.states), head.momenta
     ran = np.isfinite(first).all(axis=1) & np.isfinite(momenta).all(axis=1)  # a run may fail in its first steps
-    at_start, momenta_start = (
-        presented(solver, par, solver.loop(par, rule, state, h, np.array([0])).states),
-        np.array([start[:2]]),
-    )
+    at_start = presented(solver, par, solver.loop(par, rule, state, h, np.array([0])).states)
+    momenta_start = np.array([start[:2]])
     first, momenta = (first[ran], momenta[ran]) if ran.any() else (at_start, momenta_start)
     energy_start = float(energies(at_start, momenta_start)[0][0])
     rest = modified.oscillation(*modified.section(chart, first), energies(first, momenta)[1])
@@ -241,8 +238,7 @@ def leaves(carry: Any) -> list[float]:
     """The floats in a kernel's carry: tuples of tuples, or one array."""
     if isinstance(carry, tuple):
         return [value for part in carry for value in leaves(part)]
-    values: list[float] = np.ravel(carry).astype(float).tolist()
-    return values
+    return [float(value) for value in np.ravel(carry)]
 
 
 def regrown(carry: Any, values: Iterator[float]) -> Any:
@@ -299,7 +295,6 @@ class _Checkpoint:
             self.save()
 
     def save(self) -> None:
-        """Write what is not yet on disk."""
         if self.file is None or self.latest is None:
             return
         at, rows = self.latest
@@ -340,6 +335,5 @@ class _Checkpoint:
             raise SymtopError(f"{error}{left}") from error
 
     def close(self) -> None:
-        """The run is done."""
         if self.file is not None:
             self.file.unlink(missing_ok=True)

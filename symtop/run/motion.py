@@ -151,8 +151,7 @@ class Integrated:
         looser = CALM if calm else 1.0
         true, check = self.states(times, FINE * looser), self.states(times[some], CHECK * looser)
         gap = np.abs(check - true[some])[:, : 4 if self.chart == BODY else 3].max(initial=0.0)
-        error: Array = self.apart((chart, states), (self.chart, true)) + gap
-        return error
+        return np.asarray(self.apart((chart, states), (self.chart, true)) + gap)
 
     def start(self, _: float, /) -> Any:
         """The state at a time, as a start: the start itself, a piece begins nowhere else."""
@@ -249,7 +248,7 @@ class Exact(Integrated):
 
     def error(self, times: Array, chart: str, states: Array, since: float, _: float, /) -> Array:
         """See `Integrated`; of the axis."""
-        return self.form.axis_distance(since + times if since else times, axes(chart, states))
+        return self.form.axis_distance(since + times, axes(chart, states))
 
     def start(self, since: float, /) -> Any:
         """See `Integrated`."""

@@ -150,7 +150,6 @@ def _expected(times: Array, error: Array, end: float, amplified: float, extent: 
 def _outlook(
     f: Any, t: float, y: Array, end: float, method: str, rule: Tableau | None, setting: float, accuracy: float
 ) -> Outlook:
-    """See `guard`."""
     from scipy.integrate import solve_ivp
 
     near, watched = _motion(f, t, y, end)

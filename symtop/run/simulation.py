@@ -102,8 +102,7 @@ def chart_of(method: Integrator, watched: str, observe: str | None = None) -> st
 
 def likely_step(scene: Scene, method: Integrator, horizon: float, accuracy: float) -> float:
     """A step whose error may be about `accuracy`: that of a fifth of a nutation, cut by the method's order."""
-    power = float(method.order or 2)
-    return min(0.2 * scene.time_scale(horizon) * math.pow(accuracy, 1.0 / power), horizon)
+    return min(0.2 * scene.time_scale(horizon) * math.pow(accuracy, 1.0 / (method.order or 2)), horizon)
 
 
 def check_control(method: Integrator, step: object, tolerance: object, name: str = "step_size") -> None:

@@ -38,7 +38,7 @@ from symtop.core.numbers import real_numbers
 from symtop.model.charts import Array
 from symtop.model.exact import layout as at, samples
 from symtop.model.exact.constants import DONE, OUT_OF_RANGE, UNMET, UNRESOLVED, all_constants
-from symtop.model.exact.digits import Motion
+from symtop.model.exact.digits import Motion, precise_constants
 from symtop.model.lazy_kernel import LazyKernel
 from symtop.model.top import LARGEST, NUMBERS, SLACK, Angles, SymmetricTop, flat
 
@@ -148,8 +148,7 @@ class ClosedForm(_Form):
     def __call__(self, times: ArrayLike) -> Motion[Array]:
         """Angles and rates at `times`; every field has their shape."""
         flat_times, shape = _in_a_row(times)
-        motion = fill(self._all, flat_times, samples.MOTION)[0]
-        return Motion(*motion) if len(shape) == 1 else Motion(*(row.reshape(shape) for row in motion))
+        return Motion(*(row.reshape(shape) for row in fill(self._all, flat_times, samples.MOTION)[0]))
 
     def turns(self, times: Array) -> Array:
         """phi and psi alone (2, n) at a row of times, with the bits of a call."""
@@ -169,8 +168,7 @@ class ClosedForm(_Form):
 
     def _view(self, times: ArrayLike, view: int) -> Array:
         flat_times, shape = _in_a_row(times)
-        values = fill(self._all, flat_times, view)
-        return values[0] if len(shape) == 1 else values.reshape(*shape, samples.WIDTHS[view])
+        return fill(self._all, flat_times, view).reshape(*shape, samples.WIDTHS[view])
 
 
 def compile_now() -> None:
@@ -197,8 +195,6 @@ def short_constants(rows: Array) -> tuple[Array, int]:
 
 def take_digits(constants: Array, top: SymmetricTop, start: Angles) -> None:
     """Put the constants from 40 digits in the place of short ones that are not to be relied on."""
-    from symtop.model.exact.digits import precise_constants
-
     status = constants[at.STATUS]
     constants[:] = precise_constants(top, start)
     constants[at.STATUS] = status
@@ -211,27 +207,23 @@ def fill(constants: Array, times: Array, view: int) -> Array:
     """
     count, width = times.shape[1], samples.WIDTHS[view]
     out = np.empty((len(constants), width, count) if view in samples.ROWS else (len(constants), count, width))
-    if _fill.ready(SAMPLE_SECONDS * len(constants) * count):
-        bad = _fill.compiled(constants, times, view, out)
-    else:
-        bad = samples.all_samples(constants.tolist(), times.tolist(), view, out)
-    _within_range(times, bad)
+    _put(_fill, SAMPLE_SECONDS * len(constants) * count, constants, times, view, out)
     return out
 
 
 def distances(constants: Array, times: Array, axes: Array) -> Array:
     """Angles (n, samples) between axes (n, samples, 3) and those of n tops, rad; times as in `fill`."""
     out = np.empty(axes.shape[:2])
-    if _compare.ready(SAMPLE_SECONDS * axes.size / 3):
-        bad = _compare.compiled(constants, times, axes, out)
-    else:
-        bad = samples.all_gaps(constants.tolist(), times.tolist(), axes, out)
-    _within_range(times, bad)
+    _put(_compare, SAMPLE_SECONDS * axes.size / 3, constants, times, axes, out)
     return out
 
 
-def _within_range(times: Array, bad: int) -> None:
-    """Refuse the time at the place `bad`; -1 is none."""
+def _put(kernel: LazyKernel, seconds: float, constants: Array, times: Array, *others: Any) -> None:
+    """Let a kernel fill in the last argument, in so many seconds if interpreted; refuse the time that it names."""
+    if kernel.ready(seconds):
+        bad = kernel.compiled(constants, times, *others)
+    else:
+        bad = kernel.py_func(constants.tolist(), times.tolist(), *others)
     if bad >= 0:
         words = f"times must be finite numbers of at most {samples.LONGEST_TIME:g} in size"
         raise SymtopError(f"{words}, not {float(times.flat[bad])!r}")
@@ -321,6 +313,5 @@ def checked_numbers(numbers: ArrayLike, names: Any = None) -> Array:
         try:
             SymmetricTop(*row[:3]), Angles(*row[3:])
         except SymtopError as error:
-            called = member if names is None else names[member]
-            raise SymtopError(f"member {called}: {error}") from None
+            raise SymtopError(f"member {member if names is None else names[member]}: {error}") from None
     return rows

@@ -292,14 +292,6 @@ def _conserved(data: Data, sums: Sums) -> tuple[float, float]:
 
 
 @shared
-def _climb(data: Data, out: Any) -> None:
-    """Constants of the separatrix: theta = 4 atan tanh(g t/2) from the lower pole, g = sqrt(abs(mgl)/I1)."""
-    out[at.SCALE] = root(div((-data.mgl, 0.0), (data.I1, 0.0)))[0]
-    out[at.FLOOR_SIGN] = 1.0 if data.theta_dot > 0.0 else -1.0
-    out[at.THETA_LOW], out[at.THETA_HIGH] = 0.0, math.pi
-
-
-@shared
 def _meets(data: Data, phi: float, psi: float, speed: float, c: Any) -> bool:
     """Does the form begin where it should, to rounding, in attitude, theta' and phi' sin theta?"""
     cosine, ax, ay, sine, bx, by, nod, rate = halves(c, 0.0)
@@ -354,9 +346,10 @@ def motion_constants(numbers: Any, out: Any) -> int:
     out[at.P_PSI], out[at.W3] = sums.p_psi[0], div(sums.p_psi, (data.I3, 0.0))[0]
     out[at.ENERGY], out[at.P_PHI] = _conserved(data, sums)
     status, mean = DONE, Mean((math.inf, 0.0), ZERO, ZERO, ZERO, ZERO)
-    if exact.separatrix:
-        out[at.KIND] = at.CLIMBS
-        _climb(data, out)
+    if exact.separatrix:  # theta = 4 atan tanh(g t/2) from the lower pole, g = sqrt(abs(mgl)/I1)
+        out[at.KIND], out[at.SCALE] = at.CLIMBS, root(div((-data.mgl, 0.0), (data.I1, 0.0)))[0]
+        out[at.FLOOR_SIGN] = 1.0 if data.theta_dot > 0.0 else -1.0
+        out[at.THETA_LOW], out[at.THETA_HIGH] = 0.0, math.pi
     elif exact.rests:
         status, mean = _stand(data, sums, exact, out)
     elif points.rate_error < RATE and points.value_error < VALUE:

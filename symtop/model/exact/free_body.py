@@ -362,35 +362,26 @@ def body_constants(row: Any, c: Constants) -> bool:
 
 
 @shared
-def _sample(c: Constants, time: float) -> tuple[Quaternion, Vector]:
-    """Attitude and momentum in the body's axes."""
-    t = c[TIME_UNIT] * time
-    turns, sign = _reduced(c, HALF, t)
-    if c[KIND] == STEADY:
-        m = _in_body(c, c[A1], c[A2], c[A3])
-        sine = math.sin(TURN * turns) / c[G] if c[G] > 0.0 else 0.0
-        turned = (math.cos(TURN * turns), sine * m[0], sine * m[1], sine * m[2])
-    else:
-        phase, flip = c[PHASE] * t + c[PHASE + 2], c[FLIP]
-        if c[KIND] != SEPARATRIX:
-            phase, flip = _reduced(c, PHASE, t)
-        (m1, m2, m3), real, imag, lag = _orbit(c, phase)
-        m1, m2 = flip * m1, flip * m2
-        turned = _turned(c, (m1, m2, m3), TURN * turns + lag, real, imag)
-        m = _in_body(c, m1, m2, m3)
-    unit = c[UNIT]
-    w, x, y, z = c[START], c[START + 1], c[START + 2], c[START + 3]
-    quaternion = product((sign * w, sign * x, sign * y, sign * z), turned)
-    return quaternion, (unit * m[0], unit * m[1], unit * m[2])
-
-
-@shared
 def body_samples(c: Constants, times: Sequence[float], out: Any) -> None:
-    """Quaternion and momentum (n, 7) at a row of times."""
+    """Quaternion, and momentum in the body's axes, (n, 7) at a row of times."""
+    unit, w, x, y, z = c[UNIT], c[START], c[START + 1], c[START + 2], c[START + 3]
     for i in range(len(times)):
-        quaternion, momentum = _sample(c, times[i])
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = quaternion
-        out[i, 4], out[i, 5], out[i, 6] = momentum
+        t = c[TIME_UNIT] * times[i]
+        turns, sign = _reduced(c, HALF, t)
+        if c[KIND] == STEADY:
+            m = _in_body(c, c[A1], c[A2], c[A3])
+            sine = math.sin(TURN * turns) / c[G] if c[G] > 0.0 else 0.0
+            turned = (math.cos(TURN * turns), sine * m[0], sine * m[1], sine * m[2])
+        else:
+            phase, flip = c[PHASE] * t + c[PHASE + 2], c[FLIP]
+            if c[KIND] != SEPARATRIX:
+                phase, flip = _reduced(c, PHASE, t)
+            (m1, m2, m3), real, imag, lag = _orbit(c, phase)
+            m1, m2 = flip * m1, flip * m2
+            turned = _turned(c, (m1, m2, m3), TURN * turns + lag, real, imag)
+            m = _in_body(c, m1, m2, m3)
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = product((sign * w, sign * x, sign * y, sign * z), turned)
+        out[i, 4], out[i, 5], out[i, 6] = unit * m[0], unit * m[1], unit * m[2]
 
 
 # seconds: interpreted, constants 1e-3 and a sample 2e-5; compiling 8 s and 2 s

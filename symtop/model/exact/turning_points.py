@@ -214,8 +214,7 @@ def _is_zero(a: float, b: float, c: float, d: float) -> bool:
 def exact_zeros(data: Data) -> Exact:
     """What is known to vanish: cos theta is transcendental unless theta = 0, a root of no rational polynomial.
 
-    For the same reason the only separatrix that doubles can name exactly starts at theta = 0 in a hanging top without
-    twist: theta'^2 I1 = 4 abs(mgl), and theta = 4 atan tanh(g t/2) from then on, g = sqrt(abs(mgl)/I1).
+    The only separatrix is that of `symtop.model.exact.digits`.
     """
     I1, I3, mgl, theta, theta_dot, phi_dot, psi_dot = data
     push, spun = two_product(I1, phi_dot), two_product(I3, psi_dot)

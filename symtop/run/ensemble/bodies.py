@@ -76,10 +76,9 @@ def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float 
     for place, one in enumerate(kinds[:count]):
         rows[place :: len(kinds)] = _members(one, first, len(range(place, count, len(kinds))), epsilon)
         strata[place :: len(kinds)] = one
-    parts = dict(zip(PARTS, np.split(rows, SPLIT, axis=1), strict=True))
     columns: dict[str, Any] = {
         name: (("member", VECTORS[name]), part) if name in VECTORS else ("member", part[:, 0], PRINCIPAL.get(name))
-        for name, part in parts.items()
+        for name, part in zip(PARTS, np.split(rows, SPLIT, axis=1), strict=True)
     }
     data = xr.Dataset(columns | {"stratum": ("member", strata)}, {name: list(LABELS[name]) for name in LABELS})
     return netcdf.describe(data, f"{count} bodies of the population {chosen!r}", seed=first, kind=chosen)
@@ -191,5 +190,4 @@ def growth(scene: Scene) -> float:
     others = (w - SMALL * x, x + SMALL * w, y, z), start.omega_body
     changed = [Attitude(*others), Attitude(start.quaternion, (a + scale, b - scale, c + scale))]
     runs = [solver(scene.top, at, plan).states[:, :4] for at in (start, *changed)]
-    grown = max(float(np.nanmax(attitude_distance(run, runs[0]))) for run in runs[1:])
-    return grown / (2.0 * SMALL)
+    return max(float(np.nanmax(attitude_distance(run, runs[0]))) for run in runs[1:]) / (2.0 * SMALL)

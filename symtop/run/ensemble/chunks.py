@@ -59,9 +59,6 @@ SHOWN = {  # by each chart
     "attitude": ("theta", "phi", "psi", "axis", "quaternion", "energy", "p_theta", "p_phi", "p_psi"),
     BODY: ("theta", "axis", "quaternion", "energy", "p_phi", "momentum"),
 }
-PER_MEMBER = (  # columns, beside what a member shows
-    "outcome", "steps", "force_evaluations", "newton_iterations", "reached_time", "step_size", "horizon", "dithered",
-)  # fmt: skip
 
 
 class Schedule(NamedTuple):
@@ -217,19 +214,20 @@ class Job:
         return np.concatenate(divided(np.arange(len(each)), self.steps, each))[::-1]
 
     def columns(self) -> dict[str, Any]:
-        """The runs: ``time``, what they show, `PER_MEMBER`, and the first exception's message where one was raised."""
+        """The runs: what they show, how each was made and ended, and the message of the first exception, if any."""
         period = nutation_periods(self.numbers) if self.period is None else self.period
         plan = schedule(period, self.horizon, self.samples, self.steps)
         with np.errstate(all="ignore"):  # a run may blow up, and that is a result
             runs = _of_length_one(self._runs(plan), plan, self.chart)
             view = View(self.chart, together(self.numbers), runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
             runs, columns = _whole(runs, view, plan), self._observables(view, plan.times)
-        each: tuple[Any, ...] = (
-            np.array(ENDS)[runs.outcome], runs.steps, runs.force_evaluations, runs.newton_iterations, runs.reached,
-            plan.step_size, self.horizon, plan.dithered,
-        )  # fmt: skip
-        columns = {"time": plan.times, **columns, **dict(zip(PER_MEMBER, each, strict=True))}
-        return columns | ({RAISED: runs.raised} if runs.raised else {})
+        columns |= {
+            "time": plan.times, "outcome": np.array(ENDS)[runs.outcome], "steps": runs.steps,
+            "force_evaluations": runs.force_evaluations, "newton_iterations": runs.newton_iterations,
+            "reached_time": runs.reached, "step_size": plan.step_size, "horizon": self.horizon,
+            "dithered": plan.dithered, **({RAISED: runs.raised} if runs.raised else {}),
+        }  # fmt: skip
+        return columns
 
     def _runs(self, plan: Schedule) -> _Runs:
         """The states of the members, by the quickest way there is."""

@@ -8,7 +8,7 @@ import contextlib
 import warnings
 import zipfile
 from collections import Counter
-from collections.abc import Callable, Generator, Iterable, Iterator
+from collections.abc import Callable, Generator, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -131,7 +131,10 @@ def ensemble(
         data = netcdf.describe(data, **words, **({RAISED: first} if raised else {}))
         data = data.assign(added(data))
     else:
-        with _stream(file_path("path", path), job, read.labels, words) as stream:
+        file = file_path("path", path)
+        check_replaceable(file)
+        with only_writer(file) as folder:
+            stream = Stream(file, folder, job, read.labels, words)
             raised, first = compute(stream.missing(chunks), stream.keep)
             if raised == n:
                 stream.forget(chunks)  # there is nothing to resume
@@ -182,7 +185,6 @@ def _observables(variables: Iterable[str] | None, chart: str) -> tuple[str, ...]
 
 
 def _check_memory(n: int, samples: int, observables: tuple[str, ...]) -> None:
-    """Refuse a dataset that does not fit into memory."""
     values = n * samples * (1 + sum({"axis": 3, "momentum": 3, "quaternion": 4}.get(name, 1) for name in observables))
     if values > MOST_VALUES:
         size = f"{n} members with {samples} samples are {values:.3g} numbers, more than the {MOST_VALUES:.3g} that are"
@@ -201,8 +203,8 @@ def _job(
     control = "per_nutation" if "per_nutation" in settings else "step_size"
     check_control(method, settings.get(control), tolerance, control)
     if method.fixed_step and control not in settings:
-        words = "has a fixed step and needs step_size or per_nutation"
-        raise SymtopError(f"{method.name} {words}", "step_size", "per_nutation")
+        words = f"{method.name} has a fixed step and needs step_size or per_nutation"
+        raise SymtopError(words, "step_size", "per_nutation")
     numbers, names, n = members.numbers, members.names, len(members.numbers)
     period = nutation_periods(numbers) if "per_nutation" in settings or "nutations" in settings else None
     for i in np.flatnonzero(~np.isfinite(period))[:1] if period is not None else ():
@@ -269,8 +271,7 @@ def _tolerances(method: Integrator, tolerance: object, members: Members, horizon
     """Tolerance of each member; a horizon that `simulation.make_plan` would refuse is refused."""
     numbers, names = members.numbers, members.names
     mgl = numbers[:, 3 if of_bodies(numbers) else 2]
-    pendulum = np.sqrt(np.abs(mgl) / numbers[:, 0]) / (2.0 * np.pi)
-    swings = horizon * np.maximum(1.0 / period, pendulum)
+    swings = horizon * np.maximum(1.0 / period, np.sqrt(np.abs(mgl) / numbers[:, 0]) / (2.0 * np.pi))
     for i in np.flatnonzero(swings > MOST_SWINGS)[:1]:
         words = f"{swings[i]:.3g} swings of the top; an adaptive method may take {MOST_SWINGS:.3g}"
         raise SymtopError(f"the horizon of {member_name(names, i)} is {words}")
@@ -280,14 +281,6 @@ def _tolerances(method: Integrator, tolerance: object, members: Members, horizon
     for value in (row.min(), row.max()):
         method.check_tolerance(float(value))
     return row
-
-
-@contextlib.contextmanager
-def _stream(path: Path, job: Job, labels: dict[str, Any], words: dict[str, Any]) -> Iterator["Stream"]:
-    """The stream to a file, while nobody else has one; SymtopError if another process does."""
-    check_replaceable(path)
-    with only_writer(path) as folder:
-        yield Stream(path, folder, job, labels, words)
 
 
 class Stream:
@@ -360,7 +353,6 @@ class Stream:
         return self.folder / f"{chunk.start}-{chunk.stop}.npz"
 
     def _columns(self, chunk: slice, *names: str) -> dict[str, Any]:
-        """The columns of a chunk, or some of them."""
         path = self._part(chunk)
         try:
             with path.open("rb") as file, np.load(file) as columns:

@@ -103,8 +103,7 @@ def _from_dataset(data: xr.Dataset) -> Members:
     if "member" in data.indexes and "member" in data.dims:
         labels["member"] = _plain(data.indexes["member"])
     check = _checked_bodies if observes == BODY else checked_numbers
-    units = str(data.attrs.get("units", ""))
-    return Members(check(numbers, labels.get("member")), None, observes, units, labels)
+    return Members(check(numbers, labels.get("member")), None, observes, str(data.attrs.get("units", "")), labels)
 
 
 def _checked_bodies(numbers: Array, names: NDArray[Any] | None) -> Array:

@@ -172,26 +172,17 @@ STRATA: dict[str, tuple[float, Callable[[Array], _Start]]] = {
 KINDS = (*STRATA, "all")
 
 
-def _scaled(start: _Start, draw: Array, mgl: float) -> dict[str, Array]:
-    """The variables of members, from starts without units; `mgl` is the sign of gravity."""
+def _scaled(start: _Start, draw: Array, mgl: float) -> tuple[Array, ...]:
+    """The `NUMBERS` of members, from starts without units; `mgl` is the sign of gravity."""
     cosine = sine_cosine(start.theta)[1]
     I1, g = octaves(-10.0, 10.0, draw[0]), octaves(-6.0, 6.0, draw[1])
     ratio = between(0.02, 1.98, draw[2])
-    return {
-        "I1": I1,
-        "I3": ratio * I1,
-        "mgl": mgl * I1 * g * g,
-        "theta": start.theta,
-        "phi": between(-math.pi, math.pi, draw[3]),
-        "psi": between(-math.pi, math.pi, draw[4]),
-        "theta_dot": g * start.theta_dot,
-        "phi_dot": g * start.phi_dot,
-        "psi_dot": g * (start.a / ratio - start.phi_dot * cosine),
-    }
+    phi, psi = between(-math.pi, math.pi, draw[3]), between(-math.pi, math.pi, draw[4])
+    psi_dot = g * (start.a / ratio - start.phi_dot * cosine)
+    return I1, ratio * I1, mgl * I1 * g * g, start.theta, phi, psi, g * start.theta_dot, g * start.phi_dot, psi_dot
 
 
 def _fill(columns: dict[str, Any], draw: Array, kind: str) -> None:
-    """Fill in the members of these draws."""
     names, ends = list(STRATA), np.cumsum([share for share, _ in STRATA.values()])[:-1]
     strata = np.searchsorted(ends, draw[0], side="right")
     strata = strata if kind == "all" else np.full_like(strata, names.index(kind))
@@ -199,7 +190,8 @@ def _fill(columns: dict[str, Any], draw: Array, kind: str) -> None:
         members = strata == place
         if members.any():
             start = STRATA[name][1](draw[1:9, members])
-            for variable, values in _scaled(start, draw[9:14, members], -1.0 if name == "hanging" else 1.0).items():
+            numbers = _scaled(start, draw[9:14, members], -1.0 if name == "hanging" else 1.0)
+            for variable, values in zip(NUMBERS, numbers, strict=True):
                 columns[variable][members] = values
     columns["stratum"][:] = np.array(names)[strata]
 

@@ -25,6 +25,7 @@ from symtop.methods.framework.registry import integrator
 from symtop.methods.taylor import heyoka
 from symtop.model import charts
 from symtop.model.charts import Array
+from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 
@@ -105,10 +106,8 @@ def check_times(scene: Scene, horizon: float) -> Array:
 
 
 @functools.lru_cache(maxsize=8)
-def precise_form(top: SymmetricTop, start: Angles, digits: int) -> Any:
+def precise_form(top: SymmetricTop, start: Angles, digits: int) -> PreciseForm:
     """The closed form in so many digits."""
-    from symtop.model.exact.digits import PreciseForm
-
     return PreciseForm(top, start, digits)
 
 
@@ -149,10 +148,7 @@ def envelope(checks: Checks, name: str, times: Array) -> Array:
 def _unwrapped(angle: Any, near: Array) -> Any:
     """`angle` on the branch nearest `near`, without rounding 2 pi to double."""
     turns = np.rint((near - angle.astype(np.float64)) / (2.0 * math.pi))
-    if angle.dtype == np.float64:
-        return angle + turns * (2.0 * math.pi)
-    kind = angle.dtype.type
-    return angle + turns.astype(angle.dtype) * kind("6.283185307179586476925286766559005768394")
+    return angle + turns.astype(angle.dtype) * angle.dtype.type("6.283185307179586476925286766559005768394")
 
 
 class Integration(NamedTuple):

@@ -44,7 +44,7 @@ import warnings
 from collections.abc import Callable
 from pathlib import Path
 from reprlib import repr as short
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -59,6 +59,8 @@ from symtop.model import charts
 from symtop.model.body import Attitude, RigidBody
 from symtop.model.charts import Array
 from symtop.model.exact.closed_form import ClosedForm
+from symtop.model.exact.free_body import BodyMotion, FreeBody
+from symtop.model.exact.heavy_body import HeavyBody
 from symtop.model.exact.turning_points import RATE
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
 from symtop.run.reference.independent_checks import (
@@ -78,10 +80,6 @@ from symtop.run.reference.independent_checks import (
 )
 from symtop.run.reference.sensitivity import FAR, LEAST, conditioning
 from symtop.run.trajectory import dataset
-
-if TYPE_CHECKING:
-    from symtop.model.exact.free_body import BodyMotion, FreeBody
-    from symtop.model.exact.heavy_body import HeavyBody
 
 PRECISIONS = ("closed-form", "double", "longdouble", "quad")
 KINDS = ("digits", "discrete-map", "integration")  # of certificates
@@ -109,9 +107,8 @@ def reference(
     dimension ``time``, in the order of `times`; axis and quaternion have a second one. `precision` is "closed-form", or
     "double", "longdouble" or "quad" for heyoka's integration in that arithmetic.
 
-    `certify` is for the closed form: "digits" holds it against 40 digits at times up to a million nutations,
-    "discrete-map" also against `exact-discrete` iterated over a hundred, "integration" moreover against heyoka in long
-    double. Each is done once a scene and kept on disk.
+    `certify`, for the closed form: "digits" holds it against 40 digits, "discrete-map" also against `exact-discrete`
+    iterated, "integration" moreover against heyoka in long double; each once a scene, and kept on disk.
     Attributes say what was done: ``bound`` what the bounds follow from, ``certificate`` what the closed form of this
     scene has been held against, and how it fared, ``arithmetic`` in which its constants were computed,
     ``conditioning`` how much the motion amplifies a change of its start (`symtop.run.reference.sensitivity`): bounds
@@ -136,8 +133,7 @@ def reference(
     source = precision if have_heyoka() else "closed-form"
     if not have_heyoka() and (source != precision or certify == "integration"):
         missing = "is certified without an integration" if source == precision else f"stands in for {precision!r}"
-        sentence = f"heyoka is not installed: the closed form in double {missing}"
-        warnings.warn(sentence, SymtopWarning, stacklevel=2)
+        warnings.warn(f"heyoka is not installed: the closed form in double {missing}", SymtopWarning, stacklevel=2)
     if source == "closed-form":
         data, words = _by_closed_form(chosen, moments, certify)
     else:
@@ -147,19 +143,13 @@ def reference(
 
 
 @functools.lru_cache(maxsize=64)
-def _motion(body: RigidBody, start: Attitude) -> "FreeBody | HeavyBody":
+def _motion(body: RigidBody, start: Attitude) -> FreeBody | HeavyBody:
     at = start.quaternion, body.momentum(start), body.momentum_lo(start)
-    if body.free:
-        from symtop.model.exact.free_body import FreeBody
-
-        return FreeBody(body.moments, *at)
-    from symtop.model.exact.heavy_body import HeavyBody
-
-    return HeavyBody(body.moments, body.torque, *at)
+    return FreeBody(body.moments, *at) if body.free else HeavyBody(body.moments, body.torque, *at)
 
 
 @functools.lru_cache(maxsize=16)
-def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> "BodyMotion":
+def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> BodyMotion:
     """The motion of a body of that name at times, kept for a while; SymtopError if it is lost before, as in chaos."""
     motion, times = _motion(body, start), np.frombuffer(plain).copy()
     sampled = motion.samples if body.free else functools.partial(motion.samples, precise=precise)  # type: ignore[call-arg]
@@ -177,7 +167,6 @@ def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, prec
 
 
 def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) -> xr.Dataset:
-    """The motion of a body without symmetry."""
     body, start = scene.top, scene.start
     known = ("closed-form",) if body.free else ("closed-form", "longdouble", "quad")
     one_of(f"precision on {scene.name}", precision, known)
@@ -203,7 +192,7 @@ def _by_closed_form(scene: Scene, times: Array, certify: str | None) -> tuple[xr
     """Values and bounds in double, and words on both."""
     values, known = closed_values(scene, times), certificate(scene, certify)
     bounds = closed_bounds(scene, times, values)
-    if known is not None and (known.factor, known.doubt) != (1.0, 0.0):
+    if known is not None:
         bounds = {name: known.factor * bound + known.doubt for name, bound in bounds.items()}
     words = {
         "bound": "from the arithmetic of the closed form, its views and integrals compared at every time",
@@ -222,15 +211,13 @@ def _by_integration(scene: Scene, times: Array, precision: str) -> tuple[xr.Data
     else:
         path = place(_integration, scene.top, scene.start, precision, CHECKS, DIGITS, SAFETY, data=distinct.tobytes())
         data = cached(path, lambda: _integration(scene, distinct, precision), 5)
-    if not np.array_equal(times, distinct):
-        data = data.isel(time=order)
     words = {
         "bound": f"{SAFETY:g} times the largest error seen up to the next check",
         "certificate": f"{DIGITS} digits at times up to t = {distinct[-1]:.3g}",
         "arithmetic": precision,
         "conditioning": conditioned(scene, float(distinct[-1])),
     }
-    return data, words
+    return data.isel(time=order), words
 
 
 def conditioned(scene: Scene, horizon: float) -> str:
@@ -311,7 +298,7 @@ def closed_bounds(scene: Scene, times: Array, values: dict[str, Any]) -> dict[st
     for name in ("phi", "psi"):
         bounds[name] = ROUNDING[name] + 2.0 * EPSILON * np.abs(values[name]) + 2.0 * drift / sine
     wrong = ~(disagreement(form, times, values) <= SUSPICIOUS)
-    return {name: np.where(wrong, math.pi, bound) for name, bound in bounds.items()} if wrong.any() else bounds
+    return {name: np.where(wrong, math.pi, bound) for name, bound in bounds.items()}
 
 
 def disagreement(form: ClosedForm, times: Array, values: dict[str, Any]) -> Array:
@@ -328,8 +315,7 @@ def disagreement(form: ClosedForm, times: Array, values: dict[str, Any]) -> Arra
     spinning, lifting = 0.5 * form.p_psi**2 / top.I3, top.mgl * z
     energy = np.abs(moving + spinning + lifting - form.energy) / (moving + spinning + abs(top.mgl) + TINY)
     p_phi = np.abs(turning + form.p_psi * z - form.p_phi) / (np.abs(turning) + abs(form.p_psi) + TINY)
-    largest: Array = np.maximum(apart, np.maximum(energy, p_phi))
-    return largest
+    return np.asarray(np.maximum(apart, np.maximum(energy, p_phi)))
 
 
 class Certificate(NamedTuple):
