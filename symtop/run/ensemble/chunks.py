@@ -290,7 +290,7 @@ class Job:
         tolerance = np.nan if self.tolerance is None else float(self.tolerance[i])
         return Plan.until(plan.times[i, :count], tolerance, self.budget)
 
-    def _observables(self, view: View, times: Array) -> dict[str, Array]:
+    def _observables(self, view: View, times: Array) -> dict[str, Any]:
         """Of what a `Trajectory` shows of one run, what is asked for, of all."""
         columns = {name: getattr(view, name) for name in self.observables}
         turned = self.turned if self.continuous else ()
