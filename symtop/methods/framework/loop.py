@@ -101,7 +101,7 @@ class Loop:
         for part in (self.begin, self.increment, self.observe, self.enter, self.present):
             register_jitable(part)
 
-    def __getstate__(self) -> NoReturn:
+    def __reduce__(self) -> NoReturn:
         raise TypeError("a loop cannot be pickled: numba knows its parts in the process that made it")
 
     @cached_property

@@ -119,8 +119,11 @@ NUMBERS = (0.0,) * len(TOP._fields)
 
 
 def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
-    for i in range(len(rule.weights)):
-        numbers[i] = h * rule.weights[i]
+    i = 0
+    for share in rule.shares:
+        for weight in rule.weights:
+            numbers[i] = (h * share) * weight
+            i += 1
 
 
 def _product(count: int, terms: int, first: int, stages: int) -> Part:
@@ -178,7 +181,8 @@ def _of_shape(counts: tuple[int, ...], bent: bool) -> Lanes:
             left(block, j, q, m, v, dL)
             give_up(block, j, max(far, too_far) != 0.0)
 
-    return stepped(part, _lay, 0, sum(counts) * stages, carried=UNSPUN, effort=lambda rule: len(rule.counts))
+    each = sum(counts) * stages
+    return stepped(part, _lay, 0, each, carried=UNSPUN, effort=lambda rule: len(rule.counts) * len(rule.shares))
 
 
 class LieTable(NamedTuple):
@@ -187,7 +191,7 @@ class LieTable(NamedTuple):
     weights: tuple[float, ...]  # row by row, one entry a stage
     counts: tuple[float, ...]  # exponentials of each stage from the second on, and of the step
     bent: float = 0.0  # 1 for Munthe-Kaas
-    shares: tuple[float, ...] = (1.0,)  # the step in one part: lanes lay out no other
+    shares: tuple[float, ...] = (1.0,)
 
 
 def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
