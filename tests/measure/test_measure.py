@@ -52,6 +52,7 @@ def test_what_is_not_a_power_of_the_step_is_not_judged_and_says_why(error, reaso
     fit = order(STEPS, error, 1e-15, 1.0)
     assert math.isnan(fit.slope)
     assert reason in fit.reason
+    assert not fit.used[np.isnan(error)].any()
 
 
 def test_false_alarms_of_the_trend_are_as_rare_as_it_says():

@@ -205,9 +205,3 @@ def test_known_splittings_have_their_orders_gradients_and_processors_counted():
     assert oc.splitting_conditions((0.5, 0.5), (1 / 6, 2 / 3, 1 / 6), (0.0, 1 / 72, 0.0)).order == 2
     assert oc.splitting_conditions((1.0,), (0.5, 0.5), (-1 / 48, -1 / 48), 1 / 12).order == 4
     assert oc.splitting_conditions((1.0,), (0.5, 0.5), (-1 / 48, -1 / 48)).order == 2
-
-
-def test_no_point_counts_where_every_run_failed():
-    fit = order([0.1, 0.05, 0.025], [math.nan] * 3, 1e-16, 1.0, 4)
-    assert fit.reason == "every run failed"
-    assert not fit.used.any()
