@@ -278,6 +278,8 @@ def assert_the_same_run(solver, top, start, plan):
         np.testing.assert_array_equal(one, other)
     assert type(at_once.steps) is int
     assert type(at_once.force_evaluations) is int
+    with pytest.raises(symtop.SymtopError, match="whose parts all compile"):
+        in_python.many(np.zeros((1, 9)), np.ones(1), np.ones((1, 1), dtype=np.int64))
 
 
 @pytest.mark.parametrize(("name", "chart"), [
