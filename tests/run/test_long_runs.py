@@ -309,7 +309,7 @@ symtop.simulate("spheroid", "strang", step_size=0.01, samples=3)
 symtop.reference("spheroid", [1.0])
 symtop.ensemble(symtop.population(40, seed=1), "midpoint", per_nutation=50, nutations=1, samples=3)
 for name in ("galerkin-simpson", "gauss-4", "stormer-verlet"):  # each builds another loop round shared functions
-    long_run.chart_of(symtop.integrator(name))[1].loop.plain.__wrapped__()
+    symtop.kernel_loop.plain.func(long_run.chart_of(symtop.integrator(name))[1].loop)
 print(identity())
 """
     printed = printed_by(script, cwd=ROOT).split()
