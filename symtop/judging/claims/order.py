@@ -153,6 +153,8 @@ def on_body(subject: Subject) -> list[Finding]:
     fitted = measured_order(subject.method, scene, quick=subject.quick, finest=subject.finest, main="attitude")
     subject.traces.update(fitted.traces())
     fit, verdict, why = fitted.main, order_verdict(claim, fitted.main), f"attitude {fitted.main} on {scene.name}"
+    if claim is None and subject.stepper is not None and subject.method.adaptive:
+        return [_converges(fitted, why)]
     if not fitted.measured:
         error = fitted.error[fitted.step_size <= 10.0 * np.min(fitted.step_size)]
         wrong = float(np.min(error))  # NaN, which is above nothing, where a run ended early
