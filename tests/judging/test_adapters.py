@@ -335,8 +335,7 @@ def test_a_step_that_returns_nan_or_the_derivative_is_told_so(only):
     for value, words in ((np.nan, "returns NaN"), (np.inf, "returns infinity"), (0.0, "jumps")):
         ledger = symtop.judge(lambda f, t, y, h, value=value: f(t, y) + value, quick=True)
         assert (ledger["calls"].measured.kind, ledger["calls"].verdict) == (words, "refuted")
-        assert "differ" not in ledger["calls"].why
-        assert not ledger["order"].measured
+        assert ("differ" in ledger["calls"].why, bool(ledger["order"].measured)) == (False, False)
         assert "nothing could be measured" in str(ledger)
     assert symtop.judge(midpoint, quick=True)["calls"].verdict == "measured"
 
@@ -369,8 +368,7 @@ def test_a_step_that_hangs_backwards_is_judged_forwards(impatient, only):
     ledger = symtop.judge(backwards, quick=True, order=2)
     assert (ledger["calls"].measured.kind, ledger["order"].verdict) == ("forward only", "confirmed")
     assert "a step of -h did not return" in ledger["calls"].why
-    assert ledger["symplectic"].measured.kind == "no"
-    assert not heartbeat.inside
+    assert (ledger["symplectic"].measured.kind, heartbeat.inside) == ("no", False)
 
 
 def changes_its_input(f, t, y, h):
@@ -383,8 +381,7 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset(monkeypat
     monkeypatch.setattr("symtop.judging.judge_step.seconds_a_step", lambda *_: 7e-6)  # on a slow machine it blows up
     events = []
     ledger = symtop.judge(changes_its_input, quick=True, tell=events.append)
-    assert events[0].name == "changes_its_input"
-    assert events[1:] == list(ledger.findings)
+    assert (events[0].name, events[1:]) == ("changes_its_input", list(ledger.findings))
     assert [one.claim for one in ledger.findings] == [claim for stage in stages("step") for claim in stage.claims]
     assert {one.verdict for one in ledger.findings} <= set(VERDICTS) - {"refuted", "confirmed"}
     assert "writes to its input" in ledger["calls"].why
@@ -392,8 +389,7 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset(monkeypat
     assert data["measured"].values.tolist() == [str(one.measured) for one in ledger.findings]
     assert data.attrs["name"] == "changes_its_input"
     screen = str(ledger).splitlines()
-    assert screen[0].startswith("changes_its_input in the axis chart on spheroid, ")
-    assert screen[-1] == "No claims were made."
+    assert (screen[0][:49], screen[-1]) == ("changes_its_input in the axis chart on spheroid, ", "No claims were made.")
     told_of = {line[:15].strip(): line[15:] for line in screen}
     expected = {"order": "1.0", "symplectic": "no, ", "p_phi": "kept, ", "energy": "drifts, ", "work": "2.0 "}
     assert [name for name, words in expected.items() if not told_of[name].startswith(words)] == []

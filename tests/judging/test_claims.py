@@ -132,8 +132,7 @@ def test_jumps_short_runs_and_noise_are_told_from_growth():
     assert {long.change_of(TIME, one, WAVE[:9] * 1e-10, 1000).sudden for one in (WAVE, swell)} == {""}
     short = np.where(TIME < 4.0, WAVE + 1e-6, np.nan)  # ends before the last two decades begin: no exponent
     short_run = long.change_of(TIME, short, short[:2], 2000)
-    assert math.isnan(short_run.changed.exponent)
-    assert (short_run.kind, short_run.grows) == ("unknown", None)
+    assert (math.isnan(short_run.changed.exponent), short_run.kind, short_run.grows) == (True, "unknown", None)
     draw = np.random.default_rng(5)
     kinds = [long.change_of(TIME, WAVE + 1e-6 * draw.standard_normal(TIME.size), WAVE, 1).kind for _ in range(200)]
     assert set(kinds) == {"bounded"}
@@ -369,8 +368,7 @@ def test_no_registered_integrator_is_refuted_and_few_claims_stay_open():
     relevant = [(name, finding) for name, finding in findings if finding.verdict != "inapplicable"]
     assert [finding.sentence(name) for name, finding in relevant if finding.verdict == "refuted"] == []
     assert sum(finding.verdict == "undecided" for _, finding in relevant) <= len(relevant) / 10
-    assert all(finding.why for _, finding in relevant)
-    assert all(math.isfinite(finding.resolution) for _, finding in relevant if finding.verdict == "confirmed")
+    assert all(one.why and (one.verdict != "confirmed" or math.isfinite(one.resolution)) for _, one in relevant)
 
 
 def test_the_series_of_a_step_beside_a_pole_is_not_taken():
@@ -378,9 +376,17 @@ def test_the_series_of_a_step_beside_a_pole_is_not_taken():
     near = symtop.Angles(theta=0.001389, phi=0.966212, psi=0.842727, theta_dot=0.000981, phi_dot=-26.156396,
                          psi_dot=-1323.792023)  # fmt: skip
     upright = symtop.Scene("upright", symtop.SymmetricTop(0.1146, 0.0043, 65.3957), near, 20.0)
-    strang = integrator("strang")
-    assert order.series_of(Subject(strang, upright, quick=True)) is None
-    assert order.series_of(Subject(strang, scene("spheroid"), quick=True)).order == 2
+    subjects = (Subject(integrator("strang"), one, quick=True) for one in (upright, scene("spheroid")))
+    assert [series and series.order for series in map(order.series_of, subjects)] == [None, 2]
+
+
+def test_no_right_method_is_refuted_beside_a_pole():
+    """Slopes in angles are 5e5 there, and cancel to 3e-9 of their square; errors of some fall with a higher power."""
+    names = ("trapezoidal-unreduced", "tsit5-fixed", "yade", "stormer-verlet")
+    subjects = [Subject(integrator(name), scene("sleeping"), quick=True) for name in names]
+    verdicts = [order.measure(subject)[0].verdict for subject in subjects]
+    assert verdicts == ["confirmed", "undecided", "undecided", "confirmed"]
+    assert structure.measure(subjects[-1])[0].verdict == "undecided"
 
 
 def test_a_time_has_the_unit_that_suits_what_is_printed_and_a_least_order_is_said_to_be_one():
@@ -411,9 +417,8 @@ def test_what_methods_claim_on_a_body_holds(name: str, energy: str, momentum: st
 def test_false_claims_on_a_body_are_refuted() -> None:
     rk4 = symtop.integrator("rk4")
     lie = dataclasses.replace(rk4, name="lie", family="splitting", order=3, symplectic=True)
-    higher = dataclasses.replace(rk4, name="higher", order=5)
     assert judge(lie, FREE, quick=True).refuted == ["energy", "momentum"]  # order 4 where 3 is claimed is no false one
-    assert judge(higher, HEAVY, quick=True).refuted == ["order"]
+    assert judge(dataclasses.replace(rk4, name="higher", order=5), HEAVY, quick=True).refuted == ["order"]
     assert judge(symtop.integrator("no-gyro"), FREE, quick=True)["order"].measured.kind == "wrong limit"
     unable = judge(symtop.integrator("stormer-verlet"), FREE, quick=True)["energy"]
     assert (unable.verdict, unable.why[-6:]) == ("undecided", " [...]")  # a long list is cut
