@@ -622,7 +622,10 @@ def i_use(
     end = start.horizon if horizon is None else horizon_of(horizon)
     if h >= end:
         raise SymtopError(f"step_size must be below the horizon {end:g}, not {h:g}", "step_size")
-    runs = {name: settings.attempt(start, integrator(one), h, end, "axis") for name, one in maps[engine].items()}
+    runs = {}
+    for name, one in maps[engine].items():
+        post(f"running {one}")
+        runs[name] = settings.attempt(start, integrator(one), h, end, "axis")
     errors = {name: min(run.error, math.pi) for name, run in runs.items()}
     best = min(errors, key=lambda name: errors[name])
     error = errors[best]

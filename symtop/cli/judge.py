@@ -140,7 +140,7 @@ def _draw_beside(
 @click.command(short_help="Measure what integrators claim about themselves.")
 @click.argument("names", nargs=-1, metavar="[INTEGRATOR]...", shell_complete=completing("integrators"))
 @click.option("--scene", default="spheroid", show_default=True, help="The scene to judge on.")
-@click.option("--quick", is_flag=True, help="Shorter runs, one chart.")
+@click.option("--quick", is_flag=True, help="Shorter runs, the structure in one chart.")
 @plugin_option
 @json_option
 def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> None:

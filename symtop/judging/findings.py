@@ -17,7 +17,7 @@ import xarray as xr
 from symtop.core.errors import SymtopError, shown
 
 VERDICTS = ("confirmed", "refuted", "measured", "undecided", "inapplicable")
-LONGEST = 240  # characters of somebody else's error message
+LONGEST, CUT = 240, " [...]"  # characters of somebody else's error message, and how it ends if it had more
 
 
 def claim_name(claim: str) -> str:
@@ -91,8 +91,8 @@ def agreement(
 
 def undecided(claim: str, declared: str, why: str) -> Finding:
     """A claim that could not be judged; somebody else's long message is cut."""
-    short = why if len(why) <= LONGEST else why[:LONGEST].rsplit(" ", 1)[0] + " ..."
-    return Finding(claim, declared, NOTHING, "undecided", short.rstrip("."))
+    short = why.rstrip(".") if len(why) <= LONGEST else why[: LONGEST - len(CUT)].rsplit(" ", 1)[0] + CUT
+    return Finding(claim, declared, NOTHING, "undecided", short)
 
 
 def inapplicable(claim: str, why: str, declared: str = "") -> Finding:
@@ -189,7 +189,7 @@ def heading(about: About, scene: str) -> str:
 def line(finding: Finding, width: int = WIDTH) -> str:
     """A finding in one line, and its reason below where a claim does not hold; empty for what goes without saying."""
     claim, declared, measured, verdict, why, value, _ = finding
-    silent = verdict == "inapplicable" or claim == "explicit" or measured.kind == "a function"
+    silent = verdict == "inapplicable" or claim == "explicit" or measured.kind in ("a function", "its states'")
     if silent and not declared:
         return ""
     says = SAYS.get(f"{claim} {measured.kind}") or ("{1}" if measured.text else SAYS.get(measured.kind, "{1}"))
@@ -211,9 +211,8 @@ def description(findings: Sequence[Finding]) -> str:
     errors = ((one.claim.removesuffix("_error"), one) for one in findings if one.claim.endswith("_error"))
     words = [f"{name} within {one.value:.1e}{error_units(name)} of the truth" for name, one in errors if one.measured]
     if order := measured.get("order"):
-        wrong, p = order.kind == "wrong limit", order.number
-        whole = not wrong and abs(p - round(p)) < 0.3
-        words += ["converges to another motion" if wrong else f"order {round(p)}" if whole else f"order {p:.1f}"]
+        p, limits = order.number, {"wrong limit": "converges to another motion", "converges": order.text}
+        words += [limits.get(order.kind) or (f"order {round(p)}" if abs(p - round(p)) < 0.3 else f"order {p:.1f}")]
         words[-1] += " or more" * order.text.endswith("or more")
     for claim, yes in (("symplectic", "symplectic"), ("symmetric", "reversible")):
         answer = measured.get(claim, NOTHING).kind
@@ -227,7 +226,8 @@ def description(findings: Sequence[Finding]) -> str:
     words += [f"keeps {constant}"] if constant else []
     words += [f"{bounded} bounded"] if bounded else []
     without = "not" if constant or bounded else "does not keep"
-    return (", ".join(words) or "nothing could be measured") + (f"; {without} {changing}" if changing else "")
+    words = [", ".join(words)] * bool(words) + [f"{without} {changing}"] * bool(changing)
+    return "; ".join(words) or "nothing could be measured"
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -303,7 +303,7 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
         few = f"fewer than {FEWEST}, over less than a {scene.period_word}, say nothing"
         finding = undecided(name, declared, f"{finding.why}; {few}")
     beyond = blows_up(scene, (values - values[0]) / scale) if name == "energy" else np.empty(0)
-    return blow_up_finding(finding, time[beyond[0]]) if beyond.size else finding
+    return blow_up_finding(finding, time[beyond[0]], scene.of_body) if beyond.size else finding
 
 
 def _findings(

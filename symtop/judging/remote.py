@@ -27,6 +27,7 @@ import numpy as np
 from symtop.core.errors import SymtopError, words_of
 from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat
 from symtop.judging.adapters.python_step import MATRIX, REDUCED, ROTATION
+from symtop.judging.findings import pace
 from symtop.methods.framework import equations
 from symtop.methods.framework.calling import OWN, solve
 from symtop.methods.framework.plan import Array, Plan, Run
@@ -121,7 +122,7 @@ class Process:
                 raise SymtopError(f"a step of h = {heartbeat.step:.3g} had not returned after {now - since:.0f} s")
             if now - self.began > self.limit:
                 self.late = self.limit / max(heartbeat.calls - self.calls, 1)
-                raise SymtopError(f"it was not judged within {self.limit:.0f} s, at {1e3 * self.late:.2g} ms a call")
+                raise SymtopError(f"it was not judged within {self.limit:.0f} s, at {pace(self.late)} a call")
         try:
             return json.loads(self.pipe.recv_bytes())
         except (EOFError, OSError, ValueError):

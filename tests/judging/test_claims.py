@@ -77,20 +77,17 @@ def test_the_brackets_of_every_chart_are_those_of_its_variables_and_see_growth_b
 
     step = one_step(still(chart, swell), chart, SPHEROID, 0.1)
     defect = symplectic_defect(step, SPHEROID.start)
-    assert 1e-8 < defect.size < 1e-5
-    assert defect.noise < 1e-10
+    assert (1e-8 < defect.size < 1e-5, defect.noise < 1e-10) == (True, True)
 
 
 def test_only_a_real_defect_stays_and_a_step_is_one_map_unless_it_looks_at_the_start():
     """As the differences are refined."""
     for name, conserves in (("strang", True), ("gauss-4", False)):
         defect = symplectic_defect(*step_map(symtop.integrator(name), "axis", SPHEROID))
-        assert bool(defect.raw[-1] < defect.raw[0] / 100.0) is conserves
-        assert (defect.size < 1e-11) is conserves
+        assert (defect.raw[-1] < defect.raw[0] / 100.0, defect.size < 1e-11) == (conserves, conserves)
     for name, tuned in (("strang", False), ("cayley-tuned", True)):
         step, start = step_map(symtop.integrator(name), "attitude", SPHEROID)
-        assert (restart_gap(step, start) > 1e-9) is tuned
-        assert (return_miss(step, start) > 1e-9) is tuned
+        assert (restart_gap(step, start) > 1e-9, return_miss(step, start) > 1e-9) == (tuned, tuned)
 
 
 TIME = np.linspace(0.0, 8000.0, 4001)
@@ -135,8 +132,7 @@ def test_jumps_short_runs_and_noise_are_told_from_growth():
     assert {long.change_of(TIME, one, WAVE[:9] * 1e-10, 1000).sudden for one in (WAVE, swell)} == {""}
     short = np.where(TIME < 4.0, WAVE + 1e-6, np.nan)  # ends before the last two decades begin: no exponent
     short_run = long.change_of(TIME, short, short[:2], 2000)
-    assert math.isnan(short_run.changed.exponent)
-    assert (short_run.kind, short_run.grows) == ("unknown", None)
+    assert (math.isnan(short_run.changed.exponent), short_run.kind, short_run.grows) == (True, "unknown", None)
     draw = np.random.default_rng(5)
     kinds = [long.change_of(TIME, WAVE + 1e-6 * draw.standard_normal(TIME.size), WAVE, 1).kind for _ in range(200)]
     assert set(kinds) == {"bounded"}
@@ -154,6 +150,11 @@ def test_an_energy_that_leaves_its_scale_is_said_to_blow_up_and_the_rest_judged_
     rise = 1.0 + 2.0 * SPHEROID.top.mgl / SPHEROID.energy_scale
     assert rise < ledger["energy"].value < 2.0 * rise
     assert symtop.judge(implicit_euler, quick=True)["energy"].measured.kind in ("drift", "growing", "bounded")
+    growing = symtop.judge(lambda q, w, h, inertia, torque: (q, w + h * w), form="rotation", scene=HEAVY, quick=True)
+    assert re.search(r"blows up at t = \d\S+, after \d+ steps, \d+ a natural period", str(growing))
+    assert "more than the kinetic one of the start and 3 |mgl|" in growing["energy"].why
+    stopped = symtop.judge(euler, scene=HEAVY, quick=True).traces  # its quaternion leaves the chart
+    assert stopped["steps_run"] == pytest.approx(118 * 10.03 * stopped["nutations_run"], rel=0.02)
 
 
 @pytest.mark.parametrize(("largest", "verdict"), [(0.9, "confirmed"), (3.2, "refuted")])
@@ -367,8 +368,7 @@ def test_no_registered_integrator_is_refuted_and_few_claims_stay_open():
     relevant = [(name, finding) for name, finding in findings if finding.verdict != "inapplicable"]
     assert [finding.sentence(name) for name, finding in relevant if finding.verdict == "refuted"] == []
     assert sum(finding.verdict == "undecided" for _, finding in relevant) <= len(relevant) / 10
-    assert all(finding.why for _, finding in relevant)
-    assert all(math.isfinite(finding.resolution) for _, finding in relevant if finding.verdict == "confirmed")
+    assert all(one.why and (one.verdict != "confirmed" or math.isfinite(one.resolution)) for _, one in relevant)
 
 
 def test_the_series_of_a_step_beside_a_pole_is_not_taken():
@@ -376,9 +376,19 @@ def test_the_series_of_a_step_beside_a_pole_is_not_taken():
     near = symtop.Angles(theta=0.001389, phi=0.966212, psi=0.842727, theta_dot=0.000981, phi_dot=-26.156396,
                          psi_dot=-1323.792023)  # fmt: skip
     upright = symtop.Scene("upright", symtop.SymmetricTop(0.1146, 0.0043, 65.3957), near, 20.0)
-    strang = integrator("strang")
-    assert order.series_of(Subject(strang, upright, quick=True)) is None
-    assert order.series_of(Subject(strang, scene("spheroid"), quick=True)).order == 2
+    subjects = (Subject(integrator("strang"), one, quick=True) for one in (upright, scene("spheroid")))
+    assert [series and series.order for series in map(order.series_of, subjects)] == [None, 2]
+
+
+def test_no_right_method_is_refuted_beside_a_pole():
+    """Slopes in angles are 5e5 there, and cancel to 3e-9 of their square; errors of some fall with a higher power."""
+    names = ("trapezoidal-unreduced", "tsit5-fixed", "yade", "stormer-verlet")
+    subjects = [Subject(integrator(name), scene("sleeping"), quick=True) for name in names]
+    verdicts = [order.measure(subject)[0].verdict for subject in subjects]
+    assert verdicts == ["confirmed", "undecided", "undecided", "confirmed"]
+    assert structure.measure(subjects[-1])[0].verdict == "undecided"
+    rising = Subject(integrator("stormer-verlet"), scene("goldstein-rising"), quick=True)  # 50,000 steps beat with it
+    assert {one.claim: one.verdict for one in long.measure(rising)}["reported"] == "measured"
 
 
 def test_a_time_has_the_unit_that_suits_what_is_printed_and_a_least_order_is_said_to_be_one():
@@ -388,7 +398,7 @@ def test_a_time_has_the_unit_that_suits_what_is_printed_and_a_least_order_is_sai
     walks = Finding("p_psi", "", Measured("random walk", 1e-11), "measured", "", math.inf)
     runs = {"step_size": np.array([1.0, 0.5, 0.25]), "error": np.array([np.nan, np.nan, 1e-3])}
     told = str(Ledger("mine", "any", (walks,), runs, About(nutation=8.0)))
-    assert re.search(r" 8 to 32 steps .* order \(16 and fewer fail\)(.|\n)*; does not keep p_psi\.", told)
+    assert re.search(r" 8 to 32 steps .* order \(16 and fewer fail\)(.|\n)*It is: does not keep p_psi\.", told)
     assert walks.plain()["value"] is None
 
 
@@ -402,19 +412,18 @@ FREE, HEAVY = (body_scenes()[name] for name in ("check-case-2", "heavy-brick"))
 def test_what_methods_claim_on_a_body_holds(name: str, energy: str, momentum: str) -> None:
     for free_or_heavy in (FREE, HEAVY):
         ledger = judge(symtop.integrator(name), free_or_heavy, quick=True)
-        assert ledger.refuted == []
-        assert ledger["order"].verdict == "confirmed"
+        assert (ledger.refuted, ledger["order"].verdict) == ([], "confirmed")
         assert (ledger["energy"].measured.kind, ledger["momentum"].measured.kind) == (energy, momentum)
 
 
 def test_false_claims_on_a_body_are_refuted() -> None:
     rk4 = symtop.integrator("rk4")
     lie = dataclasses.replace(rk4, name="lie", family="splitting", order=3, symplectic=True)
-    higher = dataclasses.replace(rk4, name="higher", order=5)
     assert judge(lie, FREE, quick=True).refuted == ["energy", "momentum"]  # order 4 where 3 is claimed is no false one
-    assert judge(higher, HEAVY, quick=True).refuted == ["order"]
+    assert judge(dataclasses.replace(rk4, name="higher", order=5), HEAVY, quick=True).refuted == ["order"]
     assert judge(symtop.integrator("no-gyro"), FREE, quick=True)["order"].measured.kind == "wrong limit"
-    assert judge(symtop.integrator("stormer-verlet"), FREE, quick=True)["energy"].verdict == "undecided"
+    unable = judge(symtop.integrator("stormer-verlet"), FREE, quick=True)["energy"]
+    assert (unable.verdict, unable.why[-6:]) == ("undecided", " [...]")  # a long list is cut
 
 
 def rotation_swapped(q: Any, w: Any, h: float, inertia: Any, torque: Any) -> Any:
@@ -479,8 +488,7 @@ def test_a_right_step_is_not_refuted_where_a_body_turns_over(only: Callable[...,
     """After a calm beginning."""
     only("order", "energy", "momentum")
     ledger = symtop.judge(right.midpoint, scene="tennis-racket", order=2, quick=True)
-    assert ledger.refuted == []
-    assert ledger["order"].verdict == "confirmed"
+    assert (ledger.refuted, ledger["order"].verdict) == ([], "confirmed")
     assert ledger["energy"].measured.kind in ("growing", "drift")  # the length of its runs follows from its speed
 
 
@@ -521,8 +529,7 @@ def test_a_plug_in_that_fails_is_told_of(tmp_path):
 def test_a_plug_in_that_ends_its_process_when_it_is_loaded_is_told_of(tmp_path):
     (tmp_path / "plugin.py").write_text("import os\nos._exit(0)\n")
     code, _, err = ended(command("claims", "--plugin", tmp_path / "plugin.py", "--quick"))
-    assert code == 2
-    assert "plugin plugin.py cannot be loaded: its process ended with code 0" in err
+    assert (code, "plugin plugin.py cannot be loaded: its process ended with code 0" in err) == (2, True)
 
 
 def test_a_run_that_is_returned_is_one_of_numbers():
@@ -536,16 +543,14 @@ def test_a_run_that_is_returned_is_one_of_numbers():
     with Process(lambda: solvers_of(method)) as process:
         process.allow(30.0)
         run = symtop.simulate("spheroid", separated(method, process), step_size=0.1, guard=False)
-    assert run.attrs["outcome"] == "not_finite"
-    assert np.isnan(run["energy"].values).all()
+    assert (run.attrs["outcome"], np.isnan(run["energy"].values).all()) == ("not_finite", True)
 
 
 def test_a_name_that_is_unknown_is_told_before_anything_is_measured(monkeypatch):
     measured = []
     monkeypatch.setattr("symtop.judging.judge_step.judge_separately", lambda *one, **_: measured.append(one))
     result = call("claims", "midpoint", "midpont", code=2)
-    assert "integrator 'midpont' is unknown" in result.output
-    assert measured == []
+    assert ("integrator 'midpont' is unknown" in result.output, measured) == (True, [])
 
 
 STEP = SPHEROID.nutation_period / 118.02
@@ -605,8 +610,7 @@ def test_finer_runs_after_one_that_fails_late_share_its_steps(quick):
 
     method = adapter.integrator(PythonStep(fails, "axis"))
     run = long_run(method, SPHEROID, "axis", quick=quick, most=4000)
-    assert run.outcome == "ok"
-    assert (len(steps) < 6000) is quick
+    assert (run.outcome, len(steps) < 6000) == ("ok", quick)
 
 
 def test_limits_are_extrapolated_falls_are_seen_and_a_cayley_map_keeps_its_own_energy(monkeypatch):

@@ -34,6 +34,7 @@ from symtop.run.simulation import simulate
 SYMPLECTIC = 1e-9  # a smaller defect of the bracket is none
 MET = 1e-8  # a larger one is one, if it stands out of its noise
 STANDS = 0.2  # the raw defect of a symplectic map falls to 1/256 over the widths
+LOST = 1e-3  # of the noise: beside a pole in angles large slopes cancel, and leave such a defect at any width
 RETURNED = 1e-10  # a return as close as this is exact
 MISSED = 1e-8
 GONE = 4096.0  # times smaller at half the step, as of order 12: no step of this
@@ -137,7 +138,7 @@ def _bracket(step: maps.StepMap, start: Angles, traces: dict[str, Any] | None = 
             why = f"one number that a run takes from its start explains the defect ({defect.rest:.0e} is left)"
             return True, defect.rest, floor, why
         return None, defect.size, floor, f"a run differs from its steps one by one by {gap:.0e}: no one map"
-    stands = defect.raw[-1] > STANDS * defect.raw[0] and defect.raw[-1] > 100.0 * MET
+    stands = defect.raw[-1] > max(STANDS * defect.raw[0], 100.0 * MET, LOST * defect.noise)
     bad = stands or defect.size > max(10.0 * defect.noise, MET)
     return False if bad else None, defect.size, floor, f"defect of the bracket {defect.size:.1e} (it goes {shrinks})"
 
