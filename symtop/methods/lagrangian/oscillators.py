@@ -109,7 +109,7 @@ def attitude_state(par: Any, s: Any, t: float) -> Any:
 
 SHORTEST = 1e-100  # of a step, and of what is left of one that is a whole number of nutations
 STEEPEST = 16.0  # (P - e3)/(P - e2): what rounding of the constants is amplified by
-APART = 0.01  # (e1 - e2)/(e1 - e3): below it the turn and the time of a nutation lose digits, all of them at 1e-8
+APART = 1e-3  # (e1 - e2)/(e1 - e3): below it the turn and the time of a nutation lose digits, all of them at 1e-8
 MOST_PARTS = 10_000
 NEXT_TO_ROOT = 1e-4
 TINY = 1e-80  # of e1 - e3, in the place of e1 - b where e1 is a zero of chi: J is zero, too
