@@ -118,10 +118,10 @@ def _probe(
     motion: Integrated, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
 ) -> Probe:
     """Run `method` from the time `since` of the true motion for `duration`, with `step` or the plan's tolerance."""
+    most = min(plan.most(math.inf), MOST_WORK[method.implementation])
     if method.fixed_step:
-        piece = Plan.steps(step, _marks(max(1, round(duration / step)), motion.points))
+        piece = Plan.steps(step, _marks(max(1, round(duration / step)), motion.points), budget=most)
     else:
-        most = min(plan.most(math.inf), MOST_WORK[method.implementation])
         piece = Plan.until(duration * (_places(motion.points) / motion.points), plan.tolerance, most)
     run = solve(method, chart, motion.scene.top, motion.start(since), piece)
     with np.errstate(all="ignore"):

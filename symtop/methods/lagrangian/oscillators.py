@@ -25,9 +25,10 @@ Source: Klein and Sommerfeld, Theory of the Top, chapter 6.
 
     (A - 1) D, D, r, 1/r, delta        r = sqrt(D), of the sign of the step; delta in turns
 
-At a step beyond half a nutation they are those of the rest after whole nutations, and delta counts these. Where
-P - e2 is a small difference of large numbers, next to a separatrix, the step is made of equal parts. Compiled, in
-double: A^2 - 1 is put together without the difference of two numbers near 1, and the roots come in differences only.
+At a step beyond half a nutation they are those of the rest after whole nutations, and delta counts these. Next to a
+separatrix P - e2 is a small difference of large numbers, and so is e1 - e2, on which the turn and the time of a whole
+nutation depend: there the step is made of equal parts within half a nutation. Compiled, in double: A^2 - 1 is put
+together without the difference of two numbers near 1, and the roots come in differences only.
 """
 
 import math
@@ -108,7 +109,8 @@ def attitude_state(par: Any, s: Any, t: float) -> Any:
 
 SHORTEST = 1e-100  # of a step, and of what is left of one that is a whole number of nutations
 STEEPEST = 16.0  # (P - e3)/(P - e2): what rounding of the constants is amplified by
-MOST_PARTS = 1000
+APART = 1e-3  # (e1 - e2)/(e1 - e3): below it the turn and the time of a nutation lose digits, all of them at 1e-8
+MOST_PARTS = 10_000
 NEXT_TO_ROOT = 1e-4
 TINY = 1e-80  # of e1 - e3, in the place of e1 - b where e1 is a zero of chi: J is zero, too
 
@@ -186,7 +188,8 @@ def _mapped(rule: Any, top: Any, at: Any, h: float) -> Any:
         P = (above[0] + above[1] + above[2]) / 3.0
         # P - e2 or a D, which is small at half a nutation of an axis that comes near a pole
         least = min(above[1], P - par.b1, P - par.b2)
-        if not above[2] > STEEPEST * least or parts >= MOST_PARTS:
+        known = nutations == 0.0 or e.e1 - e.e2 > APART * (e.e1 - e.e3)
+        if (known and not above[2] > STEEPEST * least) or parts >= MOST_PARTS:
             break
         parts += 1
     sign = 1.0 if rest >= 0.0 else -1.0
