@@ -341,8 +341,7 @@ def test_a_liar_is_caught_for_the_right_reason(liar, clean_registry):
     code, output = answer("claims", "--plugin", str(planted.LIARS / f"{liar}.py"), "--json", *quick)
     claim, why = CAUGHT[liar]
     findings = {row.pop("claim"): row for row in json.loads(output)}
-    assert code == 1
-    assert findings[claim]["verdict"] == "refuted"
+    assert (code, findings[claim]["verdict"]) == (1, "refuted")
     assert re.search(why, findings[claim]["why"]), findings[claim]["why"]
     refuted = {name for name, row in findings.items() if row["verdict"] == "refuted"}
     assert refuted <= {claim} | FOLLOWS.get(liar, set())
@@ -402,8 +401,7 @@ FREE, HEAVY = (body_scenes()[name] for name in ("check-case-2", "heavy-brick"))
 def test_what_methods_claim_on_a_body_holds(name: str, energy: str, momentum: str) -> None:
     for free_or_heavy in (FREE, HEAVY):
         ledger = judge(symtop.integrator(name), free_or_heavy, quick=True)
-        assert ledger.refuted == []
-        assert ledger["order"].verdict == "confirmed"
+        assert (ledger.refuted, ledger["order"].verdict) == ([], "confirmed")
         assert (ledger["energy"].measured.kind, ledger["momentum"].measured.kind) == (energy, momentum)
 
 
@@ -479,8 +477,7 @@ def test_a_right_step_is_not_refuted_where_a_body_turns_over(only: Callable[...,
     """After a calm beginning."""
     only("order", "energy", "momentum")
     ledger = symtop.judge(right.midpoint, scene="tennis-racket", order=2, quick=True)
-    assert ledger.refuted == []
-    assert ledger["order"].verdict == "confirmed"
+    assert (ledger.refuted, ledger["order"].verdict) == ([], "confirmed")
     assert ledger["energy"].measured.kind in ("growing", "drift")  # the length of its runs follows from its speed
 
 
