@@ -172,9 +172,10 @@ class _Trial(NamedTuple):
         return self.seconds * self.run.setting / self.horizon if self.run.integrator.fixed_step else math.inf
 
     def cost(self, question: _Question) -> float:
-        """Seconds at the very accuracy; those of the run itself where the step is the user's."""
+        """Seconds at the very accuracy, with no longer steps than the user's; of the run itself where its step is."""
         ratio = 1.0 if question.step is not None else self.error / question.accuracy
-        return self.seconds * settings.at_accuracy(self.run.integrator, ratio)
+        part = max(settings.at_accuracy(self.run.integrator, ratio), self.run.setting / question.max_step)
+        return self.seconds * part
 
     def words(self) -> str:
         control = (self.run.integrator.control or "nothing").replace("_", " ")
