@@ -222,6 +222,8 @@ def recommend(
         words = f"below the horizon {horizon:g}, of which at most {MOST_STEPS:g} steps are run, not {step:g}"
         raise SymtopError(f"step_size must be {words}", "step_size")
     longest = math.inf if max_step is None else positive("max_step", max_step)
+    if step is not None and step > longest:
+        raise SymtopError(f"step_size must be at most max_step {longest:g}, not {step:g}", "step_size", "max_step")
     pace = math.inf if time_a_step is None else positive("time_a_step", time_a_step)
     constants = tuple(one_of("keeps", one, [*KEPT][: 1 if scene.of_body else None]) for one in _words(keeps))
     limits = step, longest, boolean("general", general), constants, pace
@@ -619,10 +621,12 @@ def i_use(
     """
     maps = _settings()
     one_of("engine", engine, maps)
-    start, h = scenes.scene(scene), STEP if step_size is None else positive("step_size", step_size)
+    start, h = scenes.scene(scene, bodies=True), STEP if step_size is None else positive("step_size", step_size)
     end = start.horizon if horizon is None else horizon_of(horizon)
     if h >= end:
         raise SymtopError(f"step_size must be below the horizon {end:g}, not {h:g}", "step_size")
+    if start.of_body:  # a horizon to which its motion is not known is refused
+        settings.judgeable(start, "axis", end)
     runs = {name: settings.attempt(start, integrator(one), h, end, "axis") for name, one in maps[engine].items()}
     errors = {name: min(run.error, math.pi) for name, run in runs.items()}
     best = min(errors, key=lambda name: errors[name])
@@ -631,6 +635,7 @@ def i_use(
         limits["step_size"] = h
     elif limits.get("quantity") not in (None, "axis"):
         raise SymtopError(f"quantity must be axis where there is no accuracy, not {limits['quantity']!r}", "quantity")
+    limits["quantity"] = limits.get("quantity") or "axis"  # of a body it is the attitude elsewhere
     target = error if accuracy is None else accuracy
     has_target = accuracy is not None or 0.0 < error <= WORST
     advice = recommend(start, accuracy=target, horizon=end, **limits) if has_target else None
