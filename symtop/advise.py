@@ -172,9 +172,10 @@ class _Trial(NamedTuple):
         return self.seconds * self.run.setting / self.horizon if self.run.integrator.fixed_step else math.inf
 
     def cost(self, question: _Question) -> float:
-        """Seconds at the very accuracy; those of the run itself where the step is the user's."""
+        """Seconds at the very accuracy, with no longer steps than the user's; of the run itself where its step is."""
         ratio = 1.0 if question.step is not None else self.error / question.accuracy
-        return self.seconds * settings.at_accuracy(self.run.integrator, ratio)
+        part = max(settings.at_accuracy(self.run.integrator, ratio), self.run.setting / question.max_step)
+        return self.seconds * part
 
     def words(self) -> str:
         control = (self.run.integrator.control or "nothing").replace("_", " ")
@@ -221,6 +222,8 @@ def recommend(
         words = f"below the horizon {horizon:g}, of which at most {MOST_STEPS:g} steps are run, not {step:g}"
         raise SymtopError(f"step_size must be {words}", "step_size")
     longest = math.inf if max_step is None else positive("max_step", max_step)
+    if step is not None and step > longest:
+        raise SymtopError(f"step_size must be at most max_step {longest:g}, not {step:g}", "step_size", "max_step")
     pace = math.inf if time_a_step is None else positive("time_a_step", time_a_step)
     constants = tuple(one_of("keeps", one, [*KEPT][: 1 if scene.of_body else None]) for one in _words(keeps))
     limits = step, longest, boolean("general", general), constants, pace
@@ -618,10 +621,12 @@ def i_use(
     """
     maps = _settings()
     one_of("engine", engine, maps)
-    start, h = scenes.scene(scene), STEP if step_size is None else positive("step_size", step_size)
+    start, h = scenes.scene(scene, bodies=True), STEP if step_size is None else positive("step_size", step_size)
     end = start.horizon if horizon is None else horizon_of(horizon)
     if h >= end:
         raise SymtopError(f"step_size must be below the horizon {end:g}, not {h:g}", "step_size")
+    if start.of_body:  # a horizon to which its motion is not known is refused
+        settings.judgeable(start, "axis", end)
     runs = {}
     for name, one in maps[engine].items():
         post(f"running {one}")
@@ -633,6 +638,7 @@ def i_use(
         limits["step_size"] = h
     elif limits.get("quantity") not in (None, "axis"):
         raise SymtopError(f"quantity must be axis where there is no accuracy, not {limits['quantity']!r}", "quantity")
+    limits["quantity"] = limits.get("quantity") or "axis"  # of a body it is the attitude elsewhere
     target = error if accuracy is None else accuracy
     has_target = accuracy is not None or 0.0 < error <= WORST
     advice = recommend(start, accuracy=target, horizon=end, **limits) if has_target else None

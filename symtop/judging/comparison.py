@@ -75,6 +75,8 @@ def compare(
     names = [one.name for one in variants]
     if not names or len(set(names)) < len(names):
         raise SymtopError(f"methods must be one or more, each once, not {names!r}", "methods")
+    if problem.of_body:  # a horizon to which its motion is not known is refused before any run
+        settings.judgeable(problem, quantity, end)
 
     def runs_of(method: Integrator) -> tuple[list[dict[str, Any]], list[str]]:
         limit = BUDGET[method.implementation] * min(method.speed, 1.0) if most is None else most

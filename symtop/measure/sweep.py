@@ -8,7 +8,7 @@ import contextlib
 import functools
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -24,6 +24,7 @@ from symtop.measure import columns
 from symtop.measure.accuracy import as_table, blank_row, enough_samples, error_row
 from symtop.measure.timing import bare_run, timings
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator, integrators, split_name
+from symtop.model.exact import closed_form
 from symtop.model.scenes import Scene, horizon_of, scene as find_scene
 from symtop.run.simulation import chart_of, make_plan
 
@@ -218,11 +219,16 @@ def _time(cells: list[_Cell], done: dict[str, xr.Dataset]) -> bool:
 
 def timed_rows(cells: "list[tuple[Scene, Integrator, float, list[dict[str, Any]]]]") -> None:
     """Time all runs of some scenes, variants and horizons that ended well, against each other, into their rows."""
-    rows, calls = [], []
+    rows, calls, firsts = [], list[Callable[[], object]](), list[Callable[[], object]]()
     for scene, method, horizon, runs in cells:
         rows += (ended := [one for one in runs if one["outcome"] == "ok"])
-        calls += [bare_run(scene, method, next(iter(method.solvers)), one["setting_value"], horizon) for one in ended]
+        own = [bare_run(scene, method, next(iter(method.solvers)), one["setting_value"], horizon) for one in ended]
+        calls += own
+        firsts += own[:1]
     with foreign_code("a method that is timed"):
+        for first in firsts:  # a call that loads code would pass for a long run, of which a batch has one call
+            closed_form.compile_now()
+            first()
         results = timings(calls, BATCHES, BATCH, warm=True, patience=PATIENCE, close=CLOSE) if calls else []
     for one, timing in zip(rows, results, strict=True):
         one |= {"seconds": timing.best, "seconds_spread": timing.spread}

@@ -34,7 +34,7 @@ SCIPY = {"rk45": ("RK45", 6), "dop853": ("DOP853", 12), "radau": ("Radau", 0), "
 FINE, WATCHED, PROBED = 1e-13, 4000, 5000  # tolerance of the truth; steps of DOP853, and of the method on a piece
 PERIODS, SHARE, POINTS = 10.0, 0.2, 400  # of the motion and of the run in a piece, at least; times that are compared
 TIGHTEST, LOOSEST = 2.3e-14, 0.1  # tolerances: the least of SciPy's solvers, the largest that is advised
-MOVED, SATURATED = 1e-7, 1e-2  # of the extent of the motion: how far two motions are apart, and the most
+MOVED, SATURATED = (1e-7, 1e-10), 1e-2  # of the extent of the motion: how far two motions are apart, and the most
 UNSTABLE, STIFF = 10.0, 20.0  # times that A grows in the second half; times the rate of the motion
 FIRST, FADED = 1e-7, 0.1  # of a piece, the earliest time that is compared; of the largest error, one that has faded
 
@@ -130,9 +130,17 @@ def _motion(f: Any, t: float, y: Array, end: float) -> tuple[Any, float]:
     return OdeSolution(times, parts) if parts else None, times[-1] - t
 
 
-def _apart(near: Any, far: Any, t: float, times: Array, first: float) -> Growth:
-    """How far two motions are apart, in units of their first distance."""
-    return Growth.of(times, np.linalg.norm(far(t + times) - near(t + times), axis=0) / first, SATURATED / MOVED)
+def _growth(f: Any, near: Any, t: float, y: Array, elapsed: Array, extent: float) -> Growth:
+    """How far two motions are apart, in units of their first distance; of closer ones where these part too far."""
+    for moved in MOVED:
+        far, reached = _motion(f, t, y + moved * extent / math.sqrt(y.size), float(elapsed[-1]))
+        times, most = elapsed[elapsed <= reached * (1.0 + EPSILON)], SATURATED / moved
+        if times.size == 0:
+            return Growth(elapsed[:1], np.array([math.inf]))
+        apart = np.linalg.norm(far(t + times) - near(t + times), axis=0) / (moved * extent)
+        if apart.max() < most:
+            break
+    return Growth.of(times, apart, most)
 
 
 def _expected(times: Array, error: Array, end: float, amplified: float, extent: float) -> float:
@@ -165,10 +173,8 @@ def _outlook(
     frequency = float(np.linalg.norm(rates)) / max(float(np.linalg.norm(spread)), TINY)
     whole = watched >= end or turns >= 1.0  # all that the motion does
     slow = min(frequency, 2.0 * math.pi * turns / watched)
-    moved = y + MOVED * extent / math.sqrt(y.size)
-    far, reached = _motion(f, t, moved, watched)
-    times, kind = elapsed[elapsed <= reached * (1.0 + EPSILON)], "step" if rule else "tolerance"
-    growth = _apart(near, far, t, times, MOVED * extent) if times.size else Growth(elapsed[:1], np.array([math.inf]))
+    moved, kind = y + MOVED[0] * extent / math.sqrt(y.size), "step" if rule else "tolerance"
+    growth = _growth(f, near, t, y, elapsed, extent)
     piece = min(end, watched, max(SHARE * end, PERIODS * 2.0 * math.pi / max(frequency, TINY)))
     places = np.union1d(np.geomspace(FIRST, 1.0, POINTS // 4), elapsed / watched)  # of the piece
 
@@ -192,17 +198,18 @@ def _outlook(
     change = math.sqrt(EPSILON) * extent
     rate = f(t, y)
     slopes = [(f(t, y + change * unit) - rate) / change for unit in np.eye(y.size)]
-    fastest, cause = float(np.abs(np.linalg.eigvals(np.array(slopes))).max()), "step"
+    modes, cause = np.linalg.eigvals(np.array(slopes)), "step"
+    fastest = float(np.abs(modes).max())
     if rule and fastest > STIFF * slow:  # no longer than is stable
         better = min(better, max(setting, 1.0 / fastest))
     better = float(Context(prec=2, rounding=ROUND_DOWN).create_decimal(better))
     why = f"errors add up over {end * slow / (2.0 * math.pi):.3g} periods; take a {kind} of about {better:.2g}"
     if not expected > accuracy:
         cause, why = "", f"a {kind} of {better:.2g} would do for {accuracy:.1g}"
-    elif mean * fastest > 1.0 and fastest > STIFF * slow:
+    elif mean * fastest > 1.0 and fastest > max(STIFF * slow, 2.0 * float(modes.real.max())):  # none of them grows
         cause, better = "stiffness", math.nan
         why = f"f has rates of {fastest:.1g}, the motion of {slow:.1g}; take an implicit method, such as radau"
-    elif ended or np.linalg.norm(run_piece(moved)[1] - states, axis=1).max() > OWN * since**2 * MOVED * extent:
+    elif ended or np.linalg.norm(run_piece(moved)[1] - states, axis=1).max() > OWN * since**2 * MOVED[0] * extent:
         better = min(better, 0.3 * setting)
         cause = "instability"
         why = f"it multiplies a small change more than the motion does; try a {kind} of {better:.2g}"

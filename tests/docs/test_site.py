@@ -111,8 +111,7 @@ def test_pages_fit_and_ask_for_nothing(site, width):
                 browser.evaluate(f"document.body.dataset.theme = '{theme}'")
                 assert browser.too_wide <= 0, (page, theme)
         browser.wait_for("document.querySelectorAll('#search-results li').length > 3")
-        assert browser.problems == []
-        assert browser.outside() == []
+        assert (browser.problems, browser.outside()) == ([], [])
 
 
 def test_every_public_name_and_every_derivation_is_on_a_page():

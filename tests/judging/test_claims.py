@@ -342,8 +342,7 @@ def test_a_liar_is_caught_for_the_right_reason(liar, clean_registry):
     code, output = answer("claims", "--plugin", str(planted.LIARS / f"{liar}.py"), "--json", *quick)
     claim, why = CAUGHT[liar]
     findings = {row.pop("claim"): row for row in json.loads(output)}
-    assert code == 1
-    assert findings[claim]["verdict"] == "refuted"
+    assert (code, findings[claim]["verdict"]) == (1, "refuted")
     assert re.search(why, findings[claim]["why"]), findings[claim]["why"]
     refuted = {name for name, row in findings.items() if row["verdict"] == "refuted"}
     assert refuted <= {claim} | FOLLOWS.get(liar, set())

@@ -63,6 +63,7 @@ def decay(rate):
 @pytest.mark.parametrize(("f", "y0", "horizon", "name", "control", "causes"), [
     (kepler, at_pericentre(0.3), 40.0 * math.pi, "dop853", {"tolerance": 1e-8}, ("", "step")),
     (kepler, at_pericentre(0.6), 20.0 * math.pi, "rk4", {"step_size": 0.03}, ("", "step")),
+    *((kepler, at_pericentre(0.9), n * math.pi, "dop853", {"tolerance": 1e-7}, ("step",)) for n in (20.0, 40.0)),
     (henon_heiles, of_energy(1.0 / 12.0, -0.1), 40.0 * math.pi, "rk45", {"tolerance": 1e-7}, ("", "step")),
     (decay(1.0), [1.0], 10.0, "rk4", {"step_size": 0.1}, None),
     (decay(1000.0), [1.0], 5.0, "rk4", {"step_size": 0.002}, None),
