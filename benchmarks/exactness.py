@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 import symtop
-from symtop.methods.framework.loop import FixedStep, Loop, inside, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop, inside
 from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian import exact_discrete
 from symtop.methods.lagrangian.oscillators import numbers as exact_map
@@ -118,7 +118,7 @@ def of_edges() -> Iterator[str]:
 
 def forgetful() -> Loop:
     """The loop of the map, with sums in one double."""
-    return kernel_loop(exact_discrete.begin, _forgetting, exact_discrete.observe, exact_discrete.enter,
+    return Loop(exact_discrete.begin, _forgetting, exact_discrete.observe, exact_discrete.enter,
                   exact_discrete.present_axis, accumulate_plainly)  # fmt: skip
 
 

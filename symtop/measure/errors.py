@@ -223,7 +223,8 @@ def scene_of(run: xr.Dataset | Mapping[str, Any]) -> Scene:
     try:
         return Scene(str(attributes["scene"]), _stored(run, "top"), _stored(run, "start"), attributes["horizon"])
     except (KeyError, TypeError, ValueError) as error:
-        words = "these data do not say of which top and start they are, so give errors(data, scene)"
+        of = "members" if "member" in getattr(run, "sizes", ()) else "scene"
+        words = f"these data do not say of which top and start they are, so give errors(data, {of})"
         raise SymtopError(f"scene is missing: {words}") from error
 
 

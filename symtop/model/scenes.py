@@ -84,6 +84,9 @@ class Scene:
             raise SymtopError(f"tags must be a list of names, not {shown(self.tags)}")
         object.__setattr__(self, "tags", tuple(sorted({one_of("tags", tag, TAGS) for tag in self.tags})))
 
+    def _repr_html_(self) -> str:
+        return Catalogue({self.name: self})._repr_html_()
+
     @property
     def second(self) -> str:
         """What follows a time: " s" of a scene in SI, nothing of one without units."""

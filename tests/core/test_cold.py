@@ -93,7 +93,7 @@ def test_a_loop_makes_a_kernel_when_it_is_used(monkeypatch):
     """Loading a hundred methods would hash all their kernels otherwise, in every process."""
     compiled = []
     monkeypatch.setattr(loop, "compile_kernel", lambda part: compiled.append(part) or part)
-    family = loop.kernel_loop(loop.no_carry, loop.no_carry, loop.no_carry)
+    family = loop.Loop(loop.no_carry, loop.no_carry, loop.no_carry)
     assert not compiled
     assert family.march is family.march is compiled[0]
     assert len(compiled) == 1

@@ -327,7 +327,7 @@ def test_a_rule_may_be_whatever_a_kernel_takes(rule):
     def observe(par, rule, before, dstate, h):
         return 0.0, 0.0
 
-    solver = FixedStep(loops.kernel_loop(begin, increment, observe), rule, on_angles, 1, implicit=False)
+    solver = FixedStep(loops.Loop(begin, increment, observe), rule, on_angles, 1, implicit=False)
     run = solver(SymmetricTop(1.0, 1.0, 1.0), Angles(1.0, theta_dot=0.5), Plan.steps(0.25, [0, 1, 4]))
     assert run.states[:, 0].tolist() == [1.0, 1.125, 1.5]
     assert (solver._whole is not None) == isinstance(rule, tuple)

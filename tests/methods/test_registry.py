@@ -22,6 +22,7 @@ def test_a_catalogue_is_a_dict_that_a_notebook_shows_as_a_table(catalogue):
     assert isinstance(catalogue(), dict)
     assert all(f"<td>{name}</td>" in html for name in catalogue())
     assert html.count("<tr") == len(catalogue()) + 1
+    assert all(f"<td>{name}</td>" in one._repr_html_() for name, one in catalogue().items())
 
 
 def test_two_threads_that_make_the_very_first_call_together_see_every_integrator(monkeypatch):

@@ -7,7 +7,7 @@ from symtop_studies.reduction.measures import unreduced_cost, unreduced_gaps
 import symtop
 from symtop.measure.conservation import trend
 from symtop.measure.step_map import one_step, symplectic_defect
-from symtop.methods.framework.loop import kernel_loop
+from symtop.methods.framework.loop import Loop
 from symtop.methods.lagrangian import unreduced as kernel
 from symtop.methods.lagrangian.discrete_lagrangian import RULES, Quadrature
 from symtop.methods.lagrangian.unreduced import march, with_momenta
@@ -87,7 +87,7 @@ def test_maps_that_invent_or_let_go_of_their_momenta_are_seen():
     step = one_step(wrong, "angles", scene, 0.02)
     assert symplectic_defect(step, scene.start).size * step.unit > 1e-5
     # The negative control: equations that are not solved show in p_phi, which no parameter holds.
-    largest, _ = momentum_walk("goldstein", kernel_loop(kernel.begin, one_iteration, kernel.observe), steps=50_000)
+    largest, _ = momentum_walk("goldstein", Loop(kernel.begin, one_iteration, kernel.observe), steps=50_000)
     assert not largest < 1e-11
 
 

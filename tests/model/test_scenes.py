@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 import symtop
 from symtop.model import charts
-from symtop.model.scenes import Catalogue, closed_form, energy_scales, grazing, sleeping, steady
+from symtop.model.scenes import closed_form, energy_scales, grazing, sleeping, steady
 from symtop.model.top import flat
 from tests.conftest import random_scenes
 
@@ -16,7 +16,7 @@ from tests.conftest import random_scenes
 def test_what_users_write_is_escaped_and_whole():
     purpose = "a < b & <script>, and a sentence that is longer than the fifty characters a table has by default"
     scene = symtop.Scene("mine", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0), 1.0, purpose)
-    html = Catalogue({"mine": scene})._repr_html_()
+    html = scene._repr_html_()
     assert "a &lt; b &amp; &lt;script&gt;, and a sentence that is longer than the fifty characters" in html
     assert "<script>" not in html
 

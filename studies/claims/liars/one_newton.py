@@ -7,7 +7,7 @@ import numpy as np
 import symtop
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.angles import chart_outcome, on_angles
-from symtop.methods.framework.loop import FixedStep, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.lagrangian import discrete_lagrangian as family
 from symtop.methods.lagrangian.discrete_lagrangian import forces, node_sums, opening
 
@@ -30,7 +30,7 @@ def forces_at(par, rule, theta, d):
     return forces(par, node_sums(rule, theta, d, opening(None, rule, theta)))
 
 
-march = kernel_loop(family.begin, increment, family.observe)
+march = Loop(family.begin, increment, family.observe)
 solver = FixedStep(march, family.Quadrature((0.5,), (1.0,)), on_angles, 1, implicit=True)
 symtop.register(
     dataclasses.replace(

@@ -2,7 +2,7 @@
 
 import symtop
 from symtop.methods.framework.angles import chart_outcome, on_angles
-from symtop.methods.framework.loop import FixedStep, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.splitting import angles
 
 
@@ -32,7 +32,7 @@ def observe(par, rule, before, dstate, h):
     return 0.5 * (par.north + par.south), par.p_psi
 
 
-solver = FixedStep(kernel_loop(begin, increment, observe), (0.0,), on_angles, 1, implicit=False)
+solver = FixedStep(Loop(begin, increment, observe), (0.0,), on_angles, 1, implicit=False)
 symtop.register(
     symtop.Integrator(
         name="verlet-swapped", family="other", summary="velocity Verlet, mistyped", solvers={"angles": solver}, order=2,

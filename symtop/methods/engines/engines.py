@@ -77,7 +77,7 @@ import numpy as np
 
 from symtop.core.jit import by_length, register_jitable, set_item
 from symtop.methods.framework.body import prepared
-from symtop.methods.framework.loop import FixedStep, Loop, as_stepped, kernel_loop, no_carry
+from symtop.methods.framework.loop import FixedStep, Loop, as_stepped, no_carry
 from symtop.methods.framework.preparation import BareTop, Preparation
 from symtop.methods.framework.registry import ENGINE, Integrator
 from symtop.methods.framework.space import L_at, e_at, ended_space, observe_attitude, observe_axis, q_at
@@ -343,7 +343,7 @@ def engine_loop(
         dstate = (*moved(there, y[:-3], p, state[:-3]), *_gap(v, state[-3:]))
         return dstate, carry, 1, ended_space(dstate)
 
-    return kernel_loop(begin, increment, carried.observe, present=carried.present)
+    return Loop(begin, increment, carried.observe, present=carried.present)
 
 
 @register_jitable
@@ -605,7 +605,7 @@ def _increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) 
     return dstate, carry, 1, ended_space(dstate)
 
 
-march_no_squish = kernel_loop(no_carry, _increment_no_squish, observe_attitude)
+march_no_squish = Loop(no_carry, _increment_no_squish, observe_attitude)
 
 
 def _engine(

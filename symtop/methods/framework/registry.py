@@ -147,6 +147,9 @@ class Integrator:
         if usual is not None and not max(least, 5e-324) <= errors.finite("default_tolerance", usual) < 1.0:
             raise SymtopError(f"default_tolerance must be above zero, at least {least:g} and below 1, not {usual!r}")
 
+    def _repr_html_(self) -> str:
+        return Catalogue({self.name: self})._repr_html_()
+
     def check_tolerance(self, tolerance: object) -> float:
         """The tolerance to use, refused where the arithmetic cannot reach it."""
         value = self.default_tolerance if tolerance is None else errors.positive("tolerance", tolerance)

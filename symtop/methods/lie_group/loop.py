@@ -31,7 +31,7 @@ from typing import Any, NamedTuple
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.body import turned, turned_back
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
-from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
+from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import BareTop, Preparation, Shown, as_it_steps
 from symtop.methods.framework.space import SpaceTop, axis_of, ended_space, observe_attitude, on_attitude, with_spin
@@ -115,7 +115,7 @@ def lie_loop(
             outcome = ended_space(step)
         return step, carry, effort, outcome
 
-    return kernel_loop(begin, increment, observe, lanes=lanes)
+    return Loop(begin, increment, observe, lanes=lanes)
 
 
 def in_charts(

@@ -30,7 +30,7 @@ from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework.body import General
 from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.lanes import Lanes, W, column, put, reading
-from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
+from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.registry import Integrator
@@ -176,7 +176,7 @@ def _loop(form: Any, top: Any) -> Loop:
         size = count * (count + 1) // 2
         return Lanes(step, _lay, lambda _: 0.0, lambda _: size, top, d, 1, lambda _: count, begin=no_carry)
 
-    return kernel_loop(begin, increment, form.observe, lanes=lambda rule: lanes(len(rule.b)))
+    return Loop(begin, increment, form.observe, lanes=lambda rule: lanes(len(rule.b)))
 
 
 _TOPS = {"angles": BareTop, "axis": SpaceTop, "attitude": SpaceTop, BODY: General}

@@ -55,7 +55,7 @@ from symtop.core.jit import register_jitable, set_item
 from symtop.core.numbers import context
 from symtop.methods.framework import body, space
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
-from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.plan import NOT_CONVERGED, OK, Array
 from symtop.methods.framework.preparation import Later
 from symtop.methods.framework.registry import Integrator
@@ -499,7 +499,7 @@ def _loop(  # noqa: C901
             return None
         return of_rows(*(tuple(map(tuple, rows.tolist())) for rows in (rule.mu, rule.predict)))
 
-    return kernel_loop(begin, increment, observe, lanes=in_lanes)
+    return Loop(begin, increment, observe, lanes=in_lanes)
 
 
 @register_jitable

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.loop import FixedStep, kernel_loop, no_carry
+from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import OUTCOMES, Run
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
@@ -87,8 +87,8 @@ def _attitude_shown(par: Any, t: float, y: Any) -> Any:
     return frame_sample(par, t, (*e, y[3], y[4], y[5], *a))
 
 
-march_axis = kernel_loop(no_carry, _increment_axis, observe_axis)
-march_frame = kernel_loop(no_carry, _increment_frame, _observe_frame)
+march_axis = Loop(no_carry, _increment_axis, observe_axis)
+march_frame = Loop(no_carry, _increment_frame, _observe_frame)
 
 
 class Onward(FixedStep):

@@ -32,7 +32,7 @@ from symtop.core.jit import compile_kernel, register_jitable, set_item
 from symtop.methods.framework.adaptive import Adaptive, Loop as AdaptiveLoop
 from symtop.methods.framework.angles import LEAST_TOLERANCE
 from symtop.methods.framework.equations import FORMS
-from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import as_it_steps
 from symtop.methods.framework.registry import Integrator
@@ -347,7 +347,7 @@ def fixed_loop(chart: str, pair: Pair) -> Loop:
         step = total(zero(state), stages(par, state, field(par, state), rule.b, h), h)
         return step, carry, cost, ended_at(summed(state, step))
 
-    return kernel_loop(begin, increment, form.observe)
+    return Loop(begin, increment, form.observe)
 
 
 @functools.cache

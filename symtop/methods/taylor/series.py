@@ -64,7 +64,7 @@ from symtop.core.numbers import EPSILON
 from symtop.methods.framework import space
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.lanes import Lanes, one_loop
-from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop, no_carry
+from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import NOT_FINITE, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import BareTop, Scaled, Shown, Start, as_it_steps
 from symtop.methods.framework.registry import Integrator
@@ -262,7 +262,7 @@ def _loop(series_of: Callable[..., Any], size: int, observe: Callable[..., Any])
             step, outcome = stepped(rule, state)
             return step, carry, 1, outcome
 
-        return kernel_loop(no_carry, increment, observe, lanes=lambda _: in_lanes(order))
+        return Loop(no_carry, increment, observe, lanes=lambda _: in_lanes(order))
 
     return loop
 

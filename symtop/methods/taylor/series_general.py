@@ -31,7 +31,7 @@ from symtop.core.jit_functions import fused
 from symtop.core.numbers import EPSILON
 from symtop.methods.framework.body import torque
 from symtop.methods.framework.equations import FORMS
-from symtop.methods.framework.loop import FixedStep, Loop, kernel_loop
+from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import row_of, store
@@ -186,7 +186,7 @@ def loop(chart: str) -> Loop:
         step = tail(state, carry, ORDER, h)
         return step, carry, 1, ended_at(summed(state, step))
 
-    return kernel_loop(begin, increment, form.observe)
+    return Loop(begin, increment, form.observe)
 
 
 def built_in() -> list[Integrator]:
