@@ -51,7 +51,7 @@ STORED = Path(__file__).resolve().parent.parent / "results" / "quick"
 
 @pytest.hookimpl(tryfirst=True)  # before the marks choose
 def pytest_collection_modifyitems(items):
-    """Files in the order of `LONGEST`, then as they were; tests that read the results of every study are marked."""
+    """Files in the order of `LONGEST`, then as they were; tests that read the results of every study are `quick`."""
     for item in items:
         if "quick_results" in item.fixturenames:
             item.add_marker("quick")

@@ -325,6 +325,7 @@ def test_at_the_step_that_a_user_has_it_says_what_is_good_enough(monkeypatch):
             symtop.recommend(scene, accuracy=1e-4, step_size=step, max_step=0.1)
 
 
+@pytest.mark.quick
 def test_limits_leave_out_what_a_user_cannot_use():
     scene = symtop.scene("spheroid")
     ask = functools.partial(symtop.recommend, scene, horizon=2.0)
@@ -411,6 +412,7 @@ def test_who_has_the_solution_is_given_the_exact_motion_with_its_price():
     assert symtop.recommend("spheroid", accuracy=1e-3, needs=("solution", "kicks")).integrator != "exact"
 
 
+@pytest.mark.quick
 def test_a_body_is_answered_with_a_method_of_its_chart():
     scene = symtop.scene("tennis-racket", bodies=True)
     advice = symtop.recommend(scene, accuracy=1e-6)
@@ -452,6 +454,7 @@ def test_an_engine_is_told_of_by_its_settings_and_a_map_by_itself(engine):
     assert all(f"{name} (" in str(advice) for name in advice.errors)
 
 
+@pytest.mark.quick
 def test_engines_have_maps_and_one_without_a_gyroscopic_term_nothing_to_match():
     maps = {method for settings in SETTINGS.values() for method in settings.values()}
     assert maps <= set(engines())

@@ -95,7 +95,7 @@ def follow(page, slow, folder, monkeypatch):
 
 
 @pytest.mark.parametrize(("page", "slow"), [
-    *((page, False) for page, found in PAGES.items() if found),
+    *(pytest.param(at, False, marks=[pytest.mark.quick][at == "README.md" :]) for at, found in PAGES.items() if found),
     *(pytest.param(page, True, marks=pytest.mark.slow) for page, found in PAGES.items() if any(b.slow for b in found)),
 ])  # fmt: skip
 def test_a_page_runs(page, slow, tmp_path, monkeypatch):

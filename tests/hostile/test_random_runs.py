@@ -48,6 +48,7 @@ def test_what_is_right_is_not_warned_of(k):
 OLDER = tuple(name for name in symtop.integrators() if name not in NEWER)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(("count", "without"), [
     (28, NEWER), (40, OLDER), pytest.param(1500, NEWER, marks=pytest.mark.slow)])  # fmt: skip
 def test_random_runs_are_not_wrong_in_silence(count, without):

@@ -102,6 +102,7 @@ def test_a_top_that_starts_at_rest_falls_and_a_free_one_stays(name):
             assert float(symtop.errors(run)["axis"].max()) < (0.02 if mgl else 1e-6)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", AXIS_ERROR)
 def test_a_step_is_the_engines_formula_in_body_axes_and_a_turn_about_the_axis_changes_no_map_on_it(name):
     """Kernels on the axis, with equations solved by hand, against matrices in body axes: the same to rounding."""

@@ -301,6 +301,7 @@ def of_table(*rows, bent=False):
     return lie_runge_kutta("any", rows, 1, "", "", bent=bent).solvers["attitude"]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("solver", [
     of_table(((1.0,),)),
     of_table(((1.0,),), ((0.5, 0.5), (0.0, 0.0)), bent=True),

@@ -173,6 +173,7 @@ def members(count=60):
     return numbers, 10.0 ** -(2.0 + np.arange(count) % 9), times, 1 + np.arange(count) % COUNTS
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(("name", "budget"), [
     *((name, None) for name in SOLVERS), *((name, BUDGET) for name in ONE_CHART.values())])  # fmt: skip
 def test_members_have_the_bits_of_runs_alone(name, budget):

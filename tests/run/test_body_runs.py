@@ -86,6 +86,7 @@ def test_a_table_for_an_exact_drift_falls_to_order_two_with_one_of_order_two(nam
     assert abs(math.log2(coarse / fine) - 2.0) < 0.1
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", BODIES)
 @pytest.mark.parametrize("method", [name for name in ADAPTIVE if name in symtop.integrators()])
 def test_a_tight_tolerance_comes_to_the_true_motion(name: str, method: str) -> None:
@@ -317,6 +318,7 @@ def test_a_body_stored_or_of_plain_numbers_is_read_back_to_the_bit(tmp_path):  #
     assert symtop.RigidBody(1.0, 1.2, 0.9, 1.0, (0.0, 0.0, 1.0 + 1e-15)).centre == (0.0, 0.0, 1.0)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(("name", "execution"), [
     ("rk4", chunks.IN_LANES), ("strang", chunks.IN_LANES), ("suzuki-4", chunks.IN_LANES),
     ("chin-4a", chunks.IN_LANES), ("five-rotations", chunks.IN_LANES), ("gauss-4", chunks.IN_TURN),
