@@ -32,8 +32,7 @@ def test_a_case_that_fails_there_is_recorded_here(cluster, tmp_path):
     )
     words = ["study", PROBE, "--results", tmp_path / "r", "--plugin", plugin, "--scheduler", cluster.scheduler_address]
     code, out, err = ended(symtop(*words))
-    assert code == 1
-    assert err.count("RuntimeError: no luck") == 2
+    assert (code, err.count("RuntimeError: no luck")) == (1, 2)
     assert "of 14 cases computed" in out
 
 

@@ -322,8 +322,7 @@ def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
     code, out, _ = ended(symtop("study", PROBE, "--results", results, "--plugin", plugin, "--status", "--json"))
     assert code == 1
     states = [row["state"] for row in json.loads(out)["probe"]]
-    assert states.count("failed") == 10
-    assert states.count("done") == 14
+    assert (states.count("failed"), states.count("done")) == (10, 14)
 
 
 def test_a_case_has_its_time_and_the_limit_is_heard_by_the_runner(tmp_path, monkeypatch):
@@ -362,8 +361,7 @@ def test_no_terminal_and_closed_streams(tmp_path, closed):
     words = f"{sys.executable} -m symtop.cli study {PROBE} --results {tmp_path / 'r'} --jobs 2"
     words += "".join(f" {n}>&-" if n != "0" else " 0<&-" for n in closed)
     result = subprocess.run(["/bin/sh", "-c", words], timeout=240, check=False)
-    assert result.returncode == 0
-    assert len(contents(tmp_path / "r")) == 13
+    assert (result.returncode, len(contents(tmp_path / "r"))) == (0, 13)
 
 
 def test_errors_of_the_place_are_not_errors_of_a_case(tmp_path):
@@ -372,8 +370,7 @@ def test_errors_of_the_place_are_not_errors_of_a_case(tmp_path):
     case = study.cases(True)[0]
     path = store.case_path(tmp_path, study, case)
     task = work.Task(str(PROBE), case, path, (), 10.0)
-    assert work.execute_case(task).state == "computed"
-    assert work.execute_case(task).state == "found"
+    assert (work.execute_case(task).state, work.execute_case(task).state) == ("computed", "found")
     assert work.execute_case(task._replace(fresh=True)).state == "computed"
     other = path.with_name(path.name.replace(store.digest_of(path), "0" * 20))
     with pytest.raises(SymtopError, match="not those that the study was started with"):

@@ -283,8 +283,7 @@ def test_planted_factors_of_steps_and_of_silent_runs_are_found():
         assert facts.silent_orders(data, FREE) == pytest.approx((0.05 * factor,) * 3)  # strang; rk4 and gauss-4
         assert by.silent(data, "rk4[body]", "0.3", "regular") == pytest.approx(0.05)
         assert np.isnan(by.silent(data, "rk4[body]", "0.3", "chaotic"))
-        assert by.winner(data, FREE, 1e-6) == "gauss-4[body]"
-        assert by.winner(data, FREE, 1e-6, "kicks") == "strang[body]"
+        assert (by.winner(data, FREE, 1e-6), by.winner(data, FREE, 1e-6, "kicks")) == ("gauss-4[body]", "strang[body]")
         assert by.transferred(data, FREE, 1e-6).value == pytest.approx(1.0)
     scatter = np.random.default_rng(1).lognormal(10.0, 0.5, (3, 1, 1, 1, 40))  # the same of each family
     both = planted(1.0)
@@ -321,8 +320,7 @@ def test_a_method_that_no_step_within_the_budget_makes_safe_is_counted(unserved,
     at = {"variant": 1, "family": [*FAMILIES].index(FREE), "target": 0}
     met[{**at, "member": slice(unserved)}] = np.inf  # 3 of 40 are more than 5 %
     data["short"] = data["short"].to_dataset().assign(met_at=met)
-    assert facts.steps(data, FREE).words == words
-    assert facts.steps(data, "0.1").words == "median 1, 95\xa0% below 1"
+    assert (facts.steps(data, FREE).words, facts.steps(data, "0.1").words) == (words, "median 1, 95\xa0% below 1")
     assert by.step_factors(data, FREE, 1e-3).get("strang[body]") == pytest.approx(np.inf if unserved else 3.0)
     assert {one.get_text() for one in figures.draw_steps(data).axes[0].texts} == ({"+1"} if unserved else set())
     assert facts.pooled([{"strang[body]": np.inf}]).words == "1 of 1 cases over budget"
