@@ -63,14 +63,18 @@ def first_call(function: Callable[[], object]) -> float:
     return _batch(function, 1)
 
 
-def _calibrate(function: Callable[[], object], batch: float) -> tuple[int, float | None]:
-    """How many calls last at least `batch` seconds, and a little more; with the time of one call, if that is enough."""
-    count = 1
-    while (elapsed := _batch(function, count)) < min(CLEAR, batch):
+def _calibrate(function: Callable[[], object], batch: float, once: float) -> tuple[int, list[float]]:
+    """How many calls last at least `batch` seconds, and a little more; if one does, with the times of those made."""
+    count, single = 1, [_batch(function, 1)]
+    if min(CLEAR, batch) <= single[0] < once:  # it may have met a pause, as when Python collects garbage
+        single.append(_batch(function, 1))
+    elapsed = min(single)
+    while elapsed < min(CLEAR, batch):
         count *= max(2, min(STRIDE, int(1.2 * CLEAR / max(elapsed, 1e-9))))
+        elapsed = _batch(function, count)
     if elapsed < batch:
-        return max(1, math.ceil(1.15 * count * batch / elapsed)), None
-    return count, elapsed if count == 1 else None
+        return max(1, math.ceil(1.15 * count * batch / elapsed)), []
+    return count, single if count == 1 else []
 
 
 def timings(
@@ -79,8 +83,8 @@ def timings(
 ) -> list[Timing]:  # fmt: skip
     """Time several functions against each other.
 
-    Those that are `warm`, called before, have no first call (NaN), and a call that turns out to be longer than a batch
-    is the first sample of its function: a long run costs no more calls than it has samples. A function has no more
+    Those that are `warm`, called before, have no first call (NaN), and calls that turn out to be longer than a batch
+    are the first samples of their function: a long run costs no more calls than it has samples. A function has no more
     samples, but `least` of them, if they have taken `patience` seconds together: a long one meets both fast and slow
     moments of the machine. It has no more either once they `agree` within the part `close`. The closed form is compiled
     before anything is timed, whoever calls it; if nothing that is timed does (not `exact`), it stays as it is.
@@ -91,9 +95,9 @@ def timings(
     samples: list[list[float]] = []
     for function in functions:
         firsts.append(math.nan if warm else first_call(function))
-        count, long = _calibrate(function, batch)
+        count, single = _calibrate(function, batch, math.inf if least > 1 else patience)
         calls.append(count)
-        samples.append([long] if warm and long is not None else [])
+        samples.append(single if warm else [])
     draw = random.Random(0)  # noqa: S311
     for number in range(batches):
         for index in draw.sample(range(len(functions)), len(functions)):

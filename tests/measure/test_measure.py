@@ -125,6 +125,8 @@ def taking(clock, each):
 
 
 def test_a_function_is_asked_no_more_once_it_took_long_or_its_least_samples_agree(clock):
+    timings([taking(clock, [0.03, *(1000 * [1e-4])])], 3, 5e-3, warm=True, exact=False)  # a pause before the first call
+    assert clock[0] > 0.03 + 3 * 5e-3
     for patience, least, counts in ((math.inf, 2, [4, 4, 4]), (0.05, 2, [4, 3, 2]), (0.05, 1, [4, 3, 1])):
         naps = [taking(clock, itertools.repeat(seconds)) for seconds in (1e-3, 0.02, 0.06)]
         results = timings(naps, 4, 5e-3, warm=True, patience=patience, least=least, exact=False)
@@ -133,9 +135,8 @@ def test_a_function_is_asked_no_more_once_it_took_long_or_its_least_samples_agre
         calls = taking(clock, (0.01, 0.011, 0.03, 0.03, 0.03, 0.012, 0.03, 0.03))
         (timing,) = timings([calls], 8, 2e-3, warm=True, close=close, exact=False)
         assert len(timing.samples) == count
-    assert agree([1.0, 3.0, 1.005, 3.0, 1.009], 0.01)
-    assert not agree([1.0, 3.0, 1.005, 3.0, 1.02], 0.01)
-    assert not agree([1.0, 1.0, 1.0, 1.0], 0.01)
+    samples = [[1.0, 3.0, 1.005, 3.0, last] for last in (1.009, 1.02)]
+    assert [agree(one, 0.01) for one in (*samples, 4 * [1.0])] == [True, False, False]
 
     # The machine is half as fast in its first second; of functions that are timed one by one the first look so.
     def work():
@@ -144,8 +145,7 @@ def test_a_function_is_asked_no_more_once_it_took_long_or_its_least_samples_agre
     together = [timing.best for timing in timings([work] * 10, 10, 5e-3, warm=True, exact=False)]
     clock[0] = 0.0
     alone = [timings([work], 10, 5e-3, warm=True, exact=False)[0].best for _ in range(10)]
-    assert together == pytest.approx([0.01] * 10)
-    assert alone == pytest.approx([0.02] * 5 + [0.01] * 5)
+    assert (together, alone) == (pytest.approx([0.01] * 10), pytest.approx([0.02] * 5 + [0.01] * 5))
 
 
 def test_timings_know_when_they_are_noisy_and_errors_are_relative_to_their_scales():
