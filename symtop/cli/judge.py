@@ -76,14 +76,14 @@ def judge(
 
     def tell(event: Any) -> None:
         if isinstance(event, findings.About):
-            click.echo(findings.heading(event, getattr(scene, "name", scene)))
-        elif line := findings.line(event, common.terminal_width()):
+            line = _heading(event, scene, card or figure)
+        else:
+            line = findings.line(event, common.terminal_width())
+        if line and not as_json:
             click.echo(line)
 
     _check(options["form"], output=output, card=card, badge=badge, figure=figure)
-    ledger = judged(target, scene=scene, tell=None if as_json else tell, **options)
-    if not ledger.about.chart and (card or figure):
-        raise SymtopError("a card or a figure shows a method: there is none of a trajectory")
+    ledger = judged(target, scene=scene, tell=tell, **options)
     click.echo(as_text([one.plain() for one in ledger.findings]) if as_json else findings.summary(ledger))
     if output is not None:
         from symtop.core import netcdf
@@ -99,6 +99,15 @@ def judge(
     say_written(output, card, badge, figure, err=as_json)
     if ledger.refuted:
         sys.exit(1)
+
+
+def _heading(about: Any, scene: Any, picture: str | None) -> str:
+    """The first lines of an answer; SymtopError if a picture is asked for of a trajectory."""
+    from symtop.judging import findings
+
+    if picture and not about.chart:
+        raise SymtopError("a card or a figure shows a method: there is none of a trajectory")
+    return findings.heading(about, getattr(scene, "name", scene))
 
 
 def _check(form: str | None, **files: str | None) -> None:
@@ -147,8 +156,8 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
     """Measure every claim of each INTEGRATOR: order, symplecticity, symmetry, conserved quantities, cost.
 
     Of a body without symmetry: order, energy, and L in space, of a heavy one L_z. The exit code is 1 if a claim is
-    refuted, or if nothing can be measured of an integrator. Without a name: the integrators of the plug-in, or all. A
-    plug-in runs in a process of its own.
+    refuted, or if nothing can be measured of an integrator. Without a name: the integrators of the plug-in, or all that
+    step the scene. A plug-in runs in a process of its own.
 
     \b
     symtop claims midpoint rk4
@@ -158,10 +167,12 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
         from symtop.judging.judge_step import judge_separately
         from symtop.methods.framework import registry
         from symtop.model import scenes
+        from symtop.model.charts import BODY
 
         problem = scenes.scene(scene, bodies=True)
         added = [name for name in registry.integrators() if not registry.is_built_in(name)]
-        methods = [registry.integrator(name) for name in names or added or registry.integrators()]
+        known = [name for name, one in registry.integrators().items() if not problem.of_body or BODY in one.solvers]
+        methods = [registry.integrator(name) for name in names or added or known]
     refuted, entries = False, []
     for method in methods:
         with ticking(f"measuring {method.name}"):

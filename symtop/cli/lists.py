@@ -155,6 +155,7 @@ def _numbers(scene: "Scene") -> Record:
         "top": {name: getattr(top, name) for name in top.__slots__},
         "start": {name: getattr(start, name) for name in start.__slots__},
         "momenta": {"p_phi": momenta.p_phi, "p_psi": momenta.p_psi},
+        "source": scene.reference,
         "theta": sorted(math.acos(min(1.0, max(-1.0, cosine))) for cosine in cosines),
     }
 
@@ -164,7 +165,10 @@ def _digits(value: Any) -> str:
 
 
 def _scene_page(numbers: Record) -> str:
+    from symtop.methods.framework.registry import bibliography
+
     name, purpose, angles = (numbers.pop(key) for key in ("name", "purpose", "theta"))
+    keys = str(numbers["source"] or numbers.pop("source")).split()
     parts = {key: numbers.pop(key) for key in ("top", "start", "momenta")}
     lines = {key: ", ".join(f"{name}={_digits(value)}" for name, value in part.items()) for key, part in parts.items()}
     if angles:
@@ -176,13 +180,13 @@ def _scene_page(numbers: Record) -> str:
     if "I2" in parts["top"]:
         numbers = {"natural period" if key == "nutation period" else key: value for key, value in numbers.items()}
     title = textwrap.fill(f"{name}: {purpose}" if purpose else name, terminal_width())
-    return f"{title}\n\n{facts(lines | numbers)}"
+    return "\n\n".join([title, facts(lines | numbers), *(text for key, text in bibliography().items() if key in keys)])
 
 
 @click.command(short_help="BibTeX of the package and of what a dataset used.")
 @click.argument("files", nargs=-1, type=File(exists=True, dir_okay=False, path_type=Path))
 def cite(files: tuple[Path, ...]) -> None:
-    """Print BibTeX of symtop and of the sources of the integrators in the datasets FILES (netCDF).
+    """Print BibTeX of symtop and of the sources of the integrators and scenes in the datasets FILES (netCDF).
 
     \b
     symtop cite
@@ -190,20 +194,21 @@ def cite(files: tuple[Path, ...]) -> None:
     """
     from symtop.core import netcdf
     from symtop.methods.framework.registry import bibliography, citation_keys, integrator
+    from symtop.model.scenes import scene
 
-    names: list[str] = []
+    methods: list[str] = []
+    scene_names: list[str] = []
     for group in (group for file in files for group in netcdf.groups(netcdf.read_any(file)).values()):
-        for name in {"variant", "integrator"} & group.variables.keys():  # files of version 0.2 have the latter
-            names += map(str, group[name].values.ravel())
-        if "integrator" in group.attrs:
-            names.append(str(group.attrs["integrator"]))
+        for names, kinds in ((methods, {"variant", "integrator"}), (scene_names, {"scene"})):  # "integrator" till 0.2
+            names += [str(name) for kind in kinds & group.variables.keys() for name in group[kind].values.ravel()]
+            names += [str(group.attrs[kind]) for kind in kinds & group.attrs.keys()]
     sources: dict[str, list[str]] = {}
-    for name in dict.fromkeys(names):
+    for name in dict.fromkeys(methods + scene_names):
         sources[name] = []
         with contextlib.suppress(SymtopError):  # not registered here
-            sources[name] = citation_keys(integrator(name))
+            sources[name] = citation_keys(integrator(name) if name in methods else scene(name, bodies=True))
     keys = dict.fromkeys(key for entries in sources.values() for key in entries)
     for text in [PACKAGE, *(bibliography()[key] for key in keys)]:
         click.echo(text + "\n")
-    if unknown := [name for name, entries in sources.items() if not entries]:
+    if unknown := [name for name in dict.fromkeys(methods) if not sources[name]]:
         click.echo(f"symtop: no source is known of {', '.join(unknown)}", err=True)

@@ -226,8 +226,9 @@ def timed_rows(cells: "list[tuple[Scene, Integrator, float, list[dict[str, Any]]
         calls += own
         firsts += own[:1]
     with foreign_code("a method that is timed"):
-        for first in firsts:  # a call that loads code would pass for a long run, of which a batch has one call
+        if firsts:
             closed_form.compile_now()
+        for first in firsts:  # a call that loads code would pass for a long run, of which a batch has one call
             first()
         results = timings(calls, BATCHES, BATCH, warm=True, patience=PATIENCE, close=CLOSE) if calls else []
     for one, timing in zip(rows, results, strict=True):

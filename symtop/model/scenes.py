@@ -55,7 +55,8 @@ class Scene:
 
     ``nutation`` is theta alone, ``axis`` the direction of the axis, ``attitude`` the whole orientation. `units` decides
     the units in datasets. Studies leave out scenes by their `tags`, any of `TAGS`. A `RigidBody` with an `Attitude` is
-    the scene of a body without symmetry: it observes ``body``, and what takes such a scene says so.
+    the scene of a body without symmetry: it observes ``body``, and what takes such a scene says so. `reference` names
+    where the scene was published.
     """
 
     name: str
@@ -66,6 +67,7 @@ class Scene:
     observes: str = "attitude"
     units: str = field(default="", metadata={"words": True})  # "SI", or empty: any consistent units
     tags: Iterable[str] = field(default=(), metadata={"words": True})
+    reference: str = field(default="", metadata={"words": True})  # keys in citations.bib, or words
 
     def __post_init__(self) -> None:
         label("name", self.name)
@@ -240,13 +242,15 @@ def _separatrix() -> Scene:
     g, root = math.sqrt(top.mgl / top.I1), math.sqrt(3.0)
     start = Angles(math.pi / 3.0, phi_dot=2.0 * g / root, psi_dot=(3.0 * top.I1 - top.I3) * g / (top.I3 * root))
     purpose = "rises towards the upright for ever: every disturbance grows as exp(g t/2), and no step saves a long run"
-    return Scene("separatrix", top, start, 20.0 / g, purpose, tags=["near_pole", "unstable"])
+    tags, reference = ["near_pole", "unstable"], "woodhouse-2009"
+    return Scene("separatrix", top, start, 20.0 / g, purpose, tags=tags, reference=reference)
 
 
 def _goldstein(name: str, theta_dot: float, purpose: str, *tags: str) -> Scene:
     """a = p_psi/I1 = 2.5, b = p_phi/I1 = 1.7: phi' = (b - a u)/(1 - u^2), psi' = a I1/I3 - phi' u, u = cos 43 deg."""
     start = Angles(math.radians(43.0), 0.0, 0.0, theta_dot, -0.2760228916930134, 5.201870363571313)
-    return Scene(name, SymmetricTop(2.0, 1.0, 2.0), start, 70.0, purpose, tags=["mild", *tags])
+    source = "goldstein-poole-safko-2002"
+    return Scene(name, SymmetricTop(2.0, 1.0, 2.0), start, 70.0, purpose, tags=["mild", *tags], reference=source)
 
 
 # The notebook prints alpha = 2 E1/I1 = 1.6 and a release at rest; alpha = 1.6 means this rate instead of zero.
@@ -260,7 +264,7 @@ def _kinon_betsch() -> Scene:
     spin = (top.I1 * precession**2 * math.cos(theta) + top.mgl) / (top.I3 * precession)
     start = Angles(theta=theta, phi_dot=precession, psi_dot=spin - precession * math.cos(theta))
     purpose = "steady precession of a small real gyroscope, a published benchmark"
-    return Scene("kinon-betsch", top, start, 2.0, purpose, units="SI", tags=["steady"])
+    return Scene("kinon-betsch", top, start, 2.0, purpose, units="SI", tags=["steady"], reference="kinon-betsch-2024")
 
 
 @functools.lru_cache(maxsize=1)
@@ -286,14 +290,16 @@ def _catalogue() -> dict[str, Scene]:
               "exactly steady precession: whatever nutates here is error", tags=["steady"]),
         Scene("hairer-lubich-wanner", SymmetricTop(0.5, 1.0, 1.0),
               Angles(theta=math.acos(0.6), phi=2.0 * math.atan(2.0), theta_dot=0.4, phi_dot=2.5, psi_dot=-1.1), 30.0,
-              "the flat top of Geometric Numerical Integration, figure VII.5.3", tags=["ordinary", "mild"]),
+              "the flat top of Geometric Numerical Integration, figure VII.5.3", tags=["ordinary", "mild"],
+              reference="hairer-lubich-wanner-2006"),
         Scene("simo-wong", SymmetricTop(5.0, 1.0, 20.0), Angles(theta=0.05, psi_dot=50.0), 10.0,
-              "a fast top almost upright, the benchmark of structural dynamics", tags=["fast", "repeats"]),
+              "a fast top almost upright, the benchmark of structural dynamics", tags=["fast", "repeats"],
+              reference="simo-wong-1991"),
         _kinon_betsch(),
         Scene("bruls-cardona-arnold", SymmetricTop(15.234375, 0.46875, 147.15),
               Angles(theta=math.pi / 2, phi=math.pi, psi=math.pi / 2, phi_dot=-4.61538, psi_dot=150.0), 2.0,
               "a published benchmark that grazes the lower pole at 0.00004 degrees: no place for angles", units="SI",
-              tags=["near_pole"]),
+              tags=["near_pole"], reference="bruls-cardona-arnold-2012"),
         _named(grazing(1e-3), "grazing", "passes the upper pole at 0.06 degrees: a step in angles may jump over it",
                "near_pole", "repeats"),
         _named(sleeping(2.5), "sleeping", "let go almost upright and fast enough to stay there (threshold 2)",
@@ -316,9 +322,10 @@ def _bodies() -> dict[str, Scene]:
     catalogue = [
         Scene("check-case-2", brick, Attitude(omega_body=rates), 30.0,
               "a free brick, check case 2 of NASA's flight simulations; space axes: north, east, down at the start",
-              units="SI"),
+              units="SI", reference="murri-jackson-shelton-2015"),
         Scene("tennis-racket", RigidBody(1.0, 2.0, 3.0), Attitude(omega_body=(1e-3, 1.0, 1e-3)), 100.0,
-              "free, turning about its middle axis: it flips over again and again"),
+              "free, turning about its middle axis: it flips over again and again",
+              reference="ashbaugh-chicone-cushman-1991"),
         Scene("free-wobble", RigidBody(1.0, 1.01, 1.6), Attitude(omega_body=(0.3, 0.0, 1.0)), 60.0,
               "free and nearly symmetric: a slow wobble"),
         Scene("heavy-brick", RigidBody(1.0, 1.2, 0.6, 1.0, (0.1, 0.0, 1.0)), swinging, 20.0,

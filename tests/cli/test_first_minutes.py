@@ -107,6 +107,7 @@ def test_a_cold_ensemble_is_never_silent_for_long_and_a_recording_hears_a_silenc
     assert recording.widest > 80
 
 
+@pytest.mark.quick
 def test_the_command_of_a_recommendation_holds_the_options_of_the_body():
     own = ["--body", "2,1.5,1", "--rates=-0.1,0,3"]
     answer = call("recommend", "body", *own, "--accuracy", "1e-3", "--needs", "derivative", "--horizon", "10").output

@@ -545,11 +545,13 @@ def test_a_run_that_is_returned_is_one_of_numbers():
     assert (run.attrs["outcome"], np.isnan(run["energy"].values).all()) == ("not_finite", True)
 
 
-def test_a_name_that_is_unknown_is_told_before_anything_is_measured(monkeypatch):
-    measured = []
-    monkeypatch.setattr("symtop.judging.judge_step.judge_separately", lambda *one, **_: measured.append(one))
+def test_a_name_that_is_unknown_is_told_before_anything_is_measured_and_all_are_those_that_step_the_scene(monkeypatch):
+    methods, empty = [], SimpleNamespace(findings=())
+    monkeypatch.setattr("symtop.judging.judge_step.judge_separately", lambda one, _, **__: methods.append(one) or empty)
     result = call("claims", "midpoint", "midpont", code=2)
-    assert ("integrator 'midpont' is unknown" in result.output, measured) == (True, [])
+    assert ("integrator 'midpont' is unknown" in result.output, methods) == (True, [])
+    call("claims", "--scene", "tennis-racket", code=1)
+    assert methods == [one for one in symtop.integrators().values() if "body" in one.solvers]
 
 
 STEP = SPHEROID.nutation_period / 118.02

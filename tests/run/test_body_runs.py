@@ -68,7 +68,8 @@ def slope(scene: symtop.Scene, method: str, order: int, true: symtop.Scene | Non
 
 
 @pytest.mark.parametrize("name", BODIES)
-@pytest.mark.parametrize(("method", "order"), FIXED.items())
+@pytest.mark.parametrize(("method", "order"), [
+    pytest.param(*one, marks=[pytest.mark.quick][one[0] in CONSERVED :]) for one in FIXED.items()])  # fmt: skip
 def test_the_error_falls_by_the_order(name: str, method: str, order: int) -> None:
     power = slope(body_scenes()[name], method, order)
     steep = 6.0 if order in (9, 16) else 1.6  # there the long steps fall as powers of h over a radius

@@ -29,7 +29,7 @@ from symtop.core.errors import SymtopError, SymtopWarning, one_of, shown, words_
 from symtop.core.signals import is_of_user
 from symtop.methods.framework.plan import Array, Plan, Run
 from symtop.model.charts import BODY, DIMENSIONS, View
-from symtop.model.scenes import Catalogue
+from symtop.model.scenes import Catalogue, Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
 
 Solver = Callable[[SymmetricTop, Angles, Plan], Run]
@@ -364,9 +364,9 @@ def bibliography() -> dict[str, str]:
     }
 
 
-def citation_keys(method: Integrator) -> list[str]:
-    """The entries that an integrator's `reference` names; a reference may also be plain words."""
-    return [key for key in method.reference.replace(",", " ").split() if key in bibliography()]
+def citation_keys(entry: Integrator | Scene) -> list[str]:
+    """The entries that a `reference` names, of an integrator or a scene; it may also be plain words."""
+    return [key for key in str(entry.reference).replace(",", " ").split() if key in bibliography()]
 
 
 def citation(name: "str | Integrator") -> str:
