@@ -88,6 +88,7 @@ SETTINGS = {  # the maps of an engine by its settings, the default first
 }  # fmt: skip
 MISSES_AT_STEP = "Not accurate enough at this step, each with its error"
 STEP = 1.0 / 240.0  # s
+LEAD = 1.05  # a shorter time than that is not called one
 WORST = 0.5  # rad: an axis that is further off needs no method to match it
 CLOSE = 0.85  # of the margin: the least error of a finalist, if few runs find such a setting
 ROUNDS = 15  # in which finalists are timed
@@ -140,6 +141,12 @@ class _Question(NamedTuple):
     general: bool = False
     keeps: Collection[str] = ()
     pace: float = math.inf  # most seconds of a step
+
+    @property
+    def goal(self) -> str:
+        """What is asked for, in words."""
+        until = f"t = {self.horizon:g}{self.scene.second}"
+        return f"{self.quantity} error {self.accuracy:g} on {self.scene.name} to {until}"
 
     def advice(self, **facts: Any) -> Advice:
         return Advice(self.scene.name, self.quantity, self.accuracy, self.horizon, **facts)
@@ -449,8 +456,7 @@ def _advice(
     question: _Question, ranked: Sequence[_Trial], fails: tuple[str, ...], source: str,
     beside: Sequence[_Trial] = (),
 ) -> Advice:  # fmt: skip
-    scene, accuracy, quantity, horizon = question[:4]
-    goal = f"{quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}{scene.second}"
+    scene, goal = question.scene, question.goal
     if not ranked:
         reason = f"Nothing that was tried meets {goal}; {source}."
         without = _without_steps(question, math.nan)
@@ -459,7 +465,7 @@ def _advice(
     name, fixed = best.run.integrator.name, best.run.integrator.fixed_step
     worth = f"Error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
     if fixed:
-        count = scene.time_scale(horizon) / best.run.setting
+        count = scene.time_scale(question.horizon) / best.run.setting
         worth += f"; steps are {count:.3g} a {scene.period_word}, {1e6 * best.a_step:.2g} us each"
     need = best.run.integrator.needs
     needed = f"It needs {NEEDS[need]} ({need})." if need else ""
@@ -482,11 +488,10 @@ def _times(ratio: float) -> str:
 
 
 def _the_motion(question: _Question, limit: float) -> Advice:
-    scene, accuracy, quantity, horizon = question[:4]
     closed_form.compile_now()  # its time is the answer
     exact, seconds = integrator("exact"), _exact_seconds(question)
     reason = (
-        f"exact, the closed form, meets {quantity} error {accuracy:g} on {scene.name} to t = {horizon:g}.\n"
+        f"exact, the closed form, meets {question.goal}.\n"
         f"Error below {limit:.2g} in {seconds:.2g} s, without steps.\n"
         f"It needs {NEEDS['solution']} (solution).{_carries(question, exact)}"
     )
@@ -553,7 +558,7 @@ def _without_steps(question: _Question, best: float) -> str:
     if not closed_form.load():  # to compile it takes 10 s, and its time interpreted says nothing
         return f"The closed form, integrator exact, takes no step{error}."
     seconds = _exact_seconds(question)
-    if not best > seconds:
+    if not best > LEAD * seconds:
         more = f", {_times(seconds / best)} that" if math.isfinite(best) else ""
         return f"The closed form, integrator exact, takes {seconds * 1e6:.2g} us{more}{error}, and no step."
     fastest = f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us"

@@ -1,5 +1,6 @@
 """``symtop study``, ``report`` and ``archive``: studies, the page of all findings, and the bundle of all data."""
 
+import shlex
 import sys
 from collections import Counter, deque
 from collections.abc import Iterator, Sequence
@@ -52,7 +53,7 @@ def study(
     \b
     symtop study convergence drift
     symtop study --all --quick
-    symtop study convergence --quick --only my-rk --plugin my_methods.py
+    symtop study convergence --quick --only ralston-3 --plugin my_methods.py
     symtop study --all --status --why
     symtop study convergence --scheduler tcp://10.0.0.1:8786
     """
@@ -125,7 +126,7 @@ def run_all(
     if as_json:
         click.echo(as_text(summaries))
     elif summaries:
-        click.echo(f"next: symtop report --results {results}, one page of all findings")
+        click.echo(f"next: symtop report --results {shlex.quote(str(results))}, one page of all findings")
     return 1 if any(summary["failures"] for summary in summaries) else 0
 
 

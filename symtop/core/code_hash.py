@@ -291,7 +291,7 @@ class Code:
         elif isinstance(thing, Path):
             path = thing.resolve()
             if any(folder in path.parents for folder in roots.values()) and path.is_file():
-                self._note(file_label(path), file_hash(path))
+                self._lead_to("file", "", file_label(path), file_hash(path))
         elif is_dataclass(thing):
             counted = [part.name for part in fields(thing) if not part.metadata.get("words")]
             self._add_all((type(thing), *(getattr(thing, name) for name in counted)))

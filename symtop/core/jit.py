@@ -365,7 +365,7 @@ def is_cached(kernel: Any, signature: Any, *, bitcode: bool = False) -> bool:
     """Is a kernel's machine code in memory or on disk, or, if that is asked for, at least its bitcode on disk?"""
     if signature in kernel.overloads:
         return True
-    with contextlib.suppress(AttributeError, TypeError):  # numba's own cache, or another numba
+    with contextlib.suppress(AttributeError, TypeError, OSError):  # numba's own cache, another numba, or no way there
         files = kernel._cache.files(signature, kernel.targetctx.codegen())
         return any(file.is_file() for file in files[: 3 if bitcode else 1])
     return False

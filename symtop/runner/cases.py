@@ -138,27 +138,27 @@ def status(
             before = _attribute(max(earlier, key=lambda old: old.stat().st_mtime), "made_of")
             causes = code_hash.changes(before, fingerprint.reasons(study, case))
         elif why and state == MISSING:
-            causes = other_settings(case, stored)
+            causes = other_settings(study, case, stored)
         row = {"scene": case.scene, "integrator": case.integrator, "state": state, "message": message}
         rows.append(row | ({"why": causes} if why else {}))
     return rows
 
 
-def other_settings(case: Case, stored: list[Path]) -> list[str]:
-    """How the settings of a case differ from the nearest that were computed on its scene with its integrator."""
+def other_settings(study: Study, case: Case, stored: list[Path]) -> list[str]:
+    """How the settings of a case, and what it is made of, differ from the nearest of its scene and integrator."""
     alike = [path for path in stored if store.identity_of(path).rpartition("--")[0] == case.label]
-    settings = json.loads(json.dumps(dict(case.settings)))
+    settings, made = json.loads(json.dumps(dict(case.settings))), fingerprint.reasons(study, case)
     differing = [
         [f"setting {name}" for name in sorted({*old, *settings}) if old.get(name, "") != settings.get(name, "")]
-        for old in (_attribute(path, "settings") for path in alike)
+        + [label for label in code_hash.changes(before, made) if label != "settings"]
+        for old, before in ([_attribute(path, name) for name in ("settings", "made_of")] for path in alike)
     ]
     return min(differing, key=len, default=["never computed"])
 
 
 def _attribute(path: Path, name: str) -> dict[str, Any]:
     """A mapping that a case's file holds; empty if the file is damaged or another program's."""
-    data = store.load_case(path)
-    content = {} if data is None else data.attrs.get(name)
+    content = getattr(store.load_case(path), "attrs", {}).get(name)
     return content if isinstance(content, dict) else {}
 
 

@@ -249,6 +249,7 @@ def test_changes_name_what_differs_and_versions_of_packages_are_reasons():
     before, now = {"file a": "1", "file b": "2", "scene x": "3"}, {"file a": "1", "file b": "9", "package n": "4"}
     assert changes(before, now) == ["file b", "scene x (no longer counts)", "package n (did not count before)"]
     assert changes(now, now) == []
+    assert "code symtop/core/jit.py" in Code().reasons("a file by its path", code_hash.PACKAGE / "core" / "jit.py")
     assert digest(before) == digest(dict(reversed(before.items())))
     assert digest(before) != digest(now)
     assert merged([{"a": "1"}, {"a": "1", "b": "2"}]) == {"a": "1", "b": "2"}

@@ -49,8 +49,7 @@ MADE = {
 @pytest.mark.parametrize("name", MADE)
 def test_every_number_has_a_name_and_a_unit(name, run, tmp_path):
     data = MADE[name](run)
-    assert lacking(data) == []
-    assert lacking(netcdf.read(netcdf.write(data, tmp_path / "data.nc"))) == []
+    assert (lacking(data), lacking(netcdf.read(netcdf.write(data, tmp_path / "data.nc")))) == ([], [])
 
 
 def test_what_lacks_a_name_a_unit_or_a_title_is_found(run):

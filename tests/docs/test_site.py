@@ -94,8 +94,7 @@ def test_nothing_is_fetched_from_elsewhere_and_every_link_leads_somewhere(site):
 def test_what_is_fetched_is_seen():
     """Negative control of the reading above."""
     text = "<script src='https://cdn/x.js'></script><link rel='stylesheet' href='//a/b.css'><a href='no.html'></a>"
-    assert assets(text).fetched == ["https://cdn/x.js", "//a/b.css"]
-    assert assets(text).links == ["no.html"]
+    assert (assets(text).fetched, assets(text).links) == (["https://cdn/x.js", "//a/b.css"], ["no.html"])
 
 
 @pytest.mark.slow

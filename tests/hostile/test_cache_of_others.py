@@ -7,11 +7,14 @@ import stat
 import zlib
 
 import pytest
+import xarray as xr
 
+import symtop
 from symtop.cli import doctor
-from symtop.core import jit
+from symtop.core import files, jit
 from symtop.core.errors import SymtopWarning
 from symtop.core.jit import compile_kernel
+from symtop.run.reference import truth
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "geteuid"), reason="this system has no owners of files")
 
@@ -85,3 +88,12 @@ def test_what_others_may_write_is_not_read(planted, monkeypatch, at, fault):
     with pytest.warns(SymtopWarning, match=words) as record:
         assert [compile_kernel(_doubled)(2.0) for _ in range(2)] == [4.0, 4.0]
     assert len(record) == 1
+
+
+def test_a_cache_that_cannot_be_looked_into_costs_time_and_no_run(monkeypatch):
+    monkeypatch.setenv("SYMTOP_CACHE", "x" * 300)  # too long a name: refused as what lies in another user's folder is
+    with pytest.raises(OSError, match="too long"):
+        (files.cache_root() / "kernels").is_file()
+    assert compile_kernel(_doubled)(2.0) == 4.0
+    assert truth.cached(truth.place(_doubled), xr.Dataset, None).sizes == {}
+    assert truth.certificate(symtop.scene("loop")) is None

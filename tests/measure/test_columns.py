@@ -53,8 +53,7 @@ def test_an_error_table_says_of_what_and_against_what_and_flags_have_meanings():
     assert ERRORS.keys() == (QUANTITIES | OF_BODY).keys()
     data = columns.described(table_of(), "SI", of_body=[True, False])
     words = "largest angle between the axis and the true axis over the run"
-    assert data["axis"].attrs == {"long_name": words, "units": "rad"}
-    assert data["energy"].attrs["units"] == "1"
+    assert (data["axis"].attrs, data["energy"].attrs["units"]) == ({"long_name": words, "units": "rad"}, "1")
     assert "relative to E0 - min V or of bodies the kinetic energy" in data["energy"].attrs["long_name"]
     assert data["gap"].attrs == {}
     run = columns.described(table_of().drop_vars("axis_bound"), "SI")
@@ -72,8 +71,7 @@ def test_an_error_table_says_of_what_and_against_what_and_flags_have_meanings():
 @pytest.mark.parametrize("units", ["SI", ""])
 def test_units_of_a_problem_without_any(units):
     data = columns.described(xr.Dataset({"history_time": 0.1, "seconds": 1.0}), units, OWN["convergence"])
-    assert data["seconds"].attrs["units"] == "s"
-    assert data["history_time"].attrs["units"] == ("s" if units else "1")
+    assert (data["seconds"].attrs["units"], data["history_time"].attrs["units"]) == ("s", "s" if units else "1")
     assert data["history_time"].attrs["long_name"].endswith("in units of the scene") is not bool(units)
 
 

@@ -84,8 +84,7 @@ def test_failures_are_rows():
     assert outcomes[0].tolist() == ["raised", "raised"]
     assert "ZeroDivisionError: of its own" in str(data["message"].values[0, 0, 0])
     assert data["step_size"].values[0, 0].tolist() == [1.0, 0.01]
-    assert outcomes[1].tolist() == ["left_chart", "ok"]
-    assert outcomes[2].tolist() == ["ok", "ok"]
+    assert (outcomes[1].tolist(), outcomes[2].tolist()) == (["left_chart", "ok"], ["ok", "ok"])
     assert np.isnan(data["axis"].values[0, 0]).all()
 
 

@@ -141,8 +141,7 @@ def test_no_paragraph_names_another_cost_than_the_one_that_is_counted(name):
     number = NUMBERS[word]
     forces, steps, iterations = (run.attrs[key] for key in ("force_evaluations", "steps", "newton_iterations"))
     if method.explicit:
-        assert unit == "a step"
-        assert forces == number * steps
+        assert (unit, forces) == ("a step", number * steps)
     else:
         assert unit in ("an iteration", "a sweep")
         each_step = inside(next(iter(method.solvers.values()))).each_step

@@ -82,8 +82,7 @@ def test_the_arithmetic_is_recorded():
     assert 0.0 <= long.rate_error < turning_points.RATE
     top = SymmetricTop(1.0, 0.5, 1.0)
     far = ClosedForm(top, Angles(1.0, 3e12, 0.2, 0.3, 0.4, 0.5))
-    assert far.provenance.arithmetic == "40 digits"
-    assert far.provenance.rate_error == closed_form.DIGITS_ERROR
+    assert (far.provenance.arithmetic, far.provenance.rate_error) == ("40 digits", closed_form.DIGITS_ERROR)
     assert "range" in far.provenance.reason
     asleep = ClosedForm(SymmetricTop(1.0, 1.0, 1.0), Angles(0.0, psi_dot=2.0))  # I3 w3 = 2 sqrt(I1 mgl)
     assert asleep.provenance.arithmetic == "40 digits"
@@ -236,8 +235,7 @@ def test_after_as_many_turns_as_doubles_count_the_attitude_is_within_its_bound()
 def test_every_family_keeps_the_accuracy_that_is_claimed(count):
     """So many of each; `python -m benchmarks.accuracy` measures ten thousand."""
     accuracies = accuracy.measure(count, jobs=1)
-    assert accuracies.tops == count * len(REGIMES)
-    assert accuracies.broken == []
+    assert (accuracies.tops, accuracies.broken) == (count * len(REGIMES), [])
     assert accuracies.share("double-double") > 0.7
     assert accuracies.share("40 digits") == 0.0
     assert all(accuracies.largest(name) < 0.6 * bound for name, bound in ROUNDING.items() if name != "attitude")
@@ -280,10 +278,8 @@ def test_a_member_has_the_bits_of_its_own_form(implementation):
     views = {name: getattr(forms, name)(TIMES) for name in ("axis", "quaternion", "momentum", "state")}
     for i, pair in enumerate(pairs):
         form = ClosedForm(*pair)
-        assert period[i] == form.nutation_period
-        assert forms.precession_rate[i] == form.precession_rate
-        assert forms.phi_per_period[i] == form.phi_per_period
-        assert forms.psi_per_period[i] == form.psi_per_period
+        assert (period[i], forms.precession_rate[i]) == (form.nutation_period, form.precession_rate)
+        assert (forms.phi_per_period[i], forms.psi_per_period[i]) == (form.phi_per_period, form.psi_per_period)
         assert tuple(ends[i]) == form.theta_range
         assert forms.arithmetic[i] == form.provenance.arithmetic
         for ours, theirs in zip(motion, form(TIMES), strict=True):

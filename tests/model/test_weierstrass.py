@@ -64,8 +64,7 @@ def test_the_integral_of_the_third_kind_is_carlsons_and_the_edges_of_the_range()
             assert rate != pytest.approx(1.001 / rest, rel=1e-6)
     assert half_period(roots(3.0, -1.0)) == pytest.approx(math.inf)  # e1 = e2
     free = roots(0.0, 0.0)
-    assert half_period(free) == math.inf
-    assert differences(free, 0.5) == (4.0, 4.0, 4.0)
+    assert (half_period(free), differences(free, 0.5)) == (math.inf, (4.0, 4.0, 4.0))
     steady = roots(3.0, 1.0)  # e2 = e3 = -1/2: wp = -1/2 + (3/2)/sin^2
     assert differences(steady, 0.3)[2] == pytest.approx(1.5 / math.sin(math.sqrt(1.5) * 0.3) ** 2, rel=1e-14)
     assert r_j(2.0, 2.0, 2.0, 2.0) == pytest.approx(2.0**-1.5, rel=1e-15)

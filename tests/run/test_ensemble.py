@@ -114,8 +114,7 @@ def test_scalars_count_for_all_members_and_steps_and_horizons_may_differ():
     settings = {"horizon": 2.0, "samples": 31, "quiet": True}
     for step in (0.05, 0.5):  # more steps than samples, and fewer
         data = symtop.ensemble(members, "strang[axis]", step_size=step, **settings)
-        assert data["time"].dims == ("time",)
-        assert data.axis.dims == ("member", "time", "component")
+        assert (data["time"].dims, data.axis.dims) == (("time",), ("member", "time", "component"))
         assert data.theta[:, 0].values == pytest.approx([0.3, 0.8, 1.2], abs=1e-15)
         assert_alone(members, "strang[axis]", data, 31)
     np.testing.assert_array_equal(data["time"], [0.0, 0.5, 1.0, 1.5, 2.0, *[np.nan] * 26])

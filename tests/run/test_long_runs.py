@@ -65,8 +65,7 @@ def test_a_file_that_would_replace_something_else_is_refused_before_a_step(tmp_p
 @pytest.mark.parametrize("steps", [1, 9_999, 10_000, 123_456, 10**9])
 def test_windows_and_samples_cover_a_run_once(steps):
     ends = windows(steps)
-    assert ends[-1] == steps
-    assert ends == sorted(set(ends))
+    assert (ends[-1], ends) == (steps, sorted(set(ends)))
     assert max(np.diff([0, *ends])) <= longrun.LONGEST
     marks = scattered(ends[-2] if len(ends) > 1 else 0, steps)
     assert marks[-1] == steps

@@ -79,8 +79,7 @@ def test_a_trial_decides_whether_timed_cases_run_at_once_in_workers_that_are_the
         assert (at_once(timed) >= 2) is side_by_side
         assert (at_once(timed) == 0) is not side_by_side
         for case in timed:
-            assert case.attrs["timed_at_once"] == (2 if side_by_side else 1)
-            assert case.attrs["timed_slowdown"] == ratio
+            assert (case.attrs["timed_at_once"], case.attrs["timed_slowdown"]) == (2 if side_by_side else 1, ratio)
         computed(slept, folder / "again", pool)
         assert sizes == [2]  # once for all studies of a command
 

@@ -17,9 +17,10 @@ from symtop.core.code_hash import PACKAGE
 from symtop.methods.framework.registry import is_built_in
 from symtop.report import style
 from symtop.runner import fingerprint, run as runner
+from symtop.runner.cases import status
 from symtop.runner.run import drawing_digest
 from symtop.runner.study import Case
-from tests.commands import PROBE, ended, symtop as symtop_command
+from tests.commands import PROBE, call, ended, symtop as symtop_command
 
 
 @contextlib.contextmanager
@@ -73,6 +74,7 @@ def everyone():
     return study, digests(study)
 
 
+GAUSS_FILE = "symtop/methods/runge_kutta/gauss.py"
 GAUSS = {f"gauss-{order}" for order in (2, 4, 6, 8, 10, 12)}
 SCIPY = {"rk45", "dop853", "lsoda", "radau"}
 STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear"}
@@ -107,8 +109,7 @@ def test_measure_code_and_the_reference_make_the_cases_of_their_study_stale():
     for place in ("symtop.run.reference.truth:reference", "symtop.measure.accuracy:error_row"):
         assert stale_after(place, convergence, before) == every, place
     places = "symtop_studies.convergence.figures:pictures symtop.measure.step_map:step_map"
-    assert stale_after(places, convergence, before) == set()
-    assert digests(convergence) == before
+    assert (stale_after(places, convergence, before), digests(convergence)) == (set(), before)
 
 
 @pytest.mark.parametrize(("place", "again"), [
@@ -177,14 +178,14 @@ def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
     script = tmp_path / "counted.py"
     text = PROBE.read_text()
     versions = [text, text.replace("Is it whole?", "Is it?").replace("figsize=(2, 2)", "figsize=(3, 2)")]
-    for call, definition in (
+    for used, definition in (
         ("STEPS", "STEPS = {}"),
         ("len(helper())", "def helper():\n    return range({})"),
         ("cached()", "@functools.cache\ndef cached():\n    return {}"),
         ("Few().count()", "class Few:\n    def count(self):\n        return {}"),
     ):
         assert text.count("samples=51") == 1
-        versions += [f"{text.replace('samples=51', f'samples={call}')}\n\n{definition.format(n)}\n" for n in (51, 53)]
+        versions += [f"{text.replace('samples=51', f'samples={used}')}\n\n{definition.format(n)}\n" for n in (51, 53)]
     digests = set()
     for version in versions:
         script.write_text("import functools\n" + version)
@@ -196,6 +197,16 @@ def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
         digests.add(fingerprint.digest(study, study.cases(True)[0]))
     assert len({*versions}) == 10
     assert len(digests) == 9  # what is asked and drawn changes nothing
+
+
+def test_a_missing_case_is_told_by_its_settings_and_by_what_was_edited(tmp_path):
+    study = runner.load(str(PROBE))
+    call("study", PROBE, "--quick", "--results", tmp_path)
+    coarser = dataclasses.replace(study, cases=lambda quick: [Case("loop", "midpoint", {"step_size": 0.02})])
+    for place, causes in (("cli.common:as_text", []), ("model.top:SymmetricTop.energy", ["code symtop/model/top.py"])):
+        with edited(f"symtop.{place}"):
+            (row,) = status(coarser, tmp_path / "quick", why=True)
+        assert (row["state"], row["why"]) == ("missing", ["setting step_size", *causes])
 
 
 PLUGIN = """
@@ -224,11 +235,10 @@ def test_an_edit_of_each_family_is_named_by_status_and_is_all_that_is_computed(t
         return out
 
     assert "14 of 14 cases computed" in command()
-    package = tmp_path / "symtop"
     edits = [
-        (package / "methods/runge_kutta/gauss.py", "\n", "\n# a comment\n", None, set()),
+        (tmp_path / GAUSS_FILE, "\n", "\n# a comment\n", None, set()),
         (tmp_path / "coeffs.py", "(0.0, 1.0)", "(0.5, 0.5)", "integrator bad-of-a-user", {"bad-of-a-user"}),
-        (package / "methods/runge_kutta/pairs.py", "\n", "\n", None, set()),
+        (tmp_path / GAUSS_FILE, "    place = state\n", "    place, _ = state, 0\n", f"code {GAUSS_FILE}", {"gauss-4"}),
         (tmp_path / "probe.py", "samples=51", "samples=53", "code probe.py", "all"),
     ]
     for file, before, after, why, stale in edits:

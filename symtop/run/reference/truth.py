@@ -40,6 +40,7 @@ import functools
 import hashlib
 import itertools
 import math
+import os
 import warnings
 from collections.abc import Callable
 from pathlib import Path
@@ -366,7 +367,7 @@ def certificate(scene: Scene, kind: str | None = None) -> Certificate | None:
 
 @functools.lru_cache(maxsize=1024)
 def _on_disk(scene: Scene, _root: Path) -> Certificate | None:
-    return next((_stored(scene, kind) for kind in reversed(KINDS) if _path(scene, kind).is_file()), None)
+    return next((_stored(scene, kind) for kind in reversed(KINDS) if os.access(_path(scene, kind), os.R_OK)), None)
 
 
 def _path(scene: Scene, kind: str) -> Path:
@@ -432,7 +433,7 @@ def cached(path: Path, compute: Callable[[], xr.Dataset], depth: int | None) -> 
     Warnings point `depth` calls up, 1 being this function; with None there are none, because nobody asked for a file.
     Files that nobody used for 30 days are removed, and those used longest ago beyond `MOST_BYTES` of the folder.
     """
-    if path.is_file():
+    if os.access(path, os.R_OK):  # false, too, in a folder that is another user's
         try:
             data = netcdf.read(path)
             if data.attrs.pop("content", "") == netcdf.content_hash(data):
