@@ -73,6 +73,7 @@ OWN = 10.0  # times that steps of a probe multiply a change more than the motion
 PRECESSED = 0.1  # the same, of a step that is tried past a pole
 TRIES, LESS = 8, 0.6  # steps that are tried, each at most so much of the one before
 MOST_STEPS = 20_000_000_000  # of a run: ten minutes of the fastest kernel
+NO_ORDER = "it has no order, and smaller steps need not help; take another method, such as strang"
 NO_LENGTHS = np.empty(0)
 
 
@@ -124,14 +125,18 @@ def _probe(
     else:
         piece = Plan.until(duration * (_places(motion.points) / motion.points), plan.tolerance, most)
     run = solve(method, chart, motion.scene.top, motion.start(since), piece)
+    outcome, times, states = run.outcome, piece.times, run.states
+    bound = outcome == "out_of_budget" and run.force_evaluations < plan.most(math.inf)  # the run itself may go on
+    if method.fixed_step and bound and run.reached >= motion.marks.period:
+        known = times <= run.reached
+        outcome, times, states = "ok", times[known], states[known]
     with np.errstate(all="ignore"):
-        error = motion.error(piece.times, chart, run.states, since, plan.horizon)
-        stray = np.abs(np.linalg.norm(run.states[:, :4], axis=1) - 1.0) if chart in QUATERNIONS else NO_LENGTHS
-    outcome = run.outcome
+        error = motion.error(times, chart, states, since, plan.horizon)
+        stray = np.abs(np.linalg.norm(states[:, :4], axis=1) - 1.0) if chart in QUATERNIONS else NO_LENGTHS
     if not math.isfinite(error.sum()):  # no angle is more than pi
         error[~np.isfinite(error)] = math.inf
         outcome = "not_finite" if outcome == "ok" else outcome
-    return Probe(piece.times, error, outcome, since + run.reached, run.force_evaluations, stray)
+    return Probe(times, error, outcome, since + run.reached, run.force_evaluations, stray)
 
 
 def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
@@ -235,7 +240,7 @@ def _expected(motion: Integrated, method: Integrator, chart: str, plan: Plan) ->
         probe = _probe(motion, method, chart, plan, min(plan.horizon, piece), step)
         return _fixed(motion, method, probe, plan.horizon), probe
     coarse = twice / round(allowed / step)
-    probe, finer = _probe(motion, method, chart, plan, twice, coarse), (step / coarse) ** (method.order or 1)
+    probe, finer = _probe(motion, method, chart, plan, twice, coarse), (step / coarse) ** (method.order or 0)
     probe = probe._replace(evaluations=round(probe.evaluations * coarse / step), stray=probe.stray * finer)
     expected = _fixed(motion, method, probe, plan.horizon) * finer
     if chart == "angles" and marks.rate * coarse > RESOLVED:
@@ -366,20 +371,21 @@ def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expec
     if not grows or not size * math.expm1(min(folds, MOST_FOLDS)) > EXPECTED:
         return None
     good, bad = SMALL_TURN / frequency, step
-    if growth.factor > 1.0 + GROWS and good < bad:
+
+    def stable(h: float) -> bool:
+        return _growth(scene, method, chart, h, frequency).factor <= 1.0 + GROWS
+
+    if growth.factor > 1.0 + GROWS and good < bad and stable(good):
         while bad - good > 1e-3 * bad:
             middle = 0.5 * (good + bad)
-            stable = _growth(scene, method, chart, middle, frequency).factor <= 1.0 + GROWS
-            good, bad = (middle, bad) if stable else (good, middle)
-        return Trouble(
-            f"small nutations (frequency {frequency:.4g}) grow at a step of {step:.4g}, the method is stable up to "
-            f"{good:.4g} (h omega = {good * frequency:.3f})", 0.5 * good,
-        )  # fmt: skip
-    finer = step * math.pow(math.log1p(AIM / size) / folds, 1.0 / (method.order or 1))
-    return Trouble(
-        f"small nutations (frequency {frequency:.4g}) of {size:.1g} rad grow by {growth.factor - 1.0:.1g} of "
-        f"themselves in each of {steps:.3g} steps", finer,
-    )  # fmt: skip
+            good, bad = (middle, bad) if stable(middle) else (good, middle)
+        where = f"at a step of {step:.4g}, the method is stable up to {good:.4g} (h omega = {good * frequency:.3f})"
+        words, finer = f"small nutations (frequency {frequency:.4g}) grow {where}", 0.5 * good
+    else:
+        words = f"small nutations (frequency {frequency:.4g}) of {size:.1g} rad grow by {growth.factor - 1.0:.1g} of "
+        words += f"themselves in each of {steps:.3g} steps"
+        finer = step * math.pow(math.log1p(AIM / size) / folds, 1.0 / (method.order or 1))
+    return Trouble(f"{words}: {NO_ORDER}") if method.order is None else Trouble(words, finer)
 
 
 def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
@@ -412,7 +418,7 @@ def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expec
             return Trouble(f"{size}: the motion is unstable, and a change of its start grows large; {advice}")
         return Trouble(f"{size}: errors add up over {plan.horizon / marks.period:.3g} {period}s; {advice}")
     if method.order is None:
-        return Trouble(f"{size}: it has no order, and smaller steps need not help; take another method, such as strang")
+        return Trouble(f"{size}: {NO_ORDER}")
     return Trouble(
         f"{size}: a step is 1/{marks.period / plan.step_size:.3g} of a {period}, and errors add up over "
         f"{plan.horizon / marks.period:.3g} {period}s", _smaller(method, plan, expected),

@@ -181,7 +181,7 @@ def _outlook(
     def run_piece(start: Array) -> tuple[Array, Array, float]:
         """Times and states of the piece, and the mean step of an explicit method."""
         if rule:
-            marks = np.unique(np.rint(min(round(piece / setting), PROBED) * places).clip(1.0))
+            marks = np.unique(np.rint(min(int(piece / setting * (1.0 + 1e-9)), PROBED) * places).clip(1.0))
             return marks * setting, _stepped(f, rule, t, start, setting, marks), setting
         (name, cost), shown = SCIPY[method], np.unique(np.minimum(t + piece * places, t + piece))
         run = solve_ivp(_finite(f), (t, t + piece), start, name, shown, rtol=setting, atol=setting)

@@ -62,7 +62,7 @@ def test_a_slow_top_keeps_its_energy_at_a_third_of_a_nutation_and_whole_ones_are
         h = share * scene.nutation_period
         data = symtop.simulate(scene, METHOD, step_size=h, horizon=900 * h, guard=False)
         assert np.ptp(data["energy"].values) < 1e-12
-    starts = symtop.Angles(0.01), symtop.Angles(0.01, psi_dot=0.02), symtop.Angles(1.0)
+    starts = *map(symtop.Angles, (0.01, 1.0)), *(symtop.Angles(0.01, psi_dot=spin) for spin in (0.02, 3.95))
     beside_the_separatrix = symtop.Angles(1e-4, psi_dot=0.5), symtop.Angles(2.0, theta_dot=1.68295)  # over both poles
     for start in starts + beside_the_separatrix:
         form = symtop.ClosedForm(top, start)

@@ -178,12 +178,14 @@ def _terms(series: Series) -> Measured:
 
 
 def series_of(subject: Subject) -> Series | None:
-    """The series of the chart with the lowest order; None where no step is one map of the state, or beside a pole."""
+    """The series of the chart with the lowest order, on `FALLBACK` for a scene beside a pole; None without a map."""
     candidates = []
+    if math.sin(generic_start(subject.scene).theta) <= APART:
+        subject = replace(subject, scene=find_scene(FALLBACK))
     for chart in subject.charts if subject.method.fixed_step else ():
         with contextlib.suppress(SymtopError):
             step, start = map_of(subject, chart)
-            if math.sin(start.theta) > APART and restart_gap(step, start) <= ONE_MAP:
+            if restart_gap(step, start) <= ONE_MAP:
                 candidates.append(step_series(step, start, subject.scene.time_scale()))
     return min(candidates, key=lambda one: one.order, default=None)
 
@@ -270,7 +272,10 @@ def _by_steps(subject: Subject) -> Finding:
     if claim is not None:
         finding = _claimed(claim, fitted, fitted.fits.values() if method.fixed_step else (), series, slopes)
         lowest = min((fit.slope for fit in fitted.fits.values() if math.isfinite(fit.slope)), default=0.0)
-        if finding.verdict == "refuted" and method.fixed_step and pole < 1.0 and lowest > claim - BESIDE:
+        beside = min(height, math.sin(scene.start.theta)) <= APART
+        wrong_term = series is not None and series.is_exact and series.order < claim
+        faster = beside and method.fixed_step and lowest > claim - BESIDE and not wrong_term
+        if finding.verdict == "refuted" and faster:
             finding = finding._replace(verdict="undecided", why=f"beside a pole errors may fall faster: {finding.why}")
         return finding._replace(why=_hidden(subject, finding.why)) if finding.verdict == "undecided" else finding
     if subject.stepper is not None and method.adaptive:

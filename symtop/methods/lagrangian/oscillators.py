@@ -109,7 +109,7 @@ def attitude_state(par: Any, s: Any, t: float) -> Any:
 
 SHORTEST = 1e-100  # of a step, and of what is left of one that is a whole number of nutations
 STEEPEST = 16.0  # (P - e3)/(P - e2): what rounding of the constants is amplified by
-APART = 1e-3  # (e1 - e2)/(e1 - e3): below it the turn and the time of a nutation lose digits, all of them at 1e-8
+APART = 1e-5  # (e1 - e2)^2 (e1 - e3)/(b1^2 + b2^2)^1.5: rounding over it is what e1 - e2 and a nutation are known to
 MOST_PARTS = 10_000
 NEXT_TO_ROOT = 1e-4
 TINY = 1e-80  # of e1 - e3, in the place of e1 - b where e1 is a zero of chi: J is zero, too
@@ -180,7 +180,8 @@ def _mapped(rule: Any, top: Any, at: Any, h: float) -> Any:
     e = roots(par.g2, par.g3)
     # two roots that are neighbours lose digits: e1 and e2 beside a separatrix, both turning points in a steady motion
     half = half_period(e) if e.e1 - e.e2 > e.e2 - e.e3 else 0.5 * nutation_period(top, at)
-    parts = 1
+    apart, parts = e.e1 - e.e2, 1
+    known = apart * apart * (e.e1 - e.e3) > APART * math.pow(par.b1 * par.b1 + par.b2 * par.b2, 1.5)
     while True:
         nutations = np.rint(0.5 * h / parts / half)
         rest = h / parts - 2.0 * nutations * half if nutations != 0.0 else h / parts
@@ -188,8 +189,7 @@ def _mapped(rule: Any, top: Any, at: Any, h: float) -> Any:
         P = (above[0] + above[1] + above[2]) / 3.0
         # P - e2 or a D, which is small at half a nutation of an axis that comes near a pole
         least = min(above[1], P - par.b1, P - par.b2)
-        known = nutations == 0.0 or e.e1 - e.e2 > APART * (e.e1 - e.e3)
-        if (known and not above[2] > STEEPEST * least) or parts >= MOST_PARTS:
+        if ((known or nutations == 0.0) and not above[2] > STEEPEST * least) or parts >= MOST_PARTS:
             break
         parts += 1
     sign = 1.0 if rest >= 0.0 else -1.0
