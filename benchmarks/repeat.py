@@ -82,8 +82,8 @@ def compare(first: xr.DataTree, second: xr.DataTree) -> dict[str, Any]:
         print(f"  {label(cell)}: {shown}, called {[one.called for one in each]}")
     calls = sum(cells.contest(first, cell).called + cells.safest(first, cell)[1] for cell in asked)
     return {
-        "first": calls, "winners": sum(map(bool, winners + safe)), "different": sum(len(pair) > 1 for pair in winners + safe),
-        "shares": len(shares), "overlap": overlap,
+        "first": calls, "winners": sum(map(bool, winners + safe)),
+        "different": sum(len(pair) > 1 for pair in winners + safe), "shares": len(shares), "overlap": overlap,
     }  # fmt: skip
 
 

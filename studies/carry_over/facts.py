@@ -369,9 +369,9 @@ def key(family: str) -> str:
 def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
     """The answer; taus; winners by class; safe steps by method; silent wrong runs by stratum; growth; order; limits."""
     return {
-        "carry": carry(data), "short": short(data), "rankings": rankings(data), "winners": winners(data), "steps": step_table(data),
-        "silent": silent_table(data), "growth": growth_table(data), "order": order_table(data),
-        "limits": limit_table(data),
+        "carry": carry(data), "short": short(data), "rankings": rankings(data), "winners": winners(data),
+        "steps": step_table(data), "silent": silent_table(data), "growth": growth_table(data),
+        "order": order_table(data), "limits": limit_table(data),
     }  # fmt: skip
 
 

@@ -149,6 +149,6 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 
 
 STUDY = Study(
-    name="pitfalls", title="Pitfalls", question="What goes wrong although nothing looks wrong?", cases=cases, measure=measure,
-    facts=facts, tables=tables, pictures=pictures,
+    name="pitfalls", title="Pitfalls", question="What goes wrong although nothing looks wrong?", cases=cases,
+    measure=measure, facts=facts, tables=tables, pictures=pictures,
 )  # fmt: skip
