@@ -81,9 +81,9 @@ def compare(first: xr.DataTree, second: xr.DataTree) -> dict[str, Any]:
         shown = words(*(one.first for one in each if one.first))
         print(f"  {label(cell)}: {shown}, called {[one.called for one in each]}")
     calls = sum(cells.contest(first, cell).called + cells.safest(first, cell)[1] for cell in asked)
+    called, different = sum(map(bool, winners + safe)), sum(len(pair) > 1 for pair in winners + safe)
     return {
-        "first": calls, "winners": sum(map(bool, winners + safe)),
-        "different": sum(len(pair) > 1 for pair in winners + safe), "shares": len(shares), "overlap": overlap,
+        "first": calls, "winners": called, "different": different, "confirmed": called - different, "shares": len(shares), "overlap": overlap,
     }  # fmt: skip
 
 
