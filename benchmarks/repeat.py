@@ -83,7 +83,8 @@ def compare(first: xr.DataTree, second: xr.DataTree) -> dict[str, Any]:
     calls = sum(cells.contest(first, cell).called + cells.safest(first, cell)[1] for cell in asked)
     called, different = sum(map(bool, winners + safe)), sum(len(pair) > 1 for pair in winners + safe)
     return {
-        "first": calls, "winners": called, "different": different, "confirmed": called - different, "shares": len(shares), "overlap": overlap,
+        "first": calls, "winners": called, "different": different, "confirmed": called - different,
+        "shares": len(shares), "overlap": overlap,
     }  # fmt: skip
 
 

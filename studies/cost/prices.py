@@ -29,7 +29,7 @@ samples by dense output, is timed in the same rounds, and the ratio is a table.
 import functools
 import warnings
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -99,8 +99,10 @@ def run_of(variant: Integrator, tolerance: float, nutations: float, *, own: bool
     plan = Plan.steps(period * (nutations / steps), np.array([steps // 2, steps]))
     if not variant.fixed_step:
         plan = Plan.until(np.array([0.5, 1.0]) * nutations * period, tolerance)
-    run: Any = getattr(solver, "bare", solver) if own else solver
-    return lambda: run(top, start, plan), float(run(top, start, plan).force_evaluations)
+    if own and hasattr(solver, "bare"):
+        run, evaluations = solver.bare(top, start, plan)
+        return run, float(evaluations)
+    return lambda: solver(top, start, plan), float(solver(top, start, plan).force_evaluations)
 
 
 def slopes(names: list[str], rounds: int, batch: float) -> list[tuple[str, float, float, float]]:

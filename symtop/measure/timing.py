@@ -125,8 +125,9 @@ def bare_run(
     """
     plan, _ = make_plan(scene, method, **method.given(setting), horizon=horizon, samples=2, budget=budget)
     solve = method.solvers[chart]
-    if budget is None:
-        solve = getattr(solve, "bare", solve)
+    if budget is None and hasattr(solve, "bare"):
+        run, _ = solve.bare(scene.top, scene.start, plan)
+        return run  # type: ignore[no-any-return]
     return lambda: solve(scene.top, scene.start, plan)
 
 

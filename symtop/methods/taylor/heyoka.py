@@ -17,7 +17,7 @@ Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, 
 import functools
 import importlib.util
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -137,25 +137,6 @@ class Flight(NamedTuple):
     outcome: str  # heyoka's word
     time: float  # of the last completed step
 
-    @property
-    def force_evaluations(self) -> int:
-        """Derivatives of the state that were computed."""
-        return self.steps * self.order
-
-
-def _at_start(chart: str, precision: str, tolerance: float, top: Any, start: Any) -> tuple[Any, list[Any]]:
-    """A stepper at a start, and where it belongs after its run; not after an exception, which may leave it anywhere."""
-    idle = _idle(chart, precision, tolerance)
-    try:
-        integrator = idle.pop()  # in one instruction: another thread may be here, too
-    except IndexError:
-        integrator = stepper(chart, precision, tolerance)
-    state, parameters = start_numbers(chart, precision, top, start)
-    integrator.time = arithmetic(precision).kind("0")
-    integrator.state[:] = state
-    integrator.pars[:] = parameters[: integrator.pars.size]  # the axis chart does not need the last one
-    return integrator, idle
-
 
 def propagate(
     chart: str, precision: str, tolerance: float, top: SymmetricTop, start: Angles, times: Array, most: int = 0
@@ -163,10 +144,18 @@ def propagate(
     """heyoka's states, in the working precision, at increasing times, or those reached in `most` steps."""
     kind, grid = arithmetic(precision).kind, times if times[0] == 0.0 else np.concatenate([[0.0], times])
     numbers = grid if precision == "double" else np.array([kind(float(t)) for t in grid])
-    integrator, idle = _at_start(chart, precision, tolerance, top, start)
+    idle = _idle(chart, precision, tolerance)
+    try:
+        integrator = idle.pop()  # in one instruction: another thread may be here, too
+    except IndexError:
+        integrator = stepper(chart, precision, tolerance)
+    state, parameters = start_numbers(chart, precision, top, start)
+    integrator.time = kind("0")
+    integrator.state[:] = state
+    integrator.pars[:] = parameters[: integrator.pars.size]  # the axis chart does not need the last one
     outcome, _, _, steps, *_, states = integrator.propagate_grid(numbers, max_steps=most)
     order, time = int(integrator.order), float(integrator.time)
-    idle.append(integrator)
+    idle.append(integrator)  # not after an exception, which may leave it in any state
     return Flight(states[grid.size - times.size :], int(steps), order, outcome.name, time)
 
 
@@ -195,14 +184,19 @@ class HeyokaSolver:
             word = "out_of_budget"
         reached = plan.horizon if word == "ok" else float(plan.times[good][-1]) if good.any() else 0.0
         reached = flight.time if word == "out_of_budget" else reached
-        return Run(states, p_phi, p_psi, flight.steps, flight.force_evaluations, 0, word, reached)
+        return Run(states, p_phi, p_psi, flight.steps, flight.steps * flight.order, 0, word, reached)
 
-    def bare(self, top: SymmetricTop, start: Angles, plan: Plan) -> Flight:
-        """heyoka's own loop to the horizon, which has no samples: what its users pay."""
-        integrator, idle = _at_start(self.chart, self.precision, plan.tolerance, top, start)
-        _, _, _, steps, *_ = integrator.propagate_until(arithmetic(self.precision).kind(plan.horizon))
-        idle.append(integrator)
-        return Flight(None, steps, integrator.order, "", plan.horizon)
+    def bare(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[Callable[[], Any], int]:
+        """heyoka's own loop to the horizon, without samples, as a call, and the derivatives that it computes."""
+        state, parameters = start_numbers(self.chart, self.precision, top, start)
+        one, kind = stepper(self.chart, self.precision, plan.tolerance), arithmetic(self.precision).kind
+        begin, end, parameters = kind("0"), kind(plan.horizon), parameters[: one.pars.size]
+
+        def run() -> Any:
+            one.time, one.state[:], one.pars[:] = begin, state, parameters
+            return one.propagate_until(end)
+
+        return run, int(run()[3] * one.order)
 
 
 def _padded(values: Any, size: int) -> Array:
