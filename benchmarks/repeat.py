@@ -80,8 +80,10 @@ def compare(first: xr.DataTree, second: xr.DataTree) -> dict[str, Any]:
         each = [cells.contest(data, cell) for data in both]
         shown = words(*(one.first for one in each if one.first))
         print(f"  {label(cell)}: {shown}, called {[one.called for one in each]}")
+    calls = sum(cells.contest(first, cell).called + cells.safest(first, cell)[1] for cell in asked)
+    called, different = sum(map(bool, winners + safe)), sum(len(pair) > 1 for pair in winners + safe)
     return {
-        "winners": sum(map(bool, winners + safe)), "different": sum(len(pair) > 1 for pair in winners + safe),
+        "first": calls, "winners": called, "different": different, "confirmed": called - different,
         "shares": len(shares), "overlap": overlap,
     }  # fmt: skip
 
@@ -195,7 +197,8 @@ def main() -> int:
 def write(facts: dict[str, Any], ratios: dict[str, float]) -> None:
     """What the report cites, as results/repeat.json."""
     sentence = (
-        f"Both runs call a winner in {facts['winners']} comparisons, and {facts['different']} of these differ. The "
+        f"The first run calls a winner in {facts['first']} comparisons, both in {facts['winners']}, of which "
+        f"{facts['different']} differ. The "
         f"intervals of {facts['overlap']:.1%} of {facts['shares']} shares overlap."
     )
     table = pages.Table(

@@ -88,7 +88,7 @@ def span_facts(data: xr.DataTree, span: str) -> dict[str, float | None]:
 
 def over(data: xr.DataTree) -> str:
     """What the front page shows of an error that no setting within the budget keeps."""
-    return f"over {count(span_facts(data, 'short')['budget'] or 0.0)} evaluations a nutation"
+    return f"not within {count(span_facts(data, 'short')['budget'] or 0.0)} evaluations"
 
 
 def winners_facts(data: xr.DataTree) -> dict[str, Any]:

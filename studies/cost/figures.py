@@ -2,7 +2,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Iterator
+from string import ascii_uppercase
 from typing import Any
 
 import numpy as np
@@ -10,7 +10,7 @@ import xarray as xr
 from matplotlib.colors import to_rgb
 from matplotlib.patches import Patch, Rectangle
 
-from symtop.methods.framework.registry import integrator, split_name
+from symtop.methods.framework.registry import integrator
 from symtop.report import style
 from symtop.report.figures import chosen, label_lines
 from symtop.report.style import LEAST_TEXT, few_ticks, grid, panels
@@ -32,9 +32,10 @@ NAMED = 7  # variants of the run lengths with a label
 BESIDE = ("rk4[axis]", "strang[axis]", "dop853-compiled-fixed[axis]")  # named in any case
 MARKS, LATEST = 9, 0.995
 HALF = 0.5
-HATCH, LETTER, UNREACHED = "////", 0.62, "xxx"
+HATCH, UNREACHED = "////", "xxx"
 MOST_KEYS, REST = 10, style.YELLOW  # methods that have a key, and the colour of others
 PALE = 0.55  # of white in the colour of a predicted cell
+LUMINANCE, DARK = np.array([0.2126, 0.7152, 0.0722]), 0.42  # of red, green and blue; below it letters are white
 LEFT = (style.SKY, style.ORANGE, style.VERMILLION, style.BLUE, style.LEAF)
 TITLES = {
     "axis": "axis: angle from the\ntrue axis (rad)", "energy": "energy:\nrelative change",
@@ -122,7 +123,8 @@ def draw_map(data: xr.DataTree) -> Any:
         _panel(axis, panel, colors)
         axis.set(title=TITLES[quantity], xlabel="run length (nutations)")
     axes[0][0].set_ylabel("largest error allowed")
-    keys = [Patch(facecolor=color, label=name) for name, color in colors.items() if color != REST]
+    keys = [Patch(facecolor=color, label=f"{letter}  {name}") for letter, (name, color)
+            in zip(letters(colors), colors.items(), strict=True) if color != REST]  # fmt: skip
     keys += [Patch(facecolor=REST, label="another method")] if REST in colors.values() else []
     keys.append(Patch(facecolor="white", edgecolor="#BBBBBB", hatch=UNREACHED, label="reached by no method"))
     figure.legend(handles=keys, loc="outside lower center", ncols=3, frameon=False)
@@ -138,8 +140,13 @@ def _colors(names: list[str]) -> dict[str, str]:
     return colors
 
 
+def letters(colors: dict[str, str]) -> list[str]:
+    """A letter for each variant with a colour of its own, for those who cannot tell the colours apart."""
+    return [ascii_uppercase[k] if color != REST else "" for k, color in enumerate(colors.values())]
+
+
 def _panel(axis: Any, panel: far.Diagram, painted: dict[str, str]) -> None:
-    """Cells in the colours of variants, paler and hatched where predicted, with names."""
+    """Cells in the colours and with the letters of variants, small ones at a tie, paler and hatched where predicted."""
     x, y = np.log10(panel.horizons), np.log10(far.TARGETS)
     dx, dy = 0.5 * (x[1] - x[0]), 0.5 * (y[0] - y[1])
     colors = np.ones((*panel.winner.shape, 3))
@@ -151,34 +158,15 @@ def _panel(axis: Any, panel: far.Diagram, painted: dict[str, str]) -> None:
     for cells_of, hatch, ink in ((panel.predicted, HATCH, "#FFFFFF"), (panel.winner < 0, UNREACHED, "#BBBBBB")):
         for t, h in np.argwhere(cells_of):
             axis.add_patch(Rectangle((x[h] - dx, y[t] - dy), 2 * dx, 2 * dy, fill=False, lw=0, hatch=hatch, ec=ink))
-    level = np.argwhere((panel.winner >= 0) & (panel.ratio < far.TIE))
-    axis.plot(x[level[:, 1]], y[level[:, 0]], ls="none", marker="o", ms=2.4, mfc="white", mec="black", mew=0.3)
     axis.vlines(x[1:] - dx, y[-1] - dy, y[0] + dy, color="white", lw=0.3)
     axis.hlines(y[1:] + dy, x[0] - dx, x[-1] + dx, color="white", lw=0.3)
-    for name, mask in zip(painted, masks, strict=True):
-        _names(axis, mask, split_name(name)[0], (x, y))
+    look: dict[str, Any] = {"ha": "center", "va": "center_baseline", "fontsize": LEAST_TEXT}
+    for letter, mask in zip(letters(painted), masks, strict=True):
+        for t, h in np.argwhere(mask):
+            small = panel.ratio[t, h] < far.TIE
+            ink = "black" if colors[t, h] @ LUMINANCE > DARK else "white"
+            look["weight"] = "normal" if small else "bold"
+            axis.text(x[h], y[t], letter.lower() if small else letter, color=ink, **look)
     axis.grid(visible=False)
     axis.set_xticks(range(1, 9, 2), [f"$10^{{{k}}}$" for k in range(1, 9, 2)])
     axis.set_yticks(range(-12, -1, 2), [f"$10^{{{k}}}$" for k in range(-12, -1, 2)])
-
-
-def _places(mine: Any, label: str) -> Iterator[tuple[int, int]]:
-    """The middle cell of each region of a method that has room for its name."""
-    from scipy import ndimage  # takes 0.15 s, which a study with nothing to do need not
-
-    regions, count = ndimage.label(mine)
-    for place in range(1, count + 1):
-        region = regions == place
-        places = np.argwhere(ndimage.binary_erosion(region, np.ones((3, 2 * round(LETTER * len(label) / 2) + 1))))
-        if places.size:
-            t, h = places[np.argmin(((places - np.argwhere(region).mean(axis=0)) ** 2).sum(axis=1))]
-            yield int(t), int(h)
-
-
-def _names(axis: Any, mine: Any, label: str, centres: tuple[Any, Any]) -> None:
-    """The name of a method in each of its regions that has room for it."""
-    for t, h in _places(mine, label):
-        axis.text(
-            centres[0][h], centres[1][t], label, ha="center", va="center", fontsize=LEAST_TEXT + 1, color="#111111",
-            bbox={"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none", "alpha": 0.9},
-        )  # fmt: skip

@@ -29,7 +29,7 @@ samples by dense output, is timed in the same rounds, and the ratio is a table.
 import functools
 import warnings
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -93,31 +93,16 @@ def tolerances_of(variant: Integrator) -> tuple[float, ...]:
 
 def run_of(variant: Integrator, tolerance: float, nutations: float, *, own: bool = True) -> Call:
     """The bare run of the top over so many nutations, of heyoka by its `own` loop."""
-    (chart,) = variant.solvers
-    if own and variant.inner_loop == "heyoka":
-        return bare_heyoka(chart, tolerance, nutations)
+    ((chart, solver),) = variant.solvers.items()
     top, start, period = timed_body() if chart == BODY else timed_top()
-    solver, steps = variant.solvers[chart], max(round(nutations * FIRST * 2.0**FINE), 2)
+    steps = max(round(nutations * FIRST * 2.0**FINE), 2)
     plan = Plan.steps(period * (nutations / steps), np.array([steps // 2, steps]))
     if not variant.fixed_step:
         plan = Plan.until(np.array([0.5, 1.0]) * nutations * period, tolerance)
+    if own and hasattr(solver, "bare"):
+        run, evaluations = solver.bare(top, start, plan)
+        return run, float(evaluations)
     return lambda: solver(top, start, plan), float(solver(top, start, plan).force_evaluations)
-
-
-def bare_heyoka(chart: str, tolerance: float, nutations: float) -> Call:
-    """heyoka's integrator on the same equations, top and times."""
-    from symtop.methods.taylor.heyoka import start_numbers, stepper
-
-    top, start, period = timed_body() if chart == BODY else timed_top()
-    state, parameters = start_numbers(chart, "double", top, start)
-    one = stepper(chart, "double", tolerance)
-
-    def run() -> Any:
-        one.time = 0.0
-        one.state[:], one.pars[:] = state, parameters[: one.pars.size]
-        return one.propagate_until(nutations * period)
-
-    return run, float(run()[3] * one.order)
 
 
 def slopes(names: list[str], rounds: int, batch: float) -> list[tuple[str, float, float, float]]:

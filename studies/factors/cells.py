@@ -96,7 +96,7 @@ def cells(schemes: Sequence[str] | None = None) -> list[Cell]:
 
 def taylor_in_angles() -> Integrator:
     """The variant ``taylor[angles]``: heyoka on the Euler-Lagrange equations, from the same formulas as the others."""
-    solvers = {"angles": heyoka.solver("angles", "double")}
+    solvers = {"angles": heyoka.HeyokaSolver("angles", "double")}
     return replace(integrators()["taylor"], name="taylor[angles]", solvers=solvers)
 
 

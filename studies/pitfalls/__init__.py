@@ -1,1 +1,1 @@
-"""What goes wrong without a warning?"""
+"""What goes wrong although nothing looks wrong?"""

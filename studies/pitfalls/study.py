@@ -1,4 +1,4 @@
-"""What goes wrong without a warning?
+"""What goes wrong although nothing looks wrong?
 
 Three short experiments, each a few runs: a physics engine's step without the gyroscopic term, at shorter and shorter
 steps; a run beside an unstable motion that keeps its energy; and one method in Euler's angles and in the axis on a
@@ -149,6 +149,6 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 
 
 STUDY = Study(
-    name="pitfalls", title="Pitfalls", question="What goes wrong without a warning?", cases=cases, measure=measure,
-    facts=facts, tables=tables, pictures=pictures,
+    name="pitfalls", title="Pitfalls", question="What goes wrong although nothing looks wrong?", cases=cases,
+    measure=measure, facts=facts, tables=tables, pictures=pictures,
 )  # fmt: skip

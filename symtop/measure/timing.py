@@ -16,7 +16,6 @@ from collections.abc import Callable, Sequence
 from concurrent.futures import Future
 from typing import Any, NamedTuple
 
-from symtop.methods.framework.plan import Run
 from symtop.methods.framework.registry import Integrator, integrator
 from symtop.model.exact import closed_form
 from symtop.model.scenes import Scene, scene
@@ -119,10 +118,16 @@ def agree(samples: Sequence[float], close: float) -> bool:
 
 def bare_run(
     scene: Scene, method: Integrator, chart: str, setting: float, horizon: float, budget: float | None = None
-) -> Callable[[], Run]:
-    """A call of one of a method's solvers, start to horizon, with two samples and nothing around it."""
+) -> Callable[[], Any]:
+    """A call of one of a method's solvers, start to horizon, with two samples and nothing around it.
+
+    Of heyoka it is the own loop, but with a budget, after which the caller may ask how the run ended.
+    """
     plan, _ = make_plan(scene, method, **method.given(setting), horizon=horizon, samples=2, budget=budget)
     solve = method.solvers[chart]
+    if budget is None and hasattr(solve, "bare"):
+        run, _ = solve.bare(scene.top, scene.start, plan)
+        return run  # type: ignore[no-any-return]
     return lambda: solve(scene.top, scene.start, plan)
 
 

@@ -165,7 +165,7 @@ def _names(studies: Sequence[Findings], results: Path, *, whole: bool = False) -
         import pandas as pd
 
         file, count = tables[name]["file"], tables[name]["rows"]
-        frame = pd.read_csv(results / "tables" / file, nrows=min(rows, MOST_ROWS))
+        frame = pd.read_csv(results / "tables" / file, nrows=rows)
         frame = frame if columns is None else frame[list(columns)]
         cells = [[formats.cell(value, digits) for value in row] for row in frame.itertuples(index=False)]
         extent = f"the first {len(cells)} of {count:,} rows; " if count > len(cells) else ""

@@ -190,8 +190,7 @@ def test_a_lane_that_takes_more_iterations_changes_no_other(name, longer):
 
 @pytest.mark.parametrize(("name", "steps"), [("takahashi-imada[attitude]", 250), ("kahan[axis]", 15)])
 def test_runs_of_a_few_steps_at_a_time_are_the_same(monkeypatch, name, steps):
-    given = members(300)
-    solver = SOLVERS[name]
+    given, solver = members(300), SOLVERS[name]
     whole = solver.many(*given)
     monkeypatch.setattr(loops, "BLOCK", steps)  # back to Python eight steps of a block at a time
     monkeypatch.setattr(lanes, "BATCH", 2 * W)

@@ -264,8 +264,7 @@ def test_the_image_of_a_step_does_not_depend_on_the_point_above(seed):
 
 def test_collective_methods_bound_the_energy_that_gauss_keeps_to_rounding():
     scene = symtop.scene("spheroid")
-    h = scene.nutation_period / 40.3
-    lost = {}
+    h, lost = scene.nutation_period / 40.3, {}
     for name in ("collective-gauss-4", "gauss-4", "commutator-free-4"):
         done = states(name, scene, h, 20_000, "axis")
         lost[name] = np.abs(energies(scene, done) / energies(scene, done)[0] - 1.0)

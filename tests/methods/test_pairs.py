@@ -27,8 +27,7 @@ PAIRS = {pair.name: pair for pair in pairs.PAIRS}
 
 def square(table, stages):
     """The matrix of a table with its last stage, f(y+), where an estimate asks for it."""
-    rows = [(), *table.a, table.b]
-    matrix = np.zeros((stages, stages))
+    rows, matrix = [(), *table.a, table.b], np.zeros((stages, stages))
     for i, row in enumerate(rows[:stages]):
         matrix[i, : len(row)] = row
     return matrix

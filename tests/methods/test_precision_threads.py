@@ -9,6 +9,7 @@ import pytest
 
 import symtop
 from symtop.core.numbers import context
+from symtop.methods.framework.plan import Plan
 from symtop.methods.runge_kutta.gauss import gauss_rule
 from symtop.methods.taylor import heyoka
 
@@ -61,3 +62,10 @@ def test_taylor_runs_of_one_kind_at_once_do_not_share_a_stepper():
     alone = [runs(name)[0] for name in SCENES]
     for expected, states in zip(alone, together(*(lambda name=name: runs(name) for name in SCENES)), strict=True):
         assert all(np.array_equal(expected, one) for one in states)
+
+
+def test_the_bare_loop_of_heyoka_computes_what_the_solver_does_and_begins_anew():
+    scene, plan = symtop.scene("goldstein"), Plan.until(np.array([0.0, 8.0]), 1e-9)
+    solver = symtop.integrator("taylor[axis]").solvers["axis"]
+    run, evaluations = solver.bare(scene.top, scene.start, plan)
+    assert (evaluations, run()[:4]) == (solver(scene.top, scene.start, plan).force_evaluations, run()[:4])

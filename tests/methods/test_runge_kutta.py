@@ -58,8 +58,7 @@ ADAPTIVE = ("rk45", "rk45-compiled", "dop853", "lsoda", "radau")
 @pytest.mark.parametrize("name", ["spheroid", "goldstein", "bruls-cardona-arnold"])
 def test_the_right_hand_side_is_the_derivative_of_the_true_motion(name, chart):
     """Central differences of the closed form, extrapolated to order 4, at a moment when nothing vanishes."""
-    scene = symtop.scene(name)
-    form = FORMULATIONS[chart]
+    scene, form = symtop.scene(name), FORMULATIONS[chart]
     par, _ = form.prepare(scene.top, scene.start)
     moment, h = 0.37 * scene.nutation_period, 3e-4 * scene.nutation_period
     times = moment + h * np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
@@ -76,8 +75,7 @@ def test_the_right_hand_side_is_the_derivative_of_the_true_motion(name, chart):
 @pytest.mark.parametrize("chart", list(FORMULATIONS))
 @pytest.mark.parametrize("name", ADAPTIVE)
 def test_adaptive_methods_follow_their_tolerance_in_every_chart(name, chart):
-    scene = symtop.scene("spheroid")
-    errors = []
+    scene, errors = symtop.scene("spheroid"), []
     for tolerance in (1e-5, 1e-8):
         run = symtop.simulate(scene, f"{name}[{chart}]", tolerance=tolerance, horizon=3.0, samples=61, guard=False)
         assert [run.attrs[key] for key in ("outcome", "chart", "newton_iterations")] == ["ok", chart, 0]

@@ -48,8 +48,7 @@ def test_a_predictor_integrates_polynomials_below_its_order_on_any_nodes_and_no_
     for degree in range(k + 1):
         f = nodes**degree if degree else np.ones(k)
         differences = []  # psi_1 .. psi_i f[t_n, .., t_{n-i}], of the nodes behind
-        table = f.astype(float)
-        factor = 1.0
+        table, factor = f.astype(float), 1.0
         for i in range(k):
             differences.append(factor * table[0])
             if i + 1 < k:

@@ -67,8 +67,7 @@ def test_a_top_sleeps_above_the_threshold_precesses_steadily_above_a_spin_and_ne
         assert high - low < 1e-7
     with pytest.raises(symtop.SymtopError, match="spin must be at least"):
         steady(2.5)
-    scene = symtop.scene("separatrix")
-    times = np.array([1.0, 5.0, 15.0])
+    scene, times = symtop.scene("separatrix"), np.array([1.0, 5.0, 15.0])
     cosine = np.cos(closed_form(scene)(times).theta)
     assert cosine == pytest.approx(1.0 / (1.0 + 1.0 / np.cosh(times)), abs=1e-12)  # g = 1
 

@@ -134,8 +134,7 @@ def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
     reached = longrun.netcdf.read(file)["steps_done"].item()
     steps = 4_000_000
     assert 10_000 <= reached < steps
-    positions = []
-    resume = longrun._Checkpoint.resumed
+    positions, resume = [], longrun._Checkpoint.resumed
 
     def noting(self, start):
         at, rows = resume(self, start)

@@ -151,8 +151,7 @@ def test_the_damped_top_has_order_two_and_both_integrations_of_its_truth_agree(m
 
 
 def test_the_power_of_the_friction_is_what_the_energy_loses_and_without_it_the_kernel_is_unreduced():
-    scene = symtop.scene("goldstein")
-    times = np.linspace(0.0, 10.0, 4001)
+    scene, times = symtop.scene("goldstein"), np.linspace(0.0, 10.0, 4001)
     truth, bound = damped_truth(scene, FRICTION, times)
     four = integrated(*four_equations(scene, FRICTION), times, "DOP853", 1e-13)
     assert bound == np.abs(truth[:3] - four[:3]).max()  # of all three angles

@@ -17,7 +17,8 @@ Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, 
 import functools
 import importlib.util
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -26,7 +27,7 @@ from symtop.core.numbers import EPSILON, context
 from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.plan import Array, Plan, Run
 from symtop.methods.framework.preparation import BareTop
-from symtop.methods.framework.registry import Integrator, Solver
+from symtop.methods.framework.registry import Integrator
 from symtop.model import charts
 from symtop.model.charts import BODY
 from symtop.model.exact import heavy_body
@@ -76,6 +77,7 @@ class Arithmetic(NamedTuple):
     compact: bool  # unrolled code in quadruple precision takes long to build and runs no faster
 
 
+@functools.cache
 def arithmetic(precision: str) -> Arithmetic:
     """The type behind "double", "longdouble" (80 bits on x86) or "quad" (113 bits)."""
     if precision == "double":
@@ -140,7 +142,9 @@ def propagate(
     chart: str, precision: str, tolerance: float, top: SymmetricTop, start: Angles, times: Array, most: int = 0
 ) -> Flight:
     """heyoka's states, in the working precision, at increasing times, or those reached in `most` steps."""
-    idle, kind = _idle(chart, precision, tolerance), arithmetic(precision).kind
+    kind, grid = arithmetic(precision).kind, times if times[0] == 0.0 else np.concatenate([[0.0], times])
+    numbers = grid if precision == "double" else np.array([kind(float(t)) for t in grid])
+    idle = _idle(chart, precision, tolerance)
     try:
         integrator = idle.pop()  # in one instruction: another thread may be here, too
     except IndexError:
@@ -149,25 +153,28 @@ def propagate(
     integrator.time = kind("0")
     integrator.state[:] = state
     integrator.pars[:] = parameters[: integrator.pars.size]  # the axis chart does not need the last one
-    grid = times if times[0] == 0.0 else np.concatenate([[0.0], times])
-    numbers = grid if precision == "double" else np.array([kind(float(t)) for t in grid])
     outcome, _, _, steps, *_, states = integrator.propagate_grid(numbers, max_steps=most)
     order, time = int(integrator.order), float(integrator.time)
     idle.append(integrator)  # not after an exception, which may leave it in any state
     return Flight(states[grid.size - times.size :], int(steps), order, outcome.name, time)
 
 
-def solver(chart: str, precision: str) -> Solver:
+@dataclass(frozen=True)
+class HeyokaSolver:
     """A solver of one chart and precision, samples in double."""
-    form = FORMS[chart]
 
-    def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        most = max(1, int(min(plan.most(MOST_STEPS[precision]), sys.maxsize)))  # infinity is a budget, too
-        flight = propagate(chart, precision, plan.tolerance, top, start, plan.times, most)
+    chart: str
+    precision: str
+
+    def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+        """Start to horizon, samples by dense output."""
+        form = FORMS[self.chart]
+        most = max(1, int(min(plan.most(MOST_STEPS[self.precision]), sys.maxsize)))  # infinity is a budget, too
+        flight = propagate(self.chart, self.precision, plan.tolerance, top, start, plan.times, most)
         count, size = len(flight.states), plan.times.size
         states = _padded(flight.states, size)
-        par = BareTop(top.I1, top.I3, top.mgl) if chart == "angles" else None
-        whole = flight.states if chart in ("axis", "attitude") else states  # the others work in double
+        par = BareTop(top.I1, top.I3, top.mgl) if self.chart == "angles" else None
+        whole = flight.states if self.chart in ("axis", "attitude") else states  # the others work in double
         p_phi, p_psi = (_padded(values, size) for values in form.momenta(par, whole))
         if form.present is not None:
             states = form.present(par, plan.times, states)
@@ -179,7 +186,17 @@ def solver(chart: str, precision: str) -> Solver:
         reached = flight.time if word == "out_of_budget" else reached
         return Run(states, p_phi, p_psi, flight.steps, flight.steps * flight.order, 0, word, reached)
 
-    return solve
+    def bare(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[Callable[[], Any], int]:
+        """heyoka's own loop to the horizon, without samples, as a call, and the derivatives that it computes."""
+        state, parameters = start_numbers(self.chart, self.precision, top, start)
+        one, kind = stepper(self.chart, self.precision, plan.tolerance), arithmetic(self.precision).kind
+        begin, end, parameters = kind("0"), kind(plan.horizon), parameters[: one.pars.size]
+
+        def run() -> Any:
+            one.time, one.state[:], one.pars[:] = begin, state, parameters
+            return one.propagate_until(end)
+
+        return run, int(run()[3] * one.order)
 
 
 def _padded(values: Any, size: int) -> Array:
@@ -211,7 +228,7 @@ def built_in() -> list[Integrator]:
         Integrator(
             name="taylor" if precision == "double" else f"taylor-{precision}",
             family="taylor", summary=_SUMMARIES[precision],
-            solvers={chart: solver(chart, precision) for chart in ("axis", "attitude", BODY)},
+            solvers={chart: HeyokaSolver(chart, precision) for chart in ("axis", "attitude", BODY)},
             control="tolerance", explicit=True, symplectic=False, symmetric=False, conserves=frozenset(),
             least_tolerance=arithmetic(precision).epsilon / 1000.0,
             default_tolerance=arithmetic(precision).epsilon / 100.0,
