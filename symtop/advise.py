@@ -601,12 +601,13 @@ class EngineAdvice:
             lines.append(none)
         if self.advice is None:
             return "\n".join(lines)
-        if (accuracy := self.advice.accuracy) != self.errors[self.best]:
+        if (accuracy := self.advice.accuracy) != self.errors[self.best] or self.advice.integrator is None:
             serving = ", ".join(name for name, value in self.errors.items() if value <= accuracy) or "none"
-            return "\n".join([*lines, f"Settings within {accuracy:g} rad at this step: {serving}.", str(self.advice)])
+            within = [f"Settings within {accuracy:g} rad at this step: {serving}."] * (self.advice.quantity == "axis")
+            return "\n".join([*lines, *within, str(self.advice)])
         much = f"{self.gain:.3g} times fewer" if self.gain >= 1.0 else f"{1.0 / self.gain:.3g} times more"
-        lines.append(f"As near as {self.best} with {much} force evaluations: {self.advice.reason}")
-        return "\n".join(lines)
+        work = f" with {much} force evaluations" if math.isfinite(self.gain) else ""  # the exact motion makes none
+        return "\n".join([*lines, f"As near as {self.best}{work}: {self.advice.reason}"])
 
 
 def _settings() -> dict[str, dict[str, str]]:
@@ -648,10 +649,7 @@ def i_use(
     has_target = accuracy is not None or 0.0 < error <= WORST
     advice = recommend(start, accuracy=target, horizon=end, **limits) if has_target else None
     gain = math.nan
-    if advice is not None and advice.integrator is not None:
-        setting = advice.step_size or advice.tolerance or math.nan
+    if advice is not None and advice.integrator is not None and (setting := advice.step_size or advice.tolerance):
         needed = settings.attempt(start, integrator(advice.integrator), setting, end, "axis")
         gain = runs[best].evaluations / needed.evaluations
-    elif accuracy is None:
-        advice = None
     return EngineAdvice(start.name, engine, h, end, errors, best, gain, advice, start.second)

@@ -181,8 +181,7 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     menu = ["vern9-fixed[axis]", "gauss-6[axis]", "rk4[axis]", "strang[axis]", "cayley[axis]", "srkn-14-6[axis]"]
     monkeypatch.setattr(advise, "_menu", lambda question: ["series[axis]"] if question.needs else menu)
     advice = symtop.recommend(scene, accuracy=1e-8, horizon=30.0)
-    assert sorted(names) == sorted([*menu[:5], "series[axis]"])
-    assert advice.integrator == "vern9-fixed[axis]"
+    assert (sorted(names), advice.integrator) == (sorted([*menu[:5], "series[axis]"]), "vern9-fixed[axis]")
     assert "Tried the 5 methods" in advice.reason
     names.clear()
     menu[:5] = menu[4::-1]  # the fastest is the last of five
@@ -419,8 +418,7 @@ def test_a_body_is_answered_with_a_method_of_its_chart():
     assert "symmetry" not in str(advice)  # it is one without
     assert advice.command.startswith(f"symtop run tennis-racket {advice.integrator} --")
     heavy = symtop.recommend("heavy-brick", accuracy=1e-6, needs="kicks", keeps="energy", step_size=0.02)
-    assert symtop.integrator(heavy.integrator).needs == "kicks"
-    assert (heavy.step_size, heavy.closed_form) == (0.02, "")
+    assert (symtop.integrator(heavy.integrator).needs, (heavy.step_size, heavy.closed_form)) == ("kicks", (0.02, ""))
     assert symtop.recommend("tennis-racket", accuracy=1e-3, needs="this-top").integrator is None
     for wrong, words in (
         ({"horizon": 72.0}, "horizon must be at most 46"), ({"quantity": "p_psi"}, "quantity 'p_psi' is unknown"),
@@ -458,6 +456,10 @@ def test_engines_have_maps_and_one_without_a_gyroscopic_term_nothing_to_match():
     assert rest <= {name.removesuffix("-float32") for name in maps} | {"fincham"}  # as published, in no engine
     advice = i_use("havok", "goldstein", horizon=10.0)
     assert (advice.advice, "nothing to match" in str(advice)) == (None, True)
+    none = i_use("rapier", "goldstein", horizon=10.0, needs="solution", max_step=1.0)
+    assert (none.advice.integrator, "no compiled method is within these limits" in str(none)) == (None, True)
+    other = i_use("rapier", "goldstein", horizon=10.0, needs="derivative", accuracy=1e-3, quantity="energy")
+    assert (other.advice.quantity, "Settings within" in str(other)) == ("energy", False)
     upright = symtop.Scene("upright", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(theta=0.0, psi_dot=5.0), 10.0)
     advice = i_use("mujoco", upright)
     assert (set(advice.errors.values()), advice.advice) == ({0.0}, None)

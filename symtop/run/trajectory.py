@@ -47,7 +47,8 @@ class Trajectory(NamedTuple):
     def of_run(cls, scene: Scene, chart: str, plan: Plan, run: Run) -> Self:
         """The observables of a run, whatever chart it was computed in; phi and psi are made continuous.
 
-        A run that ends well, and whose states are so large that one of these is not finite, ends where that begins.
+        A run that ends well, and whose states are so large that one of these is not finite, ends where that begins; so
+        does one whose axis becomes zero.
         """
         with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up, and that is a result
             view = View(chart, scene.top, run.states, run.p_phi, run.p_psi)
@@ -62,7 +63,8 @@ class Trajectory(NamedTuple):
                     phi, psi = (*continuous(np.array(angles), guides), None)[:2]
                 axis, energy, p_theta = readings(view)
             outcome, reached = run.outcome, run.reached
-            if outcome == "ok" and not (whole := np.isfinite(energy + run.p_phi)).all():  # its squares overflow
+            whole = np.isfinite(energy + run.p_phi) & axis.any(axis=1)  # squares overflow, or nothing has a direction
+            if outcome == "ok" and not whole.all():
                 outcome, reached = "not_finite", plan.last_of(whole)
             return cls(
                 plan.times, view.theta, phi, psi, axis, view.quaternion if chart in ("attitude", BODY) else None,

@@ -180,8 +180,7 @@ def test_a_method_of_several_steps_is_not_judged_by_the_steps_that_start_it(chan
     only("order", "time", "symmetric")
     kind = type("Three", (wrong.AdamsBashforth3,), {"start": staticmethod(right.gauss_4)} | change)
     ledger = symtop.judge(kind, quick=True, order=3, symmetric=True, scene="simo-wong")
-    assert ledger.refuted == [line] * bool(line), str(ledger)
-    assert ledger["symmetric"].verdict == "undecided"
+    assert (ledger.refuted, ledger["symmetric"].verdict) == ([line] * bool(line), "undecided"), str(ledger)
 
 
 def test_a_small_defect_of_the_bracket_that_stands_out_of_its_noise_is_not_confirmed(only):

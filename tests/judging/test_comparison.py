@@ -199,6 +199,8 @@ def test_a_step_called_as_a_method_of_ours_is_told_apart_and_a_library_needs_no_
     assert data["variant"].values.tolist() == ["own-rk4[axis]", "rk4[axis]", "mine[axis]"]
     error = data["error"].isel(setting=-1).values
     assert error[0] == error[2] != error[1]
+    none = symtop.compare("spheroid", lambda f, t, y, h: 0.0 * y, **words)  # no axis has no error of zero
+    assert {*none["outcome"].values.flat} == {"not_finite"}
     for target in ("my.so", "my.so:other", "./my.so"):
         with pytest.raises(symtop.SymtopError, match="a shared object must be a file that is there"):
             symtop.compare("spheroid", target, quiet=True)

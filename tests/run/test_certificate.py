@@ -50,8 +50,7 @@ def test_a_certificate_is_made_once_and_the_better_one_is_told(cache, monkeypatc
     iterated = certificate(chosen, "discrete-map")
     assert certificate(chosen).kind == iterated.kind == "discrete-map"
     integration = certificate(chosen, "integration")
-    assert integration.kind == "integration"
-    assert (integration.share, integration.reach) == (digits.share, digits.reach)
+    assert (integration.kind, (integration.share, integration.reach)) == ("integration", (digits.share, digits.reach))
     monkeypatch.setattr(module.netcdf, "write", pytest.fail)  # nothing is computed again
     module._on_disk.cache_clear()  # as in a new process
     assert certificate(chosen) == certificate(chosen, "integration") == integration
