@@ -49,11 +49,15 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "beside": BESIDE,
         "pairs": len(words) or None,  # of a variant and a scene
         **{word: words.count(word) if words else None for word in ("confirmed", "refuted", "undecided")},
-        "higher": int((shown == "higher").sum()), "lower": int((shown == "lower").sum()),
+        "higher": int((shown == "higher").sum()),
+        "lower": int((shown == "lower").sum()),
         "unknown": stepping(data).sizes["variant"] - len({name for _, name in efficiencies(data, TARGET)}),
         "span": float(spans.max()) if len(spans) else None,  # most work over least within an order
         "span_order": span_order,
-        "span_best": span_best, "span_least": span_least, "span_worst": span_worst, "span_most": span_most,
+        "span_best": span_best,
+        "span_least": span_least,
+        "span_worst": span_worst,
+        "span_most": span_most,
         "history_tolerance": HISTORY_TOLERANCE,
         "large": LARGE,  # rad
         "ratio_asked": int(np.isfinite(data["tolerance"].values).sum()) or None,  # runs at a tolerance

@@ -22,8 +22,9 @@ PARTS = {"spheroid": "first", "goldstein": "second"}  # scenes of the notebook's
 MOMENTA = ["p_phi_largest", "p_psi_largest"]
 KEPT = 1e-12  # relative, over 8 s: a momentum that changes by less is kept to rounding
 DRAWN = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "strang[axis]", "cayley[axis]")
-OF_SOLVER = ("followed", "ways", "energies", "solver_momenta", "alpha_at_rest", "alpha_rate", "long",
-             "both_turned")  # facts
+OF_SOLVER = (  # facts
+    "followed", "ways", "energies", "solver_momenta", "alpha_at_rest", "alpha_rate", "long", "both_turned",
+)  # fmt: skip
 BY_PART = ("end", "energy", "behind", "ahead", "long", "turned")
 
 
