@@ -31,7 +31,7 @@ def findings(
     name: str, title: str, question: str, sentences: Sequence[str] | Table, how_to_read: str, tables: Sequence[Table], *,
     further: Sequence[str] = (), captions: Mapping[str, tuple[str, str]] | None = None, **others: Any,
 ) -> dict[str, Any]:  # fmt: skip
-    """What NAME.json holds; `captions` are caption and text for the blind of each figure; `sentences`: or a table.
+    """What NAME.json holds; `captions`: caption and text for the blind of each figure, `sentences` or a table.
 
     From "How to read it" on the page is for reference: the `further` sentences and the tables.
     """

@@ -58,7 +58,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     undecided = Counter(entries["claim"][entries["verdict"] == "undecided"].map(claim_name))
     ((open_claim, open_most),) = undecided.most_common(1) or [(None, None)]
     reasons = entries["why"][(entries["verdict"] == "undecided") & (entries["claim"].map(claim_name) == open_claim)]
-    ((open_why, _),) = Counter(reasons.str.partition(", in the ")[0]).most_common(1) or [(None, None)]
+    ((open_why, _),) = Counter(why.partition(", in the ")[0] for why in reasons).most_common(1) or [(None, None)]
     ((usual, usual_runs),) = Counter(steps).most_common(1) or [(None, None)]
     return {
         "integrators": entries["integrator"].nunique() or None,
