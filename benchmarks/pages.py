@@ -28,8 +28,8 @@ class Table(NamedTuple):
 
 
 def findings(
-    name: str, title: str, question: str, sentences: Sequence[str] | Table, how_to_read: str, tables: Sequence[Table], *,
-    further: Sequence[str] = (), captions: Mapping[str, tuple[str, str]] | None = None, **others: Any,
+    name: str, title: str, question: str, sentences: Sequence[str] | Table, how_to_read: str, tables: Sequence[Table],
+    *, further: Sequence[str] = (), captions: Mapping[str, tuple[str, str]] | None = None, **others: Any,
 ) -> dict[str, Any]:  # fmt: skip
     """What NAME.json holds; `captions`: caption and text for the blind of each figure, `sentences` or a table.
 

@@ -190,13 +190,14 @@ def _wins(data: xr.Dataset) -> list[str]:
         kinds.append((f"Those that need f(t, y) alone ({', '.join(simple)})", simple))
     for who, rows in kinds:
         stands = {words: each for call, words in NAMES.items() if (each := score(data, call, rows)).compared}
-        ahead = [f"in {one.ahead} of {one.compared} comparisons of the {words}" for words, one in stands.items()]
+        ahead = [f"{one.ahead} of {one.compared}" for one in stands.values()]
         level = [str(one.level) for one in stands.values()]
-        slower = [f"{name} is faster in {count} of the {words}"
+        slower = [f"{name} is faster in {count} ({words})"
                   for words, one in stands.items() for name, count in one.slower.items()]  # fmt: skip
         if stands:
-            said.append(f"{who} are faster {' and '.join(ahead)}, level or within the noise in {' and '.join(level)}: "
-                        f"{', '.join(slower) or 'no library is faster'}.")  # fmt: skip
+            said.append(f"{who} are faster in {' and '.join(ahead)} comparisons ({' and '.join(stands)}), level or "
+                        f"within the noise in {' and '.join(level)}: {', '.join(slower) or 'no library is faster'}."
+                        )  # fmt: skip
     return said
 
 
