@@ -51,7 +51,8 @@ def verdict(results: Results) -> list[str]:
 def findings(results: Results, facts: Mapping[str, Any]) -> dict[str, Any]:
     """The numbers in the form in which the report shows a study."""
     how_to_read = (
-        f"One process, all kernels and their C twins (gcc) interleaved in random order; {kernels.SCENE}, a step of "
+        "In lanes: many tops side by side in one vector of the processor (SIMD). One process, all kernels and their C "
+        f"twins (gcc) interleaved in random order; {kernels.SCENE}, a step of "
         f"1/{kernels.PER_NUTATION:g} of a nutation. The spread is what five fifths of the batches would have said."
     )
     return pages.findings(

@@ -48,12 +48,15 @@ SAMPLES = {"tops": 501, "bodies": 201, "hostile": 201}
 MOST_TURNS = 1e3  # of a hostile body about any axis
 TABLES = Path("results") / "tables"
 CAPTION = (
-    "The guard hardly needs the solution: on tops it is silent on {0} wrong runs with the closed form and on {1} with "
-    "an integration in its place. Wrong is off by more than {limit} rad. Each limit of its forecast gives a point, the "
-    "dot is the limit that it has: higher is fewer silent ones, further left fewer false alarms. The axis begins at "
-    "0.9. On bodies the guard integrates: two samples, symtop's `body_population` and a hostile one, of thin, flat and "
-    "almost round bodies at rest or in fast rotation, in any units."
+    "The guard hardly needs the solution: on tops it is silent on {0} wrong runs with the closed form (exact) and on "
+    "{1} with an integration in its place (series). Wrong is off by more than {limit} rad. Each limit of its forecast"
+    " gives a point, the dot is the limit that it has: higher is fewer silent ones, further left fewer false alarms. "
+    "The axis begins at 0.9. On bodies the guard integrates: two samples, symtop's `body_population` and a hostile "
+    "one, of thin, flat and almost round bodies at rest or in fast rotation, in any units."
 )
+
+
+SUMMED = ["runs", "guard", "wrong: silent", "worst silent (rad)", "correct: warned of", "ended early: warned of"]
 
 
 class Run(NamedTuple):
@@ -243,7 +246,7 @@ def grouped(runs: list[Run], by: str) -> dict[str, list[Run]]:
     parts: dict[str, list[Run]] = {}
     for run in runs:
         value = getattr(run, by)
-        name = ("whole run tried" if value else "a piece tried") if by == "whole" else str(value)
+        name = ("the whole run tried" if value else "a piece tried") if by == "whole" else str(value)
         parts.setdefault(f"{value:g}" if by == "periods" else name, []).append(run)
     return dict(sorted(parts.items()))
 
@@ -269,26 +272,24 @@ def draw(known: dict[str, list[Run]], target: Path) -> None:
             rest = [run for run in runs if run.outcome == "ok"]
             last = sum(getattr(run, guarded) > guard.EXPECTED for run in rest) - 1
             axis.plot(max(false[last], 1e-4), hits[last], "o", color=color)
-        axis.set(xscale="log", xlim=(1e-4, 1.2), ylim=(0.9, 1.003), title=title, xlabel="right ones warned of")
-    axes[0, 0].set_ylabel("wrong runs warned of")
+        axis.set(
+            xscale="log", xlim=(1e-4, 1.2), ylim=(0.9, 1.003), title=title, xlabel="share of correct runs\nwarned of"
+        )
+    axes[0, 0].set_ylabel("share of wrong runs warned of")
     style.legend_below(figure, axes)
     style.save(figure, target)
 
 
-def summed(name: str, runs: list[Run], guarded: str) -> tuple[str, int]:
-    """How many wrong runs were silent and how many right ones were warned of, in a sentence; and the former."""
+def summed(name: str, runs: list[Run], guarded: str) -> list[str]:
+    """How many wrong runs were silent and how many correct ones were warned of: a row under `SUMMED`."""
     wrong = [run for run in runs if run.outcome == "ok" and run.error > guard.EXPECTED]
     right = [run for run in runs if run.outcome == "ok" and run.error <= guard.EXPECTED]
     silent = [run for run in wrong if not getattr(run, guarded) > guard.EXPECTED]
     false = sum(getattr(run, guarded) > guard.EXPECTED for run in right)
-    ended = counts(runs, guarded)[0]
-    words = f"tops, guard {guarded!r}" if name == "tops" else name
-    sentence = (
-        f"{len(runs)} runs of {words}: of {len(wrong)} wrong ones {len(silent)} were silent, the worst off by "
-        f"{max((run.error for run in silent), default=0.0):.2g} rad; of {len(right)} right ones {false} were "
-        f"warned of ({100.0 * false / max(len(right), 1):.2g} %), and of those that ended early {ended}."
-    )
-    return sentence, len(silent)
+    return [
+        f"{len(runs)} of {name}", guarded, f"{len(silent)} of {len(wrong)}",
+        f"{max((run.error for run in silent), default=0.0):.2g}", f"{false} of {len(right)}", counts(runs, guarded)[0],
+    ]  # fmt: skip
 
 
 def page(results: Path) -> None:
@@ -299,23 +300,29 @@ def page(results: Path) -> None:
     for name, every in known.items():
         parts = {"all": every}
         for by in ("whole", "control", *(("periods",) if name == "tops" else ()), "stratum", "needs"):
-            parts |= {f"{by} {value}": some for value, some in grouped(every, by).items()}
+            named = grouped(every, by).items()
+            parts |= {value if by == "whole" else f"{by} {value}": some for value, some in named}
         for guarded in ("exact", "series") if name == "tops" else ("series",):
             rows += [[f"{name}: {part}", guarded, *counts(runs, guarded)] for part, runs in parts.items()]
     table = Table("Runs that the guard warned of, of all, by the error that they had", header, rows)
     print("\n".join(" | ".join(row) for row in [header, *rows]))
-    sentences, missed = [], list[int]()
+    summary = list[list[str]]()
     shown = {"tops": known["tops"], "bodies": known["bodies"], "hostile bodies": known["hostile"]}
     for name, runs in shown.items():
         for guarded in ("exact", "series") if name == "tops" else ("series",):
-            sentence, silent = summed(name, runs, guarded)
-            missed.append(silent)
-            sentences.append(sentence)
-    alt = "Curves of wrong runs warned of against right runs warned of, near one."
-    caption = CAPTION.format(*missed, limit=guard.EXPECTED)  # of tops, with the closed form and without
+            summary.append(summed(name, runs, guarded))
     draw(known, results / "figures" / "guard-curves.png")
+    words = written(summary, table, cases=sum(map(len, known.values())),
+                    **measured.record(facts, "python -m benchmarks.guard"))  # fmt: skip
+    netcdf.write_json(results / "guard.json", words)
+
+
+def written(summary: list[list[str]], table: Table, **others: Any) -> dict[str, Any]:
+    """What results/guard.json holds: the summary, a row under `SUMMED` each, and the counts."""
+    alt = "Curves of wrong runs warned of against right runs warned of, near one."
+    missed = [row[2].split()[0] for row in summary]  # of tops, with the closed form and without
     words = pages.findings(
-        "guard", "The guard without the truth", "Does the guard need to know the solution?", sentences,
+        "guard", "The guard without the truth", "Does the guard need to know the solution?", Table("", SUMMED, summary),
         f"Wrong: off by more than {guard.EXPECTED} rad at some sample. The margin of the guard in unstable motions was "
         "chosen, and its watch mended, on 19,600 bodies of other seeds, of which few wrong runs were silent, and three "
         "beyond ten limits (0.34, 0.51 and 2.9 rad): the steps of its watch damped the chaos of a needle and of a body "
@@ -323,12 +330,10 @@ def page(results: Path) -> None:
         "unstable rotation stay 0.01 rad apart until they pass it again. These were mended, as was later, on 440 runs "
         "of free bodies beside such rotations, a piece that ended before the body turned over.",
         [table],
-        captions={"curves": (caption, alt)}, cases=sum(map(len, known.values())),
-        **measured.record(facts, "python -m benchmarks.guard"),
+        captions={"curves": (CAPTION.format(*missed, limit=guard.EXPECTED), alt)}, **others,
     )  # fmt: skip
-    counted = [dict(zip(header, row, strict=True)) for row in rows]
-    pictures = [{"name": "curves", "file": "guard-curves.png"}]
-    netcdf.write_json(results / "guard.json", words | {"pictures": pictures, "counts": counted})
+    counted = [dict(zip(table.header, row, strict=True)) for row in table.rows]
+    return words | {"pictures": [{"name": "curves", "file": "guard-curves.png"}], "counts": counted}
 
 
 def main() -> None:
@@ -343,7 +348,7 @@ def main() -> None:
         return
     make(asked.name, asked.count, asked.workers)
     for guarded in ("exact", "series") if asked.name == "tops" else ("series",):
-        print(summed(asked.name, kept(asked.name), guarded)[0])
+        print(pages.Table(asked.name, SUMMED, [summed(asked.name, kept(asked.name), guarded)]).text)
     for run in kept(asked.name):
         if run.outcome == "ok" and run.error > 10.0 * guard.EXPECTED and not run.series > guard.EXPECTED:
             print("silent and grossly wrong:", run)

@@ -28,10 +28,10 @@ class Table(NamedTuple):
 
 
 def findings(
-    name: str, title: str, question: str, sentences: Sequence[str], how_to_read: str, tables: Sequence[Table], *,
-    further: Sequence[str] = (), captions: Mapping[str, tuple[str, str]] | None = None, **others: Any,
+    name: str, title: str, question: str, sentences: Sequence[str] | Table, how_to_read: str, tables: Sequence[Table],
+    *, further: Sequence[str] = (), captions: Mapping[str, tuple[str, str]] | None = None, **others: Any,
 ) -> dict[str, Any]:  # fmt: skip
-    """What NAME.json holds; `captions` are caption and text for the blind of each figure.
+    """What NAME.json holds; `captions`: caption and text for the blind of each figure, `sentences` or a table.
 
     From "How to read it" on the page is for reference: the `further` sentences and the tables.
     """
@@ -40,7 +40,10 @@ def findings(
         for figure, (caption, alt) in (captions or {}).items()
     ]
     shown = [_raw(f"**{one.title}**{_count(one)}\n\n{table(one.header, one.rows[:ROWS])}") for one in tables[:TABLES]]
-    listed, more = (_raw("\n".join(f"- {one}" for one in said)) for said in (sentences, further))
+    listed, more = (
+        _raw(table(said.header, said.rows) if isinstance(said, Table) else "\n".join(f"- {one}" for one in said))
+        for said in (sentences, further)
+    )
     reading = _raw(f"**How to read it.** {how_to_read}")
     page = "\n\n".join(["# {{ question }}", listed, *figures, reading, *([more] if further else []), *shown])
     return {

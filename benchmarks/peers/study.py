@@ -19,7 +19,6 @@ from symtop.runner.study import Picture, Study
 
 SOLVE_IVP = "scipy["  # how the groups of SciPy's solve_ivp begin: a chart and a language each
 SPOKEN, OTHER = style.VERMILLION, "#888888"  # variants that the title is about, and the others
-WORDS = {"numba": "compiled", "Python": "Python"}  # a right-hand side
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
@@ -74,12 +73,9 @@ def caption(data: xr.Dataset) -> tuple[str, str]:
         if name in known and all(spans := _spans(data, known, name))
     )
     words = (
-        f"{first}A line is a library, with the chart and the language of its right-hand side where it was "
-        "given several; a dot is one scene and one accuracy, at which its fastest method and setting is divided by "
-        f"the fastest of symtop's own kernels, {said['fastest']}{alone}. {_over_general(data, known, said)}"
-        "Left, the call that a user types; right, the inner loop alone; the same runs at the same settings in both. "
-        "All on (e, L), but arkode-sprk and the variants [angles] in Euler angles. symtop with heyoka is taylor, "
-        "heyoka's stepper called by symtop. "
+        f"{first}{_over_general(data, known, said)}symtop's fastest is {said['fastest']}{alone}. After a comma "
+        "stands the language of the right-hand side. All step (e, L), but arkode-sprk and the variants [angles] "
+        "Euler's angles. symtop with heyoka is taylor, heyoka's stepper called by symtop. "
         + (f"Not drawn, since they model bodies and take no equations: {apart}. " if apart else "")
         + f"Measured was symtop {said['version']}."
     )
@@ -97,7 +93,7 @@ def _over_general(data: xr.Dataset, known: dict[str, list[str]], said: Mapping[s
     sides = zip(("left", "right"), NAMES, strict=True)
     slower = [f"{names} at the {side}" for side, call in sides if (names := said[f"general_slower_{call}"])]
     return (
-        f"Over the fastest that needs f(t, y) alone (open dots; {said['general']}; {scenes}), solve_ivp takes "
+        f"Over the fastest that needs f(t, y) alone (open dots; {scenes}), solve_ivp takes "
         f"{' and '.join(gains)} as long"
         f"{'; faster than it are ' if slower else ''}{' and '.join(slower)}. "
     )
@@ -117,7 +113,7 @@ def _label(name: str) -> str:
     first, mark, language = name.partition(", ")
     if first.startswith("scipy"):
         first = "SciPy " + first.replace("scipy-", "").replace(SOLVE_IVP, "solve_ivp[")
-    return f"{first}{mark}{WORDS.get(language, language)}"
+    return f"{first}{mark}{language}"
 
 
 def _gains(data: xr.Dataset, known: dict[str, list[str]], mine: Sequence[str]) -> list[str]:

@@ -187,17 +187,17 @@ def _wins(data: xr.Dataset) -> list[str]:
     said, simple = [], general(data)
     kinds = [("symtop's own kernels", groups(data).get(OURS, []))]
     if simple:
-        kinds.append((f"those of them that need f(t, y) alone ({', '.join(simple)})", simple))
+        kinds.append((f"Those that need f(t, y) alone ({', '.join(simple)})", simple))
     for who, rows in kinds:
-        for call, words in NAMES.items():
-            stands = score(data, call, rows)
-            slower = ", ".join(f"{name} is faster in {count}" for name, count in stands.slower.items())
-            if stands.compared:
-                said.append(
-                    f"{words.capitalize()}: {who} are faster in {stands.ahead} of {stands.compared} comparisons, level "
-                    f"or within the noise in {stands.level}, slower in {stands.behind}: "
-                    f"{slower or 'no library is faster'}."
-                )
+        stands = {words: each for call, words in NAMES.items() if (each := score(data, call, rows)).compared}
+        ahead = [f"{one.ahead} of {one.compared}" for one in stands.values()]
+        level = [str(one.level) for one in stands.values()]
+        slower = [f"{name} is faster in {count} ({words})"
+                  for words, one in stands.items() for name, count in one.slower.items()]  # fmt: skip
+        if stands:
+            said.append(f"{who} are faster in {' and '.join(ahead)} comparisons ({' and '.join(stands)}), level or "
+                        f"within the noise in {' and '.join(level)}: {', '.join(slower) or 'no library is faster'}."
+                        )  # fmt: skip
     return said
 
 

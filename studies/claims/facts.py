@@ -57,6 +57,8 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     steps = steps[steps > 0].astype(int)
     undecided = Counter(entries["claim"][entries["verdict"] == "undecided"].map(claim_name))
     ((open_claim, open_most),) = undecided.most_common(1) or [(None, None)]
+    reasons = entries["why"][(entries["verdict"] == "undecided") & (entries["claim"].map(claim_name) == open_claim)]
+    ((open_why, _),) = Counter(why.partition(", in the ")[0] for why in reasons).most_common(1) or [(None, None)]
     ((usual, usual_runs),) = Counter(steps).most_common(1) or [(None, None)]
     return {
         "integrators": entries["integrator"].nunique() or None,
@@ -68,6 +70,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "caught": int(refuted.sum()),
         "open_claim": open_claim,  # that most of the undecided findings are on
         "open_most": open_most,
+        "open_why": open_why,  # the reason that most of these have
         "unsaid": len(by_kind(every[unsaid])[0]),  # undecided findings on what is not declared
         "runs": len(steps) or None,
         "usual": usual,  # steps of a long run

@@ -22,7 +22,7 @@ SAID = {
     "inapplicable": "does not apply",
 }
 TITLES = {"runge-kutta": "Runge-Kutta", "lie-group": "Lie-group", "taylor": "Taylor", "discrete-lagrangian":
-          "discrete-Lagrangian"}  # fmt: skip
+          "discrete-Lagrangian", "library": "SciPy"}  # fmt: skip
 ROWS = {  # what a name alone does not say
     "energy": "energy over time", "p_phi": "$p_\\varphi$ over time", "p_psi": "$p_\\psi$ over time",
     "axis_length": "length of the axis", "reported": "reported momenta", "invariant": "own invariant",
@@ -75,7 +75,7 @@ def draw_ledger(entries: pd.DataFrame, lies: pd.Series) -> Picture:
         )
     axis.set(xlim=(-0.5, (right if len(lies) else len(names) - 1) + 0.5), ylim=(len(CLAIMS) - 0.5, -0.5))
     axis.set_yticks(range(len(CLAIMS)), [ROWS.get(claim, claim_name(claim)) for claim in CLAIMS])
-    heads = [f"{TITLES.get(name, name)}\n({sizes[name]})".replace("-", "\n") for name in names]
+    heads = [f"{TITLES.get(name, name)}\n({sizes[name]})".replace("-", "-\n") for name in names]
     places = [*range(len(names)), right] if len(lies) else range(len(names))
     heads += ["false claims,\nplanted:\ncaught"][: len(lies)]
     axis.set_xticks(places, heads)

@@ -10,6 +10,7 @@ import xarray as xr
 from symtop.measure.order import BESIDE
 
 from .measures import (
+    HISTORY_TOLERANCE,
     LARGE,
     LEAST_SCENES,
     MAIN,
@@ -33,8 +34,11 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     words = [one.verdict for one in judged(data).values()]
     part, _ = named_variants(data)
     every = cheapest(data).query("ranked")
-    best, second = (first(part) for part in (every, every[every["order"] == 2]))
     spans = every.groupby("order")["work"].agg(lambda works: works.max() / works.min())
+    span_order = int(spans.idxmax()) if len(spans) else None
+    alike = every[every["order"] == span_order]  # the least work first
+    (span_best, span_least), (span_worst, span_most) = map(first, (alike, alike[::-1]))
+    shown = orders(data)["verdict"]
     met = {name: values for name, values in ratios(data).items() if values.size}
     together = np.concatenate([np.full(1, np.nan), *met.values()])
     return {
@@ -45,13 +49,16 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "beside": BESIDE,
         "pairs": len(words) or None,  # of a variant and a scene
         **{word: words.count(word) if words else None for word in ("confirmed", "refuted", "undecided")},
-        "best_variant": best[0],
-        "best_work": best[1],
-        "second_variant": second[0],
-        "second_work": second[1],
+        "higher": int((shown == "higher").sum()),
+        "lower": int((shown == "lower").sum()),
         "unknown": stepping(data).sizes["variant"] - len({name for _, name in efficiencies(data, TARGET)}),
         "span": float(spans.max()) if len(spans) else None,  # most work over least within an order
-        "span_order": int(spans.idxmax()) if len(spans) else None,
+        "span_order": span_order,
+        "span_best": span_best,
+        "span_least": span_least,
+        "span_worst": span_worst,
+        "span_most": span_most,
+        "history_tolerance": HISTORY_TOLERANCE,
         "large": LARGE,  # rad
         "ratio_asked": int(np.isfinite(data["tolerance"].values).sum()) or None,  # runs at a tolerance
         "ratio_runs": sum(values.size for values in met.values()),  # of these
@@ -79,7 +86,7 @@ def cheapest(data: xr.Dataset) -> pd.DataFrame:
             known, foreseen = [one.work for one in every], sum(one.foreseen for one in every)
             work = float(np.median(known)), min(known), max(known), len(known), foreseen
             rows.append([label, declared_order(name), *work, len(known) >= enough])
-    header = ["variant", "order", "work", "least", "most", "scenes", "of these by the law", "ranked"]
+    header = ["variant", "order", "work", "least", "most", "scenes", "of these extrapolated", "ranked"]
     table = pd.DataFrame(rows, columns=header)
     return table.astype({"ranked": bool}).sort_values(["ranked", "work"], ascending=[False, True])
 
@@ -87,7 +94,12 @@ def cheapest(data: xr.Dataset) -> pd.DataFrame:
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     """What an error costs by variant; every order; every adaptive variant on every scene."""
     costs = cheapest(data).drop(columns="ranked")
-    costs = costs.rename(columns={"work": "force evaluations a nutation, median over scenes"})
+    costs = costs.rename(columns={"work": "force evaluations a nutation, median over scenes", "most": "largest"})
+    return {"costs": costs, "orders": orders(data), "tolerances": tolerances(data)}
+
+
+def orders(data: xr.Dataset) -> pd.DataFrame:
+    """Every order with its verdict, those that are not confirmed first."""
     ends, rows = fits(data, MAIN, at_end=True), []
     for pair, (word, slopes) in judged(data).items():
         measured = [part for name in (MAIN, *OTHERS) for part in _order(slopes.get(name))]
@@ -95,10 +107,9 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
         shown = off if word == "refuted" else word  # a claim is judged by more than this run: see the ledger
         rows.append([*pair, declared_order(pair[1]), shown, *measured, ends[pair].constant])
     names = [part for name in (MAIN, *OTHERS) for part in (f"order in {name}", f"+- in {name}")]
-    orders = pd.DataFrame(rows, columns=["scene", "variant", "declared", "verdict", *names, "C at the end (rad/s^p)"])
+    every = pd.DataFrame(rows, columns=["scene", "variant", "declared", "verdict", *names, "C at the end (rad/s^p)"])
     rank = {"lower": 0, "higher": 1, "undecided": 2}
-    orders = orders.sort_values("verdict", key=lambda column: column.map(lambda word: rank.get(word, 3)), kind="stable")
-    return {"costs": costs, "orders": orders, "tolerances": tolerances(data)}
+    return every.sort_values("verdict", key=lambda column: column.map(lambda word: rank.get(word, 3)), kind="stable")
 
 
 def _order(fit: Any) -> tuple[float, float]:
@@ -113,5 +124,5 @@ def tolerances(data: xr.Dataset) -> pd.DataFrame:
         ratio = (cell[MAIN] / cell["tolerance"]).values[fit.used]
         span = (float(ratio.min()), float(ratio.max())) if ratio.size else (np.nan, np.nan)
         rows.append([name, scene, float(fit.slope), *span, float(cell[MAIN].min())])
-    header = ["variant", "scene", "power of the tolerance", "error / tolerance, least", "most", "least error (rad)"]
+    header = ["variant", "scene", "power of the tolerance", "error / tolerance, least", "largest", "least error (rad)"]
     return pd.DataFrame(rows, columns=header)

@@ -9,7 +9,7 @@ from symtop.measure.conservation import tops
 from symtop.model.scenes import scene
 from symtop.report.figures import SMALLEST, error_band, rows
 from symtop.report.formats import number
-from symtop.report.style import few_ticks, grid, legend_below, line, look, panels
+from symtop.report.style import BLUE, few_ticks, grid, legend_below, line, panels
 from symtop.runner.study import Picture
 
 from .measures import (
@@ -51,7 +51,7 @@ def _named(data: xr.Dataset) -> Picture:
     for kind, axis in zip(shown, axes, strict=True):
         axis.set(xscale="log", yscale="log", xlabel=PANELS[kind][0], title=PANELS[kind][1])
         if kind == "energy":
-            axis.set_ylabel("relative change\nof the energy")
+            axis.set_ylabel("energy error\n/ (E0 - min V)")
         else:
             floor = 0.3 * error_band(axis, part[f"{MAIN}_bound"].values)
             axis.set(ylim=(0.5 * floor, 10.0), ylabel="largest axis error (rad)")
@@ -98,21 +98,20 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
     heads = [place for place, one in enumerate(lines) if one not in middle]
     cut = min(heads, key=lambda place: abs(2 * place - len(lines)))
     halves = [half for half in (lines[:cut], lines[cut:]) if half]
-    named = [
-        min(middle, key=lambda name: (few[name], middle[name])),
-        *(groups[power][0] for power in sorted(filter(None, groups))[:1]),
-    ]
+    ranked = [[name for name in group if not few[name]] or group for power, group in groups.items() if power]
+    widest = max(((group[0], group[-1]) for group in ranked), key=lambda ends: middle[ends[1]] / middle[ends[0]],
+                 default=())  # fmt: skip
     most = max(map(len, halves))
     figure, axes = panels(1, len(halves), height=0.135 * most + 0.3, sharex=True)
     for axis, half in zip(axes[0], halves, strict=True):
         for place, name in enumerate(half):
             if name in middle:
-                values, color = [one.work for one in known[name]], look(name).color
-                face = "white" if 2 * sum(one.foreseen for one in known[name]) > len(values) else color
-                axis.plot([min(values), max(values)], [place, place], color=color, lw=1.2)
+                values = [one.work for one in known[name]]
+                face = "white" if 2 * sum(one.foreseen for one in known[name]) > len(values) else BLUE
+                axis.plot([min(values), max(values)], [place, place], color=BLUE, lw=1.2)
                 x, mark = (values, "|") if few[name] else (middle[name], "o")
-                axis.plot(x, np.full(np.shape(x), place), mark, color=color, mfc=face, ms=5.0)
-            if name in named:
+                axis.plot(x, np.full(np.shape(x), place), mark, color=BLUE, mfc=face, ms=5.0)
+            if name in widest:
                 axis.annotate(number(middle[name]), (max(values), place), (6, 0), textcoords="offset points",
                               va="center", fontsize=7.5, weight="bold")  # fmt: skip
         axis.set(xscale="log", xlabel="force evaluations\na nutation")
@@ -120,10 +119,10 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
         for tick, name in zip(axis.get_yticklabels(), half, strict=True):
             if name not in middle:
                 tick.set(weight="bold", fontsize=8.0)
-    dark = {"color": "#444444", "lw": 0.0}
+    dark = {"color": BLUE, "lw": 0.0}
     axes[0, 0].plot([], [], "o", ms=5.0, label=f"median over up to {len(scenes)} scenes", **dark)
-    axes[0, 0].plot([], [], color="#444444", lw=1.2, label="least to largest of the scenes")
-    axes[0, 0].plot([], [], "o", ms=5.0, mfc="white", label="open: by the law on most scenes", **dark)
+    axes[0, 0].plot([], [], color=BLUE, lw=1.2, label="least to largest of the scenes")
+    axes[0, 0].plot([], [], "o", ms=5.0, mfc="white", label="open: extrapolated on most scenes", **dark)
     if any(few.values()):
         axes[0, 0].plot([], [], "|", ms=5.0, label=f"known on fewer than {LEAST_SCENES} scenes: not ranked", **dark)
     legend_below(figure, axes)

@@ -35,7 +35,7 @@ CLOSE = 0.1  # a prediction that is further off, relative, counts as missed
 WHOLE = 0.99  # of the longest run of a scene: a shorter run counts as shortened
 NAMES = {  # of the facts of each group
     HISTORIES: "nutations steps tolerance own variants holding shortened shortest energy_lost "
-    "energy_drifts energy_lost_most energy_lost_worst bounded_runs bounded_as_t lost_runs lost_faster",
+    "energy_drifts energy_lost_most energy_lost_worst momentum_lost bounded_runs bounded_as_t lost_runs lost_faster",
     WINDOWS: "long_steps long_scene moved scattered long_momenta",
     ROUNDINGS: "members walk_least walk_most walk_interval gain_least gain_most",
     HORIZONS: "lost_short lost_later lost_hits lost_hit_most lost_count",
@@ -61,6 +61,7 @@ def of_histories(histories: xr.Dataset) -> dict[str, Any]:
     fate, phases, length = fates(histories), phases_by_energy(histories), shares(histories)
     own = histories["own_tolerance"].max("scene").values > 0.0
     given = histories["tolerance"].max("scene").values[~own]
+    kept = fate[list(CONSTANTS)].isin(HELD)
     lost = fate["energy_largest"][fate["energy"].isin(BEHAVIOURS[2:])]
     return {
         "nutations": float(histories["nutations"].max()),
@@ -68,10 +69,11 @@ def of_histories(histories: xr.Dataset) -> dict[str, Any]:
         "tolerance": float(np.nanmax(given)) if np.isfinite(given).any() else None,
         "own": int(own.sum()),  # variants that ran at their own tolerance, the rounding of the arithmetic
         "variants": len(fate),
-        "holding": int(fate[list(CONSTANTS)].isin(HELD).all(axis=1).sum()),
+        "holding": int(kept.all(axis=1).sum()),
         "shortened": int((length < WHOLE).sum()),
         "shortest": float(length.min()),  # share of the run length
         "energy_lost": len(lost),
+        "momentum_lost": int((kept["energy"] & ~kept.all(axis=1)).sum()),  # variants that keep the energy
         "energy_drifts": int((fate["energy"] == "drift").sum()),
         "energy_lost_most": float(lost.max()) if len(lost) else None,
         "energy_lost_worst": str(lost.idxmax()) if len(lost) else None,

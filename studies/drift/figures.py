@@ -18,7 +18,8 @@ SHOWN = (  # in the figure of the residuals
     "midpoint[angles]", "stormer-verlet[angles]", "strang[axis]", "gauss-4[axis]", "rk4[angles]", "rk4[axis]",
     "rk45[angles]", "taylor[axis]",
 )  # fmt: skip
-LABELS = {"energy": "energy", "p_phi": r"$p_\varphi$", "p_psi": r"$p_\psi$"}
+LABELS = {"energy": "energy error\n/ (E0 - min V)", "p_phi": "relative change of $p_\\varphi$",
+          "p_psi": "relative change of $p_\\psi$"}  # fmt: skip
 NOTE = {"fontsize": LEAST_TEXT, "color": "#444444"}
 
 
@@ -46,7 +47,7 @@ def _residuals(histories: xr.Dataset) -> Picture:
                     t, r = t[good], np.maximum(r[good], SMALLEST)
                     axis.plot(*envelope(t, r), **line(name, 0.8), label=name, zorder=3)
             axis.set(xscale="log", yscale="log")
-        row[0].set_ylabel(f"relative change of {LABELS[constant]}")
+        row[0].set_ylabel(LABELS[constant])
         row[0].annotate("exact zeros", (0.01, SMALLEST), (0, 3), xycoords=row[0].get_yaxis_transform(),
                         textcoords="offset points", **NOTE)  # fmt: skip
     for axis, scene in zip(axes[0], data["scene"].values, strict=True):
@@ -87,7 +88,7 @@ def _rounding(data: xr.Dataset) -> Picture:
         axis.set_title(f"{name}\nplain: power {plain_power:.2f}\ncompensated: power {power:.2f}", fontsize=7.5)
         slope_guide(axis, 0.5, (steps[0] * 3.0, steps[-1]), 1e-18, r"$n^{1/2}$")
     axes[0, 0].set_ylim(bottom=2e-19)
-    axes[0, 0].set_ylabel("drift of modified energy (relative)")
+    axes[0, 0].set_ylabel("drift of modified energy\n/ (E0 - min V)")
     few_ticks(*axes.flat, most=5)
     members = data.sizes["member"], data.sizes["plain_member"]
     lines = (

@@ -1,4 +1,4 @@
-"""What happens to energy, momenta and phase over a million steps, and over 10^8?"""
+"""What happens to energy, momenta and phase over a million steps?"""
 
 import math
 from collections.abc import Iterable
@@ -90,6 +90,6 @@ def measure(case: Case) -> xr.Dataset:
 STUDY = Study(
     name="drift",
     title="Drift",
-    question="What happens to energy, momenta and phase over a million steps, and over 10^8?",
+    question="What happens to energy, momenta and phase over a million steps?",
     cases=cases, full=full, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
 )  # fmt: skip

@@ -128,6 +128,8 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
         "case_best_variant": case.idxmin() if case.count() else None,
         "case_worst_variant": case.idxmax() if case.count() else None,
         "turned": len(turned) or None,  # maps with the term
+        "lacking": len(without), "in_single": int((every["engine"] & every["single"]).sum()),
+        "every": int(every["engine"].sum()) or None,
         "limit": LOST, "kept": KEPT,
         # a run that ended early has no energy or spin
         **{f"{name}_lost": int((~(sizes <= KEPT)).sum()) if len(sizes) else None for name, sizes in long.items()},
@@ -149,18 +151,18 @@ def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
     columns = {"slow": f"error on {SLOW} (rad)", "fast": f"error on {FAST} (rad)", "share": "share of tops followed"}
     ranges = groups[list(columns)].agg(["min", "max"])
     ranges.columns = pd.Index([f"{columns[name]}, {'least' if pick == 'min' else 'most'}" for name, pick in ranges])
-    orders = ranges.assign(maps=groups.size()).rename_axis("order").reset_index()
+    orders = ranges.assign(maps=groups.size()).rename_axis("measured order").reset_index()
     names = {
-        "variant": "variant", "summary": "what it is", "order": "order", "slow": columns["slow"],
+        "variant": "variant", "summary": "what it is", "order": "measured order", "slow": columns["slow"],
         "fast": columns["fast"], "share": columns["share"], "best": "least error (rad)",
         "best_count": "at steps a nutation", "last": "error at the most steps (rad)",
         "energy": f"energy, {long_time(data):g} s", "spin": f"spin, {long_time(data):g} s",
         "spherical": "off the spherical top (rad)",
     }  # fmt: skip
-    bodies = on_bodies(data).drop(columns="engine").reset_index()
+    bodies = on_bodies(data).drop(columns="engine").reset_index().rename(columns={"order": "declared order"})
     bodies = bodies.sort_values(f"{BODIES[1]}, 1/{USUAL:g} s", kind="stable")
     return {
         "bodies": bodies,
-        "orders": orders[["order", "maps", *ranges.columns]],
+        "orders": orders[["measured order", "maps", *ranges.columns]],
         "maps": every[list(names)].rename(columns=names),
     }

@@ -22,7 +22,9 @@ PARTS = {"spheroid": "first", "goldstein": "second"}  # scenes of the notebook's
 MOMENTA = ["p_phi_largest", "p_psi_largest"]
 KEPT = 1e-12  # relative, over 8 s: a momentum that changes by less is kept to rounding
 DRAWN = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "strang[axis]", "cayley[axis]")
-OF_SOLVER = ("followed", "ways", "energies", "solver_momenta", "alpha_at_rest", "alpha_rate", "long")  # facts
+OF_SOLVER = (  # facts
+    "followed", "ways", "energies", "solver_momenta", "alpha_at_rest", "alpha_rate", "long", "both_turned",
+)  # fmt: skip
 BY_PART = ("end", "energy", "behind", "ahead", "long", "turned")
 
 
@@ -83,7 +85,8 @@ def of_the_solver(data: xr.Dataset, discrete: xr.Dataset) -> dict[str, Any]:
             f"{part}_long": energy_until(data, scene, SOLVER, answers["long"]),  # the solver's error to then
             f"{part}_turned": turned(data, scene),  # degrees
         }
-    return answers
+    first, second = (answers[f"{part}_turned"] for part in PARTS.values())
+    return answers | {"both_turned": first if round(first) == round(second) else None}
 
 
 def present(data: xr.Dataset) -> list[str]:

@@ -1,4 +1,4 @@
-"""Does symtop reproduce the notebook that it began with, and why do the discrete methods win there?
+"""Does symtop reproduce its notebook, and from when on do discrete methods keep the energy better?
 
 The notebook derives the equations of the heavy top from its Lagrangian, integrates them with a library's solver, and
 watches the energy and the two momenta slip. Its figures are drawn again here by its own means, beside the truth.
@@ -48,6 +48,6 @@ def measure(case: Case) -> xr.Dataset:
 STUDY = Study(
     name="notebook",
     title="The notebook",
-    question="Does it reproduce the notebook that it began with, and why do the discrete methods win there?",
+    question="Does symtop reproduce its notebook, and from when on do discrete methods keep the energy better?",
     cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
 )  # fmt: skip

@@ -1,1 +1,1 @@
-"""What becomes of a discrete Lagrangian when energy is taken away?"""
+"""What becomes of a discrete Lagrangian under friction?"""

@@ -1,4 +1,4 @@
-"""What becomes of a discrete Lagrangian when energy is taken away, and when is it exact?
+"""What becomes of a discrete Lagrangian under friction?
 
 The notebook integrated a damped oscillator by the discrete Lagrangian, and stopped at a guess about the forces. What it
 was after is done here: the virtual work of the force F over one step splits into F_d^- at its start and F_d^+ at its
@@ -55,6 +55,6 @@ def measure(case: Case) -> xr.Dataset:
 STUDY = Study(
     name="oscillators",
     title="Oscillators and friction",
-    question="What becomes of a discrete Lagrangian when energy is taken away, and when is it exact?",
+    question="What becomes of a discrete Lagrangian under friction?",
     cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
 )  # fmt: skip

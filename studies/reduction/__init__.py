@@ -1,1 +1,1 @@
-"""What does modelling less buy?"""
+"""What does stepping fewer variables save?"""

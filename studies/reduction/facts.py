@@ -31,6 +31,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     gaps, kernels, charts = tables(data).values()
     compared = cells(data, "theta_gap")
     same, apart = (gaps[(gaps[WORST] < COMMUTES) == wanted] for wanted in (True, False))
+    ends = {"least": apart["power of h"].min(), "most": apart["power of h"].max()}
     charts = charts.dropna(subset="time (ratio)")
     slowest = charts.loc[charts["time (ratio)"].idxmax()] if len(charts) else {}
     return {
@@ -40,7 +41,9 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "commuting": listed(same["rule"]),
         "commuting_gap": same[WORST].max(),
         "others": listed(apart["rule"]),
-        "power_least": apart["power of h"].min(), "power_most": apart["power of h"].max(),
+        **{f"power_{word}": end for word, end in ends.items()},
+        **{f"{word}_rules": listed(apart["rule"][apart["power of h"].round() == np.round(end)])
+           for word, end in ends.items()},
         "rules": listed(name for _, name, _ in compared),
         "twins_gap": max((float(cell[gap].max()) for *_, cell in compared for gap in GAPS), default=None),
         "step_least": kernels["time (ratio)"].min(), "step_most": kernels["time (ratio)"].max(),

@@ -1,4 +1,4 @@
-"""What does modelling less buy?
+"""What does stepping fewer variables save?
 
 The top has three charts of different size, and phi and psi can be eliminated from its equations before or after they
 are discretised. Three comparisons: the same integrator in another chart, the same discrete Lagrangian with nothing
@@ -64,7 +64,7 @@ def uses(case: Case) -> list[str]:
 STUDY = Study(
     name="reduction",
     title="Reduction",
-    question="What does modelling less buy?",
+    question="What does stepping fewer variables save?",
     cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
     timed=True, uses=uses,
 )  # fmt: skip

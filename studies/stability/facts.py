@@ -169,13 +169,13 @@ def atlas_table(data: xr.Dataset) -> pd.DataFrame:
 
 
 LIMITS = {  # header: scene, variable
-    "nutations grow at h omega": ("steady-fast", "limit_phase"),
-    "first window of growth from": ("steady-fast", "window_start"),
-    "a third of a turn at": ("steady-fast", "third_turn_phase"),
-    "survives there (rad)": ("steady-fast", "surviving_at_third_turn"),
-    "sleeps from a spin of": ("sleeping", "sleeping_threshold"),
-    "energy error, every step": ("goldstein", "energy_every"),
-    "energy error, once a nutation": ("goldstein", "energy_once"),
+    "nutations grow from h omega (rad)": ("steady-fast", "limit_phase"),
+    "first window of growth from h omega (rad)": ("steady-fast", "window_start"),
+    "h omega of a third of a turn (rad)": ("steady-fast", "third_turn_phase"),
+    "displacement survived there (rad)": ("steady-fast", "surviving_at_third_turn"),
+    "least I3 w3 that sleeps": ("sleeping", "sleeping_threshold"),
+    "energy error (J), every step": ("goldstein", "energy_every"),
+    "energy error (J), once a nutation": ("goldstein", "energy_once"),
 }
 
 

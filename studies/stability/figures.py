@@ -36,6 +36,7 @@ SETTINGS = {"step_size": "step (nutations)", "tolerance": "tolerance"}
 NAMED = ("stormer-verlet[angles]", "midpoint[angles]", "strang[axis]", "cayley[axis]", "gauss-4[axis]", "rk4[axis]")
 THEORY = {"color": style.BLACK, "lw": 0.9, "ls": (0, (1, 1.5)), "zorder": 4, "label": "theory"}
 OTHERS = {"color": style.GREY, "alpha": 0.5, "zorder": 1, "label": "all other variants"}
+RUNS = {"marker": ".", "ms": 3.0, "label": "others, a dot a run"}
 
 
 def pictures(data: xr.Dataset) -> Iterator[Picture]:
@@ -87,7 +88,9 @@ def _atlas(part: xr.Dataset, shown: Mapping[str, OutcomeMap]) -> Any:
         for side in (axis.xaxis, axis.yaxis):
             side.set_major_locator(MaxNLocator(3, integer=True))
             side.set_major_formatter(lambda power, _: f"{10.0**power:g}" if power > -3 else f"$10^{{{power:.0f}}}$")
-        axis.set_title("{}\n[{}] {:.0f} %".format(*split_name(name), 100.0 * one.accurate), fontsize=style.LEAST_TEXT)
+        axis.set_title(
+            "{}\n[{}] accurate {:.0f} %".format(*split_name(name), 100.0 * one.accurate), fontsize=style.LEAST_TEXT
+        )
         axis.tick_params(labelsize=style.LEAST_TEXT)
         below = places.get(place + COLUMNS)
         if below is None or shown[below].control != one.control:
@@ -118,7 +121,7 @@ def _lines(axis: Any, part: xr.Dataset, x: str, y: str, dots: bool = False) -> N
         good = np.isfinite(across) & np.isfinite(up)
         if good.any():
             looks = style.line(name) | {"label": name, "markevery": max(1, int(good.sum()) // 8), "zorder": 3}
-            looks = looks if name in named else OTHERS | {"lw": 0.6, "marker": "." if dots else "", "ms": 3.0}
+            looks = looks if name in named else OTHERS | {"lw": 0.6} | (RUNS if dots else {})
             axis.plot(across[good], up[good], **(looks | ({"ls": "none", "markevery": 1} if dots else {})))
 
 

@@ -227,6 +227,7 @@ def legend_below(figure: Any, axes: Any) -> None:
     for axis in np.ravel(axes):
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
+    handles = dict(sorted(handles.items(), key=lambda one: isinstance(one[1], mpl.patches.Patch)))  # shades come last
     columns = max(1, min(len(handles), int(17.0 * figure.get_figwidth()) // (max(map(len, handles), default=0) + 6)))
     figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=columns, frameon=False)
 

@@ -71,7 +71,7 @@ def test_a_median_over_few_scenes_is_not_ranked(data, monkeypatch):
     assert (answers["span"], answers["span_order"], answers["unknown"]) == (8.0, 2, known - 5)
     monkeypatch.setattr(facts, "efficiencies", lambda *_: works)
     assert table["variant"].tolist() == ["rk4[axis]", "strang[axis, attitude]"]
-    assert table[["ranked", "of these by the law"]].to_numpy().tolist() == [[True, 0], [False, 1]]
+    assert table[["ranked", "of these extrapolated"]].to_numpy().tolist() == [[True, 0], [False, 1]]
     assert facts.cheapest(data)["ranked"].all()  # the control: a dataset of one scene has no more
 
 
