@@ -626,6 +626,9 @@ def i_use(
     `horizon` its own by default. Raises SymtopError for an unknown engine and numbers out of range. It takes seconds.
     """
     maps = _settings()
+    if engine in registry.methods():
+        raise SymtopError(f"engine must be a physics engine or a map of one, not the method {engine!r}: compare "
+                          "methods with `symtop compare`", "engine")  # fmt: skip
     one_of("engine", engine, maps)
     start, h = scenes.scene(scene, bodies=True), STEP if step_size is None else positive("step_size", step_size)
     end = start.horizon if horizon is None else horizon_of(horizon)

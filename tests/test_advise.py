@@ -479,3 +479,4 @@ def test_an_accuracy_beside_an_engine_is_advised_at_its_step_below_its_errors():
     assert "meets axis error 0.001" in advice
     call(*words, "--step-size", "0.01", code=2)
     call("recommend", "spheroid", "--per-nutation", "0", code=2)
+    assert "not the method 'rk4'" in call("recommend", "spheroid", "--i-use", "rk4", code=2).output
