@@ -59,8 +59,9 @@
       set(Object.keys(columns)[0]);
       choose(key === "x" ? "Cost" : "Error", Object.keys(columns), set);
     }
-    const every = panels.flatMap((one) => chart.panels[one]), named = new Set(every.map((one) => one.name)).size <= MOST;
-    const kind = (one) => (named ? one.name.split("[")[0] : one.family); // few methods are chosen one by one, many by family
+    const every = panels.flatMap((one) => chart.panels[one]), method = (one) => one.name.split("[")[0];
+    const named = new Set(every.map(method)).size <= MOST;
+    const kind = (one) => (named ? method(one) : one.family); // few methods are chosen one by one, many by family
     const kinds = [...new Set(every.map(kind))], shown = new Set(kinds);
     const fold = html("details", controls), filter = (html("summary", fold, named ? "Methods" : "Families"), html("fieldset", fold));
     html("legend", filter, "Drawn");
@@ -92,7 +93,7 @@
       const mark = first ? chart.marks?.[panel] : undefined;
       key.hidden = !mark;
       const width = Math.max(280, frame.clientWidth), height = Math.max(320, Math.min(390, 0.5 * width));
-      const [left, right, top, bottom] = [58, named && width > WIDE ? 170 : 12, 12, 46]; // names stand at the right, if there is room
+      const [left, right, top, bottom] = [58, named && width > WIDE ? 190 : 12, 12, 46]; // names stand at the right, if there is room
       const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, tabindex: 0, role: "group",
         "aria-roledescription": "chart", "aria-label": `${chart.title}: ${panel}, ${yName} against ${xName}; arrow keys go from point to point` }, frame);
       places = [];
