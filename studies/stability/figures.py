@@ -35,8 +35,7 @@ LINES = {"linear_limit": ("small nutations grow beyond", "-"),
 SETTINGS = {"step_size": "step (nutations)", "tolerance": "tolerance"}
 NAMED = ("stormer-verlet[angles]", "midpoint[angles]", "strang[axis]", "cayley[axis]", "gauss-4[axis]", "rk4[axis]")
 THEORY = {"color": style.BLACK, "lw": 0.9, "ls": (0, (1, 1.5)), "zorder": 4, "label": "theory"}
-OTHERS = {"color": style.GREY, "alpha": 0.5, "zorder": 1, "label": "all other variants"}
-RUNS = {"marker": ".", "ms": 3.0, "label": "others, a dot a run"}
+OTHERS = {"color": style.GREY, "alpha": 0.5, "zorder": 1, "label": "all others, lines or dots"}
 
 
 def pictures(data: xr.Dataset) -> Iterator[Picture]:
@@ -121,7 +120,7 @@ def _lines(axis: Any, part: xr.Dataset, x: str, y: str, dots: bool = False) -> N
         good = np.isfinite(across) & np.isfinite(up)
         if good.any():
             looks = style.line(name) | {"label": name, "markevery": max(1, int(good.sum()) // 8), "zorder": 3}
-            looks = looks if name in named else OTHERS | {"lw": 0.6} | (RUNS if dots else {})
+            looks = looks if name in named else OTHERS | {"lw": 0.6, "marker": "." if dots else "", "ms": 3.0}
             axis.plot(across[good], up[good], **(looks | ({"ls": "none", "markevery": 1} if dots else {})))
 
 

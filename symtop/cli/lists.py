@@ -167,8 +167,7 @@ def _digits(value: Any) -> str:
 def _scene_page(numbers: Record) -> str:
     from symtop.methods.framework.registry import bibliography
 
-    name, purpose, angles = (numbers.pop(key) for key in ("name", "purpose", "theta"))
-    keys = str(numbers["source"] or numbers.pop("source")).split()
+    name, purpose, angles, source = (numbers.pop(key) for key in ("name", "purpose", "theta", "source"))
     parts = {key: numbers.pop(key) for key in ("top", "start", "momenta")}
     lines = {key: ", ".join(f"{name}={_digits(value)}" for name, value in part.items()) for key, part in parts.items()}
     if angles:
@@ -179,8 +178,9 @@ def _scene_page(numbers: Record) -> str:
         numbers[key] += " s" if numbers["units"] == "SI" else ""
     if "I2" in parts["top"]:
         numbers = {"natural period" if key == "nutation period" else key: value for key, value in numbers.items()}
+    numbers |= {"source": source} if source else {}
     title = textwrap.fill(f"{name}: {purpose}" if purpose else name, terminal_width())
-    return "\n\n".join([title, facts(lines | numbers), *(text for key, text in bibliography().items() if key in keys)])
+    return "\n\n".join([title, facts(lines | numbers), *(bibliography()[key] for key in str(source).split())])
 
 
 @click.command(short_help="BibTeX of the package and of what a dataset used.")
