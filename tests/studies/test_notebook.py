@@ -118,8 +118,7 @@ def test_its_solver_keeps_five_figures_of_energy_and_six_of_momentum_and_no_more
 
 @pytest.mark.parametrize("name", ["spheroid", "goldstein"])
 def test_the_hard_way_and_the_easy_way_agree(name):
-    scene = symtop.scene(name)
-    draw = np.random.default_rng(3)
+    scene, draw = symtop.scene(name), np.random.default_rng(3)
     top, start = scene.top, scene.top.momenta(scene.start)
     for theta, theta_dot in zip(draw.uniform(0.2, 2.9, 100), draw.uniform(-3, 3, 100), strict=True):
         phi_dot = (start.p_phi - start.p_psi * math.cos(theta)) / (top.I1 * math.sin(theta) ** 2)
