@@ -267,11 +267,12 @@ def short(data: xr.DataTree) -> pd.DataFrame:
     columns: dict[str, list[str]] = {ANSWER: ["ranking by cost", "safe steps", "wrong, energy and momenta kept"]}
     for family in ("0.3", FREE):
         tau, taken = worst_tau(data, family), own_steps(data, family)
-        share, before = (percent(silent_share(data, one), 1) for one in (family, SYMMETRIC))
+        share, before = (silent_share(data, one) for one in (family, SYMMETRIC))
         times = f"median {number(taken.middle, 3)} times, {taken.beyond} of {taken.asked} cases over budget"
         columns[words(family)] = [
             sentence(f"tau {number(tau.value, 2)}", by.ranking_verdict(tau)), sentence(times, taken.verdict),
-            sentence(f"{share} of runs, {before} on tops", cells(data, family)["silent"][1]),
+            sentence(f"{percent(share, 1)} of runs, {percent(before, 1)} on tops",
+                     by.factor_verdict(over(share, before), SEVERAL)),
         ]  # fmt: skip
     return pd.DataFrame(columns)
 

@@ -22,7 +22,7 @@ import numpy as np
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError
 from symtop.core.numbers import EPSILON
-from symtop.methods.framework.registry import engines, integrators, methods, split_name
+from symtop.methods.framework.registry import integrators, split_name
 from symtop.model.scenes import scenes
 from symtop.model.top import flat
 from symtop.report import formats, template
@@ -134,8 +134,7 @@ def texts(results: Path, studies: Sequence[Mapping[str, Any]]) -> tuple[dict[str
             title = f"{study['title']}: tables"
             parts[name] += f"More: {_link(title, REFERENCE)}.\n"
             more[f"{name}-tables"] = f"## {title}\n\n{mark}{rest}"
-    counted = {"methods": len(methods()), "maps": len(engines())}
-    values = {"reference": f"{REFERENCE}#{slug(EQUATIONS)}"} | counted | scene_tables()
+    values = {"reference": f"{REFERENCE}#{slug(EQUATIONS)}"} | template.counts() | scene_tables()
     parts["measured"], more["equations"] = (
         template.rendered(_template(name), name, values) for name in ("measured", "equations")
     )

@@ -53,11 +53,16 @@ def filled(findings: Findings, results: Path, *, pages: Mapping[str, str] | None
     return "\n\n".join(filter(None, parts)) + "\n"
 
 
+def counts() -> dict[str, int]:
+    """How many methods are compared, and how many maps of engines."""
+    return {"methods": len(methods()), "maps": len(engines())}
+
+
 def front(template: str, studies: Sequence[Findings], results: Path, pages: Mapping[str, str]) -> str:
     """A page on all studies: `fact("STUDY.NAME")` is a fact or None, figures and tables are named ``STUDY-NAME``."""
     facts = {f"{study['study']}.{name}": value for study in studies for name, value in study["facts"].items()}
     titles = {study["title"]: pages.get(study["study"], "").partition("](")[2] for study in studies}
-    context = {"pages": Links(pages), "fact": facts.get, "methods": len(methods()), "maps": len(engines())}
+    context = {"pages": Links(pages), "fact": facts.get} | counts()
     context["listed"] = [f"[{title}]({address}" for title, address in titles.items() if address]
     text = rendered(template, "front page", context | _names(studies, results, whole=True))
     return without_gaps(text).strip() + "\n"
