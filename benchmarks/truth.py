@@ -121,6 +121,6 @@ def table(rows: Sequence[Row]) -> Table:
     """Every call."""
     return Table(
         "The closed form",
-        ["call", "median us", "99 % below, us"],
+        ["call", "median (us)", "99 % below (us)"],
         [[row.name, f"{row.median * 1e6:.3g}", f"{row.slow * 1e6:.3g}"] for row in rows],
     )

@@ -471,7 +471,7 @@ def _advice(
     needed = f"It needs {NEEDS[need]} ({need})." if need else ""
     use = f"{needed}{_carries(question, best.run.integrator)}".strip()
     sentences = f"{best.words()} meets {goal}.", f"{worth}.", use, f"{source[0].upper()}{source[1:]}."
-    runners = [f"{trial.words()}, {_times(trial.seconds / best.seconds)} the time." for trial in ranked[1:2]]
+    runners = [f"{trial.words()}, {_as_long(trial.seconds / best.seconds)}." for trial in ranked[1:2]]
     setting = {str(best.run.integrator.control): best.run.setting}
     return question.advice(
         integrator=name, expected_error=best.error, seconds=best.seconds, confidence=best.confidence, fails=fails,
@@ -485,6 +485,10 @@ def _advice(
 def _times(ratio: float) -> str:
     """A factor: "1.1 times", "210 times"."""
     return f"{float(f'{ratio:.2g}'):g} times"
+
+
+def _as_long(ratio: float) -> str:
+    return "in the same time" if _times(ratio) == "1 times" else f"{_times(ratio)} the time"
 
 
 def _the_motion(question: _Question, limit: float) -> Advice:
@@ -518,7 +522,7 @@ def _solvers(method: Integrator) -> Collection[str]:
 
 
 def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
-    times = [f", {_times(one.seconds / best)} the time" if math.isfinite(best) else "" for one in trials]
+    times = [f", {_as_long(one.seconds / best)}" if math.isfinite(best) else "" for one in trials]
     return "".join(f"Made for this top: {one.words()}{time}." for one, time in zip(trials, times, strict=True))
 
 

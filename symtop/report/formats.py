@@ -1,6 +1,7 @@
 """Numbers, lists and tables as the report and the command line print them; the filters of templates."""
 
 import math
+import re
 from collections.abc import Mapping, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import Any
@@ -10,6 +11,10 @@ RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LARGEST_PLAIN = 1e4  # larger numbers are written with a power of ten
 MOST_COUNTED = 1e9  # larger whole numbers are no counts
 FEW = 4  # names that a sentence has; the others are counted, since a long list is a table's
+PRINTED = re.compile(  # in a text: what stays as it is, a number in a program's form, and microseconds behind a number
+    r"(?P<same>`[^`]*`|\]\([^)]*\)|<!--.*?-->)|(?<![\w.])(?P<mantissa>\d(?:\.\d+)?)e(?P<power>[-+]?\d{1,3})(?!\w)"
+    r"|(?:(?<=\d[ \N{NO-BREAK SPACE}])|(?<=\| )|(?<=\())us\b"
+)
 UNITS = ((1e-9, "ns"), (1e-6, "µs"), (1e-3, "ms"), (1.0, "s"), (60.0, "min"), (3600.0, "h"))  # of times, in seconds
 
 
@@ -17,10 +22,20 @@ def number(value: float, digits: int = 2, unit: str = "") -> str:
     """A number with so many significant digits, and its unit: ``10⁻⁶ rad``, ``1.4 × 10⁻¹³``, ``0.012``, ``340``."""
     rounded = float(f"{value:.{digits}g}")
     text = f"{value:.{digits}g}" if not 10.0**digits <= abs(rounded) < LARGEST_PLAIN else f"{value:.0f}"
-    mantissa, mark, power = text.partition("e")
-    ten = f"10{str(int(power or 0)).translate(RAISED)}"
-    printed = text if not mark else ten if mantissa == "1" else f"{mantissa}{FIRM}×{FIRM}{ten}"
+    printed = typeset(text)
     return f"{printed}{FIRM}{unit}" if unit else printed
+
+
+def typeset(text: str) -> str:
+    """A text with its numbers as `number` has them, ``10⁻⁶`` for 1e-06, and ``µs`` for us; not in code and links."""
+
+    def printed(found: re.Match[str]) -> str:
+        if found["same"] or not found["power"]:
+            return found["same"] or "µs"
+        ten = f"10{str(int(found['power'])).translate(RAISED)}"
+        return ten if found["mantissa"] == "1" else f"{found['mantissa']}{FIRM}×{FIRM}{ten}"
+
+    return PRINTED.sub(printed, text)
 
 
 def at_most(value: float, digits: int = 2, unit: str = "") -> str:

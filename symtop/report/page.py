@@ -123,9 +123,9 @@ def texts(results: Path, studies: Sequence[Mapping[str, Any]]) -> tuple[dict[str
     parts, more, pages = dict[str, str](), dict[str, str](), {"measured": _link("How it was measured")}
     for study in studies:
         pages[study["study"]] = _link(study["question"], REFERENCE if _checks_only(study) else "")
-    parts["front"] = template.front(_template("front"), studies, results, pages)
+    parts["front"] = formats.typeset(template.front(_template("front"), studies, results, pages))
     for study in studies:
-        name, text = study["study"], _lower(template.filled(study, results, pages=pages))
+        name, text = study["study"], formats.typeset(_lower(template.filled(study, results, pages=pages)))
         if _checks_only(study):
             more[name] = text
             continue
@@ -221,7 +221,8 @@ def write(results: Path, *, embed: bool = False) -> Path:
 def _whole(name: str, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     """A table in full, folded; the page's script builds it when it is opened."""
     cells = [["" if value != value else str(value) for value in row] for row in rows]  # noqa: PLR0124  (not a number)
-    content = json.dumps({"header": list(header), "rows": cells}, ensure_ascii=False, separators=(",", ":"))
+    names = [formats.typeset(str(name)) for name in header]
+    content = json.dumps({"header": names, "rows": cells}, ensure_ascii=False, separators=(",", ":"))
     content = content.replace("</", "<\\/")
     return (
         f'<details class="whole" data-table="{name}"><summary>All {len(cells):,} rows, to search and to sort</summary>'
