@@ -94,8 +94,7 @@ def _over_general(data: xr.Dataset, known: dict[str, list[str]], said: Mapping[s
     slower = [f"{names} at the {side}" for side, call in sides if (names := said[f"general_slower_{call}"])]
     return (
         f"Over the fastest that needs f(t, y) alone (open dots; {scenes}), solve_ivp takes "
-        f"{' and '.join(gains)} as long"
-        f"{'; faster than it are ' if slower else ''}{' and '.join(slower)}. "
+        f"{' and '.join(gains)} as long{'; faster than these: ' if slower else ''}{' and '.join(slower)}. "
     )
 
 
