@@ -28,17 +28,18 @@ IN_LANES = {name for name, solver in SOLVERS.items() if solver.in_lanes}
 ENDS = {  # how members end that step too far: numbers overflow, theta passes a pole, Newton finds no root
     ("not_finite",): ("strang[axis]", "takahashi-imada[attitude]", "cayley[axis]", "srkn-14-6[attitude]",
                       "rk4[attitude]", "series[axis]", "series[attitude]", "rkmk-se3-2[axis]",
-                      "crouch-grossman-3[attitude]"),
+                      "crouch-grossman-3[attitude]", "vern9-fixed[axis]", "tsit5-fixed[attitude]"),
     (): ("exact-discrete[attitude]",),  # whose steps are parts of a nutation, however long they are
-    ("not_finite", "left_chart"): ("stormer-verlet[angles]",),
+    ("not_finite", "left_chart"): ("stormer-verlet[angles]", "dop853-compiled-fixed[angles]"),
     ("not_converged",): ("gauss-4[axis]", "gauss-8[axis]", "gauss-4[attitude]", "lie-variational[axis]",
                          "generalised-alpha[attitude]"),
     ("left_chart", "not_converged"): ("midpoint[angles]", "trapezoidal[angles]", "simpson-linear[angles]",
                                       "galerkin-simpson[angles]"),
 }  # fmt: skip
 FEW = {  # a method of each family, for the others compile for 20 s
-    "strang[axis]", "rk4[attitude]", "series[axis]", "rkmk-se3-2[axis]", "exact-discrete[attitude]", "gauss-4[axis]",
-    "stormer-verlet[angles]", "lie-variational[axis]", "midpoint[angles]", "galerkin-simpson[angles]",
+    "strang[axis]", "rk4[attitude]", "vern9-fixed[axis]", "series[axis]", "rkmk-se3-2[axis]", "gauss-4[axis]",
+    "exact-discrete[attitude]", *("stormer-verlet[angles]", "midpoint[angles]", "galerkin-simpson[angles]"),
+    "lie-variational[axis]",
 }  # fmt: skip
 ALONE = ("midpoint-unreduced[angles]", "gauss-12[axis]", "collective-gauss-4[axis]")  # one after another
 EXPLICIT = ("rkmk-se3-2", "rkmk-se3-4", "crouch-grossman-3", "commutator-free-4")
@@ -118,8 +119,8 @@ def test_methods_that_have_lanes():
         "stormer-verlet-reversible[angles]",  # of steps that differ between members
         "five-rotations[attitude]",  # the kernel is that of a body
     }
-    assert {"rk4[angles]", "rk4[axis]", "rk4[attitude]"} <= IN_LANES
-    for name in ("exact-discrete", "series", *EXPLICIT, *ITERATED):
+    assert {"rk4[angles]", "tsit5-fixed[angles]", "vern9-fixed[angles]"} <= IN_LANES
+    for name in ("exact-discrete", "series", "rk4", "dop853-compiled-fixed", *EXPLICIT, *ITERATED):
         assert {f"{name}[axis]", f"{name}[attitude]"} <= IN_LANES
     without = ("exact[", "rk45", "taylor", "series-adaptive", "collective-gauss", "gauss-12", "gauss-6[attitude]")
     assert not any(name.startswith(without) or "unreduced" in name for name in IN_LANES)
@@ -281,8 +282,7 @@ def test_tables_of_stages_run_in_lanes_and_kicks_left_out_change_no_bit():
 def test_kernels_are_shared_by_charts_compositions_and_numbers():
     """Axis and attitude differ in what is shown, compositions in the table; other equations are other kernels."""
     kernels = {(name, chart): SOLVERS[f"{name}[{chart}]"]._whole.blocks().march
-               for name in (*EXPLICIT, *ITERATED)
-               for chart in ("axis", "attitude")}  # fmt: skip
+               for name in (*EXPLICIT, *ITERATED) for chart in ("axis", "attitude")}  # fmt: skip
     assert all(kernels[name, "axis"] is kernels[name, "attitude"] for name in (*EXPLICIT, *ITERATED))
     assert kernels["lie-variational", "axis"] is kernels["lie-variational-suzuki-4", "axis"]
     assert len(set(map(id, kernels.values()))) == 8

@@ -135,11 +135,28 @@ def weighted(weights: Any, state: Any, slopes: Any, h: float) -> Any:
     return step
 
 
+def in_lanes(form: Any, top: Any, moved: Callable[..., Any], lay: Callable[..., None], size: int, cost: int) -> Lanes:
+    """A step in lanes, ``moved(par, state, table, j)`` long, of so many evaluations; `lay` writes `size` numbers."""
+    ended, d, moved = form.ended, form.prepare.size, register_jitable(moved)
+    zeros, numbers, step_at, flag = (0.0,) * d, (0.0,) * len(top._fields), 2 * d, 3 * d
+
+    def step(block, table):  # type: ignore[no-untyped-def]
+        wide_vectors()
+        for j in range(W):
+            state, par = column(block, 0, j, zeros), top(*column(table, 0, j, numbers))
+            change = moved(par, state, table, j)
+            block[flag * W + j] = block[flag * W + j] if ended(summed(state, change)) == OK else 1.0
+            place, low = accumulate(state, column(block, d, j, zeros), change)
+            put(block, 0, j, place)
+            put(block, d, j, low)
+            put(block, step_at, j, change)
+
+    return Lanes(step, lay, lambda _: 0.0, lambda _: size, top, d, 1, lambda _: cost, begin=no_carry)
+
+
 def _loop(form: Any, top: Any) -> Loop:
     """The loop in one chart, for one and in lanes; the work counted is the number of force evaluations."""
-    field, ended, d = form.field, form.ended, form.prepare.size
-    zeros, numbers, step_at, flag = (0.0,) * d, (0.0,) * len(top._fields), 2 * d, 3 * d
-    tops = len(numbers)
+    field, ended, zeros, tops = form.field, form.ended, (0.0,) * form.prepare.size, len(top._fields)
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
         return np.empty((len(rule.b), len(state)))
@@ -162,25 +179,16 @@ def _loop(form: Any, top: Any) -> Loop:
     def lanes(count: int) -> Lanes:
         stages, total = written_out(count, stage), weighted_in_lanes(count, tops + count * (count - 1) // 2)
 
-        def step(block, table):  # type: ignore[no-untyped-def]
-            wide_vectors()
-            for j in range(W):
-                state, par = column(block, 0, j, zeros), top(*column(table, 0, j, numbers))
-                step = total(zeros, stages(par, state, field(par, state), table, j), table, j)
-                block[flag * W + j] = block[flag * W + j] if ended(summed(state, step)) == OK else 1.0
-                moved, low = accumulate(state, column(block, d, j, zeros), step)
-                put(block, 0, j, moved)
-                put(block, d, j, low)
-                put(block, step_at, j, step)
+        def moved(par, state, table, j):  # type: ignore[no-untyped-def]
+            return total(zeros, stages(par, state, field(par, state), table, j), table, j)
 
-        size = count * (count + 1) // 2
-        return Lanes(step, _lay, lambda _: 0.0, lambda _: size, top, d, 1, lambda _: count, begin=no_carry)
+        return in_lanes(form, top, moved, _lay, count * (count + 1) // 2, count)
 
     return Loop(begin, increment, form.observe, lanes=lambda rule: lanes(len(rule.b)))
 
 
-_TOPS = {"angles": BareTop, "axis": SpaceTop, "attitude": SpaceTop, BODY: General}
-LOOPS = {chart: _loop(form, _TOPS[chart]) for chart, form in FORMS.items()}
+TOPS: dict[str, Any] = {"angles": BareTop, "axis": SpaceTop, "attitude": SpaceTop, BODY: General}
+LOOPS = {chart: _loop(form, TOPS[chart]) for chart, form in FORMS.items()}
 
 
 def _explicit(a: Rows, b: Row) -> tuple[list[list[float]], list[float]]:
