@@ -110,9 +110,10 @@ def body_options(command: Callable[..., None]) -> Callable[..., None]:
         scene = "scene" if "scene" in settings else "name"
         if numbers:
             if "body" not in numbers or settings[scene] != BODY:
-                options = ", ".join(f"--{name}" for name in numbers)
-                place = "" if settings[scene] == BODY else f" on the scene {BODY}, not {settings[scene]}"
-                raise SymtopError(f"{options} must come with --body I1,I2,I3{place}")
+                options, given = ", ".join(f"--{name}" for name in numbers), settings[scene]
+                place = f"the scene {BODY}" + f", not {given}" * (given is not None)
+                lacking = ["--body I1,I2,I3"] * ("body" not in numbers) + [place] * (given != BODY)
+                raise SymtopError(f"{options} must come with {' and '.join(lacking)}")
             settings[scene] = _own_body(numbers)
         command(**settings)
 

@@ -130,8 +130,8 @@ def judge(
             listen(finding)
         return Ledger(about.name, problem.name, tuple(findings), {}, about)
     if problem.of_body and ({symplectic, symmetric, explicit} != {None} or names - {"energy"}):
-        words = "order and what becomes of energy and momentum; claim the rest on a top"
-        raise SymtopError(f"a step on {problem.name}, a RigidBody, shows its {words}")
+        words = "takes claims of its order and its energy alone; claim the rest on a top"
+        raise SymtopError(f"a step on {problem.name}, a RigidBody, {words}")
     implied = {"time": not autonomous, "energy": energy is None and "energy" not in names, "order": order is None}
     heartbeat.reset(quick=quick)
     began, findings = time.monotonic(), []

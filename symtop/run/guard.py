@@ -403,7 +403,7 @@ def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expec
         )
     if not expected.axis_error > EXPECTED and expected.outcome == "ok":
         return None
-    second, period = motion.scene.second, motion.scene.period_word
+    second, period = motion.scene.second, motion.period_word
     reached = min(expected.axis_error, math.pi)
     size = f"expect an {motion.watches} error of {reached:.1g} rad by t = {plan.horizon:.4g}{second}"
     limited = expected.outcome == "out_of_budget"  # no error is the cause, and no length of step
@@ -440,7 +440,7 @@ def _coarse(
             "an integrator whose chart has no poles, such as strang",
         )  # fmt: skip
     if marks.period / step < 2.0:
-        words = f"a step of {step:.4g} jumps over the nutation, whose period is {marks.period:.4g}"
+        words = f"a step of {step:.4g} jumps over half a {motion.period_word}, which is {marks.period:.4g} long"
         return Trouble(f"{size}: {words}", marks.period / 20.0)
     if step * frequency > SMALL_TURN and isinstance(motion, Exact):
         turn = trace(method, motion.scene, step, chart).turn

@@ -124,6 +124,7 @@ class Integrated:
 
     longest, reach = 20.0, 40.0  # natural periods of a piece that is a share of the run, and of any other
     points = 100  # of a piece that are compared
+    period_word = "natural period"  # what `marks.period` is
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.growths = scene, dict[float, Growth]()
@@ -241,7 +242,7 @@ def _frequencies(scene: Scene) -> tuple[float, float, float]:
 class Exact(Integrated):
     """The same of a top by its closed form, which knows it for ever."""
 
-    watches, longest, reach, points = "axis", 20.0, math.inf, 300
+    watches, longest, reach, points, period_word = "axis", 20.0, math.inf, 300, "nutation"
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.marks, self.form = scene, landmarks(scene), closed_form(scene)

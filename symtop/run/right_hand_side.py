@@ -66,8 +66,8 @@ def guard(
     tables = {name: rule for name, rule in rules.items() if isinstance(rule, Tableau)}
     rule = tables.get(one_of("method", method, [*SCIPY, *tables]))
     names, values = ("step_size", "tolerance"), (step_size, tolerance)
-    if values[rule is not None] is not None:
-        raise SymtopError(f"{method} takes {names[rule is None]}, not {names[rule is not None]}", *names)
+    if values[rule is None] is None or values[rule is not None] is not None:
+        raise SymtopError(f"{method} needs {names[rule is None]}, and no {names[rule is not None]}", *names)
     start, setting = np.array(row("y0", y0)), positive(names[rule is None], values[rule is None])
     begin, end, accuracy = finite("t0", t0), positive("horizon", horizon), positive("accuracy", accuracy)
     if start.size == 0:

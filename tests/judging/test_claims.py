@@ -445,7 +445,7 @@ def test_a_step_of_ones_own_is_judged_on_a_body(step: Callable[..., Any], order:
 
 @pytest.mark.parametrize(("claims", "words"), [
     ({"form": "separable"}, "form must be ode, rotation, scipy, not separable"),
-    ({"symplectic": True}, "claim the rest on a top"), ({"conserves": ["p_psi"]}, "claim the rest on a top"),
+    ({"symplectic": True}, "claim the rest on a top"), ({"conserves": ["p_psi"]}, "order and its energy alone"),
 ])  # fmt: skip
 def test_what_a_step_on_a_body_cannot_show_is_refused(claims: dict[str, Any], words: str) -> None:
     with pytest.raises(symtop.SymtopError, match=words):

@@ -196,9 +196,9 @@ OWN = ["--body", "1,2,3", "--rates", "0.01,1,0"]
 
 @pytest.mark.parametrize(("words", "sentence"), [
     (["run", "body", "rk4", "--step-size", "0.1", "--mgl", "3"], "--mgl must come with --body I1,I2,I3\n"),
-    (["run", "spheroid", "rk4", *OWN], "--body, --rates must come with --body I1,I2,I3 on the scene body, not sph"),
+    (["run", "spheroid", "rk4", *OWN], "--body, --rates must come with the scene body, not spheroid\n"),
     (["scenes", "body", "--body", "1,2"], "--body must be 3 numbers with commas between, not '1,2'"),
-    (["scenes", "body", "--body", "1,2,3"], "--body without a weight needs --rates"),
+    (["scenes", *OWN], "the scene body\n"), (["scenes", "body", *OWN[:2]], "--body without a weight needs --rates"),
     (["scenes", "body", *OWN[:2], "--rates", "nan,1,0"], "an entry of --rates must be a finite number, not nan"),
     (["scenes", "body", *OWN, "--attitude", "2,0,0,0"], "--attitude must have unit length, not 2"),
     (["scenes", "body", "--body", "1,2,4", "--mgl", "1"], "I3 must be at most the sum of the other moments"),
