@@ -95,9 +95,7 @@ def _points(cell: xr.Dataset) -> list[tuple[float | str | None, ...]]:
     columns = [cell[key].values for key in (*COSTS.values(), *ERRORS.values())]
     made = []
     for k in np.flatnonzero(np.isfinite(cell["seconds"].values)):
-        numbers = [
-            float(f"{column[k]:.3g}") if np.isfinite(column[k]) and column[k] > 0.0 else None for column in columns
-        ]
+        numbers = [float(f"{column[k]:.3g}") if np.isfinite(column[k]) else None for column in columns]
         step, tolerance = (float(cell[key].values[k]) for key in ("step_size", "tolerance"))
         made.append((*numbers, f"step {step:.3g} s" if np.isfinite(step) else f"tolerance {tolerance:.1g}"))
     return made

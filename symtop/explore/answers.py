@@ -213,8 +213,9 @@ def _middle(scene: Scene, run: Trajectory) -> np.ndarray:
 
 
 def _float32(values: Any) -> str:
-    """Base64 of the values as float32, little-endian."""
-    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode()
+    """Base64 of the values as float32, little-endian; infinite beyond its range."""
+    with np.errstate(over="ignore"):
+        return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode()
 
 
 def _curves(largest: dict[str, float], message: str = "", /, **arrays: Any) -> dict[str, Any]:

@@ -86,8 +86,7 @@ def test_the_axis_as_a_particle_has_the_acceleration_of_the_axis(scene):
     top, start = scene.top, scene.start
     y = common.start_of(top, start)
     e, momentum = y[:3], y[3:]
-    velocity = np.cross(momentum, e) / top.I1
-    torque = top.mgl * np.array([-e[1], e[0], 0.0])
+    velocity, torque = np.cross(momentum, e) / top.I1, top.mgl * np.array([-e[1], e[0], 0.0])
     expected = (np.cross(torque, e) + np.cross(momentum, velocity)) / top.I1
     particle = np.concatenate([e, velocity, np.zeros(3)])
     simulation = np.array([0, particle.ctypes.data], dtype=np.uint64)  # a struct with a pointer in its second place
@@ -124,8 +123,7 @@ def test_both_calls_of_scipy_end_at_the_truth(scene, row):
 
 def test_an_inner_loop_that_does_not_start_anew_is_seen(scene):
     """CVODE and others keep their state: a second call that went on from the first would be 20 nutations on."""
-    peer = _scipy("scipy-dop853-python[axis]")
-    horizon = measure.PERIODS * scene.nutation_period
+    peer, horizon = _scipy("scipy-dop853-python[axis]"), measure.PERIODS * scene.nutation_period
     plan, _ = make_plan(scene, peer.method, tolerance=1e-9, horizon=horizon, samples=2)
     state = [common.start_of(scene.top, scene.start)]
 

@@ -44,7 +44,6 @@ def test_a_wheel_in_an_empty_folder(tmp_path):
     assert {name for name in names if ".dist-info/" not in name} == ours
     assert ours >= {"symtop/report/templates/report.html", "symtop/explore/static/page.html", "symtop/py.typed"}
     assert "symtop_studies/convergence/study.py" in ours
-
     here(sys.executable, "-m", "venv", tmp_path / "venv")
     python, symtop = (tmp_path / "venv" / "bin" / name for name in ("python", "symtop"))
     here(python, "-m", "pip", "install", "--quiet", "--constraint", ROOT / "constraints.txt", wheel)
@@ -80,7 +79,6 @@ def test_a_wheel_brings_the_kernels_of_first_runs(tmp_path):
     assert sum(path.stat().st_size for path in kernels) < 2e6
     environment["PYTHONPATH"] = str(site)
     assert str(site) in here(sys.executable, "-c", "import symtop; print(symtop.__file__)")
-
     lines = re.findall(r"(?m)^(?:\$ )?symtop ((?:run|compare|recommend|ensemble|long) .*?)(?: +#.*)?$", README)
     assert len(lines) == 5
     cache = tmp_path / "cache"
@@ -89,7 +87,6 @@ def test_a_wheel_brings_the_kernels_of_first_runs(tmp_path):
         here(sys.executable, "-m", "symtop", *words, SYMTOP_CACHE=str(cache))
     assert list(cache.rglob("*.code"))
     assert not list(cache.rglob("*.bitcode"))  # nothing was compiled
-
     plain = {"SYMTOP_CACHE": str(tmp_path / "x86-64"), "NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": ""}
     for name in ("strang[axis]", "series[axis]", "rk4[angles]", "vern9-fixed[axis]"):  # fused products, and vectors
         words = (sys.executable, "-c", RUN, name, "0.01")
@@ -97,6 +94,5 @@ def test_a_wheel_brings_the_kernels_of_first_runs(tmp_path):
         assert here(*words, SYMTOP_CACHE=str(cache)) == compiled
         assert here(*words, **plain) == compiled  # for a processor without the instructions of this one
     assert not list((tmp_path / "x86-64").rglob("*.bitcode"))
-
     here(sys.executable, "-c", RUN, "yoshida-4[attitude]", "0.01", SYMTOP_CACHE=str(cache))
     assert list(cache.rglob("*.bitcode"))  # the control: a kernel that the wheel has not

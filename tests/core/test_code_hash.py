@@ -96,8 +96,7 @@ def measure():
 
 def test_an_import_inside_a_function_is_followed_and_a_script_counts_by_code_with_its_classes():
     def reasons_of(*numbers):
-        text = CLASSES.format(*numbers)
-        space = {"__name__": "few", "__package__": "unknown"}
+        text, space = CLASSES.format(*numbers), {"__name__": "few", "__package__": "unknown"}
         exec(text, space)
         return Code().reasons("measure", space["measure"])
 
@@ -193,8 +192,7 @@ def test_a_kernel_is_the_same_to_a_profiler():
 
         return kernel
 
-    plain = digest(by_file(jit.code_of(kernel_with(1.0))))
-    watching = cProfile.Profile()
+    plain, watching = digest(by_file(jit.code_of(kernel_with(1.0)))), cProfile.Profile()
     watching.enable()
     try:
         numba.njit(kernel_with(2.0))(1.0)

@@ -98,8 +98,7 @@ def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, heari
 
 
 def test_ctrl_c_is_heard_while_llvm_calls_back(monkeypatch):
-    engine = cpu_target.target_context.codegen()._engine._ee
-    once = iter([signal.SIGINT])
+    engine, once = cpu_target.target_context.codegen()._engine._ee, iter([signal.SIGINT])
     monkeypatch.setattr(engine, "_object_cache_notify", lambda *_: any(map(signal.raise_signal, once)))
     with told_apart(), pytest.raises(InterruptedByUser):
         jit.is_lean.__wrapped__(), [time.sleep(0.01) for _ in range(500)]

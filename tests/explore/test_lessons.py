@@ -10,7 +10,7 @@ import symtop
 from symtop.explore import answers
 from symtop.explore.server import STATIC
 from tests.browser import FAINT
-from tests.explore.test_explore import answered, fields, unpacked
+from tests.explore.test_explore import STATUS, answered, fields, unpacked
 
 SOURCE = (STATIC / "stories.js").read_text(encoding="utf-8")
 RANGE = {"step_least": 0.01, "step_most": 0.6, "spin_least": -4.0, "spin_most": 4.0}
@@ -59,12 +59,10 @@ def test_a_story_a_cell_and_a_link(explorer):
     browser.wait_for(f"document.querySelector('#status').textContent.startsWith({json.dumps(status)})")
     assert browser.evaluate(form) == before
     browser.wait_for("document.querySelector('#map-note').textContent.startsWith('stormer-verlet')")
-    said = re.search(r"([\d,]+) runs a second$", text(browser, "map-note"))
-    assert said is not None
-    assert int(said[1].replace(",", "")) > 0
+    (said,) = re.findall(r"([\d,]+) runs a second$", text(browser, "map-note"))
+    assert int(said.replace(",", "")) > 0
     spin = browser.evaluate("document.querySelector('#psi_dot').value")
-    key = "document.querySelector('#map').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowDown'}))"
-    browser.evaluate(key)
+    browser.evaluate("document.querySelector('#map').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowDown'}))")
     assert browser.evaluate("+document.querySelector('#psi_dot').value") < float(spin)
     reached = "[...document.querySelectorAll('select, input, button, canvas[tabindex]')]"
     assert browser.evaluate(f"{reached}.every((c) => c.tabIndex === 0)")
@@ -102,6 +100,31 @@ def test_a_hand_reaches_everything_and_every_text_can_be_read(explorer):
     browser.drag("#map", at=(0.3, 0.4))
     browser.wait_for(f"+document.body.dataset.answers > {count}")
     assert browser.evaluate("document.querySelector('#step_size').value") != before
+
+
+def test_a_link_shows_what_it_changes_and_says_what_is_not_known(explorer):
+    browser = explorer("#base=goldstein&scene=goldstein&integrator=rk45&tolerance=1e-9&theta=0.9")
+    browser.wait_for(f"{STATUS}.startsWith('rk45: reached t = 70')")
+    answered(browser, "#second", "midpoint")
+    controls = "[...document.querySelectorAll('#story, #scene option:checked, #step_size, #tolerance')].map((c) => "
+    controls += "c.localName === 'option' ? c.text : c.value)"
+    assert browser.evaluate(controls)[1::2] == ["goldstein (edited)", "1e-9"]  # a second method leaves the tolerance
+    browser.set("#I3", 30)
+    browser.wait_for(f"document.querySelector('#other').hidden && {STATUS}.includes('no rigid body')")
+    answered(browser, "#story", "cusp")
+    answered(browser, "#theta", 0.9)
+    browser.click("#reset")
+    assert browser.evaluate(controls)[:3] == ["cusp", "cusp", "0.33"]  # of the story
+    browser.evaluate("location.hash = 'base=nowhere'")
+    browser.wait_for("document.querySelector('#watch').textContent.includes('the scene nowhere is not known here')")
+    assert browser.evaluate(controls)[0] == ""
+    note = "document.querySelector('#map-note').textContent"
+    choose = "scene.value = 'separatrix', scene.dispatchEvent(new Event('change'))"
+    assert browser.evaluate(f"{choose}, {note}") == ""  # no map of another scene
+    browser.wait_for(f"{note}.includes(' ended early')")  # although its nutation takes longer than its run
+    before = browser.evaluate(note)
+    browser.set("#horizon", 3)
+    browser.wait_for(f"{note}.includes(' ended early') && {note} !== {before!r}")
 
 
 SHOWN = r'\s+scene: "(.*?)", integrator: "(.*?)", second: "(.*?)", step_size: (.*?),'

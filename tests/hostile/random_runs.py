@@ -191,8 +191,7 @@ def draw_run(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> O
     kind = draw.choice([*kinds])
     top, at = kinds[kind](draw)
     known = [entry for entry in integrators().values() if entry.control is not None and entry.name not in without]
-    method = draw.choice(known)
-    period = Scene("drawn", top, at, 1.0).nutation_period
+    method, period = draw.choice(known), Scene("drawn", top, at, 1.0).nutation_period
     if not math.isfinite(period):
         period = 10.0 / _swing(top)
     nutations, steps = 10.0 ** draw.uniform(0.0, 3.0), 10.0 ** draw.uniform(0.0, 2.7)
@@ -209,8 +208,7 @@ def draw_run(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> O
             nutations = min(nutations, 10.0 ** draw.uniform(0.0, 1.0))
     numbers = top.I1, top.I3, top.mgl
     start = at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot
-    observe = draw.choice(["nutation", "axis", "attitude"])
-    horizon = nutations * period
+    observe, horizon = draw.choice(["nutation", "axis", "attitude"]), nutations * period
     return Outcome(k, kind, numbers, start, method.name, observe, control, horizon, nutations, "", "", math.nan, 0.0)
 
 
@@ -219,8 +217,7 @@ def one(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outcom
     draft, messages = draw_run(k, seed, without=without), []
     began = time.process_time()
     try:
-        scene = draft.scene()
-        controls = {**draft.control, "observe": draft.observe, "samples": 501}
+        scene, controls = draft.scene(), {**draft.control, "observe": draft.observe, "samples": 501}
         try:
             run = symtop.simulate(scene, draft.integrator, guard=messages.append, **controls)
         except symtop.SymtopError as error:
@@ -255,8 +252,7 @@ def summary(runs: list[Outcome]) -> str:
 
 def run_all(count: int, seed: int = SEED, without: tuple[str, ...] = ()) -> list[Outcome]:
     """Do the first `count` runs in a process apart, and in a new one after a run that does not end or that ends it."""
-    outcomes = []
-    spawn = multiprocessing.get_context("spawn")
+    outcomes, spawn = [], multiprocessing.get_context("spawn")
     ignored = "ignore", symtop.SymtopWarning
     with ProcessPool(1, context=spawn, initializer=warnings.simplefilter, initargs=ignored) as pool:
         tasks = [pool.schedule(one, (k, seed), {"without": without}, timeout=PATIENCE) for k in range(count)]

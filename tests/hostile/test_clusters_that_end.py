@@ -72,8 +72,7 @@ def after(cluster, results, happens):
             assert time.monotonic() - began < 120.0
             time.sleep(0.05)
         happens()
-        began = time.monotonic()
-        result = ended(process, 300.0)
+        began, result = time.monotonic(), ended(process, 300.0)
         return *result, time.monotonic() - began
     finally:
         stop(process)
@@ -125,8 +124,7 @@ def test_a_cluster_that_is_gone_before_is_one_sentence(tmp_path, what, how):
 def test_an_address_that_never_answers_is_one_sentence(tmp_path):
     """A port that takes connections and says nothing, as a firewall or another service may."""
     with socket.create_server(("127.0.0.1", 0)) as deaf:
-        address = f"tcp://127.0.0.1:{deaf.getsockname()[1]}"
-        began = time.monotonic()
+        address, began = f"tcp://127.0.0.1:{deaf.getsockname()[1]}", time.monotonic()
         code, _, err = ended(symtop("study", PROBE, "--results", tmp_path, "--scheduler", address), 300.0)
     assert code == 2
     assert "scheduler must be" in err

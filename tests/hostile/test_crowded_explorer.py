@@ -102,8 +102,7 @@ def test_three_thousand_connections_are_refused_and_forgotten(crowd):
     assert refused > 2000
     assert "connections are open, and others are refused (503)" in log.read_text()
     assert len(log.read_text().splitlines()) < 2.0 + time.monotonic() - began
-    end = time.monotonic() + 5.0
-    answer = b""
+    end, answer = time.monotonic() + 5.0, b""
     while answer != GOOD and time.monotonic() < end:
         with contextlib.suppress(OSError):
             answer = first_line(port, b"/run", QUESTION, patience=5.0)

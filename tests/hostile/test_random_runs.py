@@ -178,12 +178,10 @@ def test_it_is_silent_where_the_motion_is_stable_and_conditioning_is_its_growth(
 def test_where_one_rounding_moves_the_axis_anywhere_the_answer_says_so(name, time):
     """A distance ends at pi: divided by a change that departs as far it is far below the growth."""
     chosen = symtop.scene(name)
-    words = symtop.reference(chosen, [time]).attrs["conditioning"]
-    factor = conditioning(chosen, time)
+    words, factor = symtop.reference(chosen, [time]).attrs["conditioning"], conditioning(chosen, time)
     assert words.startswith("at least ")
     assert "or more: nothing is known of the axis" in words
-    times = np.linspace(0.0, time, 101)[1:]
-    starts = [chosen.start]
+    times, starts = np.linspace(0.0, time, 101)[1:], [chosen.start]
     for rate in ("phi_dot", "psi_dot"):
         ulp_more = math.nextafter(getattr(chosen.start, rate), math.inf)
         starts.append(dataclasses.replace(chosen.start, **{rate: ulp_more}))
@@ -208,7 +206,6 @@ def test_where_a_small_change_departs_far_a_smaller_one_shows_the_growth(time):
 def test_exact_is_right_for_a_top_without_inertia_about_its_axis(I3):
     for start in (symtop.Angles(1.0, psi_dot=2.0), symtop.Angles(2.5, 0.1, 0.2, -1.0, 0.0, -3.0)):
         scene = symtop.Scene("needle", symtop.SymmetricTop(1.0, I3, 1.0), start, 20.0)
-        run = symtop.simulate(scene, "exact", samples=11)
-        precise = PreciseForm(scene.top, scene.start, 40)
+        run, precise = symtop.simulate(scene, "exact", samples=11), PreciseForm(scene.top, scene.start, 40)
         true = np.array([[float(part) for part in precise.quaternion(float(t))] for t in run["time"].values])
         assert charts.attitude_distance(run["quaternion"].values, true).max() < 4e-15

@@ -56,8 +56,7 @@ def test_a_scipy_class_makes_the_steps_that_it_is_told_to():
     run = run_of(open_target(Mine, None, "axis"))
     assert run.attrs["steps"] == 200
     assert run.attrs["force_evaluations"] == pytest.approx(600, abs=5)  # it has one in hand at each end
-    finer = run_of(open_target(Mine, None, "axis"), 400)
-    truth = symtop.reference(SPHEROID, run["time"].values)
+    finer, truth = run_of(open_target(Mine, None, "axis"), 400), symtop.reference(SPHEROID, run["time"].values)
     misses = [float(np.abs(one["axis"].values - truth["axis"].values).max()) for one in (run, finer)]
     assert misses[0] / misses[1] == pytest.approx(8.0, rel=0.1)
 
@@ -344,8 +343,7 @@ def test_a_step_that_returns_nan_or_the_derivative_is_told_so(only):
 @pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not count what waits")
 def test_waiting_for_a_processor_takes_none_of_the_time_that_judging_has():
     """Two processes on one core; sleep is no such waiting (the control)."""
-    busy = subprocess.Popen([sys.executable, "-c", "while True: pass"])
-    allowed = os.sched_getaffinity(0)
+    busy, allowed = subprocess.Popen([sys.executable, "-c", "while True: pass"]), os.sched_getaffinity(0)
     try:
         for process in (0, busy.pid):
             os.sched_setaffinity(process, {min(allowed)})

@@ -56,8 +56,7 @@ def still(chart, change=lambda y: y):
             state = np.array([start.theta, top.I1 * start.theta_dot, start.phi, start.psi])
         else:
             state = charts.space_state(chart, top, start)
-        state = change(state)
-        n = plan.times.size
+        state, n = change(state), plan.times.size
         return Run(np.tile(state, (n, 1)), np.full(n, m.p_phi), np.full(n, m.p_psi), 1, 1, 0, "ok", plan.horizon)
 
     return Integrator(name="still", family="other", summary="", solvers={chart: solve})

@@ -42,8 +42,7 @@ def test_each_run_is_that_of_simulate_and_every_variable_has_words_and_units(dat
     assert data["variant"].values.tolist() == charts
     scene = symtop.scene("goldstein")
     assert data.attrs["horizon"] == pytest.approx(2.0 * scene.nutation_period)
-    cell = data.sel(variant="rk4[axis]")
-    place = cheapest(data, 1e-3)[2]
+    cell, place = data.sel(variant="rk4[axis]"), cheapest(data, 1e-3)[2]
     step = cell["step_size"].values[place]
     row = error_row(scene, symtop.integrator("rk4[axis]"), step, data.attrs["horizon"], "axis")
     for name, own in (("axis", "error"), ("axis_bound", "error_bound"), ("energy", "energy"), ("p_psi", "p_psi")):
@@ -153,8 +152,7 @@ def test_the_command_prints_a_line_for_each_variant(tmp_path, clean_registry):
     assert "not: " not in lines["rk4[axis]"]
     assert re.search(r"^midpoint\[angles\]: .*its least error was", result.stdout, re.MULTILINE)
     assert figure.stat().st_size > 1000
-    stored = netcdf.read(output)
-    report = json.loads(call("compare", *words, "--json").stdout)
+    stored, report = netcdf.read(output), json.loads(call("compare", *words, "--json").stdout)
     runs = {(one["variant"], one["target"]): one for one in report["cheapest"]}
     assert runs["midpoint[angles]", 1e-9] == {
         "variant": "midpoint[angles]", "target": 1e-9, "reached": False, "reason": "budget"

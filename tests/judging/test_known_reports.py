@@ -40,8 +40,7 @@ def semi_implicit(q, w, h, inertia, torque, *, gyroscope=True, angle=1.0):
 def avian(q, w, h, inertia, torque, *, whole, frame):
     """L by an explicit step, put back to its length, then w from it by the whole tensor or by its diagonal."""
     axes = frame.as_matrix()
-    tensor = axes @ np.diag(inertia) @ axes.T
-    rate = axes @ (w + h * torque(q) / inertia)
+    tensor, rate = axes @ np.diag(inertia) @ axes.T, axes @ (w + h * torque(q) / inertia)
     before = tensor @ rate
     after = before - h * np.cross(rate, before)
     after *= np.linalg.norm(before) / np.linalg.norm(after)
@@ -77,8 +76,7 @@ def lammps(q, w, h, inertia, torque, *, least):
     for axis, share in ((2, 0.5), (1, 0.5), (0, 1.0), (1, 0.5), (2, 0.5)):
         vector = np.zeros(3)
         vector[axis] = share * h * w[axis] * (inertia[axis] >= least)
-        q = product(q, turn(vector))
-        w = Rotation.from_rotvec(-vector).apply(inertia * w) / inertia
+        q, w = product(q, turn(vector)), Rotation.from_rotvec(-vector).apply(inertia * w) / inertia
     return q, w + h / 2 * torque(q) / inertia
 
 

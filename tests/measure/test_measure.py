@@ -224,8 +224,7 @@ def test_a_run_that_hides_its_drift_is_seen_and_one_of_few_steps_says_nothing():
     rk4 = symtop.integrator("rk4")
 
     def solve(top, start, plan):
-        run = rk4.solvers["angles"](top, start, plan)
-        momenta = top.momenta(start)
+        run, momenta = rk4.solvers["angles"](top, start, plan), top.momenta(start)
         same = np.ones(plan.times.size)
         return run._replace(p_phi=momenta.p_phi * same, p_psi=momenta.p_psi * same)
 

@@ -30,8 +30,7 @@ def synthetic_curves(kind, powers=(2, 4, 6), q=2, seed=1):
     rng = np.random.default_rng(seed)
     for _ in range(CURVES):
         power, count = int(rng.choice(powers)), int(rng.integers(9, 18))
-        steps = 0.2 * np.geomspace(1.0, 0.1, count)
-        scatter = 10.0 ** rng.uniform(-3.0, -1.7)
+        steps, scatter = 0.2 * np.geomspace(1.0, 0.1, count), 10.0 ** rng.uniform(-3.0, -1.7)
         noise = np.exp(scatter * rng.standard_normal(count)) if kind == "normal" else sampled_maximum(
             rng, scatter, count)  # fmt: skip
         correction = 1.0 + rng.uniform(-0.5, 0.8) * (steps / 0.2) ** q
@@ -87,8 +86,7 @@ def test_no_slope_confirms_two_orders_and_a_step_taken_twice_is_one_point():
         assert words.count("confirmed") <= 1
     assert 0.2 + BESIDE < 0.5 <= 0.1 + CLEARLY
     # Two points of the same step say nothing of the scatter: counted twice they made 8.9 +- 0.1 of order 10.
-    rng = np.random.default_rng(3)
-    steps = np.geomspace(0.6, 0.8, 6)
+    rng, steps = np.random.default_rng(3), np.geomspace(0.6, 0.8, 6)
     errors = 1e-11 * steps**10.0 * (1.0 + 0.3 * steps**2) * np.exp(0.01 * rng.standard_normal(6))
     once = order(steps, errors, 1e-16, 1.0, 10, symmetric=True)
     thrice = order(np.tile(steps, 3), np.tile(errors, 3), 1e-16, 1.0, 10, symmetric=True)

@@ -30,8 +30,7 @@ def test_each_fate_is_judged_with_its_time_and_cause(scene, name, controls, word
 
 def test_a_pole_passed_on_the_wrong_side_is_a_wrong_regime():
     scene = grazing(1e-3)
-    good = symtop.simulate(scene, "exact", samples=201)
-    error = np.full(201, 0.5)
+    good, error = symtop.simulate(scene, "exact", samples=201), np.full(201, 0.5)
     assert judgement(scene, good, error).verdict == "bounded_but_wrong"
     beyond = good.assign(p_phi=good["p_phi"] - np.where(good["time"] > 2.0, 2e-3, 0.0))
     assert judgement(scene, beyond, error).verdict == "wrong_regime"

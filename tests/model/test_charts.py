@@ -124,8 +124,7 @@ def shown(chart, steps=800, h=0.005):
 
 @pytest.mark.parametrize("chart", CHARTS)
 def test_every_quantity_is_that_of_the_true_motion(chart):
-    view = shown(chart)
-    truth = reference("spheroid", 0.2 * np.arange(21), "closed-form")
+    view, truth = shown(chart), reference("spheroid", 0.2 * np.arange(21), "closed-form")
     assert view.states.shape == (21, DIMENSIONS[chart])
     assert view.axis == pytest.approx(truth["axis"].values, abs=1e-7)
     assert view.theta == pytest.approx(truth["theta"].values, abs=1e-7)

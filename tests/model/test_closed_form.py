@@ -93,8 +93,7 @@ def test_the_arithmetic_is_recorded():
 @pytest.mark.parametrize("named", [
     scene("spheroid"), scene("steady"), sleeping(2.05), sleeping(1.9), grazing(1e-4), grazing(-1e-12)])  # fmt: skip
 def test_the_last_resort_gives_the_same_motion(named, monkeypatch):
-    times = np.linspace(-20.0, 1e3, 301)
-    ours = ClosedForm(named.top, named.start)
+    times, ours = np.linspace(-20.0, 1e3, 301), ClosedForm(named.top, named.start)
     monkeypatch.setattr(constants, "motion_constants", lambda *_: constants.UNMET)
     monkeypatch.setattr(closed_form._build, "ready", lambda _: False)
     digits = ClosedForm(named.top, named.start)

@@ -221,8 +221,7 @@ def test_both_precisions_of_random_bodies_agree_within_the_bound_of_the_first():
 
 
 def test_what_is_lost_in_chaos_is_not_a_number_and_a_run_that_is_too_long_ends_as_lost(monkeypatch):
-    times = np.linspace(0.0, 300.0, 31)
-    body = HeavyBody(BRICK, WEIGHT, START, MOMENTUM)
+    times, body = np.linspace(0.0, 300.0, 31), HeavyBody(BRICK, WEIGHT, START, MOMENTUM)
     motion = body.samples(times)
     lost = motion.lost(times)
     assert 60.0 < lost < 300.0

@@ -147,8 +147,7 @@ def test_a_start_on_a_pole_keeps_its_motion(quaternion, theta):
     q = charts.quaternion_from_angles(at.theta, at.phi, at.psi)
     assert float(charts.attitude_distance(q, np.array(quaternion))) < 1e-15
     np.testing.assert_allclose(body_rates(at), omega, atol=1e-14)
-    top = symtop.SymmetricTop(2.0, 1.0, 1.0)
-    L = matrix(quaternion) @ (omega * [2.0, 2.0, 1.0])
+    top, L = symtop.SymmetricTop(2.0, 1.0, 1.0), matrix(quaternion) @ (omega * [2.0, 2.0, 1.0])
     state = charts.space_state("axis", top, symtop.Angles.from_axis(top, matrix(quaternion)[:, 2], L))
     np.testing.assert_allclose(state[3:], L, atol=1e-14)
 

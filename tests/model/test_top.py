@@ -34,8 +34,7 @@ def test_slope_and_curvature_are_the_derivatives_of_the_potential(chosen):
 def test_the_potential_keeps_its_digits_at_a_pole_where_the_textbook_form_does_not(distance, pole):
     """The naive numerator has relative error 1e-8 at theta = 1e-4 (PHYSICS 1); ours stays at rounding."""
     theta = distance if pole == 0.0 else pole - distance
-    top = SymmetricTop(1.3, 0.7, 2.0)
-    start = Angles(theta=theta, phi_dot=0.4, psi_dot=3.0)
+    top, start = SymmetricTop(1.3, 0.7, 2.0), Angles(theta=theta, phi_dot=0.4, psi_dot=3.0)
     momenta = top.momenta(start)
     with mpmath.workdps(50):
         t = mpmath.mpf(theta)

@@ -55,8 +55,7 @@ def faults(name, figure) -> list[str]:
 
 @pytest.mark.parametrize("name", runner.names())
 def test_every_figure_can_be_read_in_print(name, quick_results):
-    data = netcdf.read_any(quick_results / f"{name}.nc")
-    study = runner.load(name)
+    data, study = netcdf.read_any(quick_results / f"{name}.nc"), runner.load(name)
     pictures = [one for one in study.pictures(data) if not hasattr(one.figure, "suffix")]
     assert pictures or study.facts(data)["busy"]  # times of a busy machine are not drawn
     assert {one.name: faults(name, one.figure) for one in pictures} == {one.name: [] for one in pictures}

@@ -130,8 +130,7 @@ ASKED = {"per_nutation": 30, "nutations": 2, "samples": 41, "quiet": True}
 
 def test_quantiles_are_members_failed_ones_infinitely_wrong_and_samples_a_run_has_not_no_errors(monkeypatch):
     data = symtop.ensemble(symtop.population(200, seed=3), "stormer-verlet", **ASKED)
-    errors = member_errors(symtop.population(200, seed=3), data, "axis")
-    failed = data.outcome.values != "ok"
+    errors, failed = member_errors(symtop.population(200, seed=3), data, "axis"), data.outcome.values != "ok"
     assert 0 < failed.sum() < 100
     np.testing.assert_array_equal(np.isinf(largest(errors)), failed)
     monkeypatch.setattr("symtop.report.plot.save", lambda *_: None)

@@ -8,6 +8,7 @@ import json
 import re
 import shutil
 
+import numpy as np
 import pytest
 import xarray as xr
 
@@ -137,11 +138,14 @@ def test_a_table_in_full_is_opened_searched_sorted_and_saved(browser):
     assert browser.evaluate(names) == up[::-1]
     assert browser.evaluate(f"{table}.tHead.rows[0].cells[0].ariaSort") == "descending"
     cells = f"[...{table}.tBodies[0].rows].map(row => row.cells[1])"
-    browser.evaluate(f"{cells}.forEach((cell, k) => {{ cell.textContent = k === 3 ? 'inf' : `${{k}}`; }})")
+    odd = {"3": "inf", "5": "2\u00a0×\u00a010⁴", "7": "10⁻²", "9": "word", "11": ""}
+    browser.evaluate(f"{cells}.forEach((cell, k) => {{ cell.textContent = {json.dumps(odd)}[k] ?? `${{k}}`; }})")
     browser.click(f"{fold} th:nth-child(2) button")
     ordered = browser.evaluate(f"{cells}.map(cell => cell.textContent)")
-    assert ordered == [*(str(k) for k in range(len(every)) if k != 3), "inf"]  # numbers all of them
+    plain = [str(k) for k in range(len(every)) if str(k) not in odd]
+    assert ordered == [plain[0], odd["7"], *plain[1:], odd["5"], "inf", "word", ""]  # numbers before words
     saved = browser.evaluate("""(async () => {
+        document.querySelector("table[data-name='scenes']").rows[1].cells[1].textContent = "2\u00a0×\u00a010⁻⁴";
         let blob; const link = HTMLAnchorElement.prototype.click, make = URL.createObjectURL;
         HTMLAnchorElement.prototype.click = function () { this.dataset.saved = this.download; };
         URL.createObjectURL = (one) => { blob = one; return make(one); };
@@ -151,6 +155,7 @@ def test_a_table_in_full_is_opened_searched_sorted_and_saved(browser):
     })()""")
     rows = list(csv.DictReader(io.StringIO(saved)))
     assert [row["scene"] for row in rows] == list(symtop.scenes())
+    assert "2e-4" in rows[0].values()
 
 
 def test_the_keyboard_reaches_content_tables_and_points(browser):
@@ -248,6 +253,33 @@ def test_the_chart_takes_the_place_of_its_figure_and_pointing_at_a_run_shows_wha
     assert browser.evaluate(place) is False
     assert browser.evaluate("document.querySelector('#speed-error-against-time .chart svg').checkVisibility()")
     assert browser.evaluate("document.querySelector('#pitfalls-three .scroll').checkVisibility()")
+
+
+def test_each_of_more_than_thirty_lines_has_its_name_beside_or_below_and_zeros_are_told(browser, results, tmp_path):
+    study, data = runner.load("speed"), xr.load_dataset(results / "speed.nc")
+    names = [name for name in dict.fromkeys(case.integrator for case in study.cases(True)) if name != "together"]
+    every = data.sel(variant=["exact", *["midpoint[angles]"] * (len(names) - 1)]).assign_coords(variant=names)
+    (chart,) = study.charts(every.assign(p_phi=0.0 * every["p_phi"]))
+    stored, content = r'(?<=class="chart"><script type="application/json">).*', page.prepared(chart._asdict())
+    full = re.sub(stored, lambda _: f"{content}</script></div>", (results / "report.html").read_text("utf-8"))
+    (tmp_path / "full.html").write_text(full, "utf-8")
+    browser.open((tmp_path / "full.html").as_uri())
+    for width in (1280, 390):
+        browser.resize(width, 900)
+        boxes = browser.evaluate("""(() => {
+            const svg = document.querySelector('.chart svg'), all = svg.getBoundingClientRect();
+            return [...svg.querySelectorAll('text')].filter(one => one.textContent.endsWith(']')).map(one => {
+                const box = one.getBoundingClientRect();
+                return [one.textContent, box.top - all.top, all.right - box.right, all.bottom - box.bottom];
+            });
+        })()""")
+        assert sorted(box[0] for box in boxes) == sorted(set(names) - {"exact"})
+        assert len(boxes) > 30
+        assert min(min(box[1:]) for box in boxes) >= 0.0  # none is cut off
+        assert np.diff(sorted(box[1] for box in boxes)).min() > 14.0  # pixels: none lies on another
+    browser.set(".chart select[name='Error']", "largest error of p_phi / larger momentum")
+    key = browser.evaluate("[...document.querySelectorAll('.chart .key')].at(-1).textContent")
+    assert key == f"Exactly zero, and so without a point: {', '.join(names[1:])}."
 
 
 def test_words_follow_from_the_stored_data_and_findings_that_are_not_whole_are_told(results, tmp_path):

@@ -251,8 +251,7 @@ def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
     body = RigidBody.from_inertia(matrix.tolist(), 2.0, (columns @ [0.0, 0.6, 0.8]).tolist())
     assert body.moments == pytest.approx((1.0, 1.4, 2.1), rel=1e-14)
     at = Attitude((0.6, 0.0, 0.8, 0.0), (0.3, 0.2, 0.1))
-    inside = body.in_principal(at)
-    spin = np.array(at.omega_body)
+    inside, spin = body.in_principal(at), np.array(at.omega_body)
     kinetic = 0.5 * np.dot(body.momentum(inside), inside.omega_body)
     assert 0.5 * spin @ matrix @ spin == pytest.approx(kinetic, rel=1e-13)
     heavy = rotated(inside.quaternion, body.centre)[2]  # the height of the centre, in either axes

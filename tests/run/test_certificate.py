@@ -81,8 +81,7 @@ def test_motions_of_every_kind_can_be_certified(cache, chosen):
 def test_a_certificate_shows_a_form_that_is_wrong(cache, monkeypatch):
     """A rate of the phase that is wrong by 1e-15 shows against 40 digits; formulas of another top do in motion."""
     chosen = scene("spheroid")
-    honest = closed_form(chosen)
-    wrong = ClosedForm(chosen.top, chosen.start)
+    honest, wrong = closed_form(chosen), ClosedForm(chosen.top, chosen.start)
     wrong._constants[at.QUARTERS] *= 1.0 + 4e-16
     for holder in (module, sys.modules["symtop.run.reference.independent_checks"]):
         monkeypatch.setattr(holder, "closed_form", lambda _: wrong)

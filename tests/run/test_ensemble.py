@@ -320,8 +320,7 @@ def test_a_member_on_which_a_solver_raises_is_lost_alone_and_told(path, tmp_path
         assert ("raised" in other.attrs) == (path is None)
         assert np.flatnonzero(other.outcome == "raised").tolist() == [3, 30]
         assert np.isnan(other.theta[3]).all()
-        rest = ~np.isin(np.arange(36), [3, 30])
-        bare = other.drop_vars("member", errors="ignore")
+        rest, bare = ~np.isin(np.arange(36), [3, 30]), other.drop_vars("member", errors="ignore")
         xr.testing.assert_identical(one.isel(member=rest).drop_attrs(), bare.isel(member=rest).drop_attrs())
 
 
@@ -347,8 +346,7 @@ def test_members_may_have_labels_of_any_other_name_and_rows_are_taken_by_label()
     counts, settings = np.linspace(10.0, 45.0, 36), {"nutations": 2, "quiet": True}
     plain = symtop.ensemble(SOME, "strang[axis]", per_nutation=counts, **settings)
     for labels in ([f"m{i}" for i in range(36)], list(range(100, 136))):
-        members = SOME.assign_coords(member=labels)
-        row = xr.DataArray(counts, {"member": labels}, "member")
+        members, row = SOME.assign_coords(member=labels), xr.DataArray(counts, {"member": labels}, "member")
         for given in (row, row[::-1], counts):
             data = symtop.ensemble(members, "strang[axis]", per_nutation=given, **settings)
             assert data.member.values.tolist() == labels

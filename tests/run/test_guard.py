@@ -97,8 +97,7 @@ def test_the_trace_in_space_turns_a_small_step_by_omega(name):
 def test_the_limits_of_verlet_and_rk4_are_found():
     """F1: Verlet loses small nutations at h omega = 2, rk4 at 2 sqrt 2, the midpoint rule and Gauss methods never."""
     scene = steady(20.0)
-    frequency = landmarks(scene).frequency
-    settings = {"observe": "nutation", "horizon": 2000.0}
+    frequency, settings = landmarks(scene).frequency, {"observe": "nutation", "horizon": 2000.0}
     for name, limit in (("stormer-verlet", 2.0), ("rk4", 2.0 * math.sqrt(2.0))):
         warned = caution(scene, name, step_size=1.02 * limit / frequency, **settings)
         assert float(re.search(r"h omega = ([\d.]+)\)", warned).group(1)) == pytest.approx(limit, abs=3e-3)

@@ -131,8 +131,7 @@ def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
             child.kill()  # it is waited for even if the machine was too slow for the minute
     assert code == (-signal.SIGKILL if blow == signal.SIGKILL else 128 + signal.SIGTERM)
     monkeypatch.setattr(longrun, "LONGEST", 200_000)
-    reached = longrun.netcdf.read(file)["steps_done"].item()
-    steps = 4_000_000
+    reached, steps = longrun.netcdf.read(file)["steps_done"].item(), 4_000_000
     assert 10_000 <= reached < steps
     positions, resume = [], longrun._Checkpoint.resumed
 

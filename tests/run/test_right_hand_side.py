@@ -40,12 +40,10 @@ def swing(_, y):
 
 def measured(f, y0, horizon, name, **control):
     """The error of the run itself, by SciPy or by steps of rk4."""
-    h = control.get("step_size")
-    early = horizon * np.geomspace(1e-6, 1.0, 200)
+    h, early = control.get("step_size"), horizon * np.geomspace(1e-6, 1.0, 200)
     times = np.union1d(np.linspace(0.0, horizon, 401), early) if h is None else h * np.arange(round(horizon / h) + 1)
     if h is None:
-        tolerance = control["tolerance"]
-        solver = {"radau": "Radau"}.get(name, name.upper())
+        tolerance, solver = control["tolerance"], {"radau": "Radau"}.get(name, name.upper())
         states = solve_ivp(f, (0.0, horizon), y0, solver, times, rtol=tolerance, atol=tolerance).y
     else:
         steps = [np.array(y0)]

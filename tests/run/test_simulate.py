@@ -50,8 +50,7 @@ def sorted_times(horizon, samples, period, steps):
         marks = None if steps is None else np.unique(np.rint(steps * (place / last)).astype(np.int64))
         times = horizon * (place / last) if steps is None else marks * (horizon / steps)
         phases = np.sort(np.mod(times / period, 1.0))
-        gap = np.max(np.diff(phases, append=phases[0] + 1.0))
-        every = steps is not None and marks.size > steps
+        gap, every = np.max(np.diff(phases, append=phases[0] + 1.0)), steps is not None and marks.size > steps
         if not (math.isfinite(period) and horizon > 2.0 * period) or gap < WIDEST_GAP or every:
             break
     return times, marks, dithered
@@ -188,8 +187,7 @@ def test_every_outcome_is_produced_said_and_timed(scene, name, controls, outcome
     assert re.fullmatch(rf"stopped at t = {reached:.6g} of [\d.e+-]+{unit}: .+; .+", run.attrs["outcome_message"])
     assert 0.0 <= reached < run.attrs["horizon"]
     assert reached > 0.0 or outcome != "out_of_budget"
-    known = np.isfinite(run["axis"].values).all(axis=1)
-    after = run["time"].values > reached * (1.0 + 1e-9)
+    known, after = np.isfinite(run["axis"].values).all(axis=1), run["time"].values > reached * (1.0 + 1e-9)
     assert known[0]
     assert not known[after].any()  # nothing is made up
 

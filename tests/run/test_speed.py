@@ -44,8 +44,7 @@ def test_a_run_costs_what_it_computes(name):
 @pytest.mark.slow
 def test_a_run_of_one_step_costs_little_and_two_samples_no_more_than_501():
     """In steps of Stormer-Verlet: 80, and 175 with a table of 35 stages. It was 370, and 600."""
-    chosen = symtop.scene("spheroid")
-    verlet = symtop.integrator("stormer-verlet")
+    chosen, verlet = symtop.scene("spheroid"), symtop.integrator("stormer-verlet")
     names = ("stormer-verlet", "midpoint", "strang", "rk4", "gauss-4", "srkn-14-6", "sofroniou-spaletta-10")
     methods = [symtop.integrator(name) for name in names]
     calls = [bare_run(chosen, verlet, "angles", 0.001, 20.0)]

@@ -90,16 +90,21 @@ function chooseScene(name) {
   values.second = $("second").value;
   if ($("integrator").value !== values.integrator) chooseIntegrator($("integrator").value);
   rows.horizon.set(entry.horizon);
-  rows.step_size.set(+((entry.period || entry.horizon) / 60).toPrecision(2));
+  rows.step_size.set(+(lasting(entry) / 60).toPrecision(2));
   place = 0;
+  outcomes.cells = null;  // of another scene
+  mapped = $("map-note").textContent = "";
   ask();
 }
 
-// A map's ranges: steps from 1/200 to 1/2 of the scene's nutation, spins up to twice the scene's own.
+// A nutation of a scene, or its run where that is shorter.
+const lasting = ({ period, horizon }) => Math.min(period || horizon, horizon);
+
+// A map's ranges: steps from 1/200 to 1/2 of the scene's nutation and at most the run, spins up to twice the scene's own.
 function mapRange() {
-  const { period, horizon, psi_dot: spin } = catalogue.scenes.find((scene) => scene.name === $("scene").value);
-  const [scale, most] = [period || horizon, 2 * Math.max(1, Math.abs(spin))];
-  return { step_least: scale / 200, step_most: scale / 2, spin_least: -most, spin_most: most };
+  const entry = catalogue.scenes.find((scene) => scene.name === $("scene").value);
+  const [scale, most] = [lasting(entry), 2 * Math.max(1, Math.abs(entry.psi_dot))];
+  return { step_least: scale / 200, step_most: Math.min(scale / 2, values.horizon), spin_least: -most, spin_most: most };
 }
 
 function chooseStory(name) {
@@ -121,8 +126,16 @@ function keep() {
 }
 
 function restore() {
-  const kept = Object.fromEntries(new URLSearchParams(location.hash.slice(1)));
-  if (!catalogue.scenes.some((scene) => scene.name === kept.base) || !catalogue.integrators.some((entry) => entry.name === kept.integrator)) return false;
+  if (location.hash.length < 2) return false;
+  const first = { base: catalogue.scenes[0].name, integrator: catalogue.integrators[0].name };
+  const kept = { ...first, ...Object.fromEntries(new URLSearchParams(location.hash.slice(1))) };
+  const entry = catalogue.scenes.find((scene) => scene.name === kept.base);
+  $("story").value = "";
+  chooseStory("");
+  if (!entry || !catalogue.integrators.some((one) => one.name === kept.integrator)) {
+    $("watch").textContent = `The link is not followed: ${entry ? `the integrator ${kept.integrator}` : `the scene ${kept.base}`} is not known here.`;
+    return false;
+  }
   $("scene").value = kept.base;
   chooseScene(kept.base);
   $("integrator").value = kept.integrator;
@@ -130,18 +143,19 @@ function restore() {
   values.second = $("second").value;  // nothing, of a method that is not known here
   chooseIntegrator(kept.integrator);
   for (const [name, row] of Object.entries(rows)) if (name in kept && values[name] !== null && Number.isFinite(+kept[name])) row.set(+kept[name]);
-  if (kept.scene !== kept.base) edited("start");
+  if ([...TOP, ...START].some(([name]) => name in entry && values[name] !== entry[name])) edited("start");
   ask();
   return true;
 }
 
 function chooseIntegrator(name) {
+  const other = name !== values.integrator;
   values.integrator = name;
   const { summary, chart, control, tolerance } = chosen();
   $("summary").textContent = `${summary} (shown in the ${ofBody() ? "body" : chart} chart)`;
   const controls = [control, values.second && catalogue.integrators.find((entry) => entry.name === values.second).control];
   for (const name of ["step_size", "tolerance"]) rows[name].row.hidden = !controls.includes(name);
-  if (control === "tolerance") rows.tolerance.set(tolerance);
+  if (other && control === "tolerance") rows.tolerance.set(tolerance);
   ask();
 }
 
@@ -190,11 +204,12 @@ async function askMap() {
   clearTimeout(patient);
   if (question === mapped) { patient = setTimeout(askCost, 300); return; }
   mapping = true;
-  const name = values.integrator;
+  const name = values.integrator, scene = $("scene").value;
   const response = await post("map", range).catch(() => null);  // `ask` says that nobody answers
   const answer = response && await response.json().catch(() => null);
   mapping = false;
   if (!answer) return;
+  if (scene !== $("scene").value) { askMap(); return; }
   mapped = question;
   outcomes.cells = answer.error ? null : { ...answer, range, error: unpack(answer.error_rad) };
   $("map-note").textContent = answer.error || `${name}, ${answer.columns * answer.rows} runs, ${answer.failed} ended early, ${(+answer.cells_a_second.toPrecision(2)).toLocaleString("en")} runs a second`;
@@ -249,6 +264,7 @@ function refuse(sentence) {
   $("status").textContent = sentence;
   $("status").className = "failed";
   $("warnings").replaceChildren();
+  $("other").hidden = true;  // of the run before
   $("netcdf").disabled = $("script").disabled = true;
   document.body.dataset.answer = "refused";
 }
@@ -386,7 +402,7 @@ async function begin() {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawPlots);
   window.addEventListener("hashchange", restore);
   $("scene").addEventListener("change", () => { $("story").value = ""; chooseStory(""); chooseScene($("scene").value); });
-  $("reset").addEventListener("click", () => chooseScene($("scene").value));
+  $("reset").addEventListener("click", () => { if ($("story").value) chooseStory($("story").value); else chooseScene($("scene").value); });
   $("integrator").addEventListener("change", () => chooseIntegrator($("integrator").value));
   $("clock").addEventListener("input", () => { place = $("clock").value * (run ? run.time.length - 1 : 0); playing = false; $("play").textContent = "Play"; drawPlots(); });
   $("play").addEventListener("click", () => { playing = !playing; $("play").textContent = playing ? "Pause" : "Play"; });

@@ -32,7 +32,7 @@
     return `10${raised}`;
   };
 
-  const WIDE = 700; // pixels
+  const WIDE = 700, LINE = 15; // pixels
   const MOST = 30; // methods that are chosen one by one
 
   function start(root) {
@@ -79,6 +79,7 @@
     tip.setAttribute("role", "status");
     tip.hidden = true;
     const key = html("p", root, "Dotted, vertical: exact motion, no integrator. Grey: below the bound of the truth.", "key");
+    const zeros = html("p", root, "", "key");
     let places = [];
 
     function draw() {
@@ -86,16 +87,27 @@
       tip.hidden = true;
       const panel = parts.join(" | "), [xName, xAt] = axes.x, [yName, yAt] = axes.y;
       const there = (point) => point[xAt] > 0 && point[yAt] > 0;
-      const series = chart.panels[panel].filter((one) => shown.has(kind(one)))
+      const chosen = chart.panels[panel].filter((one) => shown.has(kind(one)));
+      const series = chosen
         .map((one) => ({ ...one, points: one.points.filter(there).map((point) => [point[xAt], point[yAt], point.at(-1)]) }))
         .filter((one) => one.points.length);
       const first = xAt === 0 && yAt === (typeof chart.y === "string" ? 1 : Object.values(chart.y)[0]);
       const mark = first ? chart.marks?.[panel] : undefined;
       key.hidden = !mark;
-      const width = Math.max(280, frame.clientWidth), height = Math.max(320, Math.min(390, 0.5 * width));
-      const [left, right, top, bottom] = [58, named && width > WIDE ? 190 : 12, 12, 46]; // names stand at the right, if there is room
-      const svg = make("svg", { viewBox: `0 0 ${width} ${height}`, tabindex: 0, role: "group",
-        "aria-roledescription": "chart", "aria-label": `${chart.title}: ${panel}, ${yName} against ${xName}; arrow keys go from point to point` }, frame);
+      const exact = chosen.filter((one) => one.points.length && one.points.every((point) => point[yAt] === 0)).map((one) => one.name);
+      zeros.textContent = exact.length ? `Exactly zero, and so without a point: ${exact.join(", ")}.` : "";
+      const svg = make("svg", { tabindex: 0, role: "group", "aria-roledescription": "chart", "aria-label": `${chart.title}: ${panel}, ${yName} against ${xName}; arrow keys go from point to point` }, frame);
+      const width = Math.max(280, frame.clientWidth), beside = named && width > WIDE; // names stand at the right, if there is room, or below
+      const longest = Math.max(0, ...series.map((one) => {
+        const text = make("text", {}, svg, one.name), length = text.getComputedTextLength();
+        text.remove();
+        return length;
+      }));
+      const [left, right, top, bottom] = [58, beside ? longest + 8 : 12, 12, 46];
+      const height = Math.max(320, Math.min(390, 0.5 * width), beside ? top + bottom + LINE * series.length : 0);
+      const columns = Math.max(1, Math.floor(width / (longest + 32))), lines = named && !beside ? Math.ceil(series.length / columns) : 0;
+      const whole = height + LINE * lines;
+      svg.setAttribute("viewBox", `0 0 ${width} ${whole}`);
       places = [];
       const all = series.flatMap((one) => one.points);
       if (!all.length) {
@@ -125,23 +137,30 @@
         make("rect", { x: left, width: width - left - right, y: low, height: height - bottom - low, class: "below" }, svg);
         make("line", { x1: px(mark[0]), x2: px(mark[0]), y1: top, y2: height - bottom, class: "exact" }, svg);
       }
+      const outline = (one, x, y) => make("path", {
+        d: MARKS[one.marker] ?? MARKS.o, transform: `translate(${x.toFixed(1)} ${y.toFixed(1)}) scale(3.6)`,
+        fill: one.marker === "x" ? "none" : one.color, stroke: one.color, "stroke-width": 0.3,
+      }, svg);
       for (const one of series) {
         const path = one.points.map(([x, y], k) => `${k ? "L" : "M"}${px(x).toFixed(1)} ${py(y).toFixed(1)}`).join("");
         make("path", { d: path, fill: "none", stroke: one.color, "stroke-width": 1.4, ...(one.dashed ? { "stroke-dasharray": "5 3" } : {}) }, svg);
         for (const [x, y, words] of one.points) {
-          make("path", {
-            d: MARKS[one.marker] ?? MARKS.o, transform: `translate(${px(x).toFixed(1)} ${py(y).toFixed(1)}) scale(3.6)`,
-            fill: one.marker === "x" ? "none" : one.color, stroke: one.color, "stroke-width": 0.3, class: "mark",
-          }, svg);
+          outline(one, px(x), py(y)).setAttribute("class", "mark");
           places.push([px(x), py(y), one, words]);
         }
       }
-      if (right > 12) {
-        const ends = series.map((one) => ({ one, x: px(one.points.at(-1)[0]), y: py(one.points.at(-1)[1]) })).sort((a, b) => a.y - b.y);
-        const gap = Math.min(15, (height - top - bottom) / Math.max(ends.length, 1));
+      const ends = series.map((one) => ({ one, x: px(one.points.at(-1)[0]), y: py(one.points.at(-1)[1]) })).sort((a, b) => a.y - b.y);
+      if (lines) {
+        for (const [k, { one }] of ends.entries()) {
+          const [x, y] = [10 + Math.floor(k / lines) * (width / columns), height + LINE * ((k % lines) + 0.5)];
+          outline(one, x, y);
+          make("text", { x: x + 10, y: y + 4 }, svg, one.name);
+        }
+      }
+      if (beside) {
         let place = top;
-        for (const end of ends) end.at = place = Math.max(place + gap, end.y);
-        for (let k = ends.length - 1, most = height - bottom; k >= 0; k -= 1, most -= gap) ends[k].at = Math.min(ends[k].at, most);
+        for (const end of ends) end.at = place = Math.max(place + LINE, end.y);
+        for (let k = ends.length - 1, most = height - bottom; k >= 0; k -= 1, most -= LINE) ends[k].at = Math.min(ends[k].at, most);
         for (const { one, x, y, at } of ends) {
           make("path", { d: `M${x} ${y}L${width - right} ${at}`, stroke: one.color, "stroke-width": 0.5, fill: "none" }, svg);
           make("text", { x: width - right + 4, y: at + 4 }, svg, one.name);
@@ -158,11 +177,11 @@
         const box = svg.getBoundingClientRect(), side = best[0] * box.width / width;
         tip.style.left = side > box.width / 2 ? "auto" : `${side + 12}px`;
         tip.style.right = side > box.width / 2 ? `${box.width - side + 12}px` : "auto";
-        tip.style.top = `${best[1] * box.height / height + 8}px`;
+        tip.style.top = `${best[1] * box.height / whole + 8}px`;
       };
       const point = (event) => {
         const box = svg.getBoundingClientRect();
-        const [mx, my] = [(event.clientX - box.left) * width / box.width, (event.clientY - box.top) * height / box.height];
+        const [mx, my] = [(event.clientX - box.left) * width / box.width, (event.clientY - box.top) * whole / box.height];
         let best = null, least = 30 ** 2;
         for (const place of places) {
           const away = (place[0] - mx) ** 2 + (place[1] - my) ** 2;

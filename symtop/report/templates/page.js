@@ -56,8 +56,10 @@
   unfold();
 
   const quoted = (cell) => (/[",\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell);
+  const plain = (text) => text.replace(/^(?:(.+)\s×\s)?10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)$/, // a power of ten as a program reads it
+    (_, factor, raised) => `${factor ?? 1}e${[...raised].map((digit) => "-0123456789"["⁻⁰¹²³⁴⁵⁶⁷⁸⁹".indexOf(digit)]).join("")}`);
   function download(table) {
-    const lines = [...table.rows].map((row) => [...row.cells].map((cell) => quoted(cell.textContent.trim())).join(","));
+    const lines = [...table.rows].map((row) => [...row.cells].map((cell) => quoted(plain(cell.textContent.trim()))).join(","));
     const link = document.createElement("a");
     link.href = URL.createObjectURL(new Blob([`${lines.join("\r\n")}\r\n`], { type: "text/csv" }));
     link.download = `${table.dataset.name}.csv`;
@@ -77,10 +79,11 @@
         for (const other of table.tHead.rows[0].cells) other.removeAttribute("aria-sort");
         head.setAttribute("aria-sort", down ? "descending" : "ascending");
         const text = (row) => row.cells[column].textContent.trim();
-        const number = (row) => Number(text(row).replaceAll(",", "").replace(/inf$/, "Infinity")); // as Python writes it
-        const rows = [...body.rows], numeric = rows.every((row) => !Number.isNaN(number(row)));
-        const order = numeric ? (a, b) => number(a) - number(b) : (a, b) => text(a).localeCompare(text(b));
-        rows.sort((a, b) => (!text(a) - !text(b)) || sign * order(a, b)); // what is empty stands last
+        const number = (row) => Number(plain(text(row)).replaceAll(",", "").replace(/inf$/, "Infinity")); // as Python writes it
+        const words = (row) => Number.isNaN(number(row));
+        const order = (a, b) => (words(a) && words(b) ? text(a).localeCompare(text(b)) : (words(a) - words(b)) || number(a) - number(b));
+        const rows = [...body.rows]; // numbers, then words, and what is empty last
+        rows.sort((a, b) => (!text(a) - !text(b)) || sign * order(a, b));
         body.append(...rows);
       });
     });
