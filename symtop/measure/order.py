@@ -18,7 +18,9 @@ there or the interval exceeds `WIDEST`.
 
 The interval is Student's, for the degrees of freedom that the data leave, and never less than `RESOLVED`. It covers p
 for 93 to 97 % of synthetic curves with an h^2 correction and the scatter of sampled maxima; that of a straight line
-covers it for less than 4 %.
+covers it for less than 4 %. On 100 random tops it covers the order of 11 symmetric methods for 93 to 100 %, but only
+for 77 % that of rk4 and for 17 % that of tsit5-fixed, whose first term is small: its slopes are near 6, whatever their
+scatter. An interval holds the scatter and not what steps too long hide; the terms of a step (`judging`) show that.
 
 One rule, `order_verdict`, says for every study whether a measured slope confirms a declared order.
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, theorem II.3.2 (even powers of a symmetric method).

@@ -319,13 +319,14 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
     """The verdict on a declared order; the steps of an adaptive method, which has no `fits`, do not all scale alike.
 
     Where the series shows the first wrong term, its order is that of the runs as h -> 0, so that a larger slope is one
-    of steps that are too long. A lower slope stands: a run may meet what one step from one point does not.
+    of steps that are too long. A slope that is lower beyond its interval stands: a run may meet what one step from one
+    point does not.
     """
     main, measured, verdict = fitted.main, fitted.measured, order_verdict(power, fitted.main, fits)
     value, resolution = main.slope, BESIDE + main.interval
     why = f"{slopes}; {series.words(power)}" if series else slopes
     if series is not None and series.order == power and series.is_exact and verdict != "confirmed":
-        early = bool(measured) and main.slope > power and all(not fit.slope < power - BESIDE for fit in fits)
+        early = bool(measured) and main.slope > power and not any(_below(fit, power) for fit in fits)
         if early or (not measured and _agree(fitted, power)):
             why = f"{why} ({main.reason or 'at steps too long for a slope'})"
             defect = series.worst(power), series.least(power)
@@ -338,6 +339,11 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
     elif verdict == "undecided":
         why = f"the slope is neither {power} nor clearly another order: {why}" if measured else f"{main.reason} ({why})"
     return Finding("order", str(power), measured, verdict, why, value, resolution)
+
+
+def _below(fit: Fit, power: int) -> bool:
+    """Is a slope lower than the order, beyond its interval?"""
+    return fit.slope + fit.interval < power - BESIDE
 
 
 def _agree(fitted: Order, power: int) -> bool:

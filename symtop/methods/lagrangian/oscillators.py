@@ -111,7 +111,6 @@ SHORTEST = 1e-100  # of a step, and of what is left of one that is a whole numbe
 STEEPEST = 16.0  # (P - e3)/(P - e2): what rounding of the constants is amplified by
 APART = 1e-5  # (e1 - e2)^2 (e1 - e3)/(b1^2 + b2^2)^1.5: rounding over it is what e1 - e2 and a nutation are known to
 MOST_PARTS = 10_000
-NEXT_TO_ROOT = 1e-4
 TINY = 1e-80  # of e1 - e3, in the place of e1 - b where e1 is a zero of chi: J is zero, too
 
 
@@ -151,12 +150,13 @@ def one_oscillator(above: Any, g2: float, g3: float, sigma: float, b: float, J: 
 def _whole_turn(e: Any, sigma: float, b: float, J: float) -> float:
     """delta of one nutation; where b is next to the root e1 that bounds it, J and the integral are 0 times infinity.
 
-    There e1 - b is that of J^2 = (e1 - b)(b - e2)(b - e3): the difference of two roots is their rounding.
+    Of e1 - b and b - e2 only the larger is a difference of roots, which lose digits in it: if that is the second, the
+    first is that of J^2 = (e1 - b)(b - e2)(b - e3).
     """
     wide, rest, turn = e.e1 - e.e3, e.e1 - b, sigma * J
     y, z = e.e1 - e.e2, wide
-    if rest < NEXT_TO_ROOT * wide:
-        y, z = abs(b - e.e2), abs(b - e.e3)
+    if rest < b - e.e2:
+        y, z = b - e.e2, b - e.e3
         rest = max(turn * turn / (y * z), TINY * wide)
         turn = math.copysign(math.sqrt(rest * y * z), turn)
         y, z = y + rest, z + rest
