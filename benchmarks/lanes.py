@@ -28,6 +28,7 @@ from symtop.core.parallel import in_threads
 from symtop.measure.timing import timings
 from symtop.methods.framework.lanes import W, members_of
 from symtop.methods.framework.loop import FixedStep, inside
+from symtop.methods.runge_kutta.pairs import PAIRS
 from symtop.methods.taylor import heyoka
 from symtop.model import charts
 from symtop.model.exact.closed_form import ClosedForms
@@ -41,8 +42,9 @@ ON_GROUPS = "explicit on Lie groups"
 LEAST = {  # times the kernel for one, by kind
     "explicit": 7.0, ON_GROUPS: 5.0, "midpoint and trapezoidal": 6.0, "gauss": 3.0,
 }  # fmt: skip
-UNLIMITED = {"series", "exact-discrete"}  # a step alone is vectors already, or most of its time a chain
-OTHERS, WIDE = "other implicit", "series and exact-discrete"  # no limit is set for them
+FIXED = {f"{pair.name}-fixed" for pair in PAIRS}
+UNLIMITED = {"series", "exact-discrete"} | FIXED  # a step alone is vectors already, or most of its time a chain
+OTHERS, WIDE = "other implicit", "series, exact-discrete and pairs with fixed steps"  # no limit is set for them
 THREADED = {("strang", "axis"): 20_000, ("srkn-14-6", "attitude"): 3000}  # steps: some 10 ms a piece
 PIECES = 8  # for two threads
 HORIZON = 8.0
