@@ -119,6 +119,7 @@ def benchmark(name: str, results: Path) -> str:
             "one_step": max(data["run"]["one_step"].values()),
             "many": {row["name"]: row["seconds"] for row in data["ensemble"]},
             "explicit": sorted(explicit, key=lambda row: row["ratio"]),
+            "pairs": sorted(row["ratio"] for row in data["lanes"]["rows"] if row["name"] in lanes.FIXED),
         }  # fmt: skip
     template = (ROOT / "docs" / "generator" / f"{name}.jinja").read_text(encoding="utf-8")
     return wrapped(rendered(template, f"{name}.jinja", given).strip()) + "\n"
