@@ -20,6 +20,13 @@ from .measures import CHECKED
 SHOWN = ("0.1", "0.3", CHAOTIC, FREE)  # families of the short table
 NEEDLE = "needle"  # a stratum of free bodies whose spin the natural period does not tell
 STRATA = ("regular", CHAOTIC)
+IN_PART = (  # facts that a run of some methods may not measure, and those of a family
+    "price", "price_high", "growth_1_judged", "growth_3_judged", "lost_0", "lost_3", "engines", "engine_steps", "grid",
+)  # fmt: skip
+OF_FAMILY_IN_PART = (
+    "limit_{}_low", "limit_{}_least", "limit_{}_of", "order_{}_seen", "order_{}_top", "order_{}_declared",
+    "long_tau_{}", "long_of_{}",
+)  # fmt: skip
 FIRST_TRIED = ("dop853-compiled-fixed", "tsit5-fixed", "vern9-fixed")  # what to begin with, given f(t, y) alone
 
 
@@ -288,7 +295,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     A number of a family has its `key` in its name; the page quotes some of them.
     """
     about = data["bodies"].to_dataset().isel(variant=0).sel(scene="short")
-    answers: dict[str, Any] = {
+    answers: dict[str, Any] = dict.fromkeys(IN_PART) | {
         "bodies": data["short"].sizes["member"], "methods": data["short"].sizes["variant"],
         "long_bodies": data["long"].sizes["member"] if "long" in data.children else None,
         "long_methods": data["long"].sizes["variant"] if "long" in data.children else None,
@@ -303,7 +310,9 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     for family in ("0.1", "0.3"):
         growth = about["growth"].sel(family=family).dropna("member").values
         answers[f"chaos_{key(family)}"] = float((growth > by.CHAOS).mean()) if growth.size else None
-    answers["first_tried"] = listed([code(name) for name in FIRST_TRIED])
+    known = {label(str(name)) for name in data["short"]["variant"].values}
+    tried = [code(name) for name in FIRST_TRIED if name in known]
+    answers["first_tried"] = listed(tried) if tried else None
     for family in OTHERS:
         answers |= _of_family(data, family)
     answers["silent_0"] = silent_share(data, SYMMETRIC)
@@ -337,7 +346,7 @@ def _of_family(data: xr.DataTree, family: str) -> dict[str, Any]:
     place, order = key(family), order_gap(data, family)
     within, known = exponents_within(data, family)
     taken = steps(data, family)
-    answers: dict[str, Any] = {
+    answers: dict[str, Any] = dict.fromkeys(name.format(place) for name in OF_FAMILY_IN_PART) | {
         f"tau_{place}": worst_tau(data, family).value, f"steps_{place}_high": taken.most,
         f"steps_{place}_beyond": taken.beyond, f"steps_{place}_asked": taken.asked,
         f"first_{place}": most_within(first_steps(data, family)), f"silent_{place}": silent_share(data, family),
