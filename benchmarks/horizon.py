@@ -73,7 +73,7 @@ def main() -> None:
     )
     options.results.mkdir(exist_ok=True)
     page = pages.findings(
-        "horizon", "Very long runs", "Do predictions hold up to 10^8 nutations?", [sentence],
+        "horizon", "Very long runs", "Do predictions hold up to a hundred million nutations?", [sentence],
         "A ratio near one is a prediction that holds. A motion is lost when its axis is off by "
         f"{laws.SATURATED} rad.", [table],
         cases=1, **measured.record(facts, "python -m benchmarks.horizon"),

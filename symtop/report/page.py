@@ -122,7 +122,7 @@ def texts(results: Path, studies: Sequence[Mapping[str, Any]]) -> tuple[dict[str
     """The parts of the report and those for reference, in Markdown, by name: "front", the studies, "measured", ..."""
     parts, more, pages = dict[str, str](), dict[str, str](), {"measured": _link("How it was measured")}
     for study in studies:
-        pages[study["study"]] = _link(study["question"], REFERENCE if _checks_only(study) else "")
+        pages[study["study"]] = _link(formats.typeset(study["question"]), REFERENCE if _checks_only(study) else "")
     parts["front"] = formats.typeset(template.front(_template("front"), studies, results, pages))
     for study in studies:
         name, text = study["study"], formats.typeset(_lower(template.filled(study, results, pages=pages)))
