@@ -311,6 +311,8 @@ def silent_shares(data: xr.DataTree, family: str, stratum: str = "") -> Array:
 @of_one_dataset
 def exponents(data: xr.DataTree) -> dict[tuple[str, str, str], float]:
     """By method, family and quantity the exponent of growth of the median error with time, over all times."""
+    if "growth" not in data.children:
+        return {}
     group = data["growth"].to_dataset().isel(scene=0)
     slopes = {}
     for name in map(str, group["variant"].values):

@@ -29,11 +29,11 @@ def number(value: float, digits: int = 2, unit: str = "") -> str:
 def typeset(text: str) -> str:
     """A text with its numbers as `number` has them, ``10⁻⁶`` for 1e-06, and ``µs`` for us; not in code and links."""
 
-    def printed(found: re.Match[str]) -> str:
-        if found["same"] or not found["power"]:
-            return found["same"] or "µs"
-        ten = f"10{str(int(found['power'])).translate(RAISED)}"
-        return ten if found["mantissa"] == "1" else f"{found['mantissa']}{FIRM}×{FIRM}{ten}"
+    def printed(match: re.Match[str]) -> str:
+        if match["same"] or not match["power"]:
+            return match["same"] or "µs"
+        ten = f"10{str(int(match['power'])).translate(RAISED)}"
+        return ten if match["mantissa"] == "1" else f"{match['mantissa']}{FIRM}×{FIRM}{ten}"
 
     return PRINTED.sub(printed, text)
 

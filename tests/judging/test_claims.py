@@ -253,8 +253,8 @@ def test_honest_claims_are_confirmed(name):
 def test_a_slope_that_is_too_large_yields_to_the_terms_of_a_step_and_a_lower_one_stands(main, other, doubt, right):
     terms = Series(1.0, np.array([0.0] * 5 + [1e-3]), np.full(6, 1e-14), True, "axis")  # of order 4
     fits = [Fit(slope, doubt, 1.0, np.ones(1, dtype=bool)) for slope in (main, other)]
-    found = order._claimed(4, order.Order("", *[np.ones(1)] * 4, fits[0], {}), fits, terms, "").verdict
-    assert found == ("confirmed" if right else "refuted")
+    verdict = order._claimed(4, order.Order("", *[np.ones(1)] * 4, fits[0], {}), fits, terms, "").verdict
+    assert verdict == ("confirmed" if right else "refuted")
 
 
 @pytest.mark.parametrize(("orders", "lower"), [

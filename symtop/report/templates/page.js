@@ -56,8 +56,8 @@
   unfold();
 
   const quoted = (cell) => (/[",\n]/.test(cell) ? `"${cell.replaceAll('"', '""')}"` : cell);
-  const plain = (text) => text.replace(/^(?:(.+)\s×\s)?10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)$/, // a power of ten as a program reads it
-    (_, factor, raised) => `${factor ?? 1}e${[...raised].map((digit) => "-0123456789"["⁻⁰¹²³⁴⁵⁶⁷⁸⁹".indexOf(digit)]).join("")}`);
+  const plain = (text) => text.replace(/^(?:(.+)\s×\s)?(-?)10([⁻⁰¹²³⁴⁵⁶⁷⁸⁹]+)$/, // a power of ten as a program reads it
+    (_, factor, minus, raised) => `${minus}${factor ?? 1}e${[...raised].map((digit) => "-0123456789"["⁻⁰¹²³⁴⁵⁶⁷⁸⁹".indexOf(digit)]).join("")}`);
   function download(table) {
     const lines = [...table.rows].map((row) => [...row.cells].map((cell) => quoted(plain(cell.textContent.trim()))).join(","));
     const link = document.createElement("a");
