@@ -1,7 +1,6 @@
 """symtop without what Windows lacks: locks of `fcntl`, interval timers, groups of processes, fork, parents' numbers.
 
-A `sitecustomize` takes them away from a whole tree of processes, the workers of a study included. It cannot show that
-symtop runs on Windows; it shows that none of them is needed.
+A `sitecustomize` takes them from a whole tree of processes, workers included: it shows that none of them is needed.
 """
 
 import errno

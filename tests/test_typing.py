@@ -56,6 +56,7 @@ def checked(tmp_path_factory):
     return {name: [one for one in result.stdout.splitlines() if f"{name}.py:" in one] for name in ("good", "bad")}
 
 
+@pytest.mark.quick
 def test_a_script_is_typed_throughout_and_mistakes_are_reported_where_they_are(checked):
     revealed = [line.split('"')[1] for line in checked["good"] if "Revealed type" in line]
     assert not [line for line in checked["good"] if ": error:" in line]

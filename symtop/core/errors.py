@@ -158,7 +158,7 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     raise error
 
 
-LONGEST = 300  # characters of an error's message that are shown
+LONGEST = 300  # characters that are shown of the message of an error or a process
 _COMPILING = "(step: nopython frontend)"  # numba says it before each cause, from the loop inwards; the last counts
 _TRACE = r",? (?:defined at |raised from |File \"|During: |There are \d+ candidate)"  # what follows a cause
 
@@ -173,6 +173,12 @@ def words_of(error: BaseException) -> str:
         message = re.split(_TRACE, message.rpartition(_COMPILING)[2], maxsplit=1)[0].strip()
     cut = message if len(message) <= LONGEST else f"{message[:LONGEST]} ..."
     return f"{type(error).__name__}: {cut}" if cut else type(error).__name__
+
+
+def last_words(output: bytes) -> str:
+    """The end of what a process printed, in one line of whole words."""
+    words = " ".join(output[-4 * LONGEST :].decode(errors="replace").split())
+    return words if len(words) <= LONGEST else f"... {words[-LONGEST:].partition(' ')[2]}"
 
 
 @contextlib.contextmanager

@@ -24,7 +24,7 @@ from typing import Any, Self
 
 import numpy as np
 
-from symtop.core.errors import SymtopError, words_of
+from symtop.core.errors import SymtopError, last_words, words_of
 from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat
 from symtop.judging.adapters.python_step import MATRIX, REDUCED, ROTATION
 from symtop.judging.findings import pace
@@ -38,7 +38,6 @@ Table = dict[str, Callable[..., Any]]
 THREADED = "jax"  # hangs in a process that was forked after its import
 LOOK = 0.05  # seconds between two looks
 PATIENCE = 60.0  # seconds for what is only loaded
-WORDS = 160  # characters of what a process says before it ends
 FORMS = {"rotation": ROTATION, "matrix": MATRIX, "plane": REDUCED}  # others have that of their chart
 FACTS = ("name", "chart", "implementation", "own_loop", "takes_field")  # of a stepper, that are sent
 
@@ -136,7 +135,7 @@ class Process:
             name = next((one.name for one in signal.Signals if one == -code), f"signal {-code}")  # one in real time
             return f"its process was ended by {name}{during}"
         self.output.seek(0)
-        words = " ".join(self.output.read()[-4 * WORDS :].decode(errors="replace").split())[-WORDS:]
+        words = last_words(self.output.read())
         return f"its process ended with code {code}{': ' if words else ''}{words}"
 
 

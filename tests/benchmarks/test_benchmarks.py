@@ -93,7 +93,7 @@ def test_an_ensemble_costs_little_around_its_steps_and_a_closed_form_ten_microse
 
 
 @needs_gcc
-@pytest.mark.parametrize("chart", ["axis", "attitude"])
+@pytest.mark.parametrize("chart", ["axis", pytest.param("attitude", marks=pytest.mark.quick)])
 def test_the_adaptive_loop_in_c_takes_the_same_steps(chart):
     row = adaptive.measure(chart, 1e-8, nutations=10.0, batches=2)
     assert row.steps[0] == row.steps[1]

@@ -115,7 +115,7 @@ def test_a_link_shows_what_it_changes_and_says_what_is_not_known(explorer):
     answered(browser, "#theta", 0.9)
     browser.click("#reset")
     assert browser.evaluate(controls)[:3] == ["cusp", "cusp", "0.33"]  # of the story
-    browser.evaluate("location.hash = 'base=nowhere'")
+    browser.evaluate("location.hash = 'base=nowhere', history.replaceState(null, '', '#')")  # by an answer, meanwhile
     browser.wait_for("document.querySelector('#watch').textContent.includes('the scene nowhere is not known here')")
     assert browser.evaluate(controls)[0] == ""
     note = "document.querySelector('#map-note').textContent"

@@ -1,7 +1,6 @@
 """Every argument of every public function, every kind of bad value: `SymtopError` in one sentence, or a result.
 
-Values that cannot be meant must be refused; of the others (`ANY`) it is only asked that nothing but a SymtopError comes
-of them, and at once. The command line is tried in `tests.hostile.test_command_lines`.
+Values that cannot be meant must be refused; of the others (`ANY`) comes at once no other error than a SymtopError.
 """
 
 import datetime

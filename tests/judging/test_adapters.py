@@ -140,7 +140,7 @@ def test_text_as_long_as_raw_doubles_is_text(tmp_path):
 @pytest.mark.parametrize(("body", "words"), [
     ("print(1, 2, 3)", "must write 4 states of 6 numbers .* 24 in all, not 3"),
     ("print('moved to', *numbers)", "must write numbers, as text or as raw doubles, not 'moved to"),
-    ("sys.exit('no licence')", "ended with code 1: no licence"),
+    ("sys.exit('no ' * 99 + 'licence')", "ended with code 1: [.]{3}( no){90,97} licence$"),
     (f"{STILL}\nsys.stdout.flush()\nimport os; os.kill(os.getpid(), 9)", "ended with code -9: it said nothing"),
     ("print(*range(24))", "must write the start that it was given as the first of its states, not 0, 1, 2"),
     ("print(*[-5] * 24)", "must write the start that it was given as the first of its states, not -5, -5"),
@@ -183,7 +183,8 @@ def impatient(monkeypatch):
     ("my 'engine -x", {"form": "program"}, 'must be a command that can be run, not "my \'engine -x"'),
     ("true", {}, "a trajectory such as FILE.csv, or a command with form program, not 'true'$"),
     ("rk4[axis]", {}, r"form program, not 'rk4\[axis\]', an integrator, whose claims `symtop claims rk4` measures$"),
-    (midpoint, {"form": "rotation"}, r"must take \(q, w, h, inertia, torque\), not \(f, t, y, h\)"),
+    (midpoint, {"form": "rotation", "chart": "attitude"}, r"must take \(q, w, h, inertia, torque\), not \(f, t, y"),
+    (midpoint, {"form": "rotation", "chart": "angles"}, "chart must be left out with form rotation, .* not 'angles'"),
     (lambda y, h: y, {}, r"must take \(f, t, y, h\), not \(y, h\)"),
     (midpoint, {"adaptive": True}, "need a class derived from OdeSolver"),
     (dict, {}, "must be derived from scipy.integrate.OdeSolver, not dict"),
@@ -278,6 +279,7 @@ def test_single_precision_is_no_other_motion_and_one_of_a_step_in_it_is(scene, o
     assert "single" not in symtop.judge(midpoint, order=2, **options)["order"].why
 
 
+@pytest.mark.quick
 def test_single_precision_refutes_nothing_that_its_rounding_hides(only):
     """It moves a step forth and back by 1e-8, and a bracket from differences by 1e-6."""
 

@@ -70,7 +70,7 @@ def test_what_is_claimed_of_a_correct_method_is_confirmed_in_short_runs(name, on
     confirmed(ledger, *(claim for claim in claims if claim in SHOWN))
 
 
-@pytest.mark.parametrize("name", ["BDF", "LSODA", "DOP853"])
+@pytest.mark.parametrize("name", [pytest.param("BDF", marks=pytest.mark.quick), "LSODA", "DOP853"])
 def test_classes_of_variable_order_are_judged_at_a_tolerance(name, only):
     """They claim no order; that their error falls with the tolerance is confirmed, and refuted of `WrongSum`."""
     only("calls", "order", "pole")

@@ -1,14 +1,11 @@
 """Ten public reports about rotation: which faulty rule `judge` tells apart from the mended one.
 
-Each rule is written down anew from its thread, for the socket that has what it needs: a rotation, the nutation alone,
-or a class of SciPy's kind for a rule that remembers. But for the fault it is of the order that it claims, so that the
-mended one must be confirmed. Two faults need more than the socket hands a step, and are tried twice: elements of the
-inertia tensor off its diagonal (`avian` in body axes of its own, turned against the principal ones), and an absolute
-threshold of inertia, which moments near one do not reach (`GRAIN`).
-
-`FORESEEN` was written down before anything was judged. What cannot be seen: a fault in elements that are zero, one
-below a threshold, one that both rules commit to the same order (`mujoco`: a step of order 1 that is explicit or
-implicit in the gyroscopic term), and a report that no rule was changed for (Drake's). `docs/engines.md` has the table.
+Each rule is written anew from its thread, in a form that has what it needs. But for the fault it has the order that it
+claims, so that the mended one must be confirmed. Two faults need more than a step is given, and are tried twice:
+moments of inertia off the diagonal (`avian`), and an absolute threshold of inertia that moments near one do not reach
+(`GRAIN`). `FORESEEN` was written before anything was judged: unseen are faults in elements that are zero or below a
+threshold, one that both rules commit to the same order (`mujoco`), and a report that changed no rule. See
+`docs/engines.md`.
 """
 
 import functools

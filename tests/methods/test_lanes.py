@@ -171,8 +171,8 @@ def spread(count, steps):
     return numbers, np.full(count, at.nutation_period / 300), np.tile([0, steps], (count, 1))
 
 
-@pytest.mark.parametrize(("name", "longer"), [
-    ("midpoint[angles]", 40.0), *((f"{name}[attitude]", 20.0) for name in ITERATED)])  # fmt: skip
+@pytest.mark.parametrize(("name", "longer"), [("midpoint[angles]", 40.0), *(
+    pytest.param(f"{name}[attitude]", 20.0, marks=pytest.mark.quick) for name in ITERATED)])  # fmt: skip
 def test_a_lane_that_takes_more_iterations_changes_no_other(name, longer):
     """A step so large that one lane takes more passes; the others keep bits and counts, and that one does not."""
     numbers, h, marks = spread(W, 40)
@@ -321,7 +321,7 @@ def test_tables_and_compositions_of_ones_own_have_the_bits_of_runs_alone(solver)
     assert_runs_alone(solver, *given, solver.many(*given))
 
 
-@pytest.mark.parametrize("name", ["commutator-free-4", "generalised-alpha"])
+@pytest.mark.parametrize("name", ["commutator-free-4", pytest.param("generalised-alpha", marks=pytest.mark.quick)])
 def test_lanes_whose_exponential_turns_too_far_for_its_series_run_alone(name):
     solver, given = SOLVERS[f"{name}[axis]"], members(400, seed=11)
     left = set(left_alone(solver, *given).tolist())

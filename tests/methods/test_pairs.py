@@ -126,7 +126,8 @@ def number(near, far, which):
     return near[which] if which < len(near) else far[which - len(near)]
 
 
-@pytest.mark.parametrize(("name", "chart"), [("spheroid", "axis"), ("heavy-chaotic", "body")])
+@pytest.mark.parametrize(("name", "chart"), [("spheroid", "axis"), pytest.param(
+    "heavy-chaotic", "body", marks=pytest.mark.quick)])  # fmt: skip
 def test_two_runs_in_one_register_have_the_bits_of_each_alone(name, chart):
     scene, h, marks = models.scene(name, bodies=True), 0.03, np.array([1, 50, 400])
     moved = replace(scene.start, **({"psi_dot": 1.0} if chart == "axis" else {"omega_body": (0.1, 0.2, 0.3)}))

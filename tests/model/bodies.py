@@ -1,7 +1,6 @@
 """Free bodies of 13 kinds, and their motion in many digits by another way than that of `symtop.model.exact.free_body`.
 
-The attitude is an integral of the third kind and an arctangent here, by Carlson's forms, without theta functions and
-without Landen's transformation; working digits make up for all that cancels. Only the canonical axes are the same.
+Here the attitude is an integral of the third kind and an arctangent, by Carlson's forms, with digits for what cancels.
 """
 
 import math

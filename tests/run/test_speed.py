@@ -20,8 +20,7 @@ from symtop.run.simulation import make_plan
 def test_a_run_costs_what_it_computes(name):
     """400 steps with all columns, in times of the steps alone: 10, and 16 to 20 with the guard but for its closed form.
 
-    They were 45 and 65 while xarray checked every dataset and the plan sorted every mark. The guard's probe makes the
-    steps once more. On spheroid it warns and tries the step that it advises: one more forecast, which is taken off.
+    The probe makes the steps again. On spheroid the guard tries the step it advises, a forecast that is taken off.
     """
     chosen, row = symtop.scene(name), symtop.integrator("stormer-verlet[angles]")
     horizon = min(chosen.horizon, 3.0 * chosen.nutation_period) if name == "goldstein" else chosen.horizon

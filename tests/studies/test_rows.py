@@ -1,7 +1,6 @@
 """What a stored dataset and a caption must say: which chart, which step or tolerance, which scene.
 
-A comparison of ``rk4`` with ``strang`` changes two factors at once, method and chart, if a name does not say the chart;
-and a number without its step or tolerance cannot be compared with another.
+``rk4`` beside ``strang`` differs in two factors, method and chart, and an error without its step cannot be compared.
 """
 
 import numpy as np

@@ -125,10 +125,10 @@ function keep() {
   history.replaceState(null, "", `#${new URLSearchParams(Object.entries({ ...values, base: $("scene").value }).filter(([, value]) => value !== null && value !== ""))}`);
 }
 
-function restore() {
-  if (location.hash.length < 2) return false;
+function restore(fragment) {
+  if (fragment.length < 2) return false;
   const first = { base: catalogue.scenes[0].name, integrator: catalogue.integrators[0].name };
-  const kept = { ...first, ...Object.fromEntries(new URLSearchParams(location.hash.slice(1))) };
+  const kept = { ...first, ...Object.fromEntries(new URLSearchParams(fragment.slice(1))) };
   const entry = catalogue.scenes.find((scene) => scene.name === kept.base);
   $("story").value = "";
   chooseStory("");
@@ -400,7 +400,7 @@ async function begin() {
     if (turn) { event.preventDefault(); sphere.turn(...turn); }
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", drawPlots);
-  window.addEventListener("hashchange", restore);
+  window.addEventListener("hashchange", (event) => restore(new URL(event.newURL).hash));  // an answer may have changed the address since
   $("scene").addEventListener("change", () => { $("story").value = ""; chooseStory(""); chooseScene($("scene").value); });
   $("reset").addEventListener("click", () => { if ($("story").value) chooseStory($("story").value); else chooseScene($("scene").value); });
   $("integrator").addEventListener("change", () => chooseIntegrator($("integrator").value));
@@ -415,7 +415,7 @@ async function begin() {
   rows.oscillator_step.set(0.5);
   values.integrator = catalogue.integrators[0].name;
   values.second = "";
-  if (!restore()) { chooseScene(catalogue.scenes[0].name); chooseIntegrator(values.integrator); }
+  if (!restore(location.hash)) { chooseScene(catalogue.scenes[0].name); chooseIntegrator(values.integrator); }
   askDamped();
   requestAnimationFrame(frame);
 }

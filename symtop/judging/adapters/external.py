@@ -40,7 +40,7 @@ from typing import Any
 
 import numpy as np
 
-from symtop.core.errors import SymtopError, at_home
+from symtop.core.errors import SymtopError, at_home, last_words
 from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat, in_runs, label_of, relative_gap, repeat
 from symtop.judging.adapters.python_step import MOST_NEWTON, state_like
 from symtop.methods.framework.equations import FORMULATIONS
@@ -49,7 +49,6 @@ from symtop.model.top import SymmetricTop
 
 MOST = 20_000  # steps of one call, so that a call that hangs is told from a long run
 GUARD, MARK = 8, -1.2345e-67  # doubles behind the state that must stay as they are
-WORDS = 100  # characters of what a program says when it fails
 TEXT = b"0123456789+-.eEinfaINFA, \t\r\n"  # the letters of numbers
 SHORT = 1e-3  # relative: digits that a program may leave out
 SLACK = 5.0  # times the seconds that earlier runs make one expect
@@ -143,8 +142,8 @@ class Program(Stepper):
                 what = f"{steps} step{'s' * (steps != 1)} of {h:.3g}"
                 raise SymtopError(f"{self.name} had not ended {seconds:.0f} s after it was asked for {what}") from None
         if result.returncode != 0:
-            words = " ".join(result.stderr.decode(errors="replace").split())[-WORDS:]
-            raise SymtopError(f"{self.name} ended with code {result.returncode}: {words or 'it said nothing'}")
+            words = last_words(result.stderr) or "it said nothing"
+            raise SymtopError(f"{self.name} ended with code {result.returncode}: {words}")
         if steps > 50:  # in fewer its start is most of the time
             self.seconds_a_step = max(self.seconds_a_step, (time.monotonic() - began) / steps)
         return result.stdout

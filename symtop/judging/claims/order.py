@@ -5,7 +5,8 @@ confirms it, by `symtop.measure.order.order_verdict` as in every study, or the s
 
 *Slopes* see what becomes of a run. They are extrapolated to h = 0 by `symtop.measure.order` from a ladder of steps,
 then again with more steps put into the decades of error above rounding where a method of high order is asymptotic; if
-the scene does not show it, on `FALLBACK` over longer runs. An adaptive method is fitted against its mean step.
+the scene does not show it, on `FALLBACK` over longer runs, the first that decides. An adaptive method is fitted against
+its mean step.
 
 *The limit.* A method whose coefficients miss their sum by 1e-9 has the right slope down to an error of 1e-9 and stays
 there. So the error at the end of a short run of many steps, with its sign, is extrapolated to h = 0 (Richardson's,
@@ -237,9 +238,10 @@ def measured_order(
         fits = {name: order_fit(problem, method, table, name, horizon) for name in (main, "theta", "energy")}
         columns = table["tolerance"].values, step, table[main].values, table[f"{main}_bound"].values
         orders.append(Order(problem.name, *columns, fits[main], fits))
-        if orders[-1].measured:
+        decided = problem is scene or order_verdict(method.order, fits[main], fits.values()) != "undecided"
+        if orders[-1].measured and decided:
             return orders[-1]
-    return orders[-1 if scene.of_body else 0]
+    return next((one for one in orders if one.measured), orders[-1 if scene.of_body else 0])
 
 
 def _by_steps(subject: Subject) -> Finding:
@@ -319,18 +321,21 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
     """The verdict on a declared order; the steps of an adaptive method, which has no `fits`, do not all scale alike.
 
     Where the series shows the first wrong term, its order is that of the runs as h -> 0, so that a larger slope is one
-    of steps that are too long. A slope that is lower beyond its interval stands: a run may meet what one step from one
-    point does not.
+    of steps that are too long. A slope that is lower beyond its interval stands, as a run may meet what one step from
+    one point does not, and refutes the order if it is clearly another.
     """
     main, measured, verdict = fitted.main, fitted.measured, order_verdict(power, fitted.main, fits)
     value, resolution = main.slope, BESIDE + main.interval
     why = f"{slopes}; {series.words(power)}" if series else slopes
     if series is not None and series.order == power and series.is_exact and verdict != "confirmed":
-        early = bool(measured) and main.slope > power and not any(_below(fit, power) for fit in fits)
-        if early or (not measured and _agree(fitted, power)):
+        early = bool(measured) and main.slope > power
+        lower = any(_below(fit, power, BESIDE) for fit in fits)
+        if (early and not lower) or (not measured and _agree(fitted, power)):
             why = f"{why} ({main.reason or 'at steps too long for a slope'})"
             defect = series.worst(power), series.least(power)
             return Finding("order", str(power), _terms(series), "confirmed", why, *defect)
+        if early and not any(_below(fit, power, CLEARLY) for fit in fits):
+            verdict = "undecided"
     if verdict == "refuted":
         why = f"the error falls with another power of the step: {why}"
     elif series is not None and series.order < min(power, series.resolved):
@@ -341,9 +346,9 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
     return Finding("order", str(power), measured, verdict, why, value, resolution)
 
 
-def _below(fit: Fit, power: int) -> bool:
-    """Is a slope lower than the order, beyond its interval?"""
-    return fit.slope + fit.interval < power - BESIDE
+def _below(fit: Fit, power: int, by: float) -> bool:
+    """Is a slope lower than the order by so much, beyond its interval?"""
+    return fit.slope + fit.interval < power - by
 
 
 def _agree(fitted: Order, power: int) -> bool:

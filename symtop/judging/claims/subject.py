@@ -33,6 +33,7 @@ from symtop.run.plugins import execute, python_file
 
 ON_BODY = ("ode", "rotation", "scipy")  # the forms of a step that are judged on a body without symmetry
 ARGUMENTS = {"ode": "(f, t, y, h)", "separable": "(state, h, dT, dV)", "rotation": "(q, w, h, inertia, torque)"}
+OWN_CHART = {"separable": "", "rotation": "attitude"}  # of forms that have no other
 LIBRARIES = (".so", ".dylib", ".dll")
 CONSTANTS = (*MOTION, "axis_length")
 KEEPING = ("splitting", "discrete-lagrangian", "lie-group")  # families that keep the momentum of a body
@@ -204,6 +205,8 @@ def open_target(
     kind = one_of("form", ("shared" if shared else "ode") if form is None else form, FORMS)
     if chart == BODY and (kind not in ON_BODY or is_solver(target)):
         raise SymtopError(f"on a body without symmetry form must be {', '.join(ON_BODY)}, not {kind}", "form")
+    if chart not in ("axis", BODY, OWN_CHART.get(kind, chart)):  # and not the default
+        raise SymtopError(f"chart must be left out with form {kind}, whose states are its own, not {chart!r}", "chart")
     if kind == "program":
         return Program(str(target), chart)
     if kind == "shared":
