@@ -65,10 +65,7 @@ def espresso(q, w, h, inertia, torque, *, fixed):
 
 
 def lammps(q, w, h, inertia, torque, *, least):
-    """Half a kick, five turns about body axes, half a kick; a moment below `least` passes for zero, and does not turn.
-
-    Miller and others, J. Chem. Phys. 116 (2002) 8649.
-    """
+    """Miller and others, J. Chem. Phys. 116 (2002) 8649; a moment below `least` passes for zero, and does not turn."""
     w = w + h / 2 * torque(q) / inertia
     for axis, share in ((2, 0.5), (1, 0.5), (0, 1.0), (1, 0.5), (2, 0.5)):
         vector = np.zeros(3)
@@ -95,10 +92,7 @@ OUTER = (146 + 5 * ROOT) / 540, (-2 + 10 * ROOT) / 135, 0.2, (-23 - 20 * ROOT) /
 
 
 def mclachlan(state, h, dT, dV, *, adjoint_first):
-    """Five times the adjoint of Euler's symplectic map and the map, of order 4; the map first is another method.
-
-    McLachlan, SIAM J. Sci. Comput. 16 (1995) 151, table 2.
-    """
+    """Five times the adjoint of Euler's symplectic map, and the map: McLachlan, SISC 16 (1995) 151, table 2."""
     theta, p = state
     for forward, adjoint in zip(OUTER, OUTER[::-1], strict=True):
         for share, kick_first in ((adjoint, False), (forward, True))[:: 1 if adjoint_first else -1]:

@@ -1,8 +1,10 @@
 """The registry: what notebooks show of it, fields that make no sense, a paragraph and sources of every method."""
 
+import pickle
 import re
 import time
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from threading import Barrier
 
 import numpy as np
@@ -23,6 +25,13 @@ def test_a_catalogue_is_a_dict_that_a_notebook_shows_as_a_table(catalogue):
     assert all(f"<td>{name}</td>" in html for name in catalogue())
     assert html.count("<tr") == len(catalogue()) + 1
     assert all(f"<td>{name}</td>" in one._repr_html_() for name, one in catalogue().items())
+
+
+def test_a_registered_one_is_pickled_by_its_name_and_no_other():
+    for own in map(symtop.integrator, ("rk4", "dop853", "strang[axis]")):
+        assert pickle.loads(pickle.dumps(own)) is own
+        with pytest.raises(TypeError, match="must be registered to be pickled"):
+            pickle.dumps(replace(own, order=7))
 
 
 def test_two_threads_that_make_the_very_first_call_together_see_every_integrator(monkeypatch):

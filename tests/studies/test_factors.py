@@ -27,10 +27,7 @@ SHORT = Goal(3.0, 1e-5, LANGUAGES, CALLS)
 
 @pytest.fixture(scope="module")
 def measured():
-    """A small factorial as the study's functions see it: two schemes at one goal, short batches.
-
-    The second process is this one, which has started.
-    """
+    """A small factorial as the study's functions see it; the second process is this one, which has started."""
     answering = iter([fresh_process.call, operator.call])
 
     def call(*asked):

@@ -9,6 +9,7 @@ maps of physics engines, family ``engine``, are run and judged by name as every 
 given, not what one would choose: `methods`, and so `variants` and every comparison, leaves them out.
 """
 
+import copyreg
 import functools
 import importlib
 import importlib.metadata
@@ -344,6 +345,17 @@ def integrator(name: "str | Integrator") -> Integrator:
     if _variants.get(name, (None,))[0] is not entry:  # none yet, or of an integrator that was replaced
         _variants[name] = entry, entry.variant(chart)
     return _variants[name][1]
+
+
+def by_its_name(method: Integrator) -> tuple[Any, ...]:
+    """How a registered one is pickled, as solvers are of their process; TypeError for any other."""
+    if integrators().get(split_name(method.name)[0]) is None or integrator(method.name) != method:
+        must = "must be registered to be pickled, and again in a process that reads it"
+        raise TypeError(f"the integrator {method.name} {must}")
+    return integrator, (method.name,)
+
+
+copyreg.pickle(Integrator, by_its_name)
 
 
 @by_name
