@@ -40,6 +40,7 @@ run spheroid cayley-tuned[axis] --step-size 0.01
 run spheroid gauss-12[axis] --step-size 0.01
 run spheroid series-adaptive[axis] --tolerance 1e-9
 run spheroid rk45-compiled --tolerance 1e-6
+run spheroid dop853-compiled-fixed --step-size 0.01
 ensemble strang --members 100 --per-nutation 100 --nutations 10 --output runs.nc
 """
 

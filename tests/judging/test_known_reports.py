@@ -4,8 +4,7 @@ Each rule is written anew from its thread, in a form that has what it needs. But
 claims, so that the mended one must be confirmed. Two faults need more than a step is given, and are tried twice:
 moments of inertia off the diagonal (`avian`), and an absolute threshold of inertia that moments near one do not reach
 (`GRAIN`). `FORESEEN` was written before anything was judged: unseen are faults in elements that are zero or below a
-threshold, one that both rules commit to the same order (`mujoco`), and a report that changed no rule. See
-`docs/engines.md`.
+threshold, one that both rules commit to the same order (`mujoco`), and a report that changed no rule.
 """
 
 import functools

@@ -322,20 +322,23 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
 
     Where the series shows the first wrong term, its order is that of the runs as h -> 0, so that a larger slope is one
     of steps that are too long. A slope that is lower beyond its interval stands, as a run may meet what one step from
-    one point does not, and refutes the order if it is clearly another.
+    one point does not, and refutes the order if it is clearly another. One that is larger and no whole number is of no
+    order at all, and refutes none.
     """
     main, measured, verdict = fitted.main, fitted.measured, order_verdict(power, fitted.main, fits)
     value, resolution = main.slope, BESIDE + main.interval
     why = f"{slopes}; {series.words(power)}" if series else slopes
-    if series is not None and series.order == power and series.is_exact and verdict != "confirmed":
-        early = bool(measured) and main.slope > power
+    shown = series is not None and series.order == power and series.is_exact
+    early = bool(measured) and main.slope > power
+    if series is not None and shown and verdict != "confirmed":
         lower = any(_below(fit, power, BESIDE) for fit in fits)
         if (early and not lower) or (not measured and _agree(fitted, power)):
             why = f"{why} ({main.reason or 'at steps too long for a slope'})"
             defect = series.worst(power), series.least(power)
             return Finding("order", str(power), _terms(series), "confirmed", why, *defect)
-        if early and not any(_below(fit, power, CLEARLY) for fit in fits):
-            verdict = "undecided"
+    if early and verdict == "refuted" and not any(_below(fit, power, CLEARLY) for fit in fits):
+        whole = abs(main.slope - round(main.slope)) <= resolution
+        verdict = "undecided" if shown or not whole else verdict
     if verdict == "refuted":
         why = f"the error falls with another power of the step: {why}"
     elif series is not None and series.order < min(power, series.resolved):
