@@ -1,7 +1,6 @@
 """The judge has to be right about methods that it was not written for: none that is right refuted, none wrong passed.
 
-`blind/right.py`, `blind/strang.c` and `blind/midpoint.awk` hold methods that are what they claim, `blind/wrong.py` and
-the other files in C such that are not, or only at the scene's own start, of its energy, in few steps and early.
+`blind/right.py`, `strang.c` and `midpoint.awk` hold methods that are what they claim, the others such that are not.
 """
 
 import shutil

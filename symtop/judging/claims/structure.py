@@ -37,7 +37,7 @@ STANDS = 0.2  # the raw defect of a symplectic map falls to 1/256 over the width
 LOST = 1e-3  # of the noise: beside a pole in angles large slopes cancel, and leave such a defect at any width
 RETURNED = 1e-10  # a return as close as this is exact
 MISSED = 1e-8
-GONE = 4096.0  # times smaller at half the step, as of order 12: no step of this
+GONE = 4096.0  # times smaller at half the step, as of order 12
 BRACKET_UNITS, RETURN_UNITS = 8.0, 64.0  # of single precision: in a difference of two steps, in a step forth and back
 ONE_MAP = 1e-9  # two steps are twice one step within this
 DRAWS, DRAWING = (8, 4), (10.0, 2.0)  # starts that are drawn, and seconds for them; the second with --quick
@@ -117,7 +117,8 @@ def _badness(one: Finding) -> tuple[int, float]:
 def _answer_at(ask: Callable[..., Answer], step: maps.StepMap, start: Angles, *traces: dict[str, Any]) -> Answer:
     """What `ask` answers at a step; at half of it where a no all but goes: its own iteration has not converged."""
     answer = ask(step, start, *traces)
-    if answer[0] is False and step.method.fixed_step:
+    falls = step.method.explicit and 2.0 ** (step.method.order or 0) >= GONE  # as fast without an iteration
+    if answer[0] is False and step.method.fixed_step and not falls:
         with contextlib.suppress(SymtopError):
             finer = ask(replace(step, h=0.5 * step.h), start)
             return finer if finer[0] and GONE * finer[1] < answer[1] else answer

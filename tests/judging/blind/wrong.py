@@ -1,7 +1,6 @@
 """Methods that are not what they claim: bugs that public codes had, and tricks; right ones are in `right`.
 
-`CLAIMS` has the claims, the line that is to name the defect, and options. The steps of the last group are what they
-claim at the scene's own start, of its energy, in few steps and early, and elsewhere are not.
+`CLAIMS` has claims, the line that is to name the defect, and options. The last steps are right at the start alone.
 """
 
 import functools
