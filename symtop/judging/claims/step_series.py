@@ -29,7 +29,7 @@ from symtop.model.top import Angles
 
 NODES = 40  # an even number: no step of length zero
 WIDEST = 0.16  # of a nutation: the largest H that is tried
-NARROWER, TRIES = 0.6, 12  # more, where a step of h is several that become one as h falls
+NARROWER, TRIES = 0.6, 7
 DEGREES = range(4, 25)
 LEAST_POWER = 6  # of the powers of h that are shown
 FURTHER = 2  # degrees more: by what they change a term is in doubt, as by the scatter
