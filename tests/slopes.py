@@ -11,10 +11,7 @@ from symtop.methods.framework.registry import Integrator
 def assert_order(
     scene: str, method: Integrator, expected: float, band: float, steps: tuple[float, float], quantity: str = "axis"
 ) -> None:
-    """The largest error falls by a power within `band` of what is expected, from at least `LEAST` points.
-
-    Over three nutations, at ten steps between two numbers of steps a nutation, where it can be judged.
-    """
+    """The largest error over three nutations falls by a power within `band`, from `LEAST` of ten steps or more."""
     chosen = symtop.scene(scene)
     settings = chosen.nutation_period / np.geomspace(*steps, 10)
     table = error_table(chosen, method, list(settings), 3.0 * chosen.nutation_period, observe=quantity)

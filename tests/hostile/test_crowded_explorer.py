@@ -76,10 +76,7 @@ def test_a_crowd_is_served_and_nothing_is_said_of_those_who_leave(crowd, count):
 
 @pytest.mark.slow
 def test_three_thousand_connections_are_refused_and_forgotten(crowd):
-    """Idle ones beyond the limit get 503, which is reported; the explorer answers while they are still open.
-
-    Those within the limit, some of whom never finish a sentence, keep nobody waiting.
-    """
+    """Idle ones beyond the limit get 503, which is reported; those within it, some unfinished, keep nobody waiting."""
     port, log, memory, _ = crowd
     assert first_line(port, b"/run", QUESTION) == GOOD
     before, began = int(memory.read_text().split()[1]), time.monotonic()

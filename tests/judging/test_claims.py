@@ -32,6 +32,7 @@ from symtop.methods.framework.registry import Integrator, integrator
 from symtop.methods.splitting import composition
 from symtop.model import charts
 from symtop.model.scenes import body_scenes, scene
+from symtop.run.ensemble.bodies import body_population, scenes_of
 from symtop.run.simulation import integrate
 from tests.commands import answer, call, ended, symtop as command
 from tests.conftest import random_scenes
@@ -422,6 +423,12 @@ def test_what_methods_claim_on_a_body_holds(name: str, energy: str, momentum: st
         ledger = judge(symtop.integrator(name), free_or_heavy, quick=True)
         assert (ledger.refuted, ledger["order"].verdict) == ([], "confirmed")
         assert (ledger["energy"].measured.kind, ledger["momentum"].measured.kind) == (energy, momentum)
+
+
+def test_a_needle_is_stepped_by_its_turns_and_a_slow_part_of_a_motion_is_no_growth() -> None:
+    drawn = {one.name: one for one in scenes_of(body_population(8, seed=3))}
+    for name, on in (("strang", "needle-0"), ("euler-poincare", "near-symmetric-0")):
+        assert judge(integrator(name), drawn[on], quick=True)["energy"].verdict == "confirmed"
 
 
 def test_false_claims_on_a_body_are_refuted() -> None:

@@ -77,10 +77,7 @@ def test_bounds_hold_on_random_tops_and_are_tight(precision, count, seed):
 
 @pytest.mark.parametrize("name", ["spheroid", "goldstein", "fast", "cusp"])
 def test_the_bound_of_the_closed_form_holds_the_rounding_and_the_rates(name):
-    """Twice what `benchmarks/accuracy.py` finds; the error of a rate times the time and the angular velocity.
-
-    And no more than ten times that: a bound is of use.
-    """
+    """Twice what `benchmarks/accuracy.py` finds, and at most ten times; of a rate, times time and angular velocity."""
     scene, times = symtop.scene(name), np.array([0.0, 1e14])
     motion = scenes.closed_form(scene)(np.linspace(0.0, scene.nutation_period, 400))
     across = motion.phi_dot * np.sin(motion.theta)

@@ -71,10 +71,7 @@ def decay(rate):
       for horizon, step in ((1.0, 0.3), (1.0, 0.4), (2.0, 0.32), (1.0, 0.21))),
 ])  # fmt: skip
 def test_an_error_is_forecast_within_a_factor_of_three(f, y0, horizon, name, control, causes):
-    """In a transient, too: of exp(-1000 t) nothing is left at the first of even times.
-
-    And of one that grows beyond the motion: exp(-30 t) ends at 7e13 where h = 0.1.
-    """
+    """In a transient, too: nothing is left of exp(-1000 t) at the first of even times; exp(-30 t) ends at 7e13."""
     expected = symtop.guard(f, 0.0, y0, horizon, name, **control)
     assert 1.0 / 3.0 < expected.error / measured(f, y0, horizon, name, **control) < 3.0
     assert causes is None or expected.cause in causes
