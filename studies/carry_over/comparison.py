@@ -114,7 +114,10 @@ def bootstrap_tau(
     a, b = first.values[rows[0]], second.values[rows[1]]
     value = tau_of(medians(a[:, bodies]), medians(b[:, others]))
     generator, taus = np.random.default_rng(4), [] if draws else [float("nan")]
-    price = factors(first.errors[rows[0]], DRAWS), factors(second.errors[rows[1]], DRAWS)
+    price = (factors(first.errors[rows[0]], DRAWS),) * 2  # the same methods have the same prices
+    if first.names != second.names:
+        both_errors = np.append(first.errors[rows[0]], second.errors[rows[1]])
+        price = factors(both_errors, DRAWS)[:, : len(rows[0])], factors(both_errors, DRAWS)[:, len(rows[0]) :]
     both = np.intersect1d(bodies, others)
     for k in range(draws):
         if paired:

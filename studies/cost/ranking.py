@@ -8,13 +8,15 @@
     safe       the cost at the one setting with which `SAFE` of the tops meet the error
 
 A hit that a finer setting misses is luck and no hit. Intervals hold the draw of the tops and the prices: a bootstrap
-draws tops with replacement and each variant's price from a log-normal distribution of its relative error. The setting
-that serves `SAFE` of n tops is an order statistic: of resampled tops it is that of a rank from Beta(k, n - k + 1),
-k = SAFE n, the same for all variants, because the hard tops are hard for all of them. A lead is called if `SURE` of the
-draws have it. Sources: Efron and Tibshirani, An Introduction to the Bootstrap (1993); run-length distributions: Hoos
-and Stuetzle, J. Autom. Reasoning 24 (2000) 421.
+draws tops with replacement, the same for all variants, and each variant's price from a log-normal distribution of its
+relative error. One more top is drawn with the n that were run, of which nothing is known: any variant may win it, and
+no setting serves it. So a share of 1 has an interval, and neither a lead on a few tops nor an upper end of what serves
+`SAFE` of fewer than some 70 is certain. A lead is called if `SURE` of the draws have it. Sources: Efron and Tibshirani,
+An Introduction to the Bootstrap (1993); run-length distributions: Hoos and Stuetzle, J. Autom. Reasoning 24
+(2000) 421.
 """
 
+import functools
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -81,6 +83,12 @@ def factors(errors: Array, draws: int = DRAWS) -> Array:
     return np.asarray(np.exp(errors * normal))
 
 
+@functools.cache
+def drawn(n: int) -> NDArray[np.int64]:
+    """How often each of n tops is drawn, and in the last place the one of which nothing is known, (`DRAWS`, n + 1)."""
+    return np.random.default_rng(2).multinomial(n + 1, np.full(n + 1, 1.0 / (n + 1)), size=DRAWS)
+
+
 class Standing(NamedTuple):
     """How a variant does in a cell, in hindsight: the best setting for each top."""
 
@@ -119,12 +127,13 @@ def hindsight(names: Sequence[str], costs: Array, errors: Array, marked: Sequenc
     ratio = slowdowns(costs[:, solved])
     won, level = wins(ratio)
     near = np.flatnonzero((ratio < CLOSE).any(axis=1))
-    weights = np.random.default_rng(2).multinomial(int(solved.sum()), np.full(int(solved.sum()), 1.0 / solved.sum()),
-                                                   size=DRAWS)  # fmt: skip
+    weights, total = drawn(int(solved.sum())), solved.sum() + 1
+    lucky = np.random.default_rng(3).integers(len(names), size=DRAWS)
     shares = np.zeros((DRAWS, len(names)))
     for draw, factor in enumerate(factors(errors)):
         each, _ = wins(ratio[near] * factor[near, np.newaxis])
-        shares[draw, near] = each @ weights[draw] / solved.sum()
+        shares[draw, near] = each @ weights[draw, :-1] / total
+        shares[draw, lucky[draw]] += weights[draw, -1] / total
     middle, half = won.mean(axis=1), level.mean(axis=1)
     low, high = np.quantile(shares, ENDS, axis=0)
     order = np.lexsort((-half, -middle))
@@ -157,24 +166,29 @@ class Safe(NamedTuple):
     high: float
 
 
+def _rank(n: int) -> int:
+    """How many of n are at least `SAFE` of them."""
+    return math.ceil(SAFE * n - 1e-9)
+
+
 def safe(ladders: Sequence[Ladder], marked: Sequence[str] = ()) -> tuple[list[Safe], bool]:
     """The safe choices of all variants, cheapest first, and whether the lead of the first is called."""
     factor = factors(np.array([one.error for one in ladders]))
     answers, draws = [], []
     for one, prices in zip(ladders, factor.T, strict=True):
         fine = np.log(np.where(one.met_at > 0.0, one.met_at, np.inf)) * (1.0 if one.fixed else -1.0)
-        fine = np.sort(np.where(np.isfinite(one.met_at) & (one.met_at > 0.0), fine, np.inf))
-        n = fine.size
-        k = math.ceil(SAFE * n - 1e-9)
-        ranks = np.random.default_rng(3).beta(k, n - k + 1, DRAWS) if n else np.zeros(DRAWS)
-        chosen = np.append(fine[max(k, 1) - 1], fine[np.minimum((ranks * n).astype(int), n - 1)]) if n else [np.inf]
+        fine = np.where(np.isfinite(one.met_at) & (one.met_at > 0.0), fine, np.inf)
+        by_setting, n = np.argsort(fine), fine.size
+        many = drawn(n)[:, np.append(by_setting, n)].cumsum(axis=1) >= _rank(n + 1)
+        fine = np.append(fine[by_setting], np.inf)
+        chosen = np.append(fine[max(_rank(n), 1) - 1], fine[many.argmax(axis=1)])
         there = np.isfinite(one.seconds) & np.isfinite(one.settings)
         x = np.log(one.settings[there]) * (1.0 if one.fixed else -1.0)
         costs = np.full(len(chosen), np.inf)
         if there.any():
             within = np.isfinite(chosen) & (chosen <= x[-1] + 1e-9)
             costs[within] = np.exp(np.interp(np.asarray(chosen)[within], x, np.log(one.seconds[there])))
-        sample = costs[1:] * prices if len(costs) > 1 else np.full(DRAWS, np.inf)
+        sample = costs[1:] * prices
         setting = math.exp(chosen[0] if one.fixed else -chosen[0]) if np.isfinite(costs[0]) else math.inf
         ends = np.quantile(sample, ENDS, method="nearest")
         answers.append(Safe(one.name, setting, float(costs[0]), float(ends[0]), float(ends[1])))

@@ -153,8 +153,8 @@ def long(
     """Run one INTEGRATOR on one SCENE for very many steps, in little memory.
 
     The run is cut into windows, and the output holds the least, largest and mean change of the energy and the momenta
-    in each, and as what power of the time their sizes grow. A checkpoint is written as it goes: the same command
-    resumes a run that was interrupted.
+    in each, and as what power of the time their sizes grow over the last 2.5 decades: one random walk, as of rounding,
+    shows 0.2 to 0.8. A checkpoint is written as it goes: the same command resumes a run that was interrupted.
 
     \b
     symtop long spheroid stormer-verlet --steps 1e9 --output long.nc
@@ -189,7 +189,7 @@ def long(
             least, most, mean = (data[f"{name}_{kind}"].values for kind in ("least", "largest", "mean"))
             sizes = np.maximum.accumulate(np.maximum(np.abs(least), np.abs(most)))
             fit = power_law(steps_made, sizes, steps_made > steps_made[-1] / 10.0**DECADES)
-            grows = f"t^({fit})" if math.isfinite(fit.slope) else ""
+            grows = f"t^{abs(fit.slope):.2f}" if math.isfinite(fit.slope) else ""  # sizes so far depend on each other
             words = "|L|" if name == "momentum" else name
             rows.append([words, *(f"{float(value):+.3e}" for value in (least.min(), most.max(), mean[-1])), grows])
         click.echo(table(["change since the start", "least", "largest", "last window's mean", "grows as"], rows))

@@ -12,6 +12,10 @@ An exponent of error ~ t^alpha is the least-squares slope of the logarithm of th
     means   bounded   random walk (rounding     steady drift (phase of   phase under a random       phase under a steady
                       at its best)              a symplectic method)     walk of the energy         drift of the energy
 
+The interval of the exponent takes the windows as independent. The largest values of one random walk are not: its own
+exponent, 0.5, lies within in 69 % of 400 walks of 4000 samples, which spread by 0.17, and 3/2 of a walk's sum in 48 %.
+Of walks that are not kept 84 % are called a random walk by `behaviour`, 10 % a drift, 6 % bounded.
+
 In the angles chart p_phi and p_psi are parameters of a state. What the trajectory itself says of them are its rates,
 
     p_psi = I3 (psi' + phi' cos theta),    p_phi = I1 phi' sin^2 theta + p_psi cos theta,

@@ -11,7 +11,7 @@ import xarray as xr
 import symtop
 from symtop.measure import datasets
 from symtop.measure.accuracy import error_table
-from symtop.measure.conservation import from_increments, growth, momenta_of, residuals, trend
+from symtop.measure.conservation import behaviour, from_increments, growth, momenta_of, residuals, trend
 from symtop.measure.order import order
 from symtop.measure.published import OTHER_BODY, START, TRAJECTORY, published_values
 from symtop.measure.settings import ladder
@@ -29,8 +29,7 @@ STEPS = 0.1 / 1.5 ** np.arange(16)
 
 def test_an_exact_power_is_found_and_stray_points_are_left_out():
     fit = order(STEPS, 3.0 * STEPS**2, 1e-16, 1.0)
-    assert fit.slope == pytest.approx(2.0, abs=1e-12)
-    assert fit.constant == pytest.approx(3.0, rel=1e-12)
+    assert (fit.slope, fit.constant) == (pytest.approx(2.0, abs=1e-12), pytest.approx(3.0, rel=1e-12))
     floor = 1e-7
     noisy = 3.0 * STEPS**2 + floor * np.array([0.9, -0.9] * 8)  # an error of the reference's own size
     masked = order(STEPS, noisy, floor, 1.0)
@@ -50,23 +49,23 @@ def test_an_exact_power_is_found_and_stray_points_are_left_out():
 ])  # fmt: skip
 def test_what_is_not_a_power_of_the_step_is_not_judged_and_says_why(error, reason):
     fit = order(STEPS, error, 1e-15, 1.0)
-    assert math.isnan(fit.slope)
-    assert reason in fit.reason
+    assert (math.isnan(fit.slope), reason in fit.reason) == (True, True)
     assert not fit.used[np.isnan(error)].any()
 
 
 def test_false_alarms_of_the_trend_are_as_rare_as_it_says():
     rng, t = np.random.default_rng(3), np.linspace(0.0, 1000.0, 2001)
     noise = [trend(t, rng.normal(size=t.size)).significant for _ in range(200)]
-    walks = [trend(t, np.cumsum(rng.normal(size=t.size))).significant for _ in range(200)]
+    walks = [np.cumsum(rng.normal(size=t.size)) for _ in range(200)]
     waves = [trend(t, np.sin(0.0314 * k * t)).significant for k in range(1, 60)]
     assert np.mean(noise) < 0.09
-    assert np.mean(walks) < 0.45
+    assert np.mean([trend(t, walk).significant for walk in walks]) < 0.45
+    words = [behaviour(1e-11, *growth(t, walk)[:2], rounding=1e-12) for walk in walks]
+    assert (words.count("random walk") > 150, words.count("drift") < 35) == (True, True)  # of 200
     assert np.mean(waves) < 0.05
     assert trend(t, rng.normal(size=t.size) + 0.005 * t).significant
     drifting = trend(t, np.sin(5.3 * t) + 1e-3 * t)  # by less than it oscillates
-    assert drifting.significant
-    assert drifting.rise == pytest.approx(1.0, rel=0.3)
+    assert (drifting.significant, drifting.rise) == (True, pytest.approx(1.0, rel=0.3))
 
 
 def test_a_table_stops_after_too_much_work_and_ladders_end():

@@ -175,20 +175,21 @@ def costs_of(medians, bodies=60, seed=0):
 def test_a_planted_difference_of_rankings_is_seen_and_scatter_is_none_nor_prices_of_what_is_not_reached():
     medians, rows = 1e-6 * 1.6 ** np.arange(20), ([*range(20)],) * 2
     same = by.bootstrap_tau(costs_of(medians), costs_of(3.0 * medians, seed=1), rows, paired=False)
-    assert by.ranking_verdict(same) == by.YES
     mixed = medians.copy()
     mixed[[0, 5, 10, 15]] = mixed[[15, 0, 5, 10]]
     partly = by.bootstrap_tau(costs_of(medians), costs_of(mixed, seed=1), rows, paired=True)
-    assert by.ranking_verdict(partly) == by.NO
+    assert (by.ranking_verdict(same), by.ranking_verdict(partly)) == (by.YES, by.NO)
     assert partly.low <= partly.value <= partly.high < same.low
-    turned = by.bootstrap_tau(costs_of(medians), costs_of(medians[::-1], seed=1), rows, paired=True)
-    assert turned.value < -0.9
+    assert by.bootstrap_tau(costs_of(medians), costs_of(medians[::-1], seed=1), rows, paired=True).value < -0.9
     half = np.where(np.arange(20) < 10, medians, np.inf)
     first, second = costs_of(half), costs_of(np.roll(half, 5), seed=1)
     free, noisy = (by.bootstrap_tau(*(one._replace(errors=np.full(20, error)) for one in (first, second)), rows,
                                     paired=True) for error in (0.0, 0.02))  # fmt: skip
     assert free.low <= free.value <= free.high
     assert (noisy.low, noisy.high) == pytest.approx((free.low, free.high), abs=0.02)
+    one = costs_of(np.ones(20))._replace(errors=np.full(20, 5.0))  # prices alone rank them
+    same, apart = (by.bootstrap_tau(one, two, rows, paired=True) for two in (one, one._replace(names=one.names[::-1])))
+    assert apart.low < -0.1 < apart.high < 0.6 < same.low
 
 
 @pytest.mark.parametrize(("beyond", "verdict"), [(0, by.FACTOR), (1, by.FACTOR), (2, by.PARTLY)])
