@@ -11,13 +11,17 @@ import signal
 import sys
 import threading
 
-from symtop.cli.main import main
-from symtop.core.parallel import VARIABLES
-from symtop.core.signals import UNREAD
-
 
 def run(name: str | None = None) -> None:
     """Run the command line of this process, which is shown as `name`, and end it with its exit code."""
+    if heard := signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C during imports has no traceback
+    from symtop.cli.main import main
+    from symtop.core.parallel import VARIABLES
+    from symtop.core.signals import UNREAD
+
+    if heard:
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     os.environ.update({name: "1" for name in VARIABLES if name not in os.environ})  # before NumPy reads them
     try:
         main(prog_name=name)

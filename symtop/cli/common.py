@@ -210,7 +210,10 @@ class Group(click.Group):
                 sys.stdout = None  # its reader has left
                 ctx.exit(UNREAD)
             if error.filename is None:
-                raise
+                if error.errno != errno.ENOENT:
+                    raise
+                warn("the folder that this command runs in is no longer there: change to another")
+                ctx.exit(2)
             name = str(error.filename)
             warn(f"cannot use {name[:LONGEST_NAME]}{'...' if name[LONGEST_NAME:] else ''}: {error.strerror}")
             ctx.exit(2)

@@ -104,7 +104,8 @@ class Process:
         self.output = tempfile.TemporaryFile()  # noqa: SIM115  (closed with the process)
         self.process = context.Process(target=_serve, args=(self.make, self.pipe, theirs, self.output), daemon=True)
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # newer versions of Python warn of threads; the child uses none of theirs
+            # Newer versions of Python warn of threads; the child uses none of theirs. Filters belong to all threads
+            warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
             heartbeat.inside = False
             self.process.start()
         theirs.close()

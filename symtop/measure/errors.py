@@ -20,7 +20,8 @@ psi the same; theta and phi the axis; an axis shows theta. Vectors that are not 
 import contextlib
 import json
 import warnings
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -114,9 +115,14 @@ def errors(
     one_of("precision", precision, PRECISIONS)
     if isinstance(run, xr.Dataset) and "member" in run.dims and not isinstance(scene, (str, Scene, type(None))):
         return _of_members(run, scene, precision)
+    return _of_run(run, scene, precision, partial(warnings.warn, category=SymtopWarning, stacklevel=3))
+
+
+def _of_run(run: Any, scene: Any, precision: str, warn: Callable[[str], object]) -> xr.Dataset:
+    """The errors of one run or trajectory; `warn` is handed what is doubtful."""
     foreign = scene is not None and "integrator" not in getattr(run, "attrs", {})
     run = sampled(run) if isinstance(run, xr.Dataset) else run
-    chosen = scene_of(run) if scene is None else find_scene(scene, bodies=True)  # type: ignore[arg-type]
+    chosen = scene_of(run) if scene is None else find_scene(scene, bodies=True)
     refuse_other_scene(run, chosen)
     data = checked(run) if foreign else Trajectory.of_data(run)
     truth = reference(chosen, data.time, precision)
@@ -130,7 +136,7 @@ def errors(
     sure = scene is None or _stored(run, "start") is not None
     doubtful = [] if sure else elsewhere(data.time, columns)
     for sentence in [*doubtful, *(doubts(data.time, columns, chosen.horizon) if foreign else ())]:
-        warnings.warn(f"on {chosen.name}: {sentence}", SymtopWarning, stacklevel=2)
+        warn(f"on {chosen.name}: {sentence}")
     bounds = {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns}
     shown = dataset(data.time, columns | bounds, chosen.units)
     for name in columns:
@@ -150,15 +156,13 @@ def _of_members(runs: xr.Dataset, members: Any, precision: str) -> xr.Dataset:
     """The errors of every member, as alone; a warning that several have comes once, with their number."""
     given, n = read_members(members), runs.sizes["member"]
     refuse_others(given, runs)
-    tables = []
-    with warnings.catch_warnings(record=True) as doubtful:
-        warnings.simplefilter("always")
-        for i, (top, start) in enumerate(members_of(given.numbers)):
-            one = runs.isel(member=i)
-            end = float(one["horizon"]) if "horizon" in one else float(np.nanmax(one["time"].values))
-            tables.append(errors(one, Scene(f"member-{i}", top, start, end), precision=precision))
+    tables, doubtful = [], list[str]()  # collected so, for a record of warnings takes those of other threads, too
+    for i, (top, start) in enumerate(members_of(given.numbers)):
+        one = runs.isel(member=i)
+        end = float(one["horizon"]) if "horizon" in one else float(np.nanmax(one["time"].values))
+        tables.append(_of_run(one, Scene(f"member-{i}", top, start, end), precision, doubtful.append))
     if doubtful:
-        words = f"{len(doubtful)} warnings on members, the first: {doubtful[0].message}"
+        words = f"{len(doubtful)} warnings on members, the first: {doubtful[0]}"
         warnings.warn(words, SymtopWarning, stacklevel=3)
     columns = {}
     for name in ("time", *tables[0].data_vars):

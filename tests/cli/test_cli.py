@@ -154,13 +154,12 @@ def test_a_variant_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_pa
 def test_the_shell_completes_names(line, completion):
     words = line.split()
     environment = {"_SYMTOP_COMPLETE": "bash_complete", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
-    result = CliRunner().invoke(main, prog_name="symtop", env=environment)
-    assert f"plain,{completion}" in result.output
+    assert f"plain,{completion}" in CliRunner().invoke(main, prog_name="symtop", env=environment).output
 
 
 ENDING = """
 import atexit, os, sys, threading, time
-import symtop.cli.__main__ as command
+import symtop.cli.__main__ as command, symtop.cli.main
 
 class Heavy:
     def __del__(self, write=os.write):
@@ -175,10 +174,13 @@ def main(**_):
     {before}
     sys.exit({code})
 
-command.kept, command.main = Heavy(), main
+command.kept, sys.modules["symtop.cli.main"].main = Heavy(), main
 atexit.register(print, "what was registered")
 command.run()
 """
+EARLY = """import signal, sys; from types import SimpleNamespace as Hook
+sys.meta_path.insert(0, Hook(find_spec=lambda name, *_: signal.raise_signal(2) if name == "symtop.cli.main" else None))
+from symtop.cli.__main__ import run; run()"""
 
 
 def ending(before="", code="3"):
@@ -208,6 +210,12 @@ def test_a_stream_that_was_closed_or_a_reader_that_leaves_is_no_case_that_has_fa
     assert "Traceback" not in result.stderr
 
 
+def test_a_command_in_a_folder_that_was_removed_says_so(tmp_path):
+    line = f"cd {tmp_path}; rmdir {tmp_path}; exec {sys.executable} -m symtop.cli run spheroid exact -o run.nc"
+    result = subprocess.run(["/bin/sh", "-c", line], capture_output=True, text=True, timeout=60, check=False)
+    assert (result.returncode, result.stderr.count("\n"), "no longer there" in result.stderr) == (2, 1, True)
+
+
 def test_a_command_ends_with_its_code_takes_nothing_apart_and_waits_for_threads():
     result = ending()
     assert (result.returncode, result.stdout, result.stderr) == (3, "the answer\nwhat was registered\n", "")
@@ -217,6 +225,8 @@ def test_a_command_ends_with_its_code_takes_nothing_apart_and_waits_for_threads(
     assert result.returncode == 3
     result = ending(before="threading.Timer(0.3, os.kill, (os.getpid(), 2)).start()")  # Ctrl-C, while it waits
     assert (result.returncode, result.stderr) == (-signal.SIGINT, "")
+    result = subprocess.run([sys.executable, "-c", EARLY], capture_output=True, text=True, timeout=60, check=False)
+    assert (result.returncode, result.stderr) == (-signal.SIGINT, "")  # while modules are imported
     result = ending(code="'a text'")
     assert (result.returncode, result.stderr) == (1, "a text\n")
 
@@ -239,8 +249,7 @@ def test_a_list_fits_the_terminal_and_names_every_entry(command, entries):
     for columns in (80, 120):
         lines = call(*command, COLUMNS=str(columns)).output.splitlines()
         assert max(map(len, lines)) <= columns
-        names = {line.split(" ")[0] for line in lines}
-        assert names >= set(entries())
+        assert (names := {line.split(" ")[0] for line in lines}) >= set(entries())
         assert ("mujoco-euler" in names, "strang" in names) == (entries is engines, entries is methods)
     assert max(map(len, call(*command, "--wide", COLUMNS="80").output.splitlines())) > 80
 
@@ -248,8 +257,7 @@ def test_a_list_fits_the_terminal_and_names_every_entry(command, entries):
 @pytest.mark.parametrize(("scene", "name"), [("spheroid", "strang"), ("goldstein", "gauss-4"), ("simo-wong", "rk4")])
 def test_a_run_cites_the_sources_of_its_method_and_of_its_scene(tmp_path, scene, name):
     data = symtop.simulate(scene, name, step_size=0.01, horizon=0.1)
-    file = netcdf.write(data, tmp_path / "run.nc")
-    text = call("cite", file, file).stdout
+    text = call("cite", file := netcdf.write(data, tmp_path / "run.nc"), file).stdout
     keys = citation_keys(symtop.integrator(name)), citation_keys(symtop.scene(scene))
     sources = {*keys[0], *keys[1]}
     assert (len(keys[0]) > 0, len(keys[1])) == (True, int(scene != "spheroid"))

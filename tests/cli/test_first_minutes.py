@@ -46,8 +46,7 @@ def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(axis_only, 
     assert data.sizes["scene"] > 1
     assert not (tmp_path / "quick" / "convergence.nc").exists()
     assert {file.suffix for file in (tmp_path / "quick" / "only" / "figures").iterdir()} == {".png"}  # no PDF to print
-    state = call(*words, "--status")
-    assert state.output.strip() == f"convergence: {lines[0].split()[1]} done"
+    assert call(*words, "--status").output.strip() == f"convergence: {lines[0].split()[1]} done"
     call("report", "--results", tmp_path / "quick" / "only", "--plugin", axis_only)
     page = (tmp_path / "quick" / "only" / "report.html").read_text(encoding="utf-8")
     assert "on-the-axis" in page

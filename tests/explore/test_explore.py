@@ -131,8 +131,7 @@ def test_the_page_says_in_which_chart_a_method_runs_and_a_row_runs_in_its_own():
 def test_the_script_makes_the_same_dataset_to_the_bit(method, scene, changes, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
     chosen = answers.setup(fields(scene, method, **changes))
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", SymtopWarning)  # the guard's, which the page has shown
+    with warnings.catch_warnings(action="ignore", category=SymtopWarning):  # the guard's, which the page has shown
         exec(compile(answers.script(chosen), "explored.py", "exec"), {})
     assert netcdf.read(tmp_path / "explored.nc").equals(answers.dataset(chosen, str))
     assert "reached t = 70" in capsys.readouterr().out

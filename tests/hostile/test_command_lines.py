@@ -102,8 +102,7 @@ def test_every_bad_command_line_is_one_sentence(name, folder, monkeypatch):
     above = sorted(path.name for path in folder.parent.iterdir())
     faults = []
     for words in lines(name):
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
+        with warnings.catch_warnings(action="ignore"):
             result = call(*words, code=None)
         option = next((word.split("=")[0] for word in reversed(words) if word.startswith("--")), "")
         messages = [line for line in result.output.splitlines() if line.startswith(("symtop: ", "Error: "))]

@@ -95,8 +95,7 @@ def test_a_damaged_checkpoint_is_not_gone_on_from(tmp_path, monkeypatch, flips):
         restarts = refused = 0
         for _ in range(flips):
             whole = flipped(book.file, draw)
-            with warnings.catch_warnings(record=True) as record:
-                warnings.simplefilter("always")
+            with warnings.catch_warnings(record=True, action="always") as record:
                 try:
                     at, rows = book.resumed(start)
                 except symtop.SymtopError as error:

@@ -166,8 +166,7 @@ COST = {"judge", "recommend", "compare"}  # seconds for every value that is take
 def came(function, arguments):
     """What a call ends in: "" if it returns, the sentence of a SymtopError, or an assertion."""
     began = time.process_time()
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", symtop.SymtopWarning)
+    with warnings.catch_warnings(action="ignore", category=symtop.SymtopWarning):
         try:
             function(**arguments)
             return ""

@@ -1,6 +1,7 @@
 """`symtop.errors`: the errors of a run and of anybody's trajectory, with controls that must and must not show one."""
 
 import warnings
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -200,11 +201,9 @@ def test_another_unit_of_time_is_asked_about():
     horizon = symtop.scene("spheroid").horizon
     for times, doubtful in ((np.linspace(0.0, 1e3 * horizon, 41), True), (np.linspace(0.0, 50 * horizon, 41), False)):
         data = {"time": times, "quaternion": reference("spheroid", times)["quaternion"].values}
-        with warnings.catch_warnings(record=True) as caught:
-            warnings.simplefilter("always")
+        with warnings.catch_warnings(record=True, action="always") as caught:
             symtop.errors(data, "spheroid")
-        sentences = [str(one.message) for one in caught]
-        assert [("are they in the scene's unit of time" in one) for one in sentences] == [True] * doubtful
+        assert [("are they in the scene's unit of time" in str(one.message)) for one in caught] == [True] * doubtful
 
 
 def test_errors_of_an_ensemble_are_those_of_its_members_and_other_members_are_refused():
@@ -234,6 +233,10 @@ def test_errors_of_an_ensemble_are_those_of_its_members_and_other_members_are_re
     with pytest.warns(symtop.SymtopWarning, match="is this the start of the scene"):
         symtop.errors(many.drop_vars("stratum"), symtop.population(4, seed=2))
     with warnings.catch_warnings():
+        before, shown_by = [*warnings.filters], warnings._showwarnmsg_impl
+        with ThreadPoolExecutor(4) as threads:  # a record of warnings takes those of other threads, and may keep them
+            list(threads.map(lambda _: symtop.errors(many, drawn), range(12)))
+        assert (warnings.filters, warnings._showwarnmsg_impl) == (before, shown_by)
         warnings.simplefilter("error")
         wrong = symtop.errors(many, drawn)
         turned = many.sel(component=["z", "x", "y"]).transpose()  # read by its labels

@@ -355,8 +355,7 @@ def test_distances_from_an_axis_are_those_of_the_chart(implementation):
     far = charts.axis_distance(-axes, axes)
     np.testing.assert_allclose(closed_form.distances(forms.constants, TIMES[None, 1:4], -axes), far, atol=1e-15)
     pair = _pairs(1)[0]
-    alone = ClosedForm(*pair).axis_distance(TIMES[1:4], states[0, :, :3])
-    assert alone.tobytes() == gap[0].tobytes()
+    assert ClosedForm(*pair).axis_distance(TIMES[1:4], states[0, :, :3]).tobytes() == gap[0].tobytes()
 
 
 def test_members_momenta_and_threads():

@@ -230,8 +230,7 @@ def test_what_is_lost_in_chaos_is_not_a_number_and_a_run_that_is_too_long_ends_a
     assert np.isnan(np.hstack([motion.quaternion, motion.momentum])[after]).all()
     assert np.isfinite(motion.quaternion[~after]).all()
     assert motion.bound[~after].max() <= heavy_body.ACCURACY
-    strict = body.samples(times, accuracy=1e-13).lost(times)
-    assert strict < lost
+    assert body.samples(times, accuracy=1e-13).lost(times) < lost
     assert body.samples(times[:5]).lost(times[:5]) is None
     assert body.samples(-times).lost(-times) < 0.0
     assert np.array_equal(body.samples([0.0]).quaternion, [START])

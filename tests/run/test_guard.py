@@ -54,8 +54,7 @@ def test_a_bad_run_is_the_same_run_with_a_warning():
     assert "\n" not in str(caught[0].message)
     assert caught[0].filename == __file__  # the line that the user wrote
     assert watched.attrs.pop("guard") == str(caught[0].message)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         quiet = symtop.simulate("spheroid", "midpoint", guard=False, **controls)
     del quiet.attrs["guard"]
     assert watched.identical(quiet)
@@ -290,8 +289,7 @@ def test_the_guard_without_the_truth_is_asked_for_by_its_name():
     controls = {"step_size": 0.1, "samples": 11, "guard": "series"}
     with pytest.warns(symtop.SymtopWarning, match="expect an axis error.* 1/8.86 of a natural period"):
         symtop.simulate("spheroid", "midpoint", **controls)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         symtop.simulate("spheroid", "gauss-4", **controls | {"step_size": 0.01})
     with pytest.raises(symtop.SymtopError, match="guard 'closed' is unknown; known: exact, series"):
         symtop.simulate("spheroid", "midpoint", **controls | {"guard": "closed"})

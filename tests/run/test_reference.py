@@ -249,8 +249,7 @@ def test_without_heyoka_the_closed_form_stands_in_and_says_so(monkeypatch, cache
         data = symtop.reference("spheroid", [1.0, 2.0, 7.77], "longdouble")
     assert (data.attrs["precision"], data.attrs["asked_for"]) == ("closed-form", "longdouble")
     assert np.all(data["theta_error_bound"] < 1e-13)
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
+    with warnings.catch_warnings(action="error"):
         symtop.reference("spheroid", [1.0])
     with pytest.warns(symtop.SymtopWarning, match="is certified without an integration"):
         data = symtop.reference("spheroid", [1.0], certify="integration")
