@@ -147,6 +147,7 @@ def _serve(make: Callable[[], Table], asking: Any, pipe: Any, output: Any) -> No
         os.dup2(output.fileno(), stream)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     faulthandler.disable()  # a crash is reported by the one that waits
+    warnings.simplefilter("ignore")  # what a step warns of, as a step that blows up does, is no answer
     table: Table = {}
     while True:
         try:
