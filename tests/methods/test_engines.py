@@ -47,6 +47,7 @@ def one_step(name, scene, h, chart="attitude"):
     return solve(symtop.integrator(name), chart, scene.top, scene.start, Plan.steps(h, [1])).states[-1]
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize(("name", "value"), AXIS_ERROR.items())
 def test_the_reference_values(name, value):
     """Five digits tell an exponential from a linear rotation: the latter has 1.5716 without a gyroscopic term."""

@@ -103,6 +103,7 @@ def test_an_iteration_that_wanders_off_ends_as_with_the_sines_of_the_library(fam
     assert sum(one != other for one, other in ends) <= 4
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", IN_ANGLES)
 def test_a_nan_stays_one(name):
     solver = inside(symtop.integrator(name).solvers["angles"])

@@ -142,6 +142,7 @@ def test_no_paragraph_names_another_order_or_another_property_than_the_record(na
         assert quantity in about
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", [name for name in DESCRIBED if symtop.integrator(name).control == "step_size"])
 def test_no_paragraph_names_another_cost_than_the_one_that_is_counted(name):
     method = symtop.integrator(name)

@@ -205,6 +205,7 @@ def test_an_infinite_budget_ends_no_run(row):
     np.testing.assert_array_equal(free.states, bound.states)
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("name", SOLVERS)
 def test_a_budget_is_passed_by_less_than_a_step(name):
     numbers, tolerance, times, _ = members(20)
