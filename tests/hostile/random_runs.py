@@ -181,10 +181,7 @@ HOSTILE = {  # drawn from by seeds below zero
 
 
 def draw_run(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outcome:
-    """What run k does: 1 to 500 steps a nutation or a tolerance of 0.1 to 1e-13, over 1 to 1000 nutations.
-
-    Tests know runs by numbers, which draw the same `without` the methods that came after them.
-    """
+    """Run k, known to tests by number `without` later methods: 1 to 500 steps a nutation or a tolerance, to 1000 of them."""
     draw = random.Random(f"{seed}/{k}")
     kinds = KINDS if seed >= 0 else HOSTILE
     kind = draw.choice([*kinds])

@@ -1,6 +1,6 @@
 """Every argument of every public function, every kind of bad value: `SymtopError` in one sentence, or a result.
 
-Values that cannot be meant must be refused; of the others (`ANY`) comes at once no other error than a SymtopError.
+Values that cannot be meant are refused; of others (`ANY`) comes at once a result or a SymtopError.
 """
 
 import datetime

@@ -347,15 +347,13 @@ def integrator(name: "str | Integrator") -> Integrator:
     return _variants[name][1]
 
 
-def by_its_name(method: Integrator) -> tuple[Any, ...]:
-    """How a registered one is pickled, as solvers are of their process; TypeError for any other."""
-    if integrators().get(split_name(method.name)[0]) is None or integrator(method.name) != method:
-        must = "must be registered to be pickled, and again in a process that reads it"
-        raise TypeError(f"the integrator {method.name} {must}")
-    return integrator, (method.name,)
+def _reduced(method: Integrator) -> Any:
+    """A registered one is pickled by its name, as solvers are of their process; any other is copied field by field."""
+    registered = split_name(method.name)[0] in integrators() and integrator(method.name) == method
+    return (integrator, (method.name,)) if registered else object.__reduce_ex__(method, 2)
 
 
-copyreg.pickle(Integrator, by_its_name)
+copyreg.pickle(Integrator, _reduced)
 
 
 @by_name
