@@ -181,7 +181,7 @@ HOSTILE = {  # drawn from by seeds below zero
 
 
 def draw_run(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outcome:
-    """Run k, known to tests by number `without` later methods: 1 to 500 steps a nutation or a tolerance, to 1000 of them."""
+    """Run k, known to tests by number `without` later methods: 1 to 500 steps a nutation or a tolerance, to 1000."""
     draw = random.Random(f"{seed}/{k}")
     kinds = KINDS if seed >= 0 else HOSTILE
     kind = draw.choice([*kinds])
