@@ -42,7 +42,7 @@ FEW = {  # a method of each family, for the others compile for 20 s
     "lie-variational[axis]",
 }  # fmt: skip
 ALONE = ("midpoint-unreduced[angles]", "gauss-12[axis]", "collective-gauss-4[axis]")  # one after another
-EXPLICIT = ("rkmk-se3-2", "rkmk-se3-4", "crouch-grossman-3", "commutator-free-4")
+EXPLICIT = ("rkmk-se3-2", "rkmk-se3-4", "rkmk-se3-5", "rkmk-se3-8", "crouch-grossman-3", "commutator-free-4")
 ITERATED = ("lie-variational", "lie-variational-suzuki-4", "euler-poincare", "simo-wong", "generalised-alpha")
 FAR, LOST = slice(3, None, 17), slice(5, None, 41)  # members whose step turns too far for lanes; whose numbers overflow
 

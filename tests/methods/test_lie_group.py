@@ -22,7 +22,7 @@ from tests.conftest import random_scenes
 from tests.judging.blind.right import product
 from tests.methods.engine_formulas import hat
 
-LIE_TABLES = ("rkmk-se3-2", "rkmk-se3-4", "crouch-grossman-3", "commutator-free-4")
+LIE_TABLES = ("rkmk-se3-2", "rkmk-se3-4", "rkmk-se3-5", "rkmk-se3-8", "crouch-grossman-3", "commutator-free-4")
 VARIATIONAL = ("lie-variational", "lie-variational-suzuki-4", "euler-poincare")
 COLLECTIVE = ("collective-gauss-2", "collective-gauss-4", "collective-gauss-6")
 K = np.array([0.0, 0.0, 1.0])
