@@ -243,8 +243,7 @@ def test_the_map_goes_by_the_median_top_and_its_shares_are_of_the_cells_that_are
     ran = {"quantity": "axis", "target": 1e-3, "horizon": np.arange(11), "told": True, "ratio": np.arange(11.0)}
     monkeypatch.setattr(runs, "checks", lambda _: pd.DataFrame(ran))
     told = facts.far_facts(tree)
-    assert told["map_axis"] == "rk4[axis]"
-    assert [told[f"map_axis_{end}"] for end in ("share", "clear", "short", "long")] == [1.0, 1.0, 0.0, 0.0]
+    assert [told[f"map_axis_{end}"] for end in ("clear", "short", "long")] == [1.0, 0.0, 0.0]
     assert [told[f"checks_{end}"] for end in ("low", "middle", "high")] == [1.0, 5.0, 9.0]
 
 
