@@ -21,7 +21,7 @@ from symtop.judging.claims.subject import LIBRARIES, open_target
 from symtop.measure import columns, settings
 from symtop.measure.accuracy import as_table, blank_row
 from symtop.measure.errors import QUANTITIES
-from symtop.measure.sweep import RAISED, SPENT, TIMED, error_row_or_message, listed, timed_rows
+from symtop.measure.sweep import RAISED, SPENT, TIMED, attributes, error_row_or_message, listed, timed_rows
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.exact import closed_form
 from symtop.model.scenes import Scene, horizon_of, scene as find_scene
@@ -118,9 +118,9 @@ def compare(
     own = {name: netcdf.Column(entry, {}) for name, entry in entries.items()}
     columns.described(data, problem.units, own, [problem.of_body])
     return netcdf.describe(
-        data, f"error against cost on {problem.name}", units=problem.units, quantity=quantity, cost=cost, horizon=end,
+        data, f"error against cost on {problem.name}", units=problem.units, quantity=quantity, cost=cost,
         nutations=end / problem.nutation_period, timed=TIMED if cost == "time" else "nothing",
-        budget=str(most or BUDGET),
+        budget=str(most or BUDGET), **attributes([problem], {problem.name: end}),
     )  # fmt: skip
 
 

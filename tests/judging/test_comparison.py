@@ -42,6 +42,7 @@ def test_each_run_is_that_of_simulate_and_every_variable_has_words_and_units(dat
     assert data["variant"].values.tolist() == charts
     scene = symtop.scene("goldstein")
     assert data.attrs["horizon"] == pytest.approx(2.0 * scene.nutation_period)
+    assert json.loads(data.attrs["start"])["goldstein"]["theta_dot"] == scene.start.theta_dot
     cell, place = data.sel(variant="rk4[axis]"), cheapest(data, 1e-3)[2]
     step = cell["step_size"].values[place]
     row = error_row(scene, symtop.integrator("rk4[axis]"), step, data.attrs["horizon"], "axis")
