@@ -43,9 +43,9 @@ def compare(
 
     `methods` are names, variants such as ``rk4[axis]`` or records; a method without a chart runs in the smallest one
     that shows the `quantity` (axis, attitude, theta, energy, p_phi or, of a top, p_psi). A function, a class,
-    ``FILE.py:NAME`` or a library is a step in the chart of the axis, or of a body, as `judge` takes it. Runs go to the
-    `horizon`, the scene's own by default, or over so many `nutations`. With the `cost` "evaluations" nothing is timed.
-    `budget` is the most force evaluations of a run, by default 3e6, for plain Python 5e4.
+    ``FILE.py:NAME`` or a library is a step in the chart of the axis, or of a body, as `judge` takes it without a form.
+    Runs go to the `horizon`, the scene's own by default, or over so many `nutations`. With the `cost` "evaluations"
+    nothing is timed. `budget` is the most force evaluations of a run, by default 3e6, for plain Python 5e4.
 
     Dimensions ``variant``, ``setting`` (coarse to fine), ``target`` (1e-3, 1e-6, 1e-9, 1e-12). Variables: those of
     `sweep`, errors and work of every run, and
@@ -128,11 +128,10 @@ def find(method: Any, on: Scene) -> Integrator:
     """A method by its name, its record, or as what `judge` takes: a step in the chart of the axis, or of a body."""
     if isinstance(method, Integrator):
         return method
-    if isinstance(method, str):
-        file = {*"/ "} & {*method} or ".py" in method or method.partition(":")[0].endswith(LIBRARIES)
-        if not file:
-            return find_integrator(method)
-    return adapted(open_target(method, None, "axis", on=on))
+    library = str(method).partition(":")[0].endswith(LIBRARIES)
+    if isinstance(method, str) and not (library or {*"/ "} & {*method} or ".py" in method):
+        return find_integrator(method)
+    return adapted(open_target(method, "shared" if library else "ode", "axis", on=on))
 
 
 def _runs(

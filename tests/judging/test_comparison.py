@@ -138,6 +138,8 @@ def test_another_quantity_takes_the_chart_that_shows_it(quantity):
     ({"methods": ["rk4[axis]"], "quantity": "attitude"}, "cannot show the attitude"),
     ({"scene": "heavy-chaotic", "methods": "gauss-4", "horizon": 1e3}, "horizon must be at most .* is not known"),
     ({"scene": "tennis-racket", "methods": "gauss-4", "quantity": "p_psi"}, "quantity 'p_psi' is unknown"),
+    ({"methods": lambda y, h: y}, "form ode must take .f, t, y, h., not .y, h.$"),  # and no option of `judge`
+    ({"methods": "my engine"}, "a step must be FILE.py:NAME or FILE.so, not 'my engine'$"),
 ])  # fmt: skip
 def test_bad_input_is_one_sentence(words, sentence):
     with pytest.raises(symtop.SymtopError, match=sentence.replace("[", r"\[")):
