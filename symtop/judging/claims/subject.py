@@ -255,8 +255,8 @@ def _thing(target: Any, *, free: bool) -> tuple[Any, str]:
     with foreign_code(f"the file {file.name}"):
         if str(file.parent) not in sys.path:  # what stands beside it, as Python has it for a script, also when it runs
             sys.path.insert(0, str(file.parent))
-        module = execute(f"symtop_judged_{Path(file).stem}", file)
-    thing = getattr(module, name or "step", None)
+        module: Any = execute(f"symtop_judged_{Path(file).stem}", file)
+    thing = functools.reduce(lambda one, part: getattr(one, part, None), (name or "step").split("."), module)
     if not (callable(thing) or is_solver(thing)):
         functions = [key for key, value in vars(module).items() if callable(value) and not key.startswith("_")]
         hint = f"it has {', '.join(functions[:8])}" if functions else "it has no function"
