@@ -9,7 +9,6 @@ A bare step is given as a function, a class, a solver, a file or a command; its 
 
 import functools
 import inspect
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -253,8 +252,6 @@ def _thing(target: Any, *, free: bool) -> tuple[Any, str]:
     hint = " (a command needs form program)" * free
     file = python_file(path, "a step", f"FILE.py:NAME with a file that is there{hint}")
     with foreign_code(f"the file {file.name}"):
-        if str(file.parent) not in sys.path:  # what stands beside it, as Python has it for a script, also when it runs
-            sys.path.insert(0, str(file.parent))
         module: Any = execute(f"symtop_judged_{Path(file).stem}", file)
     thing = functools.reduce(lambda one, part: getattr(one, part, None), (name or "step").split("."), module)
     if not (callable(thing) or is_solver(thing)):
