@@ -21,6 +21,7 @@ DECADES = 2.5  # of time, the last of a long run, in which the growth of a chang
 LONG_ENOUGH = 0.5  # seconds of steps that are timed, beside those of a run of few
 SAME = 0.01  # relative difference of the step used from --step-size that is printed
 KERNELS = 5  # of an ensemble: periods, samples, starts, the step in lanes and alone
+DRAWN = ("seed", "kind", "epsilon")  # attributes of a population that say how it was drawn
 COMPARED, COMPARED_BODIES = 100_000, 1000  # members whose errors are shown, the first: of a million tops 1 GB
 PARAMETERS = ("I1", "I2", "I3", "mgl", "centre")  # and of tops: what is no start
 
@@ -256,7 +257,7 @@ def ensemble(
         raise SymtopError(f"--figure needs {needed} among --variables, whose errors it shows")
     wrong, own = dict[str, Any](), dict[str, Any]()  # errors over time, and the largest, of each member
 
-    def added(data: Any) -> dict[str, Any]:
+    def added(data: Any) -> Any:
         few, results = (part.isel(member=slice(0, most)) for part in (sample, data))
         with ticking("comparing with the true motion"):
             wrong.update({name: member_errors(few, results, name) for name in compared})
@@ -295,17 +296,20 @@ def ensemble(
         sys.exit(3)
 
 
-def _columns(sample: Any, errors: dict[str, Any], words: dict[str, str]) -> dict[str, Any]:
-    """The members, ``I1`` and ``start_theta``, and the largest ``axis_error`` of each, for a file of their runs."""
+def _columns(sample: Any, errors: dict[str, Any], words: dict[str, str]) -> Any:
+    """The members, ``I1`` and ``start_theta``, the largest ``axis_error`` of each, and the draw, for a file of runs."""
     import numpy as np
+    import xarray as xr
+
+    from symtop.measure.errors import ERRORS
 
     numbers = {name: column.variable for name, column in sample.data_vars.items() if column.dtype.kind == "f"}
     added: dict[str, Any] = {name if name in PARAMETERS else f"start_{name}": one for name, one in numbers.items()}
     for name, values in errors.items():
         padded = np.pad(values, (0, sample.sizes["member"] - len(values)), constant_values=math.nan)
         about = {"long_name": f"{words[name]}, largest over the run, infinite after a failure"}
-        added[f"{name}_error"] = "member", padded, about
-    return added
+        added[f"{name}_error"] = "member", padded, about | {"units": ERRORS[name][1]}
+    return xr.Dataset(added, attrs={name: sample.attrs[name] for name in DRAWN if name in sample.attrs})
 
 
 @click.command(short_help="Open the explorer: one run in a browser, with sliders.")
