@@ -186,8 +186,7 @@ def test_a_tableau_may_be_made_of_arrays_and_taylor_runs_in_three_precisions():
     for name in ("taylor", "taylor-longdouble", "taylor-quad"):
         run, result[name] = _error(name, None, "attitude", horizon=4.0)
         assert (run.attrs["chart"], run["quaternion"].dtype) == ("attitude", np.float64)
-    # beyond double what is left is the rounding of the samples and of the closed form
-    assert result["taylor"] < 5e-14
+    assert result["taylor"] < 5e-14  # beyond double what is left is the rounding of the samples and of the closed form
     assert max(result["taylor-longdouble"], result["taylor-quad"]) < 5e-15
     loose = _error("taylor-quad", 1e-8, horizon=4.0)[1]
     assert loose > 1e-12  # the tolerance reaches heyoka

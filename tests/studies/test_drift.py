@@ -146,8 +146,7 @@ def test_phases_are_grouped_by_the_energy_and_a_run_that_keeps_it_is_none_of_tho
     groups = measures.phases_by_energy(histories)
     assert sorted(groups["bounded"]) == [1.0, 1.0, 1.04, 2.0]
     assert sorted(groups["lost"]) == [1.9, 2.0, 2.0, 2.2]
-    # Of a variant that loses the energy on one scene only.
-    place = {"variant": "rk4[angles]", "scene": "goldstein"}
+    place = {"variant": "rk4[angles]", "scene": "goldstein"}  # of a variant that loses the energy on one scene only
     for name, value in (("energy_largest", 1e-14), ("phase_exponent", 0.5)):
         histories = histories.assign({name: histories[name].copy()})
         histories[name].loc[place] = value
