@@ -17,6 +17,7 @@ from symtop.methods.splitting import body as splitting_body
 from symtop.methods.splitting.coefficients import STRANG
 from symtop.model.body import Attitude, RigidBody, from_flat, product, rotated
 from symtop.model.charts import BODY, attitude_distance
+from symtop.model.exact import heavy_body
 from symtop.model.scenes import body_scenes
 from symtop.run.ensemble import chunks
 from symtop.run.ensemble.bodies import scenes_of
@@ -240,7 +241,16 @@ def test_chaos_ends_the_reference_and_a_body_at_rest_stays(monkeypatch):
             symtop.reference("heavy-chaotic", times)
         bound = symtop.reference("heavy-chaotic", [20.0, float(str(refused.value).split()[5])])["attitude_error_bound"]
         assert float(bound[0]) < 1e-12 < float(bound[1]) < 1e-9
-        monkeypatch.setattr("symtop.model.exact.heavy_body.MOST_STEPS", 1000)  # of a run that is far too long
+        monkeypatch.setattr(heavy_body, "STRETCH", 1000)  # of a run that is far too long
+    monkeypatch.setattr(heavy_body, "STRETCH", 100)
+    monkeypatch.setattr(heavy_body, "MOST_STEPS", 3000)
+    ends, words = [], "on heavy-brick, not .*: to integrate its motion for longer takes more than 1,000,000 Taylor"
+    for times in ([1e4], [3.0, 90.0, 1e5]):
+        with pytest.raises(symtop.SymtopError, match=words) as refused:
+            symtop.reference("heavy-brick", times)
+        ends.append(float(str(refused.value).split()[5]))
+    assert 80.0 < ends[0] == ends[1]  # and what is named is known
+    assert symtop.reference("heavy-brick", ends[:1])["attitude_error_bound"] < 1e-12
 
 
 def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
