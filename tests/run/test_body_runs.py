@@ -266,6 +266,11 @@ def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
     assert 0.5 * spin @ matrix @ spin == pytest.approx(kinetic, rel=1e-13)
     heavy = rotated(inside.quaternion, body.centre)[2]  # the height of the centre, in either axes
     assert heavy == pytest.approx(rotated(at.quaternion, columns @ [0.0, 0.6, 0.8])[2], rel=1e-13)
+    for k, moments in enumerate([(1.4, 2.1, 1.0), (2.1, 1.0, 1.4), (1.0, 1.4, 2.1)]):  # third: that of the centre
+        body = RigidBody.from_inertia(matrix.tolist(), 2.0, (columns @ -np.eye(3)[k]).tolist())
+        assert (*body.moments, *body.centre) == pytest.approx((*moments, 0.0, 0.0, 1.0), abs=1e-14)
+        assert rotated(body.axes, (0.0, 0.0, 1.0)) == pytest.approx((columns @ -np.eye(3)[k]).tolist())
+    assert RigidBody.from_inertia(np.diag([3.0, 1.0, 2.9])).moments == (2.9, 3.0, 1.0)
     assert RigidBody.from_brick(12.0, (1.0, 2.0, 3.0)).moments == (13.0, 10.0, 5.0)
     corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-1.0, 1.0) for z in (-1.5, 1.5)]
     points = RigidBody.from_points([1.5] * 8, corners)
