@@ -218,6 +218,9 @@ def test_a_body_of_ones_own_on_the_command_line() -> None:
     run = ["rk4", "--step-size", "0.05", "--horizon", "20", "--json"]
     own, named = (json.loads(call("run", *words).stdout) for words in (["body", *run, *options], ["heavy-brick", *run]))
     assert own["errors"] == named["errors"]
+    lost = call("run", "heavy-chaotic", "rk4", "--step-size", "0.05", "--horizon", "60", "--json")
+    assert (json.loads(lost.stdout)["errors"], json.loads(lost.stdout)["judgement"]) == ({}, None)
+    assert "not compared with the true motion: horizon must be at most" in lost.stderr
     # with two equal moments and the centre on the third axis it is a top, and has all that a top has
     run = ["run", "body", "stormer-verlet", "--step-size", "1e-3", "--json", "--mgl", "3", "--centre", "0,0,-2"]
     own = json.loads(call(*run, *options[-4:], "--body", "2,2,1").stdout)
