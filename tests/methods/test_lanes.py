@@ -296,14 +296,14 @@ def with_shares(name, shares):
     return dataclasses.replace(solver, rule=solver.rule._replace(shares=shares))
 
 
-def of_table(*rows, bent=False):
-    return lie_runge_kutta("any", rows, 1, "", "", bent=bent).solvers["attitude"]
+def of_table(*rows, brackets=0):
+    return lie_runge_kutta("any", rows, 1, "", "", brackets=brackets).solvers["attitude"]
 
 
 @pytest.mark.quick
 @pytest.mark.parametrize("solver", [
     of_table(((1.0,),)),
-    of_table(((1.0,),), ((0.5, 0.5), (0.0, 0.0)), bent=True),
+    of_table(((1.0,),), ((0.5, 0.5), (0.0, 0.0)), brackets=2),
     lie_variational("any", Variational(EULER_POINCARE, SUZUKI_4.drift), 4, "", "").solvers["axis"],
     generalised_alpha("any", 0.0).solvers["axis"],
     dataclasses.replace(SOLVERS["rkmk-se3-2[attitude]"], rule=LieTable((0.0,), (1.0,))),

@@ -43,7 +43,7 @@ FAMILIES = (
 IMPLEMENTATIONS = ("compiled", "python")
 ENERGY_ERRORS = ("kept", "bounded", None)
 NEEDS = {  # the weakest thing that suffices for a method, whatever its kernel makes use of, and what a user says of it
-    "derivative": "f(t, y)", "constants": "f(t, y), constants", "expression": "f as a formula",
+    "derivative": "f(t, y)", "constants": "f(t, y) and constants", "expression": "f as a formula",
     "lagrangian": "a Lagrangian", "kicks": "torque, free motion", "group": "torque, inertia",
     "this-top": "this top's equations", "solution": "the motion itself",
 }  # fmt: skip

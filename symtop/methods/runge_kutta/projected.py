@@ -31,7 +31,7 @@ from symtop.methods.runge_kutta.explicit import in_lanes
 from symtop.methods.runge_kutta.pairs import DOP8, NINE, Pair, combination, stages_of
 from symtop.methods.vectors import dot, summed, zero
 
-SMALL = 1e-12  # of the square of a gradient: with less of its own it depends on those before it
+SMALL = 1e-8  # of the square of a gradient: with less of its own it depends on those before it
 AXIS = FORMS["axis"]
 
 
