@@ -22,7 +22,7 @@ from symtop.methods.framework.loop import Loop, inside
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian import discrete_lagrangian, exact_discrete, galerkin, unreduced
 from symtop.methods.lie_group import energy_momentum, generalised_alpha, runge_kutta, variational
-from symtop.methods.runge_kutta import collective_gauss, explicit, gauss, kahan, pairs
+from symtop.methods.runge_kutta import collective_gauss, explicit, gauss, kahan, pairs, projected
 from symtop.methods.splitting import angles, space
 from symtop.methods.taylor import series, series_general
 from symtop.methods.taylor.series import DEFAULT_ORDER
@@ -72,6 +72,7 @@ FAMILIES: dict[Loop, tuple[str, str]] = {
     space.march_attitude: ("splitting_space", "ATTITUDE"),
     **{explicit.LOOPS[chart]: ("runge_kutta", chart.upper()) for chart in CHARTS},
     **{pairs.fixed_loop(chart, pair): ("runge_kutta", chart.upper()) for pair in pairs.PAIRS for chart in CHARTS},
+    **{projected.loop(pair): ("runge_kutta", "PROJECTED") for pair in projected.PAIRS},
     exact_discrete.march_axis: ("exact_discrete", ""),
     exact_discrete.march_attitude: ("exact_discrete", ""),
     series.march_axis(DEFAULT_ORDER): ("series", ""),

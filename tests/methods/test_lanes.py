@@ -285,7 +285,7 @@ def test_kernels_are_shared_by_charts_compositions_and_numbers():
                for name in (*EXPLICIT, *ITERATED) for chart in ("axis", "attitude")}  # fmt: skip
     assert all(kernels[name, "axis"] is kernels[name, "attitude"] for name in (*EXPLICIT, *ITERATED))
     assert kernels["lie-variational", "axis"] is kernels["lie-variational-suzuki-4", "axis"]
-    assert len(set(map(id, kernels.values()))) == 8
+    assert len(set(map(id, kernels.values()))) == 10
     other = generalised_alpha("other", 0.3).solvers["axis"]
     assert other._whole.blocks().march is kernels["generalised-alpha", "axis"]
 
