@@ -67,8 +67,7 @@ def test_words_do_not_count_and_numbers_do():
 
 def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again(clean_registry):
     study, plain = runner.load(str(PROBE)), symtop.integrator("midpoint")
-    case = next(case for case in study.cases(True) if case.integrator == "midpoint")
-    digests = []
+    case, digests = next(case for case in study.cases(True) if case.integrator == "midpoint"), []
     for order in range(2, 12):
         symtop.register(dataclasses.replace(plain, order=order), replace=True)
         digests.append(fingerprint.digest(study, case))

@@ -179,8 +179,7 @@ def newton_step(par, stages, y, h):
 def sweep_step(par, stages, y, h, sweeps=100):
     """One step by sweeps from h b_i f(y), and the size of the last correction."""
     mu, b = gauss_rule(stages)[:2]
-    parts = np.outer(h * b, field_axis(par, y))
-    change = math.inf
+    parts, change = np.outer(h * b, field_axis(par, y)), math.inf
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(sweeps):
             last = parts.copy()

@@ -179,8 +179,7 @@ def test_a_lane_that_takes_more_iterations_changes_no_other(name, longer):
     solver = SOLVERS[name]
     before = solver.many(numbers, h, marks)
     h[5] *= longer
-    after = solver.many(numbers, h, marks)
-    others = np.arange(W) != 5
+    after, others = solver.many(numbers, h, marks), np.arange(W) != 5
     assert (before.outcome == 0).all()
     assert after.work[5] > before.work[5]
     assert not np.array_equal(before.states[5], after.states[5])
@@ -324,8 +323,7 @@ def test_tables_and_compositions_of_ones_own_have_the_bits_of_runs_alone(solver)
 @pytest.mark.parametrize("name", ["commutator-free-4", pytest.param("generalised-alpha", marks=pytest.mark.quick)])
 def test_lanes_whose_exponential_turns_too_far_for_its_series_run_alone(name):
     solver, given = SOLVERS[f"{name}[axis]"], members(400, seed=11)
-    left = set(left_alone(solver, *given).tolist())
-    done = solver.many(*given)
+    left, done = set(left_alone(solver, *given).tolist()), solver.many(*given)
     failed = set(np.flatnonzero(done.outcome != 0).tolist())
     assert failed < left  # some of those that are left end well, with sine and cosine
     assert len(set(range(400)[FAR]) & left) > 0.6 * len(range(400)[FAR])

@@ -217,8 +217,7 @@ def kernel(name):
 def compiled(name, scene, h, **changed):
     """What `sample` returns for a step of h from the start of a scene, or `refine` leaves in the last row."""
     par, state = REDUCED.prepare(scene.top, scene.start)
-    par = par._replace(**changed)
-    memory = np.zeros((3, 4))
+    par, memory = par._replace(**changed), np.zeros((3, 4))
     memory[0] = REDUCED.field(par, state)
     made = kernel(name)(par, state, memory, h)
     return par, made, memory[-1]
