@@ -17,7 +17,6 @@ grows linearly with time, where that of the step without projection grows quadra
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IV.4.
 """
 
-import functools
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -34,7 +33,6 @@ from symtop.methods.vectors import dot, summed, zero
 
 SMALL = 1e-8  # of the square of a gradient: with less of its own it depends on those before it
 AXIS = FORMS["axis"]
-PAIRS = {DOP8: "dop853-projected", NINE: "vern9-projected"}
 
 
 class Levels(NamedTuple):
@@ -103,8 +101,7 @@ def projected(par: Any, state: Any, step: Any) -> Any:
     return step
 
 
-@functools.cache
-def loop(pair: Pair) -> Loop:
+def _loop(pair: Pair) -> Loop:
     """The loop, for one and in lanes."""
     field, ended = AXIS.field, AXIS.ended
     stages, total, cost = stages_of(field, pair.table), combination(pair.table.b), len(pair.table.b)
@@ -132,12 +129,12 @@ def loop(pair: Pair) -> Loop:
 def built_in() -> list[Integrator]:
     """Two pairs with fixed steps, projected."""
     methods = []
-    for pair, name in PAIRS.items():
+    for pair, name in ((DOP8, "dop853-projected"), (NINE, "vern9-projected")):
         plain = pair.fixed()
         rule = plain.solvers["axis"].rule
         methods.append(replace(
             plain, name=name, summary=f"{pair.summary} with fixed steps, projected onto the constants of the motion",
-            solvers={"axis": FixedStep(loop(pair), rule, on_levels, 1, implicit=False)},
+            solvers={"axis": FixedStep(_loop(pair), rule, on_levels, 1, implicit=False)},
             conserves=frozenset({"energy", "p_phi", "p_psi", "axis_length"}), needs="constants", general=False,
             reference=f"{plain.reference} hairer-lubich-wanner-2006",
         ))  # fmt: skip
