@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.methods.framework.loop import Loop, inside
-from symtop.methods.framework.registry import Integrator
+from symtop.methods.framework.registry import Integrator, integrator
 from symtop.methods.lagrangian import discrete_lagrangian, exact_discrete, galerkin, unreduced
 from symtop.methods.lie_group import energy_momentum, generalised_alpha, runge_kutta, variational
 from symtop.methods.runge_kutta import collective_gauss, explicit, gauss, kahan, pairs
@@ -62,6 +62,7 @@ def _macros(rule: Any, chart: str = "") -> dict[str, int]:
     return found | ({chart: 1} if chart else {})
 
 
+PROJECTED = "dop853-projected", "vern9-projected"
 # the loop of a family: its C file, and the macro for its chart
 FAMILIES: dict[Loop, tuple[str, str]] = {
     discrete_lagrangian.march: ("discrete_lagrangian", ""),
@@ -72,6 +73,7 @@ FAMILIES: dict[Loop, tuple[str, str]] = {
     space.march_attitude: ("splitting_space", "ATTITUDE"),
     **{explicit.LOOPS[chart]: ("runge_kutta", chart.upper()) for chart in CHARTS},
     **{pairs.fixed_loop(chart, pair): ("runge_kutta", chart.upper()) for pair in pairs.PAIRS for chart in CHARTS},
+    **{inside(integrator(name).solvers["axis"]).loop: ("runge_kutta", "PROJECTED") for name in PROJECTED},
     exact_discrete.march_axis: ("exact_discrete", ""),
     exact_discrete.march_attitude: ("exact_discrete", ""),
     series.march_axis(DEFAULT_ORDER): ("series", ""),

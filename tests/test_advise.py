@@ -326,8 +326,7 @@ def test_at_the_step_that_a_user_has_it_says_what_is_good_enough(monkeypatch):
 def test_limits_leave_out_what_a_user_cannot_use():
     scene = symtop.scene("spheroid")
     ask = functools.partial(symtop.recommend, scene, horizon=2.0)
-    free = ask(accuracy=1e-4, needs="kicks")
-    short = ask(accuracy=1e-4, needs="kicks", max_step=0.002)
+    free, short = ask(accuracy=1e-4, needs="kicks"), ask(accuracy=1e-4, needs="kicks", max_step=0.002)
     assert short.step_size <= 0.002 < free.step_size
     body = ask(accuracy=1e-4, needs="kicks", general=True)
     assert symtop.integrator(body.integrator).general is True

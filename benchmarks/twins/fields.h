@@ -32,7 +32,11 @@ static inline int judge(const double *state, const double *step) {
 #else
 #define DIM 6
 #endif
+#ifdef PROJECTED
+typedef struct { double I1, mgl, p_psi, energy, weight; } Par;
+#else
 typedef struct { double I1, mgl, twist; } Par;
+#endif
 
 static inline void field(const Par *par, const double *y, double *f) {
 #ifdef ATTITUDE

@@ -33,7 +33,7 @@ static inline Vector inertia(const Par *par, Vector e, Vector x) {
 
 #ifdef RUNGE_KUTTA
 
-typedef struct { double weights[WEIGHTS], counts[STAGES], bent, shares[SHARES]; } Rule;
+typedef struct { double weights[WEIGHTS], counts[STAGES], brackets, shares[SHARES]; } Rule;
 typedef struct { Vector w[STAGES], f[STAGES]; } Carry;
 
 static const double CUBIC[9] = {
@@ -91,12 +91,24 @@ static inline Turn turn(const Par *par, const Rule *rule, Vector e, Vector L, Ca
         }
         if (i < STAGES) {
             Vector slope = scaled(1.0 / par->I1, plus(L, 1.0, done.dL)), g = f0;
-            if (rule->bent != 0.0) {
-                Vector once, once_f, twice, twice_f;
+            if (rule->brackets > 0.0) {
+                Vector once, once_f, twice, twice_f, next, next_f, four, four_f;
                 bracket(w, f, slope, g, &once, &once_f);
                 bracket(w, f, once, once_f, &twice, &twice_f);
                 slope = plus(plus(slope, -0.5, once), 1.0 / 12.0, twice);
                 g = plus(plus(g, -0.5, once_f), 1.0 / 12.0, twice_f);
+                if (rule->brackets > 2.0) {
+                    bracket(w, f, twice, twice_f, &next, &next_f);
+                    bracket(w, f, next, next_f, &four, &four_f);
+                    slope = plus(slope, -1.0 / 720.0, four);
+                    g = plus(g, -1.0 / 720.0, four_f);
+                    if (rule->brackets > 4.0) {
+                        bracket(w, f, four, four_f, &twice, &twice_f);
+                        bracket(w, f, twice, twice_f, &next, &next_f);
+                        slope = plus(slope, 1.0 / 30240.0, next);
+                        g = plus(g, 1.0 / 30240.0, next_f);
+                    }
+                }
             }
             at->w[i] = slope;
             at->f[i] = g;

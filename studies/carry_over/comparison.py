@@ -287,8 +287,8 @@ def silent(data: xr.DataTree, name: str, family: str, stratum: str = "") -> floa
 
     `stratum` is a stratum of free bodies, or regular or chaotic by growth in ten periods; empty for all.
     """
-    group = group_of(data, "short").sel(variant=name, family=family)
-    about = data["bodies"].to_dataset().isel(variant=0).sel(scene="short", family=family)
+    group = group_of(data, "short")[["setting", "status"]].sel(variant=name, family=family)
+    about = data["bodies"].to_dataset()[["growth", "stratum"]].isel(variant=0).sel(scene="short", family=family)
     settings = group["setting"].values[list(STATUS)]
     row = int(np.argmin(np.abs(np.log(settings / STEPS))))
     status = group["status"].transpose("kept", "member").values[row]

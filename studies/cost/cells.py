@@ -134,11 +134,9 @@ def contest(data: xr.DataTree, cell: Cell) -> Contest:
 @of_one_dataset
 def safest(data: xr.DataTree, cell: Cell, keeping: bool = False) -> tuple[list[Safe], bool]:
     """The safe choices of a cell, cheapest first, and whether the lead is called; `keeping` energy and momenta."""
-    group = data[cell.horizon].to_dataset().isel(scene=0)
+    group = data[cell.horizon].to_dataset()[["met_at", "setting", "control"]].isel(scene=0)
     mask, tariff = chosen(data, cell.horizon, cell.tops), prices(data)
-    wide = asked_tops(data, cell)
-    weights = np.array([float(wide[kinds_of(data, cell.horizon)[mask] == place].sum()) for place in range(len(KINDS))])
-    ladders = []
+    wide, ladders = asked_tops(data, cell), []
     for name in costs(data, cell).names:
         if keeping and not (integrator(name).conserves or frozenset()) >= {"energy", "p_phi", "p_psi"}:
             continue
@@ -146,12 +144,39 @@ def safest(data: xr.DataTree, cell: Cell, keeping: bool = False) -> tuple[list[S
         met = one["met_at"].sel(quantity=cell.quantity, target=cell.target).values[: mask.size].astype(float)
         settings, fixed = one["setting"].values, str(one["control"].values) == "step_size"
         price, call = tariff.at(name, np.full(settings.size, np.nan) if fixed else settings)
-        work = one["work"].transpose("level", "kind").values
-        work = (np.where(weights > 0.0, work, 0.0) * weights).sum(axis=1) / max(weights.sum(), 1.0)
+        work = mean_work(data, cell, name)
         error = float(tariff.error[tariff.names.index(name)])
         reached = met[mask][wide] * served_over_interpolated(data, cell, name)
         ladders.append(Ladder(name, reached, settings, work * price + call, fixed, error))
     return safe(ladders, tariff.marked)
+
+
+def mean_work(data: xr.DataTree, cell: Cell, name: str) -> Array:
+    """Force evaluations of a variant at each of its settings, the mean of the median tops of the kinds in a cell."""
+    mask, wide = chosen(data, cell.horizon, cell.tops), asked_tops(data, cell)
+    weights = np.array([float(wide[kinds_of(data, cell.horizon)[mask] == place].sum()) for place in range(len(KINDS))])
+    work = data[cell.horizon]["work"].isel(scene=0).sel(variant=name).transpose("level", "kind").values
+    return np.asarray((np.where(weights > 0.0, work, 0.0) * weights).sum(axis=1) / max(weights.sum(), 1.0))
+
+
+def dearer(data: xr.DataTree, cell: Cell) -> tuple[str, float, float] | None:
+    """The safe choice of the fewest evaluations, its share of those of the fastest, and from what price on it leads.
+
+    That is in seconds that an evaluation takes longer than here; None where the fastest has the fewest.
+    """
+    choices = [one for one in safest(data, cell)[0] if np.isfinite(one.seconds)]
+    counts = []
+    for one in choices:
+        settings = data[cell.horizon]["setting"].isel(scene=0).sel(variant=one.name).values
+        there = np.isfinite(settings)
+        order = np.argsort(settings[there])
+        x, work = np.log(settings[there][order]), np.log(mean_work(data, cell, one.name)[there][order])
+        counts.append(math.exp(float(np.interp(math.log(one.setting), x, work))))
+    fewest = int(np.argmin(counts)) if counts else 0
+    if not fewest:
+        return None
+    apart = choices[fewest].seconds - choices[0].seconds
+    return choices[fewest].name, counts[fewest] / counts[0], apart / (counts[0] - counts[fewest])
 
 
 def served_over_interpolated(data: xr.DataTree, cell: Cell, name: str) -> float:

@@ -1,6 +1,5 @@
 """Facts and tables of the study."""
 
-from collections import Counter
 from typing import Any
 
 import numpy as np
@@ -86,6 +85,19 @@ def span_facts(data: xr.DataTree, span: str) -> dict[str, float | None]:
     }
 
 
+def _dear(data: xr.DataTree) -> dict[str, Any]:
+    """With f(t, y) alone: what needs the fewest evaluations, at most which share, and where f is so dear that it leads.
+
+    Of the errors to which the fastest needs more; the price is the largest of these, in seconds beyond that here.
+    """
+    shown = [target for target in cells.targets(data) if decades(target) in (3, 6, 9)]
+    each = {decades(target): cells.dearer(data, Cell("short", "axis", target, NATURAL, CLASSES[0])) for target in shown}
+    known = {place: one for place, one in each.items() if one is not None}
+    share, price = (max((one[k] for one in known.values()), default=None) for k in (1, 2))
+    names = {f"dear_{place}": known[place][0] if place in known else None for place in (3, 6, 9)}
+    return names | {"dear_share": share, "dear_price": price}
+
+
 def over(data: xr.DataTree) -> str:
     """What the front page shows of an error that no setting within the budget keeps."""
     return f"not within {count(span_facts(data, 'short')['budget'] or 0.0)} evaluations"
@@ -105,6 +117,7 @@ def winners_facts(data: xr.DataTree) -> dict[str, Any]:
     keys = "misled", "misled_at", "fewest", "fewest_seconds", "instead", "instead_seconds"
     most = max((row for row in misled if 1.0 < row[0] < np.inf), default=(None,) * len(keys))
     named |= dict(zip(keys, most, strict=True))
+    named |= _dear(data)
     for needs in CLASSES[:-1]:
         named |= _safe(needs.replace("-", "_"), data, Cell("short", "axis", AT, NATURAL, needs))
     named["kicks_serve"] = serves(named["kicks"]) if named["kicks_seconds"] else ""
@@ -150,8 +163,8 @@ def guard_facts(data: xr.DataTree) -> dict[str, int]:
 
 
 def far_facts(data: xr.DataTree) -> dict[str, Any]:
-    """The map: who has the most cells, where splittings win, how many were predicted, and what checks of those say."""
-    ends = "", "_share", "_clear", "_short", "_long"
+    """The map: where splittings win, how many were predicted, and what checks of those say."""
+    ends = "_clear", "_short", "_long"
     names = [f"map_{quantity}{end}" for quantity in far.QUANTITIES for end in ends]
     names += ["map_tops", "map_methods", "predicted", "checks", "checks_runs", "checks_told", "checks_longest"]
     names += ["checks_low", "checks_middle", "checks_high"]  # error of a run, measured over predicted
@@ -163,8 +176,6 @@ def far_facts(data: xr.DataTree) -> dict[str, Any]:
         panel = far.diagram(data, quantity)
         there = panel.winner >= 0
         reached, predicted = reached + int(there.sum()), predicted + int((panel.predicted & there).sum())
-        for place, most in Counter(panel.winner[there].tolist()).most_common(1):
-            named |= {f"map_{quantity}": panel.names[place], f"map_{quantity}_share": most / there.sum()}
         splits = np.isin(panel.winner, [k for k, name in enumerate(panel.names) if integrator(name).needs == "kicks"])
         named[f"map_{quantity}_clear"] = float((panel.ratio[there] >= far.TIE).mean()) if there.any() else None
         for end, part in (("short", panel.horizons <= SHORT_RUN), ("long", panel.horizons >= LONG_RUN)):

@@ -15,6 +15,7 @@ from symtop.measure.accuracy import error_table
 from symtop.measure.settings import ladder
 from symtop.measure.sweep import timed_rows
 from symtop.methods.framework.registry import Integrator, integrator, integrators
+from symtop.model.charts import Array
 from symtop.model.scenes import Scene, scene
 from symtop.runner.study import REFERENCE, Case, Study
 
@@ -36,21 +37,33 @@ SETTINGS, MOST_STEPS = 12, 3e5
 
 
 def cases(quick: bool) -> list[Case]:
-    """Every method that is there, in its charts, and the closed form, on every scene; their times, a case a scene."""
+    """Every method that is there, in its charts, and the closed form, on every scene."""
     names = [f"{name}[{chart}]" for name, charts in METHODS.items() if name in integrators() for chart in charts]
     names.insert(0, REFERENCE)
     asked = {"lengths": LENGTHS[:1] if quick else LENGTHS, "settings": 7 if quick else SETTINGS}
-    places = SCENES[:1] if quick else SCENES
-    runs = [Case(place, name, asked) for place in places for name in names]
-    return [*runs, *(Case(place, "together", asked | {"integrators": names}, timed=True) for place in places)]
+    return [Case(place, name, asked) for place in (SCENES[:1] if quick else SCENES) for name in names]
+
+
+def follow_up(data: xr.Dataset) -> list[Case]:
+    """The times of all runs on a scene against each other, a case a scene, but `without` those that have no error."""
+    names, lengths = data["variant"].values.tolist(), data["nutations"].values.tolist()
+    asked = {"lengths": lengths, "settings": data.sizes["setting"], "integrators": names}
+    ended = (data["axis"].notnull() | data["attitude"].notnull()).transpose("scene", "variant", "nutations", "setting")
+    without = [np.argwhere(~on.values).tolist() for on in ended]  # places of runs, in the order of the last three
+    return [
+        Case(str(place), "together", asked | {"without": places}, timed=True)
+        for place, places in zip(data["scene"].values, without, strict=True)
+    ]
 
 
 def measure(case: Case) -> xr.Dataset:
     """Errors and work, or seconds, over ``nutations`` and ``setting``."""
     on, lengths, count = scene(case.scene), list(case.settings["lengths"]), case.settings["settings"]
-    variants = [integrator(name) for name in case.settings.get("integrators", ())]
-    if variants:
-        parts = [times(on, variants, length, count) for length in lengths]
+    if names := case.settings.get("integrators"):
+        ended = np.ones((len(names), len(lengths), count), dtype=bool)
+        ended[tuple(np.array(case.settings["without"], dtype=int).reshape(-1, 3).T)] = False
+        variants = [integrator(name) for name in names]
+        parts = [times(on, variants, length, ended[:, k]) for k, length in enumerate(lengths)]
     else:
         parts = [runs(on, integrator(case.integrator), length, count) for length in lengths]
     return xr.concat(parts, xr.DataArray(lengths, dims="nutations", name="nutations"))
@@ -58,29 +71,26 @@ def measure(case: Case) -> xr.Dataset:
 
 def runs(on: Scene, variant: Integrator, length: float, count: int) -> xr.Dataset:
     """A method's errors and work over so many nutations. The closed form has nothing to set."""
-    table, (chart,) = _errors(on, variant, length, count), variant.charts()
+    horizon, (chart,) = length * on.nutation_period, variant.charts()
+    observe = "attitude" if chart == "attitude" else "axis"
+    table = error_table(on, variant, ladder(variant, on, horizon, count, MOST_STEPS), horizon, observe=observe)
     if chart == "attitude" and variant.method != REFERENCE:  # the axis chart has the rest
         table = table.assign({name: table[name] * np.nan for name in ("axis", "energy", "p_phi")})
     return table[list(KEPT)]
 
 
-def _errors(on: Scene, variant: Integrator, length: float, count: int) -> xr.Dataset:
-    horizon, observe = length * on.nutation_period, "attitude" if variant.charts() == ("attitude",) else "axis"
-    return error_table(on, variant, ladder(variant, on, horizon, count, MOST_STEPS), horizon, observe=observe)
-
-
-def times(on: Scene, variants: list[Integrator], length: float, count: int) -> xr.Dataset:
-    """Seconds (variant, setting) of the runs of all methods that end `ok`, interleaved in random order, and spreads."""
+def times(on: Scene, variants: list[Integrator], length: float, ended: Array) -> xr.Dataset:
+    """Seconds of the runs that `ended` (variant, setting) well, interleaved in random order, and their spreads."""
     horizon, cells = length * on.nutation_period, []
-    for variant in variants:
-        settings = ladder(variant, on, horizon, count, MOST_STEPS)
-        outcomes = _errors(on, variant, length, count)["outcome"].values
+    for variant, well in zip(variants, ended, strict=True):
+        settings = ladder(variant, on, horizon, well.size, MOST_STEPS)
         rows: list[dict[str, Any]] = [
-            {"setting_value": setting, "outcome": outcome} for setting, outcome in zip(settings, outcomes, strict=True)
+            {"setting_value": setting, "outcome": "ok" if good else "failed"}
+            for setting, good in zip(settings, well, strict=False)
         ]
         cells.append((on, variant, horizon, rows))
     timed_rows(cells)
-    columns = {name: np.full((len(variants), count), np.nan) for name in ("seconds", "seconds_spread")}
+    columns = {name: np.full(ended.shape, np.nan) for name in ("seconds", "seconds_spread")}
     for name, column in columns.items():
         for place, (*_, rows) in enumerate(cells):
             column[place, : len(rows)] = [one.get(name, np.nan) for one in rows]
@@ -92,6 +102,6 @@ STUDY = Study(
     name="speed",
     title="Speed",
     question="How fast are well-known methods at the accuracy I need?",
-    cases=cases, measure=measure, facts=facts.facts, tables=facts.tables, pictures=figures.pictures,
-    charts=figures.charts,
+    cases=cases, measure=measure, follow_up=follow_up,
+    facts=facts.facts, tables=facts.tables, pictures=figures.pictures, charts=figures.charts,
 )  # fmt: skip

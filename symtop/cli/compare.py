@@ -33,8 +33,9 @@ def compare(
     """Compare METHODS on one SCENE: which is cheapest for an error of 1e-3, 1e-6 and 1e-9?
 
     A method is a name, or a variant such as rk4[angles]; without a chart it runs in the smallest one that shows the
-    quantity. FILE.py:NAME and a library are steps of your own, as symtop judge takes them. Each is run from coarse
-    settings to fine ones, and its runs are timed against those of the others.
+    quantity. Steps of your own are FILE.py:NAME and FILE.so, of those that symtop judge takes without --form, such as
+    a function step(f, t, y, h). Each is run from coarse settings to fine ones, and its runs are timed against those of
+    the others.
 
     \b
     symtop compare goldstein stormer-verlet midpoint rk4 dop853 taylor --figure c.png

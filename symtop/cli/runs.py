@@ -21,6 +21,7 @@ DECADES = 2.5  # of time, the last of a long run, in which the growth of a chang
 LONG_ENOUGH = 0.5  # seconds of steps that are timed, beside those of a run of few
 SAME = 0.01  # relative difference of the step used from --step-size that is printed
 KERNELS = 5  # of an ensemble: periods, samples, starts, the step in lanes and alone
+DRAWN = ("seed", "kind", "epsilon")  # attributes of a population that say how it was drawn
 COMPARED, COMPARED_BODIES = 100_000, 1000  # members whose errors are shown, the first: of a million tops 1 GB
 PARAMETERS = ("I1", "I2", "I3", "mgl", "centre")  # and of tops: what is no start
 
@@ -65,19 +66,14 @@ def run(
     check_outputs(output=output, figure=figure)
     with ticking("loading"):
         from symtop.core import netcdf
-        from symtop.measure.errors import OF_BODY, QUANTITIES, errors
-        from symtop.measure.settings import judgeable
-        from symtop.measure.verdicts import judgement
+        from symtop.measure.errors import OF_BODY, QUANTITIES
         from symtop.model import scenes
-        from symtop.run.reference.truth import reference
         from symtop.run.simulation import simulate
 
         settings["step_size"] = h = common.step_of(scene, settings)
         problem = scenes.scene(scene, bodies=True)
         horizon = problem.horizon if settings["horizon"] is None else scenes.horizon_of(settings["horizon"])
-    if problem.of_body:  # one to which its motion is not known is refused before the run, and not after it
-        with ticking("following the true motion"):
-            judgeable(problem, "attitude", horizon)
+    known = not problem.of_body or _is_known(problem, horizon, figure)
     if h is not None and h > 0.0:
         few_steps = partial(simulate, scene, integrator, step_size=h, samples=2, guard=False)
         estimate(horizon / h, lambda few: few_steps(horizon=few * h))
@@ -85,13 +81,7 @@ def run(
         data = simulate(scene, integrator, guard={"on": True, "off": False}.get(guard, guard), **settings)
         if output is not None:
             netcdf.write(data, output)
-        truth = reference(problem, data["time"].values, precision="closed-form")
-        error = errors(data)
-        verdict = judgement(problem, data, error["attitude" if problem.of_body else "axis"].values)
-        if figure is not None:
-            from symtop.report.plot import draw_run
-
-            draw_run(problem, data, truth, error, figure)
+        error, verdict = _judged(problem, data, figure) if known else ({}, None)
     words = QUANTITIES | OF_BODY if problem.of_body else QUANTITIES
     series = {name: error[name].dropna("time").values for name in words if name in error}
     largest = {name: {"largest": values.max(), "last": values[-1]} for name, values in series.items() if values.size}
@@ -99,7 +89,7 @@ def run(
     if as_json:
         names = ("outcome", "outcome_message", "reached_time", "steps", "force_evaluations")
         of_run = {name: facts[name] for name in names}
-        click.echo(as_text({**of_run, "judgement": verdict._asdict(), "errors": largest}))
+        click.echo(as_text({**of_run, "judgement": verdict and verdict._asdict(), "errors": largest}))
     else:
         method, actual, nominal = facts["integrator"], facts["step_size"], settings["step_size"]
         variant = method if method.endswith("]") else f"{method}[{facts['chart']}]"
@@ -109,13 +99,43 @@ def run(
         say(f"{counted(facts['steps'], 'step')}{of}, {counted(facts['force_evaluations'], 'force evaluation')}")
         if facts["sampling"] == "dithered":
             say("samples are not evenly spaced, so that they show all phases of the nutation")
-        if facts["outcome"] == "ok":
+        if verdict is not None and facts["outcome"] == "ok":
             say(f"judged against the truth: {verdict.words()}")
         for name, values in largest.items():
             click.echo(f"  {words[name]:<30} largest {values['largest']:.3e}   last {values['last']:.3e}")
         say_written(output, figure)
     if facts["outcome"] != "ok":
         sys.exit(3)
+
+
+def _is_known(problem: Any, horizon: float, figure: str | None) -> bool:
+    """Is the motion of a body known to the horizon? If not a sentence says why; what is to be drawn is refused."""
+    from symtop.measure.settings import judgeable
+
+    try:
+        with ticking("following the true motion"):
+            judgeable(problem, "attitude", horizon)
+    except SymtopError as error:
+        if figure is not None:
+            raise
+        warn(f"the run is not compared with the true motion: {error}")
+        return False
+    return True
+
+
+def _judged(problem: Any, data: Any, figure: str | None) -> tuple[Any, Any]:
+    """Errors and verdict of a run, which is drawn, if there is a file."""
+    from symtop.measure.errors import errors
+    from symtop.measure.verdicts import judgement
+    from symtop.run.reference.truth import reference
+
+    truth = reference(problem, data["time"].values, precision="closed-form")
+    error = errors(data)
+    if figure is not None:
+        from symtop.report.plot import draw_run
+
+        draw_run(problem, data, truth, error, figure)
+    return error, judgement(problem, data, error["attitude" if problem.of_body else "axis"].values)
 
 
 def estimate(steps: float, run: Callable[[int], object]) -> None:
@@ -256,7 +276,7 @@ def ensemble(
         raise SymtopError(f"--figure needs {needed} among --variables, whose errors it shows")
     wrong, own = dict[str, Any](), dict[str, Any]()  # errors over time, and the largest, of each member
 
-    def added(data: Any) -> dict[str, Any]:
+    def added(data: Any) -> Any:
         few, results = (part.isel(member=slice(0, most)) for part in (sample, data))
         with ticking("comparing with the true motion"):
             wrong.update({name: member_errors(few, results, name) for name in compared})
@@ -295,17 +315,20 @@ def ensemble(
         sys.exit(3)
 
 
-def _columns(sample: Any, errors: dict[str, Any], words: dict[str, str]) -> dict[str, Any]:
-    """The members, ``I1`` and ``start_theta``, and the largest ``axis_error`` of each, for a file of their runs."""
+def _columns(sample: Any, errors: dict[str, Any], words: dict[str, str]) -> Any:
+    """The members, ``I1`` and ``start_theta``, the largest ``axis_error`` of each, and the draw, for a file of runs."""
     import numpy as np
+    import xarray as xr
+
+    from symtop.measure.errors import ERRORS
 
     numbers = {name: column.variable for name, column in sample.data_vars.items() if column.dtype.kind == "f"}
     added: dict[str, Any] = {name if name in PARAMETERS else f"start_{name}": one for name, one in numbers.items()}
     for name, values in errors.items():
         padded = np.pad(values, (0, sample.sizes["member"] - len(values)), constant_values=math.nan)
         about = {"long_name": f"{words[name]}, largest over the run, infinite after a failure"}
-        added[f"{name}_error"] = "member", padded, about
-    return added
+        added[f"{name}_error"] = "member", padded, about | {"units": ERRORS[name][1]}
+    return xr.Dataset(added, attrs={name: sample.attrs[name] for name in DRAWN if name in sample.attrs})
 
 
 @click.command(short_help="Open the explorer: one run in a browser, with sliders.")

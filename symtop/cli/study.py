@@ -143,6 +143,7 @@ def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict
         try:
             yield waiting[0][1].result()
         except StudyError as error:
+            _tell(waiting[0][1].failures, str(error))  # which may be why
             refused.append(error)
         waiting.popleft()
 
@@ -182,9 +183,15 @@ def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str
         for line in (answer(findings, results), ", ".join(files)):
             if line:
                 click.echo(common.filled(f"  {line}"))
-    for failure in findings["failures"]:
-        click.echo(f"  {failure}", err=True)
+    _tell(findings["failures"])
     return summary
+
+
+def _tell(failures: Sequence[str], sentence: str = "") -> None:
+    """Print the cases that failed, but for one that a sentence holds."""
+    for failure in failures:
+        if failure not in sentence:
+            click.echo(f"  {failure}", err=True)
 
 
 def show_status(studies: "list[Study]", results: Path, why: bool, as_json: bool, grid: dict[str, bool]) -> int:

@@ -82,12 +82,12 @@ def version(package: str) -> str:
 
 @functools.cache
 def processor() -> str:
-    """The name of this machine's processor."""
-    with contextlib.suppress(OSError):
-        for line in Path("/proc/cpuinfo").read_text(encoding="utf-8").splitlines():
-            if line.startswith("model name"):
-                return line.partition(":")[2].strip()
-    return platform.processor() or platform.machine()
+    """This machine's processor: its name, which virtual machines of several kinds share, and its model."""
+    about: dict[str, str] = {}
+    with contextlib.suppress(OSError), Path("/proc/cpuinfo").open(encoding="utf-8") as lines:
+        about = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
+    more = (f"{key} {about[key]}" for key in ("cpu family", "model", "CPU implementer", "CPU part") if key in about)
+    return ", ".join([about.get("model name", platform.processor() or platform.machine()), *more])
 
 
 def packages(*names: str) -> Reasons:

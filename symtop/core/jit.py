@@ -308,9 +308,8 @@ def is_lean() -> Any:
 def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
     """numba's compilation, of a kernel that is not on disk by one process at a time: the next ones load it.
 
-    Python looks for no cyclic garbage meanwhile: numba's trees are none before the end, and grow to millions. It takes
-    9 % less time, and 100 MB more for the largest kernel there is. numba's lock is taken first, as its own nested
-    compilations take it first.
+    Python looks for no cyclic garbage meanwhile, which takes 9 % less time, and 100 MB more for the largest kernel.
+    numba's lock is taken first, as its own nested compilations take it first.
     """
 
     @functools.wraps(compiling)
@@ -342,6 +341,8 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     """
     parts = code_of(function)
     made_of = digest(by_file(parts) | {"format": FORMAT})
+    if numba.config.DISABLE_JIT:
+        raise SymtopError("NUMBA_DISABLE_JIT must be 0 or unset, not 1: some functions of kernels exist compiled only")
     kernel = njit(**OPTIONS)(_named(function, made_of))
     kernel.compile = _once(kernel, kernel.compile)
     functions = (part.thing for part in parts if isinstance(part.thing, FunctionType))

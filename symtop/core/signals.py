@@ -1,9 +1,8 @@
 """Requests of the user, heard as exceptions of their own: to end (SIGTERM, SIGHUP), and to interrupt (SIGINT).
 
 An exception of its own tells a request from what a plug-in raises. It may start between any two instructions, also
-between taking a lock and entering the block that gives it back. Where a library does so (xarray's lock of HDF5: one in
-twenty writes that were interrupted left it taken, and the next write waited for ever), a request is `deferred` until
-the library is done.
+between taking a lock and entering the block that gives it back. Where a library does so (xarray's lock of HDF5: of
+twenty interrupted writes one left it taken, and the next waited for ever), a request is `deferred` until it is done.
 """
 
 import contextlib

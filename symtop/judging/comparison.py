@@ -21,7 +21,7 @@ from symtop.judging.claims.subject import LIBRARIES, open_target
 from symtop.measure import columns, settings
 from symtop.measure.accuracy import as_table, blank_row
 from symtop.measure.errors import QUANTITIES
-from symtop.measure.sweep import RAISED, SPENT, TIMED, error_row_or_message, listed, timed_rows
+from symtop.measure.sweep import RAISED, SPENT, TIMED, attributes, error_row_or_message, listed, timed_rows
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.exact import closed_form
 from symtop.model.scenes import Scene, horizon_of, scene as find_scene
@@ -43,9 +43,9 @@ def compare(
 
     `methods` are names, variants such as ``rk4[axis]`` or records; a method without a chart runs in the smallest one
     that shows the `quantity` (axis, attitude, theta, energy, p_phi or, of a top, p_psi). A function, a class,
-    ``FILE.py:NAME`` or a library is a step in the chart of the axis, or of a body, as `judge` takes it. Runs go to the
-    `horizon`, the scene's own by default, or over so many `nutations`. With the `cost` "evaluations" nothing is timed.
-    `budget` is the most force evaluations of a run, by default 3e6, for plain Python 5e4.
+    ``FILE.py:NAME`` or a library is a step in the chart of the axis, or of a body, as `judge` takes it without a form.
+    Runs go to the `horizon`, the scene's own by default, or over so many `nutations`. With the `cost` "evaluations"
+    nothing is timed. `budget` is the most force evaluations of a run, by default 3e6, for plain Python 5e4.
 
     Dimensions ``variant``, ``setting`` (coarse to fine), ``target`` (1e-3, 1e-6, 1e-9, 1e-12). Variables: those of
     `sweep`, errors and work of every run, and
@@ -118,9 +118,9 @@ def compare(
     own = {name: netcdf.Column(entry, {}) for name, entry in entries.items()}
     columns.described(data, problem.units, own, [problem.of_body])
     return netcdf.describe(
-        data, f"error against cost on {problem.name}", units=problem.units, quantity=quantity, cost=cost, horizon=end,
+        data, f"error against cost on {problem.name}", units=problem.units, quantity=quantity, cost=cost,
         nutations=end / problem.nutation_period, timed=TIMED if cost == "time" else "nothing",
-        budget=str(most or BUDGET),
+        budget=str(most or BUDGET), **attributes([problem], {problem.name: end}),
     )  # fmt: skip
 
 
@@ -128,11 +128,10 @@ def find(method: Any, on: Scene) -> Integrator:
     """A method by its name, its record, or as what `judge` takes: a step in the chart of the axis, or of a body."""
     if isinstance(method, Integrator):
         return method
-    if isinstance(method, str):
-        file = {*"/ "} & {*method} or ".py" in method or method.partition(":")[0].endswith(LIBRARIES)
-        if not file:
-            return find_integrator(method)
-    return adapted(open_target(method, None, "axis", on=on))
+    library = str(method).partition(":")[0].endswith(LIBRARIES)
+    if isinstance(method, str) and not (library or {*"/ "} & {*method} or ".py" in method):
+        return find_integrator(method)
+    return adapted(open_target(method, "shared" if library else "ode", "axis", on=on))
 
 
 def _runs(

@@ -147,7 +147,7 @@ def _of_run(run: Any, scene: Any, precision: str, warn: Callable[[str], object])
     attributes = {"scene": chosen.name, "precision": truth.attrs["precision"]}
     if isinstance(run, xr.Dataset) and not foreign:
         shown.variables["time"].attrs.update(run["time"].attrs)
-        attributes |= {"integrator": run.attrs["integrator"]} if "integrator" in run.attrs else {}
+        attributes |= {name: run.attrs[name] for name in ("integrator", "chart") if name in run.attrs}
     shown.attrs.update(netcdf.CONVENTIONS, title=f"errors on {chosen.name}", **attributes)
     return shown
 

@@ -9,6 +9,7 @@ import functools
 import math
 import time
 from collections.abc import Callable, Iterable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -77,7 +78,8 @@ def sweep(
         outcome, message                               "ok", or how the run ended; "not_run" where a method has fewer
                                                        settings; "raised", with the message, if it raised an exception
 
-    Cells are computed on as many `threads` as there are cores. With a `path`, they are kept in that netCDF file as they
+    The attributes ``top`` and ``start`` are JSON by scene, and so is ``horizon`` if scenes differ in it. Cells are
+    computed on as many `threads` as there are cores. With a `path`, they are kept in that netCDF file as they
     are done: the same call resumes a sweep that was interrupted, runs again what has changed (a setting, a scene, the
     source of a method) or raised an exception, and ends in the same dataset, which the file then holds. More scenes and
     integrators may be asked for than are in the file, but not fewer. Raises SymtopError for arguments that make no
@@ -117,7 +119,8 @@ def sweep(
             words = {"timed": TIMED if timed else "nothing: timed was not asked for", "units": units}
             title, content = "errors and work of a sweep", netcdf.content_hash(data)
             data = columns.described(data, units, of_body=[one.of_body for one in chosen])
-            return netcdf.describe(data, title, content=content, **words)
+            ends = {row[0].scene.name: row[0].horizon for row in grid}
+            return netcdf.describe(data, title, content=content, **words, **attributes(chosen, ends))
 
         written = time.monotonic()
         with progress_bar("sweep", quiet=silent, total=len(cells), initial=len(cells) - len(rest)) as bar:
@@ -138,6 +141,13 @@ def sweep(
         if file is not None and (changed or pairs != stored):  # in another order, it would not be what is returned
             netcdf.write(data, file)
     return data
+
+
+def attributes(scenes: list[Scene], horizons: dict[str, float]) -> dict[str, Any]:
+    """Tops and starts of a dataset, by the names of its scenes, and the horizon, by them if they differ in it."""
+    ends = {*horizons.values()}
+    records = {name: {one.name: asdict(getattr(one, name)) for one in scenes} for name in ("top", "start")}
+    return {"horizon": horizons if len(ends) > 1 else ends.pop(), **records}
 
 
 def listed(things: Any) -> list[Any]:

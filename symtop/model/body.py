@@ -114,8 +114,10 @@ class RigidBody:
         """A body by its inertia matrix (3, 3) about the fixed point and the direction of its centre, in any axes.
 
         A heavy one needs `mgl`, its mass times gravity times the distance of the centre from the fixed point.
-        The matrix is diagonalised, moments in increasing order, and the turn kept in `axes`. `in_principal` takes an
-        attitude in the axes of the matrix to one of this body.
+        The matrix is diagonalised and the turn kept in `axes`. The third principal axis is that nearest to the centre,
+        and of a free body that beside which the other two moments are most alike in ratio; it points to the side of
+        `centre`. I1 <= I2 but where the third moment is the middle one. `in_principal` takes an attitude in the axes
+        of the matrix to one of this body.
         """
         from scipy.spatial.transform import Rotation  # 0.1 s
 
@@ -131,9 +133,13 @@ class RigidBody:
         if np.abs(inertia - inertia.T).max() > SYMMETRIC * np.abs(inertia).max():
             raise SymtopError("matrix must be symmetric", "matrix")
         moments, turn = np.linalg.eigh(inertia)
-        if np.linalg.det(turn) < 0.0:
-            turn[:, 2] = -turn[:, 2]
-        along = turn.T @ np.array(vector("centre", centre, 3))
+        towards = np.array(vector("centre", centre, 3))
+        apart = 0 if moments[1] ** 2 > moments[0] * moments[2] else 2
+        third = int(np.argmax(np.abs(turn.T @ towards))) if mgl else apart
+        moments, turn = np.roll(moments, 2 - third), np.roll(turn, 2 - third, axis=1)
+        turn[:, 2] *= math.copysign(1.0, turn[:, 2] @ towards)
+        turn[:, 0] *= math.copysign(1.0, np.linalg.det(turn))
+        along = turn.T @ towards
         axes = np.roll(Rotation.from_matrix(turn).as_quat(), 1)  # scalar first
         I1, I2, I3 = moments.tolist()
         return cls(I1, I2, I3, mgl, tuple(along.tolist()), tuple(axes.tolist()))

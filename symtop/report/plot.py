@@ -64,7 +64,8 @@ def plot(
         an ensemble   quantiles over members of the error of `quantity` ("axis", of bodies "attitude", or "energy") over
                       time; `members` are those that were run (the dataset does not hold them)
 
-    Any other `quantity` is one of axis, attitude, theta, energy, p_phi, p_psi. Raises SymtopError for anything else.
+    Any other `quantity` is one of axis, attitude, theta, energy, p_phi, p_psi. Runs may share an `ax`: each has its
+    variant as a label, for ``ax.legend()``, and there is no title. Raises SymtopError for anything else.
     """
     if not isinstance(data, xr.Dataset):
         raise SymtopError(f"data must be a dataset of simulate, sweep or ensemble, not {type(data).__name__}")
@@ -86,8 +87,10 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
     if "time" not in data:
         raise SymtopError("data must have the dimension time, setting or member, as simulate, sweep and ensemble give")
     times, has_bounds = data["time"].values, any(f"{name}_bound" in data for name in QUANTITIES)
-    name = data.attrs.get("integrator", "")
+    name, chart, several = data.attrs.get("integrator", ""), data.attrs.get("chart", ""), bool(ax.get_lines())
     color = look(name).color if name else "black"
+    label = name if name.endswith("]") or not chart else f"{name}[{chart}]"
+    drawn: dict[str, Any] = {"color": color, "lw": 1.2, "label": label or None}
     if quantity in QUANTITIES:
         wrong = data if has_bounds else errors(data)
         if quantity not in wrong:
@@ -95,7 +98,7 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
             raise SymtopError(f"this run does not show the {quantity}; it shows {shows}")
         marker = "o" if times.size == 2 else None  # a line has two points at least
         later = np.maximum(wrong[quantity].values[1:], SMALLEST)
-        ax.plot(wrong["time"].values[1:], later, color=color, lw=1.2, marker=marker)
+        ax.plot(wrong["time"].values[1:], later, marker=marker, **drawn)
         if has_bounds:
             ax.plot(times, np.maximum(data[f"{quantity}_bound"].values, SMALLEST), color="0.6", lw=0.8, ls=":")
         ax.set(yscale="log", ylabel=quantity_words(wrong, quantity))
@@ -103,10 +106,11 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
         variables = {name: variable for name, variable in data.data_vars.items() if variable.dims == ("time",)}
         values = data[one_of("quantity", quantity, dict.fromkeys([*QUANTITIES, *map(str, variables)]))]
         unit = values.attrs.get("units", "")
-        ax.plot(times, values.values, color=color, lw=1.2)
+        ax.plot(times, values.values, **drawn)
         ax.set_ylabel(f"{quantity} ({unit})" if unit else quantity)
     title, ended = (data.attrs.get(word, "") for word in ("title", "outcome_message"))
-    ax.set(xlabel=_clock(data), title=f"{title}: {ended}" if ended else title)
+    words = f"{title}: {ended}" if ended else title
+    ax.set(xlabel=_clock(data), title="" if several else words)  # which would name one of them alone
 
 
 def _clock(data: xr.Dataset) -> str:

@@ -26,11 +26,13 @@ def python_file(path: str | Path, name: str, kind: str) -> Path:
 
 
 def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
-    """A module of that name from a file, or a package if its `places` are given."""
+    """A module of that name from a file, which may import what stands beside it, or a package at `places`."""
     for stale in [known for known in sys.modules if known.startswith(f"{name}.")]:
         del sys.modules[stale]  # of another folder with the same name
     if file.suffix != ".py":
         raise SymtopError(f"{str(file)!r} cannot be loaded: its name must end in .py")
+    if places is None and str(file.parent) not in sys.path:  # as Python has it for a script, also when its code runs
+        sys.path.insert(0, str(file.parent))
     spec = importlib.util.spec_from_file_location(name, file, submodule_search_locations=places)
     assert spec is not None and spec.loader is not None  # noqa: PT018, S101  (its suffix has one)
     module = importlib.util.module_from_spec(spec)

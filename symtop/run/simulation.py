@@ -90,7 +90,8 @@ def chart_of(method: Integrator, watched: str, observe: str | None = None) -> st
         one_of("observe", observe or "attitude", ("axis", "attitude"))
         if BODY not in method.solvers:
             able = [name for name, entry in methods().items() if BODY in entry.solvers]
-            other = f"{method.method} without brackets" if method.method in able else f"one of {', '.join(able)}"
+            one = f"one of {len(able)}, such as strang or dop853-compiled (all: symtop integrators --wide)"
+            other = f"{method.method} without brackets" if method.method in able else one
             raise SymtopError(f"integrator must have the chart body, of a RigidBody, not {method.name}: take {other}")
         return BODY
     if isinstance(observe, str) and observe == "theta":

@@ -8,7 +8,7 @@ The findings, NAME.json, hold the facts of a study and the names of its tables, 
 import contextlib
 import math
 import time
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError
 from itertools import chain
 from pathlib import Path
@@ -36,10 +36,11 @@ QUICK = "quick pass: coarse grid"  # beside a figure of one
 
 
 class Started(NamedTuple):
-    """A study whose cases are computed: `result` waits for its findings; are they `done`?"""
+    """A study whose cases are computed, but for `failures`: `result` waits for its findings; are they `done`?"""
 
     result: Callable[[], Findings]
     done: Callable[[], bool] = lambda: True
+    failures: Sequence[str] = ()
 
 
 def run(study: Study, results: Path, *, jobs: int | None = None, pool: Pool | None = None, **options: Any) -> Findings:
@@ -101,7 +102,7 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
                 findings = analyse(cases, made_of, save, quick)
         return findings | {"computed": cases.computed, "seconds": computing + time.monotonic() - begin}
 
-    return Started(result, lambda: future is None or future.done())
+    return Started(result, lambda: future is None or future.done(), cases.failures)
 
 
 def analyse_stored(

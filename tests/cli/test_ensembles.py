@@ -33,12 +33,13 @@ def test_the_file_and_the_figure_are_those_of_the_ensemble(tmp_path, monkeypatch
     tops = symtop.population(50, seed=3)
     expected = symtop.ensemble(tops, "strang", per_nutation=30, nutations=2, samples=21, quiet=True)
     with xr.open_dataset(path) as data:
-        assert data.load()[list(expected.data_vars)].identical(expected)
+        assert data.load()[list(expected.data_vars)].identical(expected.assign_attrs(seed=3, kind="all"))
         np.testing.assert_array_equal(data["I1"].values, tops["I1"].values)
         np.testing.assert_array_equal(data["start_theta_dot"].values, tops["theta_dot"].values)
         largest = symtop.errors(expected, tops)["axis"].max("time")
         np.testing.assert_allclose(data["axis_error"], largest, rtol=1e-6, atol=1e-14)
         assert data["axis_error"].attrs["long_name"].startswith("angle between axes")
+        assert data["axis_error"].attrs["units"] == "rad"
     with Image.open(figure) as picture:
         assert np.asarray(picture.convert("L")).std() > 10.0
 
@@ -65,6 +66,7 @@ def test_bodies_are_run_compared_and_written(tmp_path):
     expected = symtop.ensemble(bodies, "strang", per_nutation=30, nutations=2, samples=21, quiet=True)
     data = netcdf.read(path)
     assert data[list(expected.data_vars)].drop_attrs().identical(expected.drop_attrs())
+    assert [data.attrs[name] for name in ("seed", "kind", "epsilon")] == [3, "heavy", 0.1]
     np.testing.assert_array_equal(data["I2"], bodies["I2"])
     np.testing.assert_array_equal(data["start_omega_body"], bodies["omega_body"])
     wrong = symtop.errors(expected, bodies)

@@ -67,8 +67,7 @@ def test_words_do_not_count_and_numbers_do():
 
 def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again(clean_registry):
     study, plain = runner.load(str(PROBE)), symtop.integrator("midpoint")
-    case = next(case for case in study.cases(True) if case.integrator == "midpoint")
-    digests = []
+    case, digests = next(case for case in study.cases(True) if case.integrator == "midpoint"), []
     for order in range(2, 12):
         symtop.register(dataclasses.replace(plain, order=order), replace=True)
         digests.append(fingerprint.digest(study, case))
@@ -212,10 +211,8 @@ def test_a_value_counts_where_it_stands_and_not_by_its_identity():
 
 
 def test_no_method_hangs_on_how_many_types_numba_has_made(monkeypatch):
-    """numba numbers its types by process; a hash with such a number would make every case stale in another one."""
-
     class Kind(types.Type):
-        """The control: a type that is held by value."""
+        """The control: numba numbers types by process, and a hash with a number makes every case stale in another."""
 
     noted = set[str]()
     monkeypatch.setattr(Code, "_note", lambda self, *values: (noted.update(values), self._at.values.extend(values)))
@@ -228,13 +225,10 @@ def test_no_method_hangs_on_how_many_types_numba_has_made(monkeypatch):
 
 def test_the_cache_keeps_what_was_used_last(tmp_path):
     for age, name in enumerate(("a", "b", "c", "d")):
-        folder = tmp_path / name
-        folder.mkdir()
+        (folder := tmp_path / name).mkdir()
         (folder / "kernel.code").write_bytes(b"\0" * 1000)
-        used = time.time() - age * 2 * files.DAY
-        os.utime(folder, (used, used))
-    old = time.time() - (files.UNUSED + 1) * files.DAY
-    os.utime(tmp_path / "a", (old, old))
+        os.utime(folder, (time.time() - age * 2 * files.DAY,) * 2)
+    os.utime(tmp_path / "a", (time.time() - (files.UNUSED + 1) * files.DAY,) * 2)
     files.touch(tmp_path / "d")  # it was used last, now
     files.prune(tmp_path, 2500)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["b", "d"]
@@ -248,12 +242,17 @@ def test_changes_name_what_differs_and_versions_of_packages_are_reasons():
     assert changes(before, now) == ["file b", "scene x (no longer counts)", "package n (did not count before)"]
     assert changes(now, now) == []
     assert "code symtop/core/jit.py" in Code().reasons("a file by its path", code_hash.PACKAGE / "core" / "jit.py")
-    assert digest(before) == digest(dict(reversed(before.items())))
-    assert digest(before) != digest(now)
+    assert digest(before) == digest(dict(reversed(before.items()))) != digest(now)
     assert merged([{"a": "1"}, {"a": "1", "b": "2"}]) == {"a": "1", "b": "2"}
     assert merged([{"a": "1"}, {"a": "2"}])["a"] not in ("1", "2")
-    assert code_hash.packages("numpy", "no-such-package") == {
-        "package numpy": importlib.metadata.version("numpy"),
-        "package no-such-package": "absent",
-    }
+    numpy = importlib.metadata.version("numpy")
+    assert code_hash.packages("numpy", "no-such-one") == {"package numpy": numpy, "package no-such-one": "absent"}
     assert code_hash.packages()["package python"] == ".".join(map(str, sys.version_info[:2]))
+
+
+def test_processors_of_one_name_differ_by_their_models(monkeypatch, tmp_path):
+    (file := tmp_path / "cpuinfo").write_text("model name\t: A\ncpu family\t: 6\nmodel\t\t: 85\n\nmodel name\t: A\n")
+    monkeypatch.setattr(code_hash, "Path", lambda _: file)
+    assert code_hash.processor.__wrapped__() == "A, cpu family 6, model 85"
+    file.unlink()
+    assert code_hash.processor.__wrapped__()  # of a system without that file: some name

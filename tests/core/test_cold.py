@@ -116,6 +116,12 @@ def test_garbage_is_collected_and_calls_of_llvm_noted_again_after_a_kernel_is_co
     assert now() == before
 
 
+def test_numba_without_its_compiler_is_refused(monkeypatch):
+    monkeypatch.setattr(jit.numba.config, "DISABLE_JIT", 1)
+    with pytest.raises(symtop.SymtopError, match="NUMBA_DISABLE_JIT must be 0 or unset, not 1"):
+        compile_kernel(lambda x: x)
+
+
 PRIVATE = {  # of numba's, without which it compiles as it does
     **dict.fromkeys(("_final_module", "_finalize_dynamic_globals", "_verify_declare_only_symbols"), jit._Library),
     "_find_referenced_environments": CompileResult,

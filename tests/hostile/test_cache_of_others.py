@@ -63,8 +63,7 @@ def test_what_is_made_is_the_users_alone_no_pickle_and_ours_to_run(planted):
     head, _, bitcode = planted[1].read_bytes()[jit.HASH :].partition(b"\n")
     assert json.loads(head)["returned"] == "float64"
     assert zlib.decompress(bitcode).startswith(b"BC\xc0\xde")
-    # The control: this is what is refused below.
-    assert compile_kernel(_doubled)(2.0) == 8.0
+    assert compile_kernel(_doubled)(2.0) == 8.0  # the control: this is what is refused below
     (code,) = planted[0].rglob("*.code")
     before = code.stat().st_mtime_ns
     assert (compile_kernel(_doubled)(2.0), code.stat().st_mtime_ns) == (8.0, before)

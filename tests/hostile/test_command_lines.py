@@ -99,8 +99,7 @@ def test_every_bad_command_line_is_one_sentence(name, folder, monkeypatch):
     monkeypatch.setattr("symtop.cli.common.telling", contextlib.nullcontext)  # a process for each line
     monkeypatch.setattr("socketserver.BaseServer.serve_forever", lambda *_: pytest.fail("it serves"))
     before = sorted(path.name for path in folder.iterdir())
-    above = sorted(path.name for path in folder.parent.iterdir())
-    faults = []
+    above, faults = sorted(path.name for path in folder.parent.iterdir()), []
     for words in lines(name):
         with warnings.catch_warnings(action="ignore"):
             result = call(*words, code=None)

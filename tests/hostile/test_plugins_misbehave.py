@@ -85,11 +85,12 @@ def test_a_solver_does_not_reach_the_plan_or_an_earlier_run_and_its_interrupt_is
 
 KERNEL = """
 import symtop
+from beside_own import ZERO
 
 def step(par, rule, state, carry, h):
     return {returns}
 
-loop = symtop.kernel_loop(lambda par, rule, state, h: (0.0,), step, lambda par, rule, before, dstate, h: (0.0, 0.0))
+loop = symtop.kernel_loop(lambda par, rule, state, h: (ZERO,), step, lambda par, rule, before, dstate, h: (0.0, 0.0))
 solver = symtop.FixedStep(loop, (0.0,), symtop.on_angles, 1, implicit=False)
 method = symtop.Integrator(name="own-kernel", family="other", summary="", solvers={{"angles": solver}})
 symtop.register(method, replace=True)
@@ -107,6 +108,7 @@ symtop.register(method, replace=True)
 def test_a_kernel_that_does_not_compile_or_returns_no_outcome_is_one_sentence(returns, says, tmp_path):
     file = tmp_path / "own.py"
     file.write_text(KERNEL.format(returns=returns))
+    (tmp_path / "beside_own.py").write_text("ZERO = 0.0\n")
     run = "spheroid", "own-kernel"
     for words in (["run", *run], ["long", *run, "--steps", "10"], ["ensemble", "own-kernel", "--members", "3"]):
         horizon = [] if words[0] == "long" else ["--horizon", "1"]

@@ -187,7 +187,8 @@ def impatient(monkeypatch):
     (midpoint, {"form": "rotation", "chart": "angles"}, "chart must be left out with form rotation, .* not 'angles'"),
     (lambda y, h: y, {}, r"must take \(f, t, y, h\), not \(y, h\)"),
     (midpoint, {"adaptive": True}, "need a class derived from OdeSolver"),
-    (dict, {}, "must be derived from scipy.integrate.OdeSolver, not dict"),
+    (dict, {}, "must be derived from scipy.integrate.OdeSolver, not dict; any other step is a function, or the method"),
+    (type("Lie", (), {"step": midpoint}), {}, "must be derived from scipy.integrate.OdeSolver, not Lie"),
     (hangs, {}, r"a step of h = \d.* had not returned after \d+ s"),
     (lambda f, t, y, h: os.kill(os.getpid(), signal.SIGSEGV), {}, "its process was ended by SIGSEGV in a step of h = "),
     (lambda f, t, y, h: 1 / 0, {}, r"a step of h = .* raises ZeroDivisionError: division by zero"),
@@ -206,10 +207,12 @@ def test_what_cannot_be_judged_is_refused_in_one_sentence(target, options, words
 def test_a_file_beside_others_one_that_fails_and_a_name_that_is_not_there(tmp_path):
     file = tmp_path / "mine.py"
     (tmp_path / "helper.py").write_text("def slope(f, t, y):\n    return f(t, y)\n")
-    file.write_text("from helper import slope\ndef leap(f, t, y, h):\n    return y + h * slope(f, t, y)\n")
-    with pytest.raises(symtop.SymtopError, match="must have a function 'step'; it has slope, leap"):
+    file.write_text("from helper import slope\ndef leap(f, t, y, h):\n    return y + h * slope(f, t, y)\n"
+                    "class One:\n    def leap(self, f, t, y, h):\n        return y\none = One()\n")  # fmt: skip
+    with pytest.raises(symtop.SymtopError, match="must have a function 'step'; it has slope, leap, One"):
         open_target(str(file), None, "axis")
     assert open_target(f"{file}:leap", None, "axis").name == "mine-leap"
+    assert open_target(f"{file}:one.leap", None, "axis").name == "mine-one.leap"  # the method of an object
     file.write_text("import nothing_of_that_name\n")
     with pytest.raises(symtop.SymtopError, match=r"the file mine\.py failed: ModuleNotFoundError"):
         open_target(str(file), None, "axis")

@@ -42,6 +42,7 @@ def test_each_run_is_that_of_simulate_and_every_variable_has_words_and_units(dat
     assert data["variant"].values.tolist() == charts
     scene = symtop.scene("goldstein")
     assert data.attrs["horizon"] == pytest.approx(2.0 * scene.nutation_period)
+    assert json.loads(data.attrs["start"])["goldstein"]["theta_dot"] == scene.start.theta_dot
     cell, place = data.sel(variant="rk4[axis]"), cheapest(data, 1e-3)[2]
     step = cell["step_size"].values[place]
     row = error_row(scene, symtop.integrator("rk4[axis]"), step, data.attrs["horizon"], "axis")
@@ -137,6 +138,8 @@ def test_another_quantity_takes_the_chart_that_shows_it(quantity):
     ({"methods": ["rk4[axis]"], "quantity": "attitude"}, "cannot show the attitude"),
     ({"scene": "heavy-chaotic", "methods": "gauss-4", "horizon": 1e3}, "horizon must be at most .* is not known"),
     ({"scene": "tennis-racket", "methods": "gauss-4", "quantity": "p_psi"}, "quantity 'p_psi' is unknown"),
+    ({"methods": lambda y, h: y}, "form ode must take .f, t, y, h., not .y, h.$"),  # and no option of `judge`
+    ({"methods": "my engine"}, "a step must be FILE.py:NAME or FILE.so, not 'my engine'$"),
 ])  # fmt: skip
 def test_bad_input_is_one_sentence(words, sentence):
     with pytest.raises(symtop.SymtopError, match=sentence.replace("[", r"\[")):

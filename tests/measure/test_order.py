@@ -150,8 +150,7 @@ def square(rows):
 def test_there_are_as_many_trees_as_there_are_and_known_tables_have_their_orders():
     assert [len(oc.trees(n)) for n in range(1, 8)] == [1, 1, 2, 4, 9, 20, 48]
     assert all(oc.size(tree) == 6 for tree in oc.trees(6))
-    # tall tree: n!; bush: n
-    assert sorted(oc.density(tree) for tree in oc.trees(4)) == [4, 8, 12, 24]
+    assert sorted(oc.density(tree) for tree in oc.trees(4)) == [4, 8, 12, 24]  # tall tree: n!; bush: n
     assert oc.conditions(square(CLASSICAL[0]), CLASSICAL[1]).order == 4
     assert oc.conditions(square(((), *DORMAND_PRINCE.a)), DORMAND_PRINCE.b).order == 5
     r = 3**0.5 / 6

@@ -1,5 +1,7 @@
 """sweep(): one dataset of errors, work and outcomes; kept in a file, resumed from it, and drawn."""
 
+import json
+
 import numpy as np
 import pytest
 import xarray as xr
@@ -9,6 +11,7 @@ from symtop.core import files, netcdf
 from symtop.measure import sweep as module
 from symtop.measure.accuracy import error_row
 from symtop.measure.timing import Timing
+from symtop.model.top import Angles, SymmetricTop
 
 STEPS = [0.02, 0.01, 0.005]
 METHODS = ["strang", "rk4[axis]", "rk45-compiled", "exact"]
@@ -22,7 +25,10 @@ def data():
 
 def test_each_entry_is_that_of_one_run_whose_settings_are_its_own(data):
     assert dict(data.sizes) == {"scene": 2, "variant": 4, "setting": 3}
+    assert data.attrs["horizon"] == 2.0
     for scene in ("spheroid", "goldstein"):
+        top, start = (json.loads(data.attrs[name])[scene] for name in ("top", "start"))
+        assert (SymmetricTop(**top), Angles(**start)) == (symtop.scene(scene).top, symtop.scene(scene).start)
         row = error_row(symtop.scene(scene), symtop.integrator("strang"), 0.01, 2.0)
         cell = data.sel(scene=scene, variant="strang").isel(setting=1)
         for name in ("axis", "attitude_end", "energy_bound", "force_evaluations", "step_size", "outcome"):
@@ -179,7 +185,9 @@ def test_times_are_those_of_runs_that_ended_well_and_are_kept(tmp_path):
     solvers = {"attitude": lambda *_: pytest.fail("another chart"), "axis": symtop.integrator("rk4").solvers["axis"]}
     both, asked = symtop.Integrator("both", "other", "", solvers), options | {"path": None, "observe": "axis"}
     assert symtop.sweep("spheroid", both, **asked)["seconds"].values[0, 0, 0] > 0.0
-    untimed = symtop.sweep("spheroid", "rk4", step_size=0.1, quiet=True)
+    untimed = symtop.sweep(["spheroid", "goldstein"], "rk4", step_size=0.1, quiet=True)
+    ends = {name: symtop.scene(name).horizon for name in untimed["scene"].values}
+    assert json.loads(untimed.attrs["horizon"]) == ends
     assert ("seconds" in untimed, untimed.attrs["timed"][:7]) == (False, "nothing")
     with pytest.raises(symtop.SymtopError, match="timed must be"):
         symtop.sweep("spheroid", "rk4", step_size=0.1, timed="yes")

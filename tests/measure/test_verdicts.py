@@ -40,8 +40,7 @@ def test_a_pole_passed_on_the_wrong_side_is_a_wrong_regime():
 def test_the_command_line_judges_a_run_against_the_width_of_the_nutation():
     few = call("run", "goldstein", "strang", "--step-size", "0.3", "--samples", "2", "--json")
     assert json.loads(few.stdout)["judgement"]["verdict"] == "bounded_but_wrong"
-    # `fast` nutates over 4e-4 rad: half a thousandth of a radian is not accurate there.
-    scene = symtop.scene("fast")
+    scene = symtop.scene("fast")  # `fast` nutates over 4e-4 rad: half a thousandth of a radian is not accurate there
     run = symtop.simulate(scene, "exact", samples=101)
     assert judgement(scene, run, np.full(101, 1e-5)).verdict == "accurate"
     assert judgement(scene, run, np.full(101, 5e-4)).verdict != "accurate"

@@ -181,8 +181,7 @@ mujoco3_rk4, rkmk4 = (partial(_kutta, corrected=one) for one in (lambda turn, b:
 
 
 def jsbsim_default(attitude, w, h, inertia, tau):
-    b = attitude.inv().apply(w)
-    new = _moved(attitude, w, h)
+    b, new = attitude.inv().apply(w), _moved(attitude, w, h)
     return new, new.apply(b + h * _rates(attitude, b, inertia, tau))
 
 

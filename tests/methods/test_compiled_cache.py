@@ -290,8 +290,7 @@ def assert_the_same_run(solver, top, start, plan):
             ("sofroniou-spaletta-10", "axis")))
 ])  # fmt: skip
 def test_a_run_at_once_is_a_run_in_stretches(name, chart):
-    scene = symtop.scene("spheroid")
-    solver = inside(symtop.integrator(name).solvers[chart])
+    scene, solver = symtop.scene("spheroid"), inside(symtop.integrator(name).solvers[chart])
     assert solver._whole is not None
     for marks in ([0, 1], [1], [0, 3, 10, 400], [7, 300]):
         assert_the_same_run(solver, scene.top, scene.start, Plan.steps(0.02, marks))
@@ -337,8 +336,7 @@ def test_a_rule_may_be_whatever_a_kernel_takes(rule):
 
 def test_tables_and_compositions_travel_as_arrays_and_arrive_whole():
     """The negative control: scaled without closing, one table in two is off by a rounding somewhere."""
-    rule = METHODS["srkn-14-6"].table
-    steps = np.random.default_rng(0).uniform(0.01, 0.1, 100)
+    rule, steps = METHODS["srkn-14-6"].table, np.random.default_rng(0).uniform(0.01, 0.1, 100)
     off = sum(exact_sum([a * h for a in rule.drift], h) != tuple(a * h for a in rule.drift) for h in steps)
     assert off > 20
     # Numbers of every kind, a rule that hangs on the start included, to the bits of the rule that Python makes.

@@ -118,8 +118,7 @@ def test_a_step_is_the_engines_formula_in_body_axes_and_a_turn_about_the_axis_ch
             return mgl * np.cross([0.0, 0.0, 1.0], at.as_matrix()[:, 2])
 
         new, w = formula(attitude, w, h, inertia, tau)
-        L = new.apply(inertia @ new.inv().apply(w))
-        done = one_step(name, scene, h)
+        L, done = new.apply(inertia @ new.inv().apply(w)), one_step(name, scene, h)
         assert charts.attitude_distance(done[:4], np.roll(new.as_quat(), 1)) < 1e-13
         np.testing.assert_allclose(done[4:], L, rtol=0.0, atol=2e-14 * np.linalg.norm(L) + 1e-14)
         if "axis" in symtop.integrator(name).charts():

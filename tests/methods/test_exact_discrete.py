@@ -44,8 +44,7 @@ def oscillators(scene, h, steps):
 @pytest.mark.parametrize("steps", [100, 20, 4.37, 2.3, 2.0, 0.61, 2.0 / 3.0])
 def test_the_step_is_the_motion_whatever_its_size(name, steps):
     scene = symtop.scene(name)
-    h = scene.nutation_period / steps
-    count = math.ceil(10 * steps)
+    h, count = scene.nutation_period / steps, math.ceil(10 * steps)
     done, bound = run(scene.top, scene.start, h, count), UNSTABLE.get(name, 1.5e-12)
     truth = closed_form(scene).state(h * np.arange(count + 1))
     assert done.outcome == "ok"
@@ -89,19 +88,16 @@ def test_random_tops_follow_the_closed_form_at_every_step():
 
 def test_a_step_agrees_with_fifty_digits_and_a_neighbour_of_the_map_is_no_motion():
     scene = symtop.scene("spheroid")
-    precise = PreciseForm(scene.top, scene.start, digits=50)
-    h = scene.nutation_period / 3.1
+    precise, h = PreciseForm(scene.top, scene.start, digits=50), scene.nutation_period / 3.1
     done = run(scene.top, scene.start, h, 3)
     for k in range(1, 4):
         quaternion = charts.quaternion_from_angles(*(float(value) for value in precise(k * h)[:3]))
         assert charts.attitude_distance(done.states[k, :4], quaternion) < 5e-15
-    h = scene.nutation_period / 20.0
-    kernel = inside(METHOD.solvers["axis"])
+    h, kernel = scene.nutation_period / 20.0, inside(METHOD.solvers["axis"])
     par, _ = on_oscillators(scene.top, scene.start)
     true = exact_map(scene.top, scene.start, h)
     D = 1.0 / h**2  # Stormer-Verlet's: A = 1 + 3 b h^2/2, B = -sigma h^2, no turn
-    verlet = Map(1.5 * par.b1, D, 1 / h, h, 0.0, 1.5 * par.b2, D, 1 / h, h, 0.0, 0.0)
-    gaps = []
+    verlet, gaps = Map(1.5 * par.b1, D, 1 / h, h, 0.0, 1.5 * par.b2, D, 1 / h, h, 0.0, 0.0), []
     for rule in (true, verlet):
         solver = dataclasses.replace(kernel, rule=lambda top, start, h, rule=rule: rule)
         state = solver(scene.top, scene.start, Plan.steps(h, [40])).states
@@ -112,8 +108,7 @@ def test_a_step_agrees_with_fifty_digits_and_a_neighbour_of_the_map_is_no_motion
 
 def test_a_free_top_a_step_back_and_the_separatrix_where_large_steps_are_divided():
     top, start = symtop.SymmetricTop(2.0, 1.0, 0.0), symtop.Angles(0.7, 0.2, 0.1, 0.3, -0.8, 1.1)
-    form = symtop.model.exact.closed_form.ClosedForm(top, start)
-    done = run(top, start, 0.7, 30)
+    form, done = symtop.model.exact.closed_form.ClosedForm(top, start), run(top, start, 0.7, 30)
     assert charts.attitude_distance(done.states[:, :4], form.quaternion(0.7 * np.arange(31))).max() < 1e-13
     assert np.ptp(run(top, symtop.Angles(0.7, 0.2, 0.1), 0.7, 3).states, axis=0).max() < 1e-15  # at rest
     scene = symtop.scene("goldstein")
@@ -122,8 +117,7 @@ def test_a_free_top_a_step_back_and_the_separatrix_where_large_steps_are_divided
     assert charts.attitude_distance(back.states[:, :4], truth).max() < 1e-13
     scene = symtop.scene("separatrix")
     h = scene.horizon / 4.0
-    done = run(scene.top, scene.start, h, 4)
-    truth = closed_form(scene).quaternion(h * np.arange(5))
+    done, truth = run(scene.top, scene.start, h, 4), closed_form(scene).quaternion(h * np.arange(5))
     assert charts.attitude_distance(done.states[:, :4], truth).max() < 1e-6
     assert done.force_evaluations > done.steps
     ordinary = symtop.scene("spheroid")
@@ -132,8 +126,7 @@ def test_a_free_top_a_step_back_and_the_separatrix_where_large_steps_are_divided
 
 def lagrangian(A, B, r, q0, q1):
     """L_d of one oscillator on two points of the plane, shape (2,), complex for a complex step."""
-    apart = q1 - q0
-    s = [q @ q for q in (q0, q1)]
+    apart, s = q1 - q0, [q @ q for q in (q0, q1)]
     return r * (0.5 * apart @ apart - 0.5 * sum(value - A / B * np.log(1.0 + B * value) for value in s))
 
 
@@ -157,8 +150,7 @@ def test_reduction_commutes_with_the_step():
     h = scene.nutation_period / 4.37
     par, _ = on_oscillators(scene.top, scene.start)
     rule = exact_map(scene.top, scene.start, h)
-    P = rule.D1 + par.b1
-    u = run(scene.top, scene.start, h, 200, "axis").states[:, 2]
+    P, u = rule.D1 + par.b1, run(scene.top, scene.start, h, 200, "axis").states[:, 2]
     y = 0.5 * (par.kappa * u + (par.b1 + par.b2))  # wp, for b1 + b2 = -mu
     sums = (2 * P * y**2 + (2 * P**2 - par.g2 / 2) * y - P * par.g2 / 2 - par.g3) / (y - P) ** 2
     assert np.abs(y[2:] + y[:-2] - sums[1:-1]).max() < 1e-12 * np.abs(y).max()

@@ -59,8 +59,7 @@ def assert_keeps_everything(method, scene, observe, nutation_steps, limit=1e-13,
 def test_a_wrong_table_loses_the_order_or_the_constants_and_no_gauss_method_is_poisson():
     with pytest.raises(AssertionError, match="order"):
         assert_order("spheroid", nudged(3, 1e-3, mirrored=True), 6, 0.05, WINDOWS[6])
-    # 1e-12 is 4500 rounding units of one coefficient
-    with pytest.raises(AssertionError, match=r"energy|p_psi"):
+    with pytest.raises(AssertionError, match=r"energy|p_psi"):  # 1e-12 is 4500 rounding units of one coefficient
         assert_keeps_everything(nudged(3, 1e-12, mirrored=False), "spheroid", "axis", 30.3)
     # the order is lost but not the constants: they need only mu + mu^T = 1
     assert_keeps_everything(nudged(3, 1e-3, mirrored=True), "spheroid", "axis", 30.3)
@@ -180,8 +179,7 @@ def newton_step(par, stages, y, h):
 def sweep_step(par, stages, y, h, sweeps=100):
     """One step by sweeps from h b_i f(y), and the size of the last correction."""
     mu, b = gauss_rule(stages)[:2]
-    parts = np.outer(h * b, field_axis(par, y))
-    change = math.inf
+    parts, change = np.outer(h * b, field_axis(par, y)), math.inf
     with np.errstate(over="ignore", invalid="ignore"):
         for _ in range(sweeps):
             last = parts.copy()

@@ -42,8 +42,7 @@ def test_starting_from_q0_plus_h_v0_costs_an_order():
 
     def begun_wrongly(top, start):
         par, state = on_angles(top, start)
-        rule = Quadrature((0.5,), (1.0,))
-        h = begun_wrongly.h
+        rule, h = Quadrature((0.5,), (1.0,)), begun_wrongly.h
         # p1 = D2 Ld(q0, q0 + h v0) moved back by a step is the momentum that this start amounts to
         d = h * start.theta_dot
         sums = node_sums(rule, start.theta, d, opening(None, rule, start.theta))
@@ -106,8 +105,7 @@ def test_an_iteration_that_wanders_off_ends_as_with_the_sines_of_the_library(fam
 @pytest.mark.quick
 @pytest.mark.parametrize("name", IN_ANGLES)
 def test_a_nan_stays_one(name):
-    solver = inside(symtop.integrator(name).solvers["angles"])
-    scene = symtop.scene("spheroid")
+    solver, scene = inside(symtop.integrator(name).solvers["angles"]), symtop.scene("spheroid")
     par, rule, state = solver.setup(scene.top, scene.start, 0.01)
     assert solver.loop(par, rule, state, 0.01, np.array([3])).outcome == OK
     broken = solver.loop(par, rule, (math.nan, *state[1:]), 0.01, np.array([3]))

@@ -22,7 +22,7 @@ from tests.conftest import random_scenes
 from tests.judging.blind.right import product
 from tests.methods.engine_formulas import hat
 
-LIE_TABLES = ("rkmk-se3-2", "rkmk-se3-4", "crouch-grossman-3", "commutator-free-4")
+LIE_TABLES = ("rkmk-se3-2", "rkmk-se3-4", "rkmk-se3-5", "rkmk-se3-8", "crouch-grossman-3", "commutator-free-4")
 VARIATIONAL = ("lie-variational", "lie-variational-suzuki-4", "euler-poincare")
 COLLECTIVE = ("collective-gauss-2", "collective-gauss-4", "collective-gauss-6")
 K = np.array([0.0, 0.0, 1.0])
@@ -101,8 +101,7 @@ def test_rattle_on_directors_is_the_lie_group_variational_integrator():
     """RATTLE on the nine numbers of a rotation matrix, R^T R = 1, with Lagrange multipliers found by a solver."""
     scene, h = symtop.scene("spheroid"), 0.02
     J = moments(scene.top)
-    Jd = 0.5 * np.trace(J) * np.eye(3) - J
-    rows = states("lie-variational", scene, h, 4)
+    Jd, rows = 0.5 * np.trace(J) * np.eye(3) - J, states("lie-variational", scene, h, 4)
     R, P = matrices(rows)[0], None
     body = R.T @ rows[0, 4:]
     P = R @ hat(np.linalg.solve(J, body)) @ Jd  # R' J_d
@@ -125,8 +124,7 @@ def test_rattle_on_directors_is_the_lie_group_variational_integrator():
         half, R = ahead(multipliers)
         P = half + 0.5 * h * force
         V = R.T @ P @ np.linalg.inv(Jd)  # tangent: V must be skew, by a second set of multipliers
-        wrong = V + V.T
-        inverse = np.diag(np.linalg.inv(Jd))
+        wrong, inverse = V + V.T, np.diag(np.linalg.inv(Jd))
         P = P - R @ (wrong / (inverse[:, None] + inverse[None, :]))
         np.testing.assert_allclose(R, matrices(rows)[k + 1], atol=3e-13)
     M = R.T @ P
@@ -141,8 +139,7 @@ def test_the_scalar_equations_are_solved_and_the_discrete_rigid_body_ends_at_a_r
         assert solve(integrator(name), "axis", top, start, Plan.steps(3.0, [1])).outcome == outcome
     random = np.random.default_rng(3)
     for _ in range(2000):
-        top = BareTop(1.0, random.uniform(0.02, 1.98), 1.0)
-        size = 10.0 ** random.uniform(-8, 4)
+        top, size = BareTop(1.0, random.uniform(0.02, 1.98), 1.0), 10.0 ** random.uniform(-8, 4)
         A, square = size * random.normal(), size**2 * random.exponential()
         first, after, rates = variational.RETRACTION
         unknown, converged, work = first(top, A, square), False, 0
@@ -226,8 +223,7 @@ def test_the_discrete_gradients_are_the_midpoint_rule_and_the_mean_field_loses_t
 @pytest.mark.parametrize("scene", random_scenes(4, seed=14), ids=lambda scene: scene.name)
 def test_kahan_is_its_runge_kutta_form(scene):
     """y_1 = y_0 + h (2 f((y_0 + y_1)/2) - (f(y_0) + f(y_1))/2)."""
-    h = 0.02
-    par = SpaceTop(scene.top.I1, scene.top.mgl, 0.0)
+    h, par = 0.02, SpaceTop(scene.top.I1, scene.top.mgl, 0.0)
     rows = states("kahan", scene, h, 3, "axis")
     for before, after in itertools.pairwise(rows):
         f0, fm, f1 = (np.array(field_axis(par, y)) for y in (before, 0.5 * (before + after), after))
@@ -245,8 +241,7 @@ def test_the_image_of_a_step_does_not_depend_on_the_point_above(seed):
     random = np.random.default_rng(seed)
     scene, h = symtop.scene("spheroid"), 0.03
     top, k = scene.top, np.array([0.0, 0.0, 0.0, 1.0])
-    attitude = charts.space_state("attitude", top, scene.start)
-    spin = random.normal()
+    attitude, spin = charts.space_state("attitude", top, scene.start), random.normal()
     q = product(attitude[:4], np.array([math.cos(spin), 0.0, 0.0, math.sin(spin)]))
     p = product(np.array([0.0, *(2.0 * attitude[4:])]), q) + random.normal() * q
     start = np.array([*q, *p])
@@ -284,8 +279,7 @@ def test_two_steps_are_those_of_the_generalised_alpha_method(radius, scene):
     done = solve(method, "attitude", scene.top, scene.start, Plan.steps(h, [0, 1, 2])).states
     am, af = (2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0)
     gamma = 0.5 + af - am
-    beta = 0.25 * (gamma + 0.5) ** 2
-    R = matrices(done)[0]
+    beta, R = 0.25 * (gamma + 0.5) ** 2, matrices(done)[0]
     W = np.linalg.solve(J, R.T @ done[0, 4:])
     change = lambda R, W: np.linalg.solve(J, R.T @ (scene.top.mgl * np.cross(K, R[:, 2])) - np.cross(W, J @ W))
     slope = a = change(R, W)

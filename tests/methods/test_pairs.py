@@ -6,11 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy import integrate
+from scipy import integrate, optimize
 
 import symtop
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.judging.claims.order_conditions import conditions
+from symtop.methods.framework.calling import solve
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
@@ -216,8 +217,7 @@ def kernel(name):
 def compiled(name, scene, h, **changed):
     """What `sample` returns for a step of h from the start of a scene, or `refine` leaves in the last row."""
     par, state = REDUCED.prepare(scene.top, scene.start)
-    par = par._replace(**changed)
-    memory = np.zeros((3, 4))
+    par, memory = par._replace(**changed), np.zeros((3, 4))
     memory[0] = REDUCED.field(par, state)
     made = kernel(name)(par, state, memory, h)
     return par, made, memory[-1]
@@ -262,3 +262,25 @@ def test_the_table_has_order_eight_its_estimate_six_and_it_needs_fewer_forces_th
         error, other = (float(symtop.errors(run)["axis"].max()) for run in (mine, theirs))
         assert mine.attrs["force_evaluations"] < theirs.attrs["force_evaluations"]
         assert error < min(tolerance, other)
+
+
+def test_a_projected_step_ends_on_the_constants_next_to_where_the_plain_one_ends():
+    scene = symtop.scene("goldstein")
+    (I1, mgl), plan = (scene.top.I1, scene.top.mgl), Plan.steps(scene.nutation_period / 5.0, [0, 1])
+    plain, done = (solve(integrator(name), "axis", scene.top, scene.start, plan).states
+                   for name in ("dop853-compiled-fixed", "dop853-projected"))  # fmt: skip
+    constants = lambda y: np.array([0.5 * y[:3] @ y[:3], y[:3] @ y[3:], 0.5 * y[3:] @ y[3:] / I1 + mgl * y[2]])
+    e, L = plain[1, :3], plain[1, 3:]
+    gradients = np.array([[*e, 0, 0, 0], [*L, *e], [0, 0, mgl, *L / I1]])
+    directions = gradients * ([1.0] * 3 + [plain[0, 3:] @ plain[0, 3:] + I1 * mgl] * 2 + [0.0])
+    off = lambda factors: constants(plain[1] + factors @ directions) - constants(plain[0])
+    expected = plain[1] + optimize.root(off, np.zeros(3), tol=1e-15).x @ directions
+    np.testing.assert_allclose(done[1], expected, atol=1e-14)
+    assert np.abs(off(np.zeros(3))).max() > 1e-8  # the control: the plain step leaves them
+
+
+@pytest.mark.parametrize("name", ["steady", "sleeping", "sleeping-unstable"])
+def test_a_gradient_that_depends_on_the_others_is_left_out_of_the_projection(name):
+    run = symtop.simulate(name, "vern9-projected", step_size=0.02, horizon=2.0, guard=False)
+    assert run.attrs["outcome"] == "ok"
+    assert float(symtop.errors(run)["axis"].max()) < 1e-9

@@ -102,8 +102,7 @@ def read_off(scene, eps, marks):
 @compile_kernel
 def _read_off(par, theta, p, eps, marks):
     I1, _, mgl, _, north, south = par
-    states = np.empty((len(marks), 2))
-    done = 0
+    states, done = np.empty((len(marks), 2)), 0
     for j in range(len(marks)):
         while done < marks[j]:
             h = eps * np.sin(theta)

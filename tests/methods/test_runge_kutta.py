@@ -87,8 +87,7 @@ def test_adaptive_methods_follow_their_tolerance_in_every_chart(name, chart):
 @pytest.mark.parametrize("name", ["rk4", *ADAPTIVE])
 def test_p_phi_stays_where_it_is_linear_in_the_state_and_is_lost_in_angles(name):
     scene = symtop.scene("spheroid")
-    control = integrator(name).given(0.02 if name == "rk4" else 1e-5)
-    change = {}
+    control, change = integrator(name).given(0.02 if name == "rk4" else 1e-5), {}
     for chart in FORMULATIONS:
         run = symtop.simulate(scene, f"{name}[{chart}]", **control, horizon=8.0, samples=81, guard=False)
         change[chart] = {p: float(np.ptp(run[p].values)) / scene.momentum_scale for p in ("p_phi", "p_psi")}
@@ -119,8 +118,7 @@ def test_the_attitude_takes_its_spin_from_the_state_and_a_pole_is_nan_in_angles_
         y, h = f.state(start), 1e-6
         truth = symtop.ClosedForm(scene.top, start).quaternion([h])[0]
         assert np.abs(truth - (y[:4] + h * f(0.0, y)[:4])).max() < 1e-8
-    top = symtop.SymmetricTop(2.0, 1.0, 1.0)
-    start = symtop.Angles(theta=0.0, theta_dot=1.0, psi_dot=2.0)
+    top, start = symtop.SymmetricTop(2.0, 1.0, 1.0), symtop.Angles(theta=0.0, theta_dot=1.0, psi_dot=2.0)
     for chart in ("axis", "attitude"):
         f = symtop.field(chart, top)
         assert np.isfinite(f(0.0, f.state(start))).all()
@@ -164,8 +162,7 @@ def test_scipys_solvers_are_solve_ivp(name):
     scene = symtop.scene("spheroid")
     run = symtop.simulate(scene, name, tolerance=1e-6, horizon=2.0, samples=41)
     par, start = with_rates(scene.top, scene.start)
-    rhs = RightHandSide(field_angles, par)
-    method = integrator(name).summary.split()[1]
+    rhs, method = RightHandSide(field_angles, par), integrator(name).summary.split()[1]
     done = solve_ivp(rhs, (0.0, 2.0), start, method, run["time"].values, rtol=1e-6, atol=1e-6)
     for angle, values in zip(("theta", "phi", "psi"), done.y, strict=False):
         np.testing.assert_array_equal(run[angle], values)
@@ -186,8 +183,7 @@ def test_a_tableau_may_be_made_of_arrays_and_taylor_runs_in_three_precisions():
     for name in ("taylor", "taylor-longdouble", "taylor-quad"):
         run, result[name] = _error(name, None, "attitude", horizon=4.0)
         assert (run.attrs["chart"], run["quaternion"].dtype) == ("attitude", np.float64)
-    # beyond double what is left is the rounding of the samples and of the closed form
-    assert result["taylor"] < 5e-14
+    assert result["taylor"] < 5e-14  # beyond double what is left is the rounding of the samples and of the closed form
     assert max(result["taylor-longdouble"], result["taylor-quad"]) < 5e-15
     loose = _error("taylor-quad", 1e-8, horizon=4.0)[1]
     assert loose > 1e-12  # the tolerance reaches heyoka

@@ -110,8 +110,7 @@ def test_long_runs_are_right_to_rounding_where_the_truncation_is_below_it(chart,
 @pytest.mark.parametrize("name", ["spheroid", "fast", "grazing", "sleeping", "separatrix", "steady"])
 def test_the_error_follows_the_tolerance(chart, method, name):
     scene = symtop.scene(name)
-    times = np.linspace(0.0, min(scene.horizon, 10.0 * scene.time_scale()), 41)
-    form = closed_form(scene)
+    times, form = np.linspace(0.0, min(scene.horizon, 10.0 * scene.time_scale()), 41), closed_form(scene)
     for tolerance in (1e-5, 1e-8, 1e-11):
         done = method.solvers[chart](scene.top, scene.start, Plan.until(times, tolerance))
         assert done.outcome == "ok"
@@ -162,8 +161,7 @@ def coefficients(chart, order, shift=0.0):
     chosen = symtop.scene("heavy-brick" if chart == "body" else "goldstein", bodies=True)
     par, state = FORMS[chart].prepare(chosen.top, chosen.start)
     name = "a1" if chart == "body" else "twist"
-    par = par._replace(**{name: getattr(par, name) + shift})
-    fill = GENERAL[chart].series()
+    par, fill = par._replace(**{name: getattr(par, name) + shift}), GENERAL[chart].series()
 
     def kernel(par, state, c):
         fill(par, state, c, order)
@@ -209,8 +207,7 @@ def test_fixed_steps_have_order_sixteen(chart):
 
 
 def test_a_motion_without_end_of_steps_is_one_step_and_constants_stay_at_rounding():
-    scene = symtop.scene("spheroid")
-    method = symtop.integrator("series")
+    scene, method = symtop.scene("spheroid"), symtop.integrator("series")
     h = scene.nutation_period / 30.1
     done = method.solvers["axis"](scene.top, scene.start, Plan.steps(h, np.arange(0, 1_000_001, 10_000)))
     e, L = done.states[:, :3], done.states[:, 3:]

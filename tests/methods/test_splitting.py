@@ -98,8 +98,7 @@ def test_a_splitting_claims_the_cayley_energy_where_it_keeps_it(kick):
 @pytest.mark.parametrize("nutations", [0.1, 0.5, 1.03, 2.0])
 @pytest.mark.parametrize("name", ["cayley", "cayley-tuned"])
 def test_cayley_never_blows_up(name, nutations):
-    # the rounding of steps this large adds up: 5e-10 at most was seen in 1e7 of them
-    scene = symtop.scene("spheroid")
+    scene = symtop.scene("spheroid")  # the rounding of steps this large adds up: 5e-10 at most was seen in 1e7 of them
     h = nutations * scene.nutation_period
     scale = space.tangent_scale(scene.top, scene.start, h) if name == "cayley-tuned" else 1.0
     assert cayley_drift(METHODS[name], scene, h, 0.5 * h / scene.top.I1 * scale, 1_000_000) < 1e-9

@@ -43,7 +43,7 @@ def test_the_terms_of_a_step_are_those_of_the_motion_up_to_its_order(name):
 
 def test_without_the_bracket_munthe_kaas_loses_two_orders():
     rows = (((0.5,),), ((0.0, 0.5),), ((0.0, 0.0, 1.0),), ((1 / 6, 1 / 3, 1 / 3, 1 / 6),))
-    assert series(lie_runge_kutta("flat", rows, 4, "", "", bent=False), "axis").order == 2
+    assert series(lie_runge_kutta("flat", rows, 4, "", ""), "axis").order == 2
 
 
 @pytest.mark.parametrize("name", [name for name in METHODS if name != "cayley-tuned"])  # see `test_splitting`

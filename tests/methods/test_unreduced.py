@@ -96,8 +96,7 @@ def test_newtons_jacobian_is_that_of_the_discrete_legendre_transform(rule):
     """A correction misses the root by the square of the distance to it; with one wrong entry, by the distance."""
     scene, h = random_scenes(1, seed=13)[0], 0.05
     par, state = with_momenta(scene.top, scene.start)
-    table = Quadrature(*RULES[rule][:2])
-    root = np.array(kernel._rates(par, state))
+    table, root = Quadrature(*RULES[rule][:2]), np.array(kernel._rates(par, state))
 
     def left_momenta(rate):
         (w, v, u), sums = rate, kernel._node_sums(par, table, state[0], rate, h)

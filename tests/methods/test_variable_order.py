@@ -43,8 +43,7 @@ def test_coefficients_of_equal_steps_are_those_of_adams_and_bashforth():
 def test_a_predictor_integrates_polynomials_below_its_order_on_any_nodes_and_no_higher_one(k):
     rng = np.random.default_rng(k)
     past, h = rng.uniform(0.5, 2.0, 13), 0.8
-    nodes = -np.concatenate([[0.0], np.cumsum(past)])[:k]
-    made = prepared(past, h, k)
+    nodes, made = -np.concatenate([[0.0], np.cumsum(past)])[:k], prepared(past, h, k)
     for degree in range(k + 1):
         f = nodes**degree if degree else np.ones(k)
         differences = []  # psi_1 .. psi_i f[t_n, .., t_{n-i}], of the nodes behind
@@ -54,8 +53,7 @@ def test_a_predictor_integrates_polynomials_below_its_order_on_any_nodes_and_no_
             if i + 1 < k:
                 table = (table[:-1] - table[1:]) / (nodes[: -i - 1] - nodes[i + 1 :])
                 factor *= nodes[0] - nodes[i + 1]
-        terms = h * made[:k, G] * made[:k, BETA] * differences
-        exact = h ** (degree + 1) / (degree + 1)
+        terms, exact = h * made[:k, G] * made[:k, BETA] * differences, h ** (degree + 1) / (degree + 1)
         gap = abs(np.sum(terms) - exact) / max(np.abs(terms).sum(), exact)
         assert gap < 1e-11 if degree < k else gap > 1e-2, (degree, gap)
 
@@ -64,12 +62,10 @@ def test_a_predictor_integrates_polynomials_below_its_order_on_any_nodes_and_no_
 @pytest.mark.parametrize("tolerance", [1e-6, 1e-10])
 def test_it_needs_no_more_evaluations_than_scipys_adams_codes_and_errs_no_more(name, tolerance):
     scene = symtop.scene(name)
-    field = symtop.field("axis", scene.top)
-    times = np.linspace(0.0, scene.horizon, 33)
+    field, times = symtop.field("axis", scene.top), np.linspace(0.0, scene.horizon, 33)
     truth = symtop.reference(scene, times)["axis"].values
     run = symtop.simulate(scene, "adams[axis]", tolerance=tolerance, samples=33, guard=False)
-    error = float(symtop.errors(run)["axis"].max())
-    start = field.state(scene.start)
+    error, start = float(symtop.errors(run)["axis"].max()), field.state(scene.start)
     lsoda = integrate.solve_ivp(field, (0.0, scene.horizon), start, method="LSODA", rtol=tolerance, atol=tolerance,
                                 t_eval=times)  # fmt: skip
     count = [0]
@@ -115,8 +111,7 @@ def one_step(h, lines):
     """A step of h with so many lines, as a sample at the fraction h of a step of one."""
     form = FORMULATIONS["axis"]
     par, state = form.prepare(SPHEROID.top, SPHEROID.start)
-    method = extrapolation.method(form.field)
-    memory = np.zeros((extrapolation.LAST + 1, 6))
+    method, memory = extrapolation.method(form.field), np.zeros((extrapolation.LAST + 1, 6))
     memory[0] = form.field(par, state)
     memory[extrapolation.ORDERS, 1] = lines
     sample = method.sample

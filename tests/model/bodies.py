@@ -110,8 +110,7 @@ class PreciseBody:
     def _state(self, t: Any) -> tuple[Any, ...]:
         mp = self.mp
         if self.steady:
-            half = self.rate * t / 2
-            axis = [value / self.G if self.G else 0 for value in self.given]
+            half, axis = self.rate * t / 2, [value / self.G if self.G else 0 for value in self.given]
             turn = np.array([mp.cos(half), *(value * mp.sin(half) for value in axis)])
             return *product(self.start, turn), *self.given
         m, psi = self._swing(self.u0 + self.rate * t)
@@ -128,8 +127,7 @@ class PreciseBody:
             turns = mp.nint(u / (2 * self.K))
             sn, cn, dn = self._jacobi(u - 2 * turns * self.K)
         side = -1 if turns % 2 else 1
-        third = self._third(sn, cn, dn) + (2 * turns * self.whole if turns else 0)
-        root = mp.sqrt(self.b)
+        third, root = self._third(sn, cn, dn) + (2 * turns * self.whole if turns else 0), mp.sqrt(self.b)
         angle = mp.atan2(sn, root * cn) + turns * mp.pi  # tan(phi)/sqrt(b)
         psi = self.s * self.gamma / self.rate * (self.G * third - self.A3 * root * angle)
         m = self.back * side * self.A1 * cn, self.back * side * self.A2 * sn, self.A3 * dn

@@ -235,9 +235,11 @@ def test_what_is_lost_in_chaos_is_not_a_number_and_a_run_that_is_too_long_ends_a
     assert body.samples(-times).lost(-times) < 0.0
     assert np.array_equal(body.samples([0.0]).quaternion, [START])
     monkeypatch.setattr(heavy_body, "MOST_STEPS", 50)
+    monkeypatch.setattr(heavy_body, "STRETCH", 10)
     times = np.linspace(0.0, 60.0, 13)
     motion = HeavyBody(BRICK, WEIGHT, START, MOMENTUM).samples(times)
-    assert motion.lost(times) is not None
+    assert motion.too_long
+    assert 0.0 < motion.known < motion.lost(times)
     assert np.isfinite(motion.quaternion[0]).all()
 
 

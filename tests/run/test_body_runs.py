@@ -17,6 +17,7 @@ from symtop.methods.splitting import body as splitting_body
 from symtop.methods.splitting.coefficients import STRANG
 from symtop.model.body import Attitude, RigidBody, from_flat, product, rotated
 from symtop.model.charts import BODY, attitude_distance
+from symtop.model.exact import heavy_body
 from symtop.model.scenes import body_scenes
 from symtop.run.ensemble import chunks
 from symtop.run.ensemble.bodies import scenes_of
@@ -217,6 +218,9 @@ def test_a_body_of_ones_own_on_the_command_line() -> None:
     run = ["rk4", "--step-size", "0.05", "--horizon", "20", "--json"]
     own, named = (json.loads(call("run", *words).stdout) for words in (["body", *run, *options], ["heavy-brick", *run]))
     assert own["errors"] == named["errors"]
+    lost = call("run", "heavy-chaotic", "rk4", "--step-size", "0.05", "--horizon", "60", "--json")
+    assert (json.loads(lost.stdout)["errors"], json.loads(lost.stdout)["judgement"]) == ({}, None)
+    assert "not compared with the true motion: horizon must be at most" in lost.stderr
     # with two equal moments and the centre on the third axis it is a top, and has all that a top has
     run = ["run", "body", "stormer-verlet", "--step-size", "1e-3", "--json", "--mgl", "3", "--centre", "0,0,-2"]
     own = json.loads(call(*run, *options[-4:], "--body", "2,2,1").stdout)
@@ -240,7 +244,16 @@ def test_chaos_ends_the_reference_and_a_body_at_rest_stays(monkeypatch):
             symtop.reference("heavy-chaotic", times)
         bound = symtop.reference("heavy-chaotic", [20.0, float(str(refused.value).split()[5])])["attitude_error_bound"]
         assert float(bound[0]) < 1e-12 < float(bound[1]) < 1e-9
-        monkeypatch.setattr("symtop.model.exact.heavy_body.MOST_STEPS", 1000)  # of a run that is far too long
+        monkeypatch.setattr(heavy_body, "STRETCH", 1000)  # of a run that is far too long
+    monkeypatch.setattr(heavy_body, "STRETCH", 100)
+    monkeypatch.setattr(heavy_body, "MOST_STEPS", 3000)
+    ends, words = [], "on heavy-brick, not .*: to integrate its motion for longer takes more than 1,000,000 Taylor"
+    for times in ([1e4], [3.0, 90.0, 1e5]):
+        with pytest.raises(symtop.SymtopError, match=words) as refused:
+            symtop.reference("heavy-brick", times)
+        ends.append(float(str(refused.value).split()[5]))
+    assert 80.0 < ends[0] == ends[1]  # and what is named is known
+    assert symtop.reference("heavy-brick", ends[:1])["attitude_error_bound"] < 1e-12
 
 
 def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
@@ -256,6 +269,11 @@ def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
     assert 0.5 * spin @ matrix @ spin == pytest.approx(kinetic, rel=1e-13)
     heavy = rotated(inside.quaternion, body.centre)[2]  # the height of the centre, in either axes
     assert heavy == pytest.approx(rotated(at.quaternion, columns @ [0.0, 0.6, 0.8])[2], rel=1e-13)
+    for k, moments in enumerate([(1.4, 2.1, 1.0), (2.1, 1.0, 1.4), (1.0, 1.4, 2.1)]):  # third: that of the centre
+        body = RigidBody.from_inertia(matrix.tolist(), 2.0, (columns @ -np.eye(3)[k]).tolist())
+        assert (*body.moments, *body.centre) == pytest.approx((*moments, 0.0, 0.0, 1.0), abs=1e-14)
+        assert rotated(body.axes, (0.0, 0.0, 1.0)) == pytest.approx((columns @ -np.eye(3)[k]).tolist())
+    assert RigidBody.from_inertia(np.diag([3.0, 1.0, 2.9])).moments == (2.9, 3.0, 1.0)
     assert RigidBody.from_brick(12.0, (1.0, 2.0, 3.0)).moments == (13.0, 10.0, 5.0)
     corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-1.0, 1.0) for z in (-1.5, 1.5)]
     points = RigidBody.from_points([1.5] * 8, corners)
@@ -361,5 +379,5 @@ def test_errors_are_those_of_each_member_against_its_own_truth():
 def test_methods_that_choose_their_steps_run_as_well_and_one_without_the_chart_is_refused():
     data = symtop.ensemble(scenes()[:8], "vern9", tolerance=1e-8, samples=6, quiet=True)
     assert_alone(scenes()[:8], "vern9", data, 6, tolerance=1e-8)
-    with pytest.raises(symtop.SymtopError, match="must have the chart body, of a RigidBody, not stormer-verlet"):
+    with pytest.raises(symtop.SymtopError, match=r"of a RigidBody, not stormer-verlet: take one of .*, such as strang"):
         symtop.ensemble(scenes(), "stormer-verlet", step_size=0.1)

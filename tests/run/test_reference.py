@@ -111,8 +111,7 @@ def test_a_bound_too_small_would_be_seen_and_times_at_which_it_is_read_change_no
     data = symtop.reference(scene, [3.0, 500.0, 1000.0], "longdouble")
     errors = true_errors(scene, data)
     assert not np.all(errors[0] <= data["attitude_error_bound"].values / 1000.0)
-    # The study of the truth reads an error and its bound off one integration.
-    run = symtop.scene("goldstein")
+    run = symtop.scene("goldstein")  # the study of the truth reads an error and its bound off one integration
     for precision in ("double", "longdouble", "quad"):
         times = np.array([3.0, 11.0, 20.0])
         both, alone = integrate_with_checks(run, times, precision), integrate(run, times, precision)[0]

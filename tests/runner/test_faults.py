@@ -120,8 +120,7 @@ def test_files_where_folders_should_be_and_folders_where_files(tmp_path):
 
 def test_truncated_damaged_and_foreign_files_are_computed_again(tmp_path):
     probe(tmp_path)
-    before = contents(tmp_path)
-    cases = sorted((tmp_path / "quick" / "cases" / "probe").glob("*.npz"))
+    before, cases = contents(tmp_path), sorted((tmp_path / "quick" / "cases" / "probe").glob("*.npz"))
     whole = cases[0].read_bytes()
     with np.load(cases[1]) as file:
         arrays = dict(file)
@@ -139,8 +138,7 @@ def test_truncated_damaged_and_foreign_files_are_computed_again(tmp_path):
 
 
 def test_a_lock_keeps_others_out_and_ends_with_its_holder(tmp_path):
-    path = tmp_path / "case.nc"
-    order = []
+    path, order = tmp_path / "case.nc", []
 
     def wait():
         with files.locked(path, wait=True) as ours:
@@ -164,8 +162,7 @@ def test_a_lock_keeps_others_out_and_ends_with_its_holder(tmp_path):
 
 @pytest.mark.slow
 def test_two_runs_at_once_share_the_work_and_agree(tmp_path):
-    log = tmp_path / "log"
-    words = ["study", PROBE, "--results", tmp_path / "shared", "--jobs", 2]
+    log, words = tmp_path / "log", ["study", PROBE, "--results", tmp_path / "shared", "--jobs", 2]
     runs = [symtop(*words, PROBE_LOG=log, PROBE_PAUSE=0.3) for _ in range(2)]
     for run in runs:
         code, out, err = ended(run)
@@ -339,8 +336,7 @@ def test_a_case_has_its_time_and_the_limit_is_heard_by_the_runner(tmp_path, monk
 
 
 def test_paths_that_are_not_ascii(tmp_path):
-    place = tmp_path / "Ergebnisse für θ – 結果"
-    plugin = tmp_path / "méthode_à_moi.py"
+    place, plugin = tmp_path / "Ergebnisse für θ – 結果", tmp_path / "méthode_à_moi.py"
     plugin.write_text("import symtop\n")
     probe(place, "--plugin", plugin)
     assert len(contents(place)) == 5

@@ -128,8 +128,7 @@ def test_findings_are_made_again_when_what_draws_or_judges_them_is_edited(place,
 def test_coefficients_and_the_numbers_of_a_scene_count(clean_registry):
     study, case = of_everyone(), Case("goldstein", "chin-4a", {})
     method, place = symtop.integrator("chin-4a"), symtop.scene("goldstein")
-    before = fingerprint.reasons(study, case)
-    solver = method.solvers["axis"]
+    before, solver = fingerprint.reasons(study, case), method.solvers["axis"]
     kicks = solver.rule.rule.kick
     nudged = solver.rule.rule._replace(kick=(kicks[0] * (1.0 + 1e-15), *kicks[1:]))
     changed = dataclasses.replace(solver.rule, rule=nudged)
@@ -175,8 +174,7 @@ def test_digests_are_the_same_whatever_the_process_has_run_or_registered():
 
 
 def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
-    script = tmp_path / "counted.py"
-    text = PROBE.read_text()
+    script, text = tmp_path / "counted.py", PROBE.read_text()
     versions = [text, text.replace("Is it whole?", "Is it?").replace("figsize=(2, 2)", "figsize=(3, 2)")]
     for used, definition in (
         ("STEPS", "STEPS = {}"),

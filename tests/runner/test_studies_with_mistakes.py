@@ -142,6 +142,11 @@ def test_a_step_that_is_nan_is_no_option_and_a_limit_holds_for_checked_cases_too
     change = "measure = lambda case: symtop.simulate(case.scene, case.integrator, step_size=float('nan'))"
     output = run_study(tmp_path, change, code=2)
     assert "study mine: no case could be measured; rk4 on spheroid failed: step_size must be a finite" in output
+    change = "def measure(case):\n    assert case.integrator != 'rk4', 'so'\n    return xr.Dataset({'err': 1.0})"
+    combining = "\ncases = lambda quick: [Case('spheroid', n, {'h': h}) for n in ('rk4', 'strang') for h in (1, 2)]"
+    failed, again, sentence = run_study(tmp_path, change + combining, code=2).splitlines()  # which may be why
+    assert failed == again == "  rk4 on spheroid failed: AssertionError: so"
+    assert "two cases of strang on spheroid measure err" in sentence
     slow = "import os, time\ndef measure(case):\n    time.sleep(float(os.environ.get('LATE', '0')))\n"
     slow += "    return xr.Dataset({'err': 1.0})"
     run_study(tmp_path, slow)

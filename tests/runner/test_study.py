@@ -84,8 +84,7 @@ def test_check_finds_a_value_that_this_version_does_not_compute(tmp_path):
     probe(tmp_path, "--check", code=2)  # nothing is stored
     probe(tmp_path)
     assert "4 of 4 cases computed again, the same to the last bit" in probe(tmp_path, "--check", "--fresh")
-    victim = next((tmp_path / "quick" / "cases" / "probe").glob("*.npz"))
-    study = runner.load(str(PROBE))
+    victim, study = next((tmp_path / "quick" / "cases" / "probe").glob("*.npz")), runner.load(str(PROBE))
     (case,) = [one for one in study.cases(True) if one.label == victim.name.split("--")[0] + "--" + one.integrator
                and victim.name.startswith(f"{one.label}--")]  # fmt: skip
     data = store.load_case(victim)
@@ -191,8 +190,7 @@ def tree(phase: xr.Dataset = PHASE) -> xr.DataTree:
 def test_single_precision_stays_and_is_stored_in_little_space(tmp_path):
     """Ten bits of each number; the same in double precision, which is not compressed, for comparison."""
     size, power = np.frexp(np.random.default_rng(1).lognormal(size=(3, 40_000)))
-    rounded = np.ldexp(np.rint(np.ldexp(size, 10)), power - 10)
-    sizes = {}
+    rounded, sizes = np.ldexp(np.rint(np.ldexp(size, 10)), power - 10), {}
     for kind in (np.float32, np.float64):
         cases = [(Case("spheroid", name), xr.Dataset({"cost": ("member", row.astype(kind)[: 40_000 - (k == 2)])}))
                  for k, (name, row) in enumerate(zip(("rk4", "strang", "midpoint"), rounded, strict=True))]  # fmt: skip

@@ -35,8 +35,7 @@ def test_a_map_says_what_single_runs_say(name):
             horizon = math.ceil(12.0 / value) * value * spun.nutation_period
             run = symtop.simulate(spun, name, step_size=value * spun.nutation_period, horizon=horizon, samples=241,
                                   observe="axis", guard=False)  # fmt: skip
-            error = symtop.errors(run)["axis"].values
-            mapped = VERDICTS[runs.verdict[place, column]]
+            error, mapped = symtop.errors(run)["axis"].values, VERDICTS[runs.verdict[place, column]]
             single = judgement(spun, run, error).verdict
             assert (mapped == "accurate") == (single == "accurate"), (ratio, value, mapped, single)
             if run.attrs["outcome"] != "ok":

@@ -95,8 +95,7 @@ def test_a_setting_that_meets_a_target_meets_it():
     assert (data["order"].values > 3.8).all()
     assert (data["order"].values < 4.3).all()
     met = data["met_at"].sel(family=SYMMETRIC, quantity="axis").sel(target=1e-3, method="nearest").values
-    at = np.ceil(np.log2(met / FIRST)).astype(int)
-    tops = bodies[SYMMETRIC]
+    at, tops = np.ceil(np.log2(met / FIRST)).astype(int), bodies[SYMMETRIC]
     for k, level in enumerate(at):
         runs = (run_level(variant, tops, EVERYONE, place, 1e6) for place in (level, level - 1))
         fine, coarse = (tops.errors("", run, EVERYONE) for run in runs)

@@ -52,8 +52,7 @@ def test_the_trapezoidal_routhian_is_stormer_verlet(scene_name):
 def lobatto_step(top, point, h):
     """One step of Lobatto IIIA-IIIB, order 4, on the Hamiltonian of the whole top: theta and p_theta afterwards."""
     IIIA = np.array([[0.0, 0.0, 0.0], [5 / 24, 1 / 3, -1 / 24], [1 / 6, 2 / 3, 1 / 6]])
-    IIIB = np.array([[1 / 6, -1 / 6, 0.0], [1 / 6, 1 / 3, 0.0], [1 / 6, 5 / 6, 0.0]])
-    weights = IIIA[2]
+    IIIB, weights = np.array([[1 / 6, -1 / 6, 0.0], [1 / 6, 1 / 3, 0.0], [1 / 6, 5 / 6, 0.0]]), IIIA[2]
     theta, _, _, p_theta, p_phi, p_psi = point
 
     # the force on phi and psi is zero, so that their stage momenta are p_phi and p_psi
@@ -77,8 +76,7 @@ def test_lobatto_on_the_whole_top_is_galerkin_on_the_routhian_and_not_on_the_top
     """The two are one method for a constant mass only; the inertia of the top is not constant."""
     at, momenta, h = scene.start, scene.top.momenta(scene.start), 0.05
     point = (at.theta, at.phi, at.psi, scene.top.I1 * at.theta_dot, momenta.p_phi, momenta.p_psi)
-    lobatto = lobatto_step(scene.top, point, h)
-    start = np.array([at.theta, point[3]])
+    lobatto, start = lobatto_step(scene.top, point, h), np.array([at.theta, point[3]])
     first = path(scene, commutation.routhian_galerkin_step(scene), h, 1)[1]
     last = kernel_path(scene, symtop.integrator("galerkin-simpson"), h, 1)[1]
     assert first == pytest.approx(lobatto, abs=1e-13)

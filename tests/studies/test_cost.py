@@ -11,7 +11,7 @@ import xarray as xr
 from symtop_studies.cost import cells, facts, figures, ladder, prices as pricing, ranking, study, tops as tops_module
 from symtop_studies.cost.cells import GENERAL, Cell
 from symtop_studies.cost.confirm import confirm, rounded, share_served
-from symtop_studies.cost.ranking import SAFE, Ladder, cost_to_reach, hindsight, run_lengths, safe, slowdowns, wins
+from symtop_studies.cost.ranking import SAFE, Ladder, Safe, cost_to_reach, hindsight, run_lengths, safe, slowdowns, wins
 from symtop_studies.cost.tops import ASKED, FIRST, KINDS, MOMENTA, NATURAL, SCENE, natural, tops_of
 
 import symtop
@@ -285,8 +285,7 @@ def test_scales_of_many_tops_are_those_of_scenes_and_samples_fall_on_the_same_ti
     assert tops.energy_scale[:80] == pytest.approx([one.energy_scale for one in scenes], rel=1e-6)
     assert tops.period[:80] == pytest.approx([one.nutation_period for one in scenes], rel=1e-6)
     assert tops.regime[:80] == pytest.approx(np.array([regime(one) for one in scenes]), abs=1e-6)
-    ends = [barriers(one) for one in scenes]
-    wide = tops.width[:80] > 1e-3
+    ends, wide = [barriers(one) for one in scenes], tops.width[:80] > 1e-3
     assert tops.width[:80][wide] == pytest.approx(np.array([one.lowest - one.highest for one in ends])[wide], abs=1e-6)
     for level in (0, 3, 9):
         h = tops.period / FIRST * 0.5**level
@@ -561,3 +560,16 @@ def test_the_page_says_what_was_measured_and_shares_of_silent_runs_are_of_their_
     named = {one.get_text() for one in figures.draw_accuracy(small).axes[0].texts}
     assert {"takahashi-imada (symmetric)", "rk4"} <= named
     assert PARTIAL in text  # there are no long runs
+
+
+def test_where_f_is_dear_the_fewest_evaluations_win(monkeypatch):
+    two = [Safe("fast", 8.0, 1e-5, 0.0, 0.0), Safe("few", 1e-5, 3e-5, 0.0, 0.0)]
+    monkeypatch.setattr(cells, "safest", lambda *_: (two, True))
+    work = {"fast": np.array([500.0, 2000.0]), "few": np.array([40.0, 90.0])}
+    monkeypatch.setattr(cells, "mean_work", lambda _, __, name: work[name])
+    settings = xr.DataArray([[[4.0, 16.0], [1e-4, 1e-6]]], dims=("scene", "variant", "level"))
+    tree = xr.DataTree.from_dict({"short": xr.Dataset({"setting": settings}, {"variant": ["fast", "few"]})})
+    name, share, price = cells.dearer(tree, Cell("short", "axis", 1e-3, NATURAL))
+    assert (name, share, price) == ("few", pytest.approx(0.06), pytest.approx(2e-5 / 940.0))
+    monkeypatch.setattr(cells, "safest", lambda *_: (two[:1], True))
+    assert cells.dearer(tree, Cell("short", "axis", 1e-3, NATURAL)) is None

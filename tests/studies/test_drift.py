@@ -146,8 +146,7 @@ def test_phases_are_grouped_by_the_energy_and_a_run_that_keeps_it_is_none_of_tho
     groups = measures.phases_by_energy(histories)
     assert sorted(groups["bounded"]) == [1.0, 1.0, 1.04, 2.0]
     assert sorted(groups["lost"]) == [1.9, 2.0, 2.0, 2.2]
-    # Of a variant that loses the energy on one scene only.
-    place = {"variant": "rk4[angles]", "scene": "goldstein"}
+    place = {"variant": "rk4[angles]", "scene": "goldstein"}  # of a variant that loses the energy on one scene only
     for name, value in (("energy_largest", 1e-14), ("phase_exponent", 0.5)):
         histories = histories.assign({name: histories[name].copy()})
         histories[name].loc[place] = value
@@ -262,8 +261,7 @@ def test_the_mean_of_a_window_is_known_far_better_than_the_energy_has_digits(nam
     where, method = symtop.scene("spheroid"), symtop.integrator(name)
     found = []
     for one in members(where, 6):
-        h = one.nutation_period / 1000.37
-        solver = chart_of(method)[1]
+        h, solver = one.nutation_period / 1000.37, chart_of(method)[1]
         par, rule, state = solver.setup(one.top, one.start, h)
         done = solver.loop(par, rule, state, h, scattered(0, 5000))
         level = watch(one, method, h)(done.states, done.momenta)["modified_energy"].mean()
@@ -275,8 +273,7 @@ def test_the_mean_of_a_window_is_known_far_better_than_the_energy_has_digits(nam
 def test_a_horizon_is_predicted_from_a_tenth_of_it(bend):
     t = np.linspace(0.0, 10_000.0, 20_001)
     error = 2e-6 + 1e-6 * t + bend * t * t + 1e-6 * np.sin(5.3 * t)
-    short = t < 1000.0
-    tolerance = abs(float(error[-1])) * 0.8
+    short, tolerance = t < 1000.0, abs(float(error[-1])) * 0.8
     true = lost_at(t, error, tolerance)
     assert horizon(t[short], error[short], tolerance).time == pytest.approx(true, rel=0.02)
     assert horizon(t[short], -error[short], tolerance).time == pytest.approx(true, rel=0.02)
@@ -302,8 +299,7 @@ def test_the_truth_is_never_late_and_a_shift_is_measured(name):
     times = np.linspace(0.0, 300.7 * where.nutation_period, 3001)
     motion = exact(times)
     assert np.max(np.abs(nutation_phase(where, times, motion.theta, motion.theta_dot))) < 1e-9
-    ahead = exact(times * (1.0 + 1e-4))
-    expected = 2.0 * np.pi * 1e-4 * times / where.nutation_period
+    ahead, expected = exact(times * (1.0 + 1e-4)), 2.0 * np.pi * 1e-4 * times / where.nutation_period
     assert nutation_phase(where, times, ahead.theta, ahead.theta_dot) == pytest.approx(expected, abs=1e-9)
 
 

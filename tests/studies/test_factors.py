@@ -194,8 +194,7 @@ def test_neighbours_in_the_waterfall_differ_in_exactly_the_factor_they_name(rows
 
 
 def test_the_product_of_the_ratios_is_the_total_and_a_waterfall_with_a_missing_step_is_not_drawn(quiet, rows):
-    part = first_goal(rows)
-    total = facts.facts(quiet)["whole"]
+    part, total = first_goal(rows), facts.facts(quiet)["whole"]
     for order in (waterfall(part), waterfall(part, call_first=True)):
         seconds = order["time (s)"].to_numpy()
         assert order["so far"].to_numpy() == pytest.approx(seconds[0] / seconds, rel=1e-12)

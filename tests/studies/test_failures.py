@@ -216,8 +216,7 @@ def test_the_trapezoidal_rule_has_its_own_limit_and_long_runs_fall_on_one_side_o
 
 def test_the_splitting_window():
     """Between h = 2 pi/a and where a tan(a h/4 - pi/2) = h; to first order in mgl up to 1 + 4 mgl I1/(I3 w3)^2."""
-    unit = 2.0 * math.pi / 6.0
-    strang = integrator("strang")
+    unit, strang = 2.0 * math.pi / 6.0, integrator("strang")
     edges = [h / unit for h in sign_changes(lambda h: sleep_margin(strang, 6.0, h), np.linspace(0.5, 1.5, 201) * unit)]
     assert len(edges) == 2
     assert edges[0] == pytest.approx(1.0, abs=1e-6)
@@ -234,8 +233,7 @@ def test_the_splitting_window():
 def test_the_separatrix_costs_half_of_g_and_a_run_that_leaves_its_chart_is_told_apart():
     """Negative control: elsewhere they do not grow like that."""
     scene, h = scenes.scene("separatrix"), 0.0125
-    g = math.sqrt(scene.top.mgl / scene.top.I1)
-    times = np.arange(1201) * h
+    g, times = math.sqrt(scene.top.mgl / scene.top.I1), np.arange(1201) * h
     window = (times > 7.0) & (times < 13.0)
     slopes = [np.polyfit(times[window], np.log(axis_errors("strang", where, step, 1200)[0][window]), 1)[0]
               for where, step in ((scene, h / g), (scenes.scene("goldstein"), h))]  # fmt: skip
@@ -307,8 +305,7 @@ def test_what_is_measured_is_the_first_displacement_that_is_lost_and_larger_ones
     assert 0.0 < surviving_displacements(method, STEADY, [h], 3000)[0] < 0.01
     centre = trace(method, STEADY, h).theta
     assert failures.survives(method, STEADY, centre, [0.03, 0.1, 0.2], h, 3000).all()
-    verlet = integrator("stormer-verlet")
-    resonance = math.sqrt(3.0) / OMEGA
+    verlet, resonance = integrator("stormer-verlet"), math.sqrt(3.0) / OMEGA
     assert not failures.survives(verlet, STEADY, STEADY.start.theta, [0.03, 0.1, 0.2], resonance, 3000).any()
 
 

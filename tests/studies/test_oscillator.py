@@ -70,8 +70,7 @@ def test_the_exponents_are_those_of_the_step_matrix(rule):
     one, measured = Oscillator(damping=1.0), convergence(four, "midpoint", [0.1], 25.0)
     assert float(measured["exponent_error"][0]) == pytest.approx(slow / (math.sqrt(3.0) - 2.0) - 1.0, rel=1e-6)
     times, position, _ = discrete_path(one, RULES["trapezoidal"], 1.0, 0.0, 25.0, 250)
-    off = position - one.exact(times, 1.0, 0.0)[0]
-    other = convergence(one, "trapezoidal", [0.1], 25.0)
+    off, other = position - one.exact(times, 1.0, 0.0)[0], convergence(one, "trapezoidal", [0.1], 25.0)
     assert 1.01 * off.max() < float(other["position_error"][0]) == pytest.approx(-off.min())
 
 
@@ -122,8 +121,7 @@ FRICTION = Friction(0.05, 0.1)
 
 
 def _run(name, friction, rule, steps, horizon):
-    scene = symtop.scene(name)
-    marks = np.arange(steps + 1, dtype=np.int64)
+    scene, marks = symtop.scene(name), np.arange(steps + 1, dtype=np.int64)
     done = damped_run(scene, friction, rule, horizon / steps, marks)
     assert done.outcome == 0
     return scene, done.states

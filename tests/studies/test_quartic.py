@@ -42,8 +42,7 @@ def test_the_motion_solves_the_discrete_euler_lagrange_equations(name, steps):
     h = oscillator.period / steps
     rule = exact(oscillator, h)
     turned = true_path(oscillator, h * np.arange(6)) * np.exp(-1j * rule.delta * np.arange(6))
-    points = np.stack([turned.real, turned.imag], axis=1)
-    wrong = rule._replace(lift=rule.lift + 1e-6)
+    points, wrong = np.stack([turned.real, turned.imag], axis=1), rule._replace(lift=rule.lift + 1e-6)
     for before, here, after in zip(points, points[1:], points[2:], strict=False):
         arrives = slopes(discrete_lagrangian, rule, before, here)[1]
         assert np.abs(arrives + slopes(discrete_lagrangian, rule, here, after)[0]).max() < 2e-14 * rule.r
@@ -74,8 +73,7 @@ def test_the_constants_tend_to_those_of_stormer_verlet(name):
 
 
 def test_the_truth_is_the_closed_form_and_any_planar_oscillator_has_its_own_function():
-    scene = symtop.scene("spheroid")
-    times = np.linspace(0.0, 3.0, 40)
+    scene, times = symtop.scene("spheroid"), np.linspace(0.0, 3.0, 40)
     oscillators = quartic.of_top(scene)
     first, second = (true_path(oscillator, times) for oscillator in oscillators)
     axis = closed_form(scene).axis(times)
@@ -95,8 +93,7 @@ def test_mcmillans_map_keeps_a_biquadratic_and_a_map_that_leaves_ends():
     oscillator = oscillator_of("planar-hardening")
     h = oscillator.period / 6.0
     for method, kept in (("mcmillan", True), ("stormer-verlet", False)):
-        rule = mcmillan(oscillator, h)
-        path = discrete_path(oscillator, method, h, 500)
+        rule, path = mcmillan(oscillator, h), discrete_path(oscillator, method, h, 500)
         first, second = path[:-1], path[1:]
         s0, s1 = np.abs(first) ** 2, np.abs(second) ** 2
         invariant = s0 + s1 - 2.0 * (1.0 + rule.lift) * (np.conj(first) * second).real + rule.B * s0 * s1

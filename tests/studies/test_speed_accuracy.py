@@ -18,9 +18,8 @@ def data():
     """A few methods on one scene at five settings each."""
     asked = {"lengths": (10.0,), "settings": 5}
     names = ("exact", "rk4[axis]", "rk4[attitude]", "strang[axis]", "stormer-verlet[angles]", "taylor[axis]")
-    cases = [Case("goldstein", name, asked) for name in names]
-    cases.append(Case("goldstein", "together", asked | {"integrators": list(names)}, timed=True))
-    return datasets.combine([(case, study.measure(case)) for case in cases])
+    runs = [(case, study.measure(case)) for case in (Case("goldstein", name, asked) for name in names)]
+    return datasets.combine(runs + [(case, study.measure(case)) for case in study.follow_up(datasets.combine(runs))])
 
 
 def test_a_cost_lies_between_the_runs_and_one_of_the_coarsest_setting_is_an_upper_bound(data):
@@ -60,17 +59,14 @@ def test_a_run_is_that_of_its_setting_and_the_page_says_what_was_measured(data, 
     assert not np.isfinite(facts.shown(data)["axis"].sel(variant="rk4[attitude]")).any()
     text = checked("speed", data, tmp_path, elsewhere={"error-against-time"})
     assert "`takahashi" not in text
-    answers = facts.facts(data)
-    assert answers["fastest_6"] in text
-    assert answers["scipy"] is None
+    assert facts.facts(data)["fastest_6"] in text
+    assert facts.facts(data)["scipy"] is None
 
 
-def test_methods_on_a_scene_are_timed_in_one_case_and_those_for_symmetric_bodies_told():
-    cases = study.cases(False)
-    for place in study.SCENES:
-        (together,) = [case for case in cases if case.scene == place and study.STUDY.is_timed(case)]
-        alone = [case.integrator for case in cases if case.scene == place and case is not together]
-        assert sorted(together.settings["integrators"]) == sorted(alone)
-    assert facts.on_f_alone("rk4[axis]")
-    assert not facts.on_f_alone("takahashi-imada[axis]")
-    assert not facts.on_f_alone("series[axis]")
+def test_methods_on_a_scene_are_timed_in_one_case_and_those_for_symmetric_bodies_told(data):
+    assert not any(study.STUDY.is_timed(case) for case in study.cases(False))
+    (together,) = study.follow_up(data.drop_vars(["seconds", "seconds_spread"]))
+    assert (together.scene, together.settings["integrators"]) == ("goldstein", data["variant"].values.tolist())
+    assert together.timed
+    names = "rk4[axis]", "takahashi-imada[axis]", "series[axis]"
+    assert [facts.on_f_alone(name) for name in names] == [True, False, False]

@@ -9,7 +9,6 @@ A bare step is given as a function, a class, a solver, a file or a command; its 
 
 import functools
 import inspect
-import sys
 import time
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -211,10 +210,10 @@ def open_target(
         return Program(str(target), chart)
     if kind == "shared":
         return SharedObject(path, chart, symbol or "step")
-    return _python_step(*_thing(target), chart, kind, adaptive=adaptive)
+    return _python_step(*_thing(target, free=form is None), chart, kind, adaptive=adaptive, free=form is None)
 
 
-def _python_step(thing: Any, name: str, chart: str, kind: str, *, adaptive: bool) -> Stepper:
+def _python_step(thing: Any, name: str, chart: str, kind: str, *, adaptive: bool, free: bool) -> Stepper:
     if kind == "diffrax" or is_solver(thing):
         return DiffraxSolver(thing, chart, name)
     if isinstance(thing, type):
@@ -225,7 +224,7 @@ def _python_step(thing: Any, name: str, chart: str, kind: str, *, adaptive: bool
     try:
         inspect.signature(thing).bind(*arguments.split(","))
     except TypeError:
-        hint = "; a rotation, q = (w, x, y, z), takes (q, w, h, inertia, torque): form rotation" * (kind == "ode")
+        hint = "; a rotation, q = (w, x, y, z), takes (q, w, h, inertia, torque): form rotation" * free
         signature = f"{inspect.signature(thing)}{hint}"
         raise SymtopError(f"a step of the form {kind} must take {arguments}, not {signature}") from None
     except ValueError:  # built in, without a signature
@@ -239,22 +238,22 @@ def _python_step(thing: Any, name: str, chart: str, kind: str, *, adaptive: bool
     return SeparableStep(thing, name)
 
 
-def _thing(target: Any) -> tuple[Any, str]:
-    """What is given, or FILE.py:NAME names, and its name; without a name the function ``step``."""
+def _thing(target: Any, *, free: bool) -> tuple[Any, str]:
+    """What is given, or FILE.py:NAME names, and its name; without a name the function ``step``. Is its form `free`?"""
     if callable(target) or is_solver(target):
         return target, ""
     path, _, name = str(target).partition(":")
     if not path.endswith(".py"):
-        words = "a step must be FILE.py:NAME, FILE.so, a trajectory such as FILE.csv, or a command with form program"
+        more = ", FILE.so, a trajectory such as FILE.csv, or a command with form program" if free else " or FILE.so"
+        words = f"a step must be FILE.py:NAME{more}"
         known = (method := path.partition("[")[0]) in methods()
         own = f", an integrator, whose claims `symtop claims {method}` measures" * known
         raise SymtopError(f"{words}, not {str(target)!r}{own}")
-    file = python_file(path, "a step", "FILE.py:NAME with a file that is there (a command needs form program)")
+    hint = " (a command needs form program)" * free
+    file = python_file(path, "a step", f"FILE.py:NAME with a file that is there{hint}")
     with foreign_code(f"the file {file.name}"):
-        if str(file.parent) not in sys.path:  # what stands beside it, as Python has it for a script, also when it runs
-            sys.path.insert(0, str(file.parent))
-        module = execute(f"symtop_judged_{Path(file).stem}", file)
-    thing = getattr(module, name or "step", None)
+        module: Any = execute(f"symtop_judged_{Path(file).stem}", file)
+    thing = functools.reduce(lambda one, part: getattr(one, part, None), (name or "step").split("."), module)
     if not (callable(thing) or is_solver(thing)):
         functions = [key for key, value in vars(module).items() if callable(value) and not key.startswith("_")]
         hint = f"it has {', '.join(functions[:8])}" if functions else "it has no function"

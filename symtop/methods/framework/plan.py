@@ -60,6 +60,7 @@ class Run(NamedTuple):
         angles     theta, p_theta, phi, psi                   radians; phi and psi count whole turns
         axis       e_x, e_y, e_z, L_x, L_y, L_z               both vectors in the space frame
         attitude   w, x, y, z of q, and L_x, L_y, L_z         q turns body vectors into space vectors
+        body       w, x, y, z of q, and M_1, M_2, M_3         the same q; M = q* L q in body axes, and p_psi is M_3
 
     p_phi and p_psi are recomputed from the trajectory (by the discrete Legendre transform, or as L_z and L.e) and never
     copied from the start, so that a method that loses them shows it.

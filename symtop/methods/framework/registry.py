@@ -43,9 +43,9 @@ FAMILIES = (
 IMPLEMENTATIONS = ("compiled", "python")
 ENERGY_ERRORS = ("kept", "bounded", None)
 NEEDS = {  # the weakest thing that suffices for a method, whatever its kernel makes use of, and what a user says of it
-    "derivative": "f(t, y)", "expression": "f as a formula", "lagrangian": "a Lagrangian",
-    "kicks": "torque, free motion", "group": "torque, inertia", "this-top": "this top's equations",
-    "solution": "the motion itself",
+    "derivative": "f(t, y)", "constants": "f(t, y) and constants", "expression": "f as a formula",
+    "lagrangian": "a Lagrangian", "kicks": "torque, free motion", "group": "torque, inertia",
+    "this-top": "this top's equations", "solution": "the motion itself",
 }  # fmt: skip
 INNER_LOOPS = ("scalar", "vector registers", "heyoka", "Python", None)
 ALLOWED: dict[str, tuple[Any, ...]] = {
@@ -222,10 +222,10 @@ class Integrator:
 _BUILT_IN = (
     "lagrangian.discrete_lagrangian", "lagrangian.unreduced", "lagrangian.galerkin", "lagrangian.exact_discrete",
     "lie_group.variational", "splitting.composition", "splitting.body", "splitting.reversible", "runge_kutta.explicit",
-    "runge_kutta.pairs", "runge_kutta.extrapolation", "runge_kutta.nystrom", "runge_kutta.adams", "runge_kutta.gauss",
-    "runge_kutta.kahan", "lie_group.runge_kutta", "lie_group.energy_momentum", "lie_group.generalised_alpha",
-    "runge_kutta.collective_gauss", "library.scipy_ivp", "taylor.heyoka", "taylor.series", "taylor.series_general",
-    "library.exact", "engines.engines",
+    "runge_kutta.pairs", "runge_kutta.projected", "runge_kutta.extrapolation", "runge_kutta.nystrom",
+    "runge_kutta.adams", "runge_kutta.gauss", "runge_kutta.kahan", "lie_group.runge_kutta",
+    "lie_group.energy_momentum", "lie_group.generalised_alpha", "runge_kutta.collective_gauss", "library.scipy_ivp",
+    "taylor.heyoka", "taylor.series", "taylor.series_general", "library.exact", "engines.engines",
 )  # fmt: skip
 ENTRY_POINTS = "symtop.integrators"  # an Integrator, or a function that returns several
 

@@ -15,6 +15,7 @@ Radau. In the registry the right-hand side is plain Python on floats; ``scipy_me
 solver around one that numba has compiled, from the same source. The loop around it is SciPy's (LSODA's is Fortran).
 """
 
+import contextlib
 import functools
 import warnings
 from collections.abc import Callable, Sequence
@@ -80,9 +81,9 @@ def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solve
         states = np.full((plan.times.size, len(y0)), np.nan)
         steps = row = 0
         outcome = OK
-        with np.errstate(all="ignore"), warnings.catch_warnings():
-            # LSODA's failures, which are in its status as well. Nothing else is silenced: filters belong to all threads
-            warnings.filterwarnings("ignore", "lsoda: ", UserWarning)
+        with np.errstate(all="ignore"), warnings.catch_warnings() if method == "LSODA" else contextlib.nullcontext():
+            if method == "LSODA":  # its failures are in its status as well; filters belong to all threads
+                warnings.filterwarnings("ignore", "lsoda: ", UserWarning)
             make: Callable[..., Any] = getattr(integrate, method) if isinstance(method, str) else method
             stepper = make(rhs, 0.0, y0, plan.horizon, rtol=plan.tolerance, atol=plan.tolerance)
             while stepper.status == "running" and outcome == OK:

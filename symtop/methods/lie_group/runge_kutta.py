@@ -15,10 +15,11 @@ of them; p_phi = L_z and the energy drift. With F_j the algebra element at stage
 
     Crouch-Grossman   y_i = exp(h a_i,i-1 F_i-1) ... exp(h a_i1 F_1) y            one exponential a coefficient
     commutator-free   y_i = ... exp(h sum_j w_2j F_j) exp(h sum_j w_1j F_j) y     few exponentials of sums
-    Munthe-Kaas       y_i = exp(U_i) y,  U_i = h sum_j a_ij K_j,  K_i = F_i - [U_i, F_i]/2 + [U_i, [U_i, F_i]]/12
+    Munthe-Kaas       y_i = exp(U_i) y,  U_i = h sum_j a_ij K_j,  K_i = F_i - [U_i, F_i]/2 + [U_i, [U_i, F_i]]/12 - ...
 
-The last is a method for the element U that the solution is the exponential of, U' = dexp^-1_U F; of dexp^-1 two
-brackets suffice for order 4. A table is rows of weights, one row an exponential, so that one kernel steps all three.
+The last is a method for the element U that the solution is the exponential of, U' = dexp^-1_U F = sum_k B_k/k! ad_U^k F
+with Bernoulli's numbers B_k; two nested brackets suffice for order 4, four for 6, six for 8. A table is rows of
+weights, one row an exponential, so that one kernel steps all three.
 The engines' `rkmk4` acts with another group, SO(3) x R^3, on body rates and turns the spin in its stages. A body
 without symmetry moves by an element of se(3), too, and q* with it (`framework.body`): p_phi is the Casimir kept there.
 
@@ -44,6 +45,7 @@ from symtop.methods.framework.plan import OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group.loop import UNSPUN, entered, give_up, in_charts, left, lie_loop, moved, stepped
 from symtop.methods.runge_kutta.explicit import add, row_of, store, weighted_in_lanes
+from symtop.methods.runge_kutta.pair_tables import DOP853, TSIT5
 from symtop.methods.simd import wide_vectors
 from symtop.methods.splitting import rotor
 from symtop.methods.vectors import cross, dot, plus, scaled
@@ -95,10 +97,17 @@ def _bracket(element: Any, other: Any) -> Any:
 
 
 @register_jitable
-def bent_back(element: Any, slope: Any) -> Any:
-    """dexp^-1 of an element of the algebra, two brackets of it, on another one."""
+def bent_back(element: Any, slope: Any, brackets: Any) -> Any:
+    """dexp^-1 of an element of the algebra, two, four or six nested brackets of it, on another one."""
     once = _bracket(element, slope)
-    return add(add(slope, once, -0.5), _bracket(element, once), 1.0 / 12.0)
+    twice = _bracket(element, once)
+    bent = add(add(slope, once, -0.5), twice, 1.0 / 12.0)
+    if brackets > 2:
+        four = _bracket(element, _bracket(element, twice))
+        bent = add(bent, four, -1.0 / 720.0)
+        if brackets > 4:
+            bent = add(bent, _bracket(element, _bracket(element, four)), 1.0 / 30240.0)
+    return bent
 
 
 @register_jitable
@@ -145,31 +154,31 @@ def _product(count: int, terms: int, first: int, stages: int) -> Part:
     return register_jitable(made)
 
 
-def _stages(counts: tuple[int, ...], stages: int, bent: bool) -> Part:
+def _stages(counts: tuple[int, ...], stages: int, brackets: int) -> Part:
     """``(par, e, L, row, j)`` to the slopes of the stages, one more than there are counts, and whether all are near."""
     if not counts:
 
         def slopes(par, e, L, row, j):  # type: ignore[no-untyped-def]
             return (_of_top(par, L),), 0.0
     else:
-        before = _stages(counts[:-1], stages, bent)
+        before = _stages(counts[:-1], stages, brackets)
         made = _product(counts[-1], len(counts), sum(counts[:-1]) * stages, stages)
 
         def slopes(par, e, L, row, j):  # type: ignore[no-untyped-def]
             known, far = before(par, e, L, row, j)
             so_far, element, too_far = made(e, L, known, row, j)
             slope = _of_top(par, plus(L, 1.0, so_far[3]))
-            if bent:
-                slope = bent_back(element, slope)
+            if brackets:
+                slope = bent_back(element, slope, brackets)
             return (*known, slope), max(far, too_far)
 
     return register_jitable(slopes)
 
 
 @functools.cache
-def _of_shape(counts: tuple[int, ...], bent: bool) -> Lanes:
+def _of_shape(counts: tuple[int, ...], brackets: int) -> Lanes:
     stages = len(counts)
-    slopes = _stages(counts[:-1], stages, bent)
+    slopes = _stages(counts[:-1], stages, brackets)
     whole = _product(counts[-1], stages, sum(counts[:-1]) * stages, stages)
 
     def part(block, table, row):  # type: ignore[no-untyped-def]
@@ -190,7 +199,7 @@ class LieTable(NamedTuple):
 
     weights: tuple[float, ...]  # row by row, one entry a stage
     counts: tuple[float, ...]  # exponentials of each stage from the second on, and of the step
-    bent: float = 0.0  # 1 for Munthe-Kaas
+    brackets: float = 0.0  # 2, 4 or 6 for Munthe-Kaas
     shares: tuple[float, ...] = (1.0,)
 
 
@@ -215,24 +224,27 @@ def _turning(field: Callable[..., Any]) -> Callable[..., Any]:
                 made = acted(made, L, element, any_angle(half_square(element)))
             if i < stages:
                 slope = field(par, plus(L, 1.0, made[3]))
-                store(slopes, i, bent_back(element, slope) if rule.bent != 0.0 else slope)
+                store(slopes, i, bent_back(element, slope, rule.brackets) if rule.brackets > 0.0 else slope)
         return made[0], made[1], made[3], slopes, stages, OK
 
     return turn
 
 
-march = lie_loop(_turning(_of_top), _begin, lambda rule: _of_shape(tuple(map(int, rule.counts)), rule.bent != 0.0))
+march = lie_loop(_turning(_of_top), _begin, lambda rule: _of_shape(tuple(map(int, rule.counts)), int(rule.brackets)))
 march_body = lie_loop(_turning(_of_body), _begin, observe=observe_turned)
 
 
 def lie_runge_kutta(
     name: str, rows: Sequence[Sequence[Sequence[float]]], order: int, summary: str, reference: str, *,
-    bent: bool = False,
+    brackets: int = 0,
 ) -> Integrator:  # fmt: skip
-    """A method from its table: for each stage from the second on, and for the step, the weights of its exponentials."""
+    """A method from its table: for each stage from the second on, and for the step, the weights of its exponentials.
+
+    With `brackets` of dexp^-1 it is one of Munthe-Kaas, and a Butcher tableau, one exponential a row, makes it.
+    """
     stages = len(rows)
     weights = [value for part in rows for row in part for value in (*row, *[0.0] * (stages - len(row)))]
-    rule = LieTable(tuple(weights), tuple(float(len(part)) for part in rows), float(bent))
+    rule = LieTable(tuple(weights), tuple(float(len(part)) for part in rows), float(brackets))
     return Integrator(
         name=name, family="lie-group", summary=summary, reference=reference, order=order, explicit=True,
         symplectic=False, symmetric=False, conserves=frozenset({"p_psi", "axis_length"}),
@@ -242,16 +254,25 @@ def lie_runge_kutta(
 
 
 def built_in() -> list[Integrator]:
-    """Two methods of Munthe-Kaas, Crouch-Grossman's and the commutator-free one."""
+    """Four methods of Munthe-Kaas, Crouch-Grossman's and the commutator-free one."""
     munthe_kaas = "munthe-kaas-1999 engo-faltinsen-2001"
+    five, eight = (tuple((row,) for row in (*of.a[: len(of.b) - 1], of.b)) for of in (TSIT5, DOP853))
     return [
         lie_runge_kutta(
             "rkmk-se3-2", (((0.5,),), ((0.0, 1.0),)), 2,
-            "Runge-Kutta-Munthe-Kaas on coadjoint orbits, the midpoint tableau", munthe_kaas, bent=True,
+            "Runge-Kutta-Munthe-Kaas on coadjoint orbits, the midpoint tableau", munthe_kaas, brackets=2,
         ),
         lie_runge_kutta(
             "rkmk-se3-4", (((0.5,),), ((0.0, 0.5),), ((0.0, 0.0, 1.0),), ((1 / 6, 1 / 3, 1 / 3, 1 / 6),)), 4,
-            "Runge-Kutta-Munthe-Kaas on coadjoint orbits, Kutta's tableau", munthe_kaas, bent=True,
+            "Runge-Kutta-Munthe-Kaas on coadjoint orbits, Kutta's tableau", munthe_kaas, brackets=2,
+        ),
+        lie_runge_kutta(
+            "rkmk-se3-5", five, 5, "Runge-Kutta-Munthe-Kaas on coadjoint orbits, Tsitouras's tableau",
+            f"{munthe_kaas} tsitouras-2011", brackets=4,
+        ),
+        lie_runge_kutta(
+            "rkmk-se3-8", eight, 8, "Runge-Kutta-Munthe-Kaas on coadjoint orbits, the tableau of DOP853",
+            f"{munthe_kaas} prince-dormand-1981 hairer-norsett-wanner-1993", brackets=6,
         ),
         lie_runge_kutta(
             "crouch-grossman-3",

@@ -226,6 +226,11 @@ def _stages(field: Callable[..., Any], rows: Sequence[Row], keep: Callable[..., 
     return written_out(len(rows) + 1, stage)
 
 
+def stages_of(field: Callable[..., Any], table: Table) -> Any:
+    """``(par, state, first, at, h)`` to the slopes of a step that nobody reads later."""
+    return _stages(field, table.a[: len(table.b) - 1], _forget)
+
+
 class Pair(NamedTuple):
     """An explicit pair with its stages written out."""
 
@@ -339,8 +344,8 @@ def _order_seven(table: Table, field: Callable[..., Any], cost: int) -> dict[str
 def fixed_loop(chart: str, pair: Pair) -> Loop:
     """The loop with fixed steps in one chart; the rule is the table as a `Tableau`, for whoever wants to see it."""
     form: Any = FORMS[chart]
-    field, ended_at, rows = form.field, form.ended, pair.table.a[: len(pair.table.b) - 1]
-    stages, total, cost = _stages(field, rows, _forget), combination(pair.table.b), len(pair.table.b)
+    field, ended_at = form.field, form.ended
+    stages, total, cost = stages_of(field, pair.table), combination(pair.table.b), len(pair.table.b)
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
         return 0.0
@@ -371,7 +376,7 @@ def two_runs(chart: str, pair: Pair, compare: Callable[..., float]) -> Callable[
     """
     form: Any = FORMS[chart]
     field, numbers, opened = form.field, form.prepare.numbers, form.prepare.opened
-    stages, total = _stages(field, pair.table.a[: len(pair.table.b) - 1], _forget), combination(pair.table.b)
+    stages, total = stages_of(field, pair.table), combination(pair.table.b)
 
     def run(near, far, h, marks, given, seen):  # type: ignore[no-untyped-def]
         par, first = numbers(*opened(near))
@@ -390,11 +395,8 @@ def two_runs(chart: str, pair: Pair, compare: Callable[..., float]) -> Callable[
 
 RK45 = Pair("rk45-compiled", DORMAND_PRINCE, 5, 4, "Dormand-Prince", "dormand-prince-1980")
 DOP8 = Pair("dop853-compiled", DOP853, 8, 7, "Dormand-Prince 8(5,3)", "prince-dormand-1981 hairer-norsett-wanner-1993")
-PAIRS = (
-    Pair("tsit5", TSIT5, 5, 4, "Tsitouras's pair 5(4)", "tsitouras-2011"),
-    DOP8,
-    Pair("vern9", VERN9, 9, 8, "Verner's most efficient pair 9(8)", "verner-2010"),
-)
+NINE = Pair("vern9", VERN9, 9, 8, "Verner's most efficient pair 9(8)", "verner-2010")
+PAIRS = Pair("tsit5", TSIT5, 5, 4, "Tsitouras's pair 5(4)", "tsitouras-2011"), DOP8, NINE
 
 
 def built_in() -> list[Integrator]:

@@ -397,6 +397,8 @@ class BodyMotion(NamedTuple):
     quaternion_lo: Array  # (n, 4), what the doubles lack
     momentum: Array  # (n, 3), in the body's axes
     bound: Array  # (n,) of the error of the attitude, rad
+    known: float = 0.0  # a time up to which the values are known, which does not hang on the samples; 0 if it is close
+    too_long: bool = False  # lost since it takes too many steps?
 
     def lost(self, times: Array) -> float | None:
         """Of the times of the samples that have no value the one nearest to 0; None if all have one."""

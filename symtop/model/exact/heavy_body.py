@@ -11,7 +11,7 @@ rounding, and with the start and 1/I off by one unit, up and down in two pattern
 bound is `SAFETY` times the largest distance from these two up to that time, at the samples and at `CHECKS` others. In
 quadruple precision (113 bits), which takes 5 times as long, all three are compared with one run, whose error is smaller
 by the ratio of the units, 2^-49, as long as the distance is small (`LINEAR`). Where the bound exceeds what is asked
-the motion is lost (chaos).
+the motion is lost (chaos). The runs go on side by side, `STRETCH` steps of the second one at a time, until it is.
 Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, MNRAS 504 (2021) 2614.
 """
 
@@ -32,7 +32,8 @@ LONG, QUAD = 2.0**-63, 2.0**-112  # rounding units
 TOLERANCES = (1e-2 * LONG, 1e-2 * LONG, 1e-5 * LONG, 1e-2 * QUAD)  # of the runs, the last one in quadruple precision
 SAFETY, LINEAR, CHECKS, SHORTER = 256.0, 1e-4, 32, 0.4
 ACCURACY, PAIR = 1e-9, 2.0**-104  # rad: asked by default, what a pair of doubles holds
-MOST_STEPS = 100_000  # of one run: 10 s, in quadruple precision 6 min
+MOST_STEPS = 1_000_000  # of all runs, one in quadruple precision counts as `QUAD_STEP`: half a minute, or three
+STRETCH, QUAD_STEP = 10_000, 10
 START_DIGITS = 60
 
 
@@ -96,49 +97,80 @@ class HeavyBody:
     def samples(self, times: ArrayLike, accuracy: float = ACCURACY, *, precise: bool = False) -> BodyMotion:
         """The motion at a row of times (n,), before 0 as well, as pairs of doubles; `precise` in quadruple precision.
 
-        Where the bound exceeds `accuracy`, rad, the values are NaN and the bound is infinite; `BodyMotion.lost` names
-        the first such time. Raises `SymtopError` for times that are not finite.
+        Where the bound exceeds `accuracy`, rad, or beyond `MOST_STEPS`, the values are NaN and the bound is infinite;
+        `BodyMotion.lost` names the first such time. Raises `SymtopError` for times that are not finite.
         """
         row = checked_times(times)
         high, low, bound = np.full((row.size, 7), np.nan), np.full((row.size, 7), np.nan), np.full(row.size, math.inf)
+        known, too_long = math.inf, False
         for way in (row >= 0.0, row < 0.0):
             if way.any():
-                high[way], low[way], bound[way] = self._one_way(row[way], precise)
+                high[way], low[way], bound[way], end, tired = self._one_way(row[way], accuracy, precise)
+                known, too_long = min(known, end), too_long or tired
         lost = ~(bound <= accuracy)
         high[lost] = low[lost] = np.nan
         bound[lost] = math.inf
-        return BodyMotion(high[:, :4], low[:, :4], high[:, 4:], bound)
+        return BodyMotion(high[:, :4], low[:, :4], high[:, 4:], bound, known, too_long)
 
-    def _one_way(self, times: Array, precise: bool) -> tuple[Array, Array, Array]:
-        """Values, their low halves and bounds at times of one sign."""
+    def _one_way(self, times: Array, accuracy: float, precise: bool) -> tuple[Array, Array, Array, float, bool]:
+        """Values, their low halves and bounds at times of one sign; up to which time they are known, and too long?"""
         last = times[np.argmax(np.abs(times))]
         sizes = np.unique(np.abs(np.concatenate([[0.0], times, last * (np.arange(1, CHECKS + 1) / CHECKS)])))
-        grid = np.copysign(sizes, last)
-        fine = self._run(grid, 2)
-        longest = SHORTER * abs(float(last)) / max(fine[2], 1) or math.inf
-        runs = [self._run(grid, 0, longest), self._run(grid, 1, longest), fine]
-        *others, (high, low, _) = [*runs, self._run(grid, 3)] if precise else runs
-        gaps = [((other - high) + (rest - low))[:, :4] for other, rest, _ in others]
-        apart = 2.0 * np.sqrt((np.square(gaps)).sum(axis=2).max(axis=0))
-        reached = np.maximum.accumulate(np.where(np.isnan(apart), math.inf, np.maximum(apart, LONG)))
+        grid = [np.longdouble(t) for t in np.copysign(sizes, last).tolist()]
+        high, bound = np.full((len(grid), 7), np.nan), np.full(len(grid), math.inf)
+        low = high.copy()
+        rough, other, fine = (self._run(run) for run in range(3))
+        exact = [self._run(3)] if precise else []
         unit = QUAD / LONG if precise else 1.0
-        bound = np.where(reached < LINEAR, SAFETY * unit * reached + PAIR, math.inf)
+        done, work, known, reached = 0, 0, 0.0, LONG
+        while done < len(grid) and work < MOST_STEPS:
+            began, old = fine.time, min(done, 1)  # a stretch begins with the end of the one before
+            states, steps = _to(fine, [began, *grid[done + 1 - old :]], STRETCH)
+            new = len(states) - old
+            points = [began, *grid[done + 1 - old : done + new]]
+            if fine.time != points[-1]:  # the end of a stretch is compared, too
+                points, states = [*points, fine.time], np.vstack([states, fine.state])
+            longest = SHORTER * abs(float(fine.time - began)) / max(steps, 1) or math.inf
+            runs = [_to(one, points, MOST_STEPS, longest) for one in (rough, other)]
+            runs += [(states, steps), *(_to(one, points, MOST_STEPS) for one in exact)]
+            work += sum(count for _, count in runs[:3]) + QUAD_STEP * sum(count for _, count in runs[3:])
+            *others, (value, rest) = [_halves(states, len(points)) for states, _ in runs]
+            gaps = [((first - value) + (second - rest))[:, :4] for first, second in others]
+            apart = 2.0 * np.sqrt((np.square(gaps)).sum(axis=2).max(axis=0))
+            apart = np.maximum.accumulate(np.where(np.isnan(apart), math.inf, np.maximum(apart, reached)))
+            error = np.where(apart < LINEAR, SAFETY * unit * apart + PAIR, math.inf)
+            here, there = slice(done, done + new), slice(old, old + new)
+            high[here], low[here], bound[here] = value[there], rest[there], error[there]
+            done, reached = done + new, apart[-1]
+            if not error[-1] <= accuracy or steps < STRETCH:
+                break
+            known = abs(float(fine.time)) if error[-1] <= 0.5 * accuracy else known
         place = np.searchsorted(sizes, np.abs(times))
-        return high[place], low[place], bound[place]
+        too_long = bool(error[-1] <= accuracy) and done < len(grid) and work >= MOST_STEPS
+        return high[place], low[place], bound[place], abs(float(fine.time)) if too_long else known, too_long
 
-    def _run(self, grid: Array, run: int, longest: float = math.inf) -> tuple[Array, Array, int]:
-        """States (n, 7) at a grid from 0 on as pairs of doubles, NaN beyond what `MOST_STEPS` reach; steps.
-
-        The first two runs take steps of at most `longest`.
-        """
+    def _run(self, run: int) -> Any:
+        """An integrator at the start; of the first two with numbers that are off by one unit."""
         stepper = copy.copy(_stepper(run))
         kind = stepper.state.dtype.type
         off = [LONG * (-1) ** (i >> run) if run < 2 else 0.0 for i in range(13)]
         numbers = [kind(self._digits(value * (1 + e))) for value, e in zip(self._numbers, off, strict=True)]
         stepper.state[:], stepper.pars[:] = numbers[:7], numbers[7:]
-        times, most = np.array([kind(t) for t in grid.tolist()]), kind(longest if run < 2 else math.inf)
-        _, _, _, steps, *_, states = stepper.propagate_grid(times, max_steps=MOST_STEPS, max_delta_t=most)
-        high, low = np.full((grid.size, 7), np.nan), np.full((grid.size, 7), np.nan)
-        high[: len(states)] = states.astype(np.float64)
-        low[: len(states)] = (states - states.astype(np.float64).astype(states.dtype)).astype(np.float64)
-        return high, low, int(steps)
+        return stepper
+
+
+def _to(stepper: Any, points: list[Any], most: int, longest: float = math.inf) -> tuple[Array, int]:
+    """States (n, 7) of an integrator at points from its time on, fewer if it takes more than `most` steps."""
+    kind = stepper.state.dtype.type
+    row = np.array([kind(point) for point in points])
+    heard = {"callback": lambda _: True}  # Python hears Ctrl-C in it
+    _, _, _, steps, *_, states = stepper.propagate_grid(row, max_steps=most, max_delta_t=kind(longest), **heard)
+    return states, int(steps)
+
+
+def _halves(states: Array, n: int) -> tuple[Array, Array]:
+    """States as pairs of doubles, (n, 7) each, NaN where there are fewer."""
+    high, low = np.full((n, 7), np.nan), np.full((n, 7), np.nan)
+    high[: len(states)] = states.astype(np.float64)
+    low[: len(states)] = (states - states.astype(np.float64).astype(states.dtype)).astype(np.float64)
+    return high, low

@@ -81,7 +81,8 @@ def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float 
         for name, part in zip(PARTS, np.split(rows, SPLIT, axis=1), strict=True)
     }
     data = xr.Dataset(columns | {"stratum": ("member", strata)}, {name: list(LABELS[name]) for name in LABELS})
-    return netcdf.describe(data, f"{count} bodies of the population {chosen!r}", seed=first, kind=chosen)
+    draw: dict[str, Any] = {"seed": first, "kind": chosen} | ({} if epsilon is None else {"epsilon": float(epsilon)})
+    return netcdf.describe(data, f"{count} bodies of the population {chosen!r}", **draw)
 
 
 def scenes_of(members: xr.Dataset) -> list[Scene]:

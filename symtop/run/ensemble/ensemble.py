@@ -47,7 +47,8 @@ def ensemble(
     per_nutation: object = None, tolerance: object = None, horizon: object = None, nutations: object = None,
     samples: int = SAMPLES, observe: str | None = None, variables: Iterable[str] | None = None,
     budget: float | None = None, path: str | Path | None = None, threads: int | None = None,
-    scheduler: str | None = None, quiet: bool = False, added: Callable[[xr.Dataset], dict[str, Any]] = lambda _: {},
+    scheduler: str | None = None, quiet: bool = False,
+    added: Callable[[xr.Dataset], xr.Dataset] = lambda _: xr.Dataset(),
 ) -> xr.Dataset:  # fmt: skip
     """Run one integrator on many tops, or on many bodies; each member has the bits of `simulate` alone.
 
@@ -81,7 +82,7 @@ def ensemble(
     `scheduler`. The attribute ``execution`` says how members were run: in "lanes", 32 side by side, where the method
     can. With a `path`, members go to that netCDF file as they are computed, in memory that does not grow with
     `samples` (0.4 kB a member). The same call resumes one that was killed, to the same file, and the dataset is lazy.
-    Variables that `added` makes of the dataset are added to it, before the file is in its place.
+    What `added` makes of it is added to it, and attributes to a file, before this is in its place.
 
     Raises SymtopError for arguments that make no sense, for members that are no top or no start, by number, and for a
     path to which another process is writing.
@@ -316,7 +317,7 @@ class Stream:
         with ending_on_sigterm(), replacing(self._part(chunk), ".npz") as partial:
             np.savez(partial, **columns)
 
-    def finish(self, chunks: list[slice], added: Callable[[xr.Dataset], dict[str, Any]]) -> xr.Dataset:
+    def finish(self, chunks: list[slice], added: Callable[[xr.Dataset], xr.Dataset]) -> xr.Dataset:
         """Put the chunks together; the dataset reads from the file what it is asked for."""
         with netcdf.one_thread, replacing(self.path) as partial:
             first = self._columns(chunks[0])
@@ -333,9 +334,9 @@ class Stream:
                         for name, values in columns.items():
                             file[name][chunk] = values.astype(object) if values.dtype.kind == "U" else values
                 with xr.open_dataset(partial, engine="netcdf4") as data:
-                    columns = added(data)
-                if columns:
-                    xr.Dataset(columns).to_netcdf(partial, mode="a")
+                    more = added(data)
+                if more:
+                    more.to_netcdf(partial, mode="a")
             except RuntimeError as error:  # the netCDF library's own word for a disk that is full
                 words = f"What was computed is in {self.folder}, and the same call goes on from there"
                 raise SymtopError(f"cannot write {self.path}: {error}; is the disk full? {words}") from error

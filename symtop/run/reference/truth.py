@@ -27,7 +27,7 @@ later reference of the scene names it. It lowers no bound: one that contradicts 
 A *body* without symmetry has no such closed form. Free, its motion is exact (`symtop.model.exact.free_body`); with a
 weight it is an integration in long double, bounded by a second one (`symtop.model.exact.heavy_body`), or with
 precision="quad" by one in quadruple precision. Beyond the time at which the bound passes 1e-9 rad, as it does in chaos,
-there is no reference.
+or that takes more than a million steps, there is no reference.
 
 With a `precision` the values are heyoka's integration of the equations of motion in that arithmetic, judged by the
 closed form in 40 digits at some thirty times (`symtop.run.reference.independent_checks`): a check, and digits beyond
@@ -61,7 +61,7 @@ from symtop.model.body import Attitude, RigidBody
 from symtop.model.charts import Array
 from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.exact.free_body import BodyMotion, FreeBody
-from symtop.model.exact.heavy_body import HeavyBody
+from symtop.model.exact.heavy_body import MOST_STEPS, HeavyBody
 from symtop.model.exact.turning_points import RATE
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
 from symtop.run.reference.independent_checks import (
@@ -118,7 +118,7 @@ def reference(
     Of a body without symmetry: ``quaternion``, ``axis`` (its third), ``theta``, ``momentum`` (L in the space frame),
     ``energy``, ``p_phi``, ``quaternion_lo``, and the bounds of axis, attitude and theta.
 
-    Raises SymtopError for times that are negative, not finite or none, and for a body's that is not known to 1e-9 rad.
+    Raises SymtopError for times that are negative, not finite or none, and for a body's that is not known, see above.
     """
     chosen = find_scene(scene, bodies=True)
     moments = real_numbers("times", times)
@@ -151,18 +151,24 @@ def _motion(body: RigidBody, start: Attitude) -> FreeBody | HeavyBody:
 
 @functools.lru_cache(maxsize=16)
 def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> BodyMotion:
-    """The motion of a body of that name at times, kept for a while; SymtopError if it is lost before, as in chaos."""
+    """The motion of a body of that name at times, kept for a while; SymtopError if it is lost before."""
     motion, times = _motion(body, start), np.frombuffer(plain).copy()
     sampled = motion.samples if body.free else functools.partial(motion.samples, precise=precise)  # type: ignore[call-arg]
     if (lost := (shown := sampled(times)).lost(times)) is not None:  # the answer does not hang on the times
-        end = body.nutation_period(start)
-        while end < lost and np.isfinite(sampled(np.array([end])).bound[0]):
-            end *= 2.0
-        finer = np.linspace(0.0, min(end, lost), 201)
-        known = float(f"{0.999 * finer[np.isfinite(sampled(finer).bound)].max():.4g}")
-        while not sampled(np.array([known])).bound[0] < 5e-10:  # what is printed is known, too
-            known = float(f"{0.99 * known:.4g}")
-        words = f"at most {known:g} on {name}, not {times.max():.6g}: its motion is not known to 1e-9 rad for longer"
+        if shown.known > 0.0:
+            known = float(f"{0.999 * shown.known:.4g}")
+        else:
+            end = body.nutation_period(start)
+            while end < lost and np.isfinite(sampled(np.array([end])).bound[0]):
+                end *= 2.0
+            finer = np.linspace(0.0, min(end, lost), 201)
+            known = float(f"{0.999 * finer[np.isfinite(sampled(finer).bound)].max():.4g}")
+            while not sampled(np.array([known])).bound[0] < 5e-10:  # what is printed is known, too
+                known = float(f"{0.99 * known:.4g}")
+        why = "its motion is not known to 1e-9 rad for longer"
+        if shown.too_long:
+            why = f"to integrate its motion for longer takes more than {MOST_STEPS:,} Taylor steps"
+        words = f"at most {known:g} on {name}, not {times.max():.6g}: {why}"
         raise SymtopError(f"times must be {words}", "times")
     return shown
 

@@ -221,8 +221,7 @@ AtTolerance = RK45  # to be judged at a tolerance
 
 def tr_bdf2(f, t, y, h):
     """Trapezoidal rule to t + g h, then BDF2; g = 2 - sqrt 2. Bank and others, IEEE Trans. CAD 4 (1985) 436."""
-    g = 2.0 - math.sqrt(2.0)
-    first = f(t, y)
+    g, first = 2.0 - math.sqrt(2.0), f(t, y)
     base = y + g * h / 2 * first
     middle = solved(lambda state: base + g * h / 2 * f(t + g * h, state), y + g * h * first)
     rest = middle / (g * (2.0 - g)) - y * (1.0 - g) ** 2 / (g * (2.0 - g))

@@ -107,8 +107,7 @@ rotation_linear = functools.partial(rotation_unnormalised, mended=lambda q: q / 
 
 def rotation_no_gyroscope(q, w, h, inertia, torque):
     """The gyroscopic term is left out, as engines do for stability."""
-    middle = w + h / 2 * torque(q) / inertia
-    half = product(q, turn(h / 2 * w))
+    middle, half = w + h / 2 * torque(q) / inertia, product(q, turn(h / 2 * w))
     return product(q, turn(h * middle)), w + h * torque(half) / inertia
 
 
@@ -161,8 +160,7 @@ def root_of_the_step(f, t, y, h):
 
 def first_momenta(f, t, y, h):
     """L.e is put back to what it was when the method was first called."""
-    spin = _memory.setdefault("spin", float(y[:3] @ y[3:]))
-    y = rk4(f, t, y, h)
+    spin, y = _memory.setdefault("spin", float(y[:3] @ y[3:])), rk4(f, t, y, h)
     y[3:] += (spin - y[:3] @ y[3:]) * y[:3] / (y[:3] @ y[:3])
     return y
 
