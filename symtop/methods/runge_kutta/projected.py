@@ -131,10 +131,10 @@ def built_in() -> list[Integrator]:
     methods = []
     for pair, name in ((DOP8, "dop853-projected"), (NINE, "vern9-projected")):
         plain = pair.fixed()
-        rule = plain.solvers["axis"].rule
+        solver: Any = plain.solvers["axis"]
         methods.append(replace(
             plain, name=name, summary=f"{pair.summary} with fixed steps, projected onto the constants of the motion",
-            solvers={"axis": FixedStep(_loop(pair), rule, on_levels, 1, implicit=False)},
+            solvers={"axis": FixedStep(_loop(pair), solver.rule, on_levels, 1, implicit=False)},
             conserves=frozenset({"energy", "p_phi", "p_psi", "axis_length"}), needs="constants", general=False,
             reference=f"{plain.reference} hairer-lubich-wanner-2006",
         ))  # fmt: skip
