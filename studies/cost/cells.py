@@ -151,10 +151,16 @@ def safest(data: xr.DataTree, cell: Cell, keeping: bool = False) -> tuple[list[S
     return safe(ladders, tariff.marked)
 
 
+@of_one_dataset
+def weights_of(data: xr.DataTree, cell: Cell) -> Array:
+    """How many tops of each kind are asked in a cell."""
+    kinds, wide = kinds_of(data, cell.horizon)[chosen(data, cell.horizon, cell.tops)], asked_tops(data, cell)
+    return np.array([float(wide[kinds == place].sum()) for place in range(len(KINDS))])
+
+
 def mean_work(data: xr.DataTree, cell: Cell, name: str) -> Array:
     """Force evaluations of a variant at each of its settings, the mean of the median tops of the kinds in a cell."""
-    mask, wide = chosen(data, cell.horizon, cell.tops), asked_tops(data, cell)
-    weights = np.array([float(wide[kinds_of(data, cell.horizon)[mask] == place].sum()) for place in range(len(KINDS))])
+    weights = weights_of(data, cell)
     work = data[cell.horizon]["work"].isel(scene=0).sel(variant=name).transpose("level", "kind").values
     return np.asarray((np.where(weights > 0.0, work, 0.0) * weights).sum(axis=1) / max(weights.sum(), 1.0))
 
@@ -162,7 +168,7 @@ def mean_work(data: xr.DataTree, cell: Cell, name: str) -> Array:
 def dearer(data: xr.DataTree, cell: Cell) -> tuple[str, float, float] | None:
     """The safe choice of the fewest evaluations, its share of those of the fastest, and from what price on it leads.
 
-    That is in seconds that an evaluation takes longer than here; None where the fastest has the fewest.
+    That is in seconds that an evaluation takes longer than here, and over all others; None if it is the fastest here.
     """
     choices = [one for one in safest(data, cell)[0] if np.isfinite(one.seconds)]
     counts = []
@@ -175,8 +181,10 @@ def dearer(data: xr.DataTree, cell: Cell) -> tuple[str, float, float] | None:
     fewest = int(np.argmin(counts)) if counts else 0
     if not fewest:
         return None
-    apart = choices[fewest].seconds - choices[0].seconds
-    return choices[fewest].name, counts[fewest] / counts[0], apart / (counts[0] - counts[fewest])
+    best, least = choices[fewest], counts[fewest]
+    others = [(best.seconds - one.seconds) / (count - least) for one, count in zip(choices, counts, strict=True)
+              if count > least]  # fmt: skip
+    return best.name, least / counts[0], max(others)
 
 
 def served_over_interpolated(data: xr.DataTree, cell: Cell, name: str) -> float:

@@ -563,13 +563,14 @@ def test_the_page_says_what_was_measured_and_shares_of_silent_runs_are_of_their_
 
 
 def test_where_f_is_dear_the_fewest_evaluations_win(monkeypatch):
-    two = [Safe("fast", 8.0, 1e-5, 0.0, 0.0), Safe("few", 1e-5, 3e-5, 0.0, 0.0)]
-    monkeypatch.setattr(cells, "safest", lambda *_: (two, True))
-    work = {"fast": np.array([500.0, 2000.0]), "few": np.array([40.0, 90.0])}
+    some = [Safe("fast", 8.0, 1e-5, 0.0, 0.0), Safe("next", 8.0, 2e-5, 0.0, 0.0), Safe("few", 1e-5, 3e-5, 0.0, 0.0)]
+    monkeypatch.setattr(cells, "safest", lambda *_: (some, True))
+    work = {"fast": np.array([500.0, 2000.0]), "next": np.array([80.0, 80.0]), "few": np.array([40.0, 90.0])}
     monkeypatch.setattr(cells, "mean_work", lambda _, __, name: work[name])
-    settings = xr.DataArray([[[4.0, 16.0], [1e-4, 1e-6]]], dims=("scene", "variant", "level"))
-    tree = xr.DataTree.from_dict({"short": xr.Dataset({"setting": settings}, {"variant": ["fast", "few"]})})
-    name, share, price = cells.dearer(tree, Cell("short", "axis", 1e-3, NATURAL))
-    assert (name, share, price) == ("few", pytest.approx(0.06), pytest.approx(2e-5 / 940.0))
-    monkeypatch.setattr(cells, "safest", lambda *_: (two[:1], True))
+    settings = xr.DataArray([[[4.0, 16.0], [4.0, 16.0], [1e-4, 1e-6]]], dims=("scene", "variant", "level"))
+    tree = xr.DataTree.from_dict({"short": xr.Dataset({"setting": settings}, {"variant": [*work]})})
+    # dearer by 2e-5 / 940 it leaves the fast one behind, but the next only by 1e-5 / 20
+    answer = cells.dearer(tree, Cell("short", "axis", 1e-3, NATURAL))
+    assert answer == ("few", pytest.approx(0.06), pytest.approx(1e-5 / 20.0))
+    monkeypatch.setattr(cells, "safest", lambda *_: (some[:1], True))
     assert cells.dearer(tree, Cell("short", "axis", 1e-3, NATURAL)) is None
