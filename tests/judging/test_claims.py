@@ -250,14 +250,17 @@ def test_honest_claims_are_confirmed(name):
 
 
 @pytest.mark.parametrize(("main", "other", "doubt", "verdicts"), [
-    (5.5, 4.0, 0.01, "confirmed undecided"), (5.0, 4.0, 0.01, "confirmed refuted"), (5.5, 3.0, 0.01, "refuted refuted"),
-    (3.0, 4.0, 0.01, "refuted refuted"), (4.0, 3.0, 0.01, "refuted refuted"), (5.5, 3.9, 0.1, "confirmed undecided"),
-    (5.5, 3.9, 0.01, "undecided undecided"), (5.5, 3.55, 0.01, "refuted refuted")])  # fmt: skip
+    (5.5, 4.0, 0.01, "confirmed" + 3 * " undecided"), (5.0, 4.0, 0.01, "confirmed refuted undecided refuted"),
+    (5.5, 3.0, 0.01, "refuted " * 4), (3.0, 4.0, 0.01, "refuted " * 4), (4.0, 3.0, 0.01, "refuted " * 4),
+    (5.5, 3.9, 0.1, "confirmed" + 3 * " undecided"), (5.5, 3.55, 0.01, "refuted " * 4),
+    (5.5, 3.9, 0.01, "undecided " * 4)])  # fmt: skip
 def test_a_slope_that_is_too_large_yields_to_the_terms_of_a_step_and_a_lower_one_stands(main, other, doubt, verdicts):
     terms = Series(1.0, np.array([0.0] * 5 + [1e-3]), np.full(6, 1e-14), True, "axis")  # of order 4
+    hidden, five = (terms._replace(defect=np.zeros(7), noise=np.full(7, noise)) for noise in (1e-6, 1e-14))
     fits = [Fit(slope, doubt, 1.0, np.ones(1, dtype=bool)) for slope in (main, other)]
     fitted = order.Order("", *[np.ones(1)] * 4, fits[0], {})
-    assert [order._claimed(4, fitted, fits, one, "").verdict for one in (terms, None)] == verdicts.split()
+    decided = [order._claimed(4, fitted, fits, one, "").verdict for one in (terms, None, hidden, five)]
+    assert decided == verdicts.split()
 
 
 @pytest.mark.parametrize(("lengths", "verdict"), [((8.37, 40.0), "confirmed"), ((8.37,), "undecided")])

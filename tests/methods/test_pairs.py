@@ -11,11 +11,12 @@ from scipy import integrate, optimize
 import symtop
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.judging.claims.order_conditions import conditions
+from symtop.measure.step_map import generic_start
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
-from symtop.methods.runge_kutta import nystrom, pairs
+from symtop.methods.runge_kutta import nystrom, pairs, projected
 from symtop.methods.runge_kutta.nystrom import DPRKN8, REDUCED
 from symtop.methods.runge_kutta.pair_tables import DOP853, DORMAND_PRINCE, TSIT5, VERN9
 from symtop.model import scenes as models
@@ -284,3 +285,24 @@ def test_a_gradient_that_depends_on_the_others_is_left_out_of_the_projection(nam
     run = symtop.simulate(name, "vern9-projected", step_size=0.02, horizon=2.0, guard=False)
     assert run.attrs["outcome"] == "ok"
     assert float(symtop.errors(run)["axis"].max()) < 1e-9
+
+
+def test_a_projected_step_has_the_order_of_its_table_though_runs_show_a_higher_one(monkeypatch):
+    """Y(h) - Y(h/2) o Y(h/2) begins with h^10: its powers of h by Cauchy's integral over complex steps."""
+    monkeypatch.setattr(projected, "summed", lambda u, v: tuple(np.add(u, v)))
+    monkeypatch.setattr(projected, "_inverse", lambda own, whole: 1.0 / own)  # complex numbers are not compared
+    scene, matrix, f = symtop.scene("spheroid"), square(VERN9, len(VERN9.b)), projected.AXIS.field
+    par, start = projected._levels(scene.top, generic_start(scene))
+    start = np.array(start)
+
+    def step(y, h):
+        k = np.zeros((len(VERN9.b), 6), complex)
+        for i, row in enumerate(matrix):
+            k[i] = f(par, y + h * row @ k)
+        return y + projected.projected(par, y, tuple(h * np.array(VERN9.b) @ k))
+
+    circle = 0.08 * np.exp(2j * np.pi * np.arange(64) / 64)
+    gaps = [step(start, h) - step(step(start, 0.5 * h), 0.5 * h) for h in circle * scene.nutation_period]
+    sizes = np.max(np.abs(np.fft.fft(gaps, axis=0))[:, :3], axis=1) / 64
+    assert sizes[:10].max() < 1e-15
+    assert 1e-11 < sizes[10] < 0.25 * sizes[11]  # of steps of 0.08 nutations
