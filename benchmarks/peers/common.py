@@ -28,7 +28,7 @@ from symtop.model.top import Angles, SymmetricTop
 
 SAME = "rtol = atol = the tolerance"
 PYTHON, NUMBA_IN_PYTHON, NUMBA_IN_C = "Python", "numba, called through Python", "numba, called from C"
-DENSE, OWN_STEPS = "dense output", "the ends of its own steps"
+DENSE, OWN_STEPS, FIXED_STEPS = "dense output", "the ends of its own steps", "ends of its fixed steps"
 
 
 class Motion(NamedTuple):

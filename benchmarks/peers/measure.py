@@ -1,10 +1,10 @@
 """Error and time of our methods and of the peers, on the same tops, by one code.
 
 Every solver comes as an Integrator record, ours from the registry and the peers' from their adapters. Accuracy: the
-largest angle between the axes over ten nutation periods, at 331 times that never beat with the nutation (for a library
-that would bend its steps to them, at the ends of its own steps), against the closed form with its bound. Time: runs of
-their own, of two calls for every solver and setting (see `common`): the public call, and the inner loop. All calls of a
-scene are interleaved in random order.
+largest angle between the axes over ten nutation periods, at 1001 times (with fixed steps, at the end of each if those
+are fewer; for a library that would bend its steps to them, at the ends of its own steps), against the closed form with
+its bound. Time: runs of their own, of two calls for every solver and setting (see `common`): the public call, and the
+inner loop. All calls of a scene are interleaved in random order.
 
 The setting is searched, not only gridded: between the loosest setting of a ladder that meets a target and the one
 before it, `symtop.measure.settings.seek` looks for a looser one, for us as for them. One setting serves both calls.
@@ -24,7 +24,7 @@ import xarray as xr
 import symtop
 from benchmarks.measured import circumstances
 from benchmarks.peers import Peer, own
-from benchmarks.peers.common import Inner, Library, axes_of
+from benchmarks.peers.common import DENSE, FIXED_STEPS, Inner, Library, axes_of
 from symtop.core.numbers import EPSILON
 from symtop.measure.accuracy import SAMPLES
 from symtop.measure.settings import ladder as settings, seek
@@ -40,7 +40,7 @@ SCENES = ("spheroid", "goldstein")
 TARGETS = (1e-3, 1e-6, 1e-9)
 CALLS = ("public", "inner")
 PERIODS = 10.0
-SHOWN = 501  # samples of a public call: what `simulate` returns by default
+SHOWN = 501  # samples that a public call is asked for: the default of `simulate`
 RUNGS = 9
 CLOSE = 0.8  # of a target: an error between it and the target ends a search
 ENOUGH = 0.1 * TARGETS[-1]  # no finer setting is tried below this error
@@ -137,6 +137,11 @@ def ready(scene: Scene, peer: Peer, setting: float) -> tuple[Callable[[], Any], 
     if isinstance(library, Library):
         return lambda: library.public(scene.top, scene.start, sampled), library.inner(scene.top, scene.start, bare)
     return own.public(scene, method, setting, horizon), own.inner(scene, method, peer.chart, bare)
+
+
+def shown_by(peer: Peer) -> str:
+    """At what times a public call shows the motion; fixed steps are not interpolated, ours as little as a library's."""
+    return FIXED_STEPS if peer.method.fixed_step else getattr(peer.method.solvers[peer.chart], "shows", DENSE)
 
 
 def end_error(scene: Scene, peer: Peer, loop: Inner) -> float:
@@ -248,7 +253,7 @@ def _combined(scenes: list[str], about: dict[str, Peer], cells: dict[tuple[str, 
         "language": [peer.language for peer in about.values()],
         "implementation": [peer.method.implementation for peer in about.values()],
         "formulation": [peer.method.summary for peer in about.values()],
-        "shows": [getattr(peer.method.solvers[peer.chart], "shows", "dense output") for peer in about.values()],
+        "shows": [shown_by(peer) for peer in about.values()],
     }
     return xr.Dataset(
         {key: (one, array) for key, array in values.items()}

@@ -23,7 +23,7 @@ TAYLOR_LANGUAGE = "LLVM by heyoka, inside the stepper"
 
 
 def public(scene: Scene, method: Integrator, setting: float, horizon: float) -> Callable[[], Any]:
-    """`simulate` with its defaults: 501 samples, momenta, energy, the guard; only the axis is asked for."""
+    """`simulate` with its defaults, at most a sample a step, momenta, energy, the guard; only the axis is asked for."""
     name, given = method.name, method.given(setting)
     return lambda: symtop.simulate(scene, name, horizon=horizon, observe="axis", **given)
 

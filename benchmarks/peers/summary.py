@@ -10,14 +10,13 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from benchmarks.kernels import ratio
 from benchmarks.pages import Table
 from benchmarks.peers.measure import HEYOKA, OURS, PERIODS, SHOWN, TARGETS
 from symtop.measure.timing import Timing
 from symtop.methods.framework.registry import methods
+from symtop.report.formats import listed, number
 
 JUDGED = TARGETS[1:]  # the accuracies at which a verdict is given
-LEVEL = 1.25  # a ratio nearer to one than this is no difference
 NAMES = {"public": "public call", "inner": "inner loop"}
 SHORT = {"Python": "Python", "numba, called through Python": "numba", "numba, called from C": "C"}
 ENGINES = ("mujoco", "drake")  # model bodies, not equations
@@ -38,6 +37,7 @@ class Best(NamedTuple):
 
     row: str
     timing: Timing
+    steps: float
 
 
 def groups(data: xr.Dataset) -> dict[str, list[str]]:
@@ -53,34 +53,24 @@ def groups(data: xr.Dataset) -> dict[str, list[str]]:
     return {name: found[name] for name in sorted(found, key=lambda name: (name != OURS, name != HEYOKA, name))}
 
 
-def best_of(data: xr.Dataset, call: str, scene: str, rows: Sequence[str], target: float) -> Best | None:
-    """The fastest measured run of some variants with an error of at most `target`; None if none is."""
+def best_of(data: xr.Dataset, call: str, scene: str, rows: Sequence[str], target: float, least: int = 0) -> Best | None:
+    """The fastest run of some variants with an error of at most `target`, and `least` steps; None if none is."""
     cell = data.sel(call=call, scene=scene, variant=list(rows))
-    seconds = np.where(cell["axis"].values <= target, cell["seconds"].values, np.inf)
+    good = (cell["axis"].values <= target) & (cell["steps"].values >= least)
+    seconds = np.where(good, cell["seconds"].values, np.inf)
     seconds[np.isnan(seconds)] = np.inf
     if not np.isfinite(seconds).any():
         return None
     row, column = np.unravel_index(int(np.argmin(seconds)), seconds.shape)
     samples = tuple(cell["seconds_samples"].values[row, column].tolist())
-    return Best(str(cell["variant"].values[row]), Timing(samples, float(cell["first_call"].values[row, column])))
+    timing = Timing(samples, float(cell["first_call"].values[row, column]))
+    return Best(str(cell["variant"].values[row]), timing, float(cell["steps"].values[row, column]))
 
 
-class Standing(NamedTuple):
-    """How we stand to a peer: ahead, behind, level, or not to be told from the noise."""
-
-    word: str
-    ratio: float  # their time over ours
-    low: float
-    high: float
-
-
-def standing(mine: Best, theirs: Best) -> Standing:
-    """A difference counts if it exceeds `LEVEL` and every fifth of the batches has the same sign."""
-    whole, low, high = ratio(theirs.timing, mine.timing)
-    if 1.0 / LEVEL <= whole <= LEVEL:
-        return Standing("level", whole, low, high)
-    certain = low > 1.0 or high < 1.0
-    return Standing("noise" if not certain else "ahead" if whole > 1.0 else "behind", whole, low, high)
+def standing(mine: Best, theirs: Best) -> str:
+    """Whether all batches of the one are faster than all of the other, however little: ahead, behind or level."""
+    ours, other = mine.timing.samples, theirs.timing.samples
+    return "ahead" if max(ours) < min(other) else "behind" if max(other) < min(ours) else "level"
 
 
 def shown(seconds: float) -> str:
@@ -91,20 +81,28 @@ def shown(seconds: float) -> str:
     return f"{seconds * 1e6:.3g} us"
 
 
-def ratios(data: xr.Dataset, call: str, mine: Sequence[str], theirs: Sequence[str]) -> list[float]:
-    """Their time over ours on every scene and at every judged accuracy that both reach."""
-    each = []
-    for scene in data["scene"].values.astype(str):
-        for target in JUDGED:
-            ours, other = (best_of(data, call, scene, rows, target) for rows in (mine, theirs))
-            if ours is not None and other is not None:
-                each.append(other.timing.best / ours.timing.best)
-    return each
+def both(
+    data: xr.Dataset, call: str, mine: Sequence[str], theirs: Sequence[str], least: int = 0
+) -> list[tuple[str, Best, Best]]:
+    """Our best, of at least so many steps, and theirs, on every scene and at every judged accuracy that both reach."""
+    return [
+        (f"{scene} at {number(target)}", ours, other)
+        for scene, target in itertools.product(data["scene"].values.astype(str), JUDGED)
+        if (ours := best_of(data, call, scene, mine, target, least)) is not None
+        and (other := best_of(data, call, scene, theirs, target)) is not None
+    ]
 
 
-def span(data: xr.Dataset, call: str, mine: Sequence[str], theirs: Sequence[str]) -> tuple[float, float] | None:
+def ratios(data: xr.Dataset, call: str, mine: Sequence[str], theirs: Sequence[str], least: int = 0) -> list[float]:
+    """Their times over ours."""
+    return [other.timing.best / ours.timing.best for _, ours, other in both(data, call, mine, theirs, least)]
+
+
+def span(
+    data: xr.Dataset, call: str, mine: Sequence[str], theirs: Sequence[str], least: int = 0
+) -> tuple[float, float] | None:
     """The least and the largest ratio, their time over ours, over scenes and judged accuracies."""
-    each = ratios(data, call, mine, theirs)
+    each = ratios(data, call, mine, theirs, least)
     return (min(each), max(each)) if each else None
 
 
@@ -119,16 +117,17 @@ def range_of(ratios: tuple[float, float] | None) -> str:
 
 
 def verdict(data: xr.Dataset) -> list[str]:
-    """Who is ahead in each comparison; what a callback costs."""
-    return [*_wins(data), *_callbacks(data)]
+    """Who is ahead in each comparison; what as many samples change."""
+    return [*_wins(data), *_samples(data)]
 
 
 def pairs(data: xr.Dataset) -> list[str]:
-    """Both ratios against SciPy and heyoka."""
+    """Both ratios against SciPy and heyoka; what a callback costs."""
     known = groups(data)
     scipys = sorted((name for name in known if name.partition("[")[0] == "scipy"), key=lambda name: "[angles" in name)
-    both = [_both(data, known, name) for name in (*scipys, HEYOKA) if OURS in known and name in known]
-    return [*both, f"All ratios: {_fixed(data)}; in angles or on (e, L) as each says."] if both else []
+    said = [_both(data, known, name) for name in (*scipys, HEYOKA) if name in known]
+    fixed = [f"All ratios: {_fixed(data)}; in angles or on (e, L) as each says."] if said else []
+    return [*said, *fixed, *_callbacks(data)]
 
 
 def _fixed(data: xr.Dataset) -> str:
@@ -138,11 +137,11 @@ def _fixed(data: xr.Dataset) -> str:
 
 def _both(data: xr.Dataset, known: dict[str, list[str]], name: str) -> str:
     """The public-call ratio beside the inner-loop ratio of one library."""
-    public, inner = (span(data, call, known[OURS], known[name]) for call in NAMES)
+    public, inner = (span(data, call, general(data), known[name]) for call in NAMES)
     call = "`taylor` in `simulate`" if name == HEYOKA else "a user's `solve_ivp`"
     return (
-        f"{name}: {call} takes {range_of(public)} times as long as `simulate` with the best of symtop's own kernels; "
-        f"the inner loop takes {range_of(inner)} times as long as the fastest kernel alone."
+        f"{name}: {call} takes {range_of(public)} times as long as `simulate` with symtop's fastest method on f(t, y) "
+        f"alone; the inner loop takes {range_of(inner)} times as long as that kernel."
     )
 
 
@@ -150,9 +149,9 @@ class Score(NamedTuple):
     """Comparisons with libraries that are handed equations, at every place that both reach."""
 
     ahead: int
-    level: int  # or not to be told from the noise
+    level: int
     behind: int
-    slower: dict[str, str]  # than which library, in how many of its comparisons
+    faster: list[str]  # which library, how many times as fast, and where
 
     @property
     def compared(self) -> int:
@@ -168,62 +167,72 @@ def general(data: xr.Dataset) -> list[str]:
 
 def score(data: xr.Dataset, call: str, mine: Sequence[str]) -> Score:
     """How the fastest of some variants stands."""
-    counts, slower = {"ahead": 0, "level": 0, "behind": 0, "noise": 0}, {}
+    counts, faster = {"ahead": 0, "level": 0, "behind": 0}, []
     for name, rows in groups(data).items():
         if name in (OURS, HEYOKA, *ENGINES):
             continue
-        places = ((str(scene), target) for scene in data["scene"].values for target in JUDGED)
-        pairs = [[best_of(data, call, scene, some, target) for some in (mine, rows)] for scene, target in places]
-        words = [standing(own, theirs).word for own, theirs in pairs if own is not None and theirs is not None]
-        for word in words:
+        for place, own, theirs in both(data, call, mine, rows):
+            word = standing(own, theirs)
             counts[word] += 1
-        if "behind" in words:
-            slower[name] = f"{words.count('behind')} of {len(words)}"
-    return Score(counts["ahead"], counts["level"] + counts["noise"], counts["behind"], slower)
+            if word == "behind":
+                faster.append(f"{name} ({printed(own.timing.best / theirs.timing.best)} times, {NAMES[call]}, {place})")
+    return Score(**counts, faster=faster)
 
 
 def _wins(data: xr.Dataset) -> list[str]:
-    """In how many places our fastest is ahead, and how those stand that need no more than a library."""
-    said, simple = [], general(data)
-    kinds = [("symtop's own kernels", groups(data).get(OURS, []))]
-    if simple:
-        kinds.append((f"Those that need f(t, y) alone ({', '.join(simple)})", simple))
-    for who, rows in kinds:
+    """Which libraries are faster than those that need no more than a library and than our fastest, and how often."""
+    said = []
+    for who, rows in (("methods on f(t, y) alone", general(data)), ("of all", groups(data).get(OURS, []))):
         stands = {words: each for call, words in NAMES.items() if (each := score(data, call, rows)).compared}
+        faster = [library for one in stands.values() for library in one.faster]
         ahead = [f"{one.ahead} of {one.compared}" for one in stands.values()]
-        level = [str(one.level) for one in stands.values()]
-        slower = [f"{name} is faster in {count} ({words})"
-                  for words, one in stands.items() for name, count in one.slower.items()]  # fmt: skip
         if stands:
-            said.append(f"{who} are faster in {' and '.join(ahead)} comparisons ({' and '.join(stands)}), level or "
-                        f"within the noise in {' and '.join(level)}: {', '.join(slower) or 'no library is faster'}."
+            said.append(f"{listed(faster) if faster else 'No library'} {'are' if faster[1:] else 'is'} faster than "
+                        f"symtop's fastest {who} ({', '.join(fastest(data, rows))}); symtop is faster in "
+                        f"{' and '.join(ahead)} comparisons ({' and '.join(stands)}), level in "
+                        f"{' and '.join(str(one.level) for one in stands.values())}."
                         )  # fmt: skip
     return said
 
 
-def fastest(data: xr.Dataset) -> list[str]:
-    """Our variants that are the fastest somewhere."""
-    ours = groups(data).get(OURS, [])
+def _samples(data: xr.Dataset) -> list[str]:
+    """How SciPy stands to those of our public calls that return as many samples."""
+    said = facts(data)
+    words = (
+        f"Where solve_ivp returns {SHOWN} samples, symtop's fastest on f(t, y) alone return one a step, "
+        f"{said.get('samples')}: a call of solve_ivp (numba, on (e, L)) takes {said['general_scipy_public']} times as "
+        f"long as theirs, and {said.get('filled')} times as long as symtop's fastest with {SHOWN} samples."
+    )
+    return [words] if "samples" in said else []
+
+
+def fastest(data: xr.Dataset, rows: Sequence[str]) -> list[str]:
+    """Those of some variants that are the fastest of them somewhere."""
     places = itertools.product(NAMES, data["scene"].values.astype(str), JUDGED)
-    best = (best_of(data, call, scene, ours, target) for call, scene, target in places)
+    best = (best_of(data, call, scene, rows, target) for call, scene, target in places)
     return sorted({one.row for one in best if one is not None})
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """Numbers that pages quote."""
-    known, simple, own = groups(data), general(data), fastest(data)
+    known, simple = groups(data), general(data)
+    ours, scipy = known.get(OURS, []), known.get("scipy[axis], numba", [])
+    own = fastest(data, ours)
     needs = [method.needs for row in own if (method := methods().get(row.partition("[")[0])) is not None]
     said: dict[str, Any] = {
-        "version": data.attrs["symtop_version"], "fastest": _coded(own), "general": _coded(simple),
+        "version": data.attrs["symtop_version"], "fastest": _coded(own), "general": _coded(fastest(data, simple)),
         "of_this_top": bool(needs) and set(needs) == {"this-top"},
     }  # fmt: skip
+    if shown := [one.steps + 1.0 for _, one, _ in both(data, "public", simple, scipy)]:
+        said["samples"] = range_of((min(shown), max(shown)))
+        said["filled"] = range_of(span(data, "public", ours, scipy, SHOWN - 1))
     for call in NAMES:
-        said[f"heyoka_{call}"] = range_of(span(data, call, known.get(OURS, []), known.get(HEYOKA, [])))
-        for kind, rows in (("", known.get(OURS, [])), ("general_", simple)):
+        said[f"heyoka_{call}"] = range_of(span(data, call, simple, known.get(HEYOKA, [])))
+        for kind, rows in (("", ours), ("general_", simple)):
             stands = score(data, call, rows)
             said |= {f"{kind}{key}_{call}": getattr(stands, key) for key in ("ahead", "level", "behind", "compared")}
-            said[f"{kind}slower_{call}"] = ", ".join(f"{name} in {count}" for name, count in stands.slower.items())
-            said[f"{kind}scipy_{call}"] = range_of(span(data, call, rows, known.get("scipy[axis], numba", [])))
+            said[f"{kind}faster_{call}"] = listed(stands.faster) if stands.faster else ""
+            said[f"{kind}scipy_{call}"] = range_of(span(data, call, rows, scipy))
     return said
 
 
@@ -259,7 +268,7 @@ def _cells(data: xr.Dataset, scene: str, target: float, rows: Sequence[str], our
 def tables(data: xr.Dataset) -> list[Table]:
     """Both comparisons side by side, group by group and variant by variant, and what every variant was given."""
     known = groups(data)
-    ours = known.get(OURS, [])
+    ours = general(data)
     places = [(str(scene), target) for scene in data["scene"].values for target in JUDGED]
     heads = [word for call in NAMES.values() for word in (f"{call}: variant", call, "times symtop's")]
     by_group = [
@@ -273,19 +282,19 @@ def tables(data: xr.Dataset) -> list[Table]:
             cells = _cells(data, scene, target, [row], ours)
             if cells[1] != "not reached":
                 by_row.append([scene, f"{target:.0e}", row, cells[1], cells[2], cells[4], cells[5]])
-    both = []
+    over = []
     for name, rows in known.items():
         one = data.sel(variant=rows[0])
         public, inner = (range_of(span(data, call, ours, rows)) for call in NAMES)
         if name != OURS:
-            both.append([name, str(one["chart"].values), str(one["language"].values), public, inner])
+            over.append([name, str(one["chart"].values), str(one["language"].values), public, inner])
     keys = ("package", "version", "chart", "language", "implementation", "shows", "formulation")
     given = [[str(row), *(str(data[key].sel(variant=row).values) for key in keys)] for row in data["variant"].values]
     return [
         Table(
             f"Both ratios: the time over symtop's ({_fixed(data)})",
             ["library", "chart", "right-hand side", NAMES["public"], NAMES["inner"]],
-            both,
+            over,
         ),
         Table(
             "Both comparisons, the fastest variant of each library",
@@ -319,10 +328,12 @@ HOW_TO_READ = (
     "Held fixed: the top, the start, ten nutations, the largest axis error over them, one thread, double precision. "
     "One code measures all errors, and the setting is searched for every variant. A variant is method[chart]: axis is "
     "the six equations on (e, L), angles are Euler's, attitude is a quaternion. Two calls are timed. Public call: "
-    f"what a user types, with the objects built in it. It returns {SHOWN} samples, or the ends of the library's own "
-    "steps where it does not interpolate. Inner loop: all that can be built once is built before; start to horizon, "
-    "no samples. Below about 15 us it compares calls from Python more than integrators. Compilation is outside of "
-    "both calls for all. The columns `times symtop's` divide by the time of the fastest of symtop's own kernels in "
-    "the same call; counts of wins are over libraries that are handed equations, not heyoka's stepper, which symtop "
-    "offers. None of this says anything about a library's other uses."
+    f"what a user types, with the objects built in it. It returns {SHOWN} samples where the library interpolates, and "
+    f"where it does not the ends of its steps, of fixed ones (symtop, ARKODE, MuJoCo) {SHOWN} at most. Inner loop: all "
+    "that can be built once is built before; start to horizon, no samples. Below about 15 us it compares calls from "
+    "Python more than integrators. Compilation is outside of both calls for all. Ratios and the columns `times "
+    "symtop's` divide by the time of symtop's fastest method on f(t, y) alone in the same call. A library counts as "
+    "faster (slower) if every batch of it is faster (slower) than every one of symtop's, however near to one the "
+    "ratio is; else both are level. Counted are libraries that are handed equations, not heyoka's stepper, which "
+    "symtop offers. None of this says anything about a library's other uses."
 )
