@@ -20,7 +20,7 @@ import numpy as np
 
 from symtop.methods.framework.loop import Loop, inside
 from symtop.methods.framework.registry import Integrator, integrator
-from symtop.methods.lagrangian import discrete_lagrangian, exact_discrete, galerkin, unreduced
+from symtop.methods.lagrangian import discrete_lagrangian, exact_discrete, galerkin, galerkin_gauss, unreduced
 from symtop.methods.lie_group import energy_momentum, generalised_alpha, runge_kutta, variational
 from symtop.methods.runge_kutta import collective_gauss, explicit, gauss, kahan, pairs
 from symtop.methods.splitting import angles, space
@@ -55,7 +55,14 @@ def kernel_of(method: Integrator, chart: str, scene: Scene, h: float) -> Kernel:
 
 def _macros(rule: Any, chart: str = "") -> dict[str, int]:
     """What numba, too, knows when it compiles: the length of the table, and the chart."""
-    lengths = {"drift": "DRIFTS", "nodes": "NODES", "a": "STAGES", "shares": "SHARES", "weights": "WEIGHTS"}
+    lengths = {
+        "drift": "DRIFTS",
+        "nodes": "NODES",
+        "a": "STAGES",
+        "shares": "SHARES",
+        "weights": "WEIGHTS",
+        "reach": "NODES",
+    }
     lengths |= {"counts": "STAGES"} if hasattr(rule, "counts") else {"mu": "STAGES"}
     rows = {"a": "b"}  # a tableau is as long as its weights
     found = {macro: len(getattr(rule, rows.get(row, row))) for row, macro in lengths.items() if hasattr(rule, row)}
@@ -68,6 +75,7 @@ FAMILIES: dict[Loop, tuple[str, str]] = {
     discrete_lagrangian.march: ("discrete_lagrangian", ""),
     unreduced.march: ("unreduced", ""),
     galerkin.march: ("galerkin", ""),
+    **{galerkin_gauss.loop(s): ("galerkin_gauss", "") for s in galerkin_gauss.NODES},
     angles.march: ("splitting_angles", ""),
     space.march_axis: ("splitting_space", ""),
     space.march_attitude: ("splitting_space", "ATTITUDE"),

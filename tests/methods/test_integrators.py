@@ -17,6 +17,7 @@ from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian import discrete_lagrangian, galerkin, galerkin as kernel
 from symtop.methods.lagrangian.discrete_lagrangian import Quadrature, forces, march, node_sums, opening
+from symtop.methods.lagrangian.galerkin_gauss import gauss_rule
 from symtop.methods.lagrangian.unreduced import unreduced
 from symtop.model.top import Angles, SymmetricTop
 from tests.conftest import random_scenes
@@ -114,7 +115,8 @@ def test_a_nan_stays_one(name):
 
 
 NAME = "galerkin-simpson"
-SIMPSON = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+SIMPSON = (0.0, 0.5, 1.0), (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
+GALERKIN = {NAME: (2, *SIMPSON)} | {f"galerkin-gauss-{2 * s}": (s, *gauss_rule(s)[:2]) for s in (2, 3, 4)}
 
 
 def derivatives(top, theta, rate):
@@ -126,38 +128,44 @@ def derivatives(top, theta, rate):
     return momentum, force
 
 
-def independent_step(top, point, h, weights=SIMPSON):
-    """One step from the stationary parabola itself: six equations in (qm, q1), nothing eliminated, SciPy's solver."""
-    q0, p0 = point[:3], point[3:]
-    # rates at the nodes are linear in q0, qm, q1: these are their coefficients, times h
-    shape = np.array([[-3.0, 4.0, -1.0], [-1.0, 0.0, 1.0], [1.0, -4.0, 3.0]])
+def independent_step(top, point, h, degree, nodes, weights):
+    """One step from the stationary polynomial: equations for all its places, nothing eliminated, SciPy's solver."""
+    q0, k, even = point[:3], np.arange(degree + 1), np.linspace(0.0, 1.0, degree + 1)[:, None]
+    c, basis = np.array(nodes)[:, None], np.linalg.inv(even**k)
+    values, rates = c**k @ basis, k * c ** np.maximum(k - 1, 0) @ basis  # at the nodes, of places at equal distances
 
     def slopes(unknown):
-        q = np.stack([q0, unknown[:3], unknown[3:]])
-        parts = [derivatives(top, q[i, 0], shape[i] @ q / h) for i in range(3)]
-        return [h * weights[j] * parts[j][1] + sum(weights[i] * shape[i, j] * parts[i][0] for i in range(3))
-                for j in range(3)]  # fmt: skip
+        q = np.concatenate([q0, unknown]).reshape(-1, 3)
+        parts = [derivatives(top, at[0], rate / h) for at, rate in zip(values @ q, rates @ q, strict=True)]
+        P, F = (np.array(each) * np.array(weights)[:, None] for each in zip(*parts, strict=True))
+        return h * values.T @ F + rates.T @ P
 
     def equations(unknown):
-        first, middle, _ = slopes(unknown)
-        return np.concatenate([p0 + first, middle])
+        left = slopes(unknown)[:-1]
+        left[0] += point[3:]
+        return left.ravel()
 
     at = angles_at(top, point)
-    rate = np.array([at.theta_dot, at.phi_dot, at.psi_dot])
-    solution = root(equations, np.concatenate([q0 + 0.5 * h * rate, q0 + h * rate]), tol=1e-14)
+    guess = q0 + h * even[1:] * np.array([at.theta_dot, at.phi_dot, at.psi_dot])
+    solution = root(equations, guess.ravel(), tol=1e-14)
     assert np.max(np.abs(solution.fun)) < 1e-12
-    return np.concatenate([solution.x[3:], slopes(solution.x)[2]])
+    return np.concatenate([solution.x[-3:], slopes(solution.x)[-1]])
 
 
+@pytest.mark.parametrize("name", GALERKIN)
 @pytest.mark.parametrize("scene", random_scenes(8, seed=21), ids=lambda s: s.name)
-def test_one_step_is_the_stationary_parabola(scene):
-    """The reduction to two unknowns, and all six results of a step, against six equations solved as they stand."""
+def test_one_step_is_that_of_the_stationary_polynomial(name, scene):
+    """The reduction to theta alone, and all six results of a step, against the equations of the whole top."""
+    degree, nodes, weights = GALERKIN[name]
     for h in (0.1, 0.02):
-        step = StepMap(symtop.integrator(NAME), "angles", scene.top, 1.0, h)
+        step = StepMap(symtop.integrator(name), "angles", scene.top, 1.0, h)
         point = step.point(scene.start)
-        assert np.max(np.abs(step.image(point) - independent_step(scene.top, point, h))) < 2e-12
+        right = independent_step(scene.top, point, h, degree, nodes, weights)
+        assert np.max(np.abs(step.image(point) - right)) < 2e-12
         if h == 0.1 and scene.name == "random-0":  # the control: other weights are another method
-            wrong = independent_step(scene.top, point, h, weights=(0.17, 0.66, 0.17))
+            wrong = independent_step(
+                scene.top, point, h, degree, nodes, (weights[0] + 0.01, *weights[1:-1], weights[-1] - 0.01)
+            )
             assert not np.max(np.abs(step.image(point) - wrong)) < 2e-12
 
 
@@ -181,7 +189,7 @@ def test_a_step_without_its_last_force_is_neither_symplectic_nor_symmetric():
 def test_every_derivative_of_a_trial_is_right(scene):
     """The analytic Jacobian against central differences; one that is off by a thousandth is seen."""
     par, (theta, *_) = on_angles(scene.top, scene.start)
-    start, m, d, e = kernel._node(par, theta), 0.03, 0.07, 1e-5
+    start, m, d, e = kernel.node_at(par, theta), 0.03, 0.07, 1e-5
     trial = lambda shift_m, shift_1: kernel._evaluate(par, start, theta + m + shift_m, theta + d + shift_1)
 
     def agree(factor):

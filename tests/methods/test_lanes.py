@@ -34,7 +34,7 @@ ENDS = {  # how members end that step too far: numbers overflow, theta passes a 
     ("not_converged",): ("gauss-4[axis]", "gauss-8[axis]", "gauss-4[attitude]", "lie-variational[axis]",
                          "generalised-alpha[attitude]"),
     ("left_chart", "not_converged"): ("midpoint[angles]", "trapezoidal[angles]", "simpson-linear[angles]",
-                                      "galerkin-simpson[angles]"),
+                                      "galerkin-simpson[angles]", "galerkin-gauss-6[angles]"),
 }  # fmt: skip
 FEW = {  # a method of each family, for the others compile for 20 s
     "strang[axis]", "rk4[attitude]", "vern9-fixed[axis]", "series[axis]", "rkmk-se3-2[axis]", "gauss-4[axis]",

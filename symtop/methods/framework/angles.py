@@ -57,6 +57,22 @@ def require_chart(at: Any) -> None:
         raise SymtopError(f"theta must lie inside (0, pi) for an integrator in the angles chart, not {at.theta!r}")
 
 
+@register_jitable
+def momenta_of_turns(par: Any, a: Any, d: Any, h: float, dstate: Any) -> Any:
+    """p_phi and p_psi of the increments of phi and psi in a step, which are linear in them.
+
+    With x = theta/2 where the force is evaluated, for a time b h each, a = sum b h/(4 I1 sin^2 x),
+    d = sum b h/(4 I1 cos^2 x) and k = h (1/I3 - 1/I1)/2:
+    dphi + dpsi = (k + 2d) south - k north,  dphi - dpsi = (k + 2a) north - k south.
+    """
+    k = 0.5 * h * (1.0 / par.I3 - 1.0 / par.I1)
+    plus, minus = dstate[2] + dstate[3], dstate[2] - dstate[3]
+    determinant = 2.0 * k * (a + d) + 4.0 * a * d
+    north = ((k + 2.0 * d) * minus + k * plus) / determinant
+    south = ((k + 2.0 * a) * plus + k * minus) / determinant
+    return 0.5 * (north + south), 0.5 * (south - north)
+
+
 def _on_angles(top: Any, at: Any) -> Any:
     """p_theta0 = dL/dtheta' is the discrete Legendre transform's start."""
     momenta = conserved(top, at)

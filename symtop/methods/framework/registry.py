@@ -226,6 +226,7 @@ _BUILT_IN = (
     "runge_kutta.adams", "runge_kutta.gauss", "runge_kutta.kahan", "lie_group.runge_kutta",
     "lie_group.energy_momentum", "lie_group.generalised_alpha", "runge_kutta.collective_gauss", "library.scipy_ivp",
     "taylor.heyoka", "taylor.series", "taylor.series_general", "library.exact", "engines.engines",
+    "lagrangian.galerkin_gauss",
 )  # fmt: skip
 ENTRY_POINTS = "symtop.integrators"  # an Integrator, or a function that returns several
 

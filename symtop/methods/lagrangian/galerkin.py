@@ -66,15 +66,16 @@ class _Pull(NamedTuple):
 
 
 @register_jitable
-def _node(par: Any, theta: float) -> Any:
+def node_at(par: Any, theta: float) -> Any:
+    """The trigonometry of a node."""
     sin_x, cos_x = sincos(0.5 * theta)
     low, high = sin_x * sin_x, cos_x * cos_x
     return _Node(0.25 / (par.I1 * high), 0.25 / (par.I1 * low), sin_x / cos_x, 2.0 * sin_x * cos_x, high - low)
 
 
 @register_jitable
-def _pull(par: Any, node: Any, south: float, north: float) -> Any:
-    """V' and what Newton needs of it: phi' = D + A, V' = sin(theta) [I1 (D^2 - A^2) - mgl]."""
+def pull_at(par: Any, node: Any, south: float, north: float) -> Any:
+    """V' of `_Node`, and what Newton needs of it: phi' = D + A, V' = sin(theta) [I1 (D^2 - A^2) - mgl]."""
     D, A = node.d * south, node.a * north
     bracket = par.I1 * (D - A) * (D + A) - par.mgl
     by_south, by_north = D * node.tangent, -A / node.tangent
@@ -107,7 +108,7 @@ def _follow(jet: Any, fix: Any) -> Any:
 @register_jitable
 def _evaluate(par: Any, start: Any, theta_m: float, theta_1: float) -> Any:
     """Slopes, rates and derivatives at trial angles, from the trigonometry at the start."""
-    middle, end = _node(par, theta_m), _node(par, theta_1)
+    middle, end = node_at(par, theta_m), node_at(par, theta_1)
     k = 0.5 * (1.0 / par.I3 - 1.0 / par.I1)
     # B0 + Bm + B1 is symmetric and positive definite: its inverse [[N, K], [K, S]] is applied three times
     S, N = 3.0 * k + 2.0 * (start.d + middle.d + end.d), 3.0 * k + 2.0 * (start.a + middle.a + end.a)
@@ -117,9 +118,9 @@ def _evaluate(par: Any, start: Any, theta_m: float, theta_1: float) -> Any:
     load_n = 2.0 * ((middle.a - start.a) + (middle.a - end.a)) * par.north
     e_s, e_n = N * load_s + K * load_n, K * load_s + S * load_n
     south, north = par.south - 0.5 * e_s, par.north - 0.5 * e_n
-    first = _pull(par, start, par.south + e_s, par.north + e_n)
-    inner = _pull(par, middle, south, north)
-    last = _pull(par, end, par.south + e_s, par.north + e_n)
+    first = pull_at(par, start, par.south + e_s, par.north + e_n)
+    inner = pull_at(par, middle, south, north)
+    last = pull_at(par, end, par.south + e_s, par.north + e_n)
     es_m, en_m = 4.0 * (N * inner.south + K * inner.north), 4.0 * (K * inner.south + S * inner.north)
     es_1, en_1 = -2.0 * (N * last.south + K * last.north), -2.0 * (K * last.south + S * last.north)
     b_s, b_n = k + 2.0 * middle.d, k + 2.0 * middle.a
@@ -158,7 +159,7 @@ def _steady(par: Any, h: float) -> Any:
 @register_jitable
 def _open(par: Any, rule: Any, theta: float) -> Any:
     """What no iteration changes: the trigonometry of the start."""
-    return _node(par, theta)
+    return node_at(par, theta)
 
 
 @register_jitable
@@ -198,7 +199,7 @@ def _free_flight(step: Any) -> Any:
 
 def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     """V' at the start, as a history of V0 and Vm for the predictor."""
-    V = _pull(par, _node(par, state[0]), par.south, par.north).slope
+    V = pull_at(par, node_at(par, state[0]), par.south, par.north).slope
     return (V, V, V, V, V, V, V, V)
 
 
@@ -262,13 +263,13 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     thetam = theta0 + m; then Pm = Bm^-1 q' and p = (P0 + 2 Pm)/3.
     """
     theta, d = before[0], dstate[0]
-    start, end = _node(par, theta), _node(par, theta + d)
+    start, end = node_at(par, theta), node_at(par, theta + d)
     plus, minus = (dstate[2] + dstate[3]) / h, (dstate[2] - dstate[3]) / h
     mean = _Node(0.5 * (start.d + end.d), 0.5 * (start.a + end.a), 0.0, 0.0, 0.0)
     south, north = _momenta(par, mean, plus, minus)
-    V0 = _pull(par, start, south, north).slope
+    V0 = pull_at(par, start, south, north).slope
     m = (6.0 * h / par.I1 * (before[1] - h * V0 / 6.0) + 2.0 * d) / 16.0
-    south_m, north_m = _momenta(par, _node(par, theta + m), plus, minus)
+    south_m, north_m = _momenta(par, node_at(par, theta + m), plus, minus)
     south, north = (south + 2.0 * south_m) / 3.0, (north + 2.0 * north_m) / 3.0
     return 0.5 * (south + north), 0.5 * (south - north)
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
-from symtop.methods.framework.angles import ReducedTop, chart_outcome
+from symtop.methods.framework.angles import ReducedTop, chart_outcome, momenta_of_turns
 from symtop.methods.framework.loop import Loop
 from symtop.methods.framework.plan import Array
 from symtop.methods.splitting.loop import compose, composed, stages
@@ -62,11 +62,7 @@ def _increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
 
 
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
-    """p_phi and p_psi from the increments of phi and psi, which are linear in them.
-
-    With k = h (1/I3 - 1/I1)/2, a = sum b h/(4 I1 sin^2 x), d = sum b h/(4 I1 cos^2 x), x = theta/2 at the kicks:
-    dphi + dpsi = (k + 2d) south - k north,  dphi - dpsi = (k + 2a) north - k south.
-    """
+    """p_phi and p_psi from the increments of phi and psi in the kicks."""
     step = (0.0, 0.0, 0.0, 0.0)
     a = d = 0.0
     n = len(rule.drift)
@@ -78,12 +74,7 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
         if i < n:
             step = kick_angles(par, force_angles(par, before, step), step, rule.kick[i], 0.0)
             step = drift_angles(par, rule, before, step, rule.drift[i])
-    k = 0.5 * h * (1.0 / par.I3 - 1.0 / par.I1)
-    plus, minus = dstate[2] + dstate[3], dstate[2] - dstate[3]
-    determinant = 2.0 * k * (a + d) + 4.0 * a * d
-    north = ((k + 2.0 * d) * minus + k * plus) / determinant
-    south = ((k + 2.0 * a) * plus + k * minus) / determinant
-    return 0.5 * (north + south), 0.5 * (south - north)
+    return momenta_of_turns(par, a, d, h, dstate)
 
 
 @register_jitable

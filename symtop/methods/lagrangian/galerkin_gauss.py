@@ -1,0 +1,301 @@
+"""Galerkin variational integrators with Gauss's quadrature: s = 2, 3, 4 and 6 nodes, order 2s.
+
+The path of a step is a polynomial of degree s, and Gauss's rule on its nodes c_i, with weights b_i, sums the action:
+
+    L_d(q0, q1) = ext h sum_i b_i L(Q_i, Q_i'),     Q_i = q0 + h sum_j a_ij Q_j',     q1 = q0 + h sum_i b_i Q_i'
+
+The stationary path is that of the partitioned Runge-Kutta method with a and b_j - b_j a_ji/b_i, which is Gauss's
+collocation on Hamilton's equations for every regular L, as b_i a_ij + b_j a_ji = b_i b_j. So p_phi and p_psi stay the
+same inside a step, and it makes no difference whether they are eliminated before or after: what remains is, with
+F_j = -V'(theta_j; p_phi, p_psi) of the effective potential,
+
+    theta_i = theta0 + h c_i p_theta/I1 + (h^2/I1) sum_j (a a)_ij F_j
+    theta1  = theta0 + h p_theta/I1 + (h^2/I1) sum_j b_j (1 - c_j) F_j,         p_theta1 = p_theta + h sum_j b_j F_j
+
+and phi, psi move by h sum_j b_j phi'(theta_j) and so on. Order 2s, symmetric, symplectic; energy is not kept, but its
+error is bounded. `gauss-4` and its kin are the same collocation on other variables, (e, L), in which it keeps the
+energy and is not symplectic.
+
+*Iteration.* Newton's on the F_j, with the analytic V''_i, from the polynomial through those of the last step:
+
+    (1 + (h^2/I1) diag(V'') a a) dF = -V'(theta(F)) - F,          dtheta = (h^2/I1) (a a) dF
+
+by elimination without pivots, two or three times a step; what follows from the last trial follows its correction to
+first order. Where that does not converge, as when a long step meets a pole, the run ends as `not_converged`.
+With P_k Legendre's polynomials on [0, 1] the Lagrange basis on the nodes is l_j(t) = b_j sum_(k<s) (2k+1) P_k(c_j)
+P_k(t), whose integral is known, so that a and the predictor need no inverse of a matrix.
+Sources: Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357, section 2.6;
+Hairer, Lubich, Wanner, Geometric Numerical Integration, section VI.6.
+"""
+
+import functools
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.polynomial import legendre
+
+from symtop.core.jit import register_jitable, set_item
+from symtop.methods.framework.angles import ReducedTop, chart_outcome, momenta_of_turns, on_angles
+from symtop.methods.framework.lanes import Lanes
+from symtop.methods.framework.loop import FixedStep, Loop
+from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
+from symtop.methods.framework.plan import NOT_CONVERGED, Array
+from symtop.methods.framework.preparation import Later
+from symtop.methods.framework.registry import Integrator
+from symtop.methods.lagrangian.galerkin import node_at, pull_at
+
+NODES = (2, 3, 4, 6)
+
+Row = tuple[float, ...]
+
+
+class Rule(NamedTuple):
+    """The numbers of a method, in tuples, which are constants of its kernel."""
+
+    c: Row
+    b: Row
+    reach: tuple[Row, ...]  # a a
+    last: Row  # b (1 - c)
+    predict: tuple[Row, ...]  # the last step's forces, continued to the nodes of this one
+    tolerance: float = 1e-8
+    iterations: int = 50
+
+
+@functools.cache
+def gauss_rule(s: int) -> Rule:
+    """Of the method with s nodes, from the zeros of Legendre's polynomial."""
+    x, w = legendre.leggauss(s)
+    c, b = 0.5 * (x + 1.0), 0.5 * w
+    k = np.arange(s)
+    weights = (legendre.legvander(x, s - 1) * (2 * k + 1)).T * b  # (k, j)
+    ahead = legendre.legvander(x + 2.0, s - 1)
+    P = legendre.legvander(x, s)
+    integrals: Array = np.empty((s, s))  # of P_k from 0 to c_i
+    integrals[:, 0] = c
+    integrals[:, 1:] = (P[:, 2:] - P[:, :-2]) / (2.0 * (2 * k[1:] + 1))
+    a = integrals @ weights
+    rows = [tuple(map(tuple, matrix.tolist())) for matrix in (a @ a, ahead @ weights)]
+    return Rule(tuple(c.tolist()), tuple(b.tolist()), rows[0], tuple((b * (1.0 - c)).tolist()), rows[1])
+
+
+class _Step(NamedTuple):
+    par: ReducedTop
+    rule: Rule
+    theta: float
+    momentum: float
+    h: float
+    lever: float  # h/I1
+
+
+class _Trial(NamedTuple):
+    """At each node, the last four times its weight."""
+
+    forces: Row  # F
+    stiffness: Row  # V''
+    turns: Row  # phi'
+    rolls: Row  # phi' cos(theta)
+    turns_by: Row  # the slopes of both
+    rolls_by: Row
+
+
+@register_jitable
+def _steady(par: Any, h: float) -> Any:
+    return h, h / par.I1
+
+
+@register_jitable
+def _open(par: Any, rule: Any, theta: float) -> Any:
+    return (theta,)
+
+
+@register_jitable
+def _equations(par: Any, rule: Any, state: Any, steady: Any, opened: Any) -> Any:
+    return _Step(par, rule, state[0], state[1], steady[0], steady[1])
+
+
+@register_jitable
+def _reached(rule: Any, forces: Any, i: int) -> float:
+    """(a a F)_i."""
+    total = 0.0
+    for j in range(len(forces)):
+        total += rule.reach[i][j] * forces[j]
+    return total
+
+
+@register_jitable
+def _node(step: Any, forces: Any, i: int) -> Any:
+    """The trigonometry at theta_i."""
+    pull = step.h * _reached(step.rule, forces, i)
+    return node_at(step.par, step.theta + step.lever * (step.rule.c[i] * step.momentum + pull))
+
+
+@register_jitable
+def _evaluate(step: Any, forces: Any) -> Any:
+    par, blank = step.par, step.rule.c
+    new, stiffness, turns, rolls, turns_by, rolls_by = blank, blank, blank, blank, blank, blank
+    for i in range(len(blank)):
+        node, b = _node(step, forces, i), step.rule.b[i]
+        pull = pull_at(par, node, par.south, par.north)
+        precession, bend = node.d * par.south + node.a * par.north, pull.south + pull.north
+        new, stiffness = set_item(new, i, -pull.slope), set_item(stiffness, i, pull.stiffness)
+        turns, rolls = set_item(turns, i, b * precession), set_item(rolls, i, b * (precession * node.cosine))
+        turns_by = set_item(turns_by, i, b * bend)
+        rolls_by = set_item(rolls_by, i, b * (bend * node.cosine - precession * node.sine))
+    return _Trial(new, stiffness, turns, rolls, turns_by, rolls_by)
+
+
+def _elimination(s: int) -> Callable[..., Any]:
+    """x of s equations in rows of s + 1 numbers, the last of them the right-hand side: for one after the other.
+
+    A function for each s, because numbers of tuples at places that vary are slow.
+    """
+    if s == 1:
+        return register_jitable(lambda rows: (rows[0][1] / rows[0][0],))
+    below, row_below = _elimination(s - 1), (0.0,) * s
+    rows_below = (row_below,) * (s - 1)
+
+    @register_jitable
+    def solved(rows):  # type: ignore[no-untyped-def]
+        first, rest = rows[0], rows_below
+        inverse = 1.0 / first[0]
+        for i in range(s - 1):
+            row, factor = row_below, rows[i + 1][0] * inverse
+            for j in range(s):
+                row = set_item(row, j, rows[i + 1][j + 1] - factor * first[j + 1])
+            rest = set_item(rest, i, row)
+        x = below(rest)
+        value = first[s]
+        for j in range(s - 1):
+            value -= first[j + 1] * x[j]
+        return (value * inverse, *x)
+
+    return solved
+
+
+def _correction(s: int) -> Callable[..., Any]:
+    """Newton's correction with s nodes."""
+    solved, blank = _elimination(s), (0.0,) * (s + 1)
+    blanks = (blank,) * s
+
+    @register_jitable
+    def correct(step, trial, forces):  # type: ignore[no-untyped-def]
+        scale, rows = step.lever * step.h, blanks
+        for i in range(s):
+            row, stiffness = blank, scale * trial.stiffness[i]
+            for j in range(s):
+                row = set_item(row, j, stiffness * step.rule.reach[i][j] + (1.0 if i == j else 0.0))
+            rows = set_item(rows, i, set_item(row, s, trial.forces[i] - forces[i]))
+        change = solved(rows)
+        after, turned, size, largest = change, change, 0.0, 0.0
+        for i in range(s):
+            after = set_item(after, i, forces[i] + change[i])
+            turned = set_item(turned, i, scale * _reached(step.rule, change, i))
+            largest = max(largest, abs(after[i]))
+            size += abs(turned[i])
+        enough = step.rule.tolerance * (abs(step.lever * step.momentum) + scale * largest) + NEGLIGIBLE_ANGLE
+        return Correction(turned, after, size, enough, ANGLE_GRAIN)
+
+    return correct
+
+
+@register_jitable
+def _predict(step: Any, carry: Any) -> Any:
+    forces = step.rule.c
+    for i in range(len(forces)):
+        ahead = 0.0
+        for j in range(len(forces)):
+            ahead += step.rule.predict[i][j] * carry[j]
+        forces = set_item(forces, i, ahead)
+    return forces
+
+
+@register_jitable
+def _free_flight(step: Any) -> Any:
+    forces = step.rule.c
+    for i in range(len(forces)):
+        forces = set_item(forces, i, 0.0)
+    return forces
+
+
+@register_jitable
+def _keep(trial: Any, correction: Any) -> Any:
+    """What was evaluated before the last correction follows it to first order; the remainder is its square."""
+    turn = roll = 0.0
+    for i in range(len(trial.turns)):
+        turn += trial.turns[i] + trial.turns_by[i] * correction.change[i]
+        roll += trial.rolls[i] + trial.rolls_by[i] * correction.change[i]
+    return (*correction.after, turn, roll)
+
+
+@register_jitable
+def _close(step: Any, end: Any) -> Any:
+    h, newest, kick, bend = step.h, step.rule.c, 0.0, 0.0
+    s = len(newest)
+    for j in range(s):
+        newest = set_item(newest, j, end[j])
+        kick += step.rule.b[j] * end[j]
+        bend += step.rule.last[j] * end[j]
+    d = step.lever * (step.momentum + h * bend)
+    dstate = (d, h * kick, h * end[s], h * (step.par.p_psi / step.par.I3 - end[s + 1]))
+    return dstate, newest, chart_outcome(step.theta + d)
+
+
+def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
+    """The force at the start, in the place of those of a last step, and once more: no tuple is empty in lanes."""
+    force, forces = -pull_at(par, node_at(par, state[0]), par.south, par.north).slope, rule.c
+    for i in range(len(forces)):
+        forces = set_item(forces, i, force)
+    return (*forces, force)
+
+
+@functools.cache
+def loop(s: int) -> Loop:
+    """The loop of the method with s nodes."""
+    correct = _correction(s)
+
+    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+        """One step on (theta, p_theta, phi, psi); the work counted is the number of Newton iterations."""
+        equations = _equations(par, rule, state, _steady(par, h), (0.0,))
+        guess = _predict(equations, carry)
+        _, trial, last, work, converged = newton(_evaluate, correct, _free_flight, equations, guess, rule.iterations)
+        step, newest, outcome = _close(equations, _keep(trial, last))
+        return step, newest + carry[:1], work, outcome if converged else NOT_CONVERGED
+
+    def observe(par, rule, before, dstate, h):  # type: ignore[no-untyped-def]
+        """p_phi and p_psi by the discrete Legendre transform: the increments of phi and psi are linear in them."""
+        equations = _equations(par, rule, before, _steady(par, h), (0.0,))
+        guess = begin(par, rule, before, h)[:-1]
+        _, _, last, _, _ = newton(_evaluate, correct, _free_flight, equations, guess, rule.iterations)
+        a = d = 0.0
+        for i in range(s):
+            node = _node(equations, last.after, i)
+            a += rule.b[i] * h * node.a
+            d += rule.b[i] * h * node.d
+        return momenta_of_turns(par, a, d, h, dstate)
+
+    def in_lanes(rule: Rule) -> Lanes:
+        record: Any = NamedTuple  # its fields are known here alone
+        end = record("End", [(name, float) for name in (*(f"F{j}" for j in range(s)), "turn", "roll")])
+        return iterated(
+            rule, _steady, _open, _equations, _predict, _evaluate, correct, _keep, _close,
+            top=ReducedTop, end=end, dimension=4, steady=2, opened=1, unknowns=s, newest=s, carry=s + 1,
+        )  # fmt: skip
+
+    return Loop(begin, increment, observe, lanes=functools.cache(in_lanes))
+
+
+def galerkin_gauss(s: int) -> Integrator:
+    """The Galerkin integrator with s nodes, named after its order."""
+    return Integrator(
+        name=f"galerkin-gauss-{2 * s}", family="discrete-lagrangian",
+        summary=f"Galerkin discrete Lagrangian, polynomial of degree {s} and Gauss's rule with {s} nodes",
+        solvers={"angles": FixedStep(loop(s), Later(functools.partial(gauss_rule, s)), on_angles, s, implicit=True)},
+        order=2 * s, explicit=False, symplectic=True, symmetric=True, conserves=frozenset({"p_phi", "p_psi"}),
+        reference="marsden-west-2001 hairer-lubich-wanner-2006", needs="lagrangian", general=True,
+    )  # fmt: skip
+
+
+def built_in() -> list[Integrator]:
+    """galerkin-gauss-4, -6, -8 and -12."""
+    return [galerkin_gauss(s) for s in NODES]
