@@ -21,7 +21,6 @@ import symtop
 from symtop.cli import doctor, runs
 from symtop.cli.main import main
 from symtop.core import netcdf, parallel
-from symtop.core.errors import SymtopError
 from symtop.core.files import cache_root
 from symtop.measure import published, timing
 from symtop.methods.framework.registry import bibliography, citation_keys, engines, methods
@@ -78,7 +77,7 @@ def test_ctrl_c_is_neither_a_failed_case_nor_bad_input(words, called, monkeypatc
     def interrupts(*_, **__):
         os.kill(os.getpid(), signal.SIGINT)
 
-    raises = Mock(side_effect=SymtopError("of its own"))
+    raises = Mock(side_effect=symtop.SymtopError("of its own"))
     for function, code, message in ((interrupts, 130, "interrupted"), (raises, 2, "of its own")):
         monkeypatch.setattr(called, function)
         assert call(*words, code=code).output.splitlines()[-1] == f"symtop: {message}"

@@ -10,8 +10,6 @@ from symtop_studies.stability.linear_limits import linear_limits
 
 import symtop
 from symtop.measure.step_map import one_step as map_of, symplectic_defect
-from symtop.methods.framework.loop import FixedStep
-from symtop.methods.framework.registry import integrator
 from symtop.methods.framework.space import SpaceTop, field_axis, frame_to_attitude, on_axis, on_frame
 from symtop.methods.runge_kutta.gauss import STAGES, gauss_rule, march_axis, march_frame
 from symtop.model import charts
@@ -28,8 +26,8 @@ def nudged(stages, by, mirrored):
     mu[1, 0] += by
     if mirrored:
         mu[0, 1] -= by
-    solver = FixedStep(march_axis, gauss_rule(stages)._replace(mu=mu), on_axis, stages, implicit=True)
-    return dataclasses.replace(integrator(f"gauss-{2 * stages}"), name="wrong", solvers={"axis": solver})
+    solver = symtop.FixedStep(march_axis, gauss_rule(stages)._replace(mu=mu), on_axis, stages, implicit=True)
+    return dataclasses.replace(symtop.integrator(f"gauss-{2 * stages}"), name="wrong", solvers={"axis": solver})
 
 
 def one_step(stages, state, par, h):
@@ -43,7 +41,7 @@ WINDOWS = {6: (25, 130), 10: (8, 26), 12: (5, 16)}  # `test_structure` has the o
 @pytest.mark.parametrize("scene", ["spheroid", "goldstein"])
 @pytest.mark.parametrize("order", WINDOWS)
 def test_order(scene, order):
-    assert_order(scene, integrator(f"gauss-{order}"), order, 0.05 if order <= 6 else 0.3, WINDOWS[order])
+    assert_order(scene, symtop.integrator(f"gauss-{order}"), order, 0.05 if order <= 6 else 0.3, WINDOWS[order])
 
 
 def assert_keeps_everything(method, scene, observe, nutation_steps, limit=1e-13, steps=100_000):
@@ -67,7 +65,7 @@ def test_a_wrong_table_loses_the_order_or_the_constants_and_no_gauss_method_is_p
     scene = symtop.scene("spheroid")
 
     def defect(order, h):
-        return symplectic_defect(map_of(integrator(f"gauss-{order}"), "axis", scene, h), scene.start).size
+        return symplectic_defect(map_of(symtop.integrator(f"gauss-{order}"), "axis", scene, h), scene.start).size
 
     for order, h in ((2, 0.05), (4, 0.1)):
         coarse, fine = defect(order, h), defect(order, h / 2.0)
@@ -115,7 +113,7 @@ def test_a_step_next_to_a_vertical_top_is_the_stability_function(stages, phase, 
     *((stages, "spheroid", "axis") for stages in STAGES), (3, "goldstein", "axis"), (3, "goldstein", "attitude"),
 ])  # fmt: skip
 def test_everything_is_kept(stages, scene, observe):
-    assert_keeps_everything(integrator(f"gauss-{2 * stages}"), scene, observe, 30.3)
+    assert_keeps_everything(symtop.integrator(f"gauss-{2 * stages}"), scene, observe, 30.3)
 
 
 @pytest.mark.parametrize(("scene", "observe"), [
@@ -123,7 +121,7 @@ def test_everything_is_kept(stages, scene, observe):
 @pytest.mark.parametrize("stages", STAGES)
 def test_everything_is_kept_at_large_steps(stages, scene, observe):
     for phase in LARGE:
-        method = integrator(f"gauss-{2 * stages}")
+        method = symtop.integrator(f"gauss-{2 * stages}")
         assert_keeps_everything(method, scene, observe, 2.0 * math.pi / phase, steps=500)
 
 
@@ -244,7 +242,7 @@ def test_the_table_keeps_small_nutations_stable_at_any_step_and_the_frame_orthon
     assert abs(np.sum(b * c ** (2 * stages)) - 1.0 / (2 * stages + 1)) > 1e-8  # no quadrature does better
     if stages == 2:
         np.testing.assert_allclose(mu[1, 0], 0.5 + 1.0 / np.sqrt(3.0), rtol=2e-16)
-    method = integrator(f"gauss-{2 * stages}")
+    method = symtop.integrator(f"gauss-{2 * stages}")
     assert math.isnan(linear_limits(method, STEADY, np.linspace(0.02, 10.0, 200) / OMEGA)[0])
     for phase in LARGE:
         at = trace(method, STEADY, phase / OMEGA)

@@ -5,7 +5,6 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.core.errors import SymtopError
 from symtop.report.plot import draw_ensemble
 from symtop.report.spread import LEVELS, at_places, largest, member_errors, spread
 from symtop.report.style import save
@@ -31,9 +30,9 @@ def test_errors_are_drawn_as_the_run_and_a_trajectory_of_no_integrator_and_witho
     theirs = {"time": run["time"].values, "axis": run["axis"].values}
     wrong = symtop.errors(theirs, "goldstein")
     assert np.array_equal(symtop.plot(wrong).get_lines()[0].get_ydata(), wrong["axis"].values[1:])
-    with pytest.raises(SymtopError, match="does not show the attitude; it shows axis"):
+    with pytest.raises(symtop.SymtopError, match="does not show the attitude; it shows axis"):
         symtop.plot(wrong, quantity="attitude")
-    with pytest.raises(SymtopError, match="must have the dimension time"):
+    with pytest.raises(symtop.SymtopError, match="must have the dimension time"):
         symtop.plot(symtop.reference("goldstein", [1.0]).isel(time=0, drop=True))
 
 
@@ -81,7 +80,7 @@ def test_one_integrator_or_scene_of_a_sweep_is_drawn(sweep):
             labels = [f"{label} on goldstein" for label in labels]
         for label, line in zip(labels, lines, strict=True):
             assert np.array_equal(line.get_ydata(), whole[label].get_ydata())
-    with pytest.raises(SymtopError, match="a sweep must have the scenes that it compares"):
+    with pytest.raises(symtop.SymtopError, match="a sweep must have the scenes that it compares"):
         symtop.plot(sweep.isel(scene=0, drop=True), plt.figure().gca())
 
 
@@ -121,7 +120,7 @@ def test_runs_of_different_lengths_are_drawn_forwards_and_what_is_no_ensemble_is
     tops = symtop.population(3, seed=1)
     runs = symtop.ensemble(tops, "strang", per_nutation=20, nutations=1, samples=5, quiet=True)
     for data in (tops, symtop.errors(runs, tops), runs.drop_attrs(), runs.drop_vars("horizon")):
-        with pytest.raises(SymtopError, match="data over member must be a dataset of ensemble"):
+        with pytest.raises(symtop.SymtopError, match="data over member must be a dataset of ensemble"):
             symtop.plot(data, members=tops)
     symtop.plot(runs, members=tops)  # the control
 

@@ -18,7 +18,6 @@ from symtop.methods.splitting.coefficients import STRANG
 from symtop.model.body import Attitude, RigidBody, from_flat, product, rotated
 from symtop.model.charts import BODY, attitude_distance
 from symtop.model.exact import heavy_body
-from symtop.model.scenes import body_scenes
 from symtop.run.ensemble import chunks
 from symtop.run.ensemble.bodies import scenes_of
 from tests.commands import call
@@ -72,7 +71,7 @@ def slope(scene: symtop.Scene, method: str, order: int, true: symtop.Scene | Non
 @pytest.mark.parametrize(("method", "order"), [
     pytest.param(*one, marks=[pytest.mark.quick][one[0] in CONSERVED :]) for one in FIXED.items()])  # fmt: skip
 def test_the_error_falls_by_the_order(name: str, method: str, order: int) -> None:
-    power = slope(body_scenes()[name], method, order)
+    power = slope(symtop.body_scenes()[name], method, order)
     steep = 6.0 if order in (9, 16) else 1.6  # there the long steps fall as powers of h over a radius
     assert order - 0.6 < power < order + steep
 
@@ -83,7 +82,7 @@ def test_a_table_for_an_exact_drift_falls_to_order_two_with_one_of_order_two(nam
     entry = symtop.integrator(method)
     solver = dataclasses.replace(entry.solvers[BODY], loop=splitting_body.march(STRANG))  # type: ignore[type-var]
     plain = dataclasses.replace(entry, name="plain", order=2, solvers={BODY: solver})
-    step = body_scenes()[name].nutation_period / 40
+    step = symtop.body_scenes()[name].nutation_period / 40
     coarse, fine = (error(name, plain, step_size=h) for h in (step, 0.5 * step))
     assert abs(math.log2(coarse / fine) - 2.0) < 0.1
 
@@ -99,7 +98,7 @@ def test_a_tight_tolerance_comes_to_the_true_motion(name: str, method: str) -> N
 @pytest.mark.parametrize(("order", "method"), {order: method for method, order in FIXED.items()}.items())
 def test_a_wrong_sign_in_the_inertia_is_caught(name: str, method: str, order: int) -> None:
     """The same momentum of the mirrored body: I1 and I3 exchanged turn the gyroscopic torque around."""
-    scene = body_scenes()[name]
+    scene = symtop.body_scenes()[name]
     body, M = scene.top, scene.top.momentum(scene.start)
     mirrored = RigidBody(body.I3, body.I2, body.I1, body.mgl, body.centre)
     rates = tuple(part / moment for part, moment in zip(M, mirrored.moments, strict=True))
@@ -110,7 +109,7 @@ def test_a_wrong_sign_in_the_inertia_is_caught(name: str, method: str, order: in
 @pytest.mark.parametrize("name", BODIES)
 @pytest.mark.parametrize("method", CONSERVED)
 def test_a_method_keeps_what_it_must_and_nothing_else(name: str, method: str) -> None:
-    scene, (free, heavy) = body_scenes()[name], CONSERVED[method]
+    scene, (free, heavy) = symtop.body_scenes()[name], CONSERVED[method]
     step = scene.nutation_period / 40
     errors = symtop.errors(symtop.simulate(name, method, step_size=step, samples=101, guard=False))
     for quantity in ("energy", "p_phi") + ("momentum",) * scene.top.free:

@@ -13,7 +13,6 @@ import pytest
 
 import symtop
 from symtop.methods.framework.registry import methods
-from symtop.methods.runge_kutta.explicit import runge_kutta
 from symtop.model import charts
 from symtop.model.charts import axes
 from symtop.model.scenes import closed_form, grazing, steady
@@ -388,7 +387,7 @@ def test_beside_a_pole_no_growth_is_seen_where_there_is_none_and_a_length_that_d
 def test_a_step_of_eulers_method_multiplies_small_nutations_by_its_stability_function(x):
     scene = symtop.scene("spheroid")
     frequency = scene.top.nutation_frequency(scene.top.momenta(scene.start))
-    growth = nutation_growth(runge_kutta("euler", ((),), (1.0,)), scene, x / frequency, "angles", frequency)
+    growth = nutation_growth(symtop.runge_kutta("euler", ((),), (1.0,)), scene, x / frequency, "angles", frequency)
     assert abs(growth.factor - math.hypot(1.0, x)) < growth.doubt < 1e-7
 
 

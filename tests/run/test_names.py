@@ -11,7 +11,6 @@ from symtop.judging.claims import constants
 from symtop.methods.framework import registry
 from symtop.methods.lagrangian.discrete_lagrangian import is_midpoint
 from symtop.run.guard import forecast
-from symtop.run.long_run import long_run
 from symtop.run.modified_energy import modified_energy
 from symtop.run.simulation import make_plan
 
@@ -29,7 +28,7 @@ def test_long_run_modified_energy_stability_and_forecast_do_not_look_at_the_name
     own = symtop.integrator(name)
     other = symtop.register(dataclasses.replace(own, name="renamed") if how == "a copy" else MADE[name](), replace=True)
     h = SCENE.nutation_period / 137.3
-    runs = [long_run(SCENE, method.name, steps=20_000, step_size=h, quiet=True) for method in (own, other)]
+    runs = [symtop.long_run(SCENE, method.name, steps=20_000, step_size=h, quiet=True) for method in (own, other)]
     for variable in runs[0]:
         np.testing.assert_array_equal(runs[0][variable].values, runs[1][variable].values)
     chart = own.chart_for("axis")

@@ -19,7 +19,6 @@ from symtop.report import style
 from symtop.runner import fingerprint, run as runner
 from symtop.runner.cases import status
 from symtop.runner.run import drawing_digest
-from symtop.runner.study import Case
 from tests.commands import PROBE, call, ended, symtop as symtop_command
 
 
@@ -63,7 +62,7 @@ def stale_after(places, study, before):
 
 def of_everyone():
     """The probe with every integrator of the registry."""
-    cases = [Case("goldstein", name, {}) for name in symtop.integrators()]
+    cases = [symtop.Case("goldstein", name, {}) for name in symtop.integrators()]
     return dataclasses.replace(runner.load(str(PROBE)), cases=lambda quick: cases)
 
 
@@ -126,7 +125,7 @@ def test_findings_are_made_again_when_what_draws_or_judges_them_is_edited(place,
 
 
 def test_coefficients_and_the_numbers_of_a_scene_count(clean_registry):
-    study, case = of_everyone(), Case("goldstein", "chin-4a", {})
+    study, case = of_everyone(), symtop.Case("goldstein", "chin-4a", {})
     method, place = symtop.integrator("chin-4a"), symtop.scene("goldstein")
     before, solver = fingerprint.reasons(study, case), method.solvers["axis"]
     kicks = solver.rule.rule.kick
@@ -146,9 +145,9 @@ def test_a_case_depends_on_the_integrators_that_its_study_says_it_runs():
     assert fingerprint.uses(reduction, twins) == sorted(["exact", twins.integrator, f"{twins.integrator}-unreduced"])
     silent = dataclasses.replace(reduction, uses=None)
     assert fingerprint.uses(silent, twins) == sorted(["exact", twins.integrator])
-    several = Case("goldstein", "together", {"integrators": ["rk4[axis]", "strang[axis]"]})
+    several = symtop.Case("goldstein", "together", {"integrators": ["rk4[axis]", "strang[axis]"]})
     assert fingerprint.uses(silent, several) == ["exact", "rk4", "strang"]
-    starred = Case("goldstein", "*", {})
+    starred = symtop.Case("goldstein", "*", {})
     assert fingerprint.uses(of_everyone(), starred) == sorted(symtop.integrators())
 
 
@@ -200,7 +199,7 @@ def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
 def test_a_missing_case_is_told_by_its_settings_and_by_what_was_edited(tmp_path):
     study = runner.load(str(PROBE))
     call("study", PROBE, "--quick", "--results", tmp_path)
-    coarser = dataclasses.replace(study, cases=lambda quick: [Case("loop", "midpoint", {"step_size": 0.02})])
+    coarser = dataclasses.replace(study, cases=lambda quick: [symtop.Case("loop", "midpoint", {"step_size": 0.02})])
     for place, causes in (("cli.common:as_text", []), ("model.top:SymmetricTop.energy", ["code symtop/model/top.py"])):
         with edited(f"symtop.{place}"):
             (row,) = status(coarser, tmp_path / "quick", why=True)

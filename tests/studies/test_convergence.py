@@ -11,7 +11,6 @@ import symtop
 from symtop.measure import datasets
 from symtop.measure.order import BESIDE, Fit, order_verdict
 from symtop.methods.framework.registry import integrator, methods, split_name, variants
-from symtop.runner.study import Case
 from tests.templates import checked
 
 ROWS = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "strang[axis]", "strang[attitude]",
@@ -24,7 +23,7 @@ def data():
     """A small grid on one scene."""
     chosen = [case for case in study.on_scene("goldstein", quick=True) if case.integrator in ROWS]
     assert {case.integrator for case in chosen} == set(ROWS)
-    longer = [Case(case.scene, case.integrator, case.settings | {"dense": True}) for case in chosen]
+    longer = [symtop.Case(case.scene, case.integrator, case.settings | {"dense": True}) for case in chosen]
     return datasets.combine([(case, study.measure(case)) for case in longer])
 
 
