@@ -139,8 +139,7 @@ def test_every_file_is_read():
     assert "symtop.run.simulation" in {arrow.target for arrow in house()["symtop"].arrows if arrow.typing}
 
 
-@pytest.fixture
-def small(tmp_path):
+def test_imports_upward_circles_and_strangers_are_reported(tmp_path):
     """A made-up package with one fault against each rule, and statements that are allowed beside them."""
     files = {
         "symtop/__init__.py": '"""symtop.report.page"""\nimport typing\nif typing.TYPE_CHECKING:\n'
@@ -167,10 +166,7 @@ def small(tmp_path):
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-    return read(tmp_path)
-
-
-def test_imports_upward_circles_and_strangers_are_reported(small):
+    small = read(tmp_path)
     assert upward(small) == [
         *(f"symtop.core.{line} imports symtop.model.good" for line in ("progress:2", "typed:3", "up:1")),
         "symtop.extra lies in no room of ORDER", "symtop.report.page:1 imports symtop_studies.drift.study",

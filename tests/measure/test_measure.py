@@ -102,14 +102,6 @@ def test_combined_values_are_those_of_each_case_whatever_its_type_and_another_or
         datasets.combine([of("a", ("n", "m"), np.eye(2)), of("b", ("m", "n"), np.eye(2))])
 
 
-@pytest.fixture
-def clock(monkeypatch):
-    """The time that `timings` reads, in a list; a function that is timed adds to it."""
-    seconds = [0.0]
-    monkeypatch.setattr("symtop.measure.timing.time.perf_counter", lambda: seconds[0])
-    return seconds
-
-
 def taking(clock, each):
     """A function whose calls take these seconds."""
     left = iter(each)
@@ -120,7 +112,9 @@ def taking(clock, each):
     return call
 
 
-def test_a_function_is_asked_no_more_once_it_took_long_or_its_least_samples_agree(clock):
+def test_a_function_is_asked_no_more_once_it_took_long_or_its_least_samples_agree(monkeypatch):
+    clock = [0.0]  # the time that `timings` reads; a function that is timed adds to it
+    monkeypatch.setattr("symtop.measure.timing.time.perf_counter", lambda: clock[0])
     timings([taking(clock, [0.03, *(1000 * [1e-4])])], 3, 5e-3, warm=True, exact=False)  # a pause before the first call
     assert clock[0] > 0.03 + 3 * 5e-3
     for patience, least, counts in ((math.inf, 2, [4, 4, 4]), (0.05, 2, [4, 3, 2]), (0.05, 1, [4, 3, 1])):

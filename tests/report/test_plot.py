@@ -11,12 +11,8 @@ from symtop.report.style import save
 from tests.commands import call
 
 
-@pytest.fixture(scope="module")
-def run():
-    return symtop.simulate("goldstein", "midpoint", step_size=0.02, horizon=10.0, samples=51, guard=False)
-
-
-def test_errors_are_drawn_as_the_run_and_a_trajectory_of_no_integrator_and_without_time_refused(run):
+def test_errors_are_drawn_as_the_run_and_a_trajectory_of_no_integrator_and_without_time_refused():
+    run = symtop.simulate("goldstein", "midpoint", step_size=0.02, horizon=10.0, samples=51, guard=False)
     wrong = symtop.errors(run)
     ax = symtop.plot(wrong)
     line, bound = ax.get_lines()
@@ -62,13 +58,9 @@ def test_failed_runs_are_named_and_angles_end_at_pi(quantity, most):
         assert (heights.max() == most) == fail
 
 
-@pytest.fixture(scope="module")
-def sweep():
+def test_one_integrator_or_scene_of_a_sweep_is_drawn():
     options = {"step_size": [0.1, 0.05], "tolerance": [1e-3, 1e-6], "horizon": 4.0, "quiet": True}
-    return symtop.sweep(["spheroid", "goldstein"], ["rk4", "rk45"], **options)
-
-
-def test_one_integrator_or_scene_of_a_sweep_is_drawn(sweep):
+    sweep = symtop.sweep(["spheroid", "goldstein"], ["rk4", "rk45"], **options)
     whole = {line.get_label(): line for line in symtop.plot(sweep, plt.figure().gca(), x="steps").get_lines()}
     assert len(whole) == 4
     assert {key.split()[-1]: one.get_linestyle() for key, one in whole.items()} == {"spheroid": "-", "goldstein": "--"}
