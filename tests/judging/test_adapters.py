@@ -392,15 +392,9 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset(monkeypat
     data = ledger.dataset()
     assert data["measured"].values.tolist() == [str(one.measured) for one in ledger.findings]
     assert data.attrs["name"] == "changes_its_input"
-    screen = str(ledger).splitlines()
-    assert (screen[0][:49], screen[-1]) == ("changes_its_input in the axis chart on spheroid, ", "No claims were made.")
-    told_of = {line[:15].strip(): line[15:] for line in screen}
+    told_of = {line[:15].strip(): line[15:] for line in str(ledger).splitlines()}
     expected = {"order": "1.0", "symplectic": "no, ", "p_phi": "kept, ", "energy": "drifts, ", "work": "2.0 "}
     assert [name for name, words in expected.items() if not told_of[name].startswith(words)] == []
-    h, nutation = float(data["structure_step"]), symtop.scene("spheroid").nutation_period
-    assert f" steps a nutation for the order, {nutation / h:.1f} for the structure;" in str(ledger)
-    steps, nutations = float(data["steps_run"]), float(data["nutations_run"])
-    assert f"{steps:.0f} steps over {nutations:.3g} nutations ({steps / nutations:.0f} a nutation)" in str(ledger)
 
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "studies" / "examples"
@@ -418,8 +412,6 @@ def test_a_file_with_a_step_says_what_it_is_and_writes_it(tmp_path, monkeypatch,
     files = ("--output=~/found.nc", "--card=~/card.html", "--badge", "~/badge.svg")
     code, output = run_judge("~/mine.py:heun", *files)
     assert code == 0, output
-    assert re.search(r"^mine-heun in the axis chart on spheroid, \S+ us a step, seed \d+$", output, re.MULTILINE)
-    assert re.search(r"^order +2\.00", output, re.MULTILINE)
     assert "It is: order 2, not symplectic, not reversible, keeps p_phi; not the energy" in output
     with xr.open_dataset(tmp_path / "found.nc") as data:
         assert str(data.sel(claim="order")["verdict"].values) == "measured"

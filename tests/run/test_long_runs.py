@@ -215,7 +215,6 @@ def test_checkpoints_of_other_runs_are_refused_and_a_failed_run_shows_the_window
     scene = symtop.scene("bruls-cardona-arnold")
     data = long_run(scene, "stormer-verlet", steps=10**6, step_size=2e-3, quiet=True)
     assert data.attrs["outcome"] == "left_chart"
-    assert "stopped at" in data.attrs["outcome_message"]
 
 
 @pytest.mark.parametrize("name", ["stormer-verlet", "midpoint", "strang", "cayley"])
