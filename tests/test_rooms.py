@@ -42,11 +42,9 @@ class Arrow(NamedTuple):
 
 @dataclass(frozen=True)
 class Module:
-    """One file: its dotted name, its room, its tree and what it imports."""
+    """One file: its dotted name, its room and what it imports."""
 
     name: str
-    path: Path
-    tree: ast.Module
     arrows: tuple[Arrow, ...]
 
     @property
@@ -64,9 +62,8 @@ def read(root: Path) -> dict[str, Module]:
             files[".".join([package, *(parts[:-1] if parts[-1] == "__init__" else parts)])] = path
     modules = {}
     for name, path in files.items():
-        tree = ast.parse(path.read_bytes())
         package = name if path.name == "__init__.py" else name.rpartition(".")[0]
-        modules[name] = Module(name, path, tree, tuple(_arrows(tree, package, known=set(files))))
+        modules[name] = Module(name, tuple(_arrows(ast.parse(path.read_bytes()), package, known=set(files))))
     return modules
 
 

@@ -6,13 +6,11 @@ import pkgutil
 import subprocess
 import sys
 import types
-from pathlib import Path
 
 import pytest
 
 import symtop
-
-ROOT = Path(__file__).resolve().parents[1]
+from tests.commands import ROOT
 
 GOOD = """
 import symtop

@@ -200,7 +200,7 @@ def test_a_body_is_judged_by_attitudes_and_rates(scene, tmp_path):
     turned[:, 1:5] = [product(rows[1:5], (1.0, 1e-4 * rows[0], 0.0, 0.0)) for rows in true]
     file.write_text(text(turned, OF_BODY), encoding="utf-8")
     other = symtop.judge(file, scene=scene)
-    assert other["attitude_error"].value == pytest.approx(4e-3, rel=1e-3)
+    assert other["attitude_error"].value == pytest.approx(2.0 * np.arctan(1e-4 * true[-1, 0]), rel=1e-9)
     assert (other["rates_error"].value < 1e-13, other["momentum_error"].value > 1e-5) == (True, True)
     file.write_text(text(of_body(scene, 1.001), OF_BODY), encoding="utf-8")
     expected = 1e-3 * np.linalg.norm(true[:, 5:], axis=1).max()

@@ -4,7 +4,6 @@ import importlib.metadata
 import json
 import math
 import shutil
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -15,9 +14,9 @@ from symtop.measure.accuracy import error_table
 from symtop.measure.order import order
 from symtop.methods.framework import registry
 from symtop.run import plugins
-from tests.commands import call, printed_by
+from tests.commands import ROOT, call, printed_by
 
-EXAMPLE = Path(__file__).resolve().parents[2] / "studies" / "examples" / "my_methods.py"
+EXAMPLE = ROOT / "studies" / "examples" / "my_methods.py"
 
 
 CLAIMS = {"two-point": 2, "mclachlan-2": 2, "ralston-3": 3, "symplectic-euler": 1}
