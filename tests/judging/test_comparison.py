@@ -5,6 +5,7 @@ import math
 import re
 import statistics
 import timeit
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -89,11 +90,8 @@ def test_failed_settings_stay_with_their_outcome_and_are_drawn(data):
     assert len({text.split(":")[0] for text in labels} & set(data["variant"].values)) == data.sizes["variant"]
 
 
-def refusing(top, start, plan):
-    raise RuntimeError("no")
-
-
 def test_own_scenes_and_methods_engines_and_scipy_take_part(clean_registry, tmp_path):
+    refusing = Mock(side_effect=RuntimeError("no"))
     for name, solver in (("on-the-axis", symtop.integrator("rk4").solvers["axis"]), ("refusing", refusing)):
         own_method = symtop.Integrator(name, "other", "", {"axis": solver}, implementation="python", order=4)
         symtop.register(own_method)

@@ -88,10 +88,8 @@ def test_charts_are_chosen_by_what_they_show_and_a_row_is_a_method_in_one():
     assert strang.variant("attitude").charts() == ("attitude",)
     with pytest.raises(symtop.SymtopError, match="cannot show the attitude"):
         strang.variant("axis").chart_for("attitude")
-    in_angles, on_axis = symtop.integrator("rk4[angles]"), symtop.integrator("rk4[axis]")
+    on_axis = symtop.integrator("rk4[axis]")
     assert (on_axis.name, on_axis.method, on_axis.charts()) == ("rk4[axis]", "rk4", ("axis",))
-    runs = {row.name: symtop.simulate("spheroid", row, step_size=0.01, guard=False) for row in (in_angles, on_axis)}
-    assert {name: run.attrs["chart"] for name, run in runs.items()} == {"rk4[angles]": "angles", "rk4[axis]": "axis"}
     assert on_axis.variant("axis") is on_axis
     names = [row.name for row in registry.variants()]
     assert len(names) == len(set(names)) == sum(len(entry.charts()) for entry in registry.methods().values())

@@ -9,7 +9,6 @@ import pytest
 import xarray as xr
 from symtop_studies.cost import facts, far as runs, laws
 from symtop_studies.cost.far import diagram
-from symtop_studies.cost.prices import TOLERANCES
 from symtop_studies.cost.tops import Tops
 
 import symtop
@@ -20,6 +19,7 @@ from symtop.measure.phase import split
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
 from symtop.run.trajectory import Trajectory
+from tests.studies.test_cost import priced
 
 FAR = runs.horizons()
 SHORT = FAR <= 1.0001e3
@@ -224,11 +224,7 @@ def test_the_map_goes_by_the_median_top_and_its_shares_are_of_the_cells_that_are
         "setting_value": (over[:3], [[[4.0, 8.0]] * 2]), "reach": (over[:3], [[[1e5, 10.0]] * 2]),
         "conserves_energy": (over[:2], [[0.0, 0.0]]),
     }, {"variant": names, "quantity": list(runs.QUANTITIES), "horizon": [10.0, 1e5]})  # fmt: skip
-    over = ("scene", "variant", "priced_at")
-    prices = xr.Dataset({"price": (over, np.full((5, 2, 7), 1e-8)), "call": (over, np.zeros((5, 2, 7))),
-                         "sampled": (over[:2], np.full((5, 2), np.nan))},
-                        {"scene": [f"first-{k}" for k in range(5)], "variant": names,
-                         "priced_at": list(TOLERANCES)})  # fmt: skip
+    prices = priced(np.full((5, 2), 1e-8), names, call=0.0)
     tree = xr.DataTree.from_dict({"far": far, "prices": prices})
     panel = diagram(tree, "axis")
     reached = np.array(runs.TARGETS)[:, np.newaxis] >= 1e-4 * (1.0 - 1e-9) * np.ones(2)
