@@ -145,11 +145,7 @@ def test_the_frame_turns_with_the_body():
 
 def jacobian(par, y):
     """Of the field of (e, L), by central differences, which are exact for a quadratic field but for rounding."""
-    columns = []
-    for m in range(6):
-        unit = np.eye(6)[m]
-        columns.append(np.subtract(field_axis(par, y + unit), field_axis(par, y - unit)) / 2.0)
-    return np.array(columns).T
+    return np.transpose([np.subtract(field_axis(par, y + e), field_axis(par, y - e)) / 2.0 for e in np.eye(6)])
 
 
 def newton_step(par, stages, y, h):

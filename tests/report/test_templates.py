@@ -10,7 +10,6 @@ from latex2mathml.converter import convert
 
 import symtop
 from symtop.report import page, template
-from symtop.report.html import slug
 from symtop.report.page import TEMPLATES, gather, prepared
 from symtop.runner import run as runner
 from tests.commands import call
@@ -127,10 +126,9 @@ def test_the_tables_of_scenes_give_every_scene_back_to_the_last_bit():
         assert float(row[4]) == pytest.approx(bound, rel=0.05)
 
 
-def test_every_formula_is_shown_in_full_and_links_lead_to_the_page():
+def test_every_formula_is_shown_in_full():
     text = (TEMPLATES / "equations.md").read_text(encoding="utf-8")
     assert text.startswith(f"## {page.EQUATIONS}\n")
-    assert slug(page.EQUATIONS) == "the-equations-the-scenes-and-the-exact-motion"
     formulas = re.findall(r"^\$\$(.+)\$\$$", text, re.MULTILINE)
     assert len(formulas) == 12
     for formula in formulas:

@@ -148,8 +148,8 @@ def test_the_page_says_what_was_measured_and_adaptive_errors_follow_their_tolera
     assert (one.slope, one.used.sum()) == (pytest.approx(1.0), 4)
     assert {name for _, name in fitted} == {name for name in ROWS if integrator(name).adaptive}
     assert fitted["goldstein", "rk45[angles]"].slope == pytest.approx(1.0, abs=0.15)
-    text, answers = checked("convergence", data, tmp_path), facts.facts(data)
-    assert f"{answers['confirmed']} show the order" in text
+    checked("convergence", data, tmp_path)
+    answers = facts.facts(data)
     assert answers["pairs"] == answers["confirmed"] + answers["refuted"] + answers["undecided"]
     assert answers["ratio_runs"] == sum(map(len, measures.ratios(data).values())) < answers["ratio_asked"]
     assert answers["ratio_most"] == max(float(values.max()) for values in measures.ratios(data).values() if values.size)

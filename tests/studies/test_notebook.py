@@ -180,8 +180,8 @@ def data():
 
 
 def test_the_page_says_what_the_notebook_and_the_discrete_methods_keep(data, tmp_path):
-    answers, text = facts.facts(data), checked("notebook", data, tmp_path)
-    assert "mgl = 26.8658" in text
+    checked("notebook", data, tmp_path)
+    answers = facts.facts(data)
     assert (answers["compared"], answers["discrete"], answers["momenta_kept"]) == (5, 5, 5)
     assert answers["momenta"] < 1e-14
     assert answers["solver_momenta"] > 1e-7  # the control

@@ -58,7 +58,6 @@ def test_a_run_is_that_of_its_setting_and_the_page_says_what_was_measured(data, 
     assert not np.isfinite(facts.shown(data)["axis"].sel(variant="rk4[attitude]")).any()
     text = checked("speed", data, tmp_path, elsewhere={"error-against-time"})
     assert "`takahashi" not in text
-    assert facts.facts(data)["fastest_6"] in text
     assert facts.facts(data)["scipy"] is None
 
 
