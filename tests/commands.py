@@ -26,6 +26,13 @@ def call(*words: object, code: int | None = 0, **environment: str) -> Result:
     return result
 
 
+def probed(results: Path, *words: object, code: int = 0) -> str:
+    """What the quick probe prints in this process; it must end with that exit code, and without a traceback."""
+    ended_with, output = answer("study", PROBE, "--quick", "--results", results, *words)
+    assert ended_with == code, output
+    return output
+
+
 def answer(*words: object) -> tuple[int, str]:
     """Exit code and output of a command in this process, which raises nothing and prints no traceback."""
     result = call(*words, code=None)
@@ -84,6 +91,13 @@ def ended(process: subprocess.Popen, seconds: float = 240.0) -> tuple[int, str, 
     assert "Traceback" not in out + err, err
     assert "leaked" not in err, err
     return process.returncode, out, err
+
+
+def succeeded(process: subprocess.Popen, seconds: float = 240.0) -> str:
+    """What a command prints that must end with exit code 0."""
+    code, out, err = ended(process, seconds)
+    assert code == 0, err
+    return out
 
 
 def contents(results: Path, *, provenance: bool = False) -> dict[str, xr.Dataset]:

@@ -21,7 +21,7 @@ from tqdm import tqdm
 from symtop.core import netcdf
 from symtop.measure.datasets import differences
 from symtop.runner import run as runner, store
-from tests.commands import ended, leftovers, symtop
+from tests.commands import leftovers, succeeded, symtop
 
 PATIENCE = 2400.0  # seconds for an undisturbed run
 
@@ -46,7 +46,7 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
     for script in (str(word) for word in words if str(word).endswith(".py")):
         runner.load(script)  # from here on it is known by its name
     command = ["study", *words, "--jobs", 2, "--results"]
-    _through(command, calm)
+    succeeded(symtop(*command, calm), PATIENCE)
     count = lost = most = rounds = 0
     bar = tqdm(total=kills, desc="kills", disable=None)  # on a terminal
     cases_before: dict[Path, tuple[int, int]] = {}  # finished cases: the identity of their file and when it was written
@@ -78,16 +78,10 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
             shutil.rmtree(results)
             cases_before = {}
     bar.close()
-    _through(command, results)
+    succeeded(symtop(*command, results), PATIENCE)
     assert_same(results, calm)
     assert not leftovers(results)
     return Survived(count, lost, most, rounds + 1)
-
-
-def _through(command: list[object], results: Path) -> None:
-    """Run the command undisturbed."""
-    code, _, err = ended(symtop(*command, results), PATIENCE)
-    assert code == 0, err
 
 
 def _locks(results: Path) -> set[Path]:

@@ -33,7 +33,6 @@ def test_what_is_recommended_meets_the_accuracy(quantity, accuracy):
     assert measured(symtop.scene("spheroid"), advice, quantity) <= accuracy
     assert 0.05 * accuracy < advice.expected_error <= accuracy  # and does not waste a step
     assert 0.0 < advice.seconds < 1.0
-    assert advice.integrator in str(advice)
 
 
 def test_a_longer_horizon_than_can_be_run_is_extrapolated(monkeypatch):
@@ -182,12 +181,10 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     monkeypatch.setattr(advise, "_menu", lambda question: ["series[axis]"] if question.needs else menu)
     advice = symtop.recommend(scene, accuracy=1e-8, horizon=30.0)
     assert (sorted(names), advice.integrator) == (sorted([*menu[:5], "series[axis]"]), "vern9-fixed[axis]")
-    assert "Tried the 5 methods" in advice.reason
     names.clear()
     menu[:5] = menu[4::-1]  # the fastest is the last of five
-    advice = symtop.recommend(scene, accuracy=1e-8, horizon=30.0)
+    symtop.recommend(scene, accuracy=1e-8, horizon=30.0)
     assert sorted(names) == sorted([*menu, "series[axis]"])
-    assert "Tried the 6 methods" in advice.reason
     names.clear()
     menu[:] = ["stormer-verlet", "strang[axis]", "midpoint", "trapezoidal", "cayley[axis]", "kahan[axis]"]
     everyone = {*menu, "vern9-fixed[axis]", "srkn-14-6[axis]"}  # of many more: each takes its kernel and its trials
@@ -197,7 +194,6 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     assert advice.confidence == "checked"
     assert advice.integrator not in menu
     assert {*names} - {"series[axis]"} == everyone
-    assert "Tried all 8 compiled methods" in advice.reason
     monkeypatch.setattr(advise, "LESS", 10.0)
     fails = symtop.recommend(scene, accuracy=1e-11, horizon=30.0).fails
     assert any(one.startswith(settings.BUDGET) and "vern9-fixed[axis]" in one for one in fails)
@@ -278,7 +274,6 @@ def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
     assert set(serving) < set(usable("axis"))
     advice = symtop.recommend("spheroid", accuracy=1e-6, horizon=4.0, needs="expression")
     assert symtop.integrator(advice.integrator).needs == "expression"
-    assert "It needs f as a formula (expression)" in advice.reason
     with pytest.raises(symtop.SymtopError, match="needs 'luck' is unknown"):
         symtop.recommend("spheroid", accuracy=1e-6, needs=["luck"])
     words = {("torque",): "kicks group", ("torque", " free motion"): "kicks", ("inertia, torque",): "group", (): "",
@@ -294,7 +289,6 @@ def test_what_is_made_for_this_top_is_named_beside_the_answer():
     assert advice.beside in str(advice)
     own = symtop.recommend("spheroid", accuracy=1e-6, horizon=8.0, needs="this-top")
     assert (symtop.integrator(own.integrator).needs, own.beside) == ("this-top", "")
-    assert "It does not carry over to a body without symmetry" in own.reason
 
 
 def test_at_the_step_that_a_user_has_it_says_what_is_good_enough(monkeypatch):
@@ -306,7 +300,6 @@ def test_at_the_step_that_a_user_has_it_says_what_is_good_enough(monkeypatch):
     advice = symtop.recommend(scene, accuracy=1e-4, step_size=step)
     assert advice.step_size == step
     assert measured(scene, advice) <= 1e-4
-    assert f"steps are {scene.nutation_period / step:.3g} a nutation" in advice.reason
     line = next(words for words in advice.fails if words.startswith("Not accurate enough at this step"))
     names = dict(words.split() for words in line.partition(": ")[2].rstrip(".").split(", "))
     assert "midpoint" in names
@@ -330,7 +323,6 @@ def test_limits_leave_out_what_a_user_cannot_use():
     assert short.step_size <= 0.002 < free.step_size
     body = ask(accuracy=1e-4, needs="kicks", general=True)
     assert symtop.integrator(body.integrator).general is True
-    assert all(w in body.reason for w in ("It carries over to a body without symmetry", "its step does not"))
     formula = functools.partial(ask, accuracy=1e-3, step_size=0.002, needs="expression")
     assert formula().integrator == "kahan[axis]"  # which is nowhere run on a body
     assert "body" in symtop.integrator(str(formula(general=True).integrator).partition("[")[0]).solvers
@@ -394,7 +386,7 @@ def test_the_command_of_a_plug_in_loads_it_and_a_cover_prefers_what_nothing_befo
 def test_who_has_the_solution_is_given_the_exact_motion_with_its_price():
     """Negative controls: with a step there is none, and beside the derivative it is a line and not the answer."""
     advice = symtop.recommend("spheroid", accuracy=1e-6, needs="solution", horizon=20.0)
-    assert (advice.integrator, "to t = 20 s.\n" in advice.reason) == ("exact", True)
+    assert advice.integrator == "exact"
     assert advice.expected_error < 1e-14
     assert 1e-7 < advice.seconds < 1e-2
     assert advice.step_size is advice.tolerance is None
@@ -403,7 +395,6 @@ def test_who_has_the_solution_is_given_the_exact_motion_with_its_price():
     assert advice.command == "symtop run spheroid exact --horizon 20.0"
     stepped = symtop.recommend("spheroid", accuracy=1e-6, needs="solution", step_size=0.01)
     assert stepped.integrator is None
-    assert "no compiled method is within these limits" in stepped.reason
     assert symtop.recommend("spheroid", accuracy=1e-3, needs=("solution", "kicks")).integrator != "exact"
 
 
@@ -413,8 +404,6 @@ def test_a_body_is_answered_with_a_method_of_its_chart():
     advice = symtop.recommend(scene, accuracy=1e-6)
     assert (advice.quantity, advice.confidence) == ("attitude", "checked")
     assert measured(scene, advice, "attitude") <= 1e-6
-    assert ("a natural period" in advice.reason, "needs no integrator" in advice.closed_form) == (True, True)
-    assert "symmetry" not in str(advice)  # it is one without
     assert advice.command.startswith(f"symtop run tennis-racket {advice.integrator} --")
     heavy = symtop.recommend("heavy-brick", accuracy=1e-6, needs="kicks", keeps="energy", step_size=0.02)
     assert (symtop.integrator(heavy.integrator).needs, (heavy.step_size, heavy.closed_form)) == ("kicks", (0.02, ""))
@@ -435,7 +424,6 @@ def test_mujoco_is_told_its_best_setting_and_the_gain_of_another_method():
     assert advice.advice is not None
     assert advice.advice.expected_error <= advice.errors[advice.best]
     assert advice.gain > 1.0
-    assert "Its best setting is RK4 of 4.0" in str(advice)
 
 
 @pytest.mark.parametrize("engine", ["bullet", "yade", "mujoco-euler"])
@@ -454,15 +442,14 @@ def test_engines_have_maps_and_one_without_a_gyroscopic_term_nothing_to_match():
     rest = {name.removesuffix("-float32") for name in set(engines()) - maps}
     assert rest <= {name.removesuffix("-float32") for name in maps} | {"fincham"}  # as published, in no engine
     advice = i_use("havok", "goldstein", horizon=10.0)
-    assert (advice.advice, "nothing to match" in str(advice)) == (None, True)
+    assert advice.advice is None
     none = i_use("rapier", "goldstein", horizon=10.0, needs="solution", max_step=1.0)
-    assert (none.advice.integrator, "no compiled method is within these limits" in str(none)) == (None, True)
+    assert none.advice.integrator is None
     other = i_use("rapier", "goldstein", horizon=10.0, needs="derivative", accuracy=1e-3, quantity="energy")
     assert (other.advice.quantity, "Settings within" in str(other)) == ("energy", False)
     upright = symtop.Scene("upright", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(theta=0.0, psi_dot=5.0), 10.0)
     advice = i_use("mujoco", upright)
     assert (set(advice.errors.values()), advice.advice) == ({0.0}, None)
-    assert "the axis is off by\n    0.00e+00 rad  Euler" in str(advice)
     assert i_use("mujoco", upright, accuracy=1e-3).advice is not None
     body = i_use("no-squish", "tennis-racket", horizon=20.0)
     assert (body.errors["no-squish"], body.advice.quantity) == (pytest.approx(9e-6, rel=0.9), "axis")

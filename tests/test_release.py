@@ -2,7 +2,6 @@
 
 import re
 import tomllib
-from pathlib import Path
 
 import pytest
 import yaml
@@ -10,8 +9,8 @@ from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
 import symtop
+from tests.commands import ROOT
 
-ROOT = Path(__file__).resolve().parents[1]
 CONDA = {"matplotlib": "matplotlib-base", "heyoka": "heyoka.py", "netcdf4": "netcdf4"}  # where names differ
 
 

@@ -42,11 +42,9 @@ class Arrow(NamedTuple):
 
 @dataclass(frozen=True)
 class Module:
-    """One file: its dotted name, its room, its tree and what it imports."""
+    """One file: its dotted name, its room and what it imports."""
 
     name: str
-    path: Path
-    tree: ast.Module
     arrows: tuple[Arrow, ...]
 
     @property
@@ -64,9 +62,8 @@ def read(root: Path) -> dict[str, Module]:
             files[".".join([package, *(parts[:-1] if parts[-1] == "__init__" else parts)])] = path
     modules = {}
     for name, path in files.items():
-        tree = ast.parse(path.read_bytes())
         package = name if path.name == "__init__.py" else name.rpartition(".")[0]
-        modules[name] = Module(name, path, tree, tuple(_arrows(tree, package, known=set(files))))
+        modules[name] = Module(name, tuple(_arrows(ast.parse(path.read_bytes()), package, known=set(files))))
     return modules
 
 
@@ -139,8 +136,7 @@ def test_every_file_is_read():
     assert "symtop.run.simulation" in {arrow.target for arrow in house()["symtop"].arrows if arrow.typing}
 
 
-@pytest.fixture
-def small(tmp_path):
+def test_imports_upward_circles_and_strangers_are_reported(tmp_path):
     """A made-up package with one fault against each rule, and statements that are allowed beside them."""
     files = {
         "symtop/__init__.py": '"""symtop.report.page"""\nimport typing\nif typing.TYPE_CHECKING:\n'
@@ -167,10 +163,7 @@ def small(tmp_path):
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
-    return read(tmp_path)
-
-
-def test_imports_upward_circles_and_strangers_are_reported(small):
+    small = read(tmp_path)
     assert upward(small) == [
         *(f"symtop.core.{line} imports symtop.model.good" for line in ("progress:2", "typed:3", "up:1")),
         "symtop.extra lies in no room of ORDER", "symtop.report.page:1 imports symtop_studies.drift.study",

@@ -6,13 +6,11 @@ import pkgutil
 import subprocess
 import sys
 import types
-from pathlib import Path
 
 import pytest
 
 import symtop
-
-ROOT = Path(__file__).resolve().parents[1]
+from tests.commands import ROOT
 
 GOOD = """
 import symtop
@@ -43,25 +41,19 @@ text: str = symtop.simulate("spheroid", "midpoint", step_size=0.01)
 REPORTED = {4: "stepsize", 5: '"str"', 6: "simluate", 7: "Scene", 8: "Dataset"}
 
 
-@pytest.fixture(scope="module")
-def checked(tmp_path_factory):
-    """What mypy says of both scripts, by file, line by line."""
-    folder = tmp_path_factory.mktemp("typed")
+@pytest.mark.quick
+def test_a_script_is_typed_throughout_and_mistakes_are_reported_where_they_are(tmp_path):
     for name, text in (("good", GOOD + "".join(map("reveal_type({})\n".format, ASKED))), ("bad", BAD)):
-        (folder / f"{name}.py").write_text(text, encoding="utf-8")
+        (tmp_path / f"{name}.py").write_text(text, encoding="utf-8")
     # with the settings of `make lint`, whose cache serves here, too
-    words = [sys.executable, "-m", "mypy", "--no-error-summary", str(folder / "good.py"), str(folder / "bad.py")]
+    words = [sys.executable, "-m", "mypy", "--no-error-summary", str(tmp_path / "good.py"), str(tmp_path / "bad.py")]
     result = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
     assert result.stdout, result.stderr
-    return {name: [one for one in result.stdout.splitlines() if f"{name}.py:" in one] for name in ("good", "bad")}
-
-
-@pytest.mark.quick
-def test_a_script_is_typed_throughout_and_mistakes_are_reported_where_they_are(checked):
-    revealed = [line.split('"')[1] for line in checked["good"] if "Revealed type" in line]
-    assert not [line for line in checked["good"] if ": error:" in line]
+    good, bad = ([one for one in result.stdout.splitlines() if f"{name}.py:" in one] for name in ("good", "bad"))
+    revealed = [line.split('"')[1] for line in good if "Revealed type" in line]
+    assert not [line for line in good if ": error:" in line]
     assert [kind.replace("builtins.", "").replace("Union[int, None]", "int | None") for kind in revealed] == SEEN
-    errors = {int(line.split(":")[1]): line for line in checked["bad"] if ": error:" in line}
+    errors = {int(line.split(":")[1]): line for line in bad if ": error:" in line}
     assert sorted(errors) == sorted(REPORTED)
     for number, word in REPORTED.items():
         assert word in errors[number]

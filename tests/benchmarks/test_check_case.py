@@ -1,5 +1,7 @@
 """The free brick of NASA's check case 2: published digits of its motion, and histories of simulators against it."""
 
+from pathlib import Path
+
 import numpy as np
 import pandas as pd
 import pytest
@@ -25,34 +27,29 @@ def test_the_motion_has_the_digits_of_two_independent_ways() -> None:
     np.testing.assert_allclose(rates, wanted, rtol=0.0, atol=1e-13)
 
 
-@pytest.fixture
-def history(tmp_path):  # type: ignore[no-untyped-def]
+def history(folder: Path, off: float = 0.0, earth: float = EARTH) -> Path:
     """Writes the exact motion as a history, in axes that turn with the Earth; `off` degrees are added to the yaw."""
-
-    def written(off: float = 0.0, earth: float = EARTH):  # type: ignore[no-untyped-def]
-        times = np.arange(0.0, 31.0)
-        quaternion, rates = truth(times)
-        half = -0.5 * earth * times
-        w, x, y, z = quaternion.T
-        c, s = np.cos(half), np.sin(half)
-        local = np.stack([c * w - s * x, c * x + s * w, c * y - s * z, c * z + s * y], axis=1)
-        table = pd.DataFrame({"time": times, "longitude_deg": 0.0})
-        table[ANGLES] = yaw_pitch_roll(local)
-        table[RATES] = rates
-        table[ANGLES[0]] += off
-        table.to_csv(tmp_path / "history.csv", index=False, float_format="%.17g")
-        return tmp_path / "history.csv"
-
-    return written
+    times = np.arange(0.0, 31.0)
+    quaternion, rates = truth(times)
+    half = -0.5 * earth * times
+    w, x, y, z = quaternion.T
+    c, s = np.cos(half), np.sin(half)
+    local = np.stack([c * w - s * x, c * x + s * w, c * y - s * z, c * z + s * y], axis=1)
+    table = pd.DataFrame({"time": times, "longitude_deg": 0.0})
+    table[ANGLES] = yaw_pitch_roll(local)
+    table[RATES] = rates
+    table[ANGLES[0]] += off
+    table.to_csv(folder / "history.csv", index=False, float_format="%.17g")
+    return folder / "history.csv"
 
 
-def test_a_history_is_judged_and_another_table_refused(history, tmp_path):
-    attitude, rate = largest_errors(history())
+def test_a_history_is_judged_and_another_table_refused(tmp_path):
+    attitude, rate = largest_errors(history(tmp_path))
     assert attitude < 1e-12
     assert rate < 1e-13
-    assert largest_errors(history(off=0.01))[0] == pytest.approx(0.01, rel=1e-9)
+    assert largest_errors(history(tmp_path, off=0.01))[0] == pytest.approx(0.01, rel=1e-9)
     # without the Earth's rotation it is off by what that is in 30 s
-    assert largest_errors(history(earth=0.0))[0] == pytest.approx(np.degrees(30.0 * EARTH), rel=1e-9)
+    assert largest_errors(history(tmp_path, earth=0.0))[0] == pytest.approx(np.degrees(30.0 * EARTH), rel=1e-9)
     (tmp_path / "other.csv").write_text("time,yaw\n0,0\n")
     with pytest.raises(SymtopError, match="must be a history with the columns of the check case"):
         largest_errors(tmp_path / "other.csv")

@@ -10,7 +10,6 @@ import xarray as xr
 
 import symtop
 from symtop.core import netcdf
-from symtop.core.errors import SymtopError
 from tests.commands import printed_by
 
 
@@ -79,7 +78,7 @@ def test_what_is_no_netcdf_is_refused_in_a_sentence(tmp_path, content):
     if content is not None:
         path.write_bytes(content)
     for read in (netcdf.read, netcdf.read_any):
-        with pytest.raises(SymtopError, match=r"cannot read .*broken\.nc as netCDF"):
+        with pytest.raises(symtop.SymtopError, match=r"cannot read .*broken\.nc as netCDF"):
             read(path)
 
 

@@ -15,7 +15,7 @@ import pytest
 from symtop import __version__
 from symtop.cli.main import main
 from symtop.run.ensemble.population import population
-from tests.commands import call, ended, symtop
+from tests.commands import call, succeeded, symtop
 from tests.judging.conftest import shorten
 from tests.pages import LANGUAGES, ROOT, Block, blocks, pages
 
@@ -75,9 +75,7 @@ class Page:
             return done.stdout
         assert program == "symtop"
         if apart:
-            code, out, err = ended(symtop(*rest), seconds=900.0)
-            assert code == 0, (line, out, err)
-            return out
+            return succeeded(symtop(*rest), seconds=900.0)
         done = call(*rest)
         return done.output
 

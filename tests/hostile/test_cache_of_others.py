@@ -12,7 +12,6 @@ import xarray as xr
 import symtop
 from symtop.cli import doctor
 from symtop.core import files, jit
-from symtop.core.errors import SymtopWarning
 from symtop.core.jit import compile_kernel
 from symtop.run.reference import truth
 
@@ -84,7 +83,7 @@ def test_what_others_may_write_is_not_read(planted, monkeypatch, at, fault):
     (doubt,) = [finding for finding in doctor._caches(root) if not finding.healthy]
     assert doubt.topic == "compiled code"
     assert str(path) in doubt.result
-    with pytest.warns(SymtopWarning, match=words) as record:
+    with pytest.warns(symtop.SymtopWarning, match=words) as record:
         assert [compile_kernel(_doubled)(2.0) for _ in range(2)] == [4.0, 4.0]
     assert len(record) == 1
 

@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from tests.commands import PROBE, ended, leftovers, same, stop, symtop
+from tests.commands import PROBE, ended, leftovers, same, stop, succeeded, symtop
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("processes_with_dask")]
 
@@ -80,9 +80,7 @@ def after(cluster, results, happens):
 
 def here(results):
     """What the command prints without a cluster."""
-    code, out, err = ended(symtop("study", PROBE, "--results", results, "--jobs", 1))
-    assert code == 0, err
-    return out
+    return succeeded(symtop("study", PROBE, "--results", results, "--jobs", 1))
 
 
 def test_a_worker_that_dies_costs_nothing(cluster, tmp_path):

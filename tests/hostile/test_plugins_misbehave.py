@@ -12,7 +12,6 @@ import pytest
 import symtop
 from symtop.core.signals import InterruptedByUser, told_apart
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan
 from symtop.run import plugins
 from tests.commands import answer, ended, symtop as command
 
@@ -67,7 +66,7 @@ def test_the_claims_of_all_of_them_are_judged(misbehaving):
 
 
 def test_a_solver_does_not_reach_the_plan_or_an_earlier_run_and_its_interrupt_is_not_the_users(misbehaving):
-    scene, plan = symtop.scene("spheroid"), Plan.steps(0.01, np.arange(5))
+    scene, plan = symtop.scene("spheroid"), symtop.Plan.steps(0.01, np.arange(5))
     before = scene.top.I1, scene.start.theta
     for name in ("changes-arguments", "changes-and-raises"):
         with pytest.raises(symtop.SymtopError, match="must not change the top or the start"):
@@ -144,9 +143,9 @@ def test_a_solver_that_expects_steps_forwards_is_ended(misbehaving, monkeypatch)
     """Probes of reversibility ask for a step backwards: `claims` waited for ever for a loop up to the horizon."""
     monkeypatch.setattr("symtop.methods.framework.calling.PATIENCE", 0.2)
     scene, method = symtop.scene("spheroid"), symtop.integrator("forwards-only")
-    assert solve(method, "angles", scene.top, scene.start, Plan.steps(0.01, [1])).outcome == "ok"
+    assert solve(method, "angles", scene.top, scene.start, symtop.Plan.steps(0.01, [1])).outcome == "ok"
     with pytest.raises(symtop.SymtopError, match=r"forwards-only failed: TimeoutError: it was not done after 0\.2 s"):
-        solve(method, "angles", scene.top, scene.start, Plan.steps(-0.01, [1]))
+        solve(method, "angles", scene.top, scene.start, symtop.Plan.steps(-0.01, [1]))
 
 
 @pytest.mark.slow

@@ -11,7 +11,6 @@ import pytest
 
 import symtop
 from symtop.model import charts
-from symtop.model.exact.closed_form import ClosedForm
 from symtop.model.exact.digits import PreciseForm
 from symtop.model.top import flat
 from symtop.run import guard
@@ -128,7 +127,7 @@ def test_the_guard_warns_where_the_motion_grows_what_a_tolerance_leaves(case):
     top, start = symtop.SymmetricTop(I1, I3, mgl), symtop.Angles(theta, 0.3, 0.1, theta_dot, 0.0, psi_dot)
     scene, messages = symtop.Scene("unstable", top, start, horizon), []
     run = symtop.simulate(scene, name, tolerance=tolerance, observe=observe, samples=201, guard=messages.append)
-    truth = ClosedForm(top, start).axis(run["time"].values)
+    truth = symtop.ClosedForm(top, start).axis(run["time"].values)
     assert run.attrs["outcome"] == "ok"
     assert charts.axis_distance(run["axis"].values, truth).max() > 0.05
     assert len(messages) == 1
@@ -152,7 +151,7 @@ def test_what_two_integrations_differ_by_is_the_start_and_not_the_closed_form(ti
     distances = charts.axis_distance(charts.axis_from_quaternion(quad[:, :4].astype(float)), truth["axis"].values)
     assert (distances <= truth["axis_error_bound"]).all()
     rounding = np.finfo(float).eps * scene.top.I3 * scene.start.psi_dot / scene.top.I1
-    other = ClosedForm(scene.top, dataclasses.replace(scene.start, theta_dot=rounding)).axis(times)
+    other = symtop.ClosedForm(scene.top, dataclasses.replace(scene.start, theta_dot=rounding)).axis(times)
     shift = charts.axis_distance(other, truth["axis"].values).max()
     factor = conditioning(scene, float(times[-1]))
     assert shift < 10.0 * factor * np.finfo(float).eps
@@ -185,7 +184,7 @@ def test_where_one_rounding_moves_the_axis_anywhere_the_answer_says_so(name, tim
     for rate in ("phi_dot", "psi_dot"):
         ulp_more = math.nextafter(getattr(chosen.start, rate), math.inf)
         starts.append(dataclasses.replace(chosen.start, **{rate: ulp_more}))
-    true, *others = (ClosedForm(chosen.top, start).axis(times) for start in starts)
+    true, *others = (symtop.ClosedForm(chosen.top, start).axis(times) for start in starts)
     shift = max(charts.axis_distance(other, true).max() for other in others)
     assert shift > 0.3
     assert factor * np.finfo(float).eps > shift / 10.0

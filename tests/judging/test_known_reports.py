@@ -16,7 +16,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import symtop
-from tests.judging.blind.right import AdamsBashforth, product, rates, turn
+from tests.judging.blind.right import ROTATION, SEPARABLE, AdamsBashforth, product, rates, turn
 
 PAGE = Path(__file__).parents[2] / "docs" / "engines.md"
 SPHEROID = symtop.scene("spheroid")
@@ -104,7 +104,6 @@ def mclachlan(state, h, dT, dV, *, adjoint_first):
 
 
 PRINCIPAL, TURNED = Rotation.identity(), Rotation.from_rotvec([0.5, -0.3, 0.2])
-ROTATION, SEPARABLE = {"form": "rotation"}, {"form": "separable"}
 RULES = {  # row of the page: function, what it is given when it is faulty and when it is mended, claims and options
     "Brax #62": (semi_implicit, {"angle": 2.0}, {}, {"order": 1, **ROTATION}),
     "ReactPhysics3D #422": (semi_implicit, {"gyroscope": False}, {}, {"order": 1, **ROTATION}),

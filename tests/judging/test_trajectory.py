@@ -42,7 +42,6 @@ def test_reported_constants_do_not_hide_those_of_the_states_nor_an_energy_that_b
     states[:, :3] /= np.linalg.norm(states[:, :3], axis=1)[:, None]
     ledger = symtop.judge({"time": columns["time"], "axis": states[:, :3], "momentum": states[:, 3:]}, energy="bounded")
     assert (ledger["energy"].measured.kind, ledger.refuted) == ("blows up", ["energy"])
-    assert "energy         blows up at t = " in str(ledger)
     damped = symtop.judge(columns | {"momentum": np.exp(-columns["time"])[:, None] * table[:101, 4:]}, energy="bounded")
     assert damped["energy"].measured.kind != "blows up"
     copied = {"time": table[:, 0], "axis": table[:, 1:4], "momentum": table[:, 4:], "p_psi": np.full(SAMPLES, 0.1)}
@@ -58,15 +57,12 @@ def test_a_claim_that_the_samples_do_not_show_is_undecided_and_not_lost(table, t
     ledger = symtop.judge(columns, conserves=claims, energy="bounded")
     undecided = {one.claim: one.declared for one in ledger.findings if one.verdict == "undecided"}
     assert undecided == {"energy": "bounded", "p_phi": "kept", "axis_length": "kept"}
-    assert "the trajectory shows no p_phi; it would with p_phi" in ledger["p_phi"].why
     assert "p_psi" not in ledger  # nobody claims it
-    assert "Claims: 3 undecided." in str(ledger)
     whole = symtop.judge(columns | {"momentum": table[:, 4:]}, conserves=claims, energy="bounded")
     assert (whole["p_phi"].verdict, whole["energy"].verdict) == ("confirmed", "refuted")
     file.write_text(text(table[:, :4], "time,ex,ey,ez"), encoding="utf-8")
     result = call("judge", file, "--conserves", "p_phi", "--energy", "kept")  # nothing is refuted
     assert "Claims: 2 undecided." in result.output
-    assert "the trajectory shows no energy" in " ".join(result.output.split())
 
 
 def test_an_unknown_claim_about_a_trajectory_is_refused_and_one_that_a_ledger_has_not(table, tmp_path):
@@ -129,7 +125,6 @@ def test_csv_netcdf_mappings_and_blanks_are_the_same_and_utf_16_is_told(table, t
     assert ledger["energy"].value == pytest.approx(np.abs(energy - energy[0]).max() / SPHEROID.energy_scale, rel=1e-6)
     assert ledger["energy"].measured.kind == "drift"
     assert (ledger["p_phi"].verdict, ledger["energy"].verdict) == ("confirmed", "refuted")
-    assert str(ledger).startswith("run on spheroid\n")
     columns = {"time": table[:, 0], "axis": table[:, 1:4], "momentum": table[:, 4:]}
     plain = symtop.judge(columns)
     (tmp_path / "run.txt").write_text("# " + text(table).replace(",", "  "), encoding="utf-8")
@@ -205,7 +200,7 @@ def test_a_body_is_judged_by_attitudes_and_rates(scene, tmp_path):
     turned[:, 1:5] = [product(rows[1:5], (1.0, 1e-4 * rows[0], 0.0, 0.0)) for rows in true]
     file.write_text(text(turned, OF_BODY), encoding="utf-8")
     other = symtop.judge(file, scene=scene)
-    assert other["attitude_error"].value == pytest.approx(4e-3, rel=1e-3)
+    assert other["attitude_error"].value == pytest.approx(2.0 * np.arctan(1e-4 * true[-1, 0]), rel=1e-9)
     assert (other["rates_error"].value < 1e-13, other["momentum_error"].value > 1e-5) == (True, True)
     file.write_text(text(of_body(scene, 1.001), OF_BODY), encoding="utf-8")
     expected = 1e-3 * np.linalg.norm(true[:, 5:], axis=1).max()

@@ -11,10 +11,8 @@ from symtop.measure.accuracy import SAMPLES, enough_samples, error_table
 from symtop.measure.errors import error_bound, errors_against
 from symtop.measure.order import LARGEST_ERROR, order
 from symtop.measure.order_table import asymptotic_steps, extended_errors, extended_order_data, order_fit
-from symtop.methods.framework.registry import integrator
 from symtop.model.charts import axis_from_angles, momentum_parts
 from symtop.run.reference.independent_checks import have_heyoka
-from symtop.run.reference.truth import reference
 from symtop.run.simulation import integrate
 from symtop.run.trajectory import Trajectory
 
@@ -35,7 +33,7 @@ def test_where_the_largest_error_scatters_the_order_is_that_at_the_end():
     h, scatter = 0.02 / 2.0 ** np.arange(9.0), 10.0 ** np.random.default_rng(0).uniform(-1.0, 1.0, 9)
     columns = {"step_size": h, "theta": h**2 * scatter, "theta_end": h**2, "theta_bound": np.full(9, 1e-14)}
     table = xr.Dataset({name: ("setting", column) for name, column in columns.items()})
-    fit = order_fit(symtop.scene("spheroid"), integrator("rk4"), table, "theta", 8.0)
+    fit = order_fit(symtop.scene("spheroid"), symtop.integrator("rk4"), table, "theta", 8.0)
     assert fit.slope == pytest.approx(2.0, abs=1e-3)
 
 
@@ -63,7 +61,7 @@ def test_as_many_samples_at_one_phase_of_the_nutation_see_less():
 @pytest.mark.skipif(not have_heyoka(), reason="long double needs heyoka")
 def test_errors_are_taken_from_both_halves_of_the_reference():
     scene = symtop.scene("goldstein")
-    truth = reference(scene, np.linspace(0.0, 20.0, 41), "longdouble")
+    truth = symtop.reference(scene, np.linspace(0.0, 20.0, 41), "longdouble")
     rounded = Trajectory.of_data(truth[["axis", "quaternion", "theta"]])  # right to the last digit
     with_low = errors_against(scene, rounded, truth)
     for name, low in (("axis", "axis_lo"), ("attitude", "quaternion_lo"), ("theta", "theta_lo")):
@@ -77,11 +75,11 @@ def test_a_run_that_shows_its_quaternion_is_judged_without_the_rounding_of_its_a
     scene = symtop.scene("spheroid")
     angles, attitude = (integrate(scene, name, step_size=0.01, samples=101, observe="attitude")
                         for name in ("stormer-verlet", "gauss-12"))  # fmt: skip
-    truth = reference(scene, angles.time, "closed-form")
+    truth = symtop.reference(scene, angles.time, "closed-form")
     turned = float(np.max(np.abs(truth["phi"].values) + np.abs(truth["psi"].values)))
     wide, narrow = (float(error_bound(scene, run, truth, "attitude").max()) for run in (angles, attitude))
     assert wide - narrow == pytest.approx(0.5 * EPSILON * turned, rel=0.05)
-    table = error_table(scene, integrator("stormer-verlet"), [0.01], 8.0, observe="attitude")
+    table = error_table(scene, symtop.integrator("stormer-verlet"), [0.01], 8.0, observe="attitude")
     assert float(table["attitude_bound"][0]) > 0.9 * wide  # the largest of the run
     assert errors_against(scene, attitude, truth)["attitude"][1] < 3.0 * narrow
 
@@ -92,7 +90,7 @@ def test_a_run_that_shows_its_quaternion_is_judged_without_the_rounding_of_its_a
 def test_a_composition_in_long_double_has_its_order_where_double_runs_out(name):
     """Order 10 falls from 1e-10 to 1e-17: in double only the first decades of it are above round-off."""
     scene = symtop.scene(name)
-    data = extended_errors(scene, integrator("sofroniou-spaletta-10"))
+    data = extended_errors(scene, symtop.integrator("sofroniou-spaletta-10"))
     error = data["extended_error"].values
     assert error.min() < 1e-17 < EPSILON < 1e-11 < error.max()
     omega = 2.0 * np.pi / scene.nutation_period
@@ -124,7 +122,7 @@ def alone(scene, stages, horizon, count):
 def test_runs_side_by_side_in_long_double_are_those_alone(name):
     scene = symtop.scene("spheroid")
     horizon, counts = 1.37 * scene.nutation_period, np.array([7, 8, 40])
-    stages = order_table._composition(scene, integrator(name))
+    stages = order_table._composition(scene, symtop.integrator(name))
     together = order_table._ends(scene, stages, horizon, counts)
     for count, end in zip(counts, together, strict=True):
         assert np.array_equal(end, order_table._ends(scene, stages, horizon, np.array([count]))[0])
@@ -138,13 +136,13 @@ def test_runs_side_by_side_in_long_double_are_those_alone(name):
 def test_a_free_top_is_run_in_long_double_without_a_warning(psi_dot):
     """Its kicks are zero, and so is its momentum if it rests."""
     free = symtop.Scene("free", symtop.SymmetricTop(1.0, 0.5, 0.0), symtop.Angles(1.0, phi_dot=psi_dot / 3.0), 5.0)
-    ends = order_table._ends(free, order_table._composition(free, integrator("strang")), 2.0, np.array([7, 8]))
+    ends = order_table._ends(free, order_table._composition(free, symtop.integrator("strang")), 2.0, np.array([7, 8]))
     true = symtop.ClosedForm(free.top, free.start).axis([2.0])[0]
     assert np.abs(ends.astype(float) - true).max() < 1e-14
 
 
 def test_added_steps_lie_where_the_error_is_a_power_and_only_plain_compositions_run_in_long_double():
-    scene, method = symtop.scene("goldstein"), integrator("sofroniou-spaletta-10")
+    scene, method = symtop.scene("goldstein"), symtop.integrator("sofroniou-spaletta-10")
     horizon = 5.0 * scene.nutation_period
     coarse = error_table(scene, method, list(scene.nutation_period / np.geomspace(6.0, 80.0, 9)), horizon, "attitude")
     steps = asymptotic_steps(coarse, "attitude", 10)
@@ -157,4 +155,4 @@ def test_added_steps_lie_where_the_error_is_a_power_and_only_plain_compositions_
     nothing = coarse.assign(attitude=coarse["attitude_bound"])
     assert asymptotic_steps(nothing, "attitude", 10) == []
     for name in ("takahashi-imada", "cayley", "gauss-4", "stormer-verlet", "rk4", "rk45"):
-        assert extended_errors(scene, integrator(name)) is None
+        assert extended_errors(scene, symtop.integrator(name)) is None

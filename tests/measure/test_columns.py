@@ -1,7 +1,5 @@
 """The columns of stored datasets say what they are: of each study, of error tables, and of a study of one's own."""
 
-from pathlib import Path
-
 import numpy as np
 import pytest
 import xarray as xr
@@ -12,9 +10,9 @@ from symtop.core.errors import SymtopError
 from symtop.measure import columns
 from symtop.measure.errors import ERRORS, OF_BODY, QUANTITIES
 from symtop.runner.scripts import file_beside, names
+from tests.commands import ROOT
 from tests.core.test_conventions import lacking
 
-ROOT = Path(__file__).resolve().parents[2]
 PEERS = netcdf.read_columns(ROOT / "benchmarks" / "peers" / "columns.tsv")
 OWN = {name: netcdf.read_columns(file_beside(name, "columns.tsv")) for name in names()}
 CHECKS = "checks"  # a group of the study of cost, of a second round that a quick pass may not have

@@ -9,7 +9,6 @@ import xarray as xr
 
 import symtop
 from symtop.measure.errors import QUANTITIES
-from symtop.run.reference.truth import reference
 from tests.judging.blind.right import product
 
 TIMES = np.linspace(0.0, 8.0, 41)
@@ -18,7 +17,7 @@ TURN = 1e-3  # rad
 
 @pytest.fixture(scope="module")
 def truth():
-    return reference("spheroid", TIMES, "closed-form")
+    return symtop.reference("spheroid", TIMES, "closed-form")
 
 
 @pytest.mark.parametrize(("integrator", "observe"), [("midpoint", "nutation"), ("strang", "axis"), ("strang", None)])
@@ -200,7 +199,7 @@ def test_another_unit_of_time_is_asked_about():
     """Milliseconds for seconds; the control: a trajectory that goes on for fifty horizons is nobody's mistake."""
     horizon = symtop.scene("spheroid").horizon
     for times, doubtful in ((np.linspace(0.0, 1e3 * horizon, 41), True), (np.linspace(0.0, 50 * horizon, 41), False)):
-        data = {"time": times, "quaternion": reference("spheroid", times)["quaternion"].values}
+        data = {"time": times, "quaternion": symtop.reference("spheroid", times)["quaternion"].values}
         with warnings.catch_warnings(record=True, action="always") as caught:
             symtop.errors(data, "spheroid")
         assert [("are they in the scene's unit of time" in str(one.message)) for one in caught] == [True] * doubtful

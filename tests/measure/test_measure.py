@@ -16,12 +16,9 @@ from symtop.measure.order import order
 from symtop.measure.published import OTHER_BODY, START, TRAJECTORY, published_values
 from symtop.measure.settings import ladder
 from symtop.measure.timing import Timing, agree, timings
-from symtop.methods.framework.angles import on_angles
-from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian import discrete_lagrangian, galerkin
 from symtop.model.scenes import closed_form
 from symtop.run.simulation import integrate
-from symtop.runner.study import Case
 from tests.conftest import random_scenes
 
 STEPS = 0.1 / 1.5 ** np.arange(16)
@@ -83,7 +80,7 @@ def test_a_table_stops_after_too_much_work_and_ladders_end():
 def test_combining_refuses_cases_with_different_coordinates():
     def case(name, horizons):
         data = xr.Dataset({"error": ("horizon", np.zeros(len(horizons)))}, coords={"horizon": horizons})
-        return Case("spheroid", name), data
+        return symtop.Case("spheroid", name), data
 
     joined = datasets.combine([case("a", [8.0, 100.0]), case("b", [8.0, 100.0, 1000.0])])
     assert np.isnan(joined["error"].sel(variant="a", horizon=1000.0))
@@ -95,7 +92,7 @@ def test_combining_refuses_cases_with_different_coordinates():
 
 
 def test_combined_values_are_those_of_each_case_whatever_its_type_and_another_order_of_dimensions_is_refused():
-    of = lambda name, dims, values: (Case("spheroid", name), xr.Dataset({"value": (dims, values)}))
+    of = lambda name, dims, values: (symtop.Case("spheroid", name), xr.Dataset({"value": (dims, values)}))
     pairs = [(np.array([3, 4], np.uint8), np.array([300.0, -1.5])), (np.float32([1.0, 2.0]), np.array([1e300, 0.1])),
              (np.array([3, 4], np.uint8), np.array([300, 7], np.uint16))]  # fmt: skip
     for two in pairs:
@@ -103,14 +100,6 @@ def test_combined_values_are_those_of_each_case_whatever_its_type_and_another_or
         np.testing.assert_array_equal(both.sel(scene="spheroid"), [*two])
     with pytest.raises(symtop.SymtopError, match=r"value of b on spheroid must be over \('n', 'm'\)"):
         datasets.combine([of("a", ("n", "m"), np.eye(2)), of("b", ("m", "n"), np.eye(2))])
-
-
-@pytest.fixture
-def clock(monkeypatch):
-    """The time that `timings` reads, in a list; a function that is timed adds to it."""
-    seconds = [0.0]
-    monkeypatch.setattr("symtop.measure.timing.time.perf_counter", lambda: seconds[0])
-    return seconds
 
 
 def taking(clock, each):
@@ -123,7 +112,9 @@ def taking(clock, each):
     return call
 
 
-def test_a_function_is_asked_no_more_once_it_took_long_or_its_least_samples_agree(clock):
+def test_a_function_is_asked_no_more_once_it_took_long_or_its_least_samples_agree(monkeypatch):
+    clock = [0.0]  # the time that `timings` reads; a function that is timed adds to it
+    monkeypatch.setattr("symtop.measure.timing.time.perf_counter", lambda: clock[0])
     timings([taking(clock, [0.03, *(1000 * [1e-4])])], 3, 5e-3, warm=True, exact=False)  # a pause before the first call
     assert clock[0] > 0.03 + 3 * 5e-3
     for patience, least, counts in ((math.inf, 2, [4, 4, 4]), (0.05, 2, [4, 3, 2]), (0.05, 1, [4, 3, 1])):
@@ -168,7 +159,7 @@ def test_every_published_value_is_reproduced_and_one_off_by_its_last_digit_is_no
     assert [printed.count(what) for what in (TRAJECTORY, START, OTHER_BODY)] == [3, 1, 3]
     assert len(values) - len(printed) == 6
     for one in values:
-        assert not one._replace(published=one.published + 1.01 * one.unit).reproduced
+        assert not one._replace(ours=one.published + 0.52 * one.unit).reproduced
 
 
 SPHEROID = symtop.scene("spheroid")
@@ -192,7 +183,7 @@ def test_a_million_steps_keep_recomputed_momenta_and_bound_the_energy_without_a_
 ], ids=["midpoint", "galerkin"])  # fmt: skip
 def test_momenta_are_recomputed_and_not_copied(family, rule):
     """A phi that moves 1e-10 too far shows in p_phi."""
-    par, state = on_angles(SPHEROID.top, SPHEROID.start)
+    par, state = symtop.on_angles(SPHEROID.top, SPHEROID.start)
     step, *_ = family.increment(par, rule, state, family.begin(par, rule, state, 0.01), 0.01)
     right = family.observe(par, rule, state, step, 0.01)
     assert right == pytest.approx(SPHEROID.top.momenta(SPHEROID.start)[:2], rel=1e-14)
@@ -200,7 +191,7 @@ def test_momenta_are_recomputed_and_not_copied(family, rule):
     assert abs(family.observe(par, rule, state, moved, 0.01)[0] - right[0]) > 1e-9
 
 
-PLAN = Plan.steps(SPHEROID.nutation_period / 118.02, [0, 40_000])
+PLAN = symtop.Plan.steps(SPHEROID.nutation_period / 118.02, [0, 40_000])
 
 
 @pytest.mark.parametrize("scene", random_scenes(3, seed=77), ids=lambda s: s.name)
@@ -229,4 +220,4 @@ def test_a_run_that_hides_its_drift_is_seen_and_one_of_few_steps_says_nothing():
 
     difference = from_increments(dataclasses.replace(rk4, name="copied", solvers={"angles": solve}), SPHEROID, PLAN)
     assert difference.size > 100.0 * difference.floor
-    assert from_increments(symtop.integrator("rk4"), SPHEROID, Plan.steps(0.01, [0, 500])) is None
+    assert from_increments(symtop.integrator("rk4"), SPHEROID, symtop.Plan.steps(0.01, [0, 500])) is None

@@ -18,7 +18,6 @@ from symtop.core.jit import compile_kernel
 from symtop.methods.framework import loop, loop as loops
 from symtop.methods.framework.angles import on_angles, with_rates
 from symtop.methods.framework.loop import FixedStep, inside
-from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.preparation import BareTop, Start
 from symtop.methods.framework.space import on_attitude, on_axis, on_frame
 from symtop.methods.lagrangian.unreduced import with_momenta
@@ -293,8 +292,8 @@ def test_a_run_at_once_is_a_run_in_stretches(name, chart):
     scene, solver = symtop.scene("spheroid"), inside(symtop.integrator(name).solvers[chart])
     assert solver._whole is not None
     for marks in ([0, 1], [1], [0, 3, 10, 400], [7, 300]):
-        assert_the_same_run(solver, scene.top, scene.start, Plan.steps(0.02, marks))
-        assert_the_same_run(solver, scene.top, scene.start, Plan.steps(-0.02, marks))
+        assert_the_same_run(solver, scene.top, scene.start, symtop.Plan.steps(0.02, marks))
+        assert_the_same_run(solver, scene.top, scene.start, symtop.Plan.steps(-0.02, marks))
 
 
 @pytest.mark.slow
@@ -304,13 +303,13 @@ def test_every_run_at_once_is_a_run_in_stretches():
             mine = [solver for chart, solver in method.solvers.items() if (chart == "body") is scene.of_body]
             for solver in filter(None, map(inside, mine)):
                 for h in (scene.horizon / 400, scene.horizon / 5):
-                    assert_the_same_run(solver, scene.top, scene.start, Plan.steps(h, np.arange(0, 400, 3)))
+                    assert_the_same_run(solver, scene.top, scene.start, symtop.Plan.steps(h, np.arange(0, 400, 3)))
 
 
 def test_long_runs_return_to_python(monkeypatch):
     """Beyond `BLOCK` steps a run is made in stretches, to the same bits, so that an interrupt is heard."""
     scene, solver = symtop.scene("spheroid"), symtop.integrator("gauss-4").solvers["attitude"]
-    plan = Plan.steps(0.01, [0, 50, 100])
+    plan = symtop.Plan.steps(0.01, [0, 50, 100])
     whole = solver(scene.top, scene.start, plan)
     monkeypatch.setattr(loops, "BLOCK", 7)
     monkeypatch.setattr(loop, "flat", None)  # what a run in one call begins with
@@ -329,7 +328,7 @@ def test_a_rule_may_be_whatever_a_kernel_takes(rule):
         return 0.0, 0.0
 
     solver = FixedStep(loops.Loop(begin, increment, observe), rule, on_angles, 1, implicit=False)
-    run = solver(SymmetricTop(1.0, 1.0, 1.0), Angles(1.0, theta_dot=0.5), Plan.steps(0.25, [0, 1, 4]))
+    run = solver(SymmetricTop(1.0, 1.0, 1.0), Angles(1.0, theta_dot=0.5), symtop.Plan.steps(0.25, [0, 1, 4]))
     assert run.states[:, 0].tolist() == [1.0, 1.125, 1.5]
     assert (solver._whole is not None) == isinstance(rule, tuple)
 
@@ -345,4 +344,4 @@ def test_tables_and_compositions_travel_as_arrays_and_arrive_whole():
     for more in ({"rotation": "cayley-tuned"}, {"gradient": [0.0, 1e-3, 0.0, 0.0, 1e-3, 0.0], "processor": 0.01}):
         for solver in symtop.composition("long", drift, kick, chart="space", **more).solvers.values():
             assert solver._whole.rule[1].tolist()[:11] == [*solver.rule.rule.drift, *solver.rule.rule.kick]
-            assert_the_same_run(solver, scene.top, scene.start, Plan.steps(0.02, [0, 1, 300]))
+            assert_the_same_run(solver, scene.top, scene.start, symtop.Plan.steps(0.02, [0, 1, 300]))

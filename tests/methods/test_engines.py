@@ -11,9 +11,7 @@ import symtop
 from symtop.measure.settings import compared, smallest_charts
 from symtop.methods.framework import registry
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan
 from symtop.model import charts
-from symtop.model.body import Attitude, RigidBody
 from symtop.model.top import flat
 from tests.conftest import random_scenes
 from tests.methods import engine_formulas
@@ -44,7 +42,7 @@ def axis_error(row, steps, scene=GOLDSTEIN, horizon=10.0, against=None):
 
 def one_step(name, scene, h, chart="attitude"):
     """The state of a chart after one step."""
-    return solve(symtop.integrator(name), chart, scene.top, scene.start, Plan.steps(h, [1])).states[-1]
+    return solve(symtop.integrator(name), chart, scene.top, scene.start, symtop.Plan.steps(h, [1])).states[-1]
 
 
 @pytest.mark.quick
@@ -125,13 +123,13 @@ def test_a_step_is_the_engines_formula_in_body_axes_and_a_turn_about_the_axis_ch
             np.testing.assert_allclose(one_step(name, scene, h, "axis"), [*new.as_matrix()[:, 2], *L],
                                        atol=2e-14 * (1.0 + np.linalg.norm(L)))  # fmt: skip
     quaternion = np.array([0.8, 0.4, -0.3, 0.2]) / math.sqrt(0.93)
-    at, h = Attitude(tuple(quaternion), (0.7, -1.1, 2.0)), 0.013
+    at, h = symtop.Attitude(tuple(quaternion), (0.7, -1.1, 2.0)), 0.013
     for moments in ((0.5, 0.9, 1.3), (1.3, 0.5, 0.9)):
-        body = RigidBody(*moments, 1.7, (0.3, -0.2, 1.0))
+        body = symtop.RigidBody(*moments, 1.7, (0.3, -0.2, 1.0))
         attitude, inertia = Rotation.from_quat(np.roll(quaternion, -1)), np.diag(body.moments)
         pull = lambda there, c=body.torque: np.cross([0.0, 0.0, 1.0], there.apply(c))
         new, w = formula(attitude, attitude.apply(at.omega_body), h, inertia, pull)
-        done = solve(symtop.integrator(name), "body", body, at, Plan.steps(h, [1])).states[-1]
+        done = solve(symtop.integrator(name), "body", body, at, symtop.Plan.steps(h, [1])).states[-1]
         assert charts.attitude_distance(done[:4], np.roll(new.as_quat(), 1)) < 1e-14
         np.testing.assert_allclose(done[4:], inertia @ new.inv().apply(w), rtol=0.0, atol=2e-14)
     # No-squish depends on where the transverse axes are put.

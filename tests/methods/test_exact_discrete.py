@@ -9,7 +9,6 @@ import pytest
 import symtop
 from benchmarks import exactness
 from symtop.methods.framework.loop import inside
-from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian.oscillators import Map, numbers as exact_map, on_oscillators
 from symtop.model import charts
 from symtop.model.exact.digits import PreciseForm
@@ -23,7 +22,7 @@ UNSTABLE = {"sleeping-unstable": 2e-10}  # rounding of the start alone moves it 
 
 def run(top, start, h, steps, chart="attitude", method=METHOD):
     """Samples after every step of exactly h."""
-    return method.solvers[chart](top, start, Plan.steps(h, np.arange(steps + 1)))
+    return method.solvers[chart](top, start, symtop.Plan.steps(h, np.arange(steps + 1)))
 
 
 def oscillators(scene, h, steps):
@@ -100,7 +99,7 @@ def test_a_step_agrees_with_fifty_digits_and_a_neighbour_of_the_map_is_no_motion
     verlet, gaps = Map(1.5 * par.b1, D, 1 / h, h, 0.0, 1.5 * par.b2, D, 1 / h, h, 0.0, 0.0), []
     for rule in (true, verlet):
         solver = dataclasses.replace(kernel, rule=lambda top, start, h, rule=rule: rule)
-        state = solver(scene.top, scene.start, Plan.steps(h, [40])).states
+        state = solver(scene.top, scene.start, symtop.Plan.steps(h, [40])).states
         gaps.append(charts.axis_distance(state[:, :3], closed_form(scene).axis([40 * h]))[0])
     assert gaps[0] < 1e-13
     assert gaps[1] > 1e-3

@@ -12,14 +12,10 @@ from symtop.methods.framework.lanes import ALIKE, LEAST, Many, W, divided, group
 from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUTCOMES, Plan
 from symtop.methods.framework.registry import variants
-from symtop.methods.framework.space import on_axis
-from symtop.methods.lagrangian.discrete_lagrangian import discrete_lagrangian
 from symtop.methods.lie_group.generalised_alpha import generalised_alpha
 from symtop.methods.lie_group.runge_kutta import LieTable, lie_runge_kutta
 from symtop.methods.lie_group.variational import EULER_POINCARE, Variational, lie_variational
-from symtop.methods.runge_kutta.explicit import runge_kutta
 from symtop.methods.splitting.coefficients import SUZUKI_4
-from symtop.methods.splitting.composition import composition
 from symtop.methods.splitting.space import march_axis
 from symtop.model.top import flat
 
@@ -261,7 +257,7 @@ def test_lanes_given_up_between_samples_and_exact_steps_of_several_parts_are_run
 
 def test_tables_of_stages_run_in_lanes_and_kicks_left_out_change_no_bit():
     """Lanes carry out a kick by 0, alone it is skipped: inside a table, at its ends, and all of them for a free top."""
-    method = composition("gaps", (0.25, 0.25, 0.5), (0.0, 0.5, 0.0, 0.5), chart="space")
+    method = symtop.composition("gaps", (0.25, 0.25, 0.5), (0.0, 0.5, 0.0, 0.5), chart="space")
     numbers, h, marks = members(200)
     numbers[::3, 2], numbers[::7, 5:] = 0.0, -0.0  # and some that stand still
     for chart in ("axis", "attitude"):
@@ -270,7 +266,7 @@ def test_tables_of_stages_run_in_lanes_and_kicks_left_out_change_no_bit():
     # Stages that are multiplied out by hand, as a script has them.
     scene, strang = symtop.scene("spheroid"), SOLVERS["strang[axis]"]
     h = scene.nutation_period / 100
-    solver = FixedStep(march_axis, strang.rule(scene.top, scene.start, h), on_axis, 1, implicit=False)
+    solver = FixedStep(march_axis, strang.rule(scene.top, scene.start, h), symtop.on_axis, 1, implicit=False)
     numbers, steps = np.tile(flat(scene.top, scene.start), (40, 1)), np.full(40, h)
     numbers[:, 4] = np.linspace(0.0, 1.0, 40)
     marks = np.tile([0, 10, 50], (40, 1))
@@ -308,9 +304,9 @@ def of_table(*rows, brackets=0):
     dataclasses.replace(SOLVERS["rkmk-se3-2[attitude]"], rule=LieTable((0.0,), (1.0,))),
     with_shares("rkmk-se3-2[attitude]", (0.25, 0.75)),
     with_shares("generalised-alpha[axis]", (0.25, 0.5, 0.25)),
-    runge_kutta("any", ((),), (1.0,)).solvers["axis"],
-    runge_kutta("any", ((), (1 / 3,), (0.0, 2 / 3)), (0.25, 0.0, 0.75)).solvers["axis"],
-    discrete_lagrangian("mixed", (0.0, 0.0, 0.3, 1.0), (0.1, 0.2, 0.3, 0.4)).solvers["angles"],
+    symtop.runge_kutta("any", ((),), (1.0,)).solvers["axis"],
+    symtop.runge_kutta("any", ((), (1 / 3,), (0.0, 2 / 3)), (0.25, 0.0, 0.75)).solvers["axis"],
+    symtop.discrete_lagrangian("mixed", (0.0, 0.0, 0.3, 1.0), (0.1, 0.2, 0.3, 0.4)).solvers["angles"],
 ], ids=["euler", "heun", "euler-poincare-4", "alpha-0", "zeros", "rkmk-twice", "alpha-thrice", "rk-1", "rk-3",
         "weights"])  # fmt: skip
 def test_tables_and_compositions_of_ones_own_have_the_bits_of_runs_alone(solver):

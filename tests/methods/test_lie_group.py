@@ -300,9 +300,7 @@ def test_two_steps_are_those_of_the_generalised_alpha_method(radius, scene):
 @pytest.mark.parametrize(("name", "steps", "band"), [("simo-wong", 128000, 1e-5), ("collective-gauss-6", 2000, 6e-6)])
 def test_the_benchmark_of_bruls_cardona_and_arnold(name, steps, band):
     """The displacement of the centre at t = 1 to the printed five digits: (0.17334, -0.35991, -0.74849)."""
-    values = published_values()
-    assert all(one.reproduced and not one._replace(ours=one.published + 0.52 * one.unit).reproduced for one in values)
-    printed = [one.published for one in values if one.source.startswith("Bruls")]
+    printed = [one.published for one in published_values() if one.source.startswith("Bruls")]
     run = symtop.simulate("bruls-cardona-arnold", name, step_size=1.0 / steps, horizon=1.0, samples=2, observe="axis")
     moved = run["axis"].values[-1] - np.array([0.0, 1.0, 0.0])
     np.testing.assert_allclose(moved, printed, atol=band)

@@ -14,8 +14,6 @@ from symtop.judging.claims.order_conditions import conditions
 from symtop.measure.step_map import generic_start
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.equations import FORMULATIONS
-from symtop.methods.framework.plan import Plan
-from symtop.methods.framework.registry import integrator
 from symtop.methods.runge_kutta import nystrom, pairs, projected
 from symtop.methods.runge_kutta.nystrom import DPRKN8, REDUCED
 from symtop.methods.runge_kutta.pair_tables import DOP853, DORMAND_PRINCE, TSIT5, VERN9
@@ -98,7 +96,7 @@ def test_the_interpolant_of_tsit5_has_order_four_and_costs_where_it_is_asked():
 
 def test_a_wrong_estimate_takes_other_steps():
     scene, pair = symtop.scene("spheroid"), PAIRS["dop853-compiled"]
-    plan, _ = make_plan(scene, integrator("dop853-compiled"), None, 1e-6, horizon=8.0, samples=2)
+    plan, _ = make_plan(scene, symtop.integrator("dop853-compiled"), None, 1e-6, horizon=8.0, samples=2)
     wrong = pair._replace(table=DOP853._replace(third=DOP853.error))
     solvers = (pairs.solver(FORMULATIONS["axis"], chosen, chosen.rows) for chosen in (pair, wrong))
     right, other = (solver(scene.top, scene.start, plan) for solver in solvers)
@@ -114,7 +112,7 @@ def test_one_fixed_step_is_the_table(name):
     for row in ((), *table.a):
         moved = h * sum((a * k for a, k in zip(row, slopes, strict=False)), np.zeros(6))
         slopes.append(np.array(form.field(par, tuple(y + moved))))
-    fixed = integrator(f"{name}-fixed[axis]")
+    fixed = symtop.integrator(f"{name}-fixed[axis]")
     plan, _ = make_plan(scene, fixed, h, None, horizon=h, samples=2)
     run = fixed.solvers["axis"](scene.top, scene.start, plan)
     moved = h * sum(b * k for b, k in zip(table.b, slopes, strict=False))
@@ -133,8 +131,8 @@ def number(near, far, which):
 def test_two_runs_in_one_register_have_the_bits_of_each_alone(name, chart):
     scene, h, marks = models.scene(name, bodies=True), 0.03, np.array([1, 50, 400])
     moved = replace(scene.start, **({"psi_dot": 1.0} if chart == "axis" else {"omega_body": (0.1, 0.2, 0.3)}))
-    run, fixed = pairs.two_runs(chart, pairs.DOP8, number), integrator("dop853-compiled-fixed").solvers[chart]
-    near, far = (fixed(scene.top, start, Plan.steps(h, marks)).states for start in (scene.start, moved))
+    run, fixed = pairs.two_runs(chart, pairs.DOP8, number), symtop.integrator("dop853-compiled-fixed").solvers[chart]
+    near, far = (fixed(scene.top, start, symtop.Plan.steps(h, marks)).states for start in (scene.start, moved))
     out = np.empty((near.shape[1] + far.shape[1], marks.size))
     for which, row in enumerate(out):
         run(flat(scene.top, scene.start), flat(scene.top, moved), h, marks, which, row)
@@ -267,8 +265,8 @@ def test_the_table_has_order_eight_its_estimate_six_and_it_needs_fewer_forces_th
 
 def test_a_projected_step_ends_on_the_constants_next_to_where_the_plain_one_ends():
     scene = symtop.scene("goldstein")
-    (I1, mgl), plan = (scene.top.I1, scene.top.mgl), Plan.steps(scene.nutation_period / 4.0, [0, 1])
-    plain, done = (solve(integrator(name), "axis", scene.top, scene.start, plan).states
+    (I1, mgl), plan = (scene.top.I1, scene.top.mgl), symtop.Plan.steps(scene.nutation_period / 4.0, [0, 1])
+    plain, done = (solve(symtop.integrator(name), "axis", scene.top, scene.start, plan).states
                    for name in ("dop853-compiled-fixed", "dop853-projected"))  # fmt: skip
     constants = lambda y: np.array([0.5 * y[:3] @ y[:3], y[:3] @ y[3:], 0.5 * y[3:] @ y[3:] / I1 + mgl * y[2]])
     e, L = plain[1, :3], plain[1, 3:]

@@ -9,7 +9,6 @@ import pytest
 
 import symtop
 from symtop.core.numbers import context
-from symtop.methods.framework.plan import Plan
 from symtop.methods.runge_kutta.gauss import gauss_rule
 from symtop.methods.taylor import heyoka
 
@@ -65,7 +64,7 @@ def test_taylor_runs_of_one_kind_at_once_do_not_share_a_stepper():
 
 
 def test_the_bare_loop_of_heyoka_computes_what_the_solver_does_and_begins_anew():
-    scene, plan = symtop.scene("goldstein"), Plan.until(np.array([0.0, 8.0]), 1e-9)
+    scene, plan = symtop.scene("goldstein"), symtop.Plan.until(np.array([0.0, 8.0]), 1e-9)
     solver = symtop.integrator("taylor[axis]").solvers["axis"]
     run, evaluations = solver.bare(scene.top, scene.start, plan)
     done = solver(scene.top, scene.start, plan)

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.core.errors import SymtopError
 from symtop.methods.framework import registry
 from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import ENGINE, NEEDS, Integrator, bibliography, paragraphs
@@ -67,7 +66,7 @@ def test_two_threads_that_make_the_very_first_call_together_see_every_integrator
 ])  # fmt: skip
 def test_a_field_that_makes_no_sense_is_refused_and_one_that_does_is_not(fields, says):
     right = {"name": "mine", "family": "other", "summary": "", "solvers": {"angles": print}}
-    with pytest.raises(SymtopError, match=f"^{re.escape(says)}"):
+    with pytest.raises(symtop.SymtopError, match=f"^{re.escape(says)}"):
         Integrator(**right | fields)
     claims = {"explicit": True, "symplectic": False, "symmetric": np.bool_(True), "least_tolerance": 0}
     assert Integrator(**right | claims, default_tolerance=1e-6, reference="x").record()["symmetric"] == "yes"
@@ -121,7 +120,7 @@ def test_tables_of_ones_own_have_the_needs_of_their_family_and_a_plug_in_has_non
     mine = Integrator(name="mine", family="other", summary="", solvers={"axis": print})
     assert (mine.needs, mine.general) == (None, None)
     assert mine.record()["needs"] == mine.record()["general"] == "unknown"
-    with pytest.raises(SymtopError, match="needs must be 'derivative'"):
+    with pytest.raises(symtop.SymtopError, match="needs must be 'derivative'"):
         Integrator(name="mine", family="other", summary="", solvers={"axis": print}, needs="luck")
 
 

@@ -10,8 +10,6 @@ from symtop.core.jit import compile_kernel
 from symtop.measure.accuracy import error_table
 from symtop.measure.conservation import trend
 from symtop.measure.order import power_law
-from symtop.methods.framework.angles import on_angles
-from symtop.methods.framework.plan import Plan
 from symtop.methods.splitting import reversible
 from symtop.methods.splitting.reversible import Reversible
 from symtop.model import charts
@@ -23,12 +21,12 @@ SOLVER = METHOD.solvers["angles"]
 
 
 def run(scene, h, marks, solver=SOLVER):
-    return solver(scene.top, scene.start, Plan.steps(h, np.asarray(marks)))
+    return solver(scene.top, scene.start, symtop.Plan.steps(h, np.asarray(marks)))
 
 
 def energies(scene, states):
     """p^2/2 I1 + V of states in angles."""
-    par, _ = on_angles(scene.top, scene.start)
+    par, _ = symtop.on_angles(scene.top, scene.start)
     height = effective_potential(states[:, 0], par.north, par.south, par.I1, par.mgl)
     return 0.5 * states[:, 1] ** 2 / par.I1 + height
 
@@ -47,7 +45,7 @@ def test_the_error_falls_with_the_square_of_the_step(name, quantity):
 
 def by_hand(scene, eps, steps, k):
     """Grid points (t, theta, p_theta) of the scheme as it stands in the papers, in plain Python."""
-    par, (theta, p, *_) = on_angles(scene.top, scene.start)
+    par, (theta, p, *_) = symtop.on_angles(scene.top, scene.start)
     pull = lambda: -k * math.cos(theta) / math.sin(theta) * p / par.I1
     t, rho, points = 0.0, math.sin(theta) ** -k + 0.5 * eps * pull(), []
     for _ in range(steps):
@@ -64,7 +62,7 @@ def by_hand(scene, eps, steps, k):
 def test_the_grid_is_that_of_the_formulas(k):
     scene, eps = grazing(0.1), 0.02
     points = by_hand(scene, eps, 400, k)
-    plan = Plan.steps(eps, [1])._replace(times=points[:, 0])
+    plan = symtop.Plan.steps(eps, [1])._replace(times=points[:, 0])
     done = Reversible(k)(scene.top, scene.start, plan)
     assert points[:, 1].min() < 0.15
     assert done.states[:, :2] == pytest.approx(points[:, 1:], rel=1e-10)
@@ -76,7 +74,7 @@ def test_samples_and_blocks_move_no_step(monkeypatch):
     scene, h = symtop.scene("goldstein"), 0.05
     few, many = run(scene, h, [400, 800]), run(scene, h, np.arange(801))
     assert np.array_equal(few.states, many.states[[400, 800]])
-    assert many.states[0] == pytest.approx(on_angles(scene.top, scene.start)[1], abs=0.0)
+    assert many.states[0] == pytest.approx(symtop.on_angles(scene.top, scene.start)[1], abs=0.0)
     for done in (few, many):
         assert (done.force_evaluations, done.newton_iterations) == (done.steps, 0)
     assert many.steps == few.steps + 798  # the start costs nothing
@@ -93,7 +91,7 @@ def read_off(scene, eps, marks):
 
     States (theta, p_theta) after `marks` steps, and where as many steps with p_theta turned round end.
     """
-    par, (theta, p, *_) = on_angles(scene.top, scene.start)
+    par, (theta, p, *_) = symtop.on_angles(scene.top, scene.start)
     states, last = _read_off(tuple(par), theta, p, eps, np.asarray(marks))
     back, _ = _read_off(tuple(par), *last * (1.0, -1.0), eps, np.asarray(marks[-1:]))
     return states, back[-1] * (1.0, -1.0)
@@ -116,7 +114,7 @@ def _read_off(par, theta, p, eps, marks):
 
 @pytest.mark.parametrize("scene", [symtop.scene("goldstein"), grazing(0.01)], ids=lambda s: s.name)
 def test_the_way_back_has_the_same_steps(scene):
-    _, state = on_angles(scene.top, scene.start)
+    _, state = symtop.on_angles(scene.top, scene.start)
     back = SOLVER.onward(scene.top, scene.start, (0.01,) * 500 + (-0.01,) * 500)
     there = SOLVER.onward(scene.top, scene.start, (0.01,) * 500)
     assert np.abs(there.states[0] - state).max() > 0.1

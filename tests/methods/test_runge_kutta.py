@@ -9,7 +9,6 @@ import pytest
 import symtop
 from symtop.methods.framework.angles import field_angles, with_rates
 from symtop.methods.framework.equations import FORMULATIONS
-from symtop.methods.framework.registry import integrator
 from symtop.methods.library.scipy_ivp import RightHandSide
 from symtop.methods.runge_kutta import pairs
 from symtop.methods.runge_kutta.explicit import LOOPS, runge_kutta
@@ -87,7 +86,7 @@ def test_adaptive_methods_follow_their_tolerance_in_every_chart(name, chart):
 @pytest.mark.parametrize("name", ["rk4", *ADAPTIVE])
 def test_p_phi_stays_where_it_is_linear_in_the_state_and_is_lost_in_angles(name):
     scene = symtop.scene("spheroid")
-    control, change = integrator(name).given(0.02 if name == "rk4" else 1e-5), {}
+    control, change = symtop.integrator(name).given(0.02 if name == "rk4" else 1e-5), {}
     for chart in FORMULATIONS:
         run = symtop.simulate(scene, f"{name}[{chart}]", **control, horizon=8.0, samples=81, guard=False)
         change[chart] = {p: float(np.ptp(run[p].values)) / scene.momentum_scale for p in ("p_phi", "p_psi")}
@@ -144,7 +143,7 @@ def test_a_state_of_another_shape_is_refused(chart, compiled):
 
 
 def _walk(scene, tolerance, pair=pairs.RK45, **limits):
-    plan, _ = make_plan(scene, integrator("rk45-compiled"), None, tolerance, horizon=8.0, samples=301)
+    plan, _ = make_plan(scene, symtop.integrator("rk45-compiled"), None, tolerance, horizon=8.0, samples=301)
     return plan, replace(pairs.solver(FORMULATIONS["angles"], pair, pair.rows), **limits)(scene.top, scene.start, plan)
 
 
@@ -162,7 +161,7 @@ def test_scipys_solvers_are_solve_ivp(name):
     scene = symtop.scene("spheroid")
     run = symtop.simulate(scene, name, tolerance=1e-6, horizon=2.0, samples=41)
     par, start = with_rates(scene.top, scene.start)
-    rhs, method = RightHandSide(field_angles, par), integrator(name).summary.split()[1]
+    rhs, method = RightHandSide(field_angles, par), symtop.integrator(name).summary.split()[1]
     done = solve_ivp(rhs, (0.0, 2.0), start, method, run["time"].values, rtol=1e-6, atol=1e-6)
     for angle, values in zip(("theta", "phi", "psi"), done.y, strict=False):
         np.testing.assert_array_equal(run[angle], values)
@@ -213,7 +212,7 @@ def test_adaptive_outcomes_and_tolerances_that_stop_at_the_arithmetic():
     assert 0.0 < run.reached < 8.0
     assert np.array_equal(np.isfinite(run.states[:, 0]), plan.times <= run.reached)
     pytest.importorskip("heyoka")
-    integrator("taylor-quad").check_tolerance(1e-36)
+    symtop.integrator("taylor-quad").check_tolerance(1e-36)
     for name, tolerance in (("taylor", 1e-20), ("taylor-quad", 1e-40), ("rk45-compiled", 1e-15), ("radau", 1e-15)):
         with pytest.raises(symtop.SymtopError, match="tolerance"):
-            integrator(name).check_tolerance(tolerance)
+            symtop.integrator(name).check_tolerance(tolerance)

@@ -9,7 +9,6 @@ import symtop
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import power_law
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
-from symtop.methods.framework.plan import Plan
 from symtop.methods.splitting import coefficients as tables, space
 from symtop.methods.splitting.composition import built_in, composition
 from symtop.model.scenes import closed_form
@@ -20,7 +19,7 @@ METHODS = {method.name: method for method in built_in()}
 
 def run(method, scene, h, marks, chart="attitude"):
     """A run of `marks[-1]` steps of exactly h."""
-    return method.solvers[chart](scene.top, scene.start, Plan.steps(h, marks))
+    return method.solvers[chart](scene.top, scene.start, symtop.Plan.steps(h, marks))
 
 
 def quadrature_defect(table, order):

@@ -8,11 +8,9 @@ import pytest
 import symtop
 from symtop import Angles, SymmetricTop
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan
 from symtop.model import charts
 from symtop.model.charts import CHARTS, DIMENSIONS, View, axis_of, space_momenta
 from symtop.model.scenes import closed_form, scene
-from symtop.run.reference.truth import reference
 from tests.conftest import random_scenes
 from tests.judging.blind.right import product
 
@@ -118,13 +116,13 @@ TOP, START = symtop.scene("spheroid").top, symtop.scene("spheroid").start
 
 def shown(chart, steps=800, h=0.005):
     method = symtop.integrator("stormer-verlet-blanes-moan-6" if chart == "angles" else "srkn-14-6")
-    run = solve(method, chart, TOP, START, Plan.steps(h, np.arange(0, steps + 1, 40)))
+    run = solve(method, chart, TOP, START, symtop.Plan.steps(h, np.arange(0, steps + 1, 40)))
     return View(chart, TOP, run.states, run.p_phi, run.p_psi)
 
 
 @pytest.mark.parametrize("chart", CHARTS)
 def test_every_quantity_is_that_of_the_true_motion(chart):
-    view, truth = shown(chart), reference("spheroid", 0.2 * np.arange(21), "closed-form")
+    view, truth = shown(chart), symtop.reference("spheroid", 0.2 * np.arange(21), "closed-form")
     assert view.states.shape == (21, DIMENSIONS[chart])
     assert view.axis == pytest.approx(truth["axis"].values, abs=1e-7)
     assert view.theta == pytest.approx(truth["theta"].values, abs=1e-7)

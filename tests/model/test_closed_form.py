@@ -13,7 +13,6 @@ import symtop
 from benchmarks import accuracy
 from benchmarks.accuracy import LIMITS, deviation, short
 from benchmarks.families import REGIMES, tops
-from symtop.core.errors import SymtopError
 from symtop.model import charts
 from symtop.model.charts import space_momenta
 from symtop.model.exact import closed_form, constants, double_double, elliptic, layout as at, samples, turning_points
@@ -307,9 +306,9 @@ def test_the_mean_precession_is_that_of_a_period_and_each_member_may_have_times_
     assert forms(times).theta.shape == (len(forms), 7)
     forms = ClosedForms([flat(*SEPARATRIX), flat(*ASLEEP)])
     for bad in ([[0.0, 1.0]], [[0.0], [1.0], [2.0]], [[[0.0]]]):
-        with pytest.raises(SymtopError, match=r"shape \(2, samples\)"):
+        with pytest.raises(symtop.SymtopError, match=r"shape \(2, samples\)"):
             forms.axis(bad)
-    with pytest.raises(SymtopError, match="must be finite numbers of at most 1e\\+100 in size, not inf"):
+    with pytest.raises(symtop.SymtopError, match="must be finite numbers of at most 1e\\+100 in size, not inf"):
         forms.axis([[0.0, 1.0], [0.0, math.inf]])
 
 
@@ -332,9 +331,9 @@ def test_a_member_without_a_form_fails_alone():
 def test_a_row_that_is_no_top_is_named(column, value, words):
     rows = np.array([flat(*ASLEEP)] * 3)
     rows[1, NUMBERS.index(column)] = value
-    with pytest.raises(SymtopError, match=words):
+    with pytest.raises(symtop.SymtopError, match=words):
         ClosedForms(rows)
-    with pytest.raises(SymtopError, match=r"shape \(n, 9\)"):
+    with pytest.raises(symtop.SymtopError, match=r"shape \(n, 9\)"):
         ClosedForms(rows[:, :8])
 
 

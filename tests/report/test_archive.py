@@ -13,7 +13,6 @@ from symtop.core import netcdf
 from symtop.measure import datasets
 from symtop.report import archive, style
 from symtop.runner import run as runner
-from symtop.runner.study import Case, Picture, Study
 from tests.core.test_conventions import lacking
 
 
@@ -21,11 +20,11 @@ def draw(data):
     """One figure."""
     figure, axes = style.panels(1, 1)
     axes[0, 0].plot(data["x"].values.ravel())
-    return [Picture("line", figure)]
+    return [symtop.Picture("line", figure)]
 
 
-STUDY = Study(
-    name="small", title="Small", question="Is it bundled?", cases=lambda _: [Case("spheroid", "strang", {})],
+STUDY = symtop.Study(
+    name="small", title="Small", question="Is it bundled?", cases=lambda _: [symtop.Case("spheroid", "strang", {})],
     measure=lambda case: xr.Dataset({"x": ("step_size", [1.0, 2.0], {"long_name": "a number", "units": "rad"})},
                                     {"step_size": [0.1, 0.2]}),
     pictures=draw, facts=lambda data: {"answer": "yes"},

@@ -9,9 +9,7 @@ import pytest
 from latex2mathml.converter import convert
 
 import symtop
-from symtop.core.errors import SymtopError
 from symtop.report import page, template
-from symtop.report.html import slug
 from symtop.report.page import TEMPLATES, gather, prepared
 from symtop.runner import run as runner
 from tests.commands import call
@@ -78,16 +76,16 @@ def test_a_page_without_what_was_not_measured_says_so_once_and_points_without_a_
     assert template.PARTIAL not in whole
     assert "**Head.** Only 2." in whole
     assert "- two 2 and more" in whole
-    with pytest.raises(SymtopError, match="page of mine"):
+    with pytest.raises(symtop.SymtopError, match="page of mine"):
         template.filled(findings | {"facts": {"a": 1}}, tmp_path)
     chart = {"title": "c", "panels": {"one": [("rk4", [(1.0, math.nan, 1e-3, "w"), (2.0, math.inf, 1e-4, "v")])]}}
     points = json.loads(prepared(chart))["panels"]["one"][0]["points"]
     assert points == [[1.0, None, 1e-3, "w"], [2.0, None, 1e-4, "v"]]
     (tmp_path / "drift.json").write_text("[]", encoding="utf-8")
-    with pytest.raises(SymtopError, match="no study has left findings"):
+    with pytest.raises(symtop.SymtopError, match="no study has left findings"):
         gather(tmp_path)
     (tmp_path / "drift.json").write_text("{}", encoding="utf-8")
-    with pytest.raises(SymtopError, match=r"the findings of drift in .* are incomplete"):
+    with pytest.raises(symtop.SymtopError, match=r"the findings of drift in .* are incomplete"):
         gather(tmp_path)
 
 
@@ -99,13 +97,13 @@ def test_a_damaged_file_is_named_and_one_of_another_kind_is_left_out(name, remed
         (tmp_path / f"{name}.json").write_text(other, encoding="utf-8")
         assert [one["study"] for one in gather(tmp_path)] == ["mine"]
     (tmp_path / f"{name}.json").write_text("{", encoding="utf-8")
-    with pytest.raises(SymtopError, match=rf"{name}\.json is damaged \(.*\); {remedy}remove the file"):
+    with pytest.raises(symtop.SymtopError, match=rf"{name}\.json is damaged \(.*\); {remedy}remove the file"):
         gather(tmp_path)
     (tmp_path / "quick").mkdir()
     (tmp_path / "mine.json").rename(tmp_path / "quick" / "mine.json")
     about = {"measured": "Then.", "command": "python -m benchmarks.guard", "pictures": [{"file": "none.png"}]}
     (tmp_path / f"{name}.json").write_text(json.dumps(findings | about), encoding="utf-8")
-    with pytest.raises(SymtopError, match=r"run it again: python -m benchmarks\.guard$"):
+    with pytest.raises(symtop.SymtopError, match=r"run it again: python -m benchmarks\.guard$"):
         gather(tmp_path)
     assert "the report is made of those in" in call("report", "--results", tmp_path, code=None).output
 
@@ -128,10 +126,9 @@ def test_the_tables_of_scenes_give_every_scene_back_to_the_last_bit():
         assert float(row[4]) == pytest.approx(bound, rel=0.05)
 
 
-def test_every_formula_is_shown_in_full_and_links_lead_to_the_page():
+def test_every_formula_is_shown_in_full():
     text = (TEMPLATES / "equations.md").read_text(encoding="utf-8")
     assert text.startswith(f"## {page.EQUATIONS}\n")
-    assert slug(page.EQUATIONS) == "the-equations-the-scenes-and-the-exact-motion"
     formulas = re.findall(r"^\$\$(.+)\$\$$", text, re.MULTILINE)
     assert len(formulas) == 12
     for formula in formulas:

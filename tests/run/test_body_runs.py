@@ -15,10 +15,9 @@ from symtop.core import netcdf
 from symtop.methods.framework.registry import engines
 from symtop.methods.splitting import body as splitting_body
 from symtop.methods.splitting.coefficients import STRANG
-from symtop.model.body import Attitude, RigidBody, from_flat, product, rotated
+from symtop.model.body import Attitude, RigidBody, from_flat, rotated
 from symtop.model.charts import BODY, attitude_distance
 from symtop.model.exact import heavy_body
-from symtop.model.scenes import body_scenes
 from symtop.run.ensemble import chunks
 from symtop.run.ensemble.bodies import scenes_of
 from tests.commands import call
@@ -41,7 +40,6 @@ TO_ROUNDING = ("strang", "kahan-li-8", "chin-4a", "srkn-11-6", "lie-variational"
 TO_ORDER = {"gauss-4": 4, "rkmk-se3-4": 4, "crouch-grossman-3": 3, "commutator-free-4": 4}
 ADAPTIVE = ("rk45", "dop853", "rk45-compiled", "dop853-compiled", "tsit5", "vern9", "series-general-adaptive",
             "extrapolation", "adams", "taylor", "taylor-longdouble")  # fmt: skip
-ANGLE = math.radians(0.3)
 
 
 def error(name: str | symtop.Scene, method: str | symtop.Integrator, **settings: float) -> float:
@@ -72,7 +70,7 @@ def slope(scene: symtop.Scene, method: str, order: int, true: symtop.Scene | Non
 @pytest.mark.parametrize(("method", "order"), [
     pytest.param(*one, marks=[pytest.mark.quick][one[0] in CONSERVED :]) for one in FIXED.items()])  # fmt: skip
 def test_the_error_falls_by_the_order(name: str, method: str, order: int) -> None:
-    power = slope(body_scenes()[name], method, order)
+    power = slope(symtop.body_scenes()[name], method, order)
     steep = 6.0 if order in (9, 16) else 1.6  # there the long steps fall as powers of h over a radius
     assert order - 0.6 < power < order + steep
 
@@ -83,7 +81,7 @@ def test_a_table_for_an_exact_drift_falls_to_order_two_with_one_of_order_two(nam
     entry = symtop.integrator(method)
     solver = dataclasses.replace(entry.solvers[BODY], loop=splitting_body.march(STRANG))  # type: ignore[type-var]
     plain = dataclasses.replace(entry, name="plain", order=2, solvers={BODY: solver})
-    step = body_scenes()[name].nutation_period / 40
+    step = symtop.body_scenes()[name].nutation_period / 40
     coarse, fine = (error(name, plain, step_size=h) for h in (step, 0.5 * step))
     assert abs(math.log2(coarse / fine) - 2.0) < 0.1
 
@@ -99,7 +97,7 @@ def test_a_tight_tolerance_comes_to_the_true_motion(name: str, method: str) -> N
 @pytest.mark.parametrize(("order", "method"), {order: method for method, order in FIXED.items()}.items())
 def test_a_wrong_sign_in_the_inertia_is_caught(name: str, method: str, order: int) -> None:
     """The same momentum of the mirrored body: I1 and I3 exchanged turn the gyroscopic torque around."""
-    scene = body_scenes()[name]
+    scene = symtop.body_scenes()[name]
     body, M = scene.top, scene.top.momentum(scene.start)
     mirrored = RigidBody(body.I3, body.I2, body.I1, body.mgl, body.centre)
     rates = tuple(part / moment for part, moment in zip(M, mirrored.moments, strict=True))
@@ -110,7 +108,7 @@ def test_a_wrong_sign_in_the_inertia_is_caught(name: str, method: str, order: in
 @pytest.mark.parametrize("name", BODIES)
 @pytest.mark.parametrize("method", CONSERVED)
 def test_a_method_keeps_what_it_must_and_nothing_else(name: str, method: str) -> None:
-    scene, (free, heavy) = body_scenes()[name], CONSERVED[method]
+    scene, (free, heavy) = symtop.body_scenes()[name], CONSERVED[method]
     step = scene.nutation_period / 40
     errors = symtop.errors(symtop.simulate(name, method, step_size=step, samples=101, guard=False))
     for quantity in ("energy", "p_phi") + ("momentum",) * scene.top.free:
@@ -162,7 +160,7 @@ def test_another_method_comes_to_the_symmetric_top_by_its_order(method: str, ord
     assert abs(math.log2(coarse / fine) - order) < 0.3
 
 
-def test_energy_and_momentum_are_those_of_its_states_and_a_trajectory_of_another_program_is_judged():
+def test_energy_and_momentum_of_a_run_are_those_of_its_states():
     run = symtop.simulate("heavy-brick", "rk4", step_size=0.2, samples=11, guard=False)
     truth, errors = symtop.reference("heavy-brick", run.time.values), symtop.errors(run)
     assert {*errors.data_vars} >= {"attitude", "axis", "theta", "momentum", "energy", "p_phi", "attitude_bound"}
@@ -170,13 +168,6 @@ def test_energy_and_momentum_are_those_of_its_states_and_a_trajectory_of_another
     np.testing.assert_allclose(run["p_phi"], run["momentum"][:, 2], rtol=1e-13)
     assert abs(run["energy"][0] - truth["energy"][0]) < 1e-15
     assert 1e-6 < abs(run["energy"] - run["energy"][0]).max() < 1e-1
-    times = np.linspace(0.0, 30.0, 31)
-    truth = symtop.reference("check-case-2", times)
-    exact = symtop.errors({"time": times, "quaternion": truth["quaternion"].values}, "check-case-2")
-    assert exact["attitude"].max() < 1e-14
-    turned = [product(q, (math.cos(ANGLE / 2), math.sin(ANGLE / 2), 0.0, 0.0)) for q in truth["quaternion"].values]
-    off = symtop.errors({"time": times, "quaternion": np.array(turned)}, "check-case-2")["attitude"].values
-    np.testing.assert_allclose(off, ANGLE, rtol=1e-9)
 
 
 def test_a_sweep_and_a_comparison_take_a_body(tmp_path) -> None:  # type: ignore[no-untyped-def]
@@ -187,7 +178,6 @@ def test_a_sweep_and_a_comparison_take_a_body(tmp_path) -> None:  # type: ignore
     shown = symtop.compare("check-case-2", ["rk4", "series-general"], quantity="attitude", quiet=True)
     assert [*shown["variant"].values] == ["rk4[body]", "series-general[body]"]
     assert ((shown["seconds"].max("setting") > 0.0) & shown["exact_seconds"].isnull()).all()
-    assert "natural periods" in symtop.plot(shown).get_title(loc="left")
     for drawn in (data, shown, symtop.simulate("heavy-brick", "rk4", step_size=0.2, samples=11, guard=False)):
         assert symtop.plot(drawn, quantity="energy").get_ylabel().endswith("energy error / (T0 + |mgl|)")
 

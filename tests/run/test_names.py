@@ -11,7 +11,6 @@ from symtop.judging.claims import constants
 from symtop.methods.framework import registry
 from symtop.methods.lagrangian.discrete_lagrangian import is_midpoint
 from symtop.run.guard import forecast
-from symtop.run.long_run import long_run
 from symtop.run.modified_energy import modified_energy
 from symtop.run.simulation import make_plan
 
@@ -29,7 +28,7 @@ def test_long_run_modified_energy_stability_and_forecast_do_not_look_at_the_name
     own = symtop.integrator(name)
     other = symtop.register(dataclasses.replace(own, name="renamed") if how == "a copy" else MADE[name](), replace=True)
     h = SCENE.nutation_period / 137.3
-    runs = [long_run(SCENE, method.name, steps=20_000, step_size=h, quiet=True) for method in (own, other)]
+    runs = [symtop.long_run(SCENE, method.name, steps=20_000, step_size=h, quiet=True) for method in (own, other)]
     for variable in runs[0]:
         np.testing.assert_array_equal(runs[0][variable].values, runs[1][variable].values)
     chart = own.chart_for("axis")
@@ -89,10 +88,8 @@ def test_charts_are_chosen_by_what_they_show_and_a_row_is_a_method_in_one():
     assert strang.variant("attitude").charts() == ("attitude",)
     with pytest.raises(symtop.SymtopError, match="cannot show the attitude"):
         strang.variant("axis").chart_for("attitude")
-    in_angles, on_axis = symtop.integrator("rk4[angles]"), symtop.integrator("rk4[axis]")
+    on_axis = symtop.integrator("rk4[axis]")
     assert (on_axis.name, on_axis.method, on_axis.charts()) == ("rk4[axis]", "rk4", ("axis",))
-    runs = {row.name: symtop.simulate("spheroid", row, step_size=0.01, guard=False) for row in (in_angles, on_axis)}
-    assert {name: run.attrs["chart"] for name, run in runs.items()} == {"rk4[angles]": "angles", "rk4[axis]": "axis"}
     assert on_axis.variant("axis") is on_axis
     names = [row.name for row in registry.variants()]
     assert len(names) == len(set(names)) == sum(len(entry.charts()) for entry in registry.methods().values())

@@ -8,7 +8,6 @@ import pytest
 
 import symtop
 from symtop.measure.timing import bare_run, timings
-from symtop.methods.framework.plan import Plan
 from symtop.model.scenes import closed_form, scene
 from symtop.run.guard import forecast
 from symtop.run.motion import PAIR_STEPS, POINTS, Integrated
@@ -66,7 +65,7 @@ def test_the_guard_watches_two_motions_in_the_time_of_one():
     body = scene("heavy-brick", bodies=True)
     watched = Integrated(symtop.Scene("long", body.top, body.start, 200.0 * body.nutation_period))
     steps = math.ceil(watched.scene.horizon * watched.fast * PAIR_STEPS / (2.0 * math.pi))
-    plan = Plan.steps(watched.scene.horizon / steps, np.arange(1, POINTS + 1) * steps // POINTS)
+    plan = symtop.Plan.steps(watched.scene.horizon / steps, np.arange(1, POINTS + 1) * steps // POINTS)
     solver = symtop.integrator("dop853-compiled-fixed").solvers["body"]
 
     def alone():

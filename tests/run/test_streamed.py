@@ -34,6 +34,12 @@ def small_pieces(monkeypatch):
     monkeypatch.setattr(chunks, "CHUNK", 21 * 7)
 
 
+def refused(words, path, name="strang[axis]", **changed):
+    """The ensemble is not written to that file."""
+    with pytest.raises(symtop.SymtopError, match=words):
+        symtop.ensemble(SOME, name, path=path, **SETTINGS | changed)
+
+
 @pytest.mark.parametrize(("name", "settings"), [
     ("strang[attitude]", {}), ("stormer-verlet", {}), ("strang[axis]", {"variables": ["energy", "p_phi"]}),
     ("midpoint", {"nutations": None, "horizon": 0.7, "per_nutation": None, "step_size": 0.01}),
@@ -85,13 +91,10 @@ def test_the_beginning_of_another_ensemble_and_a_damaged_piece_are_refused(tmp_p
         patch.setattr(ensemble.Stream, "finish", lambda *_: xr.Dataset())
         symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
     for changed in ({"samples": 20}, {"per_nutation": 21}, {"variables": ["axis"]}):
-        with pytest.raises(symtop.SymtopError, match="beginning of another ensemble"):
-            symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS | changed)
-    with pytest.raises(symtop.SymtopError, match="beginning of another ensemble"):
-        symtop.ensemble(SOME, "cayley[axis]", path=path, **SETTINGS)
+        refused("beginning of another ensemble", path, **changed)
+    refused("beginning of another ensemble", path, "cayley[axis]")
     (folder / "7-14.npz").write_bytes((folder / "7-14.npz").read_bytes()[:-300])
-    with pytest.raises(symtop.SymtopError, match=r"7-14.npz is damaged .*: remove it"):
-        symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
+    refused(r"7-14.npz is damaged .*: remove it", path)
     (folder / "7-14.npz").unlink()
     with symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS) as data:
         assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **SETTINGS))
@@ -104,8 +107,7 @@ def test_one_process_at_a_time_writes_a_file(tmp_path, small_pieces, monkeypatch
     def disturbed(stream, piece, columns):
         if piece.start == 7 and not once:
             once.append(1)
-            with pytest.raises(symtop.SymtopError, match=f"another process is writing {path}: wait until it has"):
-                symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
+            refused(f"another process is writing {path}: wait until it has", path)
             symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "other.nc", **SETTINGS).close()
         keep(stream, piece, columns)
 
@@ -125,8 +127,7 @@ def test_a_piece_that_was_removed_is_not_called_damaged(tmp_path, small_pieces, 
 
     with monkeypatch.context() as patch:
         patch.setattr(ensemble.Stream, "finish", robbed)
-        with pytest.raises(symtop.SymtopError, match=r"7-14.npz is not there any more, so somebody has removed it"):
-            symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
+        refused(r"7-14.npz is not there any more, so somebody has removed it", path)
     with symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS) as data:
         assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **SETTINGS))
 
@@ -155,8 +156,7 @@ def test_pieces_that_do_not_say_whose_they_are_belong_to_nobody(tmp_path, small_
     folder = tmp_path / "runs.nc.parts"
     folder.mkdir()
     (folder / "0-7.npz").write_bytes(b"somebody's")
-    with pytest.raises(symtop.SymtopError, match="does not say which ensemble it is of"):
-        symtop.ensemble(SOME, "strang[axis]", **settings)
+    refused("does not say which ensemble it is of", path)
     assert (folder / "0-7.npz").read_bytes() == b"somebody's"
     assert path.read_bytes() == made
 
@@ -164,12 +164,10 @@ def test_pieces_that_do_not_say_whose_they_are_belong_to_nobody(tmp_path, small_
 def test_nothing_is_replaced_that_is_no_netcdf_file(tmp_path, small_pieces):
     path = tmp_path / "mine.py"
     path.write_text("print(1)")
-    with pytest.raises(symtop.SymtopError, match="it is there, and no netCDF file"):
-        symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
+    refused("it is there, and no netCDF file", path)
     assert path.read_text() == "print(1)"
     for place in (tmp_path, "/proc/no/such/runs.nc"):
-        with pytest.raises(symtop.SymtopError, match="cannot write"):
-            symtop.ensemble(SOME, "strang[axis]", path=place, **SETTINGS)
+        refused("cannot write", place)
     assert [file.name for file in tmp_path.iterdir()] == ["mine.py"]
     for name in ("strang[axis]", "rk4[axis]"):
         with symtop.ensemble(SOME, name, path=tmp_path / "runs.nc", **SETTINGS) as data:
@@ -182,8 +180,7 @@ def test_what_a_killed_writer_left_is_swept_and_a_library_without_room_says_so(t
     no_room = Mock(side_effect=RuntimeError("NetCDF: HDF error"))
     with monkeypatch.context() as patch:
         patch.setattr(ensemble, "_lay_out", no_room)
-        with pytest.raises(symtop.SymtopError, match="is the disk full"):
-            symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
+        refused("is the disk full", path)
     assert {file.name for file in tmp_path.iterdir()} == {"runs.nc.parts"}
     (tmp_path / "runs.nc.parts" / ".0-7.npz.0123abcd.part.npz").write_bytes(b"half")
     monkeypatch.setattr(ensemble.Stream, "keep", no_room)  # nothing is left to be computed

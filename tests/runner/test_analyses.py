@@ -15,7 +15,6 @@ from symtop.runner import run as runner, store
 from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool
 from symtop.runner.run import analyse_stored, drawing_digest
-from symtop.runner.study import Case
 from tests.commands import answer, leftovers, same
 
 SCRIPT = """
@@ -167,6 +166,6 @@ def test_a_case_whose_file_is_gone_has_failed_and_timed_cases_wait_for_analyses(
     for timed in (False, True):
         study = replace(runner.load(script("first")), timed=timed, measure=measure)
         symtop.register_scene(replace(symtop.scene("spheroid"), name=f"here-{timed}"))  # cases of this process
-        here = replace(study, cases=lambda _, name=f"here-{timed}": [Case(name, "midpoint")])
+        here = replace(study, cases=lambda _, name=f"here-{timed}": [symtop.Case(name, "midpoint")])
         runner.start(here, tmp_path / "r", pool, quiet=True)
     assert states == [False, True]

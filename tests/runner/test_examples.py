@@ -4,7 +4,6 @@ import importlib.metadata
 import json
 import math
 import shutil
-from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -15,21 +14,17 @@ from symtop.measure.accuracy import error_table
 from symtop.measure.order import order
 from symtop.methods.framework import registry
 from symtop.run import plugins
-from tests.commands import call, printed_by
+from tests.commands import ROOT, call, printed_by
 
-EXAMPLE = Path(__file__).resolve().parents[2] / "studies" / "examples" / "my_methods.py"
-
-
-@pytest.fixture
-def example(tmp_path, clean_registry):
-    shutil.copy(EXAMPLE, tmp_path / "my_own_methods.py")
-    plugins.load(tmp_path / "my_own_methods.py")
+EXAMPLE = ROOT / "studies" / "examples" / "my_methods.py"
 
 
 CLAIMS = {"two-point": 2, "mclachlan-2": 2, "ralston-3": 3, "symplectic-euler": 1}
 
 
-def test_its_methods_have_the_orders_they_claim_and_its_kernel_keeps_the_momenta(example):
+def test_its_methods_have_the_orders_they_claim_and_its_kernel_keeps_the_momenta(tmp_path, clean_registry):
+    shutil.copy(EXAMPLE, tmp_path / "my_own_methods.py")
+    plugins.load(tmp_path / "my_own_methods.py")
     scene = symtop.scene("goldstein")
     for name, claim in CLAIMS.items():
         method = symtop.integrator(name)

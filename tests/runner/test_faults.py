@@ -21,15 +21,8 @@ from symtop.core import files, netcdf
 from symtop.core.errors import SymtopError
 from symtop.core.signals import at_most
 from symtop.runner import pool as work, run as runner, store
-from tests.commands import PROBE, answer, contents, ended, leftovers, same, stop, symtop
+from tests.commands import PROBE, contents, ended, leftovers, probed as probe, same, stop, succeeded, symtop
 from tests.kills import survive
-
-
-def probe(results, *words, code=0):
-    """What the quick probe says in this process; it must end with that exit code."""
-    ended_with, output = answer("study", PROBE, "--quick", "--results", results, *words)
-    assert ended_with == code, output
-    return output
 
 
 def refused(results, says):
@@ -79,7 +72,7 @@ def sentences(err):
 @pytest.mark.slow
 def test_a_real_limit_on_the_size_of_files(tmp_path):
     """The kernel refuses to let files grow beyond 8 kB: every write fails as on a full disk, in workers too."""
-    assert ended(symtop("study", PROBE, "--results", tmp_path / "warm"))[0] == 0  # kernels are cached now
+    succeeded(symtop("study", PROBE, "--results", tmp_path / "warm"))  # kernels are cached now
     code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192)); "
     code += "from symtop.cli.main import main; sys.argv[0] = 'symtop'; main()"
     words = ["study", str(PROBE), "--results", str(tmp_path / "small")]
@@ -165,13 +158,10 @@ def test_two_runs_at_once_share_the_work_and_agree(tmp_path):
     log, words = tmp_path / "log", ["study", PROBE, "--results", tmp_path / "shared", "--jobs", 2]
     runs = [symtop(*words, PROBE_LOG=log, PROBE_PAUSE=0.3) for _ in range(2)]
     for run in runs:
-        code, out, err = ended(run)
-        assert code == 0, err
-        assert "of 12 cases computed" in out
+        assert "of 12 cases computed" in succeeded(run)
     names = log.read_text().split()
     assert len(names) == len(set(names)) == 12
-    code, _, err = ended(symtop("study", PROBE, "--results", tmp_path / "alone"))
-    assert code == 0, err
+    succeeded(symtop("study", PROBE, "--results", tmp_path / "alone"))
     same(tmp_path / "shared", tmp_path / "alone")
     assert not leftovers(tmp_path / "shared")
 
@@ -223,9 +213,7 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, quick):
     assert not leftovers(tmp_path / "r")
     count = len(list((tmp_path / "r").rglob("cases/probe/*.npz")))
     assert count >= 1, [path.read_text() for path in (tmp_path / "r").rglob("*.failed.json")]
-    code, out, err = ended(symtop(*words, PROBE_LOG=log))
-    assert code == 0, err
-    assert f"{(4 if quick else 12) - count} of" in out
+    assert f"{(4 if quick else 12) - count} of" in succeeded(symtop(*words, PROBE_LOG=log))
     assert not leftovers(tmp_path / "r")
 
 
@@ -247,9 +235,7 @@ def test_a_worker_that_is_killed_costs_no_more_than_what_it_was_computing(tmp_pa
     workers = [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
     spawned = [pid for pid in workers if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
     os.kill(spawned[0], signal.SIGKILL)
-    code, out, err = ended(process)
-    assert code == 0, err
-    assert "12 of 12 cases computed" in out
+    assert "12 of 12 cases computed" in succeeded(process)
     names = log.read_text().split()
     assert len(names) - len(set(names)) <= 2  # one case a worker
 
@@ -292,7 +278,7 @@ def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
     plugin.write_text(BAD)
     results = tmp_path / "r"
     words = ["study", PROBE, "--results", results, "--jobs", 2]
-    assert ended(symtop(*words))[0] == 0  # the good ones have compiled their kernels
+    succeeded(symtop(*words))  # the good ones have compiled their kernels
     code, out, err = ended(symtop(*words, "--plugin", plugin, "--limit", 3))
     assert code == 1
     assert "2 of 24 cases computed" in out  # those that return NaN: a result like any other

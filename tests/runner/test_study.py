@@ -18,7 +18,7 @@ from symtop.model import scenes as catalogue
 from symtop.model.scenes import TAGS
 from symtop.runner import run as runner, store
 from symtop.runner.study import Case
-from tests.commands import PROBE, call, contents
+from tests.commands import PROBE, call, contents, probed as probe
 
 
 def test_every_study_leaves_figures_and_findings_that_follow_from_its_dataset(quick_results, tmp_path):
@@ -38,11 +38,6 @@ def test_every_study_leaves_figures_and_findings_that_follow_from_its_dataset(qu
         for table in findings["tables"]:
             file = f"tables/{table['file']}"
             assert (tmp_path / file).read_bytes() == (quick_results / file).read_bytes(), file
-
-
-def probe(results, *words, code=0):
-    """What the quick probe prints; it must end with that exit code."""
-    return call("study", PROBE, "--quick", "--results", results, *words, code=code).output
 
 
 def test_fresh_computes_everything_and_the_files_are_the_same_to_the_byte(tmp_path):

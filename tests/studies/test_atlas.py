@@ -302,9 +302,8 @@ def test_the_midpoint_rule_is_known_by_its_nodes_and_not_by_its_name():
     assert "plain_energy" not in sampling_table("goldstein", integrator("trapezoidal"), settings)
 
 
-@pytest.fixture(scope="module")
-def measured():
-    """Some quick cases of two variants in all parts of the study, with fewer settings."""
+def test_facts_are_those_of_the_mechanisms_and_the_page_says_them_but_none_of_what_was_not_measured(tmp_path):
+    """Some quick cases of three variants in all parts of the study, with fewer settings."""
     names, smaller = ("stormer-verlet[angles]", "midpoint[angles]", "strang[axis]"), []
     for case in study.cases(True):
         if case.integrator in names:
@@ -312,10 +311,7 @@ def measured():
             if case.scene == study.FAMILY:
                 settings |= {key: settings[key][::4] for key in ("parameters", "ladder")}
             smaller.append(dataclasses.replace(case, settings=settings))
-    return datasets.combine([(case, study.measure(case)) for case in smaller])
-
-
-def test_facts_are_those_of_the_mechanisms_and_the_page_says_them_but_none_of_what_was_not_measured(measured, tmp_path):
+    measured = datasets.combine([(case, study.measure(case)) for case in smaller])
     answers = facts.facts(measured)
     assert answers.keys() >= set(facts.NAMES)
     adaptive = {"fast_finer", "not_angles", "slow_finer", "in_angles"}  # there are none here

@@ -23,6 +23,7 @@ from symtop.methods.framework.registry import integrator
 from symtop.model.charts import BODY, attitude_distance
 from symtop.run.motion import CHECK, FINE, Integrated
 from symtop.runner import run as runner
+from tests.studies.test_cost import priced
 
 COUNT, PERIODS = 4, 5.0
 EVERYONE = np.arange(COUNT)
@@ -240,12 +241,7 @@ def planted(factor):
         "control": ("variant", ["step_size"] * 3), "needs": ("variant", ["derivative", "kicks", "derivative"]),
     }, {"variant": variants, "family": families, "quantity": ["axis", "attitude"],
         "target": [1e-3, 1e-6, 1e-9]}).expand_dims("scene")  # fmt: skip
-    over = ("scene", "variant", "priced_at")
-    prices = xr.Dataset({
-        "price": (over, np.full((3, 3, 7), 1e-7)), "call": (over, np.full((3, 3, 7), 1e-6)),
-        "sampled": (over[:2], np.full((3, 3), np.nan)),
-    }, {"variant": variants, "priced_at": 10.0 ** -np.arange(2.0, 16.0, 2.0),
-        "scene": ["first-0", "first-1", "first-2"]})  # fmt: skip
+    prices = priced(np.full((3, 3), 1e-7), variants, call=1e-6)
     about = xr.Dataset({"growth": (("scene", "family", "member"), np.full((1, len(families), members), 10.0)),
                         "stratum": (("scene", "family", "member"), np.full((1, len(families), members), "heavy"))},
                        {"scene": ["short"], "family": families}).expand_dims("variant")  # fmt: skip

@@ -106,8 +106,7 @@ def test_what_a_reduced_kernel_saves_is_split_into_iterations_and_the_time_of_on
     assert (answers["power_most"], table["at the finest step (rad)"][2]) == pytest.approx((2.0, gaps[0][2][-1]))
 
 
-@pytest.fixture(scope="module")
-def measured():
+def test_facts_and_page_are_those_of_the_rules_and_charts(tmp_path):
     """Every rule on one scene, and one method in its charts, all with short runs."""
     small = {"counts": [50, 100, 200, 400], "batches": 1, "horizon": 2.0, "step_sizes": [0.1, 0.01]}
     parts = []
@@ -115,10 +114,7 @@ def measured():
         if case.scene == "spheroid" and (case.settings["part"] != "charts" or case.integrator == "euler-poincare"):
             settings = {key: small.get(key, value) for key, value in case.settings.items()}
             parts.append((case, study.measure(dataclasses.replace(case, settings=settings))))
-    return datasets.combine(parts)
-
-
-def test_facts_and_page_are_those_of_the_rules_and_charts(measured, tmp_path):
+    measured = datasets.combine(parts)
     answers = facts.facts(measured)
     assert answers["commuting"] == "midpoint"
     assert answers["commuting_gap"] < 1e-13
@@ -133,9 +129,7 @@ def test_facts_and_page_are_those_of_the_rules_and_charts(measured, tmp_path):
     assert facts.facts(two)["others"] == answers["others"]
     assert np.isnan(facts.facts(two)["power_least"])
     assert len(figures.pictures(two)) == 1
-    text = checked("reduction", measured, tmp_path)
-    assert "With midpoint it makes no difference" in text
-    assert "With trapezoidal, simpson-linear, galerkin-simpson it does." in text
+    checked("reduction", measured, tmp_path)
 
 
 @pytest.mark.parametrize(("failed", "ratio"), [(np.nan, 2.0), (0.1, 1.75)])

@@ -147,17 +147,20 @@ def test_a_lead_is_called_if_neither_tops_nor_prices_can_turn_it_and_hindsight_m
         assert safe([steps("a", met, 1.0, error), steps("b", met, 1.08, error)])[1] is called
 
 
-def tree_of(price, names=("a", "b", "c"), **others):
-    """Prices (processes, variants) in a dataset of the study."""
+def priced(price, names, call=2e-6):
+    """Prices (processes, variants) as the study stores them."""
     price = np.asarray(price, dtype=float)
     shape = (*price.shape, len(pricing.TOLERANCES))
     dims = ("scene", "variant", "priced_at")
-    group = xr.Dataset({
-        "price": (dims, np.broadcast_to(price[..., np.newaxis], shape)), "call": (dims, np.full(shape, 2e-6)),
+    return xr.Dataset({
+        "price": (dims, np.broadcast_to(price[..., np.newaxis], shape)), "call": (dims, np.full(shape, call)),
         "sampled": (dims[:2], np.full(price.shape, NAN)),
     }, {"scene": [f"{pricing.BATCHES[k // 5]}-{k % 5}" for k in range(len(price))], "variant": list(names),
         "priced_at": list(pricing.TOLERANCES)})  # fmt: skip
-    return xr.DataTree.from_dict({"prices": group} | others)
+
+
+def tree_of(price, names=("a", "b", "c")):
+    return xr.DataTree.from_dict({"prices": priced(price, names)})
 
 
 def test_a_price_is_the_median_and_a_process_that_is_slower_at_everything_no_spread():

@@ -9,7 +9,6 @@ import pytest
 import xarray as xr
 from symtop_studies.cost import facts, far as runs, laws
 from symtop_studies.cost.far import diagram
-from symtop_studies.cost.prices import TOLERANCES
 from symtop_studies.cost.tops import Tops
 
 import symtop
@@ -17,10 +16,10 @@ from symtop.core import netcdf
 from symtop.core.numbers import EPSILON
 from symtop.measure.order import power_law
 from symtop.measure.phase import split
-from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
 from symtop.run.trajectory import Trajectory
+from tests.studies.test_cost import priced
 
 FAR = runs.horizons()
 SHORT = FAR <= 1.0001e3
@@ -48,7 +47,7 @@ def test_a_power_is_found_and_continued_over_six_decades(power):
 
 @pytest.mark.parametrize("name", ["strang[axis]", "srkn-14-6[axis]", "rk4[axis]", "series[axis]", "midpoint[angles]"])
 def test_a_law_predicts_a_measured_horizon_that_was_left_out_of_the_fit(name):
-    row, tops = integrator(name), one_top()
+    row, tops = symtop.integrator(name), one_top()
     ends = FAR[FAR <= 1.0001e4]
     within = 2.0 if name == "series[axis]" else 1.2  # at order 16 a factor of 2 in the error is one of 1.04 in the step
     setting = {"srkn-14-6[axis]": 13.11, "series[axis]": 11.3}.get(name, 140.0)
@@ -64,7 +63,7 @@ def test_a_law_predicts_a_measured_horizon_that_was_left_out_of_the_fit(name):
 
 def test_rounding_is_not_predicted_above_what_the_run_has_shown():
     """A fast top, whose nutation has little energy: its walk overstates that of the axis 10^5 times."""
-    row, tops = integrator("srkn-19-8[axis]"), runs.tops_of(1, 1)
+    row, tops = symtop.integrator("srkn-19-8[axis]"), runs.tops_of(1, 1)
     ends = FAR[FAR <= 1.0001e4]
     ((seen, work),) = runs.measured(row, tops, [runs.Asked(17.48, ends, np.inf)])
     known = np.full((len(runs.QUANTITIES), 1, FAR.size, 1), np.nan)
@@ -112,7 +111,7 @@ def test_a_drift_below_an_oscillation_is_found_and_a_wrong_law_would_not_predict
     np.testing.assert_allclose(walked, 1e-15 * np.sqrt(FAR))
     np.testing.assert_allclose(laws.rounding("axis", 1e-16, FAR, 100.0 * FAR) / walked, 2 * np.pi * FAR / np.sqrt(3))
     tops, asked = one_top(), runs.Asked(140.0, FAR[FAR <= 1.0001e4], np.inf)
-    ((seen, _),) = runs.measured(integrator("rk4[axis]"), tops, [asked])
+    ((seen, _),) = runs.measured(symtop.integrator("rk4[axis]"), tops, [asked])
     energy = seen[1, :, 0]
     assert energy[-1] > 5.0 * energy[8]  # what a bounded law says at 10^3 is off by that at 10^4
 
@@ -120,7 +119,7 @@ def test_a_drift_below_an_oscillation_is_found_and_a_wrong_law_would_not_predict
 @pytest.mark.parametrize("name", ["strang[axis]", "gauss-4[axis]", "rk45-compiled[axis]"])
 def test_settings_side_by_side_show_what_each_shows_by_itself(name):
     """To the last bit: settings of unlike lengths, one of them with fewer steps than another has samples."""
-    row, tops = integrator(name), runs.tops_of(4, 1)
+    row, tops = symtop.integrator(name), runs.tops_of(4, 1)
     settings = (4.37, 17.48, 34.96) if row.fixed_step else (1e-4, 1e-6)
     wanted = [runs.Asked(one, FAR[: 9 - 2 * k], 1e6) for k, one in enumerate(settings)]
     for given in (wanted, [*wanted, runs.Asked(settings[0], FAR[:1], 1e6)]):
@@ -225,11 +224,7 @@ def test_the_map_goes_by_the_median_top_and_its_shares_are_of_the_cells_that_are
         "setting_value": (over[:3], [[[4.0, 8.0]] * 2]), "reach": (over[:3], [[[1e5, 10.0]] * 2]),
         "conserves_energy": (over[:2], [[0.0, 0.0]]),
     }, {"variant": names, "quantity": list(runs.QUANTITIES), "horizon": [10.0, 1e5]})  # fmt: skip
-    over = ("scene", "variant", "priced_at")
-    prices = xr.Dataset({"price": (over, np.full((5, 2, 7), 1e-8)), "call": (over, np.zeros((5, 2, 7))),
-                         "sampled": (over[:2], np.full((5, 2), np.nan))},
-                        {"scene": [f"first-{k}" for k in range(5)], "variant": names,
-                         "priced_at": list(TOLERANCES)})  # fmt: skip
+    prices = priced(np.full((5, 2), 1e-8), names, call=0.0)
     tree = xr.DataTree.from_dict({"far": far, "prices": prices})
     panel = diagram(tree, "axis")
     reached = np.array(runs.TARGETS)[:, np.newaxis] >= 1e-4 * (1.0 - 1e-9) * np.ones(2)

@@ -18,7 +18,6 @@ from symtop.measure import settings
 from symtop.measure.datasets import combine
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.report.formats import number
-from symtop.runner.study import Case
 from tests.templates import checked
 
 SCENE = symtop.scene("spheroid")
@@ -37,7 +36,7 @@ def measured():
         once.setattr(measures, "TRIES", 1)
         once.setattr(fresh_process, "call", call)
         data = factorial(SCENE, [DORMAND_PRINCE, "Takahashi-Imada"], [SHORT], 2, 0.001, 2)
-    return combine([(Case("spheroid", "together"), data)])
+    return combine([(symtop.Case("spheroid", "together"), data)])
 
 
 @pytest.fixture(scope="module")

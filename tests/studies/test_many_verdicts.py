@@ -7,10 +7,9 @@ import pytest
 import xarray as xr
 from symtop_studies.stability.many_verdicts import VERDICTS, judge_runs, truths
 
+import symtop
 from symtop.measure.verdicts import judgement
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan
-from symtop.methods.framework.registry import integrator
 from symtop.model.charts import View, axis_distance
 from symtop.model.scenes import closed_form, grazing, scene
 
@@ -20,8 +19,8 @@ SAMPLES = 41
 def run_of(scene_, name, chart, step, count):
     """A run with its times, and the dataset that `judgement` reads."""
     h = step * scene_.nutation_period
-    plan = Plan.steps(h, np.unique(np.rint(np.linspace(0, count, SAMPLES)).astype(np.int64)))
-    run = solve(integrator(name), chart, scene_.top, scene_.start, plan)
+    plan = symtop.Plan.steps(h, np.unique(np.rint(np.linspace(0, count, SAMPLES)).astype(np.int64)))
+    run = solve(symtop.integrator(name), chart, scene_.top, scene_.start, plan)
     seen = View(chart, scene_.top, run.states, run.p_phi, run.p_psi)
     shown = {name: ("time", getattr(seen, name)) for name in ("theta", "energy", "p_phi", "p_psi")}
     return plan.times, run, seen, xr.Dataset(shown, {"time": plan.times}, {"outcome": run.outcome})
@@ -65,8 +64,8 @@ def test_a_quaternion_that_leaves_length_one_has_failed_in_one_pass_as_alone(ste
     cusp = scene("cusp")
     times, run, _, _ = run_of(cusp, "rk4", "attitude", step, 400)
     assert run.outcome == "not_normalised"
-    plan = Plan.steps(step * cusp.nutation_period, np.arange(0, 401, 10))
-    bare = integrator("rk4").solvers["attitude"](cusp.top, cusp.start, plan)  # it says nothing of it
+    plan = symtop.Plan.steps(step * cusp.nutation_period, np.arange(0, 401, 10))
+    bare = symtop.integrator("rk4").solvers["attitude"](cusp.top, cusp.start, plan)  # it says nothing of it
     assert bare.outcome == "ok"
     word, error = one_pass(cusp, times, bare.states, np.stack([bare.p_phi, bare.p_psi], axis=-1))
     assert word == "not_normalised"

@@ -12,13 +12,10 @@ from symtop_studies.notebook.measures import SOLVER, SOLVER_TOLERANCE, both_deri
 from symtop_studies.notebook.study import STUDY, cases, measure
 
 import symtop
-from symtop.core.errors import SymtopError
 from symtop.measure import datasets
 from symtop.methods.framework.angles import accelerations, momenta
-from symtop.methods.framework.plan import Plan
 from symtop.methods.lagrangian.discrete_lagrangian import RULES
 from symtop.run.modified_energy import modified_energy
-from symtop.runner.study import Case
 from tests.templates import checked
 
 FIRST = symtop.scene("spheroid").top
@@ -95,7 +92,7 @@ def test_a_step_of_the_kernels_is_the_discrete_legendre_transform(symbols, metho
         place |= {f"{v}": (b - a) / h for v, a, b in zip(symbols.v, first, last, strict=True)}
         L_d = L_d + h * weight * hy.subs(symbols.ways[2], place)
     slopes = hy.cfunc([*(hy.diff(L_d, a) for a in first), *(hy.diff(L_d, b) for b in last)], [*first, *last])
-    plan = Plan(np.array([0.0, h]), h, h, np.array([0, 1]), math.nan)
+    plan = symtop.Plan(np.array([0.0, h]), h, h, np.array([0, 1]), math.nan)
     run = symtop.integrator(method).solvers["angles"](scene.top, scene.start, plan)
     q = run.states[:, [0, 2, 3]]
     ends = slopes(np.concatenate([q[0], q[1]]))
@@ -142,9 +139,9 @@ def test_radii_give_the_inertia_and_alpha_contradicts_a_release_at_rest():
     for mass, polar, equatorial in ((1.0, 2.0, 1.0), (0.3, 0.1, 0.7)):
         body = symtop.SymmetricTop.from_spheroid(mass, polar, equatorial)
         assert body.spheroid_radii(mass) == pytest.approx((polar, equatorial), rel=1e-13)
-    with pytest.raises(SymtopError, match="no spheroid"):
+    with pytest.raises(symtop.SymtopError, match="no spheroid"):
         symtop.SymmetricTop(1.0, 2.0, 1.0).spheroid_radii(1.0)
-    with pytest.raises(SymtopError, match="mass"):
+    with pytest.raises(symtop.SymtopError, match="mass"):
         top.spheroid_radii(0.0)
     scene = symtop.scene("goldstein")
     cubic = nutation_cubic(scene)
@@ -156,7 +153,7 @@ def test_radii_give_the_inertia_and_alpha_contradicts_a_release_at_rest():
     for name, sign in (("goldstein-rising", 1.0), ("goldstein-falling", -1.0)):
         assert with_alpha(scene, 1.6, sign).start.theta_dot == pytest.approx(symtop.scene(name).start.theta_dot)
         assert nutation_cubic(symtop.scene(name)).alpha == pytest.approx(1.6, abs=1e-14)
-    with pytest.raises(SymtopError, match="alpha"):
+    with pytest.raises(symtop.SymtopError, match="alpha"):
         with_alpha(scene, 1.4, 1.0)
 
 
@@ -178,13 +175,13 @@ def test_the_lagrangian_is_the_same_in_three_forms_and_another_modified_energy_i
 @pytest.fixture(scope="module")
 def data():
     """The quick grid, with shorter long runs."""
-    asked = [Case(case.scene, case.integrator, case.settings | {"long": 100.0}) for case in cases(True)]
+    asked = [symtop.Case(case.scene, case.integrator, case.settings | {"long": 100.0}) for case in cases(True)]
     return datasets.combine([(case, measure(case)) for case in asked])
 
 
 def test_the_page_says_what_the_notebook_and_the_discrete_methods_keep(data, tmp_path):
-    answers, text = facts.facts(data), checked("notebook", data, tmp_path)
-    assert "mgl = 26.8658" in text
+    checked("notebook", data, tmp_path)
+    answers = facts.facts(data)
     assert (answers["compared"], answers["discrete"], answers["momenta_kept"]) == (5, 5, 5)
     assert answers["momenta"] < 1e-14
     assert answers["solver_momenta"] > 1e-7  # the control

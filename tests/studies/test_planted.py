@@ -7,7 +7,6 @@ from symtop_studies.claims import facts, figures, planted, study
 import symtop
 from symtop.judging.battery import SCENE
 from symtop.measure.datasets import combine
-from symtop.runner.study import Case
 
 LIAR = "planted-hidden-kick"
 
@@ -16,7 +15,7 @@ LIAR = "planted-hidden-kick"
 def data():
     """An honest method and a liar, as the study stores them."""
     (liar,) = (case for case in planted.cases(quick=True) if case.integrator == LIAR)
-    cases = [Case(name, "strang", {"quick": True}) for name in (facts.FREE, SCENE)] + [liar]
+    cases = [symtop.Case(name, "strang", {"quick": True}) for name in (facts.FREE, SCENE)] + [liar]
     return combine([(case, study.measure(case)) for case in cases])
 
 

@@ -11,7 +11,19 @@ import numpy as np
 from scipy.integrate import RK45
 
 from tests.judging.blind import right
-from tests.judging.blind.right import euler, explicit, heun, midpoint, product, rates, rk4, solved, turn
+from tests.judging.blind.right import (
+    ROTATION,
+    SEPARABLE,
+    euler,
+    explicit,
+    heun,
+    midpoint,
+    product,
+    rates,
+    rk4,
+    solved,
+    turn,
+)
 
 A, B, NODES = right.CLASSICAL
 swapped_weights = explicit(A, (1 / 6, 1 / 3, 1 / 6, 1 / 3), NODES)  # the last two are exchanged
@@ -301,7 +313,6 @@ def edits_the_judge(f, t, y, h):
     return heun(f, t, y, h)
 
 
-ROTATION, SEPARABLE = {"form": "rotation"}, {"form": "separable"}
 KEPT = ["energy", "p_phi", "p_psi", "axis_length"]
 ALL = {"order": 4, "symplectic": True, "symmetric": True, "conserves": ["energy"]}
 _TABLE = {  # names: claims, the line that names the defect, options
