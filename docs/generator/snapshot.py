@@ -3,9 +3,9 @@
 What the studies write into results/ is not tracked, so that a run of them leaves a checkout as it was. The snapshot is
 taken when what it says changes; a figure that the report no longer shows is removed from it. Tables are in it as far as
 the report shows them: the links to whole ones, which `make studies` writes, are taken out. What pages quote is put
-between their marks: the beginning of the front page in the README, which is the first page of the site, and answers of
-studies in docs/choosing.md, docs/results.md and docs/about/faq.md. What the benchmarks bench and peers have stored is
-said in docs/results.md by the templates beside this file.
+between their marks: in the README, which is the first page of the site, the figure of the front page before the first
+commands and its tables after them; answers of studies in docs/choosing.md, docs/results.md and docs/about/faq.md. What
+the benchmarks bench and peers have stored is said in docs/results.md by the templates beside this file.
 """
 
 import json
@@ -27,8 +27,9 @@ QUOTED = {  # of a page: the question, and the beginnings of further paragraphs
     "results.md": ("What makes",),
     "about/faq.md": ("My body is no symmetric top", "**What fell.** "),
 }
+TABLE = "**What can you supply?"  # with which the README goes on after its first commands
 HAVE = "You have one of these?"  # the title of a table of the front page
-BEGIN, END = "<!-- from the report -->\n", "<!-- to here -->\n"
+BEGIN, FIGURE, END = "<!-- from the report -->\n", "<!-- its figure -->\n", "<!-- to here -->\n"
 STORED_BY = {name: f"<!-- from results/{name}.json -->\n" for name in ("bench", "peers")}
 WIDTH = 118
 
@@ -96,11 +97,12 @@ def quote(said: str, page: str, begin: str = BEGIN) -> str:
     return f"{before}{begin}{said}{END}{rest[0].partition(END)[2]}"
 
 
-def quoted(report: str) -> dict[str, str]:
-    """What pages quote from the report, by their paths."""
-    answers = {f"docs/{page}": answer(report, *asked) for page, asked in QUOTED.items()}
-    answers["docs/choosing.md"] += titled(report, HAVE)
-    return {"README.md": beginning(report), **answers}
+def quoted(report: str) -> dict[tuple[str, str], str]:
+    """What pages quote from the report, by their paths and the marks before it."""
+    answers = {(f"docs/{page}", BEGIN): answer(report, *asked) for page, asked in QUOTED.items()}
+    answers["docs/choosing.md", BEGIN] += titled(report, HAVE)
+    figure, title, tables = beginning(report).partition(TABLE)
+    return {("README.md", FIGURE): figure.rstrip() + "\n", ("README.md", BEGIN): title + tables, **answers}
 
 
 def benchmark(name: str, results: Path) -> str:
@@ -129,9 +131,9 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
     snapshot = ROOT / "docs" / "snapshot"
     names = take(ROOT / "results", snapshot)
-    for name, said in quoted((snapshot / "report.md").read_text(encoding="utf-8")).items():
+    for (name, begin), said in quoted((snapshot / "report.md").read_text(encoding="utf-8")).items():
         page = ROOT / name
-        page.write_text(quote(said, page.read_text(encoding="utf-8")), encoding="utf-8")
+        page.write_text(quote(said, page.read_text(encoding="utf-8"), begin), encoding="utf-8")
     page = ROOT / "docs" / "results.md"
     for name, begin in STORED_BY.items():
         page.write_text(quote(benchmark(name, ROOT / "results"), page.read_text("utf-8"), begin), encoding="utf-8")

@@ -168,5 +168,5 @@ def _panel(axis: Any, panel: far.Diagram, painted: dict[str, str]) -> None:
             look["weight"] = "normal" if small else "bold"
             axis.text(x[h], y[t], letter.lower() if small else letter, color=ink, **look)
     axis.grid(visible=False)
-    axis.set_xticks(range(1, 9, 2), [f"$10^{{{k}}}$" for k in range(1, 9, 2)])
+    axis.set_xticks(range(1, 7), [f"$10^{{{k}}}$" for k in range(1, 7)])
     axis.set_yticks(range(-12, -1, 2), [f"$10^{{{k}}}$" for k in range(-12, -1, 2)])

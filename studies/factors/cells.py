@@ -7,8 +7,8 @@
                   scipy-python    SciPy's loop, the right-hand side in Python on floats
                   numpy           a loop in Python over NumPy arrays, see `plain_numpy`
     call          kernel          the bare solver, two samples
-                  simulate        `symtop.simulate` as it stands: 501 samples, its guard, a dataset
-                  solve_ivp       `scipy.integrate.solve_ivp` with the same 501 samples
+                  simulate        `symtop.simulate` as it stands: its guard, a dataset, 501 samples or each step
+                  solve_ivp       `scipy.integrate.solve_ivp` with 501 samples
 
 A splitting has another split in angles (kinetic energy of theta and effective potential) than in the space frame (free
 top and gravity), with the same coefficients. The implicit midpoint rule is `midpoint` in angles and `gauss-2` on

@@ -179,7 +179,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     for name, call_first in (("late", False), ("first", True)):
         bars = waterfall(part, call_first=call_first)
         answers |= {f"{name}_{factor}": bars["times faster"][bars["factor"] == factor].max() for factor in FACTORS}
-    answers |= _ends(part, bars)
+    answers |= _ends(part, waterfall(part), bars)
     for name, column in (("user", "times, as called"), ("author", "times, kernels")):
         answers |= {f"{name}_least": beside[column].min(), f"{name}_most": beside[column].max()}
     in_all = ratios.dropna()  # medians of one set of methods
@@ -189,14 +189,18 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     return answers
 
 
-def _ends(part: pd.DataFrame, bars: pd.DataFrame) -> dict[str, Any]:
-    """Goal, beginning and end of the waterfall."""
-    if bars.empty:
-        return dict.fromkeys((*GOAL, "start", "start_time", "end", "end_time", "whole"))
-    first, last = bars.iloc[0], bars.iloc[-1]
+def _ends(part: pd.DataFrame, bars: pd.DataFrame, bare: pd.DataFrame) -> dict[str, Any]:
+    """Goal, beginning and end of both waterfalls: as called, and of the bare solvers."""
+    if bars.empty or bare.empty:
+        return dict.fromkeys(
+            (*GOAL, "start", "start_time", "end", "end_time", "called", "bare_start", "bare_end", "bare")
+        )
+    first, last = bars.iloc[0], bars.iloc[-2]  # before the call is changed to the kernel
+    start, end = bare.iloc[1]["time (s)"], bare.iloc[-1]["time (s)"]
     return dict(part[GOAL].iloc[0]) | {
         "start": first["variant"], "start_time": first["time (s)"], "end": last["variant"],
-        "end_time": last["time (s)"], "whole": last["so far"],
+        "end_time": last["time (s)"], "called": last["so far"],
+        "bare_start": start, "bare_end": end, "bare": start / end,
     }  # fmt: skip
 
 

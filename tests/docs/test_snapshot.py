@@ -69,9 +69,9 @@ def test_the_stored_snapshot_is_whole_and_pages_quote_what_it_says():
     report = (folder / "report.md").read_text(encoding="utf-8")
     shown = set(_taker().SHOWN.findall(report))
     assert shown == {path.name for path in (folder / "figures").iterdir()}
-    for name, said in _taker().quoted(report).items():
+    for (name, begin), said in _taker().quoted(report).items():
         page = (ROOT / name).read_text(encoding="utf-8")
-        assert _taker().quote(said, page) == page, name
+        assert _taker().quote(said, page, begin) == page, name
 
 
 @pytest.mark.parametrize("name", ["bench", "peers"])

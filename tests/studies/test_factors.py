@@ -158,7 +158,7 @@ def test_times_of_a_busy_machine_are_not_compared(quiet, share, busy):
     assert answers["again"] == 0
     retaken = data["seconds_tries"].where(~(data["spread"] > facts.NOISY), 4)
     assert facts.facts(data.assign({"seconds_tries": retaken}))["again"] == loud
-    assert (answers["whole"] is None) == np.isnan(answers["user_most"]) == bool(busy)
+    assert (answers["called"] is None) == np.isnan(answers["user_most"]) == bool(busy)
     tables = facts.tables(data)
     assert tables["effects"].empty == tables["charts"].empty == tables["scipy"].empty == bool(busy)
     assert len(tables["times"]) >= known.size
@@ -168,12 +168,12 @@ def test_times_of_a_busy_machine_are_not_compared(quiet, share, busy):
 def test_where_nothing_was_timed_nothing_is_said_and_the_page_has_numbers_and_none(quiet, tmp_path):
     nothing = quiet.assign({name: quiet[name] * np.nan for name in ("seconds", "spread")})
     answers = facts.facts(nothing)
-    assert answers["whole"] is answers["busy"] is None
+    assert answers["called"] is answers["busy"] is None
     assert answers["times"] == 0
     assert np.isnan(answers["near_share"])
     assert list(figures.pictures(nothing)) == []
     text = checked("factors", quiet, tmp_path)
-    assert f"becomes {number(facts.facts(quiet)['whole'], 3)} times faster" in text
+    assert f"becomes {number(facts.facts(quiet)['called'], 2)} times faster" in text
     assert "busy" not in text
 
 
@@ -193,11 +193,14 @@ def test_neighbours_in_the_waterfall_differ_in_exactly_the_factor_they_name(rows
 
 
 def test_the_product_of_the_ratios_is_the_total_and_a_waterfall_with_a_missing_step_is_not_drawn(quiet, rows):
-    part, total = first_goal(rows), facts.facts(quiet)["whole"]
-    for order in (waterfall(part), waterfall(part, call_first=True)):
+    part, answers = first_goal(rows), facts.facts(quiet)
+    for order, ratio in ((waterfall(part), "called"), (waterfall(part, call_first=True), "bare")):
         seconds = order["time (s)"].to_numpy()
+        total = seconds[0] / seconds[-1]
+        assert answers[ratio] == pytest.approx(
+            seconds[0] / seconds[-2] if ratio == "called" else seconds[1] / seconds[-1]
+        )
         assert order["so far"].to_numpy() == pytest.approx(seconds[0] / seconds, rel=1e-12)
-        assert total == pytest.approx(seconds[0] / seconds[-1], rel=1e-12)
         assert math.prod(order["times faster"].iloc[1:]) == pytest.approx(total, rel=1e-12)
     bars = waterfall(rows)
     assert len(bars)
