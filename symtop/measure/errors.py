@@ -144,7 +144,7 @@ def _of_run(run: Any, scene: Any, precision: str, warn: Callable[[str], object])
     bounds = {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns}
     for name in UNIT_VECTORS if foreign else ():
         if name in run:
-            columns[f"{name}_length"] = np.abs(lengths(doubles(name, column(run, name))) - 1.0)
+            columns[f"{name}_length"] = np.abs(np.linalg.norm(doubles(name, column(run, name)), axis=1) - 1.0)
             bounds[f"{name}_length_bound"] = np.full(data.time.size, 4.0 * EPSILON)
     shown = dataset(data.time, columns | bounds, chosen.units)
     for name in columns:
@@ -294,7 +294,8 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
         raise SymtopError(f"data must hold {words}")
     for name in UNIT_VECTORS:
         if name in columns:
-            length = lengths(columns[name])
+            with np.errstate(over="ignore"):
+                length = np.linalg.norm(columns[name], axis=1)
             off = (length == 0.0) | np.isinf(length)  # and has no direction
             first = int(np.argmax(~np.isnan(length)))
             off[first] |= np.abs(length[first] - 1.0) > LENGTH
@@ -308,12 +309,6 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
         place = f"{theta[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
         raise SymtopError(f"theta must be radians from the vertical in [0, pi], but it is {place}")
     return Trajectory(time, **columns)
-
-
-def lengths(vectors: charts.Array) -> charts.Array:
-    """Lengths (n,) of rows (n, k); infinite where squares overflow, NaN of a row with a NaN."""
-    with np.errstate(over="ignore"):
-        return np.asarray(np.sqrt(np.sum(vectors**2, axis=-1)))
 
 
 def check_shapes(columns: Mapping[str, charts.Array], count: int) -> None:

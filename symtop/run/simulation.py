@@ -269,12 +269,11 @@ def _at_times(
     h = math.nan if step_size is None else positive("step_size", step_size)
     first = None if step_size is None else min(h, end)  # it may be longer than the run
     chosen, method, chart, plan, _ = _prepared(scene, integrator, first, tolerance, end, 2, observe, budget)
-    plan = plan._replace(times=row, horizon=float(row[-1]), step_size=h)
+    marks = plan.marks
     if method.fixed_step:
         near = np.rint(row / h)
-        whole = np.where(np.abs(row - near * h) <= SAME * row, near, np.floor(row / h))
-        plan = plan._replace(marks=whole.astype(np.int64))
-    return chosen, method, chart, plan, False
+        marks = np.where(np.abs(row - near * h) <= SAME * row, near, np.floor(row / h)).astype(np.int64)
+    return chosen, method, chart, plan._replace(times=row, horizon=float(row[-1]), step_size=h, marks=marks), False
 
 
 def _guarded_at_times(

@@ -190,8 +190,8 @@ def test_times_before_a_first_step_at_zero_and_after_a_failure():
         assert (run.attrs["outcome"], shown[0], shown[-1]) == (outcome, True, False)
         np.testing.assert_array_equal(shown, run["time"].values <= run.attrs["reached_time"])
         assert all((np.isfinite(run[name].values) == shown).all() for name in ("theta", "phi", "energy", "p_psi"))
-    rough = symtop.simulate("spheroid", "rk4[axis]", step_size=0.1, times=np.linspace(0.0, 4.0, 401), guard=False)
-    lengths = np.linalg.norm(rough["axis"].values, axis=1)
+    run = symtop.simulate("spheroid", "rk4[axis]", step_size=0.1, times=np.linspace(0.0, 4.0, 401), guard=False)
+    lengths = np.linalg.norm(run["axis"].values, axis=1)
     assert np.abs(np.diff(lengths)).max() < 0.2 * np.ptp(lengths)  # a shorter step keeps what a step has done to |e|
 
 
