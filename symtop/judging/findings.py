@@ -69,8 +69,9 @@ class Finding(NamedTuple):
 
 
 def error_units(name: str) -> str:
-    """The unit of an error of a trajectory, rad of angles."""
-    return {"momentum": " times |L|", "rates": " rad per unit time"}.get(name, " rad")
+    """The unit of an error of a trajectory, rad of angles; none of a length."""
+    none = {"axis_length": "", "quaternion_length": ""}
+    return (none | {"momentum": " times |L|", "rates": " rad per unit time"}).get(name, " rad")
 
 
 def yes_no(value: bool | int | None) -> str:

@@ -56,6 +56,8 @@ VECTORS = {
 }  # fmt: skip
 SCALARS = ("time", "theta", "phi", "psi", *CONSTANTS)
 OF_STATES = ("axis", "attitude", "theta", "momentum", "rates")
+LENGTHS = ("axis_length", "quaternion_length")
+SINGLE = 1e-6  # how far from one single precision leaves the length of a vector, which is then not worth a line
 SHOWN = 3  # of what is wrong with a line of names
 AGREE = 1e-3  # rad from the axis to the third axis of the quaternion: more than the digits of a file leave
 FEWEST = 100  # samples by which a law of growth is judged
@@ -226,7 +228,8 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
         bound = scene.momentum_scale / moments.min() * (truth["attitude_error_bound"].values + 4.0 * EPSILON)
         off = np.linalg.norm(rates - inside / moments, axis=1)
         deviation = deviation.assign(rates=("time", off), rates_bound=("time", bound))
-    findings = [_error(name, scene, time, deviation) for name in OF_STATES if name in deviation]
+    strayed = [name for name in LENGTHS if name in deviation and (deviation[name] > SINGLE).any()]
+    findings = [_error(name, scene, time, deviation) for name in (*OF_STATES, *strayed) if name in deviation]
     own = _from_states(scene, states)
     for name in (*CONSTANTS, *sorted({*conserves} - {*CONSTANTS})):
         values = own.get(name, columns.get(name))

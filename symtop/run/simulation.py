@@ -4,25 +4,34 @@ Samples never bend the step: a fixed-step run has h = T/N exactly and is sampled
 uniform, or at the steps nearest to uniform times, unless they would fall on the same few phases of the nutation again
 and again (where an energy error may read 1e5 times too small); then they are dithered by the golden ratio. The
 attribute ``sampling`` says which.
+
+A time that is asked for inside a fixed step is the end of one shorter step of the same method from where the step
+before has ended: what a step keeps is kept, to every order. That begins at a start, where |e| and |q| are one; if a
+method has let them become r, the weight is multiplied by r, or r^2 for q, and the equations are the same. A method that
+carries more than it shows makes its first step once more, whose error is of the same size.
 """
 
 import functools
 import math
 import warnings
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import ArrayLike
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, SymtopWarning, boolean, one_of, positive, shown, whole
-from symtop.core.numbers import GOLDEN
+from symtop.core.numbers import EPSILON, GOLDEN, real_numbers
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import Plan, sentence
+from symtop.methods.framework.plan import Plan, Run, off_length, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator, methods
-from symtop.model.charts import BODY, Array
-from symtop.model.scenes import OBSERVABLES, Scene, horizon_of, scene as find_scene
+from symtop.model.body import Attitude
+from symtop.model.charts import BODY, Array, axis_from_quaternion
+from symtop.model.scenes import OBSERVABLES, SHORTEST, Scene, horizon_of, scene as find_scene
+from symtop.model.top import Angles, effective_force
 from symtop.run.guard import MOST_STEPS, warning
 from symtop.run.trajectory import Trajectory, dataset
 
@@ -30,6 +39,8 @@ MOST_SAMPLES = 10_000_000
 MOST_SWINGS = 1e8  # of an adaptive run: several minutes of the fastest, taylor
 WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider stretch of phases unseen are dithered
 USUAL = 1e-3  # rad, the accuracy of a step that is proposed where none was given
+SAME = 8.0 * EPSILON  # of a time: products and quotients of decimals differ by less
+BRIEF = 0.01  # of a nutation: what an adaptive method is run for where its start alone is shown
 STRETCHES = 17  # of a nutation: two of them are less than `WIDEST_GAP`
 
 
@@ -154,7 +165,7 @@ def make_plan(
 def simulate(
     scene: "str | Scene", integrator: "str | Integrator", *, step_size: float | None = None,
     tolerance: float | None = None, horizon: float | None = None, samples: int = 501, observe: str | None = None,
-    guard: bool | str | Callable[[str], object] = True, budget: float | None = None,
+    guard: bool | str | Callable[[str], object] = True, budget: float | None = None, times: ArrayLike | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Run one integrator on one scene and return what it did.
 
@@ -168,6 +179,11 @@ def simulate(
     ``step_size`` is the step made. ``sampling`` is "uniform", "nearest steps" (to uniform times), or "dithered", so
     that all of a nutation is seen.
 
+    With `times`, an increasing row (n,) of numbers of at least 0 in the place of `horizon` and `samples`, the run is
+    shown at these and ends at the last; ``sampling`` is "at times". Adaptive methods are sampled at any time. Fixed
+    steps are of exactly `step_size` from 0: a time at the end of one, to rounding, shows it, and one inside a step is
+    the end of one shorter step of the same method. ``steps`` and ``force_evaluations`` count whole steps alone.
+
     Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a large
     error is expected; the run is the same either way. It compares a piece of the run with the closed form ("exact", of
     tops) or with an accurate integration ("series", as of bodies). Give a function to be handed the sentence instead,
@@ -179,11 +195,12 @@ def simulate(
     warn = functools.partial(warnings.warn, category=SymtopWarning, stacklevel=3)  # where `simulate` was called
     report = guard if callable(guard) else warn if isinstance(guard, str) or boolean("guard", guard) else None
     arguments = scene, integrator, step_size, tolerance, horizon, samples, observe, budget
-    chosen, method, chart, plan, dithered = _prepared(*arguments)
+    chosen, method, chart, plan, dithered = _prepared(*arguments) if times is None else _at_times(times, *arguments)
     if isinstance(guard, str) and one_of("guard", guard, ("exact", "series")) == "exact" and chosen.of_body:
         raise SymtopError(f"guard must be series on {chosen.name}, a body without symmetry, not 'exact'", "guard")
-    trajectory, caution = _guarded(chosen, method, chart, plan, report, series=guard == "series")
-    uneven = plan.marks.size and plan.marks[-1] % (plan.marks.size - 1)  # steps to a sample are no whole number
+    run = _guarded if times is None else _guarded_at_times
+    trajectory, caution = run(chosen, method, chart, plan, report, series=guard == "series")
+    uneven = times is None and plan.marks.size and plan.marks[-1] % (plan.marks.size - 1)  # no whole steps to a sample
     sampling = "dithered" if dithered else "nearest steps" if uneven else "uniform"
     data = dataset(trajectory.time, trajectory.columns, chosen.units)
     data.attrs = netcdf.attributes_of(
@@ -192,7 +209,7 @@ def simulate(
         steps=trajectory.steps, force_evaluations=trajectory.force_evaluations,
         newton_iterations=trajectory.newton_iterations, outcome=trajectory.outcome,
         outcome_message=sentence(trajectory.outcome, trajectory.reached_time, plan.horizon, chosen.second),
-        reached_time=trajectory.reached_time, guard=caution, sampling=sampling,
+        reached_time=trajectory.reached_time, guard=caution, sampling=sampling if times is None else "at times",
         top=_json(chosen.top), start=_json(chosen.start),
     )  # fmt: skip
     return data
@@ -231,6 +248,105 @@ def _guarded(
         guard(caution)
     states = solve(method, chart, scene.top, scene.start, plan, f" on {scene.name}")
     return Trajectory.of_run(scene, chart, plan, states), caution
+
+
+def _at_times(
+    times: ArrayLike, scene: Any, integrator: Any, step_size: object, tolerance: object, horizon: object,
+    samples: object, observe: str | None, budget: Any,
+) -> tuple[Scene, Integrator, str, Plan, bool]:  # fmt: skip
+    """What `_prepared` returns, of a run to the last of `times`; marks are the whole steps before each of them."""
+    for name, given, usual in (("horizon", horizon, None), ("samples", samples, 501)):
+        if type(given) is not type(usual) or given != usual:
+            raise SymtopError(f"{name} must be left out where times are given, not {shown(given)}", name, "times")
+    row = np.atleast_1d(real_numbers("times", times)).copy()
+    flat = row.ravel()
+    bad = ~(np.isfinite(flat) & ((flat >= SHORTEST) | (flat == 0.0)) & (flat > np.append(-1.0, flat[:-1])))
+    if row.ndim != 1 or bad.any() or not row.size:
+        wrong = f"{float(flat[bad][0])!r} in place {np.argmax(bad)}" if bad.any() else f"of shape {row.shape}"
+        must = f"an increasing row of finite numbers, each 0 or at least {SHORTEST:g}"
+        raise SymtopError(f"times must be {must}, not {wrong}", "times")
+    end = float(row[-1]) or BRIEF * find_scene(scene, bodies=True).time_scale()
+    h = math.nan if step_size is None else positive("step_size", step_size)
+    first = None if step_size is None else min(h, end)  # it may be longer than the run
+    chosen, method, chart, plan, _ = _prepared(scene, integrator, first, tolerance, end, 2, observe, budget)
+    marks = plan.marks
+    if method.fixed_step:
+        near = np.rint(row / h)
+        marks = np.where(np.abs(row - near * h) <= SAME * row, near, np.floor(row / h)).astype(np.int64)
+    return chosen, method, chart, plan._replace(times=row, horizon=float(row[-1]), step_size=h, marks=marks), False
+
+
+def _guarded_at_times(
+    scene: Scene, method: Integrator, chart: str, plan: Plan, guard: Callable[[str], object] | None, *, series: bool
+) -> tuple[Trajectory, str]:
+    """What `_guarded` returns, of a plan of `_at_times`."""
+    caution = "off" if guard is None else ""
+    forecast = plan._replace(step_size=plan.horizon) if plan.step_size > plan.horizon else plan
+    if guard is not None and plan.horizon > 0.0 and (caution := warning(scene, method, chart, forecast, series=series)):
+        guard(caution)
+    if method.fixed_step:
+        return Trajectory.of_run(scene, chart, plan, _stepped(scene, method, chart, plan)), caution
+    brief = plan if plan.horizon else Plan.until([0.0, BRIEF * scene.time_scale()], plan.tolerance, plan.budget)
+    run = solve(method, chart, scene.top, scene.start, brief, f" on {scene.name}")
+    run = run if plan.horizon else Run(run.states[:1], run.p_phi[:1], run.p_psi[:1], 0, 0, 0, "ok", 0.0)
+    return Trajectory.of_run(scene, chart, plan, run), caution
+
+
+def _stepped(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Run:
+    """Fixed steps, and a shorter one to each time inside them. The first that fails ends the run, and all it shows."""
+    begun = scene.top, scene.start, 1.0
+    times, since, words = plan.times, plan.marks * plan.step_size, f" on {scene.name}"
+    marks, place = np.unique(plan.marks, return_inverse=True)
+    whole = Plan.steps(plan.step_size, marks, budget=plan.budget)
+    steps = solve(method, chart, scene.top, scene.start, whole, words)
+    states, p_phi, p_psi = (values[place] for values in steps[:3])
+    outcome, reached = steps.outcome, plan.horizon if steps.outcome == "ok" else steps.reached
+    lost = np.zeros(times.size, dtype=bool)
+    for i in np.flatnonzero(np.abs(times - since) > SAME * times):
+        lost[i:] = True
+        if not np.isfinite(states[i]).all() or (steps.outcome != "ok" and plan.marks[i] >= steps.steps):
+            break  # with the whole step around it
+        try:
+            top, start, r = _start(scene, chart, states[i], p_phi[i], p_psi[i]) if plan.marks[i] else begun
+        except SymtopError:  # finite, and of no direction or beyond what a start can be
+            outcome, reached = "not_finite", float(since[i])
+            break
+        one = solve(method, chart, top, start, Plan.steps(float(times[i] - since[i]), [1]), words)
+        if one.outcome != "ok":
+            outcome, reached = one.outcome, float(since[i])
+            break
+        lost[i:], states[i], p_phi[i], p_psi[i] = False, one.states[0], one.p_phi[0], one.p_psi[0]
+        if r != 1.0:
+            states[i, :-3] *= r
+            (p_phi if chart == BODY else p_psi)[i] *= r if chart == "axis" else r * r
+    if outcome == "not_normalised" or (off_length(chart, states) & ~lost).any():
+        lost |= off_length(chart, states) | ~np.isfinite(states).all(axis=1)
+        outcome, reached = "not_normalised", plan.last_of(~lost)
+    states[lost], p_phi[lost], p_psi[lost] = math.nan, math.nan, math.nan
+    return Run(states, p_phi, p_psi, *steps[3:6], outcome, reached)
+
+
+def _start(scene: Scene, chart: str, state: Array, p_phi: float, p_psi: float) -> tuple[Any, Any, float]:
+    """The top and the start that a state of a run stands for, and its |e| or |q|; SymtopError if there is no such."""
+    top: Any = scene.top
+    with np.errstate(all="ignore"):
+        if chart == "angles":
+            theta, p_theta, phi, psi = state.tolist()
+            held = top.momenta(scene.start)  # whose north and south have no cancellation
+            more, other = p_phi - held.p_phi, p_psi - held.p_psi
+            north, south = held.north + more - other, held.south + more + other
+            _, phi_dot, cosine = effective_force(theta, north, south, top.I1, top.mgl)
+            return top, Angles(theta, phi, psi, p_theta / top.I1, phi_dot, p_psi / top.I3 - phi_dot * cosine), 1.0
+        r = float(np.linalg.norm(state[:-3]))
+        unit, momentum = state[:-3] / (r or math.nan), state[-3:]
+        place, heavy = tuple(unit.tolist()), replace(top, mgl=top.mgl * (r if chart == "axis" else r * r))
+        if chart == "axis":
+            return heavy, Angles.from_axis(top, place, momentum.tolist()), r
+        if chart == BODY:
+            return heavy, Attitude(place, tuple((momentum / top.moments).tolist())), r
+        along = axis_from_quaternion(unit)
+        omega = momentum / top.I1 + (1.0 / top.I3 - 1.0 / top.I1) * (momentum @ along) * along
+        return heavy, Angles.from_quaternion(place, omega_space=omega.tolist()), r
 
 
 @functools.lru_cache(maxsize=256)

@@ -218,7 +218,7 @@ def test_a_conjugate_attitude_of_a_body_is_refused_although_it_starts_right(tmp_
     for content, words in [
         (axis, "one of axis, quaternion, theta"),
         (text(late[::-1], OF_BODY[:16]), "at least 0 and increase, but sample 1 is at"),
-        (text(late * [1.0, 2.0, 2.0, 2.0, 2.0], OF_BODY[:16]), "quaternion must be of length 1 within 0.001"),
+        (text(late * [1.0, 2.0, 2.0, 2.0, 2.0], OF_BODY[:16]), "quaternion must be of length 1, at first within 0.5"),
         (text(wrong[:, [0, 3, 5, 6, 7]], "time,theta,wx,wy,wz").replace(",-0.", ",0."), "rows of 3 beside an attitude"),
     ]:
         file.write_text(content, encoding="utf-8")

@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 import numpy as np
 import pytest
 import xarray as xr
+from scipy.integrate import solve_ivp
 
 import symtop
 from symtop.measure.errors import QUANTITIES
@@ -90,9 +91,14 @@ def test_an_axis_or_theta_alone_is_enough(truth, name):
 
 def test_a_foreign_trajectory_is_compared_and_one_turned_by_a_thousandth_shows_a_thousandth(truth):
     mine = {"time": TIMES, "quaternion": truth["quaternion"].values}
-    for factor in (1.0, -1.0, 1.0002):  # either sign, and a length that single precision would be ashamed of
+    grown = 1.0 + TIMES[:, None]
+    for factor in (1.0, -1.0, 1.0002, grown):  # either sign, and lengths that single precision or a method has lost
         shown = symtop.errors({**mine, "quaternion": factor * mine["quaternion"]}, "spheroid")
-        assert {*shown} == {f"{name}{end}" for name in ("axis", "attitude", "theta") for end in ("", "_bound")}
+        names = ("axis", "attitude", "theta", "quaternion_length")
+        assert {*shown} == {f"{name}{end}" for name in names for end in ("", "_bound")}
+        assert shown["quaternion_length"].values == pytest.approx(
+            np.abs(factor * np.ones_like(grown))[:, 0] - 1.0, abs=4e-15
+        )
         for name in ("axis", "attitude", "theta"):
             assert np.all(shown[name].values <= shown[f"{name}_bound"].values)
     about_the_vertical = np.array([np.cos(0.5 * TURN), 0.0, 0.0, np.sin(0.5 * TURN)])
@@ -110,6 +116,19 @@ def test_a_foreign_trajectory_is_compared_and_one_turned_by_a_thousandth_shows_a
     shown = symtop.errors({**mine, "energy": truth["energy"].values + 1e-3 * scene.energy_scale}, scene)
     assert shown["energy"].values == pytest.approx(1e-3, rel=1e-9)
     assert "p_phi" not in shown
+
+
+def test_what_scipy_makes_of_the_axis_at_a_loose_tolerance_is_judged_and_its_length_is_an_error():
+    scene = symtop.scene("spheroid")
+    f = symtop.field("axis", scene.top)
+    run = solve_ivp(f, (0.0, 8.0), f.state(scene.start), rtol=1e-3, atol=1e-3)
+    axis = np.where(run.t[:, None] == run.t[-1], np.nan, run.y[:3].T)
+    with pytest.warns(symtop.SymtopWarning, match="not a number"):
+        length = symtop.errors({"time": run.t, "axis": axis}, scene)["axis_length"].values
+    np.testing.assert_array_equal(length, np.abs(np.linalg.norm(axis, axis=1) - 1.0))
+    assert 1e-3 < np.nanmax(length) < 1e-2
+    judged = symtop.judge({"time": run.t, "axis": run.y[:3].T}, scene=scene)["axis_length_error"]
+    assert judged.value >= np.nanmax(length)
 
 
 def test_a_wrong_scene_and_another_order_of_a_quaternion_are_seen(truth):
@@ -182,7 +201,8 @@ AXIS = np.tile([0.0, 0.0, 1.0], (41, 1))
     ({"time": TIMES, "axis": AXIS.T}, "spheroid", r"shape \(41, 3\)"),
     ({"time": TIMES, "quaternion": AXIS}, "spheroid", r"shape \(41, 4\)"),
     ({"time": TIMES, "axis": AXIS, "energy": TIMES[:5]}, "spheroid", r"energy must have the shape \(41,\)"),
-    ({"time": TIMES, "axis": 2.0 * AXIS}, "spheroid", "length 1 within 0.001"),
+    ({"time": TIMES, "axis": 2.0 * AXIS}, "spheroid", r"length 1, at first within 0.5, .* is 2 at t = 0$"),
+    ({"time": TIMES, "axis": np.where(TIMES[:, None] > 7.0, 0.0, AXIS)}, "spheroid", "its length is 0 at t = 7.2"),
     ({"time": TIMES, "theta": 50.0 + TIMES}, "spheroid", r"radians from the vertical"),
     ({"time": TIMES, "axis": AXIS}, None, r"give errors\(data, scene\)"),
     (xr.Dataset({"axis": (("time", "c"), AXIS)}, {"time": TIMES}), None, r"give errors\(data, scene\)"),

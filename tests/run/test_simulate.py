@@ -142,6 +142,59 @@ def test_files_are_whole_and_a_failed_write_leaves_the_old_one(tmp_path, monkeyp
     assert sorted(path.name for path in tmp_path.rglob("*") if path.is_file()) == ["b.nc", "run.nc"]
 
 
+OWN = np.sort(np.append(np.arange(0.0, 4.0, 0.3), np.random.default_rng(7).uniform(0.0, 4.0, 40)))  # ends too
+
+
+@pytest.mark.parametrize(("scene", "row", "h", "accuracy"), [
+    ("spheroid", "exact-discrete[attitude]", 0.3, 1e-12), ("grazing", "exact-discrete[axis]", 0.3, 1e-10),
+    ("spheroid", "vern9-fixed[axis]", 0.01, 1e-12), ("goldstein", "vern9-fixed[angles]", 0.01, 1e-11),
+    ("heavy-brick", "vern9-fixed", 0.01, 1e-12), ("check-case-2", "series-general", 0.3, 1e-12),
+    ("spheroid", "taylor", None, 1e-12),
+])  # fmt: skip
+def test_times_of_ones_own_show_the_true_motion_in_every_chart(scene, row, h, accuracy):
+    run, truth = symtop.simulate(scene, row, step_size=h, times=OWN, guard=False), symtop.reference(scene, OWN)
+    np.testing.assert_array_equal(run["time"].values, OWN)
+    for name in {*run.data_vars} & {*truth.data_vars} - {"quaternion"}:  # whose sign is free
+        np.testing.assert_allclose(run[name].values, truth[name].values, rtol=accuracy, atol=accuracy, err_msg=name)
+    assert max(float(symtop.errors(run)[name].max()) for name in ("axis", "energy", "p_phi")) < accuracy
+    assert run.attrs["sampling"] == "at times"
+    if h:
+        assert run.attrs["steps"] == math.floor(OWN[-1] / h)
+        every = symtop.simulate(scene, row, step_size=h, horizon=3.9, samples=1001, guard=False)["axis"].values
+        shown = run["axis"].values[np.isin(OWN, np.arange(0.0, 4.0, 0.3))]
+        np.testing.assert_allclose(shown, every[:: round(0.3 / h)], rtol=0.0, atol=accuracy)
+
+
+def test_a_time_inside_a_step_has_the_order_of_the_method_and_a_line_between_steps_has_order_two():
+    steps, wrong = np.array([0.04, 0.02, 0.01, 0.005]), []
+    for h in steps:
+        ends, inside = np.arange(0.0, 2.0, h), np.arange(0.0, 2.0, h)[:-1] + 0.4 * h
+        run = symtop.simulate("spheroid", "rk4[axis]", step_size=h, times=inside, guard=False)
+        line = np.interp(inside, ends, symtop.reference("spheroid", ends)["theta"].values)
+        off = np.abs(line - symtop.reference("spheroid", inside)["theta"].values).max()
+        wrong.append([float(symtop.errors(run)["axis"].max()), off])
+    assert np.polyfit(np.log(steps), np.log(wrong), 1)[0] == pytest.approx([4.0, 2.0], abs=0.2)
+
+
+def test_times_before_a_first_step_at_zero_and_after_a_failure():
+    for row, control in (("midpoint", {"step_size": 9.0}), ("rk4[axis]", {"step_size": 9.0}), ("radau", {})):
+        for times in ([0], 0, np.float32(1e-3), [0.0, 1e-9, 1e-3], range(1)):
+            run = symtop.simulate("spheroid", row, times=times, guard="series", **control or {"tolerance": 1e-6})
+            assert (run.attrs["horizon"], run.attrs["outcome"]) == (np.max(times), "ok")
+            assert run.attrs["steps"] == 0 or not control
+            assert float(symtop.errors(run)["axis"].max()) < 1e-4
+            symtop.plot(run)
+    for row, h, outcome in (("rk4[axis]", 1.0, "not_finite"), ("rk4[attitude]", 0.02, "not_normalised")):
+        run = symtop.simulate("simo-wong", row, step_size=h, times=np.linspace(0.0, 10.0, 77), guard=False)
+        shown = np.isfinite(run["axis"].values).all(axis=1)
+        assert (run.attrs["outcome"], shown[0], shown[-1]) == (outcome, True, False)
+        np.testing.assert_array_equal(shown, run["time"].values <= run.attrs["reached_time"])
+        assert all((np.isfinite(run[name].values) == shown).all() for name in ("theta", "phi", "energy", "p_psi"))
+    run = symtop.simulate("spheroid", "rk4[axis]", step_size=0.1, times=np.linspace(0.0, 4.0, 401), guard=False)
+    lengths = np.linalg.norm(run["axis"].values, axis=1)
+    assert np.abs(np.diff(lengths)).max() < 0.2 * np.ptp(lengths)  # a shorter step keeps what a step has done to |e|
+
+
 @pytest.mark.parametrize("theta", [0.0, math.pi])
 def test_a_start_on_a_pole_is_refused_by_the_angles_chart_and_welcome_elsewhere(theta):
     scene = symtop.Scene("pole", symtop.SymmetricTop(2.0, 1.0, 1.0), symtop.Angles(theta=theta, psi_dot=9.0), 1.0)
