@@ -33,14 +33,10 @@ recommend spheroid --accuracy 1e-3
 recommend spheroid --accuracy 1e-9
 recommend goldstein --accuracy 1e-3 --quantity attitude
 recommend spheroid --accuracy 1e-6 --needs derivative
-compare goldstein stormer-verlet midpoint rk4 dop853 taylor
+compare goldstein stormer-verlet midpoint rk4 dop853-compiled taylor
 long spheroid stormer-verlet --steps 1e5
 run spheroid chin-4a[axis] --step-size 0.01
-run spheroid cayley-tuned[axis] --step-size 0.01
-run spheroid gauss-12[axis] --step-size 0.01
-run spheroid series-adaptive[axis] --tolerance 1e-9
-run spheroid rk45-compiled --tolerance 1e-6
-run spheroid dop853-compiled-fixed --step-size 0.01
+run spheroid dop853-compiled-fixed[axis] --step-size 0.01
 ensemble strang --members 100 --per-nutation 100 --nutations 10 --output runs.nc
 """
 
