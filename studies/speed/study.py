@@ -23,6 +23,7 @@ from . import facts, figures
 
 METHODS = {  # and the charts that they run in
     "stormer-verlet": ("angles",), "midpoint": ("angles",), "trapezoidal": ("angles",),
+    "galerkin-gauss-8": ("angles",),
     **dict.fromkeys(
         ("rk4", "rk45-compiled", "dop853-compiled", "gauss-8", "strang", "takahashi-imada", "taylor", "rk45", "dop853",
          "srkn-14-6", "tsit5-fixed", "dop853-compiled-fixed", "vern9-fixed", "series"),

@@ -70,7 +70,7 @@ _LOOKS = {  # of methods that people know, in one colour with fixed steps and th
     "strang": Look(LEAF, "<"), "cayley": Look(GREENS[1], ">"), "takahashi-imada": Look(GREENS[2], "P"),
     "yoshida-4": Look(GREENS[2], "p"), "srkn-14-6": Look(GREENS[1], "H"), "chin-4a": Look(TEAL, "D"),
     "kahan-li-8": Look(GREENS[2], "X"), "five-rotations": Look(TEAL, "s"), "euler-poincare": Look(SKY, "D"),
-    "galerkin-simpson": Look(NAVY, "D"), "lie-variational": Look(BLUE, "v"),
+    "galerkin-simpson": Look(NAVY, "D"), "galerkin-gauss-8": Look(BLUES[1], "X"), "lie-variational": Look(BLUE, "v"),
     "rk4": Look(ORANGE, "o"), "rk45-compiled": Look(VERMILLION, "s"), "rk45": Look(VERMILLION, "D"),
     "tsit5-fixed": Look(NAVY, "P"), "tsit5": Look(NAVY, "X"), "vern9-fixed": Look(PLUM, "s"), "vern9": Look(PLUM, "d"),
     "dop853-compiled": Look(BROWN, "v"), "dop853-compiled-fixed": Look(BROWN, "^"), "dop853": Look(BROWN, "o"),

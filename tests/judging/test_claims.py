@@ -235,7 +235,7 @@ def test_the_angles_end_at_a_pole_and_the_space_frame_does_not():
     assert ends == [("angles", "left_chart", False), ("axis", "ok", True), ("attitude", "ok", True)]
 
 
-@pytest.mark.parametrize("name", ["midpoint", "strang", "rk4"])
+@pytest.mark.parametrize("name", ["midpoint", "galerkin-gauss-6", "strang", "rk4"])
 def test_honest_claims_are_confirmed(name):
     ledger = judge(symtop.integrator(name), SPHEROID, quick=True)
     assert [finding.claim for finding in ledger.findings] == list(CLAIMS)
