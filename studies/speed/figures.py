@@ -18,7 +18,7 @@ ADAPTED = ("RK45", "DOP853, adaptive")  # which are drawn as on the page of cost
 NAMES = {  # beside the lines; others have the names of their methods
     "stormer-verlet[angles]": "Störmer-Verlet", "midpoint[angles]": "midpoint (discrete Lagrangian)",
     "trapezoidal[angles]": "trapezoidal (discrete Lagrangian)",
-    "galerkin-gauss-8[angles]": "Galerkin, Gauss's rule (discrete Lagrangian)",
+    "galerkin-gauss-8[angles]": "Galerkin-Gauss 8 (discrete Lagrangian)",
     "rk4[axis]": "RK4", "gauss-8[axis]": "Gauss 8",
     "rk45-compiled[axis]": "RK45, adaptive", "rk45[axis]": "RK45 through SciPy",
     "tsit5-fixed[axis]": "Tsit5, fixed steps", "dop853-compiled[axis]": "DOP853, adaptive",
