@@ -3,7 +3,7 @@
 #include "march.h"
 #include "galerkin_node.h"
 
-#define DIM 4
+#define DIM 6
 #define SMALLEST 1e-18
 #define ROUNDING 1e-12
 
@@ -12,7 +12,8 @@ typedef struct {
 } Rule;
 typedef struct { double forces[NODES]; } Carry;
 typedef struct {
-    double forces[NODES], stiffness[NODES], turns[NODES], rolls[NODES], turns_by[NODES], rolls_by[NODES];
+    double forces[NODES], stiffness[NODES], souths[NODES], norths[NODES], rolls[NODES];
+    double souths_by[NODES], norths_by[NODES], rolls_by[NODES];
 } Trial;
 
 static inline double reached(const Rule *rule, const double *forces, int i) {
@@ -32,9 +33,11 @@ static inline Trial evaluate(
         double precession = at.d * par->south + at.a * par->north, bend = there.south + there.north;
         found.forces[i] = -there.slope;
         found.stiffness[i] = there.stiffness;
-        found.turns[i] = b * precession;
+        found.souths[i] = b * at.d;
+        found.norths[i] = b * at.a;
         found.rolls[i] = b * (precession * at.cosine);
-        found.turns_by[i] = b * bend;
+        found.souths_by[i] = b * (at.d * at.tangent);
+        found.norths_by[i] = -b * (at.a / at.tangent);
         found.rolls_by[i] = b * (bend * at.cosine - precession * at.sine);
     }
     return found;
@@ -103,9 +106,10 @@ static inline int increment(
         found = evaluate(par, rule, theta, momentum, h, lever, forces);
         effort++;
     }
-    double turn = 0.0, roll = 0.0, kick = 0.0, bend = 0.0;
+    double south = 0.0, north = 0.0, roll = 0.0, kick = 0.0, bend = 0.0;
     for (int i = 0; i < NODES; i++) {
-        turn += found.turns[i] + found.turns_by[i] * turned[i];
+        south += found.souths[i] + found.souths_by[i] * turned[i];
+        north += found.norths[i] + found.norths_by[i] * turned[i];
         roll += found.rolls[i] + found.rolls_by[i] * turned[i];
         kick += rule->b[i] * forces[i];
         bend += rule->last[i] * forces[i];
@@ -113,7 +117,9 @@ static inline int increment(
     }
     step[0] = lever * (momentum + h * bend);
     step[1] = h * kick;
-    step[2] = h * turn;
+    step[4] = h * south;
+    step[5] = h * north;
+    step[2] = step[4] * par->south + step[5] * par->north;
     step[3] = h * (par->p_psi / par->I3 - roll);
     *work = effort;
     return converged ? chart_outcome(theta + step[0]) : 2;

@@ -210,7 +210,9 @@ def description(findings: Sequence[Finding]) -> str:
     """What the method is, whatever is claimed of it: "order 2, symplectic, reversible, keeps p_phi; not p_psi"."""
     measured = {one.claim: one.measured for one in findings}
     errors = ((one.claim.removesuffix("_error"), one) for one in findings if one.claim.endswith("_error"))
-    words = [f"{name} within {one.value:.1e}{error_units(name)} of the truth" for name, one in errors if one.measured]
+    true = {"axis_length": "one", "quaternion_length": "one"}
+    words = [f"{name} within {one.value:.1e}{error_units(name)} of {true.get(name, 'the truth')}"
+             for name, one in errors if one.measured]  # fmt: skip
     if order := measured.get("order"):
         p, limits = order.number, {"wrong limit": "converges to another motion", "converges": order.text}
         words += [limits.get(order.kind) or (f"order {round(p)}" if abs(p - round(p)) < 0.3 else f"order {p:.1f}")]

@@ -294,8 +294,8 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
         raise SymtopError(f"data must hold {words}")
     for name in UNIT_VECTORS:
         if name in columns:
-            with np.errstate(over="ignore"):
-                length = np.linalg.norm(columns[name], axis=1)
+            largest = np.abs(columns[name]).max(axis=1)  # by which squares neither overflow nor vanish
+            length = largest * np.linalg.norm(columns[name] / np.where(largest > 0.0, largest, 1.0)[:, None], axis=1)
             off = (length == 0.0) | np.isinf(length)  # and has no direction
             first = int(np.argmax(~np.isnan(length)))
             off[first] |= np.abs(length[first] - 1.0) > LENGTH

@@ -243,6 +243,13 @@ def test_honest_claims_are_confirmed(name):
     assert {ledger[claim].verdict for claim in ("order", "symplectic", "symmetric", "explicit")} == {"confirmed"}
 
 
+def test_an_order_that_is_claimed_too_low_is_refuted():
+    method = dataclasses.replace(symtop.integrator("dop853-compiled-fixed"), order=7)
+    assert judge(method, symtop.scene("goldstein"), quick=True)["order"].verdict == "refuted"
+        "refuted"
+    ] * 2
+
+
 @pytest.mark.parametrize(("main", "other", "doubt", "verdicts"), [
     (5.5, 4.0, 0.01, "confirmed" + 3 * " undecided"), (5.0, 4.0, 0.01, "confirmed refuted undecided refuted"),
     (5.5, 3.0, 0.01, "refuted " * 4), (3.0, 4.0, 0.01, "refuted " * 4), (4.0, 3.0, 0.01, "refuted " * 4),
@@ -250,7 +257,7 @@ def test_honest_claims_are_confirmed(name):
     (5.5, 3.9, 0.01, "undecided " * 4)])  # fmt: skip
 def test_a_slope_that_is_too_large_yields_to_the_terms_of_a_step_and_a_lower_one_stands(main, other, doubt, verdicts):
     terms = Series(1.0, np.array([0.0] * 5 + [1e-3]), np.full(6, 1e-14), True, "axis")  # of order 4
-    hidden, five = (terms._replace(defect=np.zeros(7), noise=np.full(7, noise)) for noise in (1e-6, 1e-14))
+    hidden, five = (terms._replace(defect=np.zeros(7), noise=np.full(7, noise)) for noise in (1e-5, 1e-14))
     fits = [Fit(slope, doubt, 1.0, np.ones(1, dtype=bool)) for slope in (main, other)]
     fitted = order.Order("", *[np.ones(1)] * 4, fits[0], {})
     decided = [order._claimed(4, fitted, fits, one, "").verdict for one in (terms, None, hidden, five)]

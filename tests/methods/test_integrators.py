@@ -169,6 +169,19 @@ def test_one_step_is_that_of_the_stationary_polynomial(name, scene):
             assert not np.max(np.abs(step.image(point) - wrong)) < 2e-12
 
 
+@pytest.mark.parametrize("name", [*GALERKIN, "galerkin-gauss-12"])
+def test_momenta_are_those_of_the_steps_made_however_long(name):
+    """Of slow tops, whose steps are too long for one solution alone: a second solution would show other momenta."""
+    tops = symtop.population(200, seed=1, kind="slow")
+    runs = symtop.ensemble(
+        tops, name, per_nutation=8, nutations=10, samples=41, variables=["p_phi", "p_psi"], quiet=True
+    )
+    for momentum in (runs[name].values[runs["outcome"].values == "ok"] for name in ("p_phi", "p_psi")):
+        assert len(momentum) > 100
+        change = np.nanmax(np.abs(momentum - momentum[:, :1]), axis=1)
+        assert np.max(change / np.nanmax(np.abs(momentum), axis=1)) < 1e-9
+
+
 def test_a_step_without_its_last_force_is_neither_symplectic_nor_symmetric():
     """The negative control of both: p_theta moved by the forces of the first two nodes only."""
     good = symtop.integrator(NAME)

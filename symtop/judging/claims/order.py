@@ -81,7 +81,7 @@ UNSTABLE = 1e4  # times that the motion of the scene grows a change: errors of r
 CLEAR = 1e-9  # noise of the h^1 term: a step that is rounded to single precision leaves 1e-8
 CONVERGES, ROUNDED, FALLS = "converges", 1e-10, (1e4, 10.0)  # an error that falls to a tenth over four decades
 STAYS, FEWEST = 0.5, 3  # an error that falls by less over the last decade of steps, of so many runs, does not fall
-SHARPLY = 1e-6  # of a term: in slopes a wrong one that is as small is below those of higher powers
+SHARPLY = 1e-5  # of a term: in slopes a wrong one that is as small is below those of higher powers
 ABOVE, FINEST_RUNS, SPREAD = 10.0, 5, 10.0  # errors beyond so many bounds, of so many runs, fall as h^p to this factor
 
 
@@ -348,7 +348,8 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
     elif verdict == "undecided":
         neither = f"the slope is neither {power} nor clearly another order"
         if early and known > SHARPLY:
-            neither = f"the slope is above {power}, and the h^{power + 1} term of a step known to {known:.0e} of itself"
+            doubt = f"the h^{power + 1} term of a step is known only to {known:.0e} of itself"
+            neither = f"the slope is above {power}, and {doubt}"
         why = f"{neither}: {why}" if measured else f"{main.reason} ({why})"
     return Finding("order", str(power), measured, verdict, why, value, resolution)
 

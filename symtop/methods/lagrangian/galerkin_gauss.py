@@ -12,9 +12,13 @@ F_j = -V'(theta_j; p_phi, p_psi) of the effective potential,
     theta_i = theta0 + h c_i p_theta/I1 + (h^2/I1) sum_j (a a)_ij F_j
     theta1  = theta0 + h p_theta/I1 + (h^2/I1) sum_j b_j (1 - c_j) F_j,         p_theta1 = p_theta + h sum_j b_j F_j
 
-and phi, psi move by h sum_j b_j phi'(theta_j) and so on. Order 2s, symmetric, symplectic; energy is not kept, but its
-error is bounded. `gauss-4` and its kin are the same collocation on other variables, (e, L), in which it keeps the
-energy and is not symplectic.
+and phi, psi move by h sum_j b_j phi'(theta_j) and so on. With x = theta/2 the step also sums
+
+    dS = h sum_j b_j/(4 I1 cos^2 x_j),       dN = h sum_j b_j/(4 I1 sin^2 x_j)
+
+in which the increments of phi and psi are linear in p_phi and p_psi: from these four a sample shows both again. Order
+2s, symmetric, symplectic; energy is not kept, but its error is bounded. `gauss-4` and its kin are the same collocation
+on other variables, (e, L), in which it keeps the energy and is not symplectic.
 
 *Iteration.* Newton's on the F_j, with the analytic V''_i, from the polynomial through those of the last step:
 
@@ -36,12 +40,12 @@ import numpy as np
 from numpy.polynomial import legendre
 
 from symtop.core.jit import register_jitable, set_item
-from symtop.methods.framework.angles import ReducedTop, chart_outcome, momenta_of_turns, on_angles
+from symtop.methods.framework.angles import ReducedTop, chart_outcome, momenta_of_turns, on_angles, require_chart
 from symtop.methods.framework.lanes import Lanes
 from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
 from symtop.methods.framework.plan import NOT_CONVERGED, Array
-from symtop.methods.framework.preparation import Later
+from symtop.methods.framework.preparation import Later, Preparation, Shown
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian.galerkin import node_at, pull_at
 
@@ -89,13 +93,15 @@ class _Step(NamedTuple):
 
 
 class _Trial(NamedTuple):
-    """At each node, the last four times its weight."""
+    """At each node, the last six times its weight."""
 
     forces: Row  # F
     stiffness: Row  # V''
-    turns: Row  # phi'
+    souths: Row  # 1/(4 I1 cos^2 x)
+    norths: Row  # 1/(4 I1 sin^2 x)
     rolls: Row  # phi' cos(theta)
-    turns_by: Row  # the slopes of both
+    souths_by: Row  # the slopes of the three
+    norths_by: Row
     rolls_by: Row
 
 
@@ -133,16 +139,19 @@ def _node(step: Any, forces: Any, i: int) -> Any:
 @register_jitable
 def _evaluate(step: Any, forces: Any) -> Any:
     par, blank = step.par, step.rule.c
-    new, stiffness, turns, rolls, turns_by, rolls_by = blank, blank, blank, blank, blank, blank
+    new, stiffness, souths, norths, rolls = blank, blank, blank, blank, blank
+    souths_by, norths_by, rolls_by = blank, blank, blank
     for i in range(len(blank)):
         node, b = _node(step, forces, i), step.rule.b[i]
         pull = pull_at(par, node, par.south, par.north)
         precession, bend = node.d * par.south + node.a * par.north, pull.south + pull.north
         new, stiffness = set_item(new, i, -pull.slope), set_item(stiffness, i, pull.stiffness)
-        turns, rolls = set_item(turns, i, b * precession), set_item(rolls, i, b * (precession * node.cosine))
-        turns_by = set_item(turns_by, i, b * bend)
+        souths, norths = set_item(souths, i, b * node.d), set_item(norths, i, b * node.a)
+        rolls = set_item(rolls, i, b * (precession * node.cosine))
+        souths_by = set_item(souths_by, i, b * (node.d * node.tangent))
+        norths_by = set_item(norths_by, i, -b * (node.a / node.tangent))
         rolls_by = set_item(rolls_by, i, b * (bend * node.cosine - precession * node.sine))
-    return _Trial(new, stiffness, turns, rolls, turns_by, rolls_by)
+    return _Trial(new, stiffness, souths, norths, rolls, souths_by, norths_by, rolls_by)
 
 
 def _elimination(s: int) -> Callable[..., Any]:
@@ -221,23 +230,27 @@ def _free_flight(step: Any) -> Any:
 @register_jitable
 def _keep(trial: Any, correction: Any) -> Any:
     """What was evaluated before the last correction follows it to first order; the remainder is its square."""
-    turn = roll = 0.0
-    for i in range(len(trial.turns)):
-        turn += trial.turns[i] + trial.turns_by[i] * correction.change[i]
-        roll += trial.rolls[i] + trial.rolls_by[i] * correction.change[i]
-    return (*correction.after, turn, roll)
+    south = north = roll = 0.0
+    for i in range(len(trial.rolls)):
+        turned = correction.change[i]
+        south += trial.souths[i] + trial.souths_by[i] * turned
+        north += trial.norths[i] + trial.norths_by[i] * turned
+        roll += trial.rolls[i] + trial.rolls_by[i] * turned
+    return (*correction.after, south, north, roll)
 
 
 @register_jitable
 def _close(step: Any, end: Any) -> Any:
-    h, newest, kick, bend = step.h, step.rule.c, 0.0, 0.0
+    h, par, newest, kick, bend = step.h, step.par, step.rule.c, 0.0, 0.0
     s = len(newest)
     for j in range(s):
         newest = set_item(newest, j, end[j])
         kick += step.rule.b[j] * end[j]
         bend += step.rule.last[j] * end[j]
+    south, north = h * end[s], h * end[s + 1]
     d = step.lever * (step.momentum + h * bend)
-    dstate = (d, h * kick, h * end[s], h * (step.par.p_psi / step.par.I3 - end[s + 1]))
+    turn = south * par.south + north * par.north
+    dstate = (d, h * kick, turn, h * (par.p_psi / par.I3 - end[s + 2]), south, north)
     return dstate, newest, chart_outcome(step.theta + d)
 
 
@@ -249,37 +262,43 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return (*forces, force)
 
 
+def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
+    """p_phi and p_psi by the discrete Legendre transform."""
+    return momenta_of_turns(par, dstate[5], dstate[4], h, dstate)
+
+
+_reduced = on_angles.numbers
+
+
+@register_jitable
+def _with_sums(top: Any, at: Any) -> Any:
+    par, state = _reduced(top, at)
+    return par, (*state, 0.0, 0.0)
+
+
+with_sums = Preparation(_with_sums, 6, require_chart)
+to_angles = Shown(lambda _par, _t, y: (y[0], y[1], y[2], y[3]), 4)
+
+
 @functools.cache
 def loop(s: int) -> Loop:
     """The loop of the method with s nodes."""
     correct = _correction(s)
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        """One step on (theta, p_theta, phi, psi); the work counted is the number of Newton iterations."""
+        """One step on (theta, p_theta, phi, psi, S, N); the work counted is the number of Newton iterations."""
         equations = _equations(par, rule, state, _steady(par, h), (0.0,))
         guess = _predict(equations, carry)
         _, trial, last, work, converged = newton(_evaluate, correct, _free_flight, equations, guess, rule.iterations)
         step, newest, outcome = _close(equations, _keep(trial, last))
         return step, newest + carry[:1], work, outcome if converged else NOT_CONVERGED
 
-    def observe(par, rule, before, dstate, h):  # type: ignore[no-untyped-def]
-        """p_phi and p_psi by the discrete Legendre transform: the increments of phi and psi are linear in them."""
-        equations = _equations(par, rule, before, _steady(par, h), (0.0,))
-        guess = begin(par, rule, before, h)[:-1]
-        _, _, last, _, _ = newton(_evaluate, correct, _free_flight, equations, guess, rule.iterations)
-        a = d = 0.0
-        for i in range(s):
-            node = _node(equations, last.after, i)
-            a += rule.b[i] * h * node.a
-            d += rule.b[i] * h * node.d
-        return momenta_of_turns(par, a, d, h, dstate)
-
     def in_lanes(rule: Rule) -> Lanes:
         record: Any = NamedTuple  # its fields are known here alone
-        end = record("End", [(name, float) for name in (*(f"F{j}" for j in range(s)), "turn", "roll")])
+        end = record("End", [(name, float) for name in (*(f"F{j}" for j in range(s)), "south", "north", "roll")])
         return iterated(
             rule, _steady, _open, _equations, _predict, _evaluate, correct, _keep, _close,
-            top=ReducedTop, end=end, dimension=4, steady=2, opened=1, unknowns=s, newest=s, carry=s + 1,
+            top=ReducedTop, end=end, dimension=6, steady=2, opened=1, unknowns=s, newest=s, carry=s + 1,
         )  # fmt: skip
 
     return Loop(begin, increment, observe, lanes=functools.cache(in_lanes))
@@ -287,10 +306,11 @@ def loop(s: int) -> Loop:
 
 def galerkin_gauss(s: int) -> Integrator:
     """The Galerkin integrator with s nodes, named after its order."""
+    rule = Later(functools.partial(gauss_rule, s))
     return Integrator(
         name=f"galerkin-gauss-{2 * s}", family="discrete-lagrangian",
         summary=f"Galerkin discrete Lagrangian, polynomial of degree {s} and Gauss's rule with {s} nodes",
-        solvers={"angles": FixedStep(loop(s), Later(functools.partial(gauss_rule, s)), on_angles, s, implicit=True)},
+        solvers={"angles": FixedStep(loop(s), rule, with_sums, s, implicit=True, present=to_angles)},
         order=2 * s, explicit=False, symplectic=True, symmetric=True, conserves=frozenset({"p_phi", "p_psi"}),
         reference="marsden-west-2001 hairer-lubich-wanner-2006", needs="lagrangian", general=True,
     )  # fmt: skip
