@@ -1,14 +1,15 @@
 """The gallery: every figure in docs/snapshot with its caption, the study that makes it and the command to type.
 
-Titles, captions and notes on reading are those of docs/snapshot/report.md, in its order. A figure is of the study
-whose folder its name begins with; those of benchmarks are named in `OTHERS`. A figure that the report does not show,
-and one that nothing makes, is an error: the site does not build.
+Titles, captions and notes on reading are those of the pages there, in the order of the front page. A figure is of the
+study whose folder its name begins with; those of benchmarks are named in `OTHERS`. A figure that the report does not
+show, and one that nothing makes, is an error: the site does not build.
 """
 
 import re
 from pathlib import Path
 from typing import NamedTuple
 
+from generator.snapshot import whole
 from sphinx.application import Sphinx
 from sphinx.errors import ExtensionError
 
@@ -86,9 +87,8 @@ def markdown(report: str, tracked: set[str], root: Path = ROOT) -> str:
 
 def _fill(_app: Sphinx, page: str, source: list[str]) -> None:
     if page == PAGE:
-        report = (SNAPSHOT / "report.md").read_text(encoding="utf-8")
         tracked = {path.name for path in (SNAPSHOT / "figures").iterdir()}
-        source[0] = source[0].replace(MARK, markdown(report, tracked))
+        source[0] = source[0].replace(MARK, markdown(whole(SNAPSHOT), tracked))
 
 
 def setup(app: Sphinx) -> dict[str, bool]:

@@ -1,7 +1,8 @@
 """Copies the report in words and its figures to docs/snapshot, which this repository holds: make snapshot.
 
 What the studies write into results/ is not tracked, so that a run of them leaves a checkout as it was. The snapshot is
-taken when what it says changes; a figure that the report no longer shows is removed from it. Tables are in it as far as
+taken when what it says changes; a figure that the report no longer shows is removed from it. Each question of the
+report is a page of its own, named after its short name on the front page, report.md. Tables are in it as far as
 the report shows them: the links to whole ones, which `make studies` writes, are taken out. What pages quote is put
 between their marks: in the README, which is the first page of the site, the figure of the front page before the first
 commands and its tables after them; answers of studies in docs/choosing.md, docs/results.md and docs/about/faq.md. What
@@ -16,6 +17,8 @@ import textwrap
 from pathlib import Path
 from typing import Any
 
+from symtop.report.html import slug
+
 ROOT = Path(__file__).resolve().parents[2]
 SHOWN = re.compile(r"\]\(figures/([^)]+)\)")
 STORED = re.compile(  # links to what is not tracked
@@ -28,6 +31,8 @@ QUOTED = {  # of a page: the question, and the beginnings of further paragraphs
     "about/faq.md": ("My body is no symmetric top", "**What fell.** "),
 }
 TABLE = "**What can you supply?"  # with which the README goes on after its first commands
+QUESTIONS = "**All questions:**"  # the front page's list of pages
+FRONT = "report.md"
 HAVE = "You have one of these?"  # the title of a table of the front page
 BEGIN, FIGURE, END = "<!-- from the report -->\n", "<!-- its figure -->\n", "<!-- to here -->\n"
 STORED_BY = {name: f"<!-- from results/{name}.json -->\n" for name in ("bench", "peers")}
@@ -43,14 +48,40 @@ def take(results: Path, snapshot: Path) -> list[str]:
     names = sorted(set(SHOWN.findall(text)))
     if missing := [name for name in names if not (results / "figures" / name).is_file()]:
         sys.exit(f"snapshot: figures of the report are missing: {', '.join(missing)}")
-    shutil.rmtree(snapshot / "figures", ignore_errors=True)
+    shutil.rmtree(snapshot, ignore_errors=True)
     (snapshot / "figures").mkdir(parents=True)
     for name in names:
         shutil.copyfile(results / "figures" / name, snapshot / "figures" / name)
-    for file in (results / name for name in ("report.md", "reference.md") if (results / name).is_file()):
-        text = STORED.sub(lambda link: link[1] or "", file.read_text(encoding="utf-8"))
-        (snapshot / file.name).write_text(text, encoding="utf-8")
+    reference = results / "reference.md"
+    pages = parted(text) | ({reference.name: reference.read_text(encoding="utf-8")} if reference.is_file() else {})
+    for file, page in pages.items():
+        (snapshot / file).write_text(STORED.sub(lambda link: link[1] or "", page), encoding="utf-8")
     return names
+
+
+def parted(report: str) -> dict[str, str]:
+    """The pages of a report by their files, the front page first."""
+    listed = re.findall(r"\[([^]]+)\]\(#([^)]+)\)", report.partition(QUESTIONS)[2].partition("\n")[0])
+    files = {anchor: f"{slug(short)}.md" for short, anchor in listed}
+    pages = {FRONT: "", **dict.fromkeys(files.values(), "")}
+    for part in re.split(r"^(?=## )", report, flags=re.MULTILINE):
+        file = files.get(slug(part.partition("\n")[0].lstrip("# ")), FRONT)
+        front = "" if file == FRONT else FRONT  # on which every other anchor is
+        text = re.sub(r"\]\(#([^)]+)\)", lambda link: f"]({files.get(link[1], f'{front}#{link[1]}')})", part)  # noqa: B023
+        pages[file] += text if file == FRONT else re.sub(r"^#(#+ )", r"\1", text, flags=re.MULTILINE)
+    back = f"\n\n[All questions]({FRONT})\n"
+    return {file: text if file == FRONT else text.rstrip() + back for file, text in pages.items()}
+
+
+def whole(snapshot: Path) -> str:
+    """The report in one piece again, from the pages of a snapshot."""
+    front = (snapshot / FRONT).read_text(encoding="utf-8")
+    files = re.findall(r"\]\(([\w-]+\.md)\)", front.partition(QUESTIONS)[2].partition("\n")[0])
+    pages = {file: (snapshot / file).read_text(encoding="utf-8") for file in files}
+    text = "\n".join([front, *(re.sub(r"^#", "##", page, flags=re.MULTILINE) for page in pages.values())])
+    for file, page in pages.items():
+        text = text.replace(f"]({file})", f"](#{slug(page.partition(chr(10))[0].lstrip('# '))})")
+    return text
 
 
 def answer(report: str, question: str, *further: str) -> str:
@@ -131,7 +162,7 @@ if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
     snapshot = ROOT / "docs" / "snapshot"
     names = take(ROOT / "results", snapshot)
-    for (name, begin), said in quoted((snapshot / "report.md").read_text(encoding="utf-8")).items():
+    for (name, begin), said in quoted(whole(snapshot)).items():
         page = ROOT / name
         page.write_text(quote(said, page.read_text(encoding="utf-8"), begin), encoding="utf-8")
     page = ROOT / "docs" / "results.md"

@@ -47,7 +47,36 @@ All: [table](tables/a-b.csv), [CSV](tables/c.csv).
 <!-- table a-b -->
 
 Data: [a.nc](a.nc).
+
+**All questions:** [A few](#why) · [B](#how)
+
+## Trust
+
+See [how](#how).
+
+## Why?
+
+W [how](#how), [trust](#trust)
+
+### Sub
+
+## How?
+
+H
 """
+
+
+def test_each_question_becomes_a_page_and_links_lead_there(tmp_path):
+    pages = _taker().parted(REPORT)
+    assert list(pages) == ["report.md", "a-few.md", "b.md"]
+    assert pages["report.md"].endswith("[A few](a-few.md) · [B](b.md)\n\n## Trust\n\nSee [how](b.md).\n\n")
+    links = "[how](b.md), [trust](report.md#trust)"
+    assert pages["a-few.md"] == f"# Why?\n\nW {links}\n\n## Sub\n\n[All questions](report.md)\n"
+    for file, text in pages.items():
+        (tmp_path / file).write_text(text)
+    again = _taker().whole(tmp_path)
+    assert re.findall("^##+ .+", again, re.MULTILINE) == ["## Trust", "## Why?", "### Sub", "## How?"]
+    assert "W [how](#how)" in again
 
 
 def test_a_whole_report_is_taken_without_links_to_what_is_not_tracked(results, tmp_path):
@@ -66,7 +95,7 @@ def test_a_whole_report_is_taken_without_links_to_what_is_not_tracked(results, t
 
 def test_the_stored_snapshot_is_whole_and_pages_quote_what_it_says():
     folder = ROOT / "docs" / "snapshot"
-    report = (folder / "report.md").read_text(encoding="utf-8")
+    report = _taker().whole(folder)
     shown = set(_taker().SHOWN.findall(report))
     assert shown == {path.name for path in (folder / "figures").iterdir()}
     for (name, begin), said in _taker().quoted(report).items():
