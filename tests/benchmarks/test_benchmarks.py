@@ -68,6 +68,7 @@ def test_the_tops_that_lanes_are_timed_on_stay_in_lanes_and_reach_the_error():
     assert len(np.unique(true, axis=0)) == lanes.MEMBERS  # neighbours, not copies
 
 
+@needs_gcc
 @pytest.mark.slow
 def test_an_ensemble_costs_little_around_its_steps_and_a_closed_form_ten_microseconds():
     """Ratios within one run: what is around the steps is 5 us on the machine that makes 1000 of them in 4.4."""
@@ -75,20 +76,22 @@ def test_an_ensemble_costs_little_around_its_steps_and_a_closed_form_ten_microse
     around = seconds["`ensemble`, axis and energy"] - seconds["of it: the steps"]
     assert around < 1.1 * seconds["of it: the steps"]
     assert seconds["`simulate`"] > 50.0 * seconds["`ensemble`, axis and energy"]
-    # Half of the calls below 10 us, 99 % below 30 us, in both arithmetics; 40 digits take a thousand times as long.
-    # Other tests that run beside this one slow both down, alike: then the ratio alone counts.
+    # Where Verlet in C takes 30 ns a step: half of the calls below 10 us, 99 % below 30, in both arithmetics; 40 digits
+    # take a thousand times as long. Tests beside this one slow both down, alike: then that ratio alone counts.
+    verlet = twin.Twin(kernels.kernel(("stormer-verlet", "angles")))
+    slower = timings([lambda: verlet(8000)], batches=60, batch=1e-3)[0].best / 8000 / 30e-9
     short, long, digits, *others = truth.measure()
     for row in (short, long):
         assert row.median < 1e-3 * digits.median
         if "PYTEST_XDIST_WORKER" not in os.environ:
-            assert row.median < 10e-6
-            assert row.slow < 30e-6
+            assert row.median < 10e-6 * slower
+            assert row.slow < 30e-6 * slower
     assert digits.median > 1e-3
     samples = [row for row in others if row.name.startswith("one sample")]
     assert len(samples) == 6
     assert all(row.median < 1e-6 for row in samples)
     constants, again, of_body = (row for row in others if row not in samples)
-    assert max(constants.median, of_body.median) < 10e-6  # of one among many
+    assert max(constants.median, of_body.median) < 10e-6 * slower  # of one among many
     assert again.median < 10e-3  # a reference at 1001 times, asked for again
 
 
