@@ -34,7 +34,7 @@ from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.framework.space import SpaceTop
+from symtop.methods.framework.space import AttitudeTop, SpaceTop
 from symtop.methods.simd import combined, wide_vectors
 from symtop.methods.vectors import accumulate, summed, zero
 from symtop.model.charts import BODY
@@ -187,7 +187,7 @@ def _loop(form: Any, top: Any) -> Loop:
     return Loop(begin, increment, form.observe, lanes=lambda rule: lanes(len(rule.b)))
 
 
-TOPS: dict[str, Any] = {"angles": BareTop, "axis": SpaceTop, "attitude": SpaceTop, BODY: General}
+TOPS: dict[str, Any] = {"angles": BareTop, "axis": SpaceTop, "attitude": AttitudeTop, BODY: General}
 LOOPS = {chart: _loop(form, TOPS[chart]) for chart, form in FORMS.items()}
 
 
