@@ -251,11 +251,15 @@ def built_in() -> list[Integrator]:
     """The tableaux that ship with symtop."""
     return [
         runge_kutta(
+            "euler", ((),), (1.0,), order=1,
+            summary="explicit Euler method on the unreduced equations", reference="hairer-norsett-wanner-1993",
+        ),
+        runge_kutta(
             "rk4",
             ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
             (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0),
             order=4,
             summary="classical Runge-Kutta method on the unreduced equations",
             reference="kutta-1901",
-        )
-    ]
+        ),
+    ]  # fmt: skip
