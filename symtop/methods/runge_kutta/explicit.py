@@ -19,6 +19,7 @@ Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, sect
 import functools
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from reprlib import repr as short
 from typing import Any, NamedTuple
 
@@ -249,11 +250,12 @@ def runge_kutta(
 
 def built_in() -> list[Integrator]:
     """The tableaux that ship with symtop."""
+    euler = runge_kutta(
+        "euler", ((),), (1.0,), order=1,
+        summary="explicit Euler method on the unreduced equations", reference="hairer-norsett-wanner-1993",
+    )
     return [
-        runge_kutta(
-            "euler", ((),), (1.0,), order=1,
-            summary="explicit Euler method on the unreduced equations", reference="hairer-norsett-wanner-1993",
-        ),
+        replace(euler, solvers={chart: euler.solvers[chart] for chart in ("angles", "axis")}),  # no |q| would last
         runge_kutta(
             "rk4",
             ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
