@@ -245,7 +245,8 @@ def test_honest_claims_are_confirmed(name):
 
 def test_an_order_that_is_claimed_too_low_is_refuted_and_a_right_one_of_which_little_is_known_is_not():
     method = dataclasses.replace(symtop.integrator("dop853-compiled-fixed"), order=7)
-    assert {judge(method, symtop.scene(name), quick=True)["order"].verdict for name in ("goldstein", "wave")} == {"refuted"}
+    for name in ("goldstein", "wave"):
+        assert judge(method, symtop.scene(name), quick=True)["order"].verdict == "refuted"
     right = judge(symtop.integrator("rkmk-se3-8"), symtop.scene("simo-wong"), quick=True)["order"]
     assert (right.verdict, right.value > 8.9) == ("undecided", True)
     assert "the h^9 term of a step is known only to 1e+00 of itself" in right.why

@@ -250,10 +250,8 @@ def runge_kutta(
 
 def built_in() -> list[Integrator]:
     """The tableaux that ship with symtop."""
-    euler = runge_kutta(
-        "euler", ((),), (1.0,), order=1,
-        summary="explicit Euler method on the unreduced equations", reference="hairer-norsett-wanner-1993",
-    )
+    words = "explicit Euler method on the unreduced equations"
+    euler = runge_kutta("euler", ((),), (1.0,), order=1, summary=words, reference="hairer-norsett-wanner-1993")
     return [
         replace(euler, solvers={chart: euler.solvers[chart] for chart in ("angles", "axis")}),  # no |q| would last
         runge_kutta(
