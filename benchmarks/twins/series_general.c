@@ -46,7 +46,7 @@ static inline void products(double *t, const double *a, const double *b) {
 }
 
 static inline void slope(const Par *par, const double *t, const double *y, double *rate) {
-    double half = 0.5 / par->I1, turn = 0.5 * par->twist, pull = 2.0 * par->mgl;
+    double half = 0.5 / par->I1, turn = 0.5 * par->lean /* here the twist */, pull = 2.0 * par->mgl;
     rate[0] = half * t[0] - turn * y[3], rate[1] = half * t[1] + turn * y[2];
     rate[2] = half * t[2] - turn * y[1], rate[3] = half * t[3] + turn * y[0];
     rate[4] = -pull * t[5], rate[5] = pull * t[4], rate[6] = 0.0;

@@ -30,7 +30,7 @@ NEWER = (  # methods that came after the draws whose rates tests bound
     *("strang-drift-first", "dprkn8", "extrapolation", "adams", "tsit5", "tsit5-fixed", "dop853-compiled"),
     *("dop853-compiled-fixed", "vern9", "vern9-fixed", "series-general", "series-general-adaptive", "five-rotations"),
     *("spiral", "rkmk-se3-5", "rkmk-se3-8", "dop853-projected", "vern9-projected"),
-    *("galerkin-gauss-4", "galerkin-gauss-6", "galerkin-gauss-8", "galerkin-gauss-12"),
+    *("galerkin-gauss-4", "galerkin-gauss-6", "galerkin-gauss-8", "galerkin-gauss-12", "euler", "symplectic-euler"),
 )
 LATER = ("srkn-19-8", "stormer-verlet-reversible", *NEWER)  # and after the runs which tests name
 LONGEST, PATIENCE = 60.0, 240.0  # s of processor time, and of the clock on a busy machine

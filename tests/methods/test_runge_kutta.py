@@ -9,6 +9,7 @@ import pytest
 import symtop
 from symtop.methods.framework.angles import field_angles, with_rates
 from symtop.methods.framework.equations import FORMULATIONS
+from symtop.methods.framework.plan import Plan
 from symtop.methods.library.scipy_ivp import RightHandSide
 from symtop.methods.runge_kutta import pairs
 from symtop.methods.runge_kutta.explicit import LOOPS, runge_kutta
@@ -98,6 +99,21 @@ def test_p_phi_stays_where_it_is_linear_in_the_state_and_is_lost_in_angles(name)
 
 
 @pytest.mark.parametrize("chart", list(FORMULATIONS))
+def test_a_run_is_the_loop_that_anybody_writes_around_the_field(chart):
+    scene, h, steps = symtop.scene("goldstein"), 0.03, 40
+    f = symtop.field(chart, scene)
+    y = f.state(scene.start)
+    for _ in range(steps):
+        k1 = f(0.0, y)
+        k2 = f(0.0, y + 0.5 * h * k1)
+        k3 = f(0.0, y + 0.5 * h * k2)
+        y = y + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + f(0.0, y + h * k3))
+    ours = symtop.integrator("rk4").solvers[chart](scene.top, scene.start, Plan.steps(h, [steps])).states[-1]
+    ours, y = (ours[[0, 2, 3]], y[:3]) if chart == "angles" else (ours, y)  # angles are shown with p_theta
+    np.testing.assert_allclose(ours, y, rtol=0.0, atol=2e-13)
+
+
+@pytest.mark.parametrize("chart", list(FORMULATIONS))
 def test_numpy_and_compiled_are_one_function(chart):
     for scene in random_scenes(5, seed=3):
         plain, fast = (symtop.field(chart, scene.top, compiled=compiled) for compiled in (False, True))
@@ -108,7 +124,7 @@ def test_numpy_and_compiled_are_one_function(chart):
 
 
 def test_the_attitude_takes_its_spin_from_the_state_and_a_pole_is_nan_in_angles_alone():
-    """A field of one top serves every start: the kernels' own holds the spin of one."""
+    """A field of one top serves every start."""
     scene = symtop.scene("spheroid")
     f = symtop.field("attitude", scene)
     assert f.top == symtop.field("attitude", "spheroid").top == scene.top

@@ -13,7 +13,7 @@ from symtop.methods.splitting import coefficients as tables, space
 from symtop.methods.splitting.composition import built_in, composition
 from symtop.model.scenes import closed_form
 
-TABLES = {name: method.table for name, method in tables.METHODS.items()}
+TABLES = {name: one.table for name, one in tables.METHODS.items() if one.table.order > 1}  # of more than a sum of 1
 METHODS = {method.name: method for method in built_in()}
 
 

@@ -186,7 +186,7 @@ def test_every_method_can_be_probed_and_is_told_what_it_can_do(monkeypatch):
     """One forecast a method that comparisons choose from: finite, and silent at a fine setting."""
     scene = symtop.scene("goldstein")
     for method in methods().values():
-        control = {"step_size": 0.01} if method.control == "step_size" else {}
+        control = {"step_size": 1e-4 if method.order == 1 else 0.01} if method.control == "step_size" else {}
         if method.control == "tolerance" and method.default_tolerance is None:
             control = {"tolerance": 1e-6 if method.implementation == "compiled" else 1e-5}
         plan, _ = make_plan(scene, method, **control, horizon=3.0, samples=11)
@@ -374,7 +374,7 @@ def test_beside_a_pole_no_growth_is_seen_where_there_is_none_and_a_length_that_d
     top = symtop.SymmetricTop(0.4577082721218755, 0.11243869742655017, 116.05806957319277)
     start = symtop.Angles(1.4123814e-3, -2.63782662, -1.424354898914134, 5.8594e-3, 18.072692920427624, 143.08986495395)
     scene = symtop.Scene("long", top, start, 56.3)
-    assert "the quaternion's length left one" in caution(scene, "rk4[attitude]", step_size=1.948e-3)
+    assert "the quaternion's length left one" in caution(scene, "rk4[attitude]", step_size=2.2e-3)
     assert caution(scene, "rk4[attitude]", step_size=1.3e-3) == ""
 
 

@@ -81,7 +81,7 @@ UNSTABLE = 1e4  # times that the motion of the scene grows a change: errors of r
 CLEAR = 1e-9  # noise of the h^1 term: a step that is rounded to single precision leaves 1e-8
 CONVERGES, ROUNDED, FALLS = "converges", 1e-10, (1e4, 10.0)  # an error that falls to a tenth over four decades
 STAYS, FEWEST = 0.5, 3  # an error that falls by less over the last decade of steps, of so many runs, does not fall
-SHARPLY = 1e-5  # of a term: in slopes a wrong one that is as small is below those of higher powers
+SHARPLY, BESIDE_NEXT = 1e-5, 1e-3  # of a term, or of the next one: a wrong one that is as small is in no slope
 ABOVE, FINEST_RUNS, SPREAD = 10.0, 5, 10.0  # errors beyond so many bounds, of so many runs, fall as h^p to this factor
 
 
@@ -330,7 +330,11 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
     value, resolution = main.slope, BESIDE + main.interval
     why = f"{slopes}; {series.words(power)}" if series else slopes
     shown = series is not None and series.order == power and series.is_exact
-    early, known = bool(measured) and main.slope > power, series.least(power + 1) if series else 0.0
+    early, known, following = bool(measured) and main.slope > power, 0.0, 0.0
+    if series:
+        known = series.least(power + 1) if power + 1 < series.noise.size else math.inf
+        following = float(series.defect[power + 2]) if series.is_exact and series.order == power + 1 else 0.0
+    sharply = known <= max(SHARPLY, BESIDE_NEXT * following)
     if series is not None and shown and verdict != "confirmed":
         lower = any(_below(fit, power, BESIDE) for fit in fits)
         if (early and not lower) or (not measured and _agree(fitted, power)):
@@ -339,7 +343,7 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
             return Finding("order", str(power), _terms(series), "confirmed", why, *defect)
     if early and verdict == "refuted" and not any(_below(fit, power, CLEARLY) for fit in fits):
         whole = abs(main.slope - round(main.slope)) <= resolution
-        verdict = "undecided" if shown or known > SHARPLY or not whole else verdict
+        verdict = "undecided" if shown or not (sharply and whole) else verdict
     if verdict == "refuted":
         why = f"the error falls with another power of the step: {why}"
     elif series is not None and series.order < min(power, series.resolved):
@@ -347,8 +351,8 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
         value, resolution = series.worst(term), series.least(term)
     elif verdict == "undecided":
         neither = f"the slope is neither {power} nor clearly another order"
-        if early and known > SHARPLY:
-            doubt = f"the h^{power + 1} term of a step is known only to {known:.0e} of itself"
+        if early and not sharply:
+            doubt = f"the h^{power + 1} term of a step is known only to {min(known, 1.0):.0e} of itself"
             neither = f"the slope is above {power}, and {doubt}"
         why = f"{neither}: {why}" if measured else f"{main.reason} ({why})"
     return Finding("order", str(power), measured, verdict, why, value, resolution)

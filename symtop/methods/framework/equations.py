@@ -3,7 +3,7 @@
     chart      y                                       multiplications, divisions   sines, cosines   ends
     angles     (theta, phi, psi, theta', phi', psi')                           16                2   theta = 0 and pi
     axis       (e, L)                                                          12                0   nowhere
-    attitude   (q, L)                                                          29                0   nowhere
+    attitude   (q, L)                                                          37                0   nowhere
 
 (see `angles` and `space`). In each of the three, energy and momenta are functions of the state, so that whatever a
 method does to them shows. Every Runge-Kutta method, compiled or a library's, takes f from here, so that method and
@@ -24,8 +24,7 @@ from symtop.methods.framework import angles, body, space
 from symtop.methods.framework.angles import field_angles
 from symtop.methods.framework.plan import OUTCOMES, Array, Run
 from symtop.methods.framework.preparation import BareTop
-from symtop.methods.framework.space import SpaceTop, axis_of, field_attitude, field_axis
-from symtop.methods.vectors import dot
+from symtop.methods.framework.space import AttitudeTop, SpaceTop, field_attitude, field_axis
 from symtop.model import charts
 from symtop.model.charts import BODY, CHARTS, space_momenta
 from symtop.model.scenes import Scene, scene
@@ -53,7 +52,7 @@ FORMULATIONS = {
         lambda _, states: space_momenta("axis", states),
     ),
     "attitude": Formulation(
-        space.field_attitude, space.ended_space, space.observe_attitude, space.on_attitude, None,
+        space.field_attitude, space.ended_space, space.observe_attitude, space.on_state, None,
         lambda _, states: space_momenta("attitude", states),
     ),
 }  # fmt: skip
@@ -77,16 +76,10 @@ def as_run(
     return Run(shown, p_phi, p_psi, steps, evaluations, 0, OUTCOMES[outcome], reached)
 
 
-def _attitude(I1: Any, I3: Any, mgl: Any, y: Any) -> Any:
-    """With L.e taken from the state; in the kernels it is a parameter of the run."""
-    along = dot(axis_of(y[0], y[1], y[2], y[3]), (y[4], y[5], y[6]))
-    return field_attitude(SpaceTop(I1, mgl, along * (1.0 / I3 - 1.0 / I1)), y)
-
-
 _RIGHT: dict[str, tuple[Callable[..., Any], tuple[int]]] = {  # of the numbers of a top and y; the shape of y
     "angles": (lambda I1, I3, mgl, y: field_angles(BareTop(I1, I3, mgl), y), (6,)),
     "axis": (lambda I1, _I3, mgl, y: field_axis(SpaceTop(I1, mgl, 0.0), y), (6,)),
-    "attitude": (_attitude, (7,)),
+    "attitude": (lambda I1, I3, mgl, y: field_attitude(AttitudeTop(I1, mgl, 1.0 / I3 - 1.0 / I1), y), (7,)),
 }
 
 

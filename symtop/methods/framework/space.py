@@ -2,13 +2,14 @@
 
     e' = L x e / I1,    q' = (L q / I1 + twist q k) / 2,    L' = mgl k x e,    twist = p_psi (1/I3 - 1/I1)
 
-The attitude has a third form, the frame (e, L, a). A unit vector a across the axis is carried by a' = L x a / I1; the
-body turns past it about e at the constant rate `twist`, which is applied exactly when a sample is taken. Every equation
-and every constant of this form is linear or quadratic, whereas p_psi = L.e(q) is cubic in (q, L), where no Runge-Kutta
-method keeps it; and what is integrated turns with the axis, not with the spin.
+f of (q, L) has p_psi = L.e(q) of the state (`on_state`). What keeps p_psi exactly or to rounding, as splittings, maps
+on the group and Taylor series do, may take the twist of the start for the whole run (`on_attitude`). The attitude has a
+third form, the frame (e, L, a). A unit vector a across the axis is carried by a' = L x a / I1; the body turns past it
+about e at the constant rate `twist`, which is applied exactly when a sample is taken. Every equation and every constant
+of this form is linear or quadratic, whereas p_psi = L.e(q) is cubic in (q, L), where no Runge-Kutta method keeps it;
+and what is integrated turns with the axis, not with the spin.
 
-p_phi = L_z and p_psi = L.e are not parameters of these charts: they are read off the state, and whatever a kernel does
-to them shows.
+p_phi = L_z and p_psi = L.e are read off the state, and whatever a kernel does to them shows.
 """
 
 import math
@@ -31,6 +32,14 @@ class SpaceTop(NamedTuple):
     I1: float
     mgl: float
     twist: float
+
+
+class AttitudeTop(NamedTuple):
+    """The numbers of the top that f of (q, L) needs; `lean` is 1/I3 - 1/I1."""
+
+    I1: float
+    mgl: float
+    lean: float
 
 
 @register_jitable
@@ -66,6 +75,10 @@ def _on_attitude(top: Any, at: Any) -> Any:
     return _numbers(top, at), (*q_at(at), *L_at(top, at))
 
 
+def _on_state(top: Any, at: Any) -> Any:
+    return AttitudeTop(top.I1, top.mgl, 1.0 / top.I3 - 1.0 / top.I1), (*q_at(at), *L_at(top, at))
+
+
 def _on_frame(top: Any, at: Any) -> Any:
     """a is the body's first axis."""
     w, x, y, z = q_at(at)
@@ -74,6 +87,7 @@ def _on_frame(top: Any, at: Any) -> Any:
 
 
 on_axis, on_attitude, on_frame = Preparation(_on_axis, 6), Preparation(_on_attitude, 7), Preparation(_on_frame, 9)
+on_state = Preparation(_on_state, 7)
 
 
 @register_jitable
@@ -122,9 +136,8 @@ def field_frame(par: Any, y: Any) -> Any:
 
 
 @register_jitable
-def field_attitude(par: Any, y: Any) -> Any:
-    """Time derivative of (q, L); |q| stays one only as far as a method keeps it."""
-    half, turn = 0.5 / par.I1, 0.5 * par.twist
+def _turning(par: Any, twist: float, y: Any) -> Any:
+    half, turn = 0.5 / par.I1, 0.5 * twist
     w, x, y1, z = y[0], y[1], y[2], y[3]
     px, py, pz = half * y[4], half * y[5], half * y[6]
     right, back = 2.0 * (x * z + w * y1), 2.0 * (y1 * z - w * x)  # the axis, e_x and e_y
@@ -137,6 +150,19 @@ def field_attitude(par: Any, y: Any) -> Any:
         par.mgl * right,
         0.0,
     )
+
+
+@register_jitable
+def field_attitude(par: Any, y: Any) -> Any:
+    """Time derivative of (q, L); |q| stays one only as far as a method keeps it."""
+    right, back, up = axis_of(y[0], y[1], y[2], y[3])
+    return _turning(par, par.lean * (right * y[4] + back * y[5] + up * y[6]), y)
+
+
+@register_jitable
+def field_twisted(par: Any, y: Any) -> Any:
+    """The same with the twist of the start."""
+    return _turning(par, par.twist, y)
 
 
 @register_jitable

@@ -30,7 +30,7 @@ from symtop.methods.framework.equations import FORMS, FORMULATIONS, as_run
 from symtop.methods.framework.plan import NOT_FINITE, OK, OUT_OF_BUDGET, STEP_TOO_SMALL, Array, Plan, Run
 from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.registry import Integrator, Solver
-from symtop.methods.framework.space import SpaceTop
+from symtop.methods.framework.space import AttitudeTop, SpaceTop
 from symtop.model.top import Angles, SymmetricTop
 
 # a run's limit: about half a minute each; other classes have the last
@@ -56,7 +56,7 @@ class RightHandSide:
 def compiled_field(chart: str) -> Any:
     """f(a, b, c, y) -> y' of a chart of the top, compiled; a, b, c are the three parameters of its equations."""
     field = FORMS[chart].field
-    parameters: type = BareTop if chart == "angles" else SpaceTop
+    parameters: type = {"angles": BareTop, "axis": SpaceTop, "attitude": AttitudeTop}[chart]
 
     def compiled(a, b, c, y):  # type: ignore[no-untyped-def]
         return np.array(field(parameters(a, b, c), y))

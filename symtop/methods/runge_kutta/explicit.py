@@ -19,6 +19,7 @@ Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, sect
 import functools
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from reprlib import repr as short
 from typing import Any, NamedTuple
 
@@ -34,7 +35,7 @@ from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.framework.space import SpaceTop
+from symtop.methods.framework.space import AttitudeTop, SpaceTop
 from symtop.methods.simd import combined, wide_vectors
 from symtop.methods.vectors import accumulate, summed, zero
 from symtop.model.charts import BODY
@@ -187,7 +188,7 @@ def _loop(form: Any, top: Any) -> Loop:
     return Loop(begin, increment, form.observe, lanes=lambda rule: lanes(len(rule.b)))
 
 
-TOPS: dict[str, Any] = {"angles": BareTop, "axis": SpaceTop, "attitude": SpaceTop, BODY: General}
+TOPS: dict[str, Any] = {"angles": BareTop, "axis": SpaceTop, "attitude": AttitudeTop, BODY: General}
 LOOPS = {chart: _loop(form, TOPS[chart]) for chart, form in FORMS.items()}
 
 
@@ -249,7 +250,10 @@ def runge_kutta(
 
 def built_in() -> list[Integrator]:
     """The tableaux that ship with symtop."""
+    words = "explicit Euler method on the unreduced equations"
+    euler = runge_kutta("euler", ((),), (1.0,), order=1, summary=words, reference="hairer-norsett-wanner-1993")
     return [
+        replace(euler, solvers={chart: euler.solvers[chart] for chart in ("angles", "axis")}),  # no |q| would last
         runge_kutta(
             "rk4",
             ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),
@@ -257,5 +261,5 @@ def built_in() -> list[Integrator]:
             order=4,
             summary="classical Runge-Kutta method on the unreduced equations",
             reference="kutta-1901",
-        )
-    ]
+        ),
+    ]  # fmt: skip

@@ -1,7 +1,7 @@
 """The built-in splitting methods: coefficients, source and a line of words. An entry of `METHODS` makes a method.
 
-A table alternates kicks b_0 .. b_n with drifts a_1 .. a_n; both sum to 1 and all of these read the same from both ends.
-Three shapes:
+A table alternates kicks b_0 .. b_n with drifts a_1 .. a_n; both sum to 1 and all of these but one, the symplectic Euler
+method, read the same from both ends. Three shapes:
 
     strang_steps   kick-drift-kick steps of lengths gamma_i h, for any splitting; order conditions sum gamma^3 = 0 (4),
                    sum gamma^5 = 0 and two more (6), ...
@@ -21,7 +21,7 @@ from symtop.methods.splitting.loop import exact_sum
 
 
 class Table(NamedTuple):
-    """A symmetric composition: drifts a_1 .. a_n, kicks b_0 .. b_n and their force gradients c_0 .. c_n."""
+    """A composition: drifts a_1 .. a_n, kicks b_0 .. b_n and their force gradients c_0 .. c_n."""
 
     order: int
     drift: tuple[float, ...]
@@ -83,6 +83,9 @@ BLANES_MOAN_6 = kick_first(  # for two parts of any kind
 METHODS = {
     "stormer-verlet": Splitting(
         STRANG, "hairer-lubich-wanner-2003", "kick-drift-kick splitting of the reduced Hamiltonian", "angles"),
+    "symplectic-euler": Splitting(
+        Table(1, (1.0,), (1.0, 0.0)), "hairer-lubich-wanner-2006",
+        "a kick and a drift of the reduced Hamiltonian, one force", "angles"),
     "stormer-verlet-yoshida-4": Splitting(YOSHIDA_4, "yoshida-1990", "three Stormer-Verlet steps", "angles"),
     "stormer-verlet-suzuki-4": Splitting(SUZUKI_4, "suzuki-1990", "five Stormer-Verlet steps", "angles"),
     "stormer-verlet-blanes-moan-6": Splitting(  # more accurate here than the table of srkn-14-6

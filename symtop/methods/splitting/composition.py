@@ -6,7 +6,8 @@ A composition alternates kicks b_0 .. b_n with drifts a_1 .. a_n (`loop`). The c
     axis, attitude  the exact free symmetric top; gravity kicks, singular nowhere (`space`)
     body            a free motion of the order of the table, or of order two between Strang's kicks (`body`)
 
-Every method here is explicit, symplectic and symmetric, and keeps p_phi and p_psi. `stormer-verlet` and its
+Every method here is explicit and symplectic, all but the symplectic Euler method are symmetric, and all keep p_phi and
+p_psi. `stormer-verlet` and its
 compositions live in the angles chart, all others in the space frame.
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, chapters II.5 and V.3.
 """

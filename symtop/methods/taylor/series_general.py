@@ -6,8 +6,8 @@ follow from each other by Cauchy products:
     y(t + tau) = sum_n c_n tau^n,    c_0 = y,    (n + 1) c_{n+1} = sum_{j<=n} Q(c_j, c_{n-j}) + l(c_n)
 
 This is what a Taylor code for anybody's equations does: six products of series on the axis, sixteen on the attitude, in
-loops. No second order, no vector registers, and no constant of the motion but L.e, a parameter of (q, L) for every
-method: `series` beside it shows what those are worth, `taylor` what heyoka makes of the same equations.
+loops. No second order, no vector registers, and no constant of the motion but L.e, which is a parameter of (q, L) as in
+`taylor`: `series` beside it shows what those are worth, `taylor` what heyoka makes of the same equations.
 
 *With a fixed step* the order is 16. *With a tolerance* eps it is N = ceil(1 - log(eps)/2), and the step is
 
@@ -29,11 +29,12 @@ import numpy as np
 from symtop.core.jit import register_jitable, set_item
 from symtop.core.jit_functions import fused
 from symtop.core.numbers import EPSILON
+from symtop.methods.framework import equations
 from symtop.methods.framework.body import torque
-from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.registry import Integrator
+from symtop.methods.framework.space import field_twisted, on_attitude
 from symtop.methods.runge_kutta.explicit import row_of, store
 from symtop.methods.runge_kutta.pairs import Method, nothing_more, solver
 from symtop.methods.vectors import summed
@@ -170,6 +171,8 @@ CHARTS = {
     "attitude": Quadratic(_attitude_products, _attitude_slope, (0.0,) * 6),
     BODY: Quadratic(_body_products, _body_slope, (0.0,) * 10),
 }
+TWISTED = equations.FORMS["attitude"]._replace(field=field_twisted, prepare=on_attitude)
+FORMS = equations.FORMS | {"attitude": TWISTED}
 
 
 @functools.cache
@@ -196,7 +199,7 @@ def built_in() -> list[Integrator]:
         "conserves": frozenset({"p_phi"}), "reference": "jorba-zou-2005", "needs": "expression", "general": True,
     }  # fmt: skip
     fixed = {chart: FixedStep(loop(chart), (0.0,), FORMS[chart].prepare, ORDER, implicit=False) for chart in CHARTS}
-    adaptive = {chart: solver(FORMS[chart], equations, HIGHEST + 2) for chart, equations in CHARTS.items()}
+    adaptive = {chart: solver(FORMS[chart], method, HIGHEST + 2) for chart, method in CHARTS.items()}
     summary = "Taylor series of the unreduced space-frame equations by recurrence"
     return [
         Integrator("series-general", summary=f"{summary}, order {ORDER}", solvers=fixed, order=ORDER, **same),
