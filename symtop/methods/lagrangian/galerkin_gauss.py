@@ -41,10 +41,9 @@ from numpy.polynomial import legendre
 
 from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework.angles import ReducedTop, chart_outcome, momenta_of_turns, on_angles, require_chart
-from symtop.methods.framework.lanes import Lanes
 from symtop.methods.framework.loop import FixedStep, Loop
-from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
-from symtop.methods.framework.plan import NOT_CONVERGED, Array
+from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton_loop
+from symtop.methods.framework.plan import Array
 from symtop.methods.framework.preparation import Later, Preparation, Shown
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian.galerkin import node_at, pull_at
@@ -282,26 +281,12 @@ to_angles = Shown(lambda _par, _t, y: (y[0], y[1], y[2], y[3]), 4)
 
 @functools.cache
 def loop(s: int) -> Loop:
-    """The loop of the method with s nodes."""
-    correct = _correction(s)
-
-    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        """One step on (theta, p_theta, phi, psi, S, N); the work counted is the number of Newton iterations."""
-        equations = _equations(par, rule, state, _steady(par, h), (0.0,))
-        guess = _predict(equations, carry)
-        _, trial, last, work, converged = newton(_evaluate, correct, _free_flight, equations, guess, rule.iterations)
-        step, newest, outcome = _close(equations, _keep(trial, last))
-        return step, newest + carry[:1], work, outcome if converged else NOT_CONVERGED
-
-    def in_lanes(rule: Rule) -> Lanes:
-        record: Any = NamedTuple  # its fields are known here alone
-        end = record("End", [(name, float) for name in (*(f"F{j}" for j in range(s)), "south", "north", "roll")])
-        return iterated(
-            rule, _steady, _open, _equations, _predict, _evaluate, correct, _keep, _close,
-            top=ReducedTop, end=end, dimension=6, steady=2, opened=1, unknowns=s, newest=s, carry=s + 1,
-        )  # fmt: skip
-
-    return Loop(begin, increment, observe, lanes=functools.cache(in_lanes))
+    """The loop of the method with s nodes, on (theta, p_theta, phi, psi, S, N)."""
+    return newton_loop(
+        begin, observe, constants=_steady, start=_open, equation=_equations, predict=_predict, evaluate=_evaluate,
+        correct=_correction(s), restart=_free_flight, keep=_keep, close=_close, top=ReducedTop, dimension=6, steady=2,
+        opened=1, unknowns=s, ends=s + 3, newest=s, carry=s + 1,
+    )  # fmt: skip
 
 
 def galerkin_gauss(s: int) -> Integrator:
