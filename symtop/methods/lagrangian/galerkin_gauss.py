@@ -129,19 +129,13 @@ def _reached(rule: Any, forces: Any, i: int) -> float:
 
 
 @register_jitable
-def _node(step: Any, forces: Any, i: int) -> Any:
-    """The trigonometry at theta_i."""
-    pull = step.h * _reached(step.rule, forces, i)
-    return node_at(step.par, step.theta + step.lever * (step.rule.c[i] * step.momentum + pull))
-
-
-@register_jitable
 def _evaluate(step: Any, forces: Any) -> Any:
     par, blank = step.par, step.rule.c
     new, stiffness, souths, norths, rolls = blank, blank, blank, blank, blank
     souths_by, norths_by, rolls_by = blank, blank, blank
     for i in range(len(blank)):
-        node, b = _node(step, forces, i), step.rule.b[i]
+        flown, b = step.rule.c[i] * step.momentum + step.h * _reached(step.rule, forces, i), step.rule.b[i]
+        node = node_at(par, step.theta + step.lever * flown)
         pull = pull_at(par, node, par.south, par.north)
         precession, bend = node.d * par.south + node.a * par.north, pull.south + pull.north
         new, stiffness = set_item(new, i, -pull.slope), set_item(stiffness, i, pull.stiffness)
@@ -289,18 +283,16 @@ def loop(s: int) -> Loop:
     )  # fmt: skip
 
 
-def galerkin_gauss(s: int) -> Integrator:
-    """The Galerkin integrator with s nodes, named after its order."""
-    rule = Later(functools.partial(gauss_rule, s))
-    return Integrator(
-        name=f"galerkin-gauss-{2 * s}", family="discrete-lagrangian",
-        summary=f"Galerkin discrete Lagrangian, polynomial of degree {s} and Gauss's rule with {s} nodes",
-        solvers={"angles": FixedStep(loop(s), rule, with_sums, s, implicit=True, present=to_angles)},
-        order=2 * s, explicit=False, symplectic=True, symmetric=True, conserves=frozenset({"p_phi", "p_psi"}),
-        reference="marsden-west-2001 hairer-lubich-wanner-2006", needs="lagrangian", general=True,
-    )  # fmt: skip
-
-
 def built_in() -> list[Integrator]:
-    """galerkin-gauss-4, -6, -8 and -12."""
-    return [galerkin_gauss(s) for s in NODES]
+    """galerkin-gauss-4, -6, -8 and -12, named after their orders."""
+    rules = {s: Later(functools.partial(gauss_rule, s)) for s in NODES}
+    return [
+        Integrator(
+            name=f"galerkin-gauss-{2 * s}", family="discrete-lagrangian",
+            summary=f"Galerkin discrete Lagrangian, polynomial of degree {s} and Gauss's rule with {s} nodes",
+            solvers={"angles": FixedStep(loop(s), rule, with_sums, s, implicit=True, present=to_angles)},
+            order=2 * s, explicit=False, symplectic=True, symmetric=True, conserves=frozenset({"p_phi", "p_psi"}),
+            reference="marsden-west-2001 hairer-lubich-wanner-2006", needs="lagrangian", general=True,
+        )
+        for s, rule in rules.items()
+    ]  # fmt: skip
