@@ -112,6 +112,7 @@ def newton_loop(  # noqa: C901  (the loops of one step, read in one piece)
     size_at, live_at, steps_at = (end_at + ends + i for i in range(3))
     room = steps_at + 1 - opened_at
 
+    @register_jitable  # at once: what a method is made of must not hang on what has run
     def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
         values = constants(par, h)
         for i in range(len(values)):
