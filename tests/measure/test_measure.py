@@ -184,7 +184,7 @@ def test_a_million_steps_keep_recomputed_momenta_and_bound_the_energy_without_a_
 def test_momenta_are_recomputed_and_not_copied(family, rule):
     """A phi that moves 1e-10 too far shows in p_phi."""
     par, state = symtop.on_angles(SPHEROID.top, SPHEROID.start)
-    step, *_ = family.increment(par, rule, state, family.begin(par, rule, state, 0.01), 0.01)
+    step, *_ = family.march.increment(par, rule, state, family.begin(par, rule, state, 0.01), 0.01)
     right = family.observe(par, rule, state, step, 0.01)
     assert right == pytest.approx(SPHEROID.top.momenta(SPHEROID.start)[:2], rel=1e-14)
     moved = (step[0], step[1], step[2] + 1e-10, step[3])

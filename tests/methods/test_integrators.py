@@ -97,7 +97,7 @@ def test_an_iteration_that_wanders_off_ends_as_with_the_sines_of_the_library(fam
     ends = []
     for top, at, h in violent(400, seed=3):
         par, state = on_angles(top, at)
-        interpreted = family.increment(par, rule, state, family.begin(par, rule, state, h), h)[3]
+        interpreted = family.march.increment(par, rule, state, family.begin(par, rule, state, h), h)[3]
         ends.append((interpreted, loop(par, rule, state, h, np.array([1])).outcome))
     assert {OK, LEFT_CHART} < {outcome for outcome, _ in ends}  # and not converged
     assert sum(one != other for one, other in ends) <= 4

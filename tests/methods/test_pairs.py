@@ -202,7 +202,7 @@ def less(weights, error):
 @functools.cache
 def kernel(name):
     """Of `sample` or `refine`, from the start of a step."""
-    part = getattr(nystrom.Nystrom(DPRKN8)(REDUCED.field), name)
+    part = getattr(nystrom.method(REDUCED.field), name)
 
     def sample(par, state, memory, h):
         return part(par, state, state, memory, 1.0, h)

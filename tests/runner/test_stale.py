@@ -82,7 +82,7 @@ METHODS = "symtop.methods"
 
 @pytest.mark.parametrize(("place", "stale"), [
     (f"{METHODS}.runge_kutta.gauss:solve_stages", GAUSS),
-    (f"{METHODS}.lagrangian.discrete_lagrangian:increment", STRAIGHT),
+    (f"{METHODS}.lagrangian.discrete_lagrangian:forces", STRAIGHT),
     (f"{METHODS}.library.scipy_ivp:compiled_field", SCIPY),
     (f"{METHODS}.runge_kutta.explicit:later_stages", {"rk4"}),  # the guard's watch reaches what pairs are made of
     (f"{METHODS}.lie_group.generalised_alpha:_corrected", {"generalised-alpha"}),

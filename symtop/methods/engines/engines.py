@@ -14,7 +14,7 @@ the right sides of Euler's equations need the axis e alone. So every map whose s
 about its axis is one function, on the axis and on the attitude, that returns the rotation of the step as a quaternion p
 in space beside the new v, which is what the engine carries, w or L:
 
-    step(par, rule, e, v, carry, h) -> (p, v, carry),      e <- p e p*,  q <- p q/|p q|.
+    step(par, e, v, carry, h) -> (p, v, carry),      e <- p e p*,  q <- p q/|p q|.
 
 A *body without symmetry* has I_s = q I q*, and the attitude itself stands where the axis does: the same functions, but
 for what has I_s or the lever in it (`by_length`), and two equations solved in closed form, which are three there.
@@ -286,14 +286,8 @@ ANGULAR_MOMENTUM = {
 }
 
 
-class Substeps(NamedTuple):
-    """How many equal parts an engine cuts a step into, and the share of each."""
-
-    parts: int = 1
-    share: float = 1.0
-
-
-WHOLE = Substeps()
+NONE = (0.0,)  # a map has no numbers but the top's, and an empty tuple has no type of entry
+PARTS = 4  # that Rapier cuts a step into
 
 
 @register_jitable
@@ -338,8 +332,8 @@ def engine_loop(
         return reused(par, orientation(state), state[-3:])
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        there, cut, y = kind(*narrowed(par, numbers)), Substeps(rule.parts, number(rule.share)), narrowed(state, zeros)
-        p, v, carry = step(there, cut, orientation(y), y[-3:], carry, number(h))
+        there, y = kind(*narrowed(par, numbers)), narrowed(state, zeros)
+        p, v, carry = step(there, orientation(y), y[-3:], carry, number(h))
         dstate = (*moved(there, y[:-3], p, state[:-3]), *_gap(v, state[-3:]))
         return dstate, carry, 1, ended_space(dstate)
 
@@ -436,19 +430,19 @@ def _kicked(rate: Callable[..., Any], turn: Callable[..., Any] = exponential) ->
     """The map that changes w by ``rate(par, e, w, h)`` and turns the body by the new one."""
     register_jitable(rate)
 
-    def step(par, rule, e, w, carry, h):  # type: ignore[no-untyped-def]
+    def step(par, e, w, carry, h):  # type: ignore[no-untyped-def]
         w = rate(par, e, w, h)
         return turn(par, w, h), w, carry
 
     return step
 
 
-def substepped(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
+def substepped(par: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
     """Equal parts of the step, the torque's share of each taken once at the start; linear rotations."""
-    part = rule.share * h
+    part = par.half * par.half * h
     pull = scaled(part, velocity(par, e, torque(par, e)))
     p = par.one, par.zero, par.zero, par.zero
-    for _ in range(rule.parts):
+    for _ in range(PARTS):
         w = _rescaled(par, e, plus(w, par.one, pull), part)
         turn = linear(par, w, part)
         e, p = oriented(par, e, turn), product(turn, p)
@@ -466,7 +460,7 @@ def _advanced(q: Any, w: Any, over: Any, h: Any) -> Any:
     return q[0] + half * rate[0], q[1] + half * rate[1], q[2] + half * rate[2], q[3] + half * rate[3]
 
 
-def richardson(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: Any) -> Any:
+def richardson(par: Any, e: Any, L: Any, carry: Any, h: Any) -> Any:
     """Half kick, a rotation extrapolated from one and two linear ones, half kick."""
     L = plus(L, 0.5 * h, torque(par, e))
     w = velocity(par, e, L)
@@ -480,7 +474,7 @@ def richardson(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: Any) -> Any:
 def _leapfrog(*, published: bool) -> Callable[..., Any]:
     """The rotational leapfrog, with the momentum in the body axes of the half step, or of the start of the step."""
 
-    def step(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
+    def step(par, e, L, carry, h):  # type: ignore[no-untyped-def]
         one = 1.0, 0.0, 0.0, 0.0
         middle = _advanced(one, velocity(par, e, L), one, 0.5 * h)
         L = plus(L, 0.5 * h, torque(par, e))
@@ -513,7 +507,7 @@ def _straightened(turn: Any, b: Any) -> Any:
 def _kutta(*, munthe_kaas: bool) -> Callable[..., Any]:
     """Kutta's classical tableau; the stages' turns are those of Munthe-Kaas (order 4), or the rates (order 2)."""
 
-    def step(par, rule, e, b, carry, h):  # type: ignore[no-untyped-def]
+    def step(par, e, b, carry, h):  # type: ignore[no-untyped-def]
         turns = total = scaled(0.0, b)
         rates, slopes, gain = b, total, total
         for i in range(4):
@@ -540,20 +534,20 @@ def _three_stages(par: Any, e: Any, b: Any, h: Any) -> Any:
     return plus(b, 1.0 / 6.0, plus(both, 4.0, third))
 
 
-def spiral(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
+def spiral(par: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
     """Rates to the half step, a turn by them, which leaves them as they are in both axes, rates to the whole step."""
     w = _three_stages(par, e, w, 0.5 * h)
     p = exponential(par, w, h)
     return p, _three_stages(par, oriented(par, e, p), w, 0.5 * h), carry
 
 
-def explicit_euler(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
+def explicit_euler(par: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
     """Attitude and body rates both from the start of the step; a linear rotation."""
     p = linear(par, w, h)
     return p, rotated(par, p, plus(w, h, acceleration(par, e, w))), carry
 
 
-def adams_bashforth(par: Any, rule: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
+def adams_bashforth(par: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
     """Rates by Adams and Bashforth, the attitude by Magnus; `carry` is the last acceleration, turned with the body."""
     now = acceleration(par, e, w)
     p = exponential(par, plus(plus(w, 0.5 * h, now), h * h / 12.0, cross(now, w)), h)
@@ -610,8 +604,8 @@ march_no_squish = Loop(no_carry, _increment_no_squish, observe_attitude)
 
 def _engine(
     name: str, step: Callable[..., Any], order: int | None, summary: str, reference: str, keeps: str = "", *,
-    carried: Mapping[str, Carried] = VELOCITY, reused: Callable[..., Any] = _nothing, rule: Substeps = WHOLE,
-    forces: int = 1, energy_error: str | None = None, number: Any = np.float64,
+    carried: Mapping[str, Carried] = VELOCITY, reused: Callable[..., Any] = _nothing, forces: int = 1,
+    energy_error: str | None = None, number: Any = np.float64,
 ) -> Integrator:  # fmt: skip
     """A map in every chart, in single precision on quaternions alone; `keeps` names the momenta that it conserves."""
     charts = [chart for chart in carried if chart != "axis" or number is np.float64]
@@ -619,7 +613,7 @@ def _engine(
     return Integrator(
         name=name, family=ENGINE, summary=summary, reference=reference, order=order, explicit=True, symplectic=False,
         symmetric=False, conserves=frozenset(keeps.split()), energy_error=energy_error, needs="group", general=True,
-        solvers={at: FixedStep(loops[at], rule, carried[at].prepare, forces, implicit=False) for at in charts},
+        solvers={at: FixedStep(loops[at], NONE, carried[at].prepare, forces, implicit=False) for at in charts},
     )  # fmt: skip
 
 
@@ -652,8 +646,7 @@ def built_in() -> list[Integrator]:
                "Jolt with its gyroscopic term: |L| kept, then the torque", "jolt"),
         *_both("physx", _kicked(_torque_then_rescaled), 1, "PhysX with its gyroscopic flag: the torque, then |L| kept",
                "physx"),
-        *_both("rapier", substepped, 1, "Rapier by default: four substeps, |L| kept in each",
-               "rapier", rule=Substeps(4, 0.25)),
+        *_both("rapier", substepped, 1, "Rapier by default: four substeps, |L| kept in each", "rapier"),
         _engine("ode", _kicked(
                     lambda par, e, w, h: _pulled(par, e, projected(par, e, momentum(par, e, w), h), h), linear), 1,
                 "ODE by default: gyroscopic term implicit in the velocity", "ode lacoursiere-2006"),
@@ -663,7 +656,7 @@ def built_in() -> list[Integrator]:
             name="no-squish", family=ENGINE, summary="LAMMPS fix rigid/nve: turns about the body's axes", order=2,
             reference="miller-2002 lammps", explicit=True, symplectic=True, symmetric=True,
             conserves=frozenset({"p_phi"}), needs="kicks", general=True, solvers={
-                "attitude": FixedStep(march_no_squish, WHOLE, ANGULAR_MOMENTUM["attitude"].prepare, 1, implicit=False),
+                "attitude": FixedStep(march_no_squish, NONE, ANGULAR_MOMENTUM["attitude"].prepare, 1, implicit=False),
                 BODY: five_rotations(SORTED),
             },
         ),

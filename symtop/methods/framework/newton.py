@@ -13,11 +13,14 @@ rounding. The last correction is *not* applied: the caller has the trial at x an
 saves one evaluation a step. A predicted x may lie outside the basin of the root in a large step; hence `restart`. All
 is inlined.
 
+`newton_loop` makes the loop of a method of such functions, for one run and in lanes.
+
 In lanes the iteration runs over a block until no lane is live. A lane that has ended keeps its x and evaluates the same
 numbers again, so that all that follows from them may be written at every pass, and only x is chosen. A lane that is
 live after half of the evaluations is given up (`lanes`): there `newton` begins again with another guess.
 """
 
+import functools
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -25,6 +28,8 @@ import numpy as np
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
+from symtop.methods.framework.loop import Loop
+from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 
@@ -68,93 +73,106 @@ def newton(evaluate: Any, correct: Any, restart: Any, problem: Any, guess: Any, 
         evaluations += 1
 
 
-def iterated(  # noqa: C901  (the loops of one step, read in one piece)
-    rule: Any, constants: Callable[..., Any], start: Callable[..., Any], equation: Callable[..., Any],
-    predict: Callable[..., Any], evaluate: Callable[..., Any], correct: Callable[..., Any], keep: Callable[..., Any],
-    close: Callable[..., Any], *,
-    top: Any, end: Any, dimension: int, steady: int, opened: int, unknowns: int, newest: int, carry: int,
-) -> Lanes:  # fmt: skip
-    """An implicit method in lanes, from the functions of which its `increment` is made.
+def newton_loop(  # noqa: C901  (the loops of one step, read in one piece)
+    begin: Callable[..., Any], observe: Callable[..., Any], *,
+    constants: Callable[..., Any], start: Callable[..., Any], equation: Callable[..., Any],
+    predict: Callable[..., Any], evaluate: Callable[..., Any], correct: Callable[..., Any],
+    restart: Callable[..., Any], keep: Callable[..., Any], close: Callable[..., Any],
+    top: Any, dimension: int, steady: int, opened: int, unknowns: int, ends: int, newest: int, carry: int,
+) -> Loop:  # fmt: skip
+    """The loop of an implicit method on states that begin with theta; its work are the evaluations.
 
         constants(par, h) -> steady                  `steady` numbers that no step changes
         start(par, rule, theta) -> opened            `opened` numbers that no iteration changes
         equation(par, rule, state, steady, opened)   the problem of `newton`
         predict(problem, carry) -> x                 the first guess, `unknowns` numbers
-        evaluate, correct                            as `newton` takes them
-        keep(trial, correction) -> end               what the increment is made of, a NamedTuple of floats
+        evaluate, correct, restart                   as `newton` takes them
+        keep(trial, correction) -> end               what the increment is made of, `ends` numbers
         close(problem, end) -> (dstate, newest, outcome)
 
-    The next carry is `newest`, so many numbers, before the rest of this one. `rule` is a constant of the kernel: a
-    branch that hangs on it alone is none.
+    The next carry is `newest`, so many numbers, before the rest of this one. In lanes `rule` is a constant of the
+    kernel: a branch that hangs on it alone is none.
     """
-    like = (0.0,) * max(dimension, carry, steady, opened, unknowns, len(end._fields), len(top._fields))
+    rest = carry - newest
+
+    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
+        equations = equation(par, rule, state, constants(par, h), start(par, rule, state[0]))
+        guess = predict(equations, carry)
+        _, trial, last, work, converged = newton(evaluate, correct, restart, equations, guess, rule.iterations)
+        step, fresh, outcome = close(equations, keep(trial, last))
+        return step, fresh + carry[:rest], work, outcome if converged else NOT_CONVERGED
+
+    like = (0.0,) * max(dimension, carry, steady, opened, unknowns, ends, len(top._fields))
     numbers, constant, states, carries = like[: len(top._fields)], like[:steady], like[:dimension], like[:carry]
-    opens, unknown, ends, kept = like[:opened], like[:unknowns], like[: len(end._fields)], like[: carry - newest]
+    opens, unknown, end, kept = like[:opened], like[:unknowns], like[:ends], like[:rest]
     flag, work, carry_at = 3 * dimension, 3 * dimension + 1, 3 * dimension + 2
     opened_at = carry_at + carry
     x_at = opened_at + opened
     end_at = x_at + unknowns
-    size_at, live_at, steps_at = (end_at + len(ends) + i for i in range(3))
-    most = rule.iterations // 2
+    size_at, live_at, steps_at = (end_at + ends + i for i in range(3))
+    room = steps_at + 1 - opened_at
 
-    @register_jitable
-    def problem(block, table, j):  # type: ignore[no-untyped-def]
-        par, steady = top(*column(table, 0, j, numbers)), column(table, len(numbers), j, constant)
-        return equation(par, rule, column(block, 0, j, states), steady, column(block, opened_at, j, opens))
-
-    @register_jitable
-    def begin(block, table, j):  # type: ignore[no-untyped-def]
-        put(block, opened_at, j, start(top(*column(table, 0, j, numbers)), rule, block[j]))
-        put(block, x_at, j, predict(problem(block, table, j), column(block, carry_at, j, carries)))
-        block[size_at * W + j] = np.inf
-        block[live_at * W + j] = 1.0 if block[flag * W + j] == 0.0 else 0.0
-
-    @register_jitable
-    def attempt(block, table, j):  # type: ignore[no-untyped-def]
-        equations, x, live = problem(block, table, j), column(block, x_at, j, unknown), block[live_at * W + j]
-        trial = evaluate(equations, x)
-        correction = correct(equations, trial, x)
-        left = 0.0 if settled(correction, block[size_at * W + j]) else live
-        put(block, end_at, j, keep(trial, correction))
-        for i in range(unknowns):
-            block[(x_at + i) * W + j] = correction.after[i] if left != 0.0 else x[i]
-        block[size_at * W + j] = correction.size
-        block[live_at * W + j] = left
-        block[work * W + j] += live
-
-    @register_jitable
-    def finish(block, table, j):  # type: ignore[no-untyped-def]
-        state, before = column(block, 0, j, states), column(block, carry_at, j, kept)
-        step, newest, outcome = close(problem(block, table, j), end(*column(block, end_at, j, ends)))
-        moved, low = accumulate(state, column(block, dimension, j, states), step)
-        put(block, 0, j, moved)
-        put(block, dimension, j, low)
-        put(block, 2 * dimension, j, step)
-        put(block, carry_at, j, newest + before)
-        ended = -float(outcome) if block[live_at * W + j] == 0.0 else 1.0
-        ended = ended if block[flag * W + j] == 0.0 else block[flag * W + j]
-        block[flag * W + j] = ended
-        block[steps_at * W + j] += 1.0 if ended == 0.0 else 0.0
-
-    def step(block, table):  # type: ignore[no-untyped-def]
-        wide_vectors()
-        for j in range(W):
-            begin(block, table, j)
-        for _ in range(most):
-            for j in range(W):
-                attempt(block, table, j)
-            if none_left(block, live_at):
-                break
-        for j in range(W):
-            finish(block, table, j)
-
+    @register_jitable  # at once: what a method is made of must not hang on what has run
     def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
         values = constants(par, h)
         for i in range(len(values)):
             numbers[i] = values[i]
 
-    def read(numbers):  # type: ignore[no-untyped-def]
-        return rule
+    @functools.cache
+    def in_lanes(rule: Any) -> Lanes:  # noqa: C901
+        most = rule.iterations // 2
 
-    room = steps_at + 1 - opened_at
-    return Lanes(step, lay, read, lambda _: steady, top, dimension, carry, room=lambda _: room)
+        @register_jitable
+        def problem(block, table, j):  # type: ignore[no-untyped-def]
+            par, steady = top(*column(table, 0, j, numbers)), column(table, len(numbers), j, constant)
+            return equation(par, rule, column(block, 0, j, states), steady, column(block, opened_at, j, opens))
+
+        @register_jitable
+        def open_step(block, table, j):  # type: ignore[no-untyped-def]
+            put(block, opened_at, j, start(top(*column(table, 0, j, numbers)), rule, block[j]))
+            put(block, x_at, j, predict(problem(block, table, j), column(block, carry_at, j, carries)))
+            block[size_at * W + j] = np.inf
+            block[live_at * W + j] = 1.0 if block[flag * W + j] == 0.0 else 0.0
+
+        @register_jitable
+        def attempt(block, table, j):  # type: ignore[no-untyped-def]
+            equations, x, live = problem(block, table, j), column(block, x_at, j, unknown), block[live_at * W + j]
+            trial = evaluate(equations, x)
+            correction = correct(equations, trial, x)
+            left = 0.0 if settled(correction, block[size_at * W + j]) else live
+            put(block, end_at, j, keep(trial, correction))
+            for i in range(unknowns):
+                block[(x_at + i) * W + j] = correction.after[i] if left != 0.0 else x[i]
+            block[size_at * W + j] = correction.size
+            block[live_at * W + j] = left
+            block[work * W + j] += live
+
+        @register_jitable
+        def finish(block, table, j):  # type: ignore[no-untyped-def]
+            state, before = column(block, 0, j, states), column(block, carry_at, j, kept)
+            step, newest, outcome = close(problem(block, table, j), column(block, end_at, j, end))
+            moved, low = accumulate(state, column(block, dimension, j, states), step)
+            put(block, 0, j, moved)
+            put(block, dimension, j, low)
+            put(block, 2 * dimension, j, step)
+            put(block, carry_at, j, newest + before)
+            ended = -float(outcome) if block[live_at * W + j] == 0.0 else 1.0
+            ended = ended if block[flag * W + j] == 0.0 else block[flag * W + j]
+            block[flag * W + j] = ended
+            block[steps_at * W + j] += 1.0 if ended == 0.0 else 0.0
+
+        def step(block, table):  # type: ignore[no-untyped-def]
+            wide_vectors()
+            for j in range(W):
+                open_step(block, table, j)
+            for _ in range(most):
+                for j in range(W):
+                    attempt(block, table, j)
+                if none_left(block, live_at):
+                    break
+            for j in range(W):
+                finish(block, table, j)
+
+        return Lanes(step, lay, lambda _: rule, lambda _: steady, top, dimension, carry, room=lambda _: room)
+
+    return Loop(begin, increment, observe, lanes=in_lanes)

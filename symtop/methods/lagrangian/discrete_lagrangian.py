@@ -25,7 +25,6 @@ sin^2(theta/2) about its first value: no cancellation at the poles. A term whose
 added. Source: Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357.
 """
 
-import functools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -38,10 +37,9 @@ from symtop.core.jit import register_jitable
 from symtop.core.jit_functions import fused
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import ReducedTop, chart_outcome, on_angles
-from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import FixedStep, Loop, inside
-from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
-from symtop.methods.framework.plan import NOT_CONVERGED, Array
+from symtop.methods.framework.loop import FixedStep, inside
+from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton_loop
+from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import View
 from symtop.model.top import Momenta
@@ -259,51 +257,29 @@ def _free_flight(step: Any) -> Any:
     return (step.flight,)
 
 
-class _End(NamedTuple):
-    v: float
-    W0: float
-    W1: float
-    v_slope: float
-    W0_slope: float
-    W1_slope: float
-    cosine: float
-    sine_end: float
-    change: float  # the last correction of d, which is not applied
-    after: float  # d with it
-
-
 @register_jitable
 def _keep(trial: Any, correction: Any) -> Any:
+    """The forces and two sums of the last trial, and the last correction of d, which is not applied, and d with it."""
     sums, (v, W0, W1, v_slope, W0_slope, W1_slope) = trial
-    return _End(
-        v, W0, W1, v_slope, W0_slope, W1_slope, sums.cosine, sums.sine_end, correction.change, correction.after[0]
-    )
+    last, after = correction.change, correction.after[0]
+    return v, W0, W1, v_slope, W0_slope, W1_slope, sums.cosine, sums.sine_end, last, after
 
 
 @register_jitable
 def _close(step: Any, end: Any) -> Any:
-    h, change = step.h, end.change
+    v, W0, W1, v_slope, W0_slope, W1_slope, cosine, sine_end, change, after = end
+    h = step.h
     # what was evaluated before the last correction follows it to first order; the remainder is its square. Added before
     # the product with h, what follows would be rounded to one side for whole stretches of an orbit: some starts lost
     # 3e-14 of their energy in 1e8 steps, and wander by 3e-15 now
-    kick0 = fused(h, end.W0, h * (end.W0_slope * change))
-    kick1 = fused(h, end.W1, h * (end.W1_slope * change))
-    turn = fused(h, end.v, h * (end.v_slope * change))
+    kick0 = fused(h, W0, h * (W0_slope * change))
+    kick1 = fused(h, W1, h * (W1_slope * change))
+    turn = fused(h, v, h * (v_slope * change))
     # theta moves by the very force that moves p. What Newton's last division leaves instead is off by a twentieth of a
     # rounding, but always to the same side: the energy drifted by 4e-14 in 3e6 steps
     d = step.lever * (step.momentum - kick0)
-    cosine = end.cosine - end.sine_end * change
-    dstate = (d, -(kick0 + kick1), turn, fused(h, step.spin, -(turn * cosine)))
-    return dstate, (end.W0 + end.W0_slope * change,), chart_outcome(step.theta + end.after)
-
-
-def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (theta, p_theta, phi, psi); the work counted is the number of Newton iterations."""
-    equation = _equation(par, rule, state, _steady(par, h), opening(par, rule, state[0]))
-    guess = _predict(equation, carry)
-    _, trial, last, work, converged = newton(_evaluate, _correct, _free_flight, equation, guess, rule.iterations)
-    step, newest, outcome = _close(equation, _keep(trial, last))
-    return step, newest + carry[:-1], work, outcome if converged else NOT_CONVERGED
+    dstate = (d, -(kick0 + kick1), turn, fused(h, step.spin, -(turn * (cosine - sine_end * change))))
+    return dstate, (W0 + W0_slope * change,), chart_outcome(step.theta + after)
 
 
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
@@ -316,16 +292,11 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     return p_phi, par.I3 * (u + sums.cosine * v)
 
 
-@functools.cache
-def _in_lanes(rule: Quadrature) -> Lanes:
-    """A kernel for each rule: which node is the start of the step decides what is evaluated."""
-    return iterated(
-        rule, _steady, opening, _equation, _predict, _evaluate, _correct, _keep, _close,
-        top=ReducedTop, end=_End, dimension=4, steady=3, opened=6, unknowns=1, newest=1, carry=4,
-    )  # fmt: skip
-
-
-march = Loop(begin, increment, observe, lanes=_in_lanes)
+march = newton_loop(
+    begin, observe, constants=_steady, start=opening, equation=_equation, predict=_predict, evaluate=_evaluate,
+    correct=_correct, restart=_free_flight, keep=_keep, close=_close, top=ReducedTop, dimension=4, steady=3, opened=6,
+    unknowns=1, ends=10, newest=1, carry=4,
+)  # fmt: skip
 
 
 def rule_of(method: Integrator) -> Quadrature | None:

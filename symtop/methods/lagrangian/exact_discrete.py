@@ -68,9 +68,9 @@ from symtop.methods.framework.lanes import one_loop
 from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.preparation import Shown
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.framework.space import finite_outcome
+from symtop.methods.framework.space import finite_outcome, with_spin
 from symtop.methods.lagrangian import oscillators
-from symtop.methods.lagrangian.oscillators import Map, OscillatorTop, attitude_state, axis_state, on_oscillators
+from symtop.methods.lagrangian.oscillators import Map, OscillatorTop, momentum, on_oscillators
 from symtop.methods.vectors import accumulate_plainly, summed
 
 IDLE = 2e-15  # |chi|^2 may be off by as much: below that, what is seen of it is the rounding of |Z|^2
@@ -234,12 +234,16 @@ def _unwound(rule: Any, s: Any, k: int) -> Any:
 
 def present_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     """(e, L), as wide as the kernel's state."""
-    return (*axis_state(par, _unwound(rule, state, k)), 0.0, 0.0)
+    s = _unwound(rule, state, k)
+    a, b, c, d = s[0], s[1], s[2], s[3]
+    e = 2.0 * (a * c + b * d), 2.0 * (a * d - b * c), (a * a + b * b) - (c * c + d * d)
+    return (*e, *momentum(par, s), 0.0, 0.0)
 
 
 def present_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """(q, L), as wide as the kernel's state."""
-    return (*attitude_state(par, _unwound(rule, state, k), k * h), 0.0)
+    """(q, L), the twist since the start put on again, as wide as the kernel's state."""
+    s = _unwound(rule, state, k)
+    return (*with_spin(par, (s[0], -s[3], s[2], -s[1], *momentum(par, s)), k * h), 0.0)
 
 
 def _side_by_side(par: Any, rule: Any, state: Any, carry: Any) -> Any:

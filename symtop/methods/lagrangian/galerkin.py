@@ -30,16 +30,13 @@ IIIA-IIIB is what comes of reducing first. Source: Marsden and West, Discrete me
 Acta Numerica 10 (2001) 357, on Galerkin methods.
 """
 
-import functools
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.angles import ReducedTop, chart_outcome, on_angles
-from symtop.methods.framework.lanes import Lanes
-from symtop.methods.framework.loop import FixedStep, Loop
-from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
-from symtop.methods.framework.plan import NOT_CONVERGED
+from symtop.methods.framework.loop import FixedStep
+from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton_loop
 from symtop.methods.framework.registry import Integrator
 
 
@@ -165,8 +162,7 @@ def _open(par: Any, rule: Any, theta: float) -> Any:
 @register_jitable
 def _equations(par: Any, rule: Any, state: Any, steady: Any, opened: Any) -> Any:
     h, scale = steady
-    d, a, tangent, sine, cosine = opened
-    return _Step(par, rule, state[0], _Node(d, a, tangent, sine, cosine), h, h * state[1] / par.I1, scale)
+    return _Step(par, rule, state[0], _Node(*opened), h, h * state[1] / par.I1, scale)
 
 
 @register_jitable
@@ -212,20 +208,11 @@ def _predict(step: Any, carry: Any) -> Any:
     return 0.5 * d + step.scale * Vm / 8.0, d
 
 
-class _End(NamedTuple):
-    V0: float
-    Vm: float
-    V1: float
-    plus: float
-    minus: float
-    d: float
-
-
 @register_jitable
 def _keep(trial: Any, correction: Any) -> Any:
     """What was evaluated before the last correction follows it to first order; the remainder is its square."""
     fix = correction.change
-    return _End(
+    return (
         _follow(trial.V0, fix), _follow(trial.Vm, fix), _follow(trial.V1, fix),
         _follow(trial.plus, fix), _follow(trial.minus, fix), correction.after[1],
     )  # fmt: skip
@@ -237,15 +224,6 @@ def _close(step: Any, end: Any) -> Any:
     h = step.h
     dstate = (d, -h * (V0 + 4.0 * Vm + V1) / 6.0, 0.5 * h * (plus + minus), 0.5 * h * (plus - minus))
     return dstate, (V0, Vm), chart_outcome(step.theta + d)
-
-
-def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
-    """One step on (theta, p_theta, phi, psi); the work counted is the number of Newton iterations."""
-    equations = _equations(par, rule, state, _steady(par, h), _open(par, rule, state[0]))
-    guess = _predict(equations, carry)
-    _, trial, last, work, converged = newton(_at, _correct, _free_flight, equations, guess, rule.iterations)
-    step, newest, outcome = _close(equations, _keep(trial, last))
-    return step, newest + carry[:-2], work, outcome if converged else NOT_CONVERGED
 
 
 @register_jitable
@@ -274,15 +252,11 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     return 0.5 * (south + north), 0.5 * (south - north)
 
 
-@functools.cache
-def _in_lanes(rule: Iteration) -> Lanes:
-    return iterated(
-        rule, _steady, _open, _equations, _predict, _at, _correct, _keep, _close,
-        top=ReducedTop, end=_End, dimension=4, steady=2, opened=5, unknowns=2, newest=2, carry=8,
-    )  # fmt: skip
-
-
-march = Loop(begin, increment, observe, lanes=_in_lanes)
+march = newton_loop(
+    begin, observe, constants=_steady, start=_open, equation=_equations, predict=_predict, evaluate=_at,
+    correct=_correct, restart=_free_flight, keep=_keep, close=_close, top=ReducedTop, dimension=4, steady=2, opened=5,
+    unknowns=2, ends=6, newest=2, carry=8,
+)  # fmt: skip
 
 
 def built_in() -> list[Integrator]:

@@ -41,10 +41,9 @@ from numpy.polynomial import legendre
 
 from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework.angles import ReducedTop, chart_outcome, momenta_of_turns, on_angles, require_chart
-from symtop.methods.framework.lanes import Lanes
 from symtop.methods.framework.loop import FixedStep, Loop
-from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, iterated, newton
-from symtop.methods.framework.plan import NOT_CONVERGED, Array
+from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton_loop
+from symtop.methods.framework.plan import Array
 from symtop.methods.framework.preparation import Later, Preparation, Shown
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian.galerkin import node_at, pull_at
@@ -130,19 +129,13 @@ def _reached(rule: Any, forces: Any, i: int) -> float:
 
 
 @register_jitable
-def _node(step: Any, forces: Any, i: int) -> Any:
-    """The trigonometry at theta_i."""
-    pull = step.h * _reached(step.rule, forces, i)
-    return node_at(step.par, step.theta + step.lever * (step.rule.c[i] * step.momentum + pull))
-
-
-@register_jitable
 def _evaluate(step: Any, forces: Any) -> Any:
     par, blank = step.par, step.rule.c
     new, stiffness, souths, norths, rolls = blank, blank, blank, blank, blank
     souths_by, norths_by, rolls_by = blank, blank, blank
     for i in range(len(blank)):
-        node, b = _node(step, forces, i), step.rule.b[i]
+        flown, b = step.rule.c[i] * step.momentum + step.h * _reached(step.rule, forces, i), step.rule.b[i]
+        node = node_at(par, step.theta + step.lever * flown)
         pull = pull_at(par, node, par.south, par.north)
         precession, bend = node.d * par.south + node.a * par.north, pull.south + pull.north
         new, stiffness = set_item(new, i, -pull.slope), set_item(stiffness, i, pull.stiffness)
@@ -282,40 +275,24 @@ to_angles = Shown(lambda _par, _t, y: (y[0], y[1], y[2], y[3]), 4)
 
 @functools.cache
 def loop(s: int) -> Loop:
-    """The loop of the method with s nodes."""
-    correct = _correction(s)
-
-    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        """One step on (theta, p_theta, phi, psi, S, N); the work counted is the number of Newton iterations."""
-        equations = _equations(par, rule, state, _steady(par, h), (0.0,))
-        guess = _predict(equations, carry)
-        _, trial, last, work, converged = newton(_evaluate, correct, _free_flight, equations, guess, rule.iterations)
-        step, newest, outcome = _close(equations, _keep(trial, last))
-        return step, newest + carry[:1], work, outcome if converged else NOT_CONVERGED
-
-    def in_lanes(rule: Rule) -> Lanes:
-        record: Any = NamedTuple  # its fields are known here alone
-        end = record("End", [(name, float) for name in (*(f"F{j}" for j in range(s)), "south", "north", "roll")])
-        return iterated(
-            rule, _steady, _open, _equations, _predict, _evaluate, correct, _keep, _close,
-            top=ReducedTop, end=end, dimension=6, steady=2, opened=1, unknowns=s, newest=s, carry=s + 1,
-        )  # fmt: skip
-
-    return Loop(begin, increment, observe, lanes=functools.cache(in_lanes))
-
-
-def galerkin_gauss(s: int) -> Integrator:
-    """The Galerkin integrator with s nodes, named after its order."""
-    rule = Later(functools.partial(gauss_rule, s))
-    return Integrator(
-        name=f"galerkin-gauss-{2 * s}", family="discrete-lagrangian",
-        summary=f"Galerkin discrete Lagrangian, polynomial of degree {s} and Gauss's rule with {s} nodes",
-        solvers={"angles": FixedStep(loop(s), rule, with_sums, s, implicit=True, present=to_angles)},
-        order=2 * s, explicit=False, symplectic=True, symmetric=True, conserves=frozenset({"p_phi", "p_psi"}),
-        reference="marsden-west-2001 hairer-lubich-wanner-2006", needs="lagrangian", general=True,
+    """The loop of the method with s nodes, on (theta, p_theta, phi, psi, S, N)."""
+    return newton_loop(
+        begin, observe, constants=_steady, start=_open, equation=_equations, predict=_predict, evaluate=_evaluate,
+        correct=_correction(s), restart=_free_flight, keep=_keep, close=_close, top=ReducedTop, dimension=6, steady=2,
+        opened=1, unknowns=s, ends=s + 3, newest=s, carry=s + 1,
     )  # fmt: skip
 
 
 def built_in() -> list[Integrator]:
-    """galerkin-gauss-4, -6, -8 and -12."""
-    return [galerkin_gauss(s) for s in NODES]
+    """galerkin-gauss-4, -6, -8 and -12, named after their orders."""
+    rules = {s: Later(functools.partial(gauss_rule, s)) for s in NODES}
+    return [
+        Integrator(
+            name=f"galerkin-gauss-{2 * s}", family="discrete-lagrangian",
+            summary=f"Galerkin discrete Lagrangian, polynomial of degree {s} and Gauss's rule with {s} nodes",
+            solvers={"angles": FixedStep(loop(s), rule, with_sums, s, implicit=True, present=to_angles)},
+            order=2 * s, explicit=False, symplectic=True, symmetric=True, conserves=frozenset({"p_phi", "p_psi"}),
+            reference="marsden-west-2001 hairer-lubich-wanner-2006", needs="lagrangian", general=True,
+        )
+        for s, rule in rules.items()
+    ]  # fmt: skip

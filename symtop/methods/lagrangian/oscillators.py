@@ -38,7 +38,6 @@ import numpy as np
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.preparation import Preparation, Scaled
-from symtop.methods.framework.space import with_spin
 from symtop.model.exact.elliptic import differences, half_period, r_j, roots
 from symtop.model.top import nutation_period
 
@@ -92,19 +91,6 @@ def momentum(par: Any, s: Any) -> Any:
     k = 2.0 * par.I1
     x, y = (b * C - a * D) + (d * A - c * B), (a * C - c * A) + (b * D - d * B)
     return k * x, k * y, k * ((b * A - a * B) + (c * D - d * C))
-
-
-@register_jitable
-def axis_state(par: Any, s: Any) -> Any:
-    """(e, L) of a state."""
-    a, b, c, d = s[0], s[1], s[2], s[3]
-    return (2.0 * (a * c + b * d), 2.0 * (a * d - b * c), (a * a + b * b) - (c * c + d * d), *momentum(par, s))
-
-
-@register_jitable
-def attitude_state(par: Any, s: Any, t: float) -> Any:
-    """(q, L) of a state at the time t, the twist since the start put on again."""
-    return with_spin(par, (s[0], -s[3], s[2], -s[1], *momentum(par, s)), t)
 
 
 SHORTEST = 1e-100  # of a step, and of what is left of one that is a whole number of nutations

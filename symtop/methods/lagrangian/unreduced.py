@@ -119,21 +119,15 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return (rate, rate, rate)
 
 
-class _Step(NamedTuple):
-    par: Any
-    rule: Any
-    state: Any
-    h: float
-
-
 @register_jitable
 def _evaluate(step: Any, rate: Any) -> Any:
-    return _node_sums(step.par, step.rule, step.state[0], rate, step.h)
+    par, rule, state, h = step
+    return _node_sums(par, rule, state[0], rate, h)
 
 
 @register_jitable
 def _from_the_start(step: Any) -> Any:
-    return _rates(step.par, step.state)
+    return _rates(step[0], step[2])
 
 
 @register_jitable
@@ -143,10 +137,10 @@ def _correct(step: Any, sums: Any, rate: Any) -> Any:
     p1 comes from the very sums whose residual was seen to vanish. Stopped as in the reduced kernel, after a correction
     of 1e-8, p_phi of `goldstein` walks off linearly, 2e-12 in 1e6 steps at h = 0.01 against 3e-13.
     """
-    w, v, u = rate
-    dw, dv, du = _correction(step.par, sums, rate, step.state[3:], step.h)
+    (par, rule, state, h), (w, v, u) = step, rate
+    dw, dv, du = _correction(par, sums, rate, state[3:], h)
     change, size = abs(dw) + abs(dv) + abs(du), abs(w) + abs(v) + abs(u)
-    return Correction((dw, dv, du), (w + dw, v + dv, u + du), change, NEGLIGIBLE * size, step.rule.tolerance * size)
+    return Correction((dw, dv, du), (w + dw, v + dv, u + du), change, NEGLIGIBLE * size, rule.tolerance * size)
 
 
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
@@ -161,14 +155,14 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
         3.0 * (near[1] - far[1]) + farther[1],
         3.0 * (near[2] - far[2]) + farther[2],
     )
-    equations = _Step(par, rule, state, h)
-    rate, sums, _, work, converged = newton(_evaluate, _correct, _from_the_start, equations, guess, rule.iterations)
+    step = par, rule, state, h
+    rate, sums, _, work, converged = newton(_evaluate, _correct, _from_the_start, step, guess, rule.iterations)
     w, v, u = rate
     outcome = chart_outcome(state[0] + h * w) if converged else NOT_CONVERGED
     p_phi = sums.across * v + sums.mixed * u - 0.5 * h * par.c_phi * v
     p_psi = sums.mixed * v + par.I3 * u - 0.5 * h * par.c_psi * u
-    step = (h * w, h * v, h * u, par.I1 * w + h * sums.after - state[3], p_phi - state[4], p_psi - state[5])
-    return step, (rate, carry[0], carry[1]), work, outcome
+    dstate = (h * w, h * v, h * u, par.I1 * w + h * sums.after - state[3], p_phi - state[4], p_psi - state[5])
+    return dstate, (rate, carry[0], carry[1]), work, outcome
 
 
 def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:

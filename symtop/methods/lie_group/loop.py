@@ -17,8 +17,8 @@ p - 1 in place of p keeps increments free of cancellation. What |q| lacks is add
 A body without symmetry is stepped as (q*, M), for which a map sees Gamma and M (`framework.body`), alone, not in lanes.
 
 In lanes the shares stand outside and the lanes inside. A family writes what stands between, as one loop over the lanes
-or several (`stepped`), or as the parts of an iteration (`iterated`). The table holds the numbers of the top, those of
-the rule and those of each share: one kernel for compositions of any length, and for both charts. An iteration runs
+or several (`stepped`), or as the parts of an iteration (`iterated_loop`). The table holds the numbers of the top, those
+of the rule and those of each share: one kernel for compositions of any length, and for both charts. An iteration runs
 until no lane is live. A lane that is live after half of the passes that a run alone may make is given up, and so is one
 whose equation cannot be solved.
 """
@@ -199,25 +199,30 @@ def stepped(
     return Lanes(step, lay, lambda _: 0.0, size, carried.top, SIZE, carry, effort, lambda _: room, begin, show)
 
 
-def iterated(  # noqa: C901  (the loops of one step, read in one piece)
-    start: Callable[..., Any], again: Callable[..., Any], close: Callable[..., Any], most: int, *,
-    opened: int, unknowns: int, numbers: Callable[..., Any] = lambda _: (0.0,), count: int = 1,
-    begin: Callable[..., Any] = no_carry, carry: int = 1,
-) -> Lanes:  # fmt: skip
-    """An iterated map of a body in lanes, from the parts of which its `turn` is made.
+Parts = tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # start, again and close
 
-        numbers(rule) -> rule                                        `count` numbers of it, as the others take them
+
+def iterated_loop(  # noqa: C901  (the loops of one step, read in one piece)
+    parts: Parts, most: int, *, opened: int, unknowns: int, in_lanes: Parts | None = None,
+    numbers: Callable[..., Any] = lambda _: (0.0,), count: int = 1, begin: Callable[..., Any] = no_carry,
+    carry: int = 1,
+) -> Loop:  # fmt: skip
+    """The loop around an iterated map of a body, for one and in lanes, from its parts; its work are the passes.
+
+        numbers(rule) -> rule                                        in lanes `count` numbers of it, as the parts take
         start(par, rule, e, L, carry, h) -> (opened, x)              what no pass changes, and the first guess
         again(par, rule, carry, h, opened, x) -> (x, ended, lost)    one pass; a lane that is lost runs alone
         close(par, rule, carry, h, opened, x) -> (m, v, dL, carry)   the rotation and the next carry
 
-    `opened`, x and the carry are flat tuples. A run alone makes at most `most` passes.
+    `opened`, x and the carry are flat tuples. A run alone makes at most `most` passes. `in_lanes` are the parts without
+    a branch, where there is one.
     """
+    (start, again, close), (begin_lane, again_lane, close_lane) = parts, in_lanes or parts
     body, top_of = SPUN.top, reading(len(SPUN.top._fields))
     tops, first = len(body._fields), CARRY + carry
     x_at, live_at = first + opened, first + opened + unknowns
     rule_of, carried, opens, unknown = reading(count), reading(carry), reading(opened), reading(unknowns)
-    for function in (start, again, close, numbers):
+    for function in (*parts, *(in_lanes or ()), numbers):
         register_jitable(function)
 
     @register_jitable
@@ -229,7 +234,7 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
         for j in range(W):
             par, rule, carry, h = given(block, table, row, j)
             _, e, L = entered(block, j)
-            fixed, x = start(par, rule, e, L, carry, h)
+            fixed, x = begin_lane(par, rule, e, L, carry, h)
             put(block, first, j, fixed)
             put(block, x_at, j, x)
             block[live_at * W + j] = 1.0 - block[FLAG * W + j]
@@ -237,7 +242,7 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
             for j in range(W):
                 par, rule, carry, h = given(block, table, row, j)
                 x, live = unknown(block, x_at, j), block[live_at * W + j]
-                after, ended, lost = again(par, rule, carry, h, opens(block, first, j), x)
+                after, ended, lost = again_lane(par, rule, carry, h, opens(block, first, j), x)
                 for i in range(unknowns):
                     block[(x_at + i) * W + j] = after[i] if live != 0.0 else x[i]
                 block[FLAG * W + j] = max(block[FLAG * W + j], live if lost else 0.0)
@@ -247,7 +252,7 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
                 break
         for j in range(W):
             par, rule, carry, h = given(block, table, row, j)
-            m, v, dL, newest = close(par, rule, carry, h, opens(block, first, j), unknown(block, x_at, j))
+            m, v, dL, newest = close_lane(par, rule, carry, h, opens(block, first, j), unknown(block, x_at, j))
             left(block, j, entered(block, j)[0], m, v, dL)
             put(block, CARRY, j, newest)
             give_up(block, j, block[live_at * W + j] != 0.0)
@@ -260,24 +265,6 @@ def iterated(  # noqa: C901  (the loops of one step, read in one piece)
             out[i] = h * share
             i += 1
 
-    room = live_at + 1 - first
-    return stepped(part, lay, count, 1, carried=SPUN, carry=carry, begin=begin, room=room)
-
-
-Parts = tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # start, again and close of `iterated`
-
-
-def iterated_loop(
-    parts: Parts, most: int, *, begin: Callable[..., Any] = no_carry, in_lanes: Parts | None = None, **sizes: Any
-) -> Loop:  # fmt: skip
-    """The loop, for one and in lanes, around a map made of the parts that `iterated` takes; its work are the passes.
-
-    `in_lanes` are the parts without a branch, where there is one.
-    """
-    lanes, (start, again, close) = iterated(*(in_lanes or parts), most, begin=begin, **sizes), parts
-    for function in parts:
-        register_jitable(function)
-
     def turn(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
         fixed, x = start(par, rule, e, L, carry, h)
         work, ended, lost = 0, False, False
@@ -287,4 +274,5 @@ def iterated_loop(
         m, v, dL, carry = close(par, rule, carry, h, fixed, x)
         return m, v, dL, carry, work, OK if ended and not lost else NOT_CONVERGED
 
+    lanes = stepped(part, lay, count, 1, carried=SPUN, carry=carry, begin=begin, room=live_at + 1 - first)
     return lie_loop(turn, begin, lambda _: lanes)

@@ -127,6 +127,7 @@ TOP: Any = UNSPUN.top
 NUMBERS = (0.0,) * len(TOP._fields)
 
 
+@register_jitable  # at once: what a method is made of must not hang on what has run
 def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
     i = 0
     for share in rule.shares:

@@ -22,17 +22,15 @@ Sources: Ohsawa, SIGMA 15 (2019) 083 (arXiv:1907.07819), for the map T*C^2 -> se
 Nonlinearity 27 (2014) 1525 (collective integrators).
 """
 
-import functools
 from typing import Any
 
 import numpy as np
 
 from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
-from symtop.methods.framework.preparation import Later
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group.loop import UNSPUN, in_charts, lie_loop
-from symtop.methods.runge_kutta.gauss import ROUND_OFF, SWEEPS, gauss_rule, packed, stage_weights
+from symtop.methods.runge_kutta.gauss import ROUND_OFF, RULES, SWEEPS, stage_weights
 from symtop.methods.vectors import conjugate
 from symtop.model.body import product
 
@@ -104,25 +102,16 @@ def turn(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
 march = lie_loop(turn, _begin)
 
 
-def collective_gauss(stages: int) -> Integrator:
-    """The collective Gauss method with so many stages, named after its order."""
-    rule = Later(functools.partial(gauss_rule, stages), packed)
-    return Integrator(
-        name=f"collective-gauss-{2 * stages}",
-        family="lie-group",
-        summary=f"Gauss collocation with {stages} stage{'s' if stages > 1 else ''} on quaternions: Lie-Poisson",
-        solvers=in_charts(march, rule, UNSPUN, stages, implicit=True),
-        order=2 * stages,
-        explicit=False,
-        symplectic=True,
-        symmetric=True,
-        conserves=frozenset({"p_phi", "p_psi", "axis_length"}),
-        reference="ohsawa-2019 mclachlan-modin-verdier-2014",
-        needs="group",
-        general=True,
-    )
-
-
 def built_in() -> list[Integrator]:
-    """collective-gauss-2, -4 and -6."""
-    return [collective_gauss(stages) for stages in (1, 2, 3)]
+    """collective-gauss-2, -4 and -6, named after their orders."""
+    return [
+        Integrator(
+            name=f"collective-gauss-{2 * stages}", family="lie-group",
+            summary=f"Gauss collocation with {stages} stage{'s' if stages > 1 else ''} on quaternions: Lie-Poisson",
+            solvers=in_charts(march, RULES[stages], UNSPUN, stages, implicit=True),
+            order=2 * stages, explicit=False, symplectic=True, symmetric=True,
+            conserves=frozenset({"p_phi", "p_psi", "axis_length"}),
+            reference="ohsawa-2019 mclachlan-modin-verdier-2014", needs="group", general=True,
+        )
+        for stages in (1, 2, 3)
+    ]  # fmt: skip

@@ -41,6 +41,7 @@ from symtop.methods.vectors import accumulate, summed, zero
 from symtop.model.charts import BODY
 
 
+@register_jitable  # at once: what a method is made of must not hang on what has run
 def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
     n = len(rule.b)
     weights = n * (n - 1) // 2

@@ -512,31 +512,25 @@ march_axis, march_frame = _loop(field_axis, 6), _loop(field_frame, 9)
 march_body = _loop(body.field_body, 7, 4, -1, _unit_of_body, _unsolved, body.observe_body)
 
 
-def gauss(stages: int) -> Integrator:
-    """The Gauss method with 1 to 6 stages, named after its order; its coefficients are computed at the first run."""
-    rule = Later(functools.partial(gauss_rule, stages), packed)
-    return Integrator(
-        name=f"gauss-{2 * stages}",
-        family="runge-kutta",
-        summary=f"Gauss collocation with {stages} stage{'s' if stages > 1 else ''} on the space-frame equations",
-        solvers={
-            "axis": FixedStep(march_axis, rule, space.on_axis, stages, implicit=True),
-            "attitude": FixedStep(
-                march_frame, rule, space.on_frame, stages, implicit=True, present=space.frame_to_attitude
-            ),
-            BODY: FixedStep(march_body, rule, body.on_body, stages, implicit=True),
-        },
-        order=2 * stages,
-        explicit=False,
-        symplectic=False,
-        symmetric=True,
-        conserves=frozenset({"energy", "p_phi", "p_psi", "axis_length"}),
-        reference="butcher-1964 hairer-mclachlan-razakarivony-2008",
-        needs="derivative",
-        general=True,
-    )
+RULES = {stages: Later(functools.partial(gauss_rule, stages), packed) for stages in STAGES}
 
 
 def built_in() -> list[Integrator]:
-    """gauss-2, gauss-4, ... gauss-12."""
-    return [gauss(stages) for stages in STAGES]
+    """gauss-2, gauss-4, ... gauss-12, named after their orders; coefficients are computed at the first run."""
+    return [
+        Integrator(
+            name=f"gauss-{2 * stages}", family="runge-kutta",
+            summary=f"Gauss collocation with {stages} stage{'s' if stages > 1 else ''} on the space-frame equations",
+            solvers={
+                "axis": FixedStep(march_axis, rule, space.on_axis, stages, implicit=True),
+                "attitude": FixedStep(
+                    march_frame, rule, space.on_frame, stages, implicit=True, present=space.frame_to_attitude
+                ),
+                BODY: FixedStep(march_body, rule, body.on_body, stages, implicit=True),
+            },
+            order=2 * stages, explicit=False, symplectic=False, symmetric=True,
+            conserves=frozenset({"energy", "p_phi", "p_psi", "axis_length"}),
+            reference="butcher-1964 hairer-mclachlan-razakarivony-2008", needs="derivative", general=True,
+        )
+        for stages, rule in RULES.items()
+    ]  # fmt: skip

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
-from symtop.methods.framework.angles import LEAST_TOLERANCE, chart_outcome, on_angles
+from symtop.methods.framework.angles import LEAST_TOLERANCE, chart_outcome, momenta_of_turns, on_angles
 from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import row_of, store, written_out
@@ -99,65 +99,56 @@ REDUCED = FORMS["angles"]._replace(
 )  # fmt: skip
 
 
-class Nystrom(NamedTuple):
-    """A pair as `pairs.loop` takes it; rows of the memory: f at both ends of the step, and p_phi, p_psi."""
+def method(_: Callable[..., Any]) -> Method:
+    """The pair as `pairs.loop` takes it; rows of the memory: f at both ends of the step, and p_phi, p_psi."""
+    table, velocity = DPRKN8, DPRKN8.velocity
 
-    table: Table
+    def stage(i: int) -> Callable[..., Any]:
+        bend, node = combination(table.a[i - 1]), table.c[i - 1]
 
-    def __call__(self, _: Callable[..., Any]) -> Method:
-        """Attempts, their error, and samples."""
-        table, velocity = self.table, self.table.velocity
+        def k(par, state, made, slopes, h):  # type: ignore[no-untyped-def]
+            flown = state[0] + node * h * state[1] / par.I1
+            return kicks(par, bend((flown,), made, h * h / par.I1)[0])
 
-        def stage(i: int) -> Callable[..., Any]:
-            bend, node = combination(table.a[i - 1]), table.c[i - 1]
+        return k
 
-            def k(par, state, made, slopes, h):  # type: ignore[no-untyped-def]
-                flown = state[0] + node * h * state[1] / par.I1
-                return kicks(par, bend((flown,), made, h * h / par.I1)[0])
+    stages, cost, count = written_out(len(table.a) + 1, stage), len(table.a), len(velocity)
+    total, error = _total(table.b, velocity), _total(table.error, table.velocity_error)
 
-            return k
+    @register_jitable
+    def made_of(par, state, slopes, h):  # type: ignore[no-untyped-def]
+        first = row_of(slopes, 0, state)
+        return stages(par, state, (first[1], first[2], first[3], state[0]), slopes, h)
 
-        stages, cost, count = written_out(len(table.a) + 1, stage), len(table.a), len(velocity)
-        total, error = _total(table.b, velocity), _total(table.error, table.velocity_error)
+    @register_jitable
+    def after(par, state, made, h):  # type: ignore[no-untyped-def]
+        step = total(par, made, h)
+        flown = h * state[1] / par.I1 + step[0]
+        return state[0] + flown, state[1] + step[1], state[2] + step[2], state[3] + step[3]
 
-        @register_jitable
-        def made_of(par, state, slopes, h):  # type: ignore[no-untyped-def]
-            first = row_of(slopes, 0, state)
-            return stages(par, state, (first[1], first[2], first[3], state[0]), slopes, h)
+    @register_jitable
+    def attempt(par, state, slopes, h, tolerance):  # type: ignore[no-untyped-def]
+        made = made_of(par, state, slopes, h)
+        new, last = after(par, state, made, h), made[-1]
+        store(slopes, 1, (new[1] / par.I1, last[0], last[1], last[2]))
+        return new, rms(error(par, made, h), state, new, tolerance)
 
-        @register_jitable
-        def after(par, state, made, h):  # type: ignore[no-untyped-def]
-            step = total(par, made, h)
-            flown = h * state[1] / par.I1 + step[0]
-            return state[0] + flown, state[1] + step[1], state[2] + step[2], state[3] + step[3]
+    @register_jitable
+    def momenta(par, state, slopes, h):  # type: ignore[no-untyped-def]
+        made = made_of(par, state, slopes, h)
+        step, a, d = total(par, made, h), 0.0, 0.0
+        for i in range(count):
+            sin_x, cos_x = sincos(0.5 * made[i][3])
+            a += h * velocity[i] / (4.0 * par.I1 * sin_x * sin_x)
+            d += h * velocity[i] / (4.0 * par.I1 * cos_x * cos_x)
+        slopes[2, 0], slopes[2, 1] = momenta_of_turns(par, a, d, h, step)
+        return 0
 
-        @register_jitable
-        def attempt(par, state, slopes, h, tolerance):  # type: ignore[no-untyped-def]
-            made = made_of(par, state, slopes, h)
-            new, last = after(par, state, made, h), made[-1]
-            store(slopes, 1, (new[1] / par.I1, last[0], last[1], last[2]))
-            return new, rms(error(par, made, h), state, new, tolerance)
+    @register_jitable
+    def shorter(par, state, new, slopes, h, x):  # type: ignore[no-untyped-def]
+        return after(par, state, made_of(par, state, slopes, x * h), x * h)
 
-        @register_jitable
-        def momenta(par, state, slopes, h):  # type: ignore[no-untyped-def]
-            """Solve dphi + dpsi = (k + 2d) south - k north, dphi - dpsi = (k + 2a) north - k south (`splitting`)."""
-            made = made_of(par, state, slopes, h)
-            step, a, d, k = total(par, made, h), 0.0, 0.0, 0.5 * h * (1.0 / par.I3 - 1.0 / par.I1)
-            for i in range(count):
-                sin_x, cos_x = sincos(0.5 * made[i][3])
-                a += h * velocity[i] / (4.0 * par.I1 * sin_x * sin_x)
-                d += h * velocity[i] / (4.0 * par.I1 * cos_x * cos_x)
-            plus, minus, determinant = step[2] + step[3], step[2] - step[3], 2.0 * k * (a + d) + 4.0 * a * d
-            north = ((k + 2.0 * d) * minus + k * plus) / determinant
-            south = ((k + 2.0 * a) * plus + k * minus) / determinant
-            slopes[2, 0], slopes[2, 1] = 0.5 * (north + south), 0.5 * (south - north)
-            return 0
-
-        @register_jitable
-        def shorter(par, state, new, slopes, h, x):  # type: ignore[no-untyped-def]
-            return after(par, state, made_of(par, state, slopes, x * h), x * h)
-
-        return Method(trying(attempt, cost, -1.0 / 7.0), momenta, shorter, 1, -1.0 / 7.0)
+    return Method(trying(attempt, cost, -1.0 / 7.0), momenta, shorter, 1, -1.0 / 7.0)
 
 
 def built_in() -> list[Integrator]:
@@ -165,7 +156,7 @@ def built_in() -> list[Integrator]:
     return [
         Integrator(
             name="dprkn8", family="runge-kutta", control="tolerance", order=8,
-            solvers={"angles": solver(REDUCED, Nystrom(DPRKN8), 3)},
+            solvers={"angles": solver(REDUCED, method, 3)},
             summary="Runge-Kutta-Nystrom pair 8(6) of Dormand, El-Mikkawy and Prince on the reduced angles, compiled",
             explicit=True, symplectic=False, symmetric=False, conserves=frozenset({"p_phi", "p_psi"}),
             least_tolerance=LEAST_TOLERANCE, reference="dormand-el-mikkawy-prince-1987", needs="kicks", general=False,

@@ -34,7 +34,7 @@ from symtop.methods.framework.adaptive import Adaptive, Loop as AdaptiveLoop
 from symtop.methods.framework.angles import LEAST_TOLERANCE
 from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.lanes import W
-from symtop.methods.framework.loop import FixedStep, Loop
+from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import as_it_steps
 from symtop.methods.framework.registry import Integrator
@@ -343,28 +343,32 @@ def _order_seven(table: Table, field: Callable[..., Any], cost: int) -> dict[str
 @functools.cache
 def fixed_loop(chart: str, pair: Pair) -> Loop:
     """The loop with fixed steps in one chart; the rule is the table as a `Tableau`, for whoever wants to see it."""
-    form: Any = FORMS[chart]
-    field, ended_at = form.field, form.ended
-    stages, total, cost = stages_of(field, pair.table), combination(pair.table.b), len(pair.table.b)
+    return loop_of(FORMS[chart], TOPS[chart], pair.table, lambda _par, _state, step: step)
 
-    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
-        return 0.0
+
+def loop_of(form: Any, top: Any, table: Table, finished: Callable[..., Any]) -> Loop:
+    """The loop of a table's steps, for one and in lanes; ``finished(par, state, step)`` is what becomes of a step."""
+    field, ended, finished = form.field, form.ended, register_jitable(finished)
+    stages, total, cost = stages_of(field, table), combination(table.b), len(table.b)
+    zeros, step_at = (0.0,) * form.prepare.size, len(top._fields) * W
+
+    @register_jitable
+    def stepped(par, state, h):  # type: ignore[no-untyped-def]
+        step = total(zeros, stages(par, state, field(par, state), 0.0, h), h)
+        return finished(par, state, step)
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        step = total(zero(state), stages(par, state, field(par, state), rule.b, h), h)
-        return step, carry, cost, ended_at(summed(state, step))
-
-    zeros, step_at = (0.0,) * form.prepare.size, len(TOPS[chart]._fields) * W
+        step = stepped(par, state, h)
+        return step, carry, cost, ended(summed(state, step))
 
     def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
         numbers[0] = h
 
     def moved(par, state, table, j):  # type: ignore[no-untyped-def]
-        h = table[step_at + j]
-        return total(zeros, stages(par, state, field(par, state), 0.0, h), h)
+        return stepped(par, state, table[step_at + j])
 
-    lanes = in_lanes(form, TOPS[chart], moved, lay, 1, cost)
-    return Loop(begin, increment, form.observe, lanes=lambda _: lanes)
+    lanes = in_lanes(form, top, moved, lay, 1, cost)
+    return Loop(no_carry, increment, form.observe, lanes=lambda _: lanes)
 
 
 @functools.cache

@@ -22,14 +22,12 @@ from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.equations import FORMS
-from symtop.methods.framework.lanes import W
-from symtop.methods.framework.loop import FixedStep, Loop
+from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.preparation import Preparation
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import L_at, e_at
-from symtop.methods.runge_kutta.explicit import in_lanes
-from symtop.methods.runge_kutta.pairs import DOP8, NINE, Pair, combination, stages_of
-from symtop.methods.vectors import dot, summed, zero
+from symtop.methods.runge_kutta.pairs import DOP8, NINE, loop_of
+from symtop.methods.vectors import dot, summed
 
 SMALL = 1e-8  # of the square of a gradient: with less of its own it depends on those before it
 AXIS = FORMS["axis"]
@@ -101,40 +99,16 @@ def projected(par: Any, state: Any, step: Any) -> Any:
     return step
 
 
-def _loop(pair: Pair) -> Loop:
-    """The loop, for one and in lanes."""
-    field, ended = AXIS.field, AXIS.ended
-    stages, total, cost = stages_of(field, pair.table), combination(pair.table.b), len(pair.table.b)
-    zeros, step_at = (0.0,) * 6, len(Levels._fields) * W
-
-    def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
-        return 0.0
-
-    def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        step = total(zero(state), stages(par, state, field(par, state), 0.0, h), h)
-        step = projected(par, state, step)
-        return step, carry, cost, ended(summed(state, step))
-
-    def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
-        numbers[0] = h
-
-    def moved(par, state, table, j):  # type: ignore[no-untyped-def]
-        h = table[step_at + j]
-        return projected(par, state, total(zeros, stages(par, state, field(par, state), 0.0, h), h))
-
-    lanes = in_lanes(AXIS._replace(prepare=on_levels), Levels, moved, lay, 1, cost)
-    return Loop(begin, increment, AXIS.observe, lanes=lambda _: lanes)
-
-
 def built_in() -> list[Integrator]:
     """Two pairs with fixed steps, projected."""
     methods = []
     for pair, name in ((DOP8, "dop853-projected"), (NINE, "vern9-projected")):
         plain = pair.fixed()
         solver: Any = plain.solvers["axis"]
+        loop = loop_of(AXIS._replace(prepare=on_levels), Levels, pair.table, projected)
         methods.append(replace(
             plain, name=name, summary=f"{pair.summary} with fixed steps, projected onto the constants of the motion",
-            solvers={"axis": FixedStep(_loop(pair), solver.rule, on_levels, 1, implicit=False)},
+            solvers={"axis": FixedStep(loop, solver.rule, on_levels, 1, implicit=False)},
             conserves=frozenset({"energy", "p_phi", "p_psi", "axis_length"}), needs="constants", general=False,
             reference=f"{plain.reference} hairer-lubich-wanner-2006",
         ))  # fmt: skip
