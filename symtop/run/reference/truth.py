@@ -65,6 +65,7 @@ from symtop.model.exact.heavy_body import MOST_STEPS, HeavyBody
 from symtop.model.exact.turning_points import RATE
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
 from symtop.run.reference.independent_checks import (
+    CHECKED,
     CHECKS,
     DIGITS,
     SAFETY,
@@ -390,7 +391,7 @@ def _compared(scene: Scene, kind: str) -> xr.Dataset:
     values = closed_values(scene, times)
     checks = largest_errors(scene, times, values["quaternion"], values["phi"], values["psi"])
     bounds = closed_bounds(scene, times, values)
-    share = max(float(np.max(getattr(checks, name) / bounds[name])) for name in ("attitude", "axis", "phi", "psi"))
+    share = max(float(np.max(checks[name] / bounds[name])) for name in CHECKED)
     overlap, map_apart = _against_map(scene) if kind != "digits" else (math.nan, math.nan)
     apart = _against_integration(scene)[1] if kind == "integration" else math.nan
     made = Certificate(float(times[-1]), times.size, share, overlap, map_apart, apart)
@@ -416,7 +417,7 @@ def _against_integration(scene: Scene) -> tuple[float, float]:
     states, _ = integrate(scene, times, "longdouble")
     gap = charts.attitude_distance(closed_form(scene).quaternion(times), states[:, :4].astype(float))
     _, phi, psi = charts.angles_from_quaternion(states[:, :4])
-    rounding = largest_errors(scene, times, states[:, :4], phi, psi).attitude  # grows where the motion is unstable
+    rounding = largest_errors(scene, times, states[:, :4], phi, psi)["attitude"]  # grows where the motion is unstable
     return float(times[-1]), float(max(np.max(gap - 2.0 * rounding), 0.0))
 
 
