@@ -337,11 +337,6 @@ class Certificate(NamedTuple):
     apart: float  # rad, the same of the integration
 
     @property
-    def kind(self) -> str:
-        """One of `KINDS`."""
-        return "digits" if math.isnan(self.map_apart) else "discrete-map" if math.isnan(self.apart) else "integration"
-
-    @property
     def doubt(self) -> float:
         """Rad by which the formulas may be wrong: a distance from an independent check that exceeds rounding."""
         return max((gap for gap in (self.map_apart, self.apart) if gap > SUSPICIOUS), default=0.0)
