@@ -11,7 +11,6 @@ import re
 import time
 from collections.abc import Callable, Sequence
 from ctypes import c_bool, c_double, c_long
-from dataclasses import dataclass
 from typing import Any, Self
 
 import numpy as np
@@ -31,7 +30,7 @@ PATIENCE, QUICK_PATIENCE = 10.0, 3.0  # seconds for one call
 
 
 class Stepper:
-    """Something that steps."""
+    """Something that steps, and the solver of its record, which can also go on from any of its states."""
 
     name: str
     chart: str  # of its states; "nutation" for (theta, p_theta), which no solver of the registry shows
@@ -60,6 +59,36 @@ class Stepper:
             return self.march(top, par, y.copy(), h, np.array(marks))
 
         return np.array(state, dtype=float), run
+
+    def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+        """Start to horizon, as the registry calls a solver."""
+        par, state = self.form.prepare(top, start)
+        states = self.march(top, par, np.array(state, dtype=float), plan.step_size, plan.marks)
+        outcome, reached, steps = OK, plan.horizon, int(plan.marks[-1])
+        for k, row in enumerate(states):
+            outcome = self.form.ended(row.tolist()) if np.isfinite(row).all() else NOT_FINITE
+            if outcome != OK:
+                states[k:] = np.nan
+                reached, steps = float(plan.times[max(k - 1, 0)]), int(plan.marks[max(k - 1, 0)])
+                break
+        return as_run(self.form, par, plan.times, states, steps, self.evaluations, outcome, reached)
+
+    def onward(self, top: SymmetricTop, start: Angles, steps: Sequence[float]) -> Run:
+        """The end of steps of these lengths, each a run of its own from the state where the last one ended."""
+        par, state = self.form.prepare(top, start)
+        y = np.array(state, dtype=float)
+        for h in steps:
+            y = self.march(top, par, y.copy(), h, A_STEP)[0]
+        return as_run(self.form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
+
+    def there_and_back(self, top: SymmetricTop, start: Angles, h: float) -> Run:
+        """The end of a step of h and one from there with all rates reversed: for what makes no step of -h."""
+        par, state = self.form.prepare(top, start)
+        turned = np.ones(len(state))
+        turned[-3 if turned.size > 2 else -1 :] = -1.0  # L, w, the rates or p_theta
+        y = turned * self.march(top, par, np.array(state, dtype=float), h, A_STEP)[0]
+        y = turned * self.march(top, self.form.prepare(top, reversed_rates(start))[0], y, h, A_STEP)[0]
+        return as_run(self.form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
 
 
 def in_runs(
@@ -100,50 +129,11 @@ def label_of(thing: Any) -> str:
     return re.sub(r"[^A-Za-z0-9._+-]+", "-", text).strip("-._+")[:64] or "step"
 
 
-@dataclass(frozen=True)
-class AdapterSolver:
-    """The solver of the registry around a stepper, which can also go on from any of its states."""
-
-    stepper: Stepper
-
-    def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        """Start to horizon."""
-        form = self.stepper.form
-        par, state = form.prepare(top, start)
-        states = self.stepper.march(top, par, np.array(state, dtype=float), plan.step_size, plan.marks)
-        outcome, reached, steps = OK, plan.horizon, int(plan.marks[-1])
-        for k, row in enumerate(states):
-            outcome = form.ended(row.tolist()) if np.isfinite(row).all() else NOT_FINITE
-            if outcome != OK:
-                states[k:] = np.nan
-                reached, steps = float(plan.times[max(k - 1, 0)]), int(plan.marks[max(k - 1, 0)])
-                break
-        return as_run(form, par, plan.times, states, steps, self.stepper.evaluations, outcome, reached)
-
-    def onward(self, top: SymmetricTop, start: Angles, steps: Sequence[float]) -> Run:
-        """The end of steps of these lengths, each a run of its own from the state where the last one ended."""
-        par, state = self.stepper.form.prepare(top, start)
-        y = np.array(state, dtype=float)
-        for h in steps:
-            y = self.stepper.march(top, par, y.copy(), h, A_STEP)[0]
-        return as_run(self.stepper.form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
-
-    def there_and_back(self, top: SymmetricTop, start: Angles, h: float) -> Run:
-        """The end of a step of h and one from there with all rates reversed: for what makes no step of -h."""
-        form, march = self.stepper.form, self.stepper.march
-        par, state = form.prepare(top, start)
-        turned = np.ones(len(state))
-        turned[-3 if turned.size > 2 else -1 :] = -1.0  # L, w, the rates or p_theta
-        y = turned * march(top, par, np.array(state, dtype=float), h, A_STEP)[0]
-        y = turned * march(top, form.prepare(top, reversed_rates(start))[0], y, h, A_STEP)[0]
-        return as_run(form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
-
-
 def integrator(stepper: Stepper, **claims: Any) -> Integrator:
     """The record of a stepper with the claims that are made for it; ``own-rk4`` of one that is called as ours is."""
     chart = "angles" if stepper.chart == "nutation" else stepper.chart
     name = f"own-{stepper.name}"[:64] if stepper.name in integrators() else stepper.name
-    solvers = {chart: stepper.adaptive or AdapterSolver(stepper)}
+    solvers = {chart: stepper.adaptive or stepper}
     claims |= {"control": "tolerance" if stepper.adaptive else "step_size", "implementation": stepper.implementation}
     return Integrator(name, "other", "given through an adapter", solvers, **claims)
 
