@@ -161,7 +161,8 @@ class _Question(NamedTuple):
         claims = [claim for kept in self.keeps for claim in KEPT[kept]]
         conserving = all(declared(method, claim) in ("kept", "bounded") for claim in claims)
         fixed = self.step is None and self.max_step == self.pace == math.inf
-        return conserving and (fixed or method.fixed_step) and (not self.general or BODY in _solvers(method))
+        suits = not self.general or BODY in integrator(method.method).solvers  # whatever the chart of a variant
+        return conserving and (fixed or method.fixed_step) and suits
 
 
 class _Trial(NamedTuple):
@@ -511,14 +512,9 @@ def _carries(question: _Question, method: Integrator) -> str:
         return ""
     if method.general is not True:
         return " It does not carry over to a body without symmetry."
-    if BODY not in _solvers(method):
+    if BODY not in integrator(method.method).solvers:
         return " It carries over to a body without symmetry, which symtop does not run it on."
     return " It carries over to a body without symmetry, in chart body; its step does not: ask again with that body."
-
-
-def _solvers(method: Integrator) -> Collection[str]:
-    """The charts of a method, whatever the one of a variant."""
-    return integrator(method.method).solvers
 
 
 def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:

@@ -47,7 +47,7 @@ class Truths(NamedTuple):
     """What the runs of m scenes are judged by."""
 
     constants: Array  # (m, constants of a closed form)
-    scenes: Array  # (m, 11): I1, I3, mgl, nutation period, `Barriers`, energy scale, p_phi -+ p_psi where it has a sign
+    scenes: Array  # (m, 11): I1, I3, mgl, nutation period, `barriers`, energy scale, p_phi -+ p_psi where it has a sign
 
     @property
     def periods(self) -> Array:

@@ -76,7 +76,9 @@ def judge(
 
     def tell(event: Any) -> None:
         if isinstance(event, findings.About):
-            line = _heading(event, scene, card or figure)
+            if (card or figure) and not event.chart:
+                raise SymtopError("a card or a figure shows a method: there is none of a trajectory")
+            line = findings.heading(event, getattr(scene, "name", scene))
         else:
             line = findings.line(event, common.terminal_width())
         if line and not as_json:
@@ -99,15 +101,6 @@ def judge(
     say_written(output, card, badge, figure, err=as_json)
     if ledger.refuted:
         sys.exit(1)
-
-
-def _heading(about: Any, scene: Any, picture: str | None) -> str:
-    """The first lines of an answer; SymtopError if a picture is asked for of a trajectory."""
-    from symtop.judging import findings
-
-    if picture and not about.chart:
-        raise SymtopError("a card or a figure shows a method: there is none of a trajectory")
-    return findings.heading(about, getattr(scene, "name", scene))
 
 
 def _check(form: str | None, **files: str | None) -> None:

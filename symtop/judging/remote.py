@@ -20,12 +20,12 @@ import warnings
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 import numpy as np
 
 from symtop.core.errors import SymtopError, last_words, words_of
-from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat
+from symtop.judging.adapters.adapter import Marks, Stepper, heartbeat
 from symtop.judging.adapters.python_step import MATRIX, REDUCED, ROTATION
 from symtop.judging.findings import pace
 from symtop.methods.framework import equations
@@ -42,7 +42,7 @@ FORMS = {"rotation": ROTATION, "matrix": MATRIX, "plane": REDUCED}  # others hav
 FACTS = ("name", "chart", "implementation", "own_loop", "takes_field")  # of a stepper, that are sent
 
 
-class Process:
+class Process(contextlib.AbstractContextManager["Process"]):
     """A process that calls the functions of the table that `make` returns there; a context, at whose end it ends."""
 
     def __init__(self, make: Callable[[], Table]) -> None:
@@ -51,9 +51,6 @@ class Process:
         self.forked = "fork" in multiprocessing.get_all_start_methods() and THREADED not in sys.modules
         self.table: Table | None = None
         self.process: Any = None
-
-    def __enter__(self) -> Self:
-        return self
 
     def __exit__(self, *_: object) -> None:
         if self.process is not None:
@@ -190,7 +187,7 @@ def table_of(opened: Callable[[], Stepper]) -> Table:
 
     def march(since: float, *args: Any) -> tuple[Any, ...]:
         stepper.since = since
-        return *stepper.march(*args), stepper.wrote
+        return stepper.march(*args), stepper.evaluations, stepper.wrote
 
     def along(f: Any, *args: Any) -> tuple[Any, ...]:
         return stepper.along(f, *args), sorted(getattr(f, "times", ()))
@@ -221,11 +218,10 @@ class Remote(Stepper):
         """The next call is of a new process."""
         self.process.end()
 
-    def march(self, top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
+    def march(self, top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> Array:
         """The state at the marks."""
-        states, evaluations, wrote = self.process.call("march", self.since, top, par, y, h, marks)
-        self.wrote = bool(wrote)
-        return March(np.array(states, dtype=float).reshape(marks.size, y.size), int(evaluations))
+        states, self.evaluations, self.wrote = self.process.call("march", self.since, top, par, y, h, marks)
+        return np.array(states, dtype=float).reshape(marks.size, y.size)
 
     def along(self, f: Any, t: float, y: Array, h: float, marks: Marks) -> Array:
         """The states at the marks for a right-hand side that can be sent, from a time t on."""

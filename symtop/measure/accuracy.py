@@ -83,4 +83,4 @@ def error_row(
         row[name] = math.nan if failed else float(np.max(values))
         row[f"{name}_end"] = math.nan if failed else float(values[-1])
         row[f"{name}_bound"] = float(np.max(error_bound(scene, run, truth, name)))
-    return row | phase(scene, run, truth)._asdict() if phases else row
+    return {**row, **phase(scene, run, truth)} if phases else row

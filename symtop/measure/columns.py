@@ -19,7 +19,6 @@ import numpy as np
 from symtop.core import netcdf
 from symtop.measure.errors import ERRORS, against
 
-Table = Mapping[str, netcdf.Column]
 ERROR_TABLE = {
     f"{name}{end}": (words.format(what), unit)
     for name, (what, unit) in ERRORS.items()

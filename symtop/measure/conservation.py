@@ -57,11 +57,6 @@ class Trend(NamedTuple):
     interval: float  # half-width, 95 %
     rise: float  # slope times the length of the run
 
-    @property
-    def significant(self) -> bool:
-        """Does the interval exclude zero?"""
-        return bool(abs(self.slope) > self.interval)
-
 
 class Changed(NamedTuple):
     """What became of a quantity that the true motion keeps: its size, its trend and its law of growth."""

@@ -48,29 +48,27 @@ def _dense(cases: list[tuple[Any, xr.Dataset]]) -> xr.Dataset:
             cells.append((case.scene, case.integrator, data))
     scenes, methods = (list(dict.fromkeys(names)) for names in list(zip(*cells, strict=True))[:2])
     sizes, coordinates = _coordinates(cells)
-    kinds: dict[str, list[Any]] = {}
-    for _, _, data in cells:
-        for name, variable in data.data_vars.items():
-            kinds.setdefault(str(name), []).append(variable.dtype)
-    filled: dict[str, tuple[tuple[str, ...], Any, dict[str, Any]]] = {}
-    keys = set[tuple[str, str, str]]()
+    measured: dict[str, dict[tuple[int, int], xr.Variable]] = {}  # by name and place
     for scene, method, data in cells:
         place = scenes.index(scene), methods.index(method)
-        for name, variable in data.data_vars.items():
-            if (scene, method, str(name)) in keys:
+        for name in map(str, data.data_vars):
+            own, variable = measured.setdefault(name, {}), data.variables[name]
+            if place in own:
                 words = f"two cases of {method} on {scene} measure {name}, and one would replace the other"
                 remedy = "give each a group, or measure all settings in one case, over a dimension of the dataset"
                 raise SymtopError(f"{words}: {remedy}")
-            keys.add((scene, method, str(name)))
-            dims = tuple(str(dim) for dim in variable.dims)
-            if str(name) not in filled:
-                blank = np.full((len(scenes), len(methods), *(sizes[dim] for dim in dims)), *_blank(kinds[str(name)]))
-                filled[str(name)] = ("scene", "variant", *dims), blank, dict(variable.attrs)
-            if (other := filled[str(name)][0][2:]) != dims:
-                raise SymtopError(f"{name} of {method} on {scene} must be over {other}, as in other cases, not {dims}")
-            corner = tuple(slice(0, size) for size in variable.shape)
-            filled[str(name)][1][(*place, *corner)] = variable.values
-    variables = {name: (dims, as_text(values), attrs) for name, (dims, values, attrs) in filled.items()}
+            if own and (other := next(iter(own.values())).dims) != variable.dims:
+                words = f"over {other}, as in other cases, not {variable.dims}"
+                raise SymtopError(f"{name} of {method} on {scene} must be {words}")
+            own[place] = variable
+    variables: dict[str, Any] = {}
+    for name, own in measured.items():
+        dims, attributes = next((one.dims, one.attrs) for one in own.values())
+        shape = len(scenes), len(methods), *(sizes[str(dim)] for dim in dims)
+        filled: Any = np.full(shape, *_blank([one.dtype for one in own.values()]))
+        for place, one in own.items():
+            filled[(*place, *map(slice, one.shape))] = one.values
+        variables[name] = ("scene", "variant", *dims), as_text(filled), dict(attributes)
     return xr.Dataset(variables, coords={"scene": scenes, "variant": methods} | coordinates)
 
 

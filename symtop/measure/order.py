@@ -66,24 +66,18 @@ class Fit(NamedTuple):
         return f"{self.slope:.3f} +- {self.interval:.3f}" if math.isfinite(self.slope) else "not judged"
 
 
-class Line(NamedTuple):
-    """A straight line through points, by least squares."""
+def line(x: Array, y: Array) -> tuple[float, float, tuple[float, float], Array]:
+    """The least-squares line through points (n,), n at least 3.
 
-    slope: float
-    error: float  # standard error of the slope
-    middle: tuple[float, float]  # the point of means, which is on the line
-    rest: Array  # what the line leaves
-
-
-def line(x: Array, y: Array) -> Line:
-    """The line through points (n,), n at least 3."""
+    Its slope, the standard error of that, the point of means, which is on the line, and what the line leaves.
+    """
     middle = x.mean(), y.mean()
     dx, dy = x - middle[0], y - middle[1]
     spread = float(dx @ dx)
     slope = float(dx @ dy) / spread
     rest = dy - slope * dx
     error = math.sqrt(float(rest @ rest) / (x.size - 2) / spread)
-    return Line(slope, error, middle, rest)
+    return slope, error, middle, rest
 
 
 def student(freedom: int) -> float:
@@ -102,10 +96,8 @@ def power_law(x: ArrayLike, y: ArrayLike, used: ArrayLike | None = None) -> Fit:
     n = int(mask.sum())
     if n < 3:
         return Fit(math.nan, math.nan, math.nan, mask)
-    fitted = line(np.log(x[mask]), np.log(y[mask]))
-    u_mean, v_mean = fitted.middle
-    constant = math.exp(float(v_mean - fitted.slope * u_mean))
-    return Fit(fitted.slope, student(n - 2) * fitted.error, constant, mask)
+    slope, error, (u_mean, v_mean), _ = line(np.log(x[mask]), np.log(y[mask]))
+    return Fit(slope, student(n - 2) * error, math.exp(float(v_mean - slope * u_mean)), mask)
 
 
 def order(

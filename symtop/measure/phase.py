@@ -44,15 +44,6 @@ LEAST_RATE = 1e-3  # of omega: below it a mean precession is an accident, and it
 Array = Any
 
 
-class Phase(NamedTuple):
-    """Relative errors of the frequencies of a run, and what the reference can judge of these."""
-
-    nutation_period: float
-    precession_rate: float
-    nutation_period_bound: float
-    precession_rate_bound: float
-
-
 class Split(NamedTuple):
     """Shape error, nutation lag (time, the sign of early) and precession lag (of phi, rad) at every sample."""
 
@@ -131,10 +122,13 @@ def _slope(t: Array, values: Array, bound: Array, weights: Array) -> tuple[float
     return float(np.sum(weights * middle * values) / spread), float(np.sum(weights * np.abs(middle) * bound) / spread)
 
 
-def phase(scene: Scene, run: Trajectory, truth: xr.Dataset) -> Phase:
-    """Errors of the frequencies of a run; all NaN if it failed or has fewer than three samples."""
+def phase(scene: Scene, run: Trajectory, truth: xr.Dataset) -> dict[str, float]:
+    """Errors of the `FREQUENCIES` of a run, and with ``_bound`` behind the name what the reference can judge of these.
+
+    All NaN if it failed or has fewer than three samples.
+    """
     if run.outcome != "ok" or run.time.size < 3:
-        return Phase(*[math.nan] * 4)
+        return {f"{name}{end}": math.nan for end in ("", "_bound") for name in FREQUENCIES}
     form, t = closed_form(scene), run.time
     sine = np.maximum(np.sin(run.theta), EPSILON)
     with np.errstate(over="ignore", invalid="ignore"):  # a run may be far from anything
@@ -152,9 +146,9 @@ def phase(scene: Scene, run: Trajectory, truth: xr.Dataset) -> Phase:
         doubt += EPSILON
     turned, turn_doubt = _slope(t, parts.turn, grain / sine + EPSILON * np.abs(truth["phi"].values), sine * sine)
     turn_doubt += abs(mean_rate) * (doubt + EPSILON)
-    return Phase(
-        nutation_period=abs(1.0 / (1.0 + faster) - 1.0) if swings else math.nan,
-        precession_rate=abs(mean_rate * faster + turned) / scale,
-        nutation_period_bound=doubt if swings else math.nan,
-        precession_rate_bound=turn_doubt / scale + EPSILON,
-    )
+    return {
+        "nutation_period": abs(1.0 / (1.0 + faster) - 1.0) if swings else math.nan,
+        "precession_rate": abs(mean_rate * faster + turned) / scale,
+        "nutation_period_bound": doubt if swings else math.nan,
+        "precession_rate_bound": turn_doubt / scale + EPSILON,
+    }

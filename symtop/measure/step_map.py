@@ -181,11 +181,6 @@ def drawn(scene: Scene, count: int, seed: int, *, same_top: bool) -> Iterator[Sc
         yield Scene("drawn", top, Angles(math.acos(cosine), *draw.uniform(-3.0, 3.0, 2), *rates.tolist()), 1.0)
 
 
-def moved(step: StepMap, scene: Scene) -> StepMap:
-    """The map on another scene's top, of a step that is coarse there."""
-    return coarsest(replace(step, top=scene.top, unit=unit_of(scene), h=SHARE * scene.time_scale()), scene.start)
-
-
 def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Angles]:
     """The map at a step so large that its structure shows, and the point to judge it at; SymtopError without one."""
     start, trial = generic_start(scene), one_step(method, chart, scene, SHARE * scene.time_scale())

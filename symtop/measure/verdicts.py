@@ -28,23 +28,17 @@ FEWEST = 8  # samples of half a run: fewer do not tell an energy that grows from
 NO_GAP = 1e-9  # of the momentum scale: a gap p_phi -+ p_psi below this has no sign to change
 
 
-class Barriers(NamedTuple):
-    """The turning points of the true motion, and how exact a run has to be to have respected them; radians."""
+def barriers(scene: Scene) -> tuple[float, float, float, float]:
+    """What the axis of a scene never passes, and how exact a run has to be to have respected that; radians.
 
-    highest: float  # the smallest theta
-    lowest: float  # the largest theta
-    margin: float
-    accurate: float  # the largest axis error that is still accurate
-
-
-def barriers(scene: Scene) -> Barriers:
-    """What the axis of a scene never passes."""
+    The smallest and the largest theta, the margin, and the largest axis error that is still accurate.
+    """
     if scene.of_body:  # it may point anywhere
-        return Barriers(0.0, math.pi, OUTSIDE, ACCURATE)
+        return 0.0, math.pi, OUTSIDE, ACCURATE
     low, high = scene.top.turning_cosines(scene.start)
     highest, lowest = math.acos(min(high, 1.0)), math.acos(max(low, -1.0))
     width = lowest - highest if lowest - highest > STEADY else 1.0
-    return Barriers(highest, lowest, OUTSIDE * width, min(ACCURATE, OUTSIDE * width))
+    return highest, lowest, OUTSIDE * width, min(ACCURATE, OUTSIDE * width)
 
 
 def pole_passed(scene: Scene, p_phi: Any, p_psi: Any) -> NDArray[np.bool_]:
@@ -77,12 +71,12 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
     times, ended = run["time"].values, str(run.attrs["outcome"])
     if ended != "ok":
         return Judgement(ended, float(run.attrs["reached_time"]), str(run.attrs["outcome_message"]))
-    truth, worst = barriers(scene), float(np.max(axis_error))
-    if worst <= truth.accurate:
+    (highest, lowest, margin, accurate), worst = barriers(scene), float(np.max(axis_error))
+    if worst <= accurate:
         sentence = f"accurate to {worst:.2g} rad up to t = {times[-1]:.6g}{scene.second}"
         return Judgement("accurate", float(times[-1]), sentence)
     theta, energy = run["theta"].values, np.abs(run["energy"].values - run["energy"].values[0]) / scene.energy_scale
-    beyond = ~((theta >= truth.highest - truth.margin) & (theta <= truth.lowest + truth.margin))
+    beyond = ~((theta >= highest - margin) & (theta <= lowest + margin))
     strays = beyond | pole_passed(scene, run["p_phi"].values, run.get("p_psi", run["p_phi"]).values)
     half = energy.size // 2
     early, late = np.max(energy[:half] if half >= FEWEST else energy), np.max(energy[half:])
@@ -90,7 +84,7 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         first = int(np.argmax(strays))
         word, sentence = "wrong_regime", "the axis had passed a pole on the side that its momenta forbid"
         if beyond[first]:
-            bounds = f"{truth.highest:.4g} to {truth.lowest:.4g}"
+            bounds = f"{highest:.4g} to {lowest:.4g}"
             sentence = f"theta was {theta[first]:.4g} rad, where the true motion never goes ({bounds})"
         sentence = f"at t = {times[first]:.6g}{scene.second} {sentence}"
     elif not (late <= DRIFT or late <= GROWING * early):
@@ -98,7 +92,7 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         at = f"{times[first]:.6g}{scene.second}"
         sentence = f"the energy error passed {DRIFT:.0%} at t = {at} and grew on, to {energy.max():.2g}"
     else:
-        word, first = "bounded_but_wrong", int(np.argmax(~(axis_error <= truth.accurate)))
+        word, first = "bounded_but_wrong", int(np.argmax(~(axis_error <= accurate)))
         energies = f"while the energy stayed within {energy.max():.2g}"
-        sentence = f"the axis error passed {truth.accurate:.2g} rad at t = {times[first]:.6g}{scene.second} {energies}"
+        sentence = f"the axis error passed {accurate:.2g} rad at t = {times[first]:.6g}{scene.second} {energies}"
     return Judgement(word, float(times[first]), sentence)

@@ -21,18 +21,9 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.core import netcdf
+from symtop.core import errors, netcdf
 from symtop.core.code_hash import by_file, digest, hashed
-from symtop.core.errors import (
-    SymtopError,
-    SymtopWarning,
-    boolean,
-    check_replaceable,
-    file_path,
-    foreign_code,
-    positive,
-    whole,
-)
+from symtop.core.errors import SymtopError, SymtopWarning, boolean, file_path, foreign_code, positive, whole
 from symtop.core.files import cache_root, make_private
 from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
@@ -187,7 +178,7 @@ def long_run(
     ends, outcome, reached, title = windows(count), OK, at.k, f"{method.name} on {chosen.name}"
     quantities = OF_BODY if chosen.of_body else QUANTITIES
     gauge = watch(chosen, method, h) if len(rows) < len(ends) else None
-    with checkpoints.saved_on_failure():
+    with ending_on_sigterm(), checkpoints:
         with progress_bar(title, quiet=silent, total=count, initial=at.k, unit="step", unit_scale=True) as bar:
             while gauge is not None and len(rows) < len(ends) and outcome == OK:
                 marks = scattered(at.k, ends[len(rows)])
@@ -217,7 +208,6 @@ def long_run(
         )  # fmt: skip
         if result is not None:
             checkpoints.write(data, result)
-    checkpoints.close()
     return data
 
 
@@ -250,8 +240,8 @@ def regrown(carry: Any, values: Iterator[float]) -> Any:
     return next(values)
 
 
-class _Checkpoint:
-    """The windows of one run so far, on disk from time to time."""
+class _Checkpoint(contextlib.AbstractContextManager["_Checkpoint"]):
+    """The windows of one run so far, on disk from time to time, and where a run is ended early; removed at its end."""
 
     def __init__(self, file: "str | Path | bool", identity: str) -> None:
         self.own, self.identity, self.saved = file is True, identity, time.monotonic()
@@ -306,15 +296,11 @@ class _Checkpoint:
         netcdf.write(data, self.file)
         self.saved, self.latest = time.monotonic(), None
 
-    @contextlib.contextmanager
-    def saved_on_failure(self) -> Iterator[None]:
-        """A run that is ended early, by an interrupt, SIGTERM or an error, leaves a checkpoint."""
-        with ending_on_sigterm():
-            try:
-                yield
-            except BaseException:
-                self.save()
-                raise
+    def __exit__(self, failure: object, *_: object) -> None:
+        if failure is not None:  # an interrupt, SIGTERM or an error
+            self.save()
+        elif self.file is not None:
+            self.file.unlink(missing_ok=True)
 
     def checked(self, output: Path) -> Path:
         """The file for the result, refused if it is a folder or the checkpoint, which is removed at the end."""
@@ -323,7 +309,7 @@ class _Checkpoint:
         if self.file is not None and output.resolve() == self.file.resolve():
             words = f"output and checkpoint must be two files, not both {str(output)!r}"
             raise SymtopError(words, "output", "checkpoint")
-        check_replaceable(output)
+        errors.check_replaceable(output)
         return output
 
     def write(self, data: xr.Dataset, output: Path) -> None:
@@ -333,7 +319,3 @@ class _Checkpoint:
         except SymtopError as error:
             left = "" if self.file is None else f"; the steps are kept in {self.file}, and the same call goes on there"
             raise SymtopError(f"{error}{left}") from error
-
-    def close(self) -> None:
-        if self.file is not None:
-            self.file.unlink(missing_ok=True)

@@ -198,8 +198,8 @@ def simulate(
     chosen, method, chart, plan, dithered = _prepared(*arguments) if times is None else _at_times(times, *arguments)
     if isinstance(guard, str) and one_of("guard", guard, ("exact", "series")) == "exact" and chosen.of_body:
         raise SymtopError(f"guard must be series on {chosen.name}, a body without symmetry, not 'exact'", "guard")
-    run = _guarded if times is None else _guarded_at_times
-    trajectory, caution = run(chosen, method, chart, plan, report, series=guard == "series")
+    options = {"series": guard == "series", "at_times": times is not None}
+    trajectory, caution = _guarded(chosen, method, chart, plan, report, **options)
     uneven = times is None and plan.marks.size and plan.marks[-1] % (plan.marks.size - 1)  # no whole steps to a sample
     sampling = "dithered" if dithered else "nearest steps" if uneven else "uniform"
     data = dataset(trajectory.time, trajectory.columns, chosen.units)
@@ -240,14 +240,19 @@ def _prepared(
 
 def _guarded(
     scene: Scene, method: Integrator, chart: str, plan: Plan, guard: Callable[[str], object] | None, *,
-    series: bool = False,
+    series: bool = False, at_times: bool = False,
 ) -> tuple[Trajectory, str]:  # fmt: skip
     """Make a run, after the guard's sentence if there is one; "off" is the sentence of no guard."""
-    caution = "off" if guard is None else warning(scene, method, chart, plan, series=series)
-    if caution and guard is not None:
+    caution = "off" if guard is None else ""
+    forecast = plan._replace(step_size=plan.horizon) if plan.step_size > plan.horizon else plan
+    if guard is not None and plan.horizon > 0.0 and (caution := warning(scene, method, chart, forecast, series=series)):
         guard(caution)
-    states = solve(method, chart, scene.top, scene.start, plan, f" on {scene.name}")
-    return Trajectory.of_run(scene, chart, plan, states), caution
+    if at_times and method.fixed_step:
+        return Trajectory.of_run(scene, chart, plan, _stepped(scene, method, chart, plan)), caution
+    brief = plan if plan.horizon else Plan.until([0.0, BRIEF * scene.time_scale()], plan.tolerance, plan.budget)
+    run = solve(method, chart, scene.top, scene.start, brief, f" on {scene.name}")
+    run = run if plan.horizon else Run(run.states[:1], run.p_phi[:1], run.p_psi[:1], 0, 0, 0, "ok", 0.0)
+    return Trajectory.of_run(scene, chart, plan, run), caution
 
 
 def _at_times(
@@ -274,22 +279,6 @@ def _at_times(
         near = np.rint(row / h)
         marks = np.where(np.abs(row - near * h) <= SAME * row, near, np.floor(row / h)).astype(np.int64)
     return chosen, method, chart, plan._replace(times=row, horizon=float(row[-1]), step_size=h, marks=marks), False
-
-
-def _guarded_at_times(
-    scene: Scene, method: Integrator, chart: str, plan: Plan, guard: Callable[[str], object] | None, *, series: bool
-) -> tuple[Trajectory, str]:
-    """What `_guarded` returns, of a plan of `_at_times`."""
-    caution = "off" if guard is None else ""
-    forecast = plan._replace(step_size=plan.horizon) if plan.step_size > plan.horizon else plan
-    if guard is not None and plan.horizon > 0.0 and (caution := warning(scene, method, chart, forecast, series=series)):
-        guard(caution)
-    if method.fixed_step:
-        return Trajectory.of_run(scene, chart, plan, _stepped(scene, method, chart, plan)), caution
-    brief = plan if plan.horizon else Plan.until([0.0, BRIEF * scene.time_scale()], plan.tolerance, plan.budget)
-    run = solve(method, chart, scene.top, scene.start, brief, f" on {scene.name}")
-    run = run if plan.horizon else Run(run.states[:1], run.p_phi[:1], run.p_psi[:1], 0, 0, 0, "ok", 0.0)
-    return Trajectory.of_run(scene, chart, plan, run), caution
 
 
 def _stepped(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Run:

@@ -25,7 +25,7 @@ def table():
     stepper = open_target(midpoint, None, "axis")
     par, state = FORMULATIONS["axis"].prepare(SPHEROID.top, SPHEROID.start)
     marks = STRIDE * np.arange(SAMPLES)
-    states = stepper.march(SPHEROID.top, par, np.array(state), H, marks).states
+    states = stepper.march(SPHEROID.top, par, np.array(state), H, marks)
     states[:, :3] /= np.linalg.norm(states[:, :3], axis=1)[:, None]
     return np.column_stack([marks * H, states])
 
@@ -38,7 +38,7 @@ def test_reported_constants_do_not_hide_those_of_the_states_nor_an_energy_that_b
     """Euler's method gains energy; that of `table` drifts, and friction that takes all of it is no blow-up."""
     stepper, columns = open_target(euler, None, "axis"), {"time": table[:101, 0], "axis": table[:101, 1:4]}
     par, state = FORMULATIONS["axis"].prepare(SPHEROID.top, SPHEROID.start)
-    states = stepper.march(SPHEROID.top, par, np.array(state), H, STRIDE * np.arange(101)).states
+    states = stepper.march(SPHEROID.top, par, np.array(state), H, STRIDE * np.arange(101))
     states[:, :3] /= np.linalg.norm(states[:, :3], axis=1)[:, None]
     ledger = symtop.judge({"time": columns["time"], "axis": states[:, :3], "momentum": states[:, 3:]}, energy="bounded")
     assert (ledger["energy"].measured.kind, ledger.refuted) == ("blows up", ["energy"])

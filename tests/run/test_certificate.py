@@ -17,6 +17,7 @@ from symtop.run.reference.independent_checks import MAP_STEPS, iterate_map, iter
 from symtop.run.reference.truth import SUSPICIOUS, Certificate, certificate, closed_bounds, closed_values, disagreement
 
 TIMES = np.array([0.3, 17.0, 1e3, 1e6])
+kind = lambda one: module.KINDS[int(np.isfinite(one[-2:]).sum())]
 
 
 def test_views_and_integrals_agree_in_every_regime():
@@ -44,13 +45,12 @@ def test_a_certificate_is_made_once_and_the_better_one_is_told(cache, monkeypatc
     chosen = scene("goldstein")
     assert certificate(chosen) is None
     digits = certificate(chosen, "digits")
-    assert certificate(chosen)[:3] == digits[:3]
-    assert digits.kind == certificate(chosen).kind == "digits"
+    assert (certificate(chosen)[:3], kind(digits), kind(certificate(chosen))) == (digits[:3], "digits", "digits")
     assert digits.reach == pytest.approx(1e6 * chosen.nutation_period)
     iterated = certificate(chosen, "discrete-map")
-    assert certificate(chosen).kind == iterated.kind == "discrete-map"
+    assert kind(certificate(chosen)) == kind(iterated) == "discrete-map"
     integration = certificate(chosen, "integration")
-    assert (integration.kind, (integration.share, integration.reach)) == ("integration", (digits.share, digits.reach))
+    assert (kind(integration), (integration.share, integration.reach)) == ("integration", (digits.share, digits.reach))
     monkeypatch.setattr(module.netcdf, "write", pytest.fail)  # nothing is computed again
     module._on_disk.cache_clear()  # as in a new process
     assert certificate(chosen) == certificate(chosen, "integration") == integration
@@ -61,8 +61,8 @@ def test_a_certificate_is_made_once_and_the_better_one_is_told(cache, monkeypatc
 def test_a_certificate_without_heyoka_is_not_taken_for_one_with_it(cache, monkeypatch):
     with monkeypatch.context() as hidden:
         hidden.setitem(sys.modules, "heyoka", None)
-        assert certificate(scene("goldstein"), "integration").kind == "discrete-map"
-    assert certificate(scene("goldstein"), "integration").kind == "integration"
+        assert kind(certificate(scene("goldstein"), "integration")) == "discrete-map"
+    assert kind(certificate(scene("goldstein"), "integration")) == "integration"
 
 
 @pytest.mark.parametrize("chosen", [

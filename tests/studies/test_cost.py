@@ -288,8 +288,8 @@ def test_scales_of_many_tops_are_those_of_scenes_and_samples_fall_on_the_same_ti
     assert tops.energy_scale[:80] == pytest.approx([one.energy_scale for one in scenes], rel=1e-6)
     assert tops.period[:80] == pytest.approx([one.nutation_period for one in scenes], rel=1e-6)
     assert tops.regime[:80] == pytest.approx(np.array([regime(one) for one in scenes]), abs=1e-6)
-    ends, wide = [barriers(one) for one in scenes], tops.width[:80] > 1e-3
-    assert tops.width[:80][wide] == pytest.approx(np.array([one.lowest - one.highest for one in ends])[wide], abs=1e-6)
+    (highest, lowest, *_), wide = np.array([barriers(one) for one in scenes]).T, tops.width[:80] > 1e-3
+    assert tops.width[:80][wide] == pytest.approx((lowest - highest)[wide], abs=1e-6)
     for level in (0, 3, 9):
         h = tops.period / FIRST * 0.5**level
         assert np.array_equal((tops.marks << level) * h[:, np.newaxis], tops.times, equal_nan=True)

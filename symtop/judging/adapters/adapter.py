@@ -11,8 +11,7 @@ import re
 import time
 from collections.abc import Callable, Sequence
 from ctypes import c_bool, c_double, c_long
-from dataclasses import dataclass
-from typing import Any, NamedTuple, Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,19 +24,13 @@ from symtop.methods.framework.registry import Integrator, Solver, integrators
 from symtop.model.top import Angles, SymmetricTop
 
 Marks = NDArray[np.int64]
+A_STEP: Marks = np.array([1])
 LOOK = 64  # steps from one look at whether the state is finite to the next
 PATIENCE, QUICK_PATIENCE = 10.0, 3.0  # seconds for one call
 
 
-class March(NamedTuple):
-    """A state at the marks, shape (marks, dimension), NaN after a failure, and the force evaluations; 0 if unknown."""
-
-    states: Array
-    evaluations: int
-
-
 class Stepper:
-    """Something that steps."""
+    """Something that steps, and the solver of its record, which can also go on from any of its states."""
 
     name: str
     chart: str  # of its states; "nutation" for (theta, p_theta), which no solver of the registry shows
@@ -48,13 +41,14 @@ class Stepper:
     takes_field = False  # is it given a right-hand side (`along`)?
     since = 0.0  # the time at which runs begin
     wrote = False  # has it changed its input?
+    evaluations = 0  # of the force, in the last march; 0 if unknown
     clock: Callable[[], float] = staticmethod(time.perf_counter)  # by which its steps are timed
 
     def renew(self) -> None:
         """Forget whatever it may keep, where that is possible."""
 
-    def march(self, top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
-        """The state after marks[0], marks[1], ... steps of h from y."""
+    def march(self, top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> Array:
+        """The state after marks[0], marks[1], ... steps of h from y, (marks, dimension), NaN after a failure."""
         raise NotImplementedError  # each kind of foreign code has its own
 
     def from_start(self, top: SymmetricTop, start: Angles, h: float) -> tuple[Array, Callable[..., Array]]:
@@ -62,9 +56,39 @@ class Stepper:
         par, state = self.form.prepare(top, start)
 
         def run(y: Array, *marks: int) -> Array:
-            return self.march(top, par, y.copy(), h, np.array(marks)).states
+            return self.march(top, par, y.copy(), h, np.array(marks))
 
         return np.array(state, dtype=float), run
+
+    def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
+        """Start to horizon, as the registry calls a solver."""
+        par, state = self.form.prepare(top, start)
+        states = self.march(top, par, np.array(state, dtype=float), plan.step_size, plan.marks)
+        outcome, reached, steps = OK, plan.horizon, int(plan.marks[-1])
+        for k, row in enumerate(states):
+            outcome = self.form.ended(row.tolist()) if np.isfinite(row).all() else NOT_FINITE
+            if outcome != OK:
+                states[k:] = np.nan
+                reached, steps = float(plan.times[max(k - 1, 0)]), int(plan.marks[max(k - 1, 0)])
+                break
+        return as_run(self.form, par, plan.times, states, steps, self.evaluations, outcome, reached)
+
+    def onward(self, top: SymmetricTop, start: Angles, steps: Sequence[float]) -> Run:
+        """The end of steps of these lengths, each a run of its own from the state where the last one ended."""
+        par, state = self.form.prepare(top, start)
+        y = np.array(state, dtype=float)
+        for h in steps:
+            y = self.march(top, par, y.copy(), h, A_STEP)[0]
+        return as_run(self.form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
+
+    def there_and_back(self, top: SymmetricTop, start: Angles, h: float) -> Run:
+        """The end of a step of h and one from there with all rates reversed: for what makes no step of -h."""
+        par, state = self.form.prepare(top, start)
+        turned = np.ones(len(state))
+        turned[-3 if turned.size > 2 else -1 :] = -1.0  # L, w, the rates or p_theta
+        y = turned * self.march(top, par, np.array(state, dtype=float), h, A_STEP)[0]
+        y = turned * self.march(top, self.form.prepare(top, reversed_rates(start))[0], y, h, A_STEP)[0]
+        return as_run(self.form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
 
 
 def in_runs(
@@ -105,54 +129,11 @@ def label_of(thing: Any) -> str:
     return re.sub(r"[^A-Za-z0-9._+-]+", "-", text).strip("-._+")[:64] or "step"
 
 
-@dataclass(frozen=True)
-class AdapterSolver:
-    """The solver of the registry around a stepper, which can also go on from any of its states."""
-
-    stepper: Stepper
-
-    def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        """Start to horizon."""
-        form = self.stepper.form
-        par, state = form.prepare(top, start)
-        states, evaluations = self.stepper.march(top, par, np.array(state, dtype=float), plan.step_size, plan.marks)
-        outcome, reached, steps = OK, plan.horizon, int(plan.marks[-1])
-        for k, row in enumerate(states):
-            outcome = form.ended(row.tolist()) if np.isfinite(row).all() else NOT_FINITE
-            if outcome != OK:
-                states[k:] = np.nan
-                reached, steps = float(plan.times[max(k - 1, 0)]), int(plan.marks[max(k - 1, 0)])
-                break
-        return as_run(form, par, plan.times, states, steps, evaluations, outcome, reached)
-
-    def onward(self, top: SymmetricTop, start: Angles, steps: Sequence[float]) -> Run:
-        """The end of steps of these lengths, each a run of its own from the state where the last one ended."""
-        par, state = self.stepper.form.prepare(top, start)
-        y = np.array(state, dtype=float)
-        for h in steps:
-            y = self._once(top, par, y.copy(), h)
-        return as_run(self.stepper.form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
-
-    def there_and_back(self, top: SymmetricTop, start: Angles, h: float) -> Run:
-        """The end of a step of h and one from there with all rates reversed: for what makes no step of -h."""
-        form = self.stepper.form
-        par, state = form.prepare(top, start)
-        turned = np.ones(len(state))
-        turned[-3 if turned.size > 2 else -1 :] = -1.0  # L, w, the rates or p_theta
-        y = turned * self._once(top, par, np.array(state, dtype=float), h)
-        y = turned * self._once(top, form.prepare(top, reversed_rates(start))[0], y, h)
-        return as_run(form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
-
-    def _once(self, top: SymmetricTop, par: Any, y: Array, h: float) -> Array:
-        end: Array = self.stepper.march(top, par, y, h, np.array([1])).states[0]
-        return end
-
-
 def integrator(stepper: Stepper, **claims: Any) -> Integrator:
     """The record of a stepper with the claims that are made for it; ``own-rk4`` of one that is called as ours is."""
     chart = "angles" if stepper.chart == "nutation" else stepper.chart
     name = f"own-{stepper.name}"[:64] if stepper.name in integrators() else stepper.name
-    solvers = {chart: stepper.adaptive or AdapterSolver(stepper)}
+    solvers = {chart: stepper.adaptive or stepper}
     claims |= {"control": "tolerance" if stepper.adaptive else "step_size", "implementation": stepper.implementation}
     return Integrator(name, "other", "given through an adapter", solvers, **claims)
 

@@ -41,7 +41,7 @@ from typing import Any
 import numpy as np
 
 from symtop.core.errors import SymtopError, at_home, last_words
-from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat, in_runs, label_of, relative_gap, repeat
+from symtop.judging.adapters.adapter import Marks, Stepper, heartbeat, in_runs, label_of, relative_gap, repeat
 from symtop.judging.adapters.python_step import MOST_NEWTON, state_like
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import QUATERNIONS, Array
@@ -80,7 +80,7 @@ class SharedObject(Stepper):
         self.function.argtypes = [Doubles, ctypes.c_double, Doubles, ctypes.c_long]
         self.function.restype = None
 
-    def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: Marks) -> March:
+    def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: Marks) -> Array:
         """The state at the marks; SymtopError if it writes beyond its state or into the parameters."""
         numbers, size = np.array([top.I1, top.I3, top.mgl]), y.size
         par, room = numbers.copy(), np.full(size + GUARD, MARK)
@@ -96,7 +96,7 @@ class SharedObject(Stepper):
             raise SymtopError(f"{self.name} writes beyond the {size} numbers of its state")
         if (par != numbers).any():
             raise SymtopError(f"{self.name} writes into its parameters")
-        return March(states, 0)
+        return states
 
 
 class Program(Stepper):
@@ -114,7 +114,7 @@ class Program(Stepper):
         self.name = label_of(Path(self.words[0]).name)
         self.seconds_a_step = 0.0  # of the slowest run so far
 
-    def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: Marks) -> March:
+    def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: Marks) -> Array:
         """The state at the marks; SymtopError if the program fails or writes anything else."""
         stride, last = max(int(np.gcd.reduce(marks)), 1), int(marks[-1])
         numbers = [top.I1, top.I3, top.mgl, h, last, stride, *y.tolist()]
@@ -129,7 +129,7 @@ class Program(Stepper):
             first = ", ".join(f"{value:.4g}" for value in states[0])
             words = f"{self.name} must write the start that it was given as the first of its states, not {first}"
             raise SymtopError(words)
-        return March(states[marks // stride], 0)
+        return states[marks // stride]
 
     def _answer(self, line: str, h: float, steps: int) -> bytes:
         seconds, began = heartbeat.patience + SLACK * self.seconds_a_step * steps, time.monotonic()
@@ -173,17 +173,16 @@ class BatchStep(Stepper):
         self._step = self.library.jit(self._called) if self.jax else self._called
         self._tried = False
 
-    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
+    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> Array:
         """The state at the marks: the first row of the batch."""
         with double_precision(self.library) if self.jax else self.library.no_grad():
             step = functools.partial(self._step, par)
             batch = self._array(np.stack([y, np.concatenate([y[:-3], OTHER * y[-3:]])]))
             if not self._tried:
                 self._try(step, y, batch, h)
-            states = repeat(
+            return repeat(
                 lambda k, rows: _once(step, self.since + k * h, rows, h), batch, marks, lambda rows: np.asarray(rows[0])
             )
-            return March(states, 0)
 
     def _array(self, values: Array) -> Any:
         return self.library.numpy.asarray(values) if self.jax else self.library.tensor(values)
@@ -275,7 +274,7 @@ class DiffraxSolver(Stepper):
         self._begin, self._run = self._compiled()
         self._fresh = True  # nothing is compiled yet
 
-    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
+    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> Array:
         """The state at the marks; NaN where the solver says that a step failed."""
 
         def run(done: int, steps: int, at: Any) -> Any:
@@ -289,7 +288,7 @@ class DiffraxSolver(Stepper):
             with heartbeat.call(h, COMPILING if self._fresh else 0.0):
                 start = self.jax.numpy.asarray(y)
                 memory = self._begin(par, start, h)
-            return March(in_runs(run, (start, memory), marks, MOST, lambda at: np.asarray(at[0])), 0)
+            return in_runs(run, (start, memory), marks, MOST, lambda at: np.asarray(at[0]))
 
     def _compiled(self) -> tuple[Any, Any]:
         """The start of a run, and so many steps of it; the numbers of the top are `args`, so that both compile once."""

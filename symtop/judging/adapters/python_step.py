@@ -40,7 +40,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from symtop.core.errors import SymtopError
-from symtop.judging.adapters.adapter import March, Marks, Stepper, heartbeat, label_of, repeat
+from symtop.judging.adapters.adapter import Marks, Stepper, heartbeat, label_of, repeat
 from symtop.methods.framework.angles import chart_outcome, on_angles
 from symtop.methods.framework.body import torque as torque_of
 from symtop.methods.framework.equations import FORMS, FORMULATIONS, Formulation
@@ -125,11 +125,12 @@ class PythonStep(FunctionStep):
         super().__init__(function, name)
         self.chart, self.form = chart, FORMS[chart]
 
-    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
+    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> Array:
         """The state at the marks."""
         f = Equations(self.chart, par)
         states = self.along(f, self.since, y, h, marks)
-        return March(states, f.calls)
+        self.evaluations = f.calls
+        return states
 
     def along(self, f: Field, t: float, y: Array, h: float, marks: Marks) -> Array:
         """The states at the marks for any right-hand side, from a time t on."""
@@ -262,13 +263,12 @@ class RotationStep(FunctionStep):
         except SymtopError as error:
             self.of_matrix = str(error)
 
-    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
+    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> Array:
         """The state at the marks."""
-        calls, shape = 0, (3, 3) if self.form is MATRIX else (4,)
+        self.evaluations, shape = 0, (3, 3) if self.form is MATRIX else (4,)
 
         def torque(q: Any) -> Array:
-            nonlocal calls
-            calls += 1
+            self.evaluations += 1
             at = np.asarray(q, dtype=float)
             up = at[2] if shape == (3, 3) else np.array(vertical(*at.tolist())) / (float(at @ at) or math.nan)
             return np.array(torque_of(par, *up.tolist()))
@@ -288,7 +288,7 @@ class RotationStep(FunctionStep):
                 raise
             raise SymtopError(f"{error}, given q = (w, x, y, z); given a matrix, it raises {other}") from None
         self.of_matrix = ""
-        return March(states, calls)
+        return states
 
 
 def _no_field(*_: Any) -> Any:
@@ -313,20 +313,18 @@ class SeparableStep(FunctionStep):
 
     chart, form = "nutation", REDUCED
 
-    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> March:
+    def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> Array:
         """The state at the marks."""
-        calls = 0
+        self.evaluations = 0
 
         def dT(p_theta: Any) -> Any:
             return p_theta / par.I1
 
         def dV(theta: Any) -> Any:
-            nonlocal calls
-            calls += 1
+            self.evaluations += 1
             try:
                 return effective_force(theta, par.north, par.south, par.I1, par.mgl)[0]
             except (OverflowError, ZeroDivisionError, ValueError):  # at a pole, or at infinity
                 return np.nan
 
-        states = self.steps(lambda _, state: self.function(state, h, dT, dV), 0.0, y, h, marks)
-        return March(states, calls)
+        return self.steps(lambda _, state: self.function(state, h, dT, dV), 0.0, y, h, marks)

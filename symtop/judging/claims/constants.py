@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError
 from symtop.core.numbers import EPSILON
-from symtop.judging.adapters.adapter import AdapterSolver
+from symtop.judging.adapters.adapter import Stepper
 from symtop.judging.claims.subject import CONSTANTS, PLANE, STEPS_A_NUTATION, Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided, yes_no
 from symtop.measure.conservation import Changed, Difference, behaviour, constant_of, from_increments, residuals, tops
@@ -193,7 +193,7 @@ def long_run(
     _, other, _ = _run(method, scene, inside, PILOT, 0.21 * step, PILOT + 1)
     steady = len({one.force_evaluations / max(one.steps, 1) for one in (first, other)}) == 1
     reported = None
-    plain = isinstance(method.solvers[inside], AdapterSolver)
+    plain = isinstance(method.solvers[inside], Stepper)
     if not (plain or scene.of_body):  # else its momenta are those of its states
         reported = _reported(method, scene, chart, trajectory, (run, plan))
         if method.fixed_step:

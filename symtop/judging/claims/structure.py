@@ -156,7 +156,8 @@ def _elsewhere(subject: Subject, step: maps.StepMap, answers: list[Answer]) -> l
     """The answers, or a no that a step gives at a start, on a top, that is drawn at random, where they are yes."""
     for name, scene in subject.elsewhere(DRAWS, DRAWING) if answers[0][0] or answers[1][0] else ():
         with contextlib.suppress(SymtopError):
-            other = maps.moved(step, scene)
+            trial = maps.one_step(step.method, step.chart, scene, maps.SHARE * scene.time_scale())
+            other = maps.coarsest(trial, scene.start)
             for i, ask in enumerate((_bracket, _returned)):
                 if answers[i][0] and (answer := _answer_at(ask, other, scene.start))[0] is False:
                     answers[i] = *answer[:3], f"{answer[3]} ({name})"

@@ -31,7 +31,7 @@ made of sums, products, quotients and square roots, sine and cosine of theta inc
 import math
 import os
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -46,14 +46,8 @@ BYTES = 400  # of memory that a member takes
 DRAWS = 16  # uniform numbers a member: a new quantity must not move those that are there
 BLOCK = 1 << 16  # members drawn at a time
 
-
-class _Start(NamedTuple):
-    """Starts without units: tilt from the pole that gravity pulls from, rates in units of g; each (n,)."""
-
-    theta: Array
-    theta_dot: Array
-    phi_dot: Array
-    a: Array
+# without units: theta, the tilt from the pole that gravity pulls from, theta' and phi' in units of g, and a; each (n,)
+Start = tuple[Array, Array, Array, Array]
 
 
 def between(low: float, high: float, uniform: Array) -> Array:
@@ -94,18 +88,18 @@ def direction(uniform: Array) -> tuple[Array, Array]:
     return signs(uniform) * (1.0 - t * t) / square, signs(uniform) * 2.0 * t / square
 
 
-def _slow(draw: Array) -> _Start:
+def _slow(draw: Array) -> Start:
     theta, a = between(0.1, 3.04, draw[0]), 2.0 * signs(draw[1]) * octaves(-6.0, 0.0, draw[2])
     speed, (along, across) = 4.0 * draw[3], direction(draw[4])  # energy speed^2/2: from 0 to 8, more often little
-    return _Start(theta, speed * along, speed * across / sine_cosine(theta)[0], a)
+    return theta, speed * along, speed * across / sine_cosine(theta)[0], a
 
 
-def _fast(draw: Array) -> _Start:
+def _fast(draw: Array) -> Start:
     a = 2.0 * signs(draw[1]) * octaves(1.0, 6.0, draw[2])
-    return _Start(between(0.2, 2.9, draw[0]), between(-2.0, 2.0, draw[3]) / a, between(-2.0, 4.0, draw[4]) / a, a)
+    return between(0.2, 2.9, draw[0]), between(-2.0, 2.0, draw[3]) / a, between(-2.0, 4.0, draw[4]) / a, a
 
 
-def _grazing(draw: Array) -> _Start:
+def _grazing(draw: Array) -> Start:
     """Tilts `away` from the pole that is passed. With x = away/2, u the speed at the pole and delta = b -+ a = u gap,
 
         away'^2 = u^2 +- 4 sin^2 x - a^2 tan^2 x    (upper, lower pole), up to terms of the size of delta,
@@ -124,10 +118,10 @@ def _grazing(draw: Array) -> _Start:
     rest = top * tangent
     rate = signs(draw[7]) * np.sqrt(rest * rest - a * a * tangent * tangent)
     turn = (delta + a * (1.0 - cosine)) / (sine * sine)
-    return _Start(np.where(upper, away, math.pi - away), rate, turn, np.where(upper, a, -a))
+    return np.where(upper, away, math.pi - away), rate, turn, np.where(upper, a, -a)
 
 
-def _near_separatrix(draw: Array) -> _Start:
+def _near_separatrix(draw: Array) -> Start:
     """Near the upper pole theta'^2 + (delta/theta)^2 - r^2 theta^2 = 2 eta, r^2 = 1 - sigma^2, delta = b - a.
 
     The axis turns at the tilt `gap` if delta^2 = r^2 gap^4 + 2 eta gap^2; eta = kappa r^2 gap^2/2 is drawn by kappa.
@@ -141,27 +135,27 @@ def _near_separatrix(draw: Array) -> _Start:
     eta = 0.5 * kappa * growth * gap * gap
     lever = (delta + a * (1.0 - cosine)) / sine
     rate = signs(draw[7]) * np.sqrt(2.0 * (1.0 - cosine) + 2.0 * eta + a * delta - lever * lever)
-    return _Start(theta, rate, lever / sine, a)
+    return theta, rate, lever / sine, a
 
 
-def _hanging(draw: Array) -> _Start:
+def _hanging(draw: Array) -> Start:
     """Here the tilt is from the pole that gravity pulls to; cos(tilt) is the energy that lifts the axis level."""
     theta, a = between(0.05, 1.2, draw[0]), 2.0 * signs(draw[1]) * octaves(-6.0, 1.0, draw[2])
     sine, cosine = sine_cosine(theta)
     speed, (along, across) = np.sqrt(2.0 * between(0.0, 0.95, draw[3]) * cosine), direction(draw[4])
-    return _Start(theta, speed * along, speed * across / sine, a)
+    return theta, speed * along, speed * across / sine, a
 
 
-def _sleeping(draw: Array) -> _Start:
+def _sleeping(draw: Array) -> Start:
     """In the frame that turns at a/2 the axis swings as theta'' = -omega^2 theta, omega^2 = sigma^2 - 1."""
     tilt, excess = octaves(-12.0, -4.0, draw[0]), octaves(-5.0, 2.0, draw[2])
     sigma = 1.0 + excess
     omega = np.sqrt(excess * (2.0 + excess))
     rates = omega * between(-1.0, 1.0, draw[3]), sigma + omega * between(-1.0, 1.0, draw[4])
-    return _Start(tilt, tilt * rates[0], signs(draw[1]) * rates[1], 2.0 * signs(draw[1]) * sigma)
+    return tilt, tilt * rates[0], signs(draw[1]) * rates[1], 2.0 * signs(draw[1]) * sigma
 
 
-STRATA: dict[str, tuple[float, Callable[[Array], _Start]]] = {
+STRATA: dict[str, tuple[float, Callable[[Array], Start]]] = {
     "slow": (0.25, _slow),
     "fast": (0.25, _fast),
     "grazing": (0.15, _grazing),
@@ -172,14 +166,14 @@ STRATA: dict[str, tuple[float, Callable[[Array], _Start]]] = {
 KINDS = (*STRATA, "all")
 
 
-def _scaled(start: _Start, draw: Array, mgl: float) -> tuple[Array, ...]:
+def _scaled(start: Start, draw: Array, mgl: float) -> tuple[Array, ...]:
     """The `NUMBERS` of members, from starts without units; `mgl` is the sign of gravity."""
-    cosine = sine_cosine(start.theta)[1]
+    theta, theta_dot, phi_dot, a = start
     I1, g = octaves(-10.0, 10.0, draw[0]), octaves(-6.0, 6.0, draw[1])
     ratio = between(0.02, 1.98, draw[2])
     phi, psi = between(-math.pi, math.pi, draw[3]), between(-math.pi, math.pi, draw[4])
-    psi_dot = g * (start.a / ratio - start.phi_dot * cosine)
-    return I1, ratio * I1, mgl * I1 * g * g, start.theta, phi, psi, g * start.theta_dot, g * start.phi_dot, psi_dot
+    psi_dot = g * (a / ratio - phi_dot * sine_cosine(theta)[1])
+    return I1, ratio * I1, mgl * I1 * g * g, theta, phi, psi, g * theta_dot, g * phi_dot, psi_dot
 
 
 def _fill(columns: dict[str, Any], draw: Array, kind: str) -> None:

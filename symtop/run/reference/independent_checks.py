@@ -34,16 +34,9 @@ DIGITS = 40
 SAFETY = 8.0
 MAP_STEPS = (4.37, 7.13)  # of the discrete map, a nutation: no two of its constants agree
 MOST_NUTATIONS = 1e4  # that it is iterated over
+CHECKED = ("attitude", "axis", "phi", "psi")
 
-
-class Checks(NamedTuple):
-    """Largest errors up to each check time (running maxima), by quantity."""
-
-    times: Array
-    attitude: Array
-    axis: Array
-    phi: Array
-    psi: Array
+Checks = dict[str, Array]  # largest errors up to each check time (running maxima), by quantity, and the ``times``
 
 
 def integrate(scene: Scene, times: Array, precision: str, chart: str = "attitude") -> tuple[Any, int]:
@@ -129,7 +122,7 @@ def largest_errors(scene: Scene, times: Array, quaternions: Any, phis: Any, psis
         tilt = float(mp.norm(charts.axis_from_quaternion(attitude) - charts.axis_from_quaternion(true)))
         total, difference = mp.atan2(z, w), mp.atan2(y, x)
         rows.append((turn, tilt, _turn(mp, phi, total + difference), _turn(mp, psi, total - difference)))
-    return Checks(times, *np.maximum.accumulate(np.array(rows), axis=0).T)
+    return {"times": times, **dict(zip(CHECKED, np.maximum.accumulate(np.array(rows), axis=0).T, strict=True))}
 
 
 def _turn(mp: Any, angle: Any, true: Any) -> float:
@@ -140,9 +133,8 @@ def _turn(mp: Any, angle: Any, true: Any) -> float:
 
 def envelope(checks: Checks, name: str, times: Array) -> Array:
     """SAFETY times the largest error at any check up to the first one that is not before t."""
-    values: Array = getattr(checks, name)
-    after = np.minimum(np.searchsorted(checks.times, times, side="left"), values.size - 1)
-    return SAFETY * values[after]
+    after = np.minimum(np.searchsorted(checks["times"], times, side="left"), checks[name].size - 1)
+    return SAFETY * checks[name][after]
 
 
 def _unwrapped(angle: Any, near: Array) -> Any:

@@ -65,6 +65,7 @@ from symtop.model.exact.heavy_body import MOST_STEPS, HeavyBody
 from symtop.model.exact.turning_points import RATE
 from symtop.model.scenes import Scene, closed_form, scene as find_scene
 from symtop.run.reference.independent_checks import (
+    CHECKED,
     CHECKS,
     DIGITS,
     SAFETY,
@@ -336,11 +337,6 @@ class Certificate(NamedTuple):
     apart: float  # rad, the same of the integration
 
     @property
-    def kind(self) -> str:
-        """One of `KINDS`."""
-        return "digits" if math.isnan(self.map_apart) else "discrete-map" if math.isnan(self.apart) else "integration"
-
-    @property
     def doubt(self) -> float:
         """Rad by which the formulas may be wrong: a distance from an independent check that exceeds rounding."""
         return max((gap for gap in (self.map_apart, self.apart) if gap > SUSPICIOUS), default=0.0)
@@ -390,7 +386,7 @@ def _compared(scene: Scene, kind: str) -> xr.Dataset:
     values = closed_values(scene, times)
     checks = largest_errors(scene, times, values["quaternion"], values["phi"], values["psi"])
     bounds = closed_bounds(scene, times, values)
-    share = max(float(np.max(getattr(checks, name) / bounds[name])) for name in ("attitude", "axis", "phi", "psi"))
+    share = max(float(np.max(checks[name] / bounds[name])) for name in CHECKED)
     overlap, map_apart = _against_map(scene) if kind != "digits" else (math.nan, math.nan)
     apart = _against_integration(scene)[1] if kind == "integration" else math.nan
     made = Certificate(float(times[-1]), times.size, share, overlap, map_apart, apart)
@@ -416,7 +412,7 @@ def _against_integration(scene: Scene) -> tuple[float, float]:
     states, _ = integrate(scene, times, "longdouble")
     gap = charts.attitude_distance(closed_form(scene).quaternion(times), states[:, :4].astype(float))
     _, phi, psi = charts.angles_from_quaternion(states[:, :4])
-    rounding = largest_errors(scene, times, states[:, :4], phi, psi).attitude  # grows where the motion is unstable
+    rounding = largest_errors(scene, times, states[:, :4], phi, psi)["attitude"]  # grows where the motion is unstable
     return float(times[-1]), float(max(np.max(gap - 2.0 * rounding), 0.0))
 
 
