@@ -19,7 +19,7 @@ from symtop.runner.study import Picture
 from .atlas import OutcomeMap, families, maps
 from .failures import LOST, MOST as LARGEST, SEEN
 from .many_verdicts import EARLY, JUDGED, SAID
-from .mechanisms import measured
+from .mechanisms import measured, rate
 
 KNOWN = (  # the variants whose maps are drawn, if they are there
     "stormer-verlet[angles]", "midpoint[angles]", "rk4[angles]", "rk4[axis]", "strang[axis]", "takahashi-imada[axis]",
@@ -145,9 +145,10 @@ def _resonance(axis: Any, data: xr.Dataset) -> None:
 
 
 def _separatrix(axis: Any, data: xr.Dataset) -> None:
-    _lines(axis, data.sel(scene="separatrix"), "early_error", "horizon", dots=True)
+    part = data.sel(scene="separatrix")
+    _lines(axis, part.assign(horizon=rate() * part["horizon"]), "early_error", "horizon", dots=True)
     error = np.geomspace(1e-16, 0.1, 50)
-    axis.plot(error, SEEN + 2.0 * np.log(LOST / error), **THEORY)
+    axis.plot(error, SEEN + np.log(LOST / error), **THEORY)
     axis.set(xscale="log", xlabel=rf"axis error at ${SEEN:g}/\lambda$ (rad)", title="next to the separatrix")
     axis.set_ylabel(rf"time to {LOST:g} rad ($1/\lambda$)")
 
