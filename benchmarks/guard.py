@@ -48,10 +48,10 @@ SAMPLES = {"tops": 501, "bodies": 201, "hostile": 201}
 MOST_TURNS = 1e3  # of a hostile body about any axis
 TABLES = Path("results") / "tables"
 ANSWER = (
-    "Hardly. Of the wrong runs of tops the guard is silent on {silent[0]} with the closed form (exact) and on {silent[1]} "
-    "with an integration in its place (series); of the correct ones it warns of {false[0]} and {false[1]}. On bodies, "
-    "where it always integrates, it is silent on {silent[2]} wrong runs, on hostile ones on {silent[3]}. Wrong is off by "
-    "more than {limit} rad."
+    "Hardly. Of the wrong runs of tops the guard is silent on {silent[0]} with the closed form (exact) and on "
+    "{silent[1]} with an integration in its place (series); of the correct ones it warns of {false[0]} and {false[1]}. "
+    "On bodies, where it always integrates, it is silent on {silent[2]} wrong runs, on hostile ones on {silent[3]}. "
+    "Wrong is off by more than {limit} rad."
 )
 CAPTION = (
     "Each limit of the guard's forecast gives a point, the dot is the limit that it has: higher is fewer silent wrong "

@@ -29,7 +29,8 @@ class Table(NamedTuple):
 
 def findings(
     name: str, title: str, question: str, sentences: Sequence[str] | Table, how_to_read: str, tables: Sequence[Table],
-    *, answer: str = "", further: Sequence[str] = (), captions: Mapping[str, tuple[str, str]] | None = None, **others: Any,
+    *, answer: str = "", further: Sequence[str] = (), captions: Mapping[str, tuple[str, str]] | None = None,
+    **others: Any,
 ) -> dict[str, Any]:  # fmt: skip
     """What NAME.json holds; `captions`: caption and text for the blind of each figure, `sentences` or a table.
     The `answer` to the question comes first.

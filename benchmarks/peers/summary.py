@@ -127,8 +127,8 @@ def answer(data: xr.Dataset) -> str:
     won, lost, of = (sum(said[f"general_{key}_{call}"] for call in NAMES) for key in ("behind", "ahead", "compared"))
     scipy = [said[f"general_scipy_{call}"] for call in NAMES]
     slower = (
-        f"With SciPy's solve_ivp a user waits {scipy[0]} times as long, and the inner loop of an author takes {scipy[1]} "
-        "times as long. "
+        f"With SciPy's solve_ivp a user waits {scipy[0]} times as long, and the inner loop of an author takes "
+        f"{scipy[1]} times as long. "
     )
     return (
         "You gain equations of any kind, where symtop has tops and rigid bodies alone, and seldom speed: of "
