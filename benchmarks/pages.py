@@ -29,9 +29,11 @@ class Table(NamedTuple):
 
 def findings(
     name: str, title: str, question: str, sentences: Sequence[str] | Table, how_to_read: str, tables: Sequence[Table],
-    *, further: Sequence[str] = (), captions: Mapping[str, tuple[str, str]] | None = None, **others: Any,
+    *, answer: str = "", further: Sequence[str] = (), captions: Mapping[str, tuple[str, str]] | None = None,
+    **others: Any,
 ) -> dict[str, Any]:  # fmt: skip
     """What NAME.json holds; `captions`: caption and text for the blind of each figure, `sentences` or a table.
+    The `answer` to the question comes first.
 
     From "How to read it" on the page is for reference: the `further` sentences and the tables.
     """
@@ -45,7 +47,8 @@ def findings(
         for said in (sentences, further)
     )
     reading = _raw(f"**How to read it.** {how_to_read}")
-    page = "\n\n".join(["# {{ question }}", listed, *figures, reading, *([more] if further else []), *shown])
+    first = [_raw(answer)] if answer else []
+    page = "\n\n".join(["# {{ question }}", *first, listed, *figures, reading, *([more] if further else []), *shown])
     return {
         "study": name, "title": title, "question": question, "facts": {}, "tables": [], "charts": [], "pictures": [],
         "failures": [], "quick": False, "page": page, **others,

@@ -139,6 +139,7 @@ def findings(data: xr.Dataset, many: list[together.Row], results: Path, missing:
     tables = [*summary.tables(data), *([together.table(many)] if many else [])]
     said = pages.findings(
         STUDY.name, STUDY.title, STUDY.question, [*summary.verdict(data), *together.verdict(many)],
-        summary.HOW_TO_READ, tables, further=summary.pairs(data), captions={"fronts": caption(data)},
+        summary.HOW_TO_READ, tables, answer=summary.answer(data), further=summary.pairs(data),
+        captions={"fronts": caption(data)},
     )  # fmt: skip
     return drawn | {"page": said["page"], "together": [row._asdict() for row in many], **measured(data)}

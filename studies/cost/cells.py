@@ -165,11 +165,16 @@ def mean_work(data: xr.DataTree, cell: Cell, name: str) -> Array:
     return np.asarray((np.where(weights > 0.0, work, 0.0) * weights).sum(axis=1) / max(weights.sum(), 1.0))
 
 
-def dearer(data: xr.DataTree, cell: Cell) -> tuple[str, float, float] | None:
-    """The safe choice of the fewest evaluations, its share of those of the fastest, and from what price on it leads.
+class Dear(NamedTuple):
+    """The safe choice of the fewest evaluations."""
 
-    That is in seconds that an evaluation takes longer than here, and over all others; None if it is the fastest here.
-    """
+    best: Safe
+    evaluations: float  # of a run with its safe setting
+    price: float  # s that an evaluation takes longer than here where it is the fastest of all; 0 if it is that here
+
+
+def dearer(data: xr.DataTree, cell: Cell) -> Dear | None:
+    """The safe choice where an evaluation takes long; None if no choice reaches the error."""
     choices = [one for one in safest(data, cell)[0] if np.isfinite(one.seconds)]
     counts = []
     for one in choices:
@@ -178,13 +183,12 @@ def dearer(data: xr.DataTree, cell: Cell) -> tuple[str, float, float] | None:
         order = np.argsort(settings[there])
         x, work = np.log(settings[there][order]), np.log(mean_work(data, cell, one.name)[there][order])
         counts.append(math.exp(float(np.interp(math.log(one.setting), x, work))))
-    fewest = int(np.argmin(counts)) if counts else 0
-    if not fewest:
+    if not counts:
         return None
-    best, least = choices[fewest], counts[fewest]
+    best, least = choices[int(np.argmin(counts))], min(counts)
     others = [(best.seconds - one.seconds) / (count - least) for one, count in zip(choices, counts, strict=True)
               if count > least]  # fmt: skip
-    return best.name, least / counts[0], max(others)
+    return Dear(best, least, max([0.0, *others]))
 
 
 def served_over_interpolated(data: xr.DataTree, cell: Cell, name: str) -> float:

@@ -8,7 +8,7 @@ import xarray as xr
 
 from symtop.judging.claims.subject import declared
 from symtop.methods.framework.registry import NEEDS, integrator
-from symtop.report.formats import count, duration, number
+from symtop.report.formats import at_most, count, duration, number
 from symtop.run.guard import EXPECTED
 
 from . import cells, far
@@ -37,6 +37,7 @@ HAVE = (  # methods that people have, of the table of their settings
 )  # fmt: skip
 SHORT_RUN, LONG_RUN = 1e3, 1e5  # nutations of a short run of the map at most, and of a long one at least
 AT = 1e-6  # rad, the error at which classes are quoted
+KEEPS = "keeps, at 1e-6 rad"  # that is, at `AT`
 US = 1e6  # microseconds in a second
 
 
@@ -85,19 +86,6 @@ def span_facts(data: xr.DataTree, span: str) -> dict[str, float | None]:
     }
 
 
-def _dear(data: xr.DataTree) -> dict[str, Any]:
-    """With f(t, y) alone: what needs the fewest evaluations, at most which share, and where f is so dear that it leads.
-
-    Of the errors to which the fastest needs more; the price is the largest of these, in seconds beyond that here.
-    """
-    shown = [target for target in cells.targets(data) if decades(target) in (3, 6, 9)]
-    each = {decades(target): cells.dearer(data, Cell("short", "axis", target, NATURAL, CLASSES[0])) for target in shown}
-    known = {place: one for place, one in each.items() if one is not None}
-    share, price = (max((one[k] for one in known.values()), default=None) for k in (1, 2))
-    names = {f"dear_{place}": known[place][0] if place in known else None for place in (3, 6, 9)}
-    return names | {"dear_share": share, "dear_price": price}
-
-
 def over(data: xr.DataTree) -> str:
     """What the front page shows of an error that no setting within the budget keeps."""
     return f"not within {count(span_facts(data, 'short')['budget'] or 0.0)} evaluations"
@@ -117,7 +105,6 @@ def winners_facts(data: xr.DataTree) -> dict[str, Any]:
     keys = "misled", "misled_at", "fewest", "fewest_seconds", "instead", "instead_seconds"
     most = max((row for row in misled if 1.0 < row[0] < np.inf), default=(None,) * len(keys))
     named |= dict(zip(keys, most, strict=True))
-    named |= _dear(data)
     for needs in CLASSES[:-1]:
         named |= _safe(needs.replace("-", "_"), data, Cell("short", "axis", AT, NATURAL, needs))
     named["kicks_serve"] = serves(named["kicks"]) if named["kicks_seconds"] else ""
@@ -209,9 +196,9 @@ def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
 def use(data: xr.DataTree) -> pd.DataFrame:
     """The safe choice of each class at each error, over the shorter runs, and what that at `AT` keeps.
 
-    The second line is of those methods of the first that keep energy and momenta.
+    The second line is of an f that takes longer, the third of those methods of the first that keep energy and momenta.
     """
-    rows = []
+    rows = list[dict[str, str]]()
     lines = [(NEEDS[needs], needs, False) for needs in CLASSES[:-1]]
     for supplied, needs, keeping in [lines[0], (f"{lines[0][0]}, all constants kept", lines[0][1], True), *lines[1:]]:
         line, kept = {"you can supply": supplied}, ""
@@ -225,8 +212,27 @@ def use(data: xr.DataTree) -> pd.DataFrame:
                 words += f"{setting_words(best.name, best.setting)}, {duration(best.seconds)}"
                 kept = keeps(best.name) if target == AT else kept
             line[f"1e-{decades(target)} rad"] = words
-        rows.append(line | {f"keeps, at 1e-{decades(AT)} rad": kept})
+        rows.append(line | {KEEPS: kept})
+        rows += [] if rows[1:] else slower(data)
     return pd.DataFrame(rows)
+
+
+def slower(data: xr.DataTree) -> list[dict[str, str]]:
+    """The safe choice of f(t, y) alone where f takes so much longer that the fewest evaluations lead at every error.
+
+    A cell has the evaluations in the place of the time; nothing if those that lead here have the fewest.
+    """
+    each = {target: cells.dearer(data, Cell("short", "axis", target, NATURAL, CLASSES[0]))
+            for target in cells.targets(data)}  # fmt: skip
+    known = {target: one for target, one in each.items() if one is not None}
+    price = max((one.price for one in known.values()), default=0.0)
+    line = {"you can supply": f"{NEEDS[CLASSES[0]]} that takes {at_most(US * price, 1, 'us')} longer"}
+    for target in each:
+        line[f"1e-{decades(target)} rad"] = over(data)
+    for target, (best, evaluations, _) in known.items():
+        words = f"{best.name}, {setting_words(best.name, best.setting)}, {count(evaluations)} evaluations"
+        line[f"1e-{decades(target)} rad"] = words
+    return [line | {KEEPS: keeps(known[AT].best.name) if AT in known else ""}] if price > 0.0 else []
 
 
 def keeps(name: str) -> str:

@@ -4,9 +4,10 @@
 some thousands of steps. A linear analysis calls every step below the limit stable; at a third of a turn a step
 (`linear_stability`) some small displacement is lost all the same.
 
-`separatrix_horizon` follows the top that rises towards the upright and never reaches it. Near this motion a deviation
-grows as exp(g t/2), g^2 = mgl/I1, so that an error e at time t1 reaches E at t1 + (2/g) ln(E/e): each digit of accuracy
-lengthens the run by 4.6/g.
+`separatrix_horizon` follows the top that rises towards the upright and never reaches it. Near the upright
+z = sin(theta) exp(i phi) obeys I1 z'' - i p_psi z' = mgl z, so that a deviation grows as exp(lambda t) with
+lambda^2 = mgl/I1 - (p_psi/2 I1)^2. An error e at time t1 reaches E at t1 + ln(E/e)/lambda: each digit of accuracy
+lengthens the run by 2.3/lambda.
 
 `sampled_energy_error` measures one energy error twice, once a nutation and at every step. The energy error of a
 symplectic method is a function of the phase of the nutation, so that samples at one phase show almost none of it.
@@ -32,10 +33,10 @@ from symtop.run.linear_stability import trace, with_momenta
 
 RUNS_AWAY = 4.0  # times the displacement; an island that a resonance has bent is at most three times as long as wide
 LOST = 0.1  # rad, axis error at which a run next to the separatrix has lost its accuracy
-LONGEST = 80.0  # 1/g, of a run next to the separatrix
+LONGEST = 40.0  # 1/lambda, of a run next to the separatrix
 LEAST, MOST, TRIED = 1e-4, 0.3, 8  # rad, the displacements tried; how many are
 HALVINGS = 5  # how often the gap above the last that survives is halved: it ends at 4 %
-SEEN = 6.0  # 1/g, the time at which its early error is read
+SEEN = 3.0  # 1/lambda, the time at which its early error is read
 
 
 def _run(method: Integrator, scene: Scene, start: Angles, plan: Plan) -> tuple[str, View]:
@@ -102,20 +103,28 @@ class Horizon(NamedTuple):
     broken: float  # 1 if the run ended before it passed `LOST`, else 0
 
 
+def growth_rate(scene: Scene) -> float:
+    """lambda, at which a deviation from the upright grows; NaN where the upright top sleeps."""
+    top, p_psi = scene.top, scene.top.momenta(scene.start).p_psi
+    squared = top.mgl / top.I1 - (0.5 * p_psi / top.I1) ** 2
+    return math.sqrt(squared) if squared > 0.0 else math.nan
+
+
 def separatrix_horizon(method: Integrator, scene: Scene, setting: float) -> Horizon:
-    """When the axis error passes `LOST`; `setting` is the step in units of 1/g, or the tolerance."""
-    g = math.sqrt(scene.top.mgl / scene.top.I1)
+    """When the axis error passes `LOST`; `setting` is the step in units of sqrt(I1/mgl), or the tolerance."""
+    rate, step = growth_rate(scene), setting * math.sqrt(scene.top.I1 / scene.top.mgl)
     if method.fixed_step:
-        plan = Plan.steps(setting / g, np.unique(np.linspace(0, round(LONGEST / setting), 1601).astype(np.int64)))
+        steps = round(LONGEST / (rate * step))
+        plan = Plan.steps(step, np.unique(np.linspace(0, steps, 1601).astype(np.int64)))
     else:
-        plan = Plan.until(np.linspace(0.0, LONGEST, 1601) / g, setting)
+        plan = Plan.until(np.linspace(0.0, LONGEST, 1601) / rate, setting)
     times = plan.times
     outcome, seen = _run(method, scene, scene.start, plan)
     error = charts.axis_distance(seen.axis, closed_form(scene).axis(times))
-    early = float(error[np.searchsorted(times, SEEN / g * (1.0 - 1e-12))])
+    early = float(error[np.searchsorted(times, SEEN / rate * (1.0 - 1e-12))])
     past = np.flatnonzero(error > LOST)
     reached = float(times[past[0]]) if past.size else math.nan
-    predicted = SEEN / g + 2.0 / g * math.log(LOST / early) if early > 0.0 else math.nan
+    predicted = (SEEN + math.log(LOST / early)) / rate if early > 0.0 else math.nan
     return Horizon(early, reached, predicted, float(outcome != "ok" and not past.size))
 
 

@@ -19,7 +19,7 @@ from symtop.runner.study import Picture
 from .atlas import OutcomeMap, families, maps
 from .failures import LOST, MOST as LARGEST, SEEN
 from .many_verdicts import EARLY, JUDGED, SAID
-from .mechanisms import measured
+from .mechanisms import measured, rate
 
 KNOWN = (  # the variants whose maps are drawn, if they are there
     "stormer-verlet[angles]", "midpoint[angles]", "rk4[angles]", "rk4[axis]", "strang[axis]", "takahashi-imada[axis]",
@@ -35,6 +35,7 @@ LINES = {"linear_limit": ("small nutations grow beyond", "-"),
 SETTINGS = {"step_size": "step (nutations)", "tolerance": "tolerance"}
 NAMED = ("stormer-verlet[angles]", "midpoint[angles]", "strang[axis]", "cayley[axis]", "gauss-4[axis]", "rk4[axis]")
 THEORY = {"color": style.BLACK, "lw": 0.9, "ls": (0, (1, 1.5)), "zorder": 4, "label": "theory"}
+SLEEPS, WIDTHS = 2.0, 1.75  # spin from which the motion sleeps; times the largest shift of theory that are drawn
 OTHERS = {"color": style.GREY, "alpha": 0.5, "zorder": 1, "label": "all others, lines or dots"}
 
 
@@ -145,9 +146,10 @@ def _resonance(axis: Any, data: xr.Dataset) -> None:
 
 
 def _separatrix(axis: Any, data: xr.Dataset) -> None:
-    _lines(axis, data.sel(scene="separatrix"), "early_error", "horizon", dots=True)
+    part = data.sel(scene="separatrix")
+    _lines(axis, part.assign(horizon=rate() * part["horizon"]), "early_error", "horizon", dots=True)
     error = np.geomspace(1e-16, 0.1, 50)
-    axis.plot(error, SEEN + 2.0 * np.log(LOST / error), **THEORY)
+    axis.plot(error, SEEN + np.log(LOST / error), **THEORY)
     axis.set(xscale="log", xlabel=rf"axis error at ${SEEN:g}/\lambda$ (rad)", title="next to the separatrix")
     axis.set_ylabel(rf"time to {LOST:g} rad ($1/\lambda$)")
 
@@ -155,8 +157,15 @@ def _separatrix(axis: Any, data: xr.Dataset) -> None:
 def _sleep(axis: Any, data: xr.Dataset) -> None:
     _lines(axis, data.sel(scene="sleeping"), "sleeping_step", "sleeping_threshold", dots=True)
     steps = np.linspace(0.02, 1.0, 60)
-    for law in (cayley_sleeps_from, strang_sleeps_from):
-        axis.plot(steps, [law(float(h)) for h in steps], **THEORY)
+    laws = np.array([[law(float(h)) for h in steps] for law in (cayley_sleeps_from, strang_sleeps_from)])
+    for law in laws:
+        axis.plot(steps, law, **THEORY)
+    wide = WIDTHS * np.abs(laws - SLEEPS).max()  # a few dots far away would squeeze both laws into one line
+    beyond = int((np.abs(data["sleeping_threshold"].sel(scene="sleeping") - SLEEPS) > wide).sum())
+    if beyond:
+        axis.text(0.02, 0.98, f"{beyond} dots lie beyond this axis", va="top", fontsize=style.LEAST_TEXT,
+                  transform=axis.transAxes)  # fmt: skip
+        axis.set_ylim(SLEEPS - wide, SLEEPS + wide)
     axis.set(xlabel="step $h$", ylabel="least spin that sleeps $I_3\\omega_3$", title="the upright top")
 
 

@@ -6,14 +6,17 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from symtop.model.scenes import scene as scene_of
+
 from .atlas import methods_of
+from .failures import growth_rate
 
 BARELY = 0.02  # rad: a top that is lost at a smaller displacement is lost to a resonance
 NEXT = 1.05  # times the largest displacement up to which all stay, at most: the first that was lost
 REVIVAL = 3.0  # times more survives past a resonance than in it; what stays dead beyond is no resonance
 LEAST_SAMPLED = 1e-14  # an energy error that is rounding
 LEAST_ASKED = 1e-12  # an energy error at every step from which on one asks what samples show of it
-OUTLASTS = 10.0  # 1/λ: two and a half digits more than the early error has
+OUTLASTS = 5.0  # 1/λ: two digits more than the early error has
 EARLY = 1e-15, 1e-2  # rad, axis errors that predict the time next to a separatrix: above rounding, still small
 
 
@@ -51,9 +54,14 @@ def resonant(part: xr.Dataset) -> dict[str, float]:
     return phases
 
 
+def rate() -> float:
+    """λ of the scene next to whose separatrix methods run."""
+    return growth_rate(scene_of("separatrix"))
+
+
 def outlasting(part: xr.Dataset) -> list[str]:
     """Variants with a run that stays accurate next to the separatrix longer than predicted, by over `OUTLASTS`."""
-    longer = (part["horizon"] - part["predicted_horizon"]).transpose("variant", ...).values
+    longer = rate() * (part["horizon"] - part["predicted_horizon"]).transpose("variant", ...).values
     variants = zip(map(str, part["variant"].values), longer, strict=True)
     return [name for name, values in variants if np.max(values[np.isfinite(values)], initial=0.0) > OUTLASTS]
 
@@ -70,7 +78,7 @@ def lawful(part: xr.Dataset) -> xr.DataArray:
 
 def misses(part: xr.Dataset) -> NDArray[np.float64]:
     """By how much the law misses the accurate time of the runs to which it applies, in units of 1/λ."""
-    gap = np.abs(part["horizon"] - part["predicted_horizon"]).where(lawful(part)).values
+    gap = rate() * np.abs(part["horizon"] - part["predicted_horizon"]).where(lawful(part)).values
     return np.asarray(gap[np.isfinite(gap)])
 
 

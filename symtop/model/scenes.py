@@ -241,7 +241,7 @@ def _separatrix() -> Scene:
     top = SymmetricTop(2.0, 1.0, 2.0)
     g, root = math.sqrt(top.mgl / top.I1), math.sqrt(3.0)
     start = Angles(math.pi / 3.0, phi_dot=2.0 * g / root, psi_dot=(3.0 * top.I1 - top.I3) * g / (top.I3 * root))
-    purpose = "rises towards the upright for ever: every disturbance grows as exp(g t/2), and no step saves a long run"
+    purpose = "rises to the upright for ever: errors grow at the rate sqrt(mgl/I1 - (p_psi/2 I1)^2), whatever the step"
     tags, reference = ["near_pole", "unstable"], "woodhouse-2009"
     return Scene("separatrix", top, start, 20.0 / g, purpose, tags=tags, reference=reference)
 

@@ -18,6 +18,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.colors import to_hex
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError
@@ -27,7 +28,7 @@ from symtop.model.scenes import scenes
 from symtop.model.top import flat
 from symtop.report import formats, template
 from symtop.report.html import Writer, slug
-from symtop.report.style import look
+from symtop.report.style import ink, look
 from symtop.run.reference.truth import reference
 from symtop.runner import run as runner
 
@@ -51,6 +52,7 @@ def _series(name: str, points: Sequence[tuple[float | None, float | None, str]])
         "name": name,
         "family": method.family if method else "other",
         "color": style.color,
+        "ink": to_hex(ink(style.color)),
         "marker": style.marker,
         "dashed": method is not None and method.implementation == "python",
         "points": [

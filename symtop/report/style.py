@@ -112,7 +112,7 @@ def line(name: str, scale: float = 1.0) -> dict[str, Any]:
     return {"color": one.color, "ls": one.dash, "marker": one.marker, "fillstyle": one.fill, "ms": scale * one.size}
 
 
-def ink(color: str) -> tuple[float, ...]:
+def ink(color: str) -> tuple[float, float, float]:
     """A colour as dark as letters on white need it: itself, or darker (luminance at most 0.18, a contrast of 4.5)."""
     from matplotlib.colors import to_rgb
 
@@ -120,7 +120,8 @@ def ink(color: str) -> tuple[float, ...]:
     linear = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
     linear *= min(1.0, 0.18 / max(float(linear @ np.array([0.2126, 0.7152, 0.0722])), 1e-9))
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
-    return tuple(map(float, encoded))
+    red, green, blue = map(float, encoded)
+    return red, green, blue
 
 
 PAPER: dict[Any, Any] = {

@@ -184,6 +184,8 @@ def test_a_win_is_one_of_every_batch_and_the_first_numbers_are_over_methods_on_f
     said = "are faster than symtop's fastest methods on f(t, y) alone (vern9-fixed[axis]); symtop is faster in "
     won = f"{places} {said}2 of 2 and 0 of 2 comparisons (public call and inner loop), level in 0 and 0."
     assert summary.verdict(data)[0] == won
+    assert "of 4 comparisons with symtop's fastest" in (answer := summary.answer(data))
+    assert "is faster in 2 and slower in 2. You lose the exact motion" in answer
     data["seconds_samples"].values[:, 0, :, 0, 4] *= 1.03  # one batch of each was slow
     assert "0 of 2 and 0 of 2 comparisons (public call and inner loop), level in 2 and 2." in summary.verdict(data)[0]
     scipys = {f"scipy[axis] {language}": (8e-4, 9e-4) for language in ("numba", "Python")}

@@ -4,10 +4,12 @@ import csv
 import dataclasses
 import html
 import io
+import itertools
 import json
 import re
 import shutil
 
+import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 import xarray as xr
@@ -255,15 +257,47 @@ def test_the_chart_takes_the_place_of_its_figure_and_pointing_at_a_run_shows_wha
     assert browser.evaluate("document.querySelector('#pitfalls-three .scroll').checkVisibility()")
 
 
+def test_a_figure_that_is_cut_off_has_a_shade_at_its_edge(browser, tmp_path):
+    browser.resize(390, 900)
+    region = "document.querySelector('#pitfalls-three .scroll')"
+    for end in (0, 9999):
+        browser.evaluate(f"{region}.scrollIntoView(), {region}.scrollLeft = {end}, {region}.firstChild.decode()")
+        box = browser.evaluate(f"{region}.getBoundingClientRect().toJSON()")
+        shown = plt.imread(browser.screenshot(tmp_path / "edge.png"))[..., :3]
+        edge = shown[int(box["top"]) + 3 : int(box["bottom"]) - 3, int(box["right"]) - 3]
+        assert bool(edge.max() < 0.95) is (end == 0)  # of its white
+
+
+def open_with(chart, browser, results, file):
+    """Show the page with another chart."""
+    stored, content = r'(?<=class="chart"><script type="application/json">).*', page.prepared(chart)
+    full = re.sub(stored, lambda _: f"{content}</script></div>", (results / "report.html").read_text("utf-8"))
+    file.write_text(full, "utf-8")
+    browser.open(file.as_uri())
+
+
+def test_lines_to_names_do_not_cross_and_each_name_has_the_colour_of_its_line(browser, results, tmp_path):
+    ends = np.random.default_rng(3).uniform((1.0, -12.0), (5.0, -11.0), (12, 2))
+    series = [(f"line {k}", [(1.0, 1.0, ""), (*10.0**end, "")]) for k, end in enumerate(ends)]
+    browser.resize(1280, 900)
+    open_with({"title": "", "x": "x", "y": "y", "panels": {"": series}}, browser, results, tmp_path / "ends.html")
+    lines = browser.evaluate("""[...document.querySelectorAll('.chart svg path[stroke-width="0.5"]')].map(one =>
+        [one.getAttribute('d'), one.getAttribute('stroke'), getComputedStyle(one.nextSibling).fill])""")
+    ends = [[*map(float, re.findall(r"[-\d.]+", path))] for path, *_ in lines]
+    assert len(ends) == 12
+    for (x, y, right, at), (x2, y2, _, at2) in itertools.combinations(ends, 2):
+        heights = [np.interp(max(x, x2), one[::2], one[1::2]) for one in ((x, y, right, at), (x2, y2, right, at2))]
+        assert (heights[0] - heights[1]) * (at - at2) >= 0.0
+    for _, color, ink in lines:
+        assert style.ink(color) == pytest.approx([int(one) / 255 for one in re.findall(r"\d+", ink)], abs=0.003)
+
+
 def test_each_of_more_than_thirty_lines_has_its_name_beside_or_below_and_zeros_are_told(browser, results, tmp_path):
     study, data = runner.load("speed"), xr.load_dataset(results / "speed.nc")
     names = [name for name in dict.fromkeys(case.integrator for case in study.cases(True)) if name != "together"]
     every = data.sel(variant=["exact", *["midpoint[angles]"] * (len(names) - 1)]).assign_coords(variant=names)
     (chart,) = study.charts(every.assign(p_phi=0.0 * every["p_phi"]))
-    stored, content = r'(?<=class="chart"><script type="application/json">).*', page.prepared(chart._asdict())
-    full = re.sub(stored, lambda _: f"{content}</script></div>", (results / "report.html").read_text("utf-8"))
-    (tmp_path / "full.html").write_text(full, "utf-8")
-    browser.open((tmp_path / "full.html").as_uri())
+    open_with(chart._asdict(), browser, results, tmp_path / "full.html")
     for width in (1280, 390):
         browser.resize(width, 900)
         boxes = browser.evaluate("""(() => {

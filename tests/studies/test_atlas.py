@@ -261,12 +261,12 @@ def test_runs_that_outlast_the_law_are_not_counted_nor_floors_of_ratios_and_wind
     part = xr.Dataset(columns, coords={"variant": ["rk4[axis]", "gauss-4[axis]"]})
     assert mechanisms.outlasting(part) == ["gauss-4[axis]"]
     assert facts.separatrix_facts(part)["outlasting"] == "`gauss-4[axis]`"
-    assert mechanisms.misses(part) == pytest.approx([0.5, 0.2])
+    assert mechanisms.misses(part) == pytest.approx([0.25, 0.1])  # 1/λ = 2 s
     answers = facts.separatrix_facts(part)
     assert (answers["law_runs"], answers["law_early"]) == (2, 0)
     part["horizon"][0, 1] = part["horizon"][1, 1] = math.nan
     part["broken"][0, 1] = part["broken"][1, 1] = 1.0  # to the second the law does not apply
-    assert mechanisms.misses(part) == pytest.approx([0.5])
+    assert mechanisms.misses(part) == pytest.approx([0.25])
     answers = facts.separatrix_facts(part)
     assert (answers["law_runs"], answers["law_early"]) == (1, 1)
     columns = {"limit_phase": ("variant", [math.nan, 5.9, 2.0, math.nan]),

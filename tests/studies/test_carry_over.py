@@ -455,4 +455,9 @@ def test_planted_limits_resonances_and_rankings_of_engines_are_found(monkeypatch
     assert facts.exponent_gap(data, "0.3") == (pytest.approx(0.6), "a, energy")
     monkeypatch.setattr(by, "orders", lambda _: [("a", "0.3", 3.5, 4.0), ("b", "0.3", 2.9, 2.0), ("c", FREE, 1.0, 2.0)])
     assert facts.order_gap(data, "0.3") == (0.5, "a")
+    monkeypatch.setattr(by, "orders", lambda _: [("rk4", "0.3", 4.25, 5.0), ("strang", "0.3", 1.75, 2.5)])
+    assert facts.order_gap(data, "0.3", claimed=True) == (0.25, "strang")  # declared as 2; rk4 loses what nobody claims
+    for within, verdict in ((19, by.YES), (18, by.NO)):
+        monkeypatch.setattr(facts, "exponents_within", lambda *_, n=within: (n, 20))
+        assert facts.growth_cell(data, "0.3")[1] == verdict  # one that is far away decides no row
     assert facts.least([by.Interval(0.5, 0.4, 0.9), by.Interval(0.6, 0.1, 0.7)]) == (0.5, 0.1, 0.7)

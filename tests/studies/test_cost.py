@@ -574,6 +574,20 @@ def test_where_f_is_dear_the_fewest_evaluations_win(monkeypatch):
     tree = xr.DataTree.from_dict({"short": xr.Dataset({"setting": settings}, {"variant": [*work]})})
     # dearer by 2e-5 / 940 it leaves the fast one behind, but the next only by 1e-5 / 20
     answer = cells.dearer(tree, Cell("short", "axis", 1e-3, NATURAL))
-    assert answer == ("few", pytest.approx(0.06), pytest.approx(1e-5 / 20.0))
+    assert answer == (some[2], pytest.approx(60.0), pytest.approx(1e-5 / 20.0))  # halfway between its two settings
     monkeypatch.setattr(cells, "safest", lambda *_: (some[:1], True))
+    assert cells.dearer(tree, Cell("short", "axis", 1e-3, NATURAL)) == (some[0], pytest.approx(1000.0), 0.0)
+    monkeypatch.setattr(cells, "safest", lambda *_: ([], True))
     assert cells.dearer(tree, Cell("short", "axis", 1e-3, NATURAL)) is None
+
+
+def test_a_row_of_the_front_page_is_of_a_slower_f(monkeypatch):
+    each = {1e-3: cells.Dear(Safe("adams[axis]", 1e-4, 1e-5, 0.0, 0.0), 81.6, 1.7e-7),
+            1e-6: cells.Dear(Safe("rk4[axis]", 8.0, 1e-5, 0.0, 0.0), 320.0, 0.0)}  # fmt: skip
+    monkeypatch.setattr(cells, "targets", lambda _: [*each])
+    monkeypatch.setattr(cells, "dearer", lambda _, cell: each[cell.target])
+    monkeypatch.setattr(facts, "over", lambda _: "")
+    first = "f(t, y) that takes 0.2\xa0us longer", "adams[axis], tolerance 0.0001, 82 evaluations"
+    assert (*facts.slower(None)[0].values(),) == (*first, "rk4[axis], 8 steps, 320 evaluations", "p_phi")
+    each[1e-3] = each[1e-6]  # nothing leads where f is slow that does not lead here
+    assert facts.slower(None) == []

@@ -233,7 +233,12 @@ def test_the_separatrix_costs_half_of_g_and_a_run_that_leaves_its_chart_is_told_
     window = (times > 7.0) & (times < 13.0)
     slopes = [np.polyfit(times[window], np.log(axis_errors("strang", where, step, 1200)[0][window]), 1)[0]
               for where, step in ((scene, h / g), (scenes.scene("goldstein"), h))]  # fmt: skip
-    assert slopes[0] == pytest.approx(0.5, abs=0.01)
+    assert slopes[0] == pytest.approx(failures.growth_rate(scene) / g, abs=0.01)
+    assert failures.growth_rate(scene) == pytest.approx(0.5 * g)
+    for spin in (0.5, 1.5):  # another momentum, another rate
+        x, y, _ = closed_form(sleeping(spin, 1e-9)).axis(np.array([6.0, 9.0])).T
+        grown = np.diff(np.log(np.hypot(x, y)))[0] / 3.0
+        assert failures.growth_rate(sleeping(spin)) == pytest.approx(grown, rel=1e-3)
     assert abs(slopes[1]) < 0.25
     measured = [separatrix_horizon(integrator("strang"), scene, step) for step in (0.1, 0.05, 0.025, 0.0125)]
     for entry in measured:

@@ -41,7 +41,7 @@
     const controls = html("div", root, "", "controls");
     const choose = (title, options, changed) => { // a menu, where there is something to choose
       if (options.length < 2) return;
-      const select = html("select", html("label", controls, `${title} `));
+      const select = html("select", html("label", controls, `${title[0].toUpperCase()}${title.slice(1)} `));
       select.name = title;
       for (const option of options) html("option", select, option).value = option;
       select.addEventListener("change", () => { changed(select.value); draw(); });
@@ -161,9 +161,15 @@
         let place = top;
         for (const end of ends) end.at = place = Math.max(place + LINE, end.y);
         for (let k = ends.length - 1, most = height - bottom; k >= 0; k -= 1, most -= LINE) ends[k].at = Math.min(ends[k].at, most);
+        const over = (end, x) => end.y + (end.at - end.y) * (x - end.x) / (width - right - end.x);
+        const cross = (a, b) => (over(a, Math.max(a.x, b.x)) - over(b, Math.max(a.x, b.x))) * (a.at - b.at) < 0;
+        for (let found = true; found;) { // two names change places where their lines cross, and these get shorter
+          found = false;
+          for (const a of ends) for (const b of ends) if (cross(a, b)) [a.at, b.at, found] = [b.at, a.at, true];
+        }
         for (const { one, x, y, at } of ends) {
           make("path", { d: `M${x} ${y}L${width - right} ${at}`, stroke: one.color, "stroke-width": 0.5, fill: "none" }, svg);
-          make("text", { x: width - right + 4, y: at + 4 }, svg, one.name);
+          make("text", { x: width - right + 4, y: at + 4, style: `fill: ${one.ink}` }, svg, one.name);
         }
       }
       const ring = make("circle", { r: 8, fill: "none", stroke: "#1b1f24", "stroke-width": 1.5, visibility: "hidden" }, svg);
