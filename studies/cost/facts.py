@@ -7,7 +7,8 @@ import pandas as pd
 import xarray as xr
 
 from symtop.judging.claims.subject import declared
-from symtop.methods.framework.registry import NEEDS, integrator
+from symtop.methods.framework.registry import NEEDS, integrator, split_name
+from symtop.model.charts import BODY
 from symtop.report.formats import at_most, count, duration, number
 from symtop.run.guard import EXPECTED
 
@@ -47,9 +48,9 @@ def decades(target: float) -> int:
 
 
 def serves(name: str) -> str:
-    """What follows the name of a variant that exists for symmetric bodies alone."""
-    method = integrator(name)
-    return "" if method.general or method.needs == "this-top" else " (symmetric)"
+    """What follows the name of a variant of a method that runs on symmetric bodies alone, as it is here."""
+    method = integrator(split_name(name)[0])
+    return "" if BODY in method.solvers or method.needs == "this-top" else " (symmetric)"
 
 
 def setting_words(name: str, value: float) -> str:

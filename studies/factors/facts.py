@@ -193,14 +193,14 @@ def _ends(part: pd.DataFrame, bars: pd.DataFrame, bare: pd.DataFrame) -> dict[st
     """Goal, beginning and end of both waterfalls: as called, and of the bare solvers."""
     if bars.empty or bare.empty:
         return dict.fromkeys(
-            (*GOAL, "start", "start_time", "end", "end_time", "called", "bare_start", "bare_end", "bare")
+            (*GOAL, "start", "start_time", "end", "end_time", "called", "bare_start", "bare_end", "bare", "around")
         )
     first, last = bars.iloc[0], bars.iloc[-2]  # before the call is changed to the kernel
     start, end = bare.iloc[1]["time (s)"], bare.iloc[-1]["time (s)"]
     return dict(part[GOAL].iloc[0]) | {
         "start": first["variant"], "start_time": first["time (s)"], "end": last["variant"],
         "end_time": last["time (s)"], "called": last["so far"],
-        "bare_start": start, "bare_end": end, "bare": start / end,
+        "bare_start": start, "bare_end": end, "bare": start / end, "around": last["time (s)"] - end,
     }  # fmt: skip
 
 
