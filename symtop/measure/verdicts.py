@@ -6,10 +6,12 @@ An outcome that is not ok stands. A run that reached its end is, in this order,
     wrong_regime        the axis went where the true motion never goes: a tenth of the width beyond a turning point, or
                         past a pole on the other side (p_phi - p_psi or p_phi + p_psi changed its sign)
     drifting            the energy error grew with time and passed 1 % of the energy of the nutation
-    bounded_but_wrong   everything looks right except the answer
+    wrong               it grew, too, and stayed below 1 % so far
+    bounded_but_wrong   it did not grow, or is rounding: everything looks right except the answer
 """
 
 import math
+from decimal import ROUND_CEILING, Context
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +26,7 @@ OUTSIDE = 0.1  # of the nutation's width, or rad if it has none
 STEADY = 1e-6  # rad; a nutation narrower than this is a steady precession, known to rounding only
 DRIFT = 0.01  # of the energy of the nutation, `Scene.energy_scale`
 GROWING = 1.3  # the second half's largest energy error over the first half's; bounded errors have 1
+ROUNDING = 1e-12  # of the energies that are summed: an error below that, `rounding`, is not said to grow
 FEWEST = 8  # samples of half a run: fewer do not tell an energy that grows from one that oscillates
 NO_GAP = 1e-9  # of the momentum scale: a gap p_phi -+ p_psi below this has no sign to change
 
@@ -60,6 +63,11 @@ def pole_passed(scene: Scene, p_phi: Any, p_psi: Any) -> NDArray[np.bool_]:
     return passed
 
 
+def rounding(scene: Scene) -> float:
+    """What rounding may leave in an energy error; in units of the energy of the nutation."""
+    return ROUNDING * scene.energy_grain
+
+
 class Judgement(NamedTuple):
     """A verdict, the time from which it holds, and the cause, in one sentence."""
 
@@ -79,7 +87,7 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         return Judgement(ended, float(run.attrs["reached_time"]), str(run.attrs["outcome_message"]))
     truth, worst = barriers(scene), float(np.max(axis_error))
     if worst <= truth.accurate:
-        sentence = f"accurate to {worst:.2g} rad up to t = {times[-1]:.6g}{scene.second}"
+        sentence = f"accurate to {_upwards(worst)} rad up to t = {times[-1]:.6g}{scene.second}"
         return Judgement("accurate", float(times[-1]), sentence)
     theta, energy = run["theta"].values, np.abs(run["energy"].values - run["energy"].values[0]) / scene.energy_scale
     beyond = ~((theta >= truth.highest - truth.margin) & (theta <= truth.lowest + truth.margin))
@@ -98,7 +106,15 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         at = f"{times[first]:.6g}{scene.second}"
         sentence = f"the energy error passed {DRIFT:.0%} at t = {at} and grew on, to {energy.max():.2g}"
     else:
-        word, first = "bounded_but_wrong", int(np.argmax(~(axis_error <= truth.accurate)))
-        energies = f"while the energy stayed within {energy.max():.2g}"
-        sentence = f"the axis error passed {truth.accurate:.2g} rad at t = {times[first]:.6g}{scene.second} {energies}"
+        grew = late > max(GROWING * early, rounding(scene))
+        word, first = "wrong" if grew else "bounded_but_wrong", int(np.argmax(~(axis_error <= truth.accurate)))
+        most = _upwards(energy.max())
+        energies = f"energy error grew, to {most}, below {DRIFT:.0%}" if grew else f"energy stayed within {most}"
+        sentence = f"at t = {times[first]:.6g}{scene.second} while the {energies}"
+        sentence = f"the axis error passed {truth.accurate:.2g} rad {sentence}"
     return Judgement(word, float(times[first]), sentence)
+
+
+def _upwards(bound: float) -> str:
+    """A bound to two digits, rounded up."""
+    return f"{float(Context(prec=2, rounding=ROUND_CEILING).create_decimal(repr(float(bound)))):.2g}"
