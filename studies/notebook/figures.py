@@ -59,7 +59,7 @@ def draw_modified_energy(data: xr.Dataset) -> Picture:
         first.set(
             title=f"{MIDPOINT}, {scenes[0]},\n40 steps a nutation",
             xlabel="time (s)",
-            ylabel="change / energy of the nutation",
+            ylabel="change\n/ energy of the nutation",
         )
     for axis, scene in zip(axes[0, over_time:], scenes, strict=True):
         for name in names:
@@ -71,7 +71,7 @@ def draw_modified_energy(data: xr.Dataset) -> Picture:
         for power, column in ((2, "energy_swing"), (4, "modified_swing")):
             span = float(h.min()), float(h.max())
             style.slope_guide(axis, power, span, 0.2 * float(run[column].min()), f"$h^{power}$")
-        axis.set(xscale="log", yscale="log", xlabel="step size (s)", ylabel="largest change / energy of the nutation")
+        axis.set(xscale="log", yscale="log", xlabel="step size (s)", ylabel="largest change\n/ energy of the nutation")
         axis.set_title(f"scene {scene}")
         style.few_ticks(axis, most=4)
     style.legend_below(figure, axes)

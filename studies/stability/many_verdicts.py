@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.measure.verdicts import DRIFT, FEWEST, GROWING, NO_GAP, barriers, rounding
+from symtop.measure.verdicts import DRIFT, FEWEST, GROWING, NO_GAP, ROUNDING, barriers
 from symtop.methods.framework.plan import NOT_FINITE, NOT_NORMALISED, OUTCOMES, off_length
 from symtop.methods.framework.space import axis_of as of_quaternion
 from symtop.model.charts import DIMENSIONS, Array
@@ -48,7 +48,7 @@ class Truths(NamedTuple):
     """What the runs of m scenes are judged by."""
 
     constants: Array  # (m, constants of a closed form)
-    # (m, 12): I1, I3, mgl, nutation period, `Barriers`, energy scale, p_phi -+ p_psi where it has a sign, `rounding`
+    # (m, 12): I1, I3, mgl, nutation period, `Barriers`, energy scale, p_phi -+ p_psi where it has a sign, rounding
     scenes: Array
 
     @property
@@ -69,9 +69,10 @@ def truths(scenes: Sequence[Scene]) -> Truths:
 
 @functools.lru_cache(maxsize=1024)
 def _numbers(scene: Scene) -> tuple[float, ...]:
+    rounding = ROUNDING * scene.energy_grain
     top, momenta, least = scene.top, scene.top.momenta(scene.start), NO_GAP * scene.momentum_scale
     gaps = (gap if abs(gap) > least else 0.0 for gap in (momenta.north, momenta.south))
-    return top.I1, top.I3, top.mgl, scene.nutation_period, *barriers(scene), scene.energy_scale, *gaps, rounding(scene)
+    return top.I1, top.I3, top.mgl, scene.nutation_period, *barriers(scene), scene.energy_scale, *gaps, rounding
 
 
 def judge_runs(

@@ -26,7 +26,7 @@ OUTSIDE = 0.1  # of the nutation's width, or rad if it has none
 STEADY = 1e-6  # rad; a nutation narrower than this is a steady precession, known to rounding only
 DRIFT = 0.01  # of the energy of the nutation, `Scene.energy_scale`
 GROWING = 1.3  # the second half's largest energy error over the first half's; bounded errors have 1
-ROUNDING = 1e-12  # of the energies that are summed: an error below that, `rounding`, is not said to grow
+ROUNDING = 1e-12  # of the energies that are summed, `Scene.energy_grain`: an error below that is not said to grow
 FEWEST = 8  # samples of half a run: fewer do not tell an energy that grows from one that oscillates
 NO_GAP = 1e-9  # of the momentum scale: a gap p_phi -+ p_psi below this has no sign to change
 
@@ -61,11 +61,6 @@ def pole_passed(scene: Scene, p_phi: Any, p_psi: Any) -> NDArray[np.bool_]:
         if abs(gap) > least:
             passed |= now * gap < 0.0
     return passed
-
-
-def rounding(scene: Scene) -> float:
-    """What rounding may leave in an energy error; in units of the energy of the nutation."""
-    return ROUNDING * scene.energy_grain
 
 
 class Judgement(NamedTuple):
@@ -106,12 +101,11 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         at = f"{times[first]:.6g}{scene.second}"
         sentence = f"the energy error passed {DRIFT:.0%} at t = {at} and grew on, to {energy.max():.2g}"
     else:
-        grew = late > max(GROWING * early, rounding(scene))
-        word, first = "wrong" if grew else "bounded_but_wrong", int(np.argmax(~(axis_error <= truth.accurate)))
-        most = _upwards(energy.max())
-        energies = f"energy error grew, to {most}, below {DRIFT:.0%}" if grew else f"energy stayed within {most}"
-        sentence = f"at t = {times[first]:.6g}{scene.second} while the {energies}"
-        sentence = f"the axis error passed {truth.accurate:.2g} rad {sentence}"
+        word, first, energies = "bounded_but_wrong", int(np.argmax(~(axis_error <= truth.accurate))), "stayed within {}"
+        if late > max(GROWING * early, ROUNDING * scene.energy_grain):
+            word, energies = "wrong", f"error grew, to {{}}, below {DRIFT:.0%}"
+        energies = f"while the energy {energies.format(_upwards(energy.max()))}"
+        sentence = f"the axis error passed {truth.accurate:.2g} rad at t = {times[first]:.6g}{scene.second} {energies}"
     return Judgement(word, float(times[first]), sentence)
 
 

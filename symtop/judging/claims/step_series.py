@@ -107,9 +107,7 @@ def compared(
     return series
 
 
-def _narrowed(
-    image: Callable[[float], Array], motion: Callable[[float], Array], period: float, chart: str, *, backward: bool
-) -> tuple[float, Series]:
+def _narrowed(image: Any, motion: Any, period: float, chart: str, *, backward: bool) -> tuple[float, Series]:
     """The fit of the least noise that narrower intervals give, and its noise."""
     width, best = WIDEST * period, None
     refusal = SymtopError("no step succeeds")
