@@ -214,8 +214,7 @@ def description(findings: Sequence[Finding]) -> str:
     words = [f"{name} within {one.value:.1e}{error_units(name)} of {true.get(name, 'the truth')}"
              for name, one in errors if one.measured]  # fmt: skip
     if order := measured.get("order"):
-        p, limits = order.number, {"wrong limit": "converges to another motion", "none": "of no order"}
-        limits["converges"] = order.text
+        p, limits = order.number, {"wrong limit": "converges to another motion", "converges": order.text}
         words += [limits.get(order.kind) or (f"order {round(p)}" if abs(p - round(p)) < 0.3 else f"order {p:.1f}")]
         words[-1] += " or more" * order.text.endswith("or more")
     for claim, yes in (("symplectic", "symplectic"), ("symmetric", "reversible")):

@@ -172,13 +172,12 @@ def on_body(subject: Subject) -> list[Finding]:
 
 
 def _terms(series: Series) -> Measured:
-    if series.order < 0:
-        return Measured("none", text=f"none: a step of no length moves the state by {series.defect[0]:.1g}")
-    text, term = f"{series.order} or more", series.order + 1
+    order, term = max(series.order, 0), series.order + 1
+    text = f"{order} or more"
     if series.is_exact:
         miss = f"{series.defect[term]:.1g} +- {series.noise[term]:.0g} of it"
-        text = f"{series.order}: in one step the term in h^{term} is the first that is wrong, by {miss}"
-    return Measured("by a term", series.order, text=text)
+        text = f"{order}: in one step the term in h^{term} is the first that is wrong, by {miss}"
+    return Measured("by a term", order, text=text)
 
 
 def series_of(subject: Subject) -> Series | None:

@@ -99,11 +99,14 @@ def compared(
     image: Callable[[float], Array], motion: Callable[[float], Array], period: float, chart: str = ""
 ) -> Series:
     """The series of one function of h beside that of another, both (n,) of one chart and of order one."""
-    scatter, series = _narrowed(image, motion, period, chart, backward=True)
-    if series.backward and scatter > ROUGH:
+    ahead = functools.partial(_narrowed, image, motion, period, chart, backward=False)
+    try:
+        scatter, series = ahead(backward=True)
+    except SymtopError:
+        return ahead()[1]
+    if scatter > ROUGH:
         with contextlib.suppress(SymtopError):
-            ahead, forward = _narrowed(image, motion, period, chart, backward=False)
-            series = forward if ahead < SMOOTH * scatter else series
+            series = forward[1] if (forward := ahead())[0] < SMOOTH * scatter else series
     return series
 
 
@@ -116,9 +119,6 @@ def _narrowed(image: Any, motion: Any, period: float, chart: str, *, backward: b
             fitted = _fitted(image, motion, width, chart, backward=backward)
         except SymtopError as error:
             refusal = error
-            if backward and _steps(image, 1e-3 * width) and not _steps(image, -1e-3 * width):
-                backward = False
-                continue
         else:
             if best is None or fitted[0] < 0.5 * best[0]:
                 best = fitted
@@ -128,13 +128,6 @@ def _narrowed(image: Any, motion: Any, period: float, chart: str, *, backward: b
     if best is None:
         raise refusal
     return best
-
-
-def _steps(image: Callable[[float], Array], h: float) -> bool:
-    with contextlib.suppress(SymtopError):
-        image(h)
-        return True
-    return False
 
 
 def _fitted(
