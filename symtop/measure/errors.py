@@ -140,6 +140,10 @@ def _of_run(run: Any, scene: Any, precision: str, warn: Callable[[str], object])
     columns = errors_against(chosen, data, truth)
     sure = scene is None or _stored(run, "start") is not None
     doubtful = [] if sure else elsewhere(data.time, columns)
+    if doubtful and data.axis is not None:
+        x, up, z = data.axis[0]
+        if np.min(charts.axis_distance(np.array([[x, -z, up], [x, z, up]]), truth["axis"].values[0])) < NEAR:
+            doubtful[0] += " It is the true one if y is read as up, where here z is up."
     for sentence in [*doubtful, *(doubts(data.time, columns, chosen.horizon) if foreign else ())]:
         warn(f"on {chosen.name}: {sentence}")
     bounds = {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns}
