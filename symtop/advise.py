@@ -600,7 +600,7 @@ class EngineAdvice:
             none = f"No setting is within {WORST:g} rad: none is better than another, and there is nothing to match."
             lines.append(none)
         if self.advice is None:
-            return "\n".join(lines)
+            return "\n".join([*lines, *["With --accuracy it names a method for the error that you need."] * (not near)])
         if (accuracy := self.advice.accuracy) != self.errors[self.best] or self.advice.integrator is None:
             serving = ", ".join(name for name, value in self.errors.items() if value <= accuracy) or "none"
             within = [f"Settings within {accuracy:g} rad at this step: {serving}."] * (self.advice.quantity == "axis")

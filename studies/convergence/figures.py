@@ -51,7 +51,7 @@ def _named(data: xr.Dataset) -> Picture:
     for kind, axis in zip(shown, axes, strict=True):
         axis.set(xscale="log", yscale="log", xlabel=PANELS[kind][0], title=PANELS[kind][1])
         if kind == "energy":
-            axis.set_ylabel("energy error\n/ (E0 - min V)")
+            axis.set_ylabel("energy error\n/ energy of the nutation")
         else:
             floor = 0.3 * error_band(axis, part[f"{MAIN}_bound"].values)
             axis.set(ylim=(0.5 * floor, 10.0), ylabel="largest axis error (rad)")

@@ -18,7 +18,7 @@ SHOWN = (  # in the figure of the residuals
     "midpoint[angles]", "stormer-verlet[angles]", "strang[axis]", "gauss-4[axis]", "rk4[angles]", "rk4[axis]",
     "rk45[angles]", "taylor[axis]",
 )  # fmt: skip
-LABELS = {"energy": "energy error\n/ (E0 - min V)", "p_phi": "relative change of $p_\\varphi$",
+LABELS = {"energy": "energy error\n/ energy of the nutation", "p_phi": "relative change of $p_\\varphi$",
           "p_psi": "relative change of $p_\\psi$"}  # fmt: skip
 NOTE = {"fontsize": LEAST_TEXT, "color": "#444444"}
 
@@ -88,7 +88,7 @@ def _rounding(data: xr.Dataset) -> Picture:
         axis.set_title(f"{name}\nplain: power {plain_power:.2f}\ncompensated: power {power:.2f}", fontsize=7.5)
         slope_guide(axis, 0.5, (steps[0] * 3.0, steps[-1]), 1e-18, r"$n^{1/2}$")
     axes[0, 0].set_ylim(bottom=2e-19)
-    axes[0, 0].set_ylabel("drift of modified energy\n/ (E0 - min V)")
+    axes[0, 0].set_ylabel("drift of modified energy\n/ energy of the nutation")
     few_ticks(*axes.flat, most=5)
     members = data.sizes["member"], data.sizes["plain_member"]
     lines = (

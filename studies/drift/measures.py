@@ -46,7 +46,7 @@ def worst_behaviour(histories: xr.Dataset, name: str) -> str:
 
 
 def grain(scene_name: str, name: str) -> float:
-    """The rounding of a constant on a scene, in units of the machine's: that of an energy counts from E0 - min V."""
+    """The rounding of a constant on a scene, in units of the machine's: that of an energy is over the nutation's."""
     known = scenes()
     return known[scene_name].energy_grain if name == "energy" and scene_name in known else 1.0
 

@@ -22,7 +22,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 def draw_energy(data: xr.Dataset) -> Picture:
     """The largest energy error so far of the solver and of methods of order two, far beyond the notebook's end."""
     names = [name for name in (SOLVER, *DRAWN) if name in data["variant"].values]
-    labels = ("time (s)", "largest energy error so far\n/ (E0 - min V)")
+    labels = ("time (s)", "largest energy error so far\n/ energy of the nutation")
     figure, axes = style.grid(data.sizes["scene"], 2, labels, height=2.7, sharey=True)
     ring = {"color": style.BLACK, "mfc": "none", "ms": 8.0, "mew": 1.3, "lw": 0.0, "zorder": 5}
     for axis, scene in zip(axes, map(str, data["scene"].values), strict=True):
@@ -57,7 +57,9 @@ def draw_modified_energy(data: xr.Dataset) -> Picture:
         for (column, kind, _), color in zip(kinds, (style.ORANGE, style.BLACK), strict=True):
             first.plot(run["shadow_time"], run[f"{column}_history"], color=color, label=f"{kind} over time")
         first.set(
-            title=f"{MIDPOINT}, {scenes[0]},\n40 steps a nutation", xlabel="time (s)", ylabel="change / (E0 - min V)"
+            title=f"{MIDPOINT}, {scenes[0]},\n40 steps a nutation",
+            xlabel="time (s)",
+            ylabel="change\n/ energy of the nutation",
         )
     for axis, scene in zip(axes[0, over_time:], scenes, strict=True):
         for name in names:
@@ -69,7 +71,7 @@ def draw_modified_energy(data: xr.Dataset) -> Picture:
         for power, column in ((2, "energy_swing"), (4, "modified_swing")):
             span = float(h.min()), float(h.max())
             style.slope_guide(axis, power, span, 0.2 * float(run[column].min()), f"$h^{power}$")
-        axis.set(xscale="log", yscale="log", xlabel="step size (s)", ylabel="largest change / (E0 - min V)")
+        axis.set(xscale="log", yscale="log", xlabel="step size (s)", ylabel="largest change\n/ energy of the nutation")
         axis.set_title(f"scene {scene}")
         style.few_ticks(axis, most=4)
     style.legend_below(figure, axes)

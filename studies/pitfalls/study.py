@@ -40,7 +40,7 @@ def cases(quick: bool) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    """Errors of the axis (rad) and the energy (over E0 - min V) over ``setting`` and ``sample``, NaN after the end.
+    """Errors of the axis (rad) and the energy (over the nutation's) over ``setting`` and ``sample``, NaN after the end.
 
     ``warned`` says whether the guard warned before the run.
     """
@@ -103,7 +103,7 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
                 worst = one[["steps", "outcome", "warned"]].assign(one[["axis", "energy"]].max("sample"))
                 worst["warned"] = worst["warned"].astype(bool)
                 parts.append(worst.isel(setting=slice(None, None, -1)).to_pandas().assign(scene=on, variant=name))
-    names = {"steps": "steps a nutation", "axis": "axis error (rad)", "energy": "energy error / (E0 - min V)",
+    names = {"steps": "steps a nutation", "axis": "axis error (rad)", "energy": "energy error / energy of the nutation",
              "warned": "guard warned"}  # fmt: skip
     rows = pd.concat([part.reset_index(drop=True) for part in parts]).sort_index(kind="stable").rename(columns=names)
     return {"runs": rows[["scene", "variant", *names.values(), "outcome"]]}

@@ -31,7 +31,8 @@ LEAST, MOST = 1e-16, 3.0  # rad, of the panel
 COSTS = {"time of a run, one core (µs)": "seconds", "force evaluations": "force_evaluations"}
 ERRORS = {
     "largest error of the axis (rad)": "axis", "largest error of the attitude (rad)": "attitude",
-    "largest error of the energy / (E0 - min V)": "energy", "largest error of p_phi / larger momentum": "p_phi",
+    "largest error of the energy / energy of the nutation": "energy",
+    "largest error of p_phi / larger momentum": "p_phi",
 }  # fmt: skip
 
 

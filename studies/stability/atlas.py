@@ -14,7 +14,7 @@ import xarray as xr
 
 from symtop.methods.framework.registry import Integrator, integrator, integrators, split_name
 
-from .many_verdicts import BOUNDED_BUT_WRONG, JUDGED, VERDICTS
+from .many_verdicts import BOUNDED_BUT_WRONG, JUDGED, VERDICTS, WRONG
 from .measures import MECHANISMS
 from .outcome_maps import NOT_RUN, SETTLED
 
@@ -65,18 +65,18 @@ class OutcomeMap(NamedTuple):
     @property
     def early(self) -> float:
         """The share of the runs that ended early."""
-        return float(np.mean(self.outcome >= len(JUDGED)))
+        return float(np.mean((self.outcome >= len(JUDGED)) & (self.outcome != WRONG)))
 
     @property
     def silent(self) -> float:
         """The share of the inaccurate runs that ended without an error; NaN if every run is accurate."""
         wrong = self.outcome[self.outcome != 0]
-        return float(np.mean(wrong < len(JUDGED))) if wrong.size else math.nan
+        return float(np.mean((wrong < len(JUDGED)) | (wrong == WRONG))) if wrong.size else math.nan
 
     @property
     def failure(self) -> Failure:
-        """Where at least `COMMON` of the rows fail at every larger setting; `bounded_but_wrong` is no failure here."""
-        failed = self.outcome > BOUNDED_BUT_WRONG
+        """Where at least `COMMON` of the rows fail at every larger setting; an energy error below 1 % is no failure."""
+        failed = (self.outcome > BOUNDED_BUT_WRONG) & (self.outcome != WRONG)
         share = failed.mean(axis=0)
         rare = np.flatnonzero(share < COMMON)
         first = int(rare[-1]) + 1 if rare.size else 0

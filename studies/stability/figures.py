@@ -18,7 +18,7 @@ from symtop.runner.study import Picture
 
 from .atlas import OutcomeMap, families, maps
 from .failures import LOST, MOST as LARGEST, SEEN
-from .many_verdicts import EARLY, JUDGED, SAID
+from .many_verdicts import EARLY, JUDGED, SAID, WRONG
 from .mechanisms import measured, rate
 
 KNOWN = (  # the variants whose maps are drawn, if they are there
@@ -28,7 +28,7 @@ KNOWN = (  # the variants whose maps are drawn, if they are there
 MOST, COLUMNS = len(KNOWN), 4  # maps in a figure, and beside each other
 OUTCOMES = {  # as the key names them; what ends early for any reason is one of them
     **dict(zip((SAID[name] for name in JUDGED), (style.GREEN, style.YELLOW, style.ORANGE, style.PURPLE), strict=True)),
-    EARLY: style.BLACK, "accurate, not run": "#9FDAC8",
+    EARLY: style.BLACK, SAID["wrong"]: style.SKY, "accurate, not run": "#9FDAC8",
 }  # fmt: skip
 LINES = {"linear_limit": ("small nutations grow beyond", "-"),
          "third_turn": ("a step turns the nutation by a third", (0, (4, 2)))}  # fmt: skip
@@ -72,7 +72,8 @@ def _atlas(part: xr.Dataset, shown: Mapping[str, OutcomeMap]) -> Any:
         axis.set_visible(place in places)
     for place, name in places.items():
         one, axis = shown[name], axes.flat[place]
-        codes = np.where(one.made, np.minimum(one.outcome, len(JUDGED)), len(OUTCOMES) - 1)
+        codes = np.where(one.outcome == WRONG, len(JUDGED) + 1, np.minimum(one.outcome, len(JUDGED)))
+        codes = np.where(one.made, codes, len(OUTCOMES) - 1)
         axis.imshow(codes, cmap=ListedColormap(list(OUTCOMES.values())), vmin=-0.5, vmax=len(OUTCOMES) - 0.5,
                     extent=(*_ends(one.settings), *_ends(one.parameter)), origin="lower", aspect="auto",
                     interpolation="nearest")  # fmt: skip

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.measure.verdicts import DRIFT, FEWEST, GROWING, NO_GAP, barriers
+from symtop.measure.verdicts import DRIFT, FEWEST, GROWING, NO_GAP, ROUNDING, barriers
 from symtop.methods.framework.plan import NOT_FINITE, NOT_NORMALISED, OUTCOMES, off_length
 from symtop.methods.framework.space import axis_of as of_quaternion
 from symtop.model.charts import DIMENSIONS, Array
@@ -24,11 +24,12 @@ from symtop.model.scenes import Scene
 from symtop.model.top import effective_potential, flat
 
 JUDGED = ("accurate", "bounded_but_wrong", "drifting", "wrong_regime")
-VERDICTS = (*JUDGED, *OUTCOMES[1:])
-BOUNDED_BUT_WRONG, DRIFTING, WRONG_REGIME = 1, 2, 3
+VERDICTS = (*JUDGED, *OUTCOMES[1:], "wrong")
+BOUNDED_BUT_WRONG, DRIFTING, WRONG_REGIME, WRONG = 1, 2, 3, len(VERDICTS) - 1
 EARLY = "ended early"
 SAID = dict(zip(JUDGED, ("accurate", "bounded energy, wrong motion", "energy drifts", "crosses a turning point"),
                 strict=True)) | {name: f"{EARLY}: {name.replace('_', ' ')}" for name in OUTCOMES[1:]}  # fmt: skip
+SAID["wrong"] = f"wrong motion, energy error below {100.0 * DRIFT:g} %"
 
 
 class Judged(NamedTuple):
@@ -47,7 +48,8 @@ class Truths(NamedTuple):
     """What the runs of m scenes are judged by."""
 
     constants: Array  # (m, constants of a closed form)
-    scenes: Array  # (m, 11): I1, I3, mgl, nutation period, `barriers`, energy scale, p_phi -+ p_psi where it has a sign
+    # (m, 12): I1, I3, mgl, nutation period, `barriers`, energy scale, p_phi -+ p_psi where it has a sign, rounding
+    scenes: Array
 
     @property
     def periods(self) -> Array:
@@ -67,9 +69,10 @@ def truths(scenes: Sequence[Scene]) -> Truths:
 
 @functools.lru_cache(maxsize=1024)
 def _numbers(scene: Scene) -> tuple[float, ...]:
+    rounding = ROUNDING * scene.energy_grain
     top, momenta, least = scene.top, scene.top.momenta(scene.start), NO_GAP * scene.momentum_scale
     gaps = (gap if abs(gap) > least else 0.0 for gap in (momenta.north, momenta.south))
-    return top.I1, top.I3, top.mgl, scene.nutation_period, *barriers(scene), scene.energy_scale, *gaps
+    return top.I1, top.I3, top.mgl, scene.nutation_period, *barriers(scene), scene.energy_scale, *gaps, rounding
 
 
 def judge_runs(
@@ -156,8 +159,8 @@ def _kernel() -> Any:  # noqa: C901  (one loop, read in one piece)
         return False
 
     @register_jitable
-    def drifts(scene, states, momenta, count):  # type: ignore[no-untyped-def]
-        """Does the energy error grow and pass the bound? With few samples nothing is said to grow."""
+    def by_energy(scene, states, momenta, count):  # type: ignore[no-untyped-def]
+        """The verdict by whether the energy error grows and passes the bound; few samples are not said to grow."""
         half = count // 2
         before = half if half >= FEWEST else count
         start, early, late = energy_of(scene, states[0], momenta[0, 0], momenta[0, 1]), 0.0, 0.0
@@ -167,7 +170,9 @@ def _kernel() -> Any:  # noqa: C901  (one loop, read in one piece)
                 early = error
             if j >= half and error > late:
                 late = error
-        return not (late <= DRIFT or late <= GROWING * early)
+        if not (late <= DRIFT or late <= GROWING * early):
+            return DRIFTING
+        return WRONG if late > max(GROWING * early, scene[11]) else BOUNDED_BUT_WRONG
 
     def judge_all(  # type: ignore[no-untyped-def]
         constants, scenes, phases, counts, followed, states, momenta, outcome, verdict, error
@@ -193,6 +198,6 @@ def _kernel() -> Any:  # noqa: C901  (one loop, read in one piece)
                 elif strays(scene, run, kept, count):
                     verdict[i, k] = WRONG_REGIME
                 else:
-                    verdict[i, k] = DRIFTING if drifts(scene, run, kept, count) else BOUNDED_BUT_WRONG
+                    verdict[i, k] = by_energy(scene, run, kept, count)
 
     return compile_kernel(judge_all)

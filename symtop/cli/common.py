@@ -6,6 +6,7 @@ import functools
 import importlib
 import json
 import math
+import re
 import shutil
 import sys
 import tempfile
@@ -35,6 +36,11 @@ NAMES = {  # what the shell completes: the module and its function
 }  # fmt: skip
 BODY, PERIODS = "body", 20.0  # the scene of the options of a body, and its horizon
 TEXT = (".csv", ".tsv", ".txt", ".json")  # what nobody reads as netCDF
+USAGE = {  # what click says of a value, and what we do
+    "invalid value for '(.+?)': (.+) is not (?:a valid )?(.+)": r"\1 must be \3, not \2",
+    r"invalid value for '\[?(.+?)(?:]...)?': File (.+) (?:does not exist|is a .+)": r"\1 must be a file, not \2",
+    "must be float( range)?,": "must be a number,", "must be integer( range)?,": "must be a whole number,",
+}  # fmt: skip
 SILENT = ("explore",)  # commands that work until they are ended
 
 
@@ -203,25 +209,37 @@ class Group(click.Group):
             warn("interrupted")
             ctx.exit(INTERRUPTED)
         except OSError as error:
-            if error.errno in (errno.ENOSPC, errno.EDQUOT) and error.filename is None:
-                warn(f"cannot write what there is to say: {error.strerror}")
-                ctx.exit(2)
             if error.errno == errno.EPIPE:
                 sys.stdout = None  # its reader has left
                 ctx.exit(UNREAD)
-            if error.filename is None:
-                if error.errno != errno.ENOENT:
-                    raise
-                warn("the folder that this command runs in is no longer there: change to another")
-                ctx.exit(2)
-            name = str(error.filename)
-            warn(f"cannot use {name[:LONGEST_NAME]}{'...' if name[LONGEST_NAME:] else ''}: {error.strerror}")
+            name, words = str(error.filename), f"cannot write what there is to say: {error.strerror}"
+            if error.filename is not None:
+                words = f"cannot use {name[:LONGEST_NAME]}{'...' if name[LONGEST_NAME:] else ''}: {error.strerror}"
+            elif error.errno == errno.ENOENT:
+                words = "the folder that this command runs in is no longer there: change to another"
+            elif error.errno not in (errno.ENOSPC, errno.EDQUOT):
+                raise
+            warn(words)
             ctx.exit(2)
         except Exception as error:
             if not type(error).__module__.startswith("numba."):  # of a plug-in's kernel, where no solver is called
                 raise
             warn(f"a kernel cannot be compiled: {words_of(error)}")
             ctx.exit(2)
+
+
+def _show(error: click.UsageError, file: Any = None) -> None:  # noqa: ARG001  (click calls it so)
+    """Print what is wrong with a command line in one sentence: what, which value, and what is allowed."""
+    words = error.format_message().removesuffix(".").replace(". Did", "; did")
+    words = words[0].lower() + words[1:]
+    for click_says, we_say in USAGE.items():
+        words = re.sub(click_says, we_say, words)
+    if error.ctx is not None and not (" must be " in words or words.endswith("?")):
+        words += f"; {error.ctx.get_usage()} (--help says more)".replace("Usage: ", "usage: ")
+    warn(words)
+
+
+click.UsageError.show = _show  # type: ignore[assignment, method-assign]
 
 
 def _in_options(error: SymtopError, command: click.Command | None) -> str:

@@ -1,14 +1,14 @@
 """Errors of a run against the truth, in quantities that no chart can distort.
 
     axis       angle between the axes, rad                   attitude   angle of the rotation between, rad
-    theta      |theta - theta_ref|, rad                      energy     |E - E_ref| / (E0 - min V)
+    theta      |theta - theta_ref|, rad                      energy     |E - E_ref| / energy of the nutation
     p_phi      |p_phi - ref| / max(|p_phi|, |p_psi|)         p_psi      likewise
 
-The energy's scale is `Scene.energy_scale`, the energy of the nutation above the steady precession with the same
-momenta; V has p_psi^2 / 2 I3 in it, so that the spin drops out: on `fast` it is 9.2e-5, and the kinetic energy, nearly
-all spin, 5000. Both momenta share one scale because one of them may vanish. Radians and momenta never share a norm. Of
-a body without symmetry the scale of the energy is that of the start, kinetic and |mgl|, and that of p_phi and of the
-vector L is |L|.
+The energy of the nutation, `Scene.energy_scale`, is E0 - p_psi^2 / 2 I3 - min V, the height of the start above the
+steady precession with the same momenta. V is `top.potential`, which has no spin in it: on `fast` the energy of the
+nutation is 9.2e-5, and the kinetic energy, nearly all spin, 5000. Both momenta share one scale because one of them may
+vanish. Radians and momenta never share a norm. Of a body without symmetry the scale of the energy is that of the start,
+kinetic and |mgl|, and that of p_phi and of the vector L is |L|.
 
 The length of e or q, which explicit methods let leave one, is no part of an angle; it counts in the energy and the
 momenta.
@@ -46,7 +46,7 @@ QUANTITIES: dict[str, str] = {
     "axis": "angle between axes (rad)",
     "attitude": "angle between attitudes (rad)",
     "theta": "error of theta (rad)",
-    "energy": "energy error / (E0 - min V)",
+    "energy": "energy error / energy of the nutation",
     "p_phi": "relative error of p_phi",
     "p_psi": "relative error of p_psi",
 }
@@ -59,13 +59,14 @@ ERRORS = {  # what each is of and against what, and its units
     "axis": ("angle between the axis and the true axis", "rad"),
     "attitude": ("angle of the rotation between the attitude and the true attitude", "rad"),
     "theta": ("error of theta against the true motion", "rad"),
-    "energy": ("error of the energy against that of the start, relative to E0 - min V", "1"),
+    "energy": ("error of the energy against that of the start, relative to the energy of the nutation", "1"),
     "p_phi": ("error of p_phi against that of the start, relative to the larger momentum", "1"),
     "p_psi": ("error of p_psi against that of the start, relative to the larger momentum", "1"),
     "momentum": ("error of the angular momentum in the space frame, relative to that of the start", "1"),
 }
 SCALES = {  # what they are relative to, and of bodies without symmetry
-    "E0 - min V": "the kinetic energy of the start and |mgl|", "the larger momentum": "the momentum of the start",
+    "the energy of the nutation": "the kinetic energy of the start and |mgl|",
+    "the larger momentum": "the momentum of the start",
 }  # fmt: skip
 
 
@@ -78,10 +79,10 @@ def against(words: str, of_body: Collection[bool]) -> str:
 
 def quantity_words(data: xr.Dataset, quantity: str) -> str:
     """The words for a quantity of a dataset of errors, with the scale that its long name has."""
-    name, (top, body) = str(data[quantity].attrs.get("long_name", "")), next(iter(SCALES.items()))
+    name, body = str(data[quantity].attrs.get("long_name", "")), next(iter(SCALES.values()))
     if body not in name:
         return QUANTITIES[quantity]
-    return OF_BODY[quantity] if top not in name else f"{QUANTITIES[quantity]}, of bodies / (T0 + |mgl|)"
+    return OF_BODY[quantity] if " or of bodies " not in name else f"{QUANTITIES[quantity]}, of bodies / (T0 + |mgl|)"
 
 
 def errors(
@@ -139,6 +140,10 @@ def _of_run(run: Any, scene: Any, precision: str, warn: Callable[[str], object])
     columns = errors_against(chosen, data, truth)
     sure = scene is None or _stored(run, "start") is not None
     doubtful = [] if sure else elsewhere(data.time, columns)
+    if doubtful and data.axis is not None:
+        x, up, z = data.axis[0]
+        if np.min(charts.axis_distance(np.array([[x, -z, up], [x, z, up]]), truth["axis"].values[0])) < NEAR:
+            doubtful[0] += " It is the true one if y is read as up, where here z is up."
     for sentence in [*doubtful, *(doubts(data.time, columns, chosen.horizon) if foreign else ())]:
         warn(f"on {chosen.name}: {sentence}")
     bounds = {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns}

@@ -6,10 +6,12 @@ An outcome that is not ok stands. A run that reached its end is, in this order,
     wrong_regime        the axis went where the true motion never goes: a tenth of the width beyond a turning point, or
                         past a pole on the other side (p_phi - p_psi or p_phi + p_psi changed its sign)
     drifting            the energy error grew with time and passed 1 % of the energy of the nutation
-    bounded_but_wrong   everything looks right except the answer
+    wrong               it grew, too, and stayed below 1 % so far
+    bounded_but_wrong   it did not grow, or is rounding: everything looks right except the answer
 """
 
 import math
+from decimal import ROUND_CEILING, Context
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -24,6 +26,7 @@ OUTSIDE = 0.1  # of the nutation's width, or rad if it has none
 STEADY = 1e-6  # rad; a nutation narrower than this is a steady precession, known to rounding only
 DRIFT = 0.01  # of the energy of the nutation, `Scene.energy_scale`
 GROWING = 1.3  # the second half's largest energy error over the first half's; bounded errors have 1
+ROUNDING = 1e-12  # of the energies that are summed, `Scene.energy_grain`: an error below that is not said to grow
 FEWEST = 8  # samples of half a run: fewer do not tell an energy that grows from one that oscillates
 NO_GAP = 1e-9  # of the momentum scale: a gap p_phi -+ p_psi below this has no sign to change
 
@@ -73,7 +76,7 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         return Judgement(ended, float(run.attrs["reached_time"]), str(run.attrs["outcome_message"]))
     (highest, lowest, margin, accurate), worst = barriers(scene), float(np.max(axis_error))
     if worst <= accurate:
-        sentence = f"accurate to {worst:.2g} rad up to t = {times[-1]:.6g}{scene.second}"
+        sentence = f"accurate to {_upwards(worst)} rad up to t = {times[-1]:.6g}{scene.second}"
         return Judgement("accurate", float(times[-1]), sentence)
     theta, energy = run["theta"].values, np.abs(run["energy"].values - run["energy"].values[0]) / scene.energy_scale
     beyond = ~((theta >= highest - margin) & (theta <= lowest + margin))
@@ -92,7 +95,14 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         at = f"{times[first]:.6g}{scene.second}"
         sentence = f"the energy error passed {DRIFT:.0%} at t = {at} and grew on, to {energy.max():.2g}"
     else:
-        word, first = "bounded_but_wrong", int(np.argmax(~(axis_error <= accurate)))
-        energies = f"while the energy stayed within {energy.max():.2g}"
+        word, first, energies = "bounded_but_wrong", int(np.argmax(~(axis_error <= accurate))), "stayed within {}"
+        if late > max(GROWING * early, ROUNDING * scene.energy_grain):
+            word, energies = "wrong", f"error grew, to {{}}, below {DRIFT:.0%}"
+        energies = f"while the energy {energies.format(_upwards(energy.max()))}"
         sentence = f"the axis error passed {accurate:.2g} rad at t = {times[first]:.6g}{scene.second} {energies}"
     return Judgement(word, float(times[first]), sentence)
+
+
+def _upwards(bound: float) -> str:
+    """A bound to two digits, rounded up."""
+    return f"{float(Context(prec=2, rounding=ROUND_CEILING).create_decimal(repr(float(bound)))):.2g}"

@@ -10,7 +10,8 @@ phi and psi are cyclic, so that ``p_psi = I3 (psi' + phi' cos theta)`` and
 
     V(theta) = (p_phi - p_psi cos theta)^2 / (2 I1 sin^2 theta) + mgl cos theta.
 
-The constant p_psi^2 / 2 I3 is left out of V in the code; with it in V, ``E0 - min V`` is the energy of the nutation.
+The constant p_psi^2 / 2 I3 of the energy E is no part of V, nor of `potential`: ``E0 - p_psi^2 / 2 I3 - min V`` is the
+energy of the nutation, which energy errors are divided by.
 
 The fraction cancels near a pole. With ``x = theta/2``, ``north = p_phi - p_psi`` (zero if the axis can pass theta = 0)
 and ``south = p_phi + p_psi`` (zero if it can pass theta = pi) it is a sum without subtraction, exact to rounding:

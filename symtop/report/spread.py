@@ -2,7 +2,7 @@
 
     axis        angle between the member's axis and that of its closed form, rad
     attitude    of bodies without symmetry, in its place: angle between the attitude and that of the true motion, rad
-    energy      abs(E - E0) / (E0 - min V), or of bodies / (T0 + |mgl|), the units of `errors`
+    energy      abs(E - E0) / energy of the nutation, or of bodies / (T0 + |mgl|), the units of `errors`
 
 A member that has failed has an infinite error from there on, so that it counts among the worst and is not left out.
 Quantiles are those of the sample, without interpolation: an infinite one says that so many have failed.

@@ -61,7 +61,9 @@ def test_a_correct_method_is_not_refuted(name):
     assert ledger["pole"].verdict in ("measured", "inapplicable")  # never claimed of a step
 
 
-@pytest.mark.parametrize("name", ["AdamsBashforth", "separable_forest_ruth", slowly("rotation_strang")])
+@pytest.mark.parametrize(
+    "name", ["AdamsBashforth", "separable_forest_ruth", "rotation_guarded", slowly("rotation_strang")]
+)
 def test_what_is_claimed_of_a_correct_method_is_confirmed_in_short_runs(name, only):
     only(*(claim for stage in battery.TABLE for claim in stage.claims))
     claims, options = right.CLAIMS[name]
@@ -228,6 +230,15 @@ def test_a_seed_draws_the_same_and_without_a_claim_the_order_is_said_and_not_the
     first, again = (symtop.judge(wrong.late_euler, quick=True, order=4, seed=7) for _ in range(2))
     assert (first["order"].why, "of seed 7" in first["order"].why) == (again["order"].why, True)
     assert (first.refuted, first.about.seed) == (["order"], 7)
+
+
+def test_no_order_is_below_zero(only):
+    only("order")
+    shifted = lambda f, t, y, h: right.rk4(f, t, y, h) + 1e-6
+    for claim in ({}, {"order": 4}):
+        ledger = symtop.judge(shifted, quick=True, seed=1, **claim)
+        assert str(ledger["order"].measured).startswith("0: in one step the term in h^0 is the first that is wrong")
+        assert "It is: order 0" in str(ledger)
 
 
 def test_a_step_written_for_f_of_y_may_say_so(only):

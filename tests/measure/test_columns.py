@@ -52,7 +52,7 @@ def test_an_error_table_says_of_what_and_against_what_and_flags_have_meanings():
     data = columns.described(table_of(), "SI", of_body=[True, False])
     words = "largest angle between the axis and the true axis over the run"
     assert (data["axis"].attrs, data["energy"].attrs["units"]) == ({"long_name": words, "units": "rad"}, "1")
-    assert "relative to E0 - min V or of bodies the kinetic energy" in data["energy"].attrs["long_name"]
+    assert "relative to the energy of the nutation or of bodies the kinetic energy" in data["energy"].attrs["long_name"]
     assert data["gap"].attrs == {}
     run = columns.described(table_of().drop_vars("axis_bound"), "SI")
     assert (run["energy"].attrs["long_name"], run["energy"].attrs["units"]) == ("total energy", "kg m2 s-2")

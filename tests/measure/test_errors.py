@@ -264,6 +264,15 @@ def test_errors_of_an_ensemble_are_those_of_its_members_and_other_members_are_re
         symtop.errors(turned.assign_coords(component=["x", "y", "z"]), drawn)  # the control
 
 
+def test_an_axis_with_y_up_is_told_from_another_start():
+    run = symtop.simulate("spheroid", "rk4", step_size=0.01, samples=5)
+    x, y, z = run["axis"].values.T
+    for axis, told in (((x, z, y), True), ((x, z, -y), True), ((y, x, z), False)):
+        with pytest.warns(symtop.SymtopWarning, match="is this the start of the scene") as seen:
+            symtop.errors({"time": run["time"].values, "axis": np.stack(axis, axis=1)}, "spheroid")
+        assert ("if y is read as up" in str(seen[0].message)) is told
+
+
 @pytest.mark.parametrize(("top", "start", "integrator"), [
     (symtop.RigidBody(1.0, 1.2, 0.6, mgl=1.0, centre=(0.1, 0.0, 1.0)), symtop.Attitude(), "vern9-fixed"),
     (symtop.SymmetricTop(1.0, 0.5, mgl=1.0), symtop.Angles(theta=1.0, phi=0.3), "rkmk-se3-4"),

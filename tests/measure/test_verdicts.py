@@ -28,6 +28,25 @@ def test_each_fate_is_judged_with_its_time_and_cause(scene, name, controls, word
     assert 0.0 <= result.time <= controls.get("horizon", scene.horizon) * (1.0 + 1e-12)
 
 
+@pytest.mark.parametrize(("early", "late", "beyond", "error", "word"), [
+    (0.0, 0.0102, 0.0, 0.5, "drifting"), (0.0, 0.0098, 0.0, 0.5, "wrong"), (1e-3, 1.32e-3, 0.0, 0.5, "wrong"),
+    (1e-3, 1.28e-3, 0.0, 0.5, "bounded_but_wrong"), (0.0, 6e-11, 0.0, 0.5, "bounded_but_wrong"),
+    (0.0, 7e-11, 0.0, 0.5, "wrong"), (0.0, 0.0, 0.098, 0.5, "bounded_but_wrong"),
+    (0.0, 0.0, 0.102, 0.5, "wrong_regime"), (0.0, 0.0, 0.0, 0.0098, "accurate"),
+    (0.0, 0.0, 0.0, 0.0102, "bounded_but_wrong"),
+])  # fmt: skip
+def test_each_bound_is_where_it_is_said_to_be(early, late, beyond, error, word):
+    """Energy errors of the halves of a run, what theta is beyond a turning point over the width, and the axis error."""
+    scene = symtop.scene("goldstein")
+    low, high = np.sort(np.arccos(scene.top.turning_cosines(scene.start)))
+    run = symtop.simulate(scene, "exact", samples=101)
+    run["energy"] = "time", run["energy"].values[0] + scene.energy_scale * np.repeat([0.0, early, late], [1, 49, 51])
+    run["theta"] = "time", np.where(np.arange(101) == 60, high + beyond * (high - low), run["theta"].values)
+    result = judgement(scene, run, np.full(101, error))
+    assert result.verdict == word
+    assert "within 0.0013" in result.sentence or late != 1.28e-3  # rounded up
+
+
 def test_a_pole_passed_on_the_wrong_side_is_a_wrong_regime():
     scene = grazing(1e-3)
     good, error = symtop.simulate(scene, "exact", samples=201), np.full(201, 0.5)

@@ -74,7 +74,7 @@ def test_a_top_sleeps_above_the_threshold_precesses_steadily_above_a_spin_and_ne
 
 @pytest.mark.parametrize("name", ["spheroid", "goldstein", "fast", "simo-wong", "bruls-cardona-arnold", "separatrix"])
 def test_energies_are_measured_by_the_nutation_and_not_by_the_spin(name):
-    """Over the true motion the kinetic energy of theta goes from 0 to E0 - min V, where V is least."""
+    """Over the true motion the kinetic energy of theta goes from 0 to the energy of the nutation, where V is least."""
     scene = symtop.scene(name)
     end = min(scene.nutation_period, scene.horizon)
     motion = closed_form(scene)(np.linspace(0.0, end, 20_001))

@@ -22,7 +22,7 @@ def test_errors_are_drawn_as_the_run_and_a_trajectory_of_no_integrator_and_witho
     assert bound.get_ydata().max() < 1e-9 < line.get_ydata().max()
     symtop.plot(symtop.simulate("goldstein", "rk4[axis]", step_size=0.02, horizon=10.0, guard=False), ax)
     assert (ax.get_title(), ax.get_legend_handles_labels()[1]) == ("", ["midpoint[angles]", "rk4[axis]"])
-    assert symtop.plot(wrong, quantity="energy").get_ylabel() == "energy error / (E0 - min V)"
+    assert symtop.plot(wrong, quantity="energy").get_ylabel() == "energy error / energy of the nutation"
     theirs = {"time": run["time"].values, "axis": run["axis"].values}
     wrong = symtop.errors(theirs, "goldstein")
     assert np.array_equal(symtop.plot(wrong).get_lines()[0].get_ydata(), wrong["axis"].values[1:])

@@ -194,6 +194,8 @@ def test_thresholds_hold_at_every_larger_step_and_reach_and_failures_are_read_of
     assert one.failure == (1.0, "left_chart")
     assert (one.accurate, one.early, one.silent) == (7 / 20, 9 / 20, 4 / 13)
     assert math.isnan(atlas.maps(hand_made([[A, A, A]] * 4), "cusp")["midpoint"].silent)  # no run is wrong
+    mild = atlas.maps(hand_made([[A, A, "wrong"]] * 4), "cusp")["midpoint"]  # inaccurate, said by nobody, no failure
+    assert (mild.accurate, mild.early, mild.silent, math.isnan(mild.failure.setting)) == (2 / 3, 0.0, 1.0, True)
     row = facts.tables(data)["atlas"].iloc[0]
     assert (row["accurate up to, fast tops"], row["fails from"]) == (0.1, 1.0)
     assert row["fails mostly by"] == "ended early: left chart"

@@ -44,6 +44,7 @@ def padded(values):
     ("stormer-verlet", "angles", 0.03, "accurate"), ("stormer-verlet", "angles", 0.1, "bounded_but_wrong"),
     ("rk4", "axis", 0.1, "drifting"), ("rk4", "axis", 0.5, "wrong_regime"), ("rk4", "attitude", 0.03, "accurate"),
     ("commutator-free-4", "attitude", 0.3, "wrong_regime"), ("rk4", "angles", 0.15, "drifting"),
+    ("rk4", "angles", 0.1, "wrong"),
 ])  # fmt: skip
 def test_one_pass_says_what_judgement_says(name, chart, step, word):
     cusp = scene("cusp")
@@ -103,7 +104,9 @@ def test_a_state_that_is_not_finite_and_a_pole_on_the_wrong_side_are_seen():
     turned = states.copy()  # by half a turn about the vertical
     turned[:, :4] = states[:, [3, 2, 1, 0]] * np.array([-1.0, -1.0, 1.0, 1.0])
     assert one_pass(near, times, turned, momenta)[0] == "bounded_but_wrong"
-    for place, word in ((SAMPLES // 2, "drifting"), (SAMPLES // 2 - 1, "bounded_but_wrong")):
-        (bent := turned.copy())[place, 4:] *= 1.5  # more energy at the first sample of the second half, or before it
+    for place, more, word in ((SAMPLES // 2, 1.5, "drifting"), (SAMPLES // 2 - 1, 1.5, "bounded_but_wrong"),
+                              (SAMPLES // 2, 1.0001, "wrong"), (SAMPLES // 2 - 1, 1.0001, "bounded_but_wrong"),
+                              (SAMPLES // 2, 1.0 + 1e-14, "bounded_but_wrong")):  # fmt: skip
+        (bent := turned.copy())[place, 4:] *= more  # energy at the first sample of the second half, or before it
         assert one_pass(near, times, bent, momenta)[0] == word
     assert one_pass(near, times, turned, momenta - np.array([2e-3, 0.0]))[0] == "wrong_regime"

@@ -172,11 +172,12 @@ def on_body(subject: Subject) -> list[Finding]:
 
 
 def _terms(series: Series) -> Measured:
-    text, term = f"{series.order} or more", series.order + 1
+    order, term = max(series.order, 0), series.order + 1
+    text = f"{order} or more"
     if series.is_exact:
         miss = f"{series.defect[term]:.1g} +- {series.noise[term]:.0g} of it"
-        text = f"{series.order}: in one step the term in h^{term} is the first that is wrong, by {miss}"
-    return Measured("by a term", series.order, text=text)
+        text = f"{order}: in one step the term in h^{term} is the first that is wrong, by {miss}"
+    return Measured("by a term", order, text=text)
 
 
 def series_of(subject: Subject) -> Series | None:
@@ -189,7 +190,7 @@ def series_of(subject: Subject) -> Series | None:
             step, start = map_of(subject, chart)
             if restart_gap(step, start) <= ONE_MAP:
                 candidates.append(step_series(step, start, subject.scene.time_scale()))
-    return min(candidates, key=lambda one: one.order, default=None)
+    return min((one for one in candidates if one.resolved >= 0), key=lambda one: one.order, default=None)
 
 
 class Order(NamedTuple):
@@ -288,7 +289,7 @@ def _by_steps(subject: Subject) -> Finding:
         power = round(main.slope) if measured else series.order
         why = f"{slopes}; {series.words(power)}"
         if not measured or series.order < power:  # the slope, unless the series of a step has a lower order
-            measured, value = _terms(series), float(series.order)
+            measured, value = _terms(series), float(max(series.order, 0))
     if not measured:
         return undecided("order", "", _hidden(subject, main.reason))
     return Finding("order", "", measured, "measured", why, value, main.interval)

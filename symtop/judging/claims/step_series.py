@@ -4,10 +4,11 @@ One step of h from a generic point z of the true motion ends at Y(h), the motion
 
     Y(h) - y(h) = sum_k c_k h^k,        order p  <=>  c_0 = ... = c_p = 0  <=>  the order conditions up to p hold.
 
-Y - y is sampled at Chebyshev points of [-H, H], or of [0, H] where a solver makes no step backwards, and fitted by the
-polynomial that leaves only noise. The defect of a term is |c_k| / |y_k|, y_k the same term of the motion: what an
-order condition is off by, relative to itself. Slopes do not see a small defect: a coefficient of a fourth-order method
-that is off by 3e-8 has slope 4.03 in double precision, and here the h^3 term is off by 1e-8 with a noise of 1e-13.
+Y - y is sampled at Chebyshev points of [-H, H] and fitted by the polynomial that leaves only noise. The points are of
+[0, H] where a solver makes no step backwards, or one of another function, which no polynomial fits together with the
+steps forwards. The defect of a term is |c_k| / |y_k|, y_k the same term of the motion: what an order condition is off
+by, relative to itself. Slopes do not see a small defect: a coefficient of a fourth-order method that is off by 3e-8 has
+slope 4.03 in double precision, and here the h^3 term is off by 1e-8 with a noise of 1e-13.
 
 What a run carries from step to step is not seen in one step from a start; `step_map.restart_gap` tells such methods.
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, III.1 (the elementary differentials of a step).
@@ -35,6 +36,7 @@ LEAST_POWER = 6  # of the powers of h that are shown
 FURTHER = 2  # degrees more: by what they change a term is in doubt, as by the scatter
 NOISE = 1.25  # times the least: the polynomial of least degree whose residual is as small as this is taken
 CLEAN = 3e-14  # of a residual: nothing is gained with a smaller H
+ROUGH, SMOOTH = 1e-12, 0.01  # of a residual: beyond the one, and so much smaller forwards, -h is another function
 SAMPLE_ROUNDING = 2e-16  # of a sample
 SURE = 10.0  # times its noise: a term is there
 AGREES = 1e-10  # a smaller defect is none: difference quotients in a step leave 1e-11, coefficients 1e-12
@@ -76,10 +78,10 @@ class Series(NamedTuple):
 
     def words(self, power: int) -> str:
         """What it says of the order `power`."""
-        agreed = min(power, self.order)
+        agreed, ahead = min(power, self.order), "" if self.backward else " (a step of -h is not taken)"
         if agreed < min(power, self.resolved):
-            return f"{self.wrong_term()}, in the {self.chart} chart"
-        return f"a step has the motion's terms up to h^{agreed} to {max(self.worst(agreed), 1e-16):.0e}"
+            return f"{self.wrong_term()}, in the {self.chart} chart{ahead}"
+        return f"a step has the motion's terms up to h^{agreed} to {max(self.worst(agreed), 1e-16):.0e}{ahead}"
 
     def wrong_term(self) -> str:
         """The first term that is not the motion's, if there is one."""
@@ -97,16 +99,26 @@ def compared(
     image: Callable[[float], Array], motion: Callable[[float], Array], period: float, chart: str = ""
 ) -> Series:
     """The series of one function of h beside that of another, both (n,) of one chart and of order one."""
-    backward, width, best = True, WIDEST * period, None
+    ahead = functools.partial(_narrowed, image, motion, period, chart, backward=False)
+    try:
+        scatter, series = ahead(backward=True)
+    except SymtopError:
+        return ahead()[1]
+    if scatter > ROUGH:
+        with contextlib.suppress(SymtopError):
+            series = forward[1] if (forward := ahead())[0] < SMOOTH * scatter else series
+    return series
+
+
+def _narrowed(image: Any, motion: Any, period: float, chart: str, *, backward: bool) -> tuple[float, Series]:
+    """The fit of the least noise that narrower intervals give, and its noise."""
+    width, best = WIDEST * period, None
     refusal = SymtopError("no step succeeds")
     for _ in range(TRIES):
         try:
             fitted = _fitted(image, motion, width, chart, backward=backward)
         except SymtopError as error:
             refusal = error
-            if backward and _steps(image, 1e-3 * width) and not _steps(image, -1e-3 * width):
-                backward = False
-                continue
         else:
             if best is None or fitted[0] < 0.5 * best[0]:
                 best = fitted
@@ -115,14 +127,7 @@ def compared(
         width *= NARROWER
     if best is None:
         raise refusal
-    return best[1]
-
-
-def _steps(image: Callable[[float], Array], h: float) -> bool:
-    with contextlib.suppress(SymtopError):
-        image(h)
-        return True
-    return False
+    return best
 
 
 def _fitted(

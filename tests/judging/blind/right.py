@@ -300,6 +300,13 @@ def rotation_negated(q, w, h, inertia, torque):
     return -q, w
 
 
+def rotation_guarded(q, w, h, inertia, torque):
+    """Of order 1, as engines write it: an angle that is not positive turns nothing, so that a step of -h is another."""
+    w = w + h * rates(q, w, inertia, torque)
+    angle = h * np.sqrt(w @ w)
+    return product(q, turn(h * w)) if angle > 0.0 else q, w
+
+
 def verlet(state, h, dT, dV):
     theta, p = state
     p = p - h / 2 * dV(theta)
@@ -352,6 +359,7 @@ _TABLE = {  # names: claims, and options of judge
     "rotation_strang": ({"order": 2, "symplectic": True, "symmetric": True, "conserves": ["p_phi", "p_psi"]}, ROTATION),
     "rotation_lie_midpoint rotation_negated":
         ({"order": 2, "symplectic": False, "conserves": ["axis_length"]}, ROTATION),
+    "rotation_guarded": ({"order": 1, "symmetric": False}, ROTATION),
     "separable_forest_ruth": ({"order": 4, "symplectic": True, "symmetric": True, "explicit": True}, SEPARABLE),
     "separable_implicit_midpoint":
         ({"order": 2, "symplectic": True, "symmetric": True, "energy": "bounded"}, SEPARABLE),
