@@ -21,8 +21,7 @@ needs_gcc = pytest.mark.skipif(twin.compiler() is None, reason="the twins are bu
 
 
 def test_every_compiled_fixed_step_kernel_has_a_twin_and_every_twin_a_kernel():
-    marches = {inside(methods()[name].solvers[chart]).loop for name, chart in KEYS}
-    assert marches == set(twin.FAMILIES)
+    assert {inside(methods()[name].solvers[chart]).loop for name, chart in KEYS} == set(twin.FAMILIES)
 
 
 @needs_gcc
@@ -63,8 +62,7 @@ def test_the_tops_that_lanes_are_timed_on_stay_in_lanes_and_reach_the_error():
     left = whole.blocks().run(np.arange(lanes.MEMBERS), numbers, whole.rule, h, marks, done, loops.BLOCK)
     assert left.size == 0
     true = ClosedForms(numbers).axis(np.full((lanes.MEMBERS, 1), lanes.HORIZON))[:, 0]
-    errors = charts.axis_distance(done.states[:, 0, :3], true)
-    assert 1e-8 < errors.max() < 2e-6
+    assert 1e-8 < charts.axis_distance(done.states[:, 0, :3], true).max() < 2e-6
     assert len(np.unique(true, axis=0)) == lanes.MEMBERS  # neighbours, not copies
 
 

@@ -29,8 +29,7 @@ def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(tmp_path):
     axis_only.write_text(AXIS_ONLY, encoding="utf-8")
     tmp_path /= "two words"
     words = ["study", "convergence", "--quick", "--only", "on-the-axis", "--results", tmp_path, "--plugin", axis_only]
-    result = call(*words)
-    lines = result.output.splitlines()
+    lines = call(*words).output.splitlines()
     assert f"next: symtop report --results '{tmp_path / 'quick' / 'only'}', one" in lines[-1]
     data = netcdf.read(tmp_path / "quick" / "only" / "convergence.nc")
     assert {split_name(str(row))[0] for row in data["variant"].values} == {"on-the-axis"}

@@ -130,8 +130,7 @@ def kernels_of(root: Path, store: Path) -> dict[str, int]:
 @pytest.mark.slow
 def test_an_edited_callee_makes_a_new_kernel_and_a_comment_makes_none(tmp_path):
     """In a copy of the package, each time in a new process."""
-    skip = shutil.ignore_patterns("__pycache__")
-    shutil.copytree(code_hash.PACKAGE, tmp_path / "symtop", ignore=skip)
+    shutil.copytree(code_hash.PACKAGE, tmp_path / "symtop", ignore=shutil.ignore_patterns("__pycache__"))
     before = kernels_of(tmp_path, tmp_path / "cache")
     assert before["files"]
     for name in ("measure/errors.py", "run/modified_energy.py", "explore/answers.py", "methods/runge_kutta/gauss.py",

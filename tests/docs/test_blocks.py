@@ -76,8 +76,7 @@ class Page:
         assert program == "symtop"
         if apart:
             return succeeded(symtop(*rest), seconds=900.0)
-        done = call(*rest)
-        return done.output
+        return call(*rest).output
 
 
 def follow(page, slow, folder, monkeypatch):

@@ -96,8 +96,7 @@ def test_a_whole_report_is_taken_without_links_to_what_is_not_tracked(results, t
 def test_the_stored_snapshot_is_whole_and_pages_quote_what_it_says():
     folder = ROOT / "docs" / "snapshot"
     report = _taker().whole(folder)
-    shown = set(_taker().SHOWN.findall(report))
-    assert shown == {path.name for path in (folder / "figures").iterdir()}
+    assert set(_taker().SHOWN.findall(report)) == {path.name for path in (folder / "figures").iterdir()}
     for (name, begin), said in _taker().quoted(report).items():
         page = (ROOT / name).read_text(encoding="utf-8")
         assert _taker().quote(said, page, begin) == page, name

@@ -237,8 +237,7 @@ def test_exports_over_http_and_a_bad_port_is_refused(site, tmp_path):
     status, body, _ = request(site, "POST", "/script", json.dumps(chosen), **JSON)
     assert body.decode() == answers.script(answers.setup(chosen))
     for port in (site.server_address[1], 70_000):
-        result = call("explore", "--no-browser", "--port", port, code=2)
-        assert "port must be" in result.output
+        assert "port must be" in call("explore", "--no-browser", "--port", port, code=2).output
 
 
 PLOT = "document.querySelector('#plot-{}').toDataURL()"
@@ -350,8 +349,7 @@ def test_a_warning_is_shown_on_the_page(explorer, monkeypatch):
         return integrate(*args, **controls)
 
     monkeypatch.setattr(answers, "integrate", worried)
-    browser = explorer()
-    browser.wait_for("document.querySelector('#warnings').textContent === 'the phase will be <lost>'")
+    explorer().wait_for("document.querySelector('#warnings').textContent === 'the phase will be <lost>'")
 
 
 def costs(**changes):

@@ -125,10 +125,9 @@ def test_a_kernel_that_does_not_compile_or_returns_no_outcome_is_one_sentence(re
 def test_a_number_of_steps_that_is_none_is_refused(count, misbehaving):
     solver = misbehaving.changed(steps=lambda _: count)
     counted = symtop.Integrator(name="counted", family="other", summary="", solvers={"angles": solver})
-    with pytest.raises(symtop.SymtopError, match="must return a finite number of steps, not"):
-        symtop.simulate("spheroid", counted, step_size=0.01, horizon=0.5, guard=False)
-    with pytest.raises(symtop.SymtopError, match="must return a finite number of steps, not"):
-        symtop.ensemble(symtop.population(3), counted, step_size=0.01, horizon=0.5)
+    for run, on in ((symtop.simulate, "spheroid"), (symtop.ensemble, symtop.population(3))):
+        with pytest.raises(symtop.SymtopError, match="must return a finite number of steps, not"):
+            run(on, counted, step_size=0.01, horizon=0.5)
 
 
 def test_counts_of_numpy_are_numbers_in_a_dataset(misbehaving):

@@ -188,7 +188,6 @@ def impatient(monkeypatch):
     (lambda y, h: y, {}, r"must take \(f, t, y, h\), not \(y, h\)"),
     (midpoint, {"adaptive": True}, "need a class derived from OdeSolver"),
     (dict, {}, "must be derived from scipy.integrate.OdeSolver, not dict; any other step is a function, or the method"),
-    (type("Lie", (), {"step": midpoint}), {}, "must be derived from scipy.integrate.OdeSolver, not Lie"),
     (hangs, {}, r"a step of h = \d.* had not returned after \d+ s"),
     (lambda f, t, y, h: os.kill(os.getpid(), signal.SIGSEGV), {}, "its process was ended by SIGSEGV in a step of h = "),
     (lambda f, t, y, h: 1 / 0, {}, r"a step of h = .* raises ZeroDivisionError: division by zero"),
@@ -196,7 +195,6 @@ def impatient(monkeypatch):
     (lambda f, t, y, h: y.fill(0.0), {}, "step must return the new state, 6 real numbers, not None"),
     (lambda f, t, y, h: y[:3], {}, r"6 real numbers, not ndarray of shape \(3,\)"),
     (lambda f, t, y, h: (y, h), {}, "step must return the new state, 6 real numbers, not tuple$"),
-    (lambda f, t, y, h: (y, y), {}, r"6 real numbers, not tuple of shape \(2, 6\)"),
     (lambda f, t, y, h: y * 1j, {}, "6 real numbers, not ndarray .* complex128"),
 ])  # fmt: skip
 def test_what_cannot_be_judged_is_refused_in_one_sentence(target, options, words, impatient):
@@ -459,10 +457,6 @@ def euler_of_quaternions(q, w, h, inertia, torque):
     return product(q, turn(h * w)), w
 
 
-def euler_that_stretches(R, w, h, inertia, torque):
-    return R + h * np.cross(R, w), w + h * rates(R, w, inertia, torque)
-
-
 def of_rotation(function, step_size, horizon):
     method = integrator(RotationStep(function))
     return symtop.simulate("spheroid", method, step_size=step_size, horizon=horizon, guard=False)
@@ -478,8 +472,9 @@ def test_a_step_of_rotation_matrices_is_judged_as_one_of_quaternions_until_it_is
     errors = [float(symtop.errors(of_rotation(euler_of_matrices, h, 0.5))["axis"].max()) for h in (2e-3, 1e-3)]
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)  # order 1
     # SciPy raises an error of its own where one is left-handed, as a step that blows up may return it.
-    assert of_rotation(euler_that_stretches, 0.01, 2.0).attrs["outcome"] == "not_normalised"
-    lengths = np.linalg.norm(of_rotation(euler_that_stretches, 1e-5, 1e-3)["axis"].values, axis=1)
+    stretches = lambda R, w, h, inertia, torque: (R + h * np.cross(R, w), w + h * rates(R, w, inertia, torque))
+    assert of_rotation(stretches, 0.01, 2.0).attrs["outcome"] == "not_normalised"
+    lengths = np.linalg.norm(of_rotation(stretches, 1e-5, 1e-3)["axis"].values, axis=1)
     assert 1e-13 < abs(lengths[-1] - 1.0) < 1e-3
     run = of_rotation(lambda R, w, h, inertia, torque: (R @ np.diag([1.0, 1.0, -1.0]), w), 0.01, 0.1)
     assert (run.attrs["outcome"], run.attrs["reached_time"]) == ("not_finite", 0.0)

@@ -67,8 +67,7 @@ def test_errors_are_taken_from_both_halves_of_the_reference():
     for name, low in (("axis", "axis_lo"), ("attitude", "quaternion_lo"), ("theta", "theta_lo")):
         assert 1e-18 < float(with_low[name].max()) < EPSILON
         assert float(np.abs(truth[low].values).max()) > 1e-18
-        dropped = truth.drop_vars([low])
-        assert float(errors_against(scene, rounded, dropped)[name].max()) < 1e-20
+        assert float(errors_against(scene, rounded, truth.drop_vars([low]))[name].max()) < 1e-20
 
 
 def test_a_run_that_shows_its_quaternion_is_judged_without_the_rounding_of_its_angles():
@@ -123,11 +122,9 @@ def test_runs_side_by_side_in_long_double_are_those_alone(name):
     scene = symtop.scene("spheroid")
     horizon, counts = 1.37 * scene.nutation_period, np.array([7, 8, 40])
     stages = order_table._composition(scene, symtop.integrator(name))
-    together = order_table._ends(scene, stages, horizon, counts)
-    for count, end in zip(counts, together, strict=True):
+    for count, end in zip(counts, order_table._ends(scene, stages, horizon, counts), strict=True):
         assert np.array_equal(end, order_table._ends(scene, stages, horizon, np.array([count]))[0])
-        expected = alone(scene, stages, horizon, count)
-        assert np.abs(end - expected).max() < 1e-15
+        assert np.abs(end - alone(scene, stages, horizon, count)).max() < 1e-15
         assert np.abs(end - alone(scene, stages, horizon, count + 1)).max() > 1e-12  # the control
 
 
@@ -145,14 +142,12 @@ def test_added_steps_lie_where_the_error_is_a_power_and_only_plain_compositions_
     scene, method = symtop.scene("goldstein"), symtop.integrator("sofroniou-spaletta-10")
     horizon = 5.0 * scene.nutation_period
     coarse = error_table(scene, method, list(scene.nutation_period / np.geomspace(6.0, 80.0, 9)), horizon, "attitude")
-    steps = asymptotic_steps(coarse, "attitude", 10)
-    table = error_table(scene, method, steps, horizon, "attitude")
+    table = error_table(scene, method, asymptotic_steps(coarse, "attitude", 10), horizon, "attitude")
 
     def judged(part):
         return int(np.sum((part["attitude"] > 10.0 * part["attitude_bound"]) & (part["attitude"] < LARGEST_ERROR)))
 
     assert judged(table) >= 10 > judged(coarse)
-    nothing = coarse.assign(attitude=coarse["attitude_bound"])
-    assert asymptotic_steps(nothing, "attitude", 10) == []
+    assert asymptotic_steps(coarse.assign(attitude=coarse["attitude_bound"]), "attitude", 10) == []
     for name in ("takahashi-imada", "cayley", "gauss-4", "stormer-verlet", "rk4", "rk45"):
         assert extended_errors(scene, symtop.integrator(name)) is None

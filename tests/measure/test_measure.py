@@ -77,15 +77,11 @@ def test_a_table_stops_after_too_much_work_and_ladders_end():
 
 
 def test_combining_refuses_cases_with_different_coordinates():
-    def case(name, horizons):
-        data = xr.Dataset({"error": ("horizon", np.zeros(len(horizons)))}, coords={"horizon": horizons})
-        return symtop.Case("spheroid", name), data
-
+    case = lambda name, horizons: (symtop.Case("spheroid", name), xr.Dataset(
+        {"error": ("horizon", np.zeros(len(horizons)))}, coords={"horizon": horizons}))  # fmt: skip
     joined = datasets.combine([case("a", [8.0, 100.0]), case("b", [8.0, 100.0, 1000.0])])
     assert np.isnan(joined["error"].sel(variant="a", horizon=1000.0))
-    with pytest.raises(symtop.SymtopError, match="coordinate horizon of b on spheroid differs"):
-        datasets.combine([case("a", [8.0, 100.0]), case("b", [8.0, 1000.0])])
-    for these, those in ((["x", "y"], ["y", "x"]), ([10, 20], [20, 30])):
+    for these, those in (([8.0, 100.0], [8.0, 1000.0]), (["x", "y"], ["y", "x"]), ([10, 20], [20, 30])):
         with pytest.raises(symtop.SymtopError, match="coordinate horizon of b on spheroid differs"):
             datasets.combine([case("a", these), case("b", those)])
 
@@ -138,8 +134,7 @@ def test_a_function_is_asked_no_more_once_it_took_long_or_its_least_samples_agre
 
 
 def test_timings_know_when_they_are_noisy_and_errors_are_relative_to_their_scales():
-    scene = symtop.scene("goldstein")
-    run = symtop.simulate(scene, "exact", samples=5)
+    run = symtop.simulate(symtop.scene("goldstein"), "exact", samples=5)
     errors = symtop.errors(run.assign(p_phi=run["p_phi"] + 0.5, energy=run["energy"] + 0.16))
     assert errors["p_phi"].values == pytest.approx(0.5 / 5.0, rel=1e-12)  # the larger momentum is p_psi = 5
     assert errors["energy"].values == pytest.approx(0.16 / 0.24705927, rel=1e-6)  # E0 - p_psi^2/2 I3 - min V

@@ -82,8 +82,7 @@ def test_one_rule_says_what_a_slope_says_of_a_declared_order(claim, main, others
 
 def test_no_slope_confirms_two_orders_and_a_step_taken_twice_is_one_point():
     for slope in np.linspace(1.0, 3.0, 201):
-        words = [order_verdict(claim, fit(slope, 0.2)) for claim in (1, 2, 3)]
-        assert words.count("confirmed") <= 1
+        assert [order_verdict(claim, fit(slope, 0.2)) for claim in (1, 2, 3)].count("confirmed") <= 1
     assert 0.2 + BESIDE < 0.5 <= 0.1 + CLEARLY
     # Two points of the same step say nothing of the scatter: counted twice they made 8.9 +- 0.1 of order 10.
     rng, steps = np.random.default_rng(3), np.geomspace(0.6, 0.8, 6)

@@ -141,7 +141,7 @@ def test_two_runs_in_one_register_have_the_bits_of_each_alone(name, chart):
 
 
 NODES = np.array([0.0, *DPRKN8.c])
-MATRIX = np.array([np.pad(row, (0, len(NODES) - len(row))) for row in ((), *DPRKN8.a)])
+MATRIX = np.array([weights(row, len(NODES)) for row in ((), *DPRKN8.a)])
 
 
 @functools.cache
@@ -182,21 +182,15 @@ def moment(tree):
 
 def order_of(matrix, position, velocity, most=10):
     """The order to which weights of positions and velocities meet all conditions."""
-    b, c = (np.pad(weights, (0, len(NODES) - len(weights))) for weights in (position, velocity))
+    b, c = (weights(row, len(NODES)) for row in (position, velocity))
     for order in range(1, most):
-        for tree in trees(order):
-            weight, (factor, power) = elementary(tree, matrix), moment(tree)
-            if abs(c @ weight - factor / (power + 1)) > 1e-12:
-                return order - 1
-        for tree in trees(order - 1) if order > 1 else ():
-            weight, (factor, power) = elementary(tree, matrix), moment(tree)
-            if abs(b @ weight - factor / ((power + 1) * (power + 2))) > 1e-12:
-                return order - 1
+        for row, less in ((c, 0), (b, 1)):  # a position takes one integration more
+            for tree in trees(order - less):
+                factor, power = moment(tree)
+                solution = factor / ((power + 1) * (power + 2) ** less)
+                if abs(row @ elementary(tree, matrix) - solution) > 1e-12:
+                    return order - 1
     return most
-
-
-def less(weights, error):
-    return np.subtract(*(np.pad(row, (0, len(NODES) - len(row))) for row in (weights, error)))
 
 
 @functools.cache
@@ -248,7 +242,8 @@ def test_momenta_come_from_the_increments(factor):
 def test_the_table_has_order_eight_its_estimate_six_and_it_needs_fewer_forces_than_dop853():
     assert [len(trees(order)) for order in range(1, 6)] == [1, 1, 2, 3, 6]
     assert order_of(MATRIX, DPRKN8.b, DPRKN8.velocity) == 8
-    lower = less(DPRKN8.b, DPRKN8.error), less(DPRKN8.velocity, DPRKN8.velocity_error)
+    pairs_of_rows = (DPRKN8.b, DPRKN8.error), (DPRKN8.velocity, DPRKN8.velocity_error)
+    lower = (np.subtract(*(weights(row, len(NODES)) for row in pair)) for pair in pairs_of_rows)
     assert order_of(MATRIX, *lower) == 6
     np.testing.assert_allclose(MATRIX.sum(axis=1), NODES**2 / 2.0, atol=1e-14)
     np.testing.assert_array_equal(DPRKN8.a[-1], DPRKN8.b)  # the ninth stage is the first of the next step

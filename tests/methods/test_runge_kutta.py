@@ -17,7 +17,7 @@ from symtop.methods.runge_kutta.pair_tables import DORMAND_PRINCE
 from symtop.model.scenes import closed_form
 from symtop.run.simulation import make_plan
 from tests.conftest import random_scenes
-from tests.judging.blind.right import CLASSICAL, explicit
+from tests.judging.blind.right import CLASSICAL, explicit, rk4
 from tests.measure.test_order import series
 
 KUTTA_A, KUTTA_B, _ = CLASSICAL
@@ -104,10 +104,7 @@ def test_a_run_is_the_loop_that_anybody_writes_around_the_field(chart):
     f = symtop.field(chart, scene)
     y = f.state(scene.start)
     for _ in range(steps):
-        k1 = f(0.0, y)
-        k2 = f(0.0, y + 0.5 * h * k1)
-        k3 = f(0.0, y + 0.5 * h * k2)
-        y = y + h / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + f(0.0, y + h * k3))
+        y = rk4(f, 0.0, y, h)
     ours = symtop.integrator("rk4").solvers[chart](scene.top, scene.start, Plan.steps(h, [steps])).states[-1]
     ours, y = (ours[[0, 2, 3]], y[:3]) if chart == "angles" else (ours, y)  # angles are shown with p_theta
     np.testing.assert_allclose(ours, y, rtol=0.0, atol=2e-13)
@@ -163,13 +160,6 @@ def _walk(scene, tolerance, pair=pairs.RK45, **limits):
     return plan, replace(pairs.solver(FORMULATIONS["angles"], pair, pair.rows), **limits)(scene.top, scene.start, plan)
 
 
-def _error(name, tolerance, quantity="axis", **controls):
-    scene = symtop.scene("spheroid")
-    run = symtop.simulate(scene, name, tolerance=tolerance, **controls)
-    assert run.attrs["outcome"] == "ok"
-    return run, float(symtop.errors(run)[quantity].max())
-
-
 @pytest.mark.parametrize("name", ["rk45", "dop853", "lsoda", "radau"])
 def test_scipys_solvers_are_solve_ivp(name):
     from scipy.integrate import solve_ivp
@@ -194,13 +184,15 @@ def test_a_tableau_may_be_made_of_arrays_and_taylor_runs_in_three_precisions():
     rows = [np.array([]), np.array([1.0])]
     assert runge_kutta("heun", rows, heun[1]).solvers["axis"].rule == rules[0]
     pytest.importorskip("heyoka")
-    result = {}
-    for name in ("taylor", "taylor-longdouble", "taylor-quad"):
-        run, result[name] = _error(name, None, "attitude", horizon=4.0)
-        assert (run.attrs["chart"], run["quaternion"].dtype) == ("attitude", np.float64)
-    assert result["taylor"] < 5e-14  # beyond double what is left is the rounding of the samples and of the closed form
-    assert max(result["taylor-longdouble"], result["taylor-quad"]) < 5e-15
-    loose = _error("taylor-quad", 1e-8, horizon=4.0)[1]
+    names, result = ("taylor", "taylor-longdouble", "taylor-quad"), {}
+    for name, tolerance in (*((name, None) for name in names), (names[2], 1e-8)):
+        run = symtop.simulate("spheroid", name, tolerance=tolerance, horizon=4.0)
+        kind = run.attrs["outcome"], run.attrs["chart"], run["quaternion"].dtype
+        assert kind == ("ok", "attitude", np.float64)
+        result[name, tolerance] = float(symtop.errors(run)["attitude"].max())
+    double, *beyond, loose = result.values()
+    assert double < 5e-14  # beyond double what is left is the rounding of the samples and of the closed form
+    assert max(beyond) < 5e-15
     assert loose > 1e-12  # the tolerance reaches heyoka
 
 
@@ -213,8 +205,7 @@ def test_extended_precision_is_not_lost_on_the_way():
     flight = propagate("axis", "quad", 1e-35, scene.top, scene.start, np.array([0.0, 4.0]))
     assert flight.states.dtype == np.dtype(hy.real128)
     p_phi, p_psi = space_momenta("axis", flight.states)
-    length = np.sum(flight.states[:, :3] * flight.states[:, :3], axis=-1)
-    for constant in (p_phi, p_psi, length):
+    for constant in (p_phi, p_psi, np.sum(flight.states[:, :3] * flight.states[:, :3], axis=-1)):
         assert abs(float(constant[1] - constant[0])) < 1e-30
 
 

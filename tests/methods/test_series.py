@@ -39,8 +39,7 @@ def worst_gap(chart, method, scene, per_nutation, nutations=10.0):
 
 def called(function, *arguments):
     """What an intrinsic returns, which only compiled code can call."""
-    call = lambda given: function(*given)
-    return njit(call)(arguments)
+    return njit(lambda given: function(*given))(arguments)
 
 
 @pytest.mark.parametrize(("of_order", "size"), [(axis_sum, 6), (attitude_sum, 7)])
@@ -115,8 +114,7 @@ def test_the_error_follows_the_tolerance(chart, method, name):
     strict = method.solvers[chart](scene.top, scene.start, symtop.Plan.until(times, 1e-17))
     loose = method.solvers[chart](scene.top, scene.start, symtop.Plan.until(times, 1e-5))
     assert strict.steps > loose.steps
-    p_psi = scene.top.momenta(scene.start).p_psi
-    assert strict.p_psi == pytest.approx(np.full(41, p_psi), rel=1e-11)
+    assert strict.p_psi == pytest.approx(np.full(41, scene.top.momenta(scene.start).p_psi), rel=1e-11)
 
 
 def test_a_free_top_and_one_at_rest_and_bad_input():

@@ -60,8 +60,7 @@ def test_a_table_without_a_last_kick_kicks_with_the_newest_axis(chart):
 def test_lengths_and_momenta_have_no_trend_in_a_million_steps(name, chart):
     scene = symtop.scene("spheroid")
     done = run(METHODS[name], scene, scene.nutation_period / 20.2, np.arange(0, 1_000_001, 100_000), chart)
-    place = done.states[:, :-3]
-    assert np.abs(np.linalg.norm(place, axis=1) - 1.0).max() < 2e-15
+    assert np.abs(np.linalg.norm(done.states[:, :-3], axis=1) - 1.0).max() < 2e-15
     assert np.ptp(done.states[:, -1]) == 0.0  # L_z
     scale = max(abs(done.p_phi[0]), abs(done.p_psi[0]))
     assert np.abs(done.p_psi - done.p_psi[0]).max() < 5e-13 * scale

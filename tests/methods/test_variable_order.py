@@ -41,8 +41,7 @@ def test_coefficients_of_equal_steps_are_those_of_adams_and_bashforth():
 
 @pytest.mark.parametrize("k", range(1, HIGHEST + 1))
 def test_a_predictor_integrates_polynomials_below_its_order_on_any_nodes_and_no_higher_one(k):
-    rng = np.random.default_rng(k)
-    past, h = rng.uniform(0.5, 2.0, 13), 0.8
+    past, h = np.random.default_rng(k).uniform(0.5, 2.0, 13), 0.8
     nodes, made = -np.concatenate([[0.0], np.cumsum(past)])[:k], prepared(past, h, k)
     for degree in range(k + 1):
         f = nodes**degree if degree else np.ones(k)

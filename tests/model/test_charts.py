@@ -21,8 +21,7 @@ def turn(angle):
 
 @pytest.mark.parametrize("scene", random_scenes(40, seed=7), ids=lambda s: s.name)
 def test_attitude_and_back(scene):
-    state = charts.space_state("attitude", scene.top, scene.start)
-    back = charts.angles_from_attitude(scene.top, state)
+    back = charts.angles_from_attitude(scene.top, charts.space_state("attitude", scene.top, scene.start))
     assert back.theta == pytest.approx(scene.start.theta, abs=4e-16)
     assert turn(back.phi - scene.start.phi) == pytest.approx(0.0, abs=1e-15)
     assert turn(back.psi - scene.start.psi) == pytest.approx(0.0, abs=1e-15)

@@ -79,8 +79,7 @@ def test_the_arithmetic_is_recorded():
     long = ClosedForm(steady.top, steady.start).provenance
     assert long.arithmetic == "quad-double"
     assert 0.0 <= long.rate_error < turning_points.RATE
-    top = SymmetricTop(1.0, 0.5, 1.0)
-    far = ClosedForm(top, Angles(1.0, 3e12, 0.2, 0.3, 0.4, 0.5))
+    far = ClosedForm(SymmetricTop(1.0, 0.5, 1.0), Angles(1.0, 3e12, 0.2, 0.3, 0.4, 0.5))
     assert (far.provenance.arithmetic, far.provenance.rate_error) == ("40 digits", closed_form.DIGITS_ERROR)
     assert "range" in far.provenance.reason
     asleep = ClosedForm(SymmetricTop(1.0, 1.0, 1.0), Angles(0.0, psi_dot=2.0))  # I3 w3 = 2 sqrt(I1 mgl)
@@ -225,8 +224,6 @@ def test_after_as_many_turns_as_doubles_count_the_attitude_is_within_its_bound()
     times = np.random.default_rng(0).uniform(most, 2.0 * most, 12) * form.nutation_period / 4.0
     true = np.array([[float(part) for part in precise.quaternion(float(time))] for time in times])
     assert charts.attitude_distance(form.quaternion(times), true).max() < 1e-14
-    for value in (0.5, 1.5, 2.5, -2.5, most / 2 + 0.5, most / 2 + 1.5, -most / 2 - 1.5, most - 0.5, most + 1.0):
-        assert double_double.whole_part(value) == round(value)
 
 
 @pytest.mark.parametrize("count", [1, pytest.param(40, marks=pytest.mark.slow)])
@@ -353,8 +350,7 @@ def test_distances_from_an_axis_are_those_of_the_chart(implementation):
     np.testing.assert_allclose(gap, turn, rtol=1e-3)
     far = charts.axis_distance(-axes, axes)
     np.testing.assert_allclose(closed_form.distances(forms.constants, TIMES[None, 1:4], -axes), far, atol=1e-15)
-    pair = _pairs(1)[0]
-    assert ClosedForm(*pair).axis_distance(TIMES[1:4], states[0, :, :3]).tobytes() == gap[0].tobytes()
+    assert ClosedForm(*_pairs(1)[0]).axis_distance(TIMES[1:4], states[0, :, :3]).tobytes() == gap[0].tobytes()
 
 
 def test_members_momenta_and_threads():

@@ -69,7 +69,8 @@ def test_sums_products_square_roots_and_rounding():
         assert _error(dd.root(a), mp.sqrt(_exact(a))) <= 4 * UNIT
         assert dd.square(a) == dd.mul(a, a)
     assert dd.root((-1.0, 0.0)) == (0.0, 0.0)
-    for x in (0.5, 1.5, 2.5, -0.5, 3.49, 1e15 + 0.5, 3e17, -7.0):
+    half, most = 2.0**51, 2.0**52
+    for x in (0.5, 1.5, 2.5, -0.5, -2.5, 3.49, 3e17, -7.0, half + 0.5, half + 1.5, -half - 1.5, most - 0.5, most + 1.0):
         assert dd.whole_part(x) == round(x)
 
 

@@ -154,8 +154,7 @@ def test_without_weight_it_is_the_exact_free_motion(precise, count):
         times = np.array([0.0, -1.7, 10.0]) * natural
         free, states = HeavyBody(body.inertia, (0.0, 0.0, 0.0), body.quaternion, body.momentum), exact.states(times)
         motion = free.samples(times, precise=precise)
-        share = worst_share(exact.mp, motion, [state[:4] for state in states])
-        assert share < 1.0, body
+        assert worst_share(exact.mp, motion, [state[:4] for state in states]) < 1.0, body
         assert apart(exact.mp, motion.momentum[2], states[2][4:]) < 1e-12 * float(exact.G)
         assert motion.bound.max() < (1e-24 if precise else 1e-9)
         if k == 0:  # the control

@@ -55,8 +55,7 @@ def test_the_units_of_a_card_are_those_of_its_scene(chart, unit, scale, tmp_path
 
 
 def test_the_badge_says_what_is_refuted_or_what_the_method_is(ledger, tmp_path):
-    file = write_badge(ledger, tmp_path / "badge.svg")
-    root = ET.fromstring(file.read_text(encoding="utf-8"))
+    root = ET.fromstring(write_badge(ledger, tmp_path / "badge.svg").read_text(encoding="utf-8"))
     words = [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")]
     assert words == ["symtop", "refuted: symplectic, energy"]
     confirmed = Finding("order", "2", Measured("slope", 2.0, text="2.000 +- 0.001"), "confirmed", "a <b>", 2.0, 0.05)

@@ -127,8 +127,7 @@ def test_a_published_figure_has_a_vector_beside_it_and_the_same_bytes_again(tmp_
         files.append([(tmp_path / folder / f"a.{kind}").read_bytes() for kind in ("png", "pdf")])
     assert files[0] == files[1]
     assert files[0][1].startswith(b"%PDF")
-    with_pixels = np.frombuffer(files[0][0][16:24], ">u4")
-    assert with_pixels[0] == round(style.WIDTH * style.DPI)
+    assert np.frombuffer(files[0][0][16:24], ">u4")[0] == round(style.WIDTH * style.DPI)
 
 
 def test_no_two_integrators_look_alike_and_a_formula_has_one_colour():

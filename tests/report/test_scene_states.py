@@ -229,10 +229,9 @@ def test_a_start_that_is_moved_by_a_rounding_is_another_motion(monkeypatch):
 def test_the_command_refuses_a_folder_that_holds_something(tmp_path, monkeypatch):
     (tmp_path / "test-set").mkdir()
     (tmp_path / "test-set" / "mine").touch()
-    result = call("archive", "--test-set", "--results", tmp_path, code=2)
-    assert "the test set needs a folder that is new or empty" in result.stderr
-    result = call("archive", "--test-set", "--output", tmp_path / "test-set", code=2)
-    assert "the test set needs a folder that is new or empty" in result.stderr
+    for place in (("--results", tmp_path), ("--output", tmp_path / "test-set")):
+        result = call("archive", "--test-set", *place, code=2)
+        assert "the test set needs a folder that is new or empty" in result.stderr
     with monkeypatch.context() as patch:  # told before anything is computed
         patch.setattr(test_set, "body_digits", None)
         call("archive", "--test-set", "--output", tmp_path / "test-set" / "mine" / "folder", code=2)

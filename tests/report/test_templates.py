@@ -34,8 +34,7 @@ def test_a_page_asks_its_question_and_its_figures_have_titles_captions_and_words
 
 @pytest.mark.parametrize("name", TEXTS)
 def test_links_to_pages_name_studies_or_benchmarks(name):
-    linked = set(re.findall(r"\bpages\.(\w+)", TEXTS[name]))
-    assert linked <= {*runner.names(), "peers", "bench", "measured"}
+    assert set(re.findall(r"\bpages\.(\w+)", TEXTS[name])) <= {*runner.names(), "peers", "bench", "measured"}
 
 
 def test_the_front_page_renders_without_any_study_and_with_what_there_is(tmp_path):
@@ -81,12 +80,10 @@ def test_a_page_without_what_was_not_measured_says_so_once_and_points_without_a_
     chart = {"title": "c", "panels": {"one": [("rk4", [(1.0, math.nan, 1e-3, "w"), (2.0, math.inf, 1e-4, "v")])]}}
     points = json.loads(prepared(chart))["panels"]["one"][0]["points"]
     assert points == [[1.0, None, 1e-3, "w"], [2.0, None, 1e-4, "v"]]
-    (tmp_path / "drift.json").write_text("[]", encoding="utf-8")
-    with pytest.raises(symtop.SymtopError, match="no study has left findings"):
-        gather(tmp_path)
-    (tmp_path / "drift.json").write_text("{}", encoding="utf-8")
-    with pytest.raises(symtop.SymtopError, match=r"the findings of drift in .* are incomplete"):
-        gather(tmp_path)
+    for stored, words in (("[]", "no study has left findings"), ("{}", "the findings of drift in .* are incomplete")):
+        (tmp_path / "drift.json").write_text(stored, encoding="utf-8")
+        with pytest.raises(symtop.SymtopError, match=words):
+            gather(tmp_path)
 
 
 @pytest.mark.parametrize(("name", "remedy"), [("drift", "run it again: symtop study drift, or "), ("peers", "")])

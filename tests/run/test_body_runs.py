@@ -266,8 +266,7 @@ def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
     assert RigidBody.from_inertia(np.diag([3.0, 1.0, 2.9])).moments == (2.9, 3.0, 1.0)
     assert RigidBody.from_brick(12.0, (1.0, 2.0, 3.0)).moments == (13.0, 10.0, 5.0)
     corners = [(x, y, z) for x in (-0.5, 0.5) for y in (-1.0, 1.0) for z in (-1.5, 1.5)]
-    points = RigidBody.from_points([1.5] * 8, corners)
-    assert sorted(points.moments) == pytest.approx([15.0, 30.0, 39.0])
+    assert sorted(RigidBody.from_points([1.5] * 8, corners).moments) == pytest.approx([15.0, 30.0, 39.0])
 
 
 @functools.cache
@@ -318,8 +317,7 @@ def test_a_body_stored_or_of_plain_numbers_is_read_back_to_the_bit(tmp_path):  #
         np.testing.assert_array_equal(errors["attitude"], symtop.errors(run)["attitude"])
     with pytest.raises(symtop.SymtopError, match="scene must be that of the data"):
         symtop.errors(run, scene)
-    draws = np.random.default_rng(0).normal(size=(500, 4))
-    for w, x, y, z in draws:
+    for w, x, y, z in np.random.default_rng(0).normal(size=(500, 4)):
         body = symtop.RigidBody(1.0, 1.2, 0.9, 1.0, (x, y, z))
         start = symtop.Attitude(np.array([w, x, y, z]) / np.linalg.norm([w, x, y, z]))
         assert (dataclasses.replace(body), dataclasses.replace(start)) == (body, start)

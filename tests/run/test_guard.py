@@ -329,8 +329,7 @@ def test_a_body_at_rest_that_falls_into_chaos_is_watched_with_steps_short_enough
     centre = -0.16832199744994217, 0.1246126810504462, 0.977823800536621
     top = symtop.RigidBody(64.71510826337011, 65.93699830228155, 2.8344512930461883, 441.5149085593378, centre)
     quaternion = -0.47393681068836624, -0.09460717548517857, 0.2768361448418805, 0.8305390603278943
-    start = symtop.Attitude(quaternion, (0.0, 0.0, 0.0))
-    scene = symtop.Scene("falling", top, start, 75.80899162607354)
+    scene = symtop.Scene("falling", top, symtop.Attitude(quaternion, (0.0, 0.0, 0.0)), 75.80899162607354)
     method, step = symtop.integrator("series-general"), 0.014985196599444847
     fine = Integrated(scene).states(np.array([scene.horizon]), 1e-15)
     coarse = symtop.simulate(scene, method, step_size=step, guard=False, samples=2)

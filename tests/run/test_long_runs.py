@@ -279,8 +279,7 @@ def test_what_a_free_body_keeps_grows_as_rounding_and_what_it_does_not_keep_as_t
     command = ["long", "tennis-racket", "--steps", "1e5", "--per-nutation", "60.37", "--checkpoint", tmp_path / "c.nc"]
     sizes = {}
     for name in ("strang", "rk4"):
-        lines = call(*command, name).output.splitlines()
-        row = next(line.split() for line in lines if line.startswith("|L|"))
+        row = next(line.split() for line in call(*command, name).output.splitlines() if line.startswith("|L|"))
         sizes[name] = max(abs(float(row[1])), abs(float(row[2]))), float(row[4].removeprefix("t^"))
     assert sizes["strang"][0] < 1e-14
     assert sizes["rk4"][0] > 1e-6

@@ -56,8 +56,7 @@ def test_a_full_disk_ends_the_run_and_what_was_computed_is_kept(tmp_path, monkey
     (store.tempfile, "TemporaryFile", OSError(errno.EROFS, os.strerror(errno.EROFS)), "Read-only file system"),
 ])  # fmt: skip
 def test_what_the_netcdf_library_or_the_system_refuses_to_write(tmp_path, monkeypatch, place, name, error, says):
-    refuse = Mock(side_effect=error)
-    monkeypatch.setattr(place, name, refuse)
+    monkeypatch.setattr(place, name, Mock(side_effect=error))
     refused(tmp_path, says)
     if place is xr.Dataset:
         monkeypatch.setattr(netcdf, "LITTLE", 1e30)

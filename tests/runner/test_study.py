@@ -143,8 +143,7 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path, clean_registr
     cases.append(dataclasses.replace(cases[0], integrator="unlucky[angles]"))
     small = dataclasses.replace(whole, cases=lambda quick: cases)
     symtop.register(unlucky)
-    findings = runner.run(small, tmp_path, quick=True, quiet=True)
-    (failure,) = findings["failures"]
+    (failure,) = runner.run(small, tmp_path, quick=True, quiet=True)["failures"]
     assert failure == "unlucky[angles] on goldstein failed: integrator unlucky[angles] failed: RuntimeError: no luck"
     assert list(netcdf.read(tmp_path / "stability.nc")["variant"].values) == ["midpoint[angles]"]
     assert runner.run(small, tmp_path, quick=True, quiet=True)["failures"]  # tried again, not forgotten
@@ -189,8 +188,7 @@ def test_single_precision_stays_and_is_stored_in_little_space(tmp_path):
     for kind in (np.float32, np.float64):
         cases = [(Case("spheroid", name), xr.Dataset({"cost": ("member", row.astype(kind)[: 40_000 - (k == 2)])}))
                  for k, (name, row) in enumerate(zip(("rk4", "strang", "midpoint"), rounded, strict=True))]  # fmt: skip
-        data = datasets.combine(cases)
-        path = netcdf.write(data, tmp_path / f"{kind.__name__}.nc")
+        path = netcdf.write(datasets.combine(cases), tmp_path / f"{kind.__name__}.nc")
         again = netcdf.read(path)["cost"].sel(scene="spheroid")
         assert again.dtype == kind
         np.testing.assert_array_equal(again.values[:2], rounded[:2])
@@ -201,8 +199,7 @@ def test_single_precision_stays_and_is_stored_in_little_space(tmp_path):
 
 def test_a_tree_is_read_as_it_was_written_and_a_check_names_the_group_that_differs(tmp_path):
     data = netcdf.describe(tree(), "Groups", question="Does it come back?")
-    path = netcdf.write(data, tmp_path / "groups.nc")
-    again = netcdf.read_any(path)
+    again = netcdf.read_any(netcdf.write(data, tmp_path / "groups.nc"))
     assert (differences(data, again), again["phases/energy"].dtype) == ([], np.uint8)
     assert again.attrs["question"] == "Does it come back?"
     assert again["windows/energy"].attrs["long_name"] == "total energy"

@@ -84,8 +84,7 @@ def test_a_body_of_epsilon_zero_moves_as_the_top_that_it_is():
     bodies = drawn(SYMMETRIC)
     tops = as_tops(bodies)
     np.testing.assert_array_equal(tops.times, bodies.times)
-    gap = attitude_distance(tops.truth[1], bodies.truth[0])
-    assert (gap.max(axis=1) < bodies.truth[1] + 1e-13).all()
+    assert (attitude_distance(tops.truth[1], bodies.truth[0]).max(axis=1) < bodies.truth[1] + 1e-13).all()
     other = as_tops(drawn("0.1"))
     assert (attitude_distance(other.truth[1], drawn("0.1").truth[0]).max(axis=1) > 1e-4).all()  # the negative control
 

@@ -94,8 +94,7 @@ def test_noise_of_a_price_widens_the_interval_of_a_share_which_covers_it_as_ofte
         one = next(standing for standing in first if standing.name == "a")
         inside += one.low <= true <= one.high
     assert 51 <= inside <= 60
-    draw = np.random.default_rng(2)
-    table = np.stack([np.exp(0.1 * draw.standard_normal(3000)), np.full(3000, 1.1)])
+    table = np.stack([np.exp(0.1 * np.random.default_rng(2).standard_normal(3000)), np.full(3000, 1.1)])
     narrow, wide = (hindsight("ab", table, np.array([error, error])).standings[0] for error in (0.0, 0.06))
     assert wide.share == narrow.share
     assert wide.high - wide.low > 3.0 * (narrow.high - narrow.low)

@@ -38,8 +38,7 @@ def data(quick_results):
 
 @pytest.mark.parametrize("power", laws.POWERS)
 def test_a_power_is_found_and_continued_over_six_decades(power):
-    errors = np.where(SHORT, 1e-9 * FAR**power, np.nan)[np.newaxis]
-    found = laws.fit(FAR, errors)
+    found = laws.fit(FAR, np.where(SHORT, 1e-9 * FAR**power, np.nan)[np.newaxis])
     assert found.leading[0] == power
     assert found.slope[0] == pytest.approx(power, abs=1e-6)
     np.testing.assert_allclose(found.at(FAR)[0], 1e-9 * FAR**power, rtol=1e-9)
@@ -154,8 +153,7 @@ def test_a_variant_whose_energy_drifts_loses_it_late_and_one_that_keeps_it_takes
     late = panel.horizons > 1e5
     assert not DRIFTING & {panel.names[k] for k in panel.winner[:, late].ravel() if k >= 0}
     t, h = panel.place(1e-4, 1e6)
-    row = panel.names.index("rk4[axis]")
-    behind = panel.costs[row, t] / panel.costs[:, t].min(axis=0)
+    behind = panel.costs[panel.names.index("rk4[axis]"), t] / panel.costs[:, t].min(axis=0)
     assert behind[h] > 5.0 * behind[0]  # by much more than at ten nutations
     assert "gauss-8[axis]" in runs.variants_of(data, "axis")
     assert not any("gauss" in name for name in runs.variants_of(data, "shape"))

@@ -60,8 +60,7 @@ def test_a_history_says_with_what_it_ran_and_has_one_behaviour_in_every_study():
         columns = {"outcome": ("scene", ["ok"]), **{name: ("scene", [value]) for name, value in measured.items()}}
         cell = xr.Dataset(columns, coords={"scene": ["spheroid"]})
         grain = symtop.scene("spheroid").energy_grain
-        changed = Changed(size, 0.0, 1.0, 0.0, exponent, interval, "")
-        ledger = Constant(changed, 0.0, KEPT * grain, grain)
+        ledger = Constant(Changed(size, 0.0, 1.0, 0.0, exponent, interval, ""), 0.0, KEPT * grain, grain)
         assert measures.worst_behaviour(cell, "energy") == ledger.kind
 
 
@@ -94,8 +93,7 @@ def test_a_constant_is_kept_bounded_or_lost_on_the_worst_scene(histories):
     assert fates["p_phi_largest"].tolist() == SIZES["p_phi"]
     answers = facts.of_histories(histories)
     assert (answers["variants"], answers["holding"]) == (5, 2)
-    lost = [answers[f"energy_lost{end}"] for end in ("", "_worst", "_most")]
-    assert lost == [2, "rk4[angles]", 1e-2]
+    assert [answers[f"energy_lost{end}"] for end in ("", "_worst", "_most")] == [2, "rk4[angles]", 1e-2]
     assert (answers["bounded_runs"], answers["bounded_as_t"], answers["lost_faster"]) == (4, 3, 4)
     ended = histories.assign(outcome=histories["outcome"].where(histories["variant"] != "strang[axis]", "left_chart"))
     assert measures.fates(ended)["energy"]["strang[axis]"] == measures.FAILED
@@ -186,8 +184,7 @@ def test_each_has_the_bits_of_a_long_run(name, compensated):
 def test_adaptive_methods_drift_at_one_tolerance_and_the_ordinary_ensemble_goes_in_lanes():
     """One value for all of them, except for those that have a default of their own and keep it."""
     asked = [case for case in cases(quick=False) if case.group == measures.HISTORIES]
-    given = {case.settings["tolerance"] for case in asked if "tolerance" in case.settings}
-    assert given == {TOLERANCE}
+    assert {case.settings["tolerance"] for case in asked if "tolerance" in case.settings} == {TOLERANCE}
     for case in asked:
         method = symtop.integrator(case.integrator)
         assert len(method.charts()) == 1, case

@@ -44,8 +44,7 @@ class Symbols:
 
     def values(self, expressions, points):
         """Numbers of expressions at points (n, 6) of (theta, phi, psi, theta', phi', psi'); shape (len, n)."""
-        function = self.hy.cfunc(list(expressions), [*self.q, *self.v])
-        return function(np.ascontiguousarray(points.T))
+        return self.hy.cfunc(list(expressions), [*self.q, *self.v])(np.ascontiguousarray(points.T))
 
 
 @pytest.fixture(scope="module")
@@ -75,8 +74,7 @@ def test_accelerations_and_momenta_of_the_kernels_are_those_of_the_symbolic_lagr
     top = symtop.SymmetricTop(*NUMBERS)
     slopes = symbols.values([symbols.hy.diff(symbols.ways[0], v) for v in symbols.v[1:]], points)
     for k, point in enumerate(points):
-        at = symtop.Angles(*point)
-        assert top.momenta(at)[:2] == pytest.approx(slopes[:, k], rel=1e-12, abs=1e-12)
+        assert top.momenta(symtop.Angles(*point))[:2] == pytest.approx(slopes[:, k], rel=1e-12, abs=1e-12)
         assert momenta(top, point[0], point[4], point[5]) == pytest.approx(slopes[:, k], rel=1e-12, abs=1e-12)
 
 

@@ -83,8 +83,7 @@ def test_the_truth_is_the_closed_form_and_any_planar_oscillator_has_its_own_func
     assert np.abs(np.abs(true_path(off, times)) ** 2 - np.abs(first) ** 2).max() > 1e-5
     oscillator = Quartic(-0.7, 0.4, 0.9 + 0.1j, 0.2 + 0.6j)  # a potential with a hump in the middle
     assert 1.0 + exact(oscillator, 0.5 * oscillator.period).lift == pytest.approx(0.0, abs=1e-7)
-    times = oscillator.period * np.array([0.3, 1.3])
-    here, later = np.abs(true_path(oscillator, times))
+    here, later = np.abs(true_path(oscillator, oscillator.period * np.array([0.3, 1.3])))
     assert here == pytest.approx(later, abs=1e-14)
 
 

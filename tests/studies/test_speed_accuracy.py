@@ -24,8 +24,7 @@ def data():
 def test_a_cost_lies_between_the_runs_and_one_of_the_coarsest_setting_is_an_upper_bound(data):
     cell = facts.shown(data.assign(seconds=data["force_evaluations"])).sel(variant="strang[axis]")
     error, seconds = cell["axis"].values, cell["seconds"].values
-    middle = math.sqrt(error[1] * error[2])
-    assert facts.cost(cell, middle) == pytest.approx(math.sqrt(seconds[1] * seconds[2]))
+    assert facts.cost(cell, math.sqrt(error[1] * error[2])) == pytest.approx(math.sqrt(seconds[1] * seconds[2]))
     assert facts.cost(cell, error[2]) == pytest.approx(seconds[2])
     assert facts.cost(cell, 1e-3 * error.min()) == math.inf
     assert facts.tables(data)["times"].set_index("variant")["upper bound at (rad)"].eq("").all()  # the control
@@ -56,8 +55,7 @@ def test_a_run_is_that_of_its_setting_and_the_page_says_what_was_measured(data, 
     assert not np.isfinite(attitude[["attitude", "seconds"]].isel(setting=0).to_array()).any()
     assert np.isfinite(attitude[["attitude", "seconds"]].isel(setting=slice(1, None)).to_array()).all()
     assert not np.isfinite(facts.shown(data)["axis"].sel(variant="rk4[attitude]")).any()
-    text = checked("speed", data, tmp_path, elsewhere={"error-against-time"})
-    assert "`takahashi" not in text
+    assert "`takahashi" not in checked("speed", data, tmp_path, elsewhere={"error-against-time"})
     assert facts.facts(data)["scipy"] is None
 
 

@@ -26,6 +26,5 @@ def test_facts_and_page_follow_from_the_errors_and_a_broken_bound_is_counted(tmp
     ratios = xr.Dataset({ERROR: ("run", [1.0, 2.0, 4.0, np.nan]), BOUND: ("run", [2.0, 1.0, 40.0, 1.0])})
     assert bound_ratios(ratios) == (3, 1, 2.0)
     assert facts.tables(data)["sources"]["time (s)"].tolist() == [20.0, 20.0]  # each at its longest
-    text = checked("truth", data, tmp_path)
-    assert "quadruple precision, which" not in text  # there was none
+    assert "quadruple precision, which" not in checked("truth", data, tmp_path)  # there was none
     assert np.isfinite(facts.facts(data)["bound_ratio"])
