@@ -84,7 +84,7 @@ METHODS = "symtop.methods"
     (f"{METHODS}.runge_kutta.gauss:solve_stages", GAUSS),
     (f"{METHODS}.lagrangian.discrete_lagrangian:forces", STRAIGHT),
     (f"{METHODS}.library.scipy_ivp:compiled_field", SCIPY),
-    (f"{METHODS}.runge_kutta.explicit:later_stages", {"euler", "rk4"}),  # the guard's watch reaches what pairs are made of
+    (f"{METHODS}.runge_kutta.explicit:later_stages", {"euler", "rk4"}),  # the watch of guards reaches what pairs are of
     (f"{METHODS}.lie_group.generalised_alpha:_corrected", {"generalised-alpha"}),
     (f"{METHODS}.taylor.heyoka:propagate", {"taylor", "taylor-longdouble", "taylor-quad"}),
     ("symtop.cli.common:as_text symtop.report.page:write symtop.measure.accuracy:error_row", set()),
