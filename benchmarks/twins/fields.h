@@ -45,6 +45,8 @@ static inline void field(const Par *par, const double *y, double *f) {
     double half = 0.5 / par->I1, px = half * y[4], py = half * y[5], pz = half * y[6];
     double right = 2.0 * (y[1] * y[3] + y[0] * y[2]), back = 2.0 * (y[2] * y[3] - y[0] * y[1]);
     double up = y[0] * y[0] - y[1] * y[1] - y[2] * y[2] + y[3] * y[3];
+    double one = 1.0 / (y[0] * y[0] + y[1] * y[1] + y[2] * y[2] + y[3] * y[3]);
+    right = one * right, back = one * back, up = one * up;
     double turn = 0.5 * (par->lean * (right * y[4] + back * y[5] + up * y[6]));
     f[0] = -(px * y[1] + py * y[2] + pz * y[3]) - turn * y[3];
     f[1] = px * y[0] + py * y[3] - pz * y[2] + turn * y[2];

@@ -333,11 +333,9 @@ def _start(scene: Scene, chart: str, state: Array, p_phi: float, p_psi: float) -
             return heavy, Angles.from_axis(top, place, momentum.tolist()), r
         if chart == BODY:
             return heavy, Attitude(place, tuple((momentum / top.moments).tolist())), r
-        # L.e(q) is r^2 times what it is of a unit quaternion, so 1/I3 - 1/I1 is: in a disc, beyond what a top can have
-        lean, along = r * r * (1.0 / top.I3 - 1.0 / top.I1), axis_from_quaternion(unit)
-        object.__setattr__(heavy, "I3", 1.0 / (1.0 / top.I1 + lean))
-        omega = momentum / top.I1 + lean * (momentum @ along) * along
-        return heavy, Angles.from_quaternion(place, omega_space=omega.tolist()), r
+        along = axis_from_quaternion(unit)
+        omega = momentum / top.I1 + (1.0 / top.I3 - 1.0 / top.I1) * (momentum @ along) * along
+        return top, Angles.from_quaternion(place, omega_space=omega.tolist()), r  # f does not hang on |q|
 
 
 @functools.lru_cache(maxsize=256)

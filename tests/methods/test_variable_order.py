@@ -84,7 +84,7 @@ def test_it_needs_no_more_evaluations_than_scipys_adams_codes_and_errs_no_more(n
 @pytest.mark.parametrize("chart", list(FORMULATIONS))
 @pytest.mark.parametrize(("name", "tolerances"), [
     ("adams", (1e-5, 1e-8, 1e-12)),  # at 1e-4 a quaternion is longer than one by more than 0.1 %, an outcome
-    ("extrapolation", (1e-5, 1e-8, 1e-13)),
+    ("extrapolation", (1e-4, 1e-8, 1e-12)),
 ])  # fmt: skip
 def test_errors_follow_the_tolerance_and_orders_rise_with_it(name, tolerances, chart):
     runs = [symtop.simulate("spheroid", f"{name}[{chart}]", tolerance=tolerance, samples=161, guard=False)

@@ -2,12 +2,13 @@
 
     e' = L x e / I1,    q' = (L q / I1 + twist q k) / 2,    L' = mgl k x e,    twist = p_psi (1/I3 - 1/I1)
 
-f of (q, L) has p_psi = L.e(q) of the state (`on_state`). What keeps p_psi exactly or to rounding, as splittings, maps
-on the group and Taylor series do, may take the twist of the start for the whole run (`on_attitude`). The attitude has a
-third form, the frame (e, L, a). A unit vector a across the axis is carried by a' = L x a / I1; the body turns past it
-about e at the constant rate `twist`, which is applied exactly when a sample is taken. Every equation and every constant
-of this form is linear or quadratic, whereas p_psi = L.e(q) is cubic in (q, L), where no Runge-Kutta method keeps it;
-and what is integrated turns with the axis, not with the spin.
+f of (q, L) has p_psi = L.e of the state, with the axis of q/|q| (`on_state`): of a length that a method does not keep
+the rates would be those of another spin. What keeps p_psi exactly or to rounding, as splittings, maps on the group and
+Taylor series do, may take the twist of the start for the whole run (`on_attitude`). The attitude has a third form, the
+frame (e, L, a). A unit vector a across the axis is carried by a' = L x a / I1; the body turns past it about e at the
+constant rate `twist`, which is applied exactly when a sample is taken. Every equation and every constant of this form
+is linear or quadratic, whereas p_psi = L.e(q) is cubic in (q, L), where no Runge-Kutta method keeps it; and what is
+integrated turns with the axis, not with the spin.
 
 p_phi = L_z and p_psi = L.e are read off the state, and whatever a kernel does to them shows.
 """
@@ -136,11 +137,10 @@ def field_frame(par: Any, y: Any) -> Any:
 
 
 @register_jitable
-def _turning(par: Any, twist: float, y: Any) -> Any:
+def _turning(par: Any, twist: float, right: float, back: float, y: Any) -> Any:
     half, turn = 0.5 / par.I1, 0.5 * twist
     w, x, y1, z = y[0], y[1], y[2], y[3]
     px, py, pz = half * y[4], half * y[5], half * y[6]
-    right, back = 2.0 * (x * z + w * y1), 2.0 * (y1 * z - w * x)  # the axis, e_x and e_y
     return (
         -(px * x + py * y1 + pz * z) - turn * z,
         px * w + py * z - pz * y1 + turn * y1,
@@ -154,15 +154,19 @@ def _turning(par: Any, twist: float, y: Any) -> Any:
 
 @register_jitable
 def field_attitude(par: Any, y: Any) -> Any:
-    """Time derivative of (q, L); |q| stays one only as far as a method keeps it."""
-    right, back, up = axis_of(y[0], y[1], y[2], y[3])
-    return _turning(par, par.lean * (right * y[4] + back * y[5] + up * y[6]), y)
+    """Time derivative of (q, L); |q| stays one only as far as a method keeps it, and nothing else hangs on it."""
+    w, x, y1, z = y[0], y[1], y[2], y[3]
+    one = 1.0 / (w * w + x * x + y1 * y1 + z * z)
+    right, back, up = axis_of(w, x, y1, z)
+    right, back, up = one * right, one * back, one * up
+    return _turning(par, par.lean * (right * y[4] + back * y[5] + up * y[6]), right, back, y)
 
 
 @register_jitable
 def field_twisted(par: Any, y: Any) -> Any:
-    """The same with the twist of the start."""
-    return _turning(par, par.twist, y)
+    """The same with the twist of the start and of unit quaternions."""
+    right, back, _ = axis_of(y[0], y[1], y[2], y[3])
+    return _turning(par, par.twist, right, back, y)
 
 
 @register_jitable
