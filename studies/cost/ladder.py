@@ -238,7 +238,7 @@ def table(variant: Integrator, tops: Tops, budget: float, *, twin: bool, guarded
     if guarded:
         data |= {
             name: (("level", "guarded"), stored(values))
-            for name, values in guarded_runs(variant, tops, done, guarded).items()
+            for name, values in guarded_runs(variant, tops, done, guarded, budget).items()
         }
     return xr.Dataset(data, coords={"quantity": list(ASKED), "target": list(TARGETS), "kind": list(KINDS)})
 
@@ -297,8 +297,11 @@ def _healthy(done: Climb, tops: Tops) -> dict[str, Array]:
     }
 
 
-def guarded_runs(variant: Integrator, tops: Tops, done: Climb, guarded: int) -> dict[str, Array]:
-    """What the guard foretells, what is watched and what is measured, for the first members; (LEVELS, guarded)."""
+def guarded_runs(variant: Integrator, tops: Tops, done: Climb, guarded: int, budget: float) -> dict[str, Array]:
+    """What the guard foretells, what is watched and what is measured, for the first members; (LEVELS, guarded).
+
+    The error of a run that ends early is infinite, foretold or measured.
+    """
     (chart,) = variant.charts()
     seen = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured", "whole")}
     each = [
@@ -314,9 +317,10 @@ def guarded_runs(variant: Integrator, tops: Tops, done: Climb, guarded: int) -> 
                 if variant.fixed_step:
                     plan = Plan.steps(float(tops.period[member]) / FIRST * 0.5**level, tops.marks << level)
                 else:
-                    plan = Plan.until(tops.times[member], setting_of(variant, level))
+                    plan = Plan.until(tops.times[member], setting_of(variant, level), budget)
                 expected = forecast(scene, variant, chart, plan)
-                seen["foretold"][level, place], seen["whole"][level, place] = expected.axis_error, expected.whole
+                seen["foretold"][level, place] = expected.axis_error if expected.outcome == "ok" else math.inf
+                seen["whole"][level, place] = expected.whole
                 seen["watched"][level, place] = max(done.errors[name][level, member] for name in ("energy", MOMENTA))
                 seen["measured"][level, place] = done.errors["axis"][level, member]
     return seen
