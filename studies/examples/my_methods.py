@@ -54,7 +54,7 @@ def observe(par, rule, before, dstate, h):
 loop = symtop.kernel_loop(begin, increment, observe)
 symtop.register(
     symtop.Integrator(
-        name="symplectic-euler", family="other", summary="kick then drift, order 1",
+        name="kick-then-drift", family="other", summary="kick then drift, order 1",
         solvers={"angles": symtop.FixedStep(loop, (0.0,), symtop.on_angles, 1, implicit=False)},
         order=1, explicit=True, symplectic=True, symmetric=False, conserves=frozenset({"p_phi", "p_psi"}),
     )
