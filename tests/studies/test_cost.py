@@ -393,8 +393,11 @@ def test_finer_targets_cost_more_within_the_budget_and_every_top_is_judged_or_dr
     done = ladder.Climb(blank, wrong, blank == 1.0, blank[0] > 0.0)
     three, rk4 = tops_module.Tops(tops.numbers[:3], 10.0), integrator("rk4[axis]")
     assert ladder.typical_work(rk4, done, three)[0, 0] == 1.0  # of the median top
-    monkeypatch.setattr(ladder, "forecast", lambda *_: SimpleNamespace(axis_error=1.0, whole=False))
-    assert ladder.guarded_runs(rk4, three, done, 2, 4e4)["watched"][0, 0] == 0.2  # the larger
+    for outcome, error in (("ok", 1.0), ("not_normalised", math.inf)):  # a run that is to end is warned of
+        expected = SimpleNamespace(axis_error=1.0, whole=False, outcome=outcome)
+        monkeypatch.setattr(ladder, "forecast", lambda *_, expected=expected: expected)
+        seen = ladder.guarded_runs(rk4, three, done, 2, 4e4)
+        assert (seen["watched"][0, 0], seen["foretold"][0, 0]) == (0.2, error)  # the larger
     assert health.dropped[-1].sum() > 0  # a budget ends every ladder of order 2
     rows = cells.guard_counts(data)  # the guard is counted once for every run that it was asked about
     asked = np.isfinite(strang["foretold"].values).sum()
