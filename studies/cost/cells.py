@@ -321,6 +321,7 @@ def guard_counts(data: xr.DataTree) -> pd.DataFrame:
     """
     group = data["short"].to_dataset().isel(scene=0)[["foretold", "measured", "watched", "whole", "chart", "control"]]
     runs = group.to_dataframe().dropna(subset=["foretold"])
+    # a fixed step on the attitude repeats the numbers of the axis
     runs = runs[(runs["control"] == "tolerance") | (runs["chart"] != "attitude")]
     kinds = {"wrong": runs["measured"] > WRONG, "right": runs["measured"] <= EXPECTED}
     kinds["between"] = ~kinds["wrong"] & ~kinds["right"]
