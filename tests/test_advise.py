@@ -11,7 +11,7 @@ import pytest
 import symtop
 from benchmarks import candidates
 from symtop import advise
-from symtop.advise import SETTINGS, i_use
+from symtop.engine_settings import SETTINGS, i_use
 from symtop.measure import settings
 from symtop.methods.framework.registry import NEEDS, engines
 from symtop.model.exact import closed_form

@@ -213,14 +213,14 @@ def recommend(scene: Any, accuracy: float | None, engine: str | None, as_json: b
     symtop recommend goldstein --i-use mujoco --step-size 0.002
     """
     with ticking("loading"):
-        from symtop import advise
+        from symtop import advise, engine_settings
     if accuracy is None and engine is None:
         raise SymtopError("recommend needs --accuracy, for example 1e-6, or --i-use")
     options |= {"step_size": common.step_of(scene, options), "needs": options["needs"] or ()}
     with ticking("trying methods"):
         answer: Any
         if engine is not None:
-            answer = advise.i_use(engine, scene, accuracy=accuracy, **options)
+            answer = engine_settings.i_use(engine, scene, accuracy=accuracy, **options)
             advice = answer.advice if accuracy is not None else None
         else:
             answer = advice = advise.recommend(scene, accuracy=accuracy or 0.0, **options)
