@@ -1,11 +1,12 @@
 """The benchmarks measure what they say: twins are twins, and what was measured stays in the report with its date."""
 
+import math
 import os
 
 import numpy as np
 import pytest
 
-from benchmarks import adaptive, candidates, ensemble, kernels, lanes, truth, twin
+from benchmarks import adaptive, candidates, ensemble, kernels, lanes, machines, truth, twin
 from symtop.measure.timing import timings
 from symtop.methods.framework import loop as loops
 from symtop.methods.framework.lanes import Many
@@ -118,3 +119,13 @@ def test_a_wrong_call_of_the_table_of_candidates_is_one_sentence(arguments, word
     with pytest.raises(SystemExit, match="2"):
         candidates.main()
     assert words in capsys.readouterr().err
+
+
+def test_what_one_processor_chooses_is_priced_on_another():
+    def row(**seconds):
+        return [{"needs": "derivative", "keeping": False, "target": 1e-3, "called": True, "seconds": seconds}]
+
+    keys, there = ("cells", "same", "most", "called_same"), row(b=1.0, a=1.5)
+    facts = [machines.compare(row(**one), there) for one in ({"a": 2.0, "b": 3.0}, {"b": 2.0}, {"c": 1.0})]
+    assert [[fact[key] for key in keys] for fact in facts] == [[1, 0, 1.5, 0], [1, 1, 1.0, 1], [1, 0, math.inf, 0]]
+    assert machines.compare(there, row(b=1.0))["cells"] == 0  # where nothing else is known nothing is compared
