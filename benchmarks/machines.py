@@ -6,8 +6,6 @@
 Errors and evaluations hang on the method alone; what an evaluation costs hangs on the processor, too: how wide its
 vectors are, what a division and a wrong guess of a branch take. A cell of the table is a class of `needs` and an error;
 of each the seconds of its safe choices are kept, or of the first alone, which can be priced elsewhere but prices none.
-What one machine chooses is *the same* on another if that chooses it, too, and otherwise costs there so many times the
-best.
 """
 
 import argparse
@@ -16,14 +14,15 @@ import json
 import math
 import sys
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import xarray as xr
 
 from benchmarks import measured, pages
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError
-from symtop.report.formats import number
+from symtop.methods.framework.registry import NEEDS
+from symtop.report.formats import number, typeset
 from symtop.runner import scripts
 
 scripts.install()
@@ -49,20 +48,47 @@ def choices(data: xr.DataTree) -> list[dict[str, Any]]:
     return table
 
 
-def compare(one: list[dict[str, Any]], other: list[dict[str, Any]]) -> dict[str, Any]:
-    """What the choices of the one cost on the other: cells, the same, those called, the most that another one costs."""
-    there = {_cell(row): row["seconds"] for row in other if len(row["seconds"]) > 1}
-    costs = dict[tuple[Any, ...], float]()
-    for row in one:
-        if (seconds := there.get(_cell(row))) is not None:
-            costs[_cell(row)] = seconds.get(next(iter(row["seconds"])), math.inf) / min(seconds.values())
-    called = [costs[_cell(row)] for row in one if row["called"] and _cell(row) in costs]
-    return {
-        "cells": len(costs), "same": sum(cost == 1.0 for cost in costs.values()),
-        "most": max(costs.values(), default=math.nan),
-        "called": len(called), "called_same": sum(cost == 1.0 for cost in called),
-        "called_most": max(called, default=math.nan),
-    }  # fmt: skip
+class Pair(NamedTuple):
+    """Two machines: cells that both have, those whose choice is the same, and what the others cost."""
+
+    cells: int
+    same: int
+    clear: int  # cells whose lead is beyond the error of measurement on one of them at least
+    clear_same: int
+    most: float  # times the best of a machine: the dearest choice of the other there; NaN where no price is known
+    differing: list[list[str]]  # rows: the cell, both choices, what each costs on the other machine
+
+
+def compare(one: list[dict[str, Any]], other: list[dict[str, Any]]) -> Pair:
+    """What two machines choose, and what the choice of each costs on the other."""
+    theirs = {_cell(row): row for row in other}
+    pairs = [(row, theirs[_cell(row)]) for row in one if _cell(row) in theirs]
+    apart = [pair for pair in pairs if _first(pair[0]) != _first(pair[1])]
+    clear = [pair for pair in pairs if pair[0]["called"] or pair[1]["called"]]
+    costs = [(_cost(a, b), _cost(b, a)) for a, b in apart]
+    rows = [[_words(a), _first(a), _first(b), _times(there), _times(here)]
+            for (a, b), (there, here) in zip(apart, costs, strict=True)]  # fmt: skip
+    known = [cost for both in costs for cost in both if not math.isnan(cost)]
+    return Pair(len(pairs), len(pairs) - len(apart), len(clear), sum(pair not in apart for pair in clear),
+                max(known, default=math.nan), rows)  # fmt: skip
+
+
+def _first(row: dict[str, Any]) -> str:
+    return next(iter(row["seconds"]))
+
+
+def _cost(chosen: dict[str, Any], there: dict[str, Any]) -> float:
+    """What a choice costs on another machine, in units of the best there; NaN if no other price is kept."""
+    seconds = there["seconds"]
+    return seconds.get(_first(chosen), math.inf) / min(seconds.values()) if len(seconds) > 1 else math.nan
+
+
+def _times(cost: float) -> str:
+    return "not kept" if math.isnan(cost) else f"over {NEAR:g}" if math.isinf(cost) else number(cost, 3)
+
+
+def _words(row: dict[str, Any]) -> str:
+    return f"{NEEDS[row['needs']]}{', all constants kept' * row['keeping']}, to {typeset(f'{row['target']:.0e}')} rad"
 
 
 def _cell(row: dict[str, Any]) -> tuple[Any, ...]:
@@ -82,25 +108,32 @@ def main() -> int:
             sys.exit(f"machines: {error}; run symtop study cost first")
         about = measured.circumstances()
         netcdf.write_json(KEPT / f"{options.name}.json", {"processor": about["processor"], "choices": choices(data)})
-    kept = {file.stem: json.loads(file.read_text(encoding="utf-8")) for file in sorted(KEPT.glob("*.json"))}
-    pairs = [(one, other, fact) for one, other in itertools.permutations(kept, 2)
-             if (fact := compare(kept[one]["choices"], kept[other]["choices"]))["cells"]]  # fmt: skip
+    kept = [json.loads(file.read_text(encoding="utf-8")) for file in sorted(KEPT.glob("*.json"))]
+    pairs = [(one, other, compare(one["choices"], other["choices"]))
+             for one, other in itertools.combinations(kept, 2)]  # fmt: skip
     if not pairs:
         print("machines: two machines have to be kept to compare them")
         return 1
-    header = ["chosen on", "run on", "cells", "the same", "others cost there, at most",
-              "clear leads", "the same", "others, at most"]  # fmt: skip
-    rows = [[kept[one]["processor"], kept[other]["processor"], f"{fact['cells']}", f"{fact['same']}",
-             f"{number(fact['most'])} times", f"{fact['called']}", f"{fact['called_same']}",
-             f"{number(fact['called_most'])} times"] for one, other, fact in pairs]  # fmt: skip
-    table = pages.Table("Choices of one processor on another", header, rows)
-    print(table.text)
-    worst = max((fact for *_, fact in pairs), key=lambda fact: fact["most"])
-    facts = worst | {"machines": len(kept)}
+    first, second, pair = min(pairs, key=lambda each: each[2].same)  # that agree least
+    names = first["processor"], second["processor"]
+    header = [
+        "what can be supplied, and error",
+        *(f"on {name}" for name in names),
+        "the first on the second",
+        "and back",
+    ]
+    table = pages.Table("Where two processors choose differently", header, pair.differing)
+    sentence = (
+        f"Of {pair.cells} choices of the front page's first table {pair.same} are the same on {names[0]} and on "
+        f"{names[1]}, and {pair.clear_same} of the {pair.clear} whose lead is beyond the error of measurement on one "
+        f"of them. Where they differ, the other's choice costs at most {_times(pair.most)} times the best."
+    )
+    print(f"{table.text}\n{sentence}")
     page = pages.findings(
-        "machines", "Other processors", "Does another processor choose the same methods?", table,
-        "A cell is a class of what can be supplied and an error, of the front page's table. Errors and evaluations are "
-        "the same on every processor, prices are not.", [], cases=len(kept), facts=facts,
+        "machines", "Another processor", "Does another processor choose the same methods?", table,
+        "Errors and evaluations are the same on every processor, to rounding; prices are not. The last two columns are "
+        "the time of a choice on the other processor over the least there.", [], answer=sentence, cases=len(kept),
+        facts=pair._asdict() | {"differing": len(pair.differing)},
         **measured.record(measured.circumstances(), "python -m benchmarks.machines"),
     )  # fmt: skip
     netcdf.write_json(RESULTS / "machines.json", page)

@@ -122,10 +122,15 @@ def test_a_wrong_call_of_the_table_of_candidates_is_one_sentence(arguments, word
 
 
 def test_what_one_processor_chooses_is_priced_on_another():
-    def row(**seconds):
-        return [{"needs": "derivative", "keeping": False, "target": 1e-3, "called": True, "seconds": seconds}]
+    def row(called=True, **seconds):
+        return [{"needs": "derivative", "keeping": False, "target": 1e-3, "called": called, "seconds": seconds}]
 
-    keys, there = ("cells", "same", "most", "called_same"), row(b=1.0, a=1.5)
-    facts = [machines.compare(row(**one), there) for one in ({"a": 2.0, "b": 3.0}, {"b": 2.0}, {"c": 1.0})]
-    assert [[fact[key] for key in keys] for fact in facts] == [[1, 0, 1.5, 0], [1, 1, 1.0, 1], [1, 0, math.inf, 0]]
-    assert machines.compare(there, row(b=1.0))["cells"] == 0  # where nothing else is known nothing is compared
+    there = row(b=1.0, a=1.5, called=False)
+    pairs = [machines.compare(row(**one), there) for one in ({"a": 2.0, "b": 3.2}, {"b": 2.0}, {"c": 1.0})]
+    assert [tuple(pair[:5]) for pair in pairs[:2]] == [
+        (1, 0, 1, 0, 1.6),
+        (1, 1, 1, 1, pytest.approx(math.nan, nan_ok=True)),
+    ]
+    assert pairs[0].differing == [["f(t, y), to 10\N{SUPERSCRIPT MINUS}³ rad", "a", "b", "1.5", "1.6"]]
+    assert pairs[2].differing[0][3:] == ["over 10", "not kept"]
+    assert machines.compare([], there).cells == 0
