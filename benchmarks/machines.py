@@ -88,7 +88,8 @@ def _times(cost: float) -> str:
 
 
 def _words(row: dict[str, Any]) -> str:
-    return f"{NEEDS[row['needs']]}{', all constants kept' * row['keeping']}, to {typeset(f'{row['target']:.0e}')} rad"
+    error = typeset(f"{row['target']:.0e}")
+    return f"{NEEDS[row['needs']]}{', all constants kept' * row['keeping']}, to {error} rad"
 
 
 def _cell(row: dict[str, Any]) -> tuple[Any, ...]:
