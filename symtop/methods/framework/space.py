@@ -200,7 +200,7 @@ def axis_of(w: float, x: float, y: float, z: float) -> Any:
 
 @register_jitable
 def with_spin(par: Any, state: Any, t: float) -> Any:
-    """An attitude state (q, L) that was stepped without the turn about the axis at rate `twist`, plus that turn at t."""
+    """An attitude state (q, L) that was stepped without the turn about the axis at rate `twist`, turned by twist t."""
     w, x, y, z, Lx, Ly, Lz = state
     half = 0.5 * par.twist * t
     c, s = np.cos(half), np.sin(half)
