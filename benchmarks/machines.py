@@ -3,8 +3,8 @@
     symtop study cost; python -m benchmarks.machines NAME   keeps this machine's choices as results/machines/NAME.json
     python -m benchmarks.machines                           compares what is kept
 
-Errors and evaluations hang on the method alone; what an evaluation costs hangs on the processor, too: how wide its
-vectors are, what a division and a wrong guess of a branch take. A cell of the table is a class of `needs` and an error;
+Errors and evaluations depend on the method only; the cost of an evaluation also depends on the processor: how wide its
+vectors are, how long a division and a mispredicted branch take. A cell of the table is a class of `needs` and an error;
 of each the seconds of its safe choices are kept, or of the first alone, which can be priced elsewhere but prices none.
 What one machine chooses is *the same* on another if that chooses it, too, and otherwise costs there so many times the
 best.
