@@ -66,7 +66,7 @@ class Row(NamedTuple):
 
 
 class Threads(NamedTuple):
-    """What two threads do with one method."""
+    """The speed-up of one method by two threads."""
 
     name: str
     chart: str

@@ -50,7 +50,7 @@ def choices(data: xr.DataTree) -> list[dict[str, Any]]:
 
 
 def compare(one: list[dict[str, Any]], other: list[dict[str, Any]]) -> dict[str, Any]:
-    """What the choices of the one cost on the other: cells, the same, those called, the most that another one costs."""
+    """Costs of the one's choices on the other: cells, the same, those called, the most that another choice costs."""
     there = {_cell(row): row["seconds"] for row in other if len(row["seconds"]) > 1}
     costs = dict[tuple[Any, ...], float]()
     for row in one:

@@ -31,7 +31,7 @@ class Item(NamedTuple):
 
     name: str
     seconds: float
-    steps: float  # the same in steps of the method
+    steps: float  # the time in steps of the method
 
 
 def measure() -> list[Item]:

@@ -105,7 +105,7 @@ def _atlas(part: xr.Dataset, shown: Mapping[str, OutcomeMap]) -> Any:
 
 
 def _ends(values: Any) -> tuple[float, float]:
-    """Both ends of an axis of cells at logarithmically even values, as decimal logarithms."""
+    """Lower and upper edge of cells centred at logarithmically even values, as decimal logarithms."""
     low, high = np.log10(values[[0, -1]])
     half = 0.5 * (high - low) / (values.size - 1) if values.size > 1 else 0.5
     return float(low - half), float(high + half)

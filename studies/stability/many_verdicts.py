@@ -57,7 +57,7 @@ class Truths(NamedTuple):
         return self.scenes[:, 3]
 
     def part(self, scenes: NDArray[np.int64]) -> "Truths":
-        """The same for some of the scenes."""
+        """The truths of the scenes with these indices."""
         return Truths(self.constants[scenes], self.scenes[scenes])
 
 

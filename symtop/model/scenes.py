@@ -91,7 +91,7 @@ class Scene:
 
     @property
     def second(self) -> str:
-        """What follows a time: " s" of a scene in SI, nothing of one without units."""
+        """The unit after a time: " s" for a scene in SI, empty for one without units."""
         return " s" if self.units else ""
 
     @property
@@ -106,7 +106,7 @@ class Scene:
 
     @property
     def period_word(self) -> str:
-        """What a `nutation_period` is called."""
+        """The name of `nutation_period` in texts."""
         return "natural period" if self.of_body else "nutation"
 
     def time_scale(self, horizon: float | None = None) -> float:

@@ -38,7 +38,7 @@ ANGLE_GRAIN = 1e-12  # radians: a smaller correction that does not halve is roun
 
 
 class Correction(NamedTuple):
-    """What Newton proposes at x."""
+    """A Newton correction at x, with the limits that decide about convergence."""
 
     change: Any  # like x
     after: Any  # x + change

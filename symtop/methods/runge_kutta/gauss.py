@@ -278,7 +278,7 @@ def farthest(sweeps: int) -> float:
 
 
 def _after(first: Any, then: Any) -> Any:
-    """Both, one after the other."""
+    """A function that applies `first` and then `then` to a block."""
 
     @register_jitable
     def both(block, table):  # type: ignore[no-untyped-def]

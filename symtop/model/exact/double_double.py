@@ -364,7 +364,7 @@ def quad_neg(a: QuadDouble) -> QuadDouble:
 
 @inlined
 def widened(a: DoubleDouble) -> QuadDouble:
-    """The same number."""
+    """The number `a` as a quad-double."""
     return a[0], a[1], 0.0, 0.0
 
 

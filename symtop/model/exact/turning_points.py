@@ -231,7 +231,7 @@ LEAST_TERM = 1e-270  # lower limit on the largest term of the cubic, whose round
 
 
 class TurningPoints(NamedTuple):
-    """What the module's docstring names; x1, x2 relative to the start, bend = lead g3."""
+    """The quantities of the module's docstring; x1, x2 relative to the start, bend = lead g3."""
 
     d1: DoubleDouble
     d2: DoubleDouble
