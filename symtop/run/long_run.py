@@ -69,7 +69,7 @@ def scattered(begin: int, end: int, samples: int = SAMPLES) -> Whole:
 
 
 def chart_of(method: Integrator, *, of_body: bool = False) -> tuple[str, FixedStep]:
-    """The smallest chart in which a method has a compiled loop of fixed steps (`of_body`: chart "body"), and the loop."""
+    """The smallest chart in which a method has a compiled loop of fixed steps (for a body "body"), and the loop."""
     loops = {chart: loop for chart, solver in method.solvers.items() if (loop := inside(solver)) is not None}
     if not loops:
         raise SymtopError(f"{method.name} has no compiled loop of fixed steps, so that it cannot be run in stretches")
@@ -264,7 +264,7 @@ class _Checkpoint(contextlib.AbstractContextManager["_Checkpoint"]):
         return Position(state, low, carry, int(data["steps_done"])), data["rows"].values.tolist()
 
     def _read(self, file: Path) -> xr.Dataset | None:
-        """The data in the file. If it is damaged: SymtopError for a user's file, None with a warning for the cache's."""
+        """The data in the file. If damaged: SymtopError for a user's file, None with a warning for one in the cache."""
         try:
             data = netcdf.read(file)
             known = not self.own or data.attrs.get("identity") == self.identity  # a file in the cache is named by it
@@ -303,7 +303,7 @@ class _Checkpoint(contextlib.AbstractContextManager["_Checkpoint"]):
             self.file.unlink(missing_ok=True)
 
     def checked(self, output: Path) -> Path:
-        """The output file; SymtopError if it is a folder, cannot be written, or is the checkpoint, removed at the end."""
+        """The output file; SymtopError if it is a folder, not writable, or the checkpoint, which the end removes."""
         if output.is_dir():
             raise SymtopError(f"output must be a file, not the folder {str(output)!r}", "output")
         if self.file is not None and output.resolve() == self.file.resolve():

@@ -26,7 +26,7 @@ def python_file(path: str | Path, name: str, kind: str) -> Path:
 
 
 def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
-    """Import a file as the module `name`. It may import files beside it; with `places` it is a package with these paths."""
+    """Import a file as the module `name`, which may import files beside it, or as a package with the paths `places`."""
     for stale in [known for known in sys.modules if known.startswith(f"{name}.")]:
         del sys.modules[stale]  # submodules of another folder with the same name
     if file.suffix != ".py":

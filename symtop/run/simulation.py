@@ -201,7 +201,7 @@ def simulate(
         raise SymtopError(f"guard must be series on {chosen.name}, a body without symmetry, not 'exact'", "guard")
     options = {"series": guard == "series", "at_times": times is not None}
     trajectory, caution = _guarded(chosen, method, chart, plan, report, **options)
-    uneven = times is None and plan.marks.size and plan.marks[-1] % (plan.marks.size - 1)  # samples are not equally many steps apart
+    uneven = times is None and plan.marks.size and plan.marks[-1] % (plan.marks.size - 1)  # unequal numbers of steps
     sampling = "dithered" if dithered else "nearest steps" if uneven else "uniform"
     data = dataset(trajectory.time, trajectory.columns, chosen.units)
     data.attrs = netcdf.attributes_of(
@@ -283,7 +283,7 @@ def _at_times(
 
 
 def _stepped(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Run:
-    """A run of fixed steps, with a shorter step to each time inside one. Samples after the first failed step are NaN."""
+    """A run of fixed steps, with a shorter step to each time inside one; NaN from the first step that fails."""
     begun = scene.top, scene.start, 1.0
     times, since, words = plan.times, plan.marks * plan.step_size, f" on {scene.name}"
     marks, place = np.unique(plan.marks, return_inverse=True)

@@ -86,7 +86,7 @@ class Trajectory(NamedTuple):
 
 
 def column(data: xr.Dataset | Mapping[str, Any], name: str) -> Any:
-    """The variable `name` of data, with time as the first dimension and labelled components in the order of `LABELS`."""
+    """The variable `name` of data, with time as first dimension and labelled components in the order of `LABELS`."""
     values = data[name]
     if isinstance(values, xr.DataArray) and values.dims != ("time",):
         for dim, labels in LABELS.items():
