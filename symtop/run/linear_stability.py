@@ -167,7 +167,7 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
 
 
 def _beside(scene: Scene, chart: str) -> bool:
-    """Is the steady precession so near a pole, with a stable rotation there, that nutations are followed in e_x, e_y?"""
+    """Is the steady precession so near a pole with a stable rotation that nutations are followed in e_x, e_y?"""
     top, momenta = scene.top, scene.top.momenta(scene.start)
     theta, square = top.steady_theta(momenta), momenta.p_psi**2
     weight = 4.0 * top.I1 * (top.mgl if theta < 1.0 else -top.mgl)  # p_psi^2 at the threshold

@@ -1,4 +1,4 @@
-"""The guard for the user's equations y' = f(t, y): a forecast of the error of a method and its cause, before a long run.
+"""The guard for a user's equations y' = f(t, y): forecasts the error of a method and its cause before a long run.
 
 The method makes a piece of the run, which is compared with DOP853 at a tight tolerance, since only f is known. Its
 error is extrapolated by the law of `symtop.run.guard`, linear to quadratic, or by the amplification A(t) of a small
@@ -80,7 +80,7 @@ def guard(
         raise SymtopError(f"step_size must be at most the horizon {end!r}, not {setting!r}", "step_size")
 
     def rate(t: float, y: Array) -> Array:
-        value = real_numbers("what f returns", f(t, y.copy())).copy()  # f may change y, or return the same array each time
+        value = real_numbers("what f returns", f(t, y.copy())).copy()  # f may change y or reuse its result
         if value.shape != start.shape:
             raise SymtopError(f"f must return {start.size} numbers, not an array of shape {value.shape}")
         return value
