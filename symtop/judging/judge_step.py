@@ -244,7 +244,7 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
 
 
 def _refuse_contradiction(states: Trajectory, scene: Scene) -> None:
-    """SymtopError if axis and quaternion of a trajectory disagree, naming the quaternion's convention if that is why."""
+    """SymtopError if axis and quaternion of a trajectory disagree, naming another convention if that explains it."""
     if states.axis is None or states.quaternion is None:
         return
     apart = axis_distance(states.axis, axis_from_quaternion(states.quaternion))
@@ -338,7 +338,7 @@ def _findings(
 
 
 def judge_separately(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
-    """The `Ledger` of a registered integrator, as by `symtop.judging.battery.judge`; foreign solvers run in a process."""
+    """The `Ledger` of a registered integrator, as `symtop.judging.battery.judge`; foreign solvers run in a process."""
     heartbeat.reset(quick=quick)
     limits = PLUGIN, math.inf, PLUGIN
     with Process(lambda: solvers_of(method)) as process:

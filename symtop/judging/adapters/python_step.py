@@ -56,7 +56,7 @@ PROBE = 1e-3  # step of the call that shows whether a rotation is a matrix
 CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 ANY = 1e300  # a tolerance that every step meets; with infinity, a component of zero would give NaN
 LOOSE = 1e8  # the same for implicit classes, small enough that updates of Newton's iteration do not underflow
-SOLVED, MOST_NEWTON, NEWTON = 1e-14, 50, "NEWTON_MAXITER"  # of a stage: absolute error, iterations, their name in modules
+SOLVED, MOST_NEWTON, NEWTON = 1e-14, 50, "NEWTON_MAXITER"  # absolute error of a stage, iterations, their name in SciPy
 SAME = 1e-9  # relative: a step length that differs less from h is h
 _patching = threading.RLock()  # `compare` runs variants in threads
 
