@@ -401,7 +401,7 @@ def _try(question: _Question, method: Integrator, patience: float, most: float =
 
 
 def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]], rounds: int = 5) -> list[_Trial]:
-    """The trials with times, measured against each other, the fastest first; those with too slow steps go to `fails`."""
+    """The trials with times, measured against each other, the fastest first; slow steps are noted in `fails`."""
     runs = [one.run for one in trials]
     times = settings.seconds(question.scene, runs, question.quantity, question.horizon, rounds)
     pairs = zip(trials, times, strict=True)

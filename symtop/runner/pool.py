@@ -266,7 +266,7 @@ def begin_worker() -> None:
 
 
 def in_order(tasks: Sequence[Task]) -> list[Task]:
-    """Order tasks: the first case of every family of methods, then the second, ...; a family shares compiled kernels."""
+    """Order tasks: the first case of every family of methods, then the second, ...; a family shares kernels."""
     methods, count = integrators(), Counter[str]()
 
     def rank(task: Task) -> int:

@@ -470,7 +470,7 @@ class Hastened:
 
 
 def series_by_clock(subject: Subject, uneven: float) -> tuple[Series, set[float]]:
-    """The series of a step (several, of a multistep method) with a clock of a = `uneven`, and the times of f's calls."""
+    """The series of a step (or several, if a multistep method) with a clock of a = `uneven`; the times of f's calls."""
     scene, start, scale = subject.scene, generic_start(subject.scene), subject.scene.time_scale()
     begin, rate, unit = BEGIN * scale, 2.0 * math.pi * WAVES / scale, np.repeat([1.0, unit_of(scene)], 3)
     par, state = FORMULATIONS["axis"].prepare(scene.top, start)
