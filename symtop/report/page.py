@@ -121,7 +121,7 @@ def _image(file: Path, *, embed: bool) -> dict[str, Any]:
 
 
 def texts(results: Path, studies: Sequence[Mapping[str, Any]]) -> tuple[dict[str, str], dict[str, str]]:
-    """The parts of `report.md` and those of `reference.md`, in Markdown by name: "front", the studies, "measured", ..."""
+    """The parts of `report.md` and of `reference.md`, in Markdown by name: "front", the studies, "measured", ..."""
     parts, more, pages = dict[str, str](), dict[str, str](), {"measured": _link("How it was measured")}
     for study in studies:
         pages[study["study"]] = _link(formats.typeset(study["question"]), REFERENCE if _checks_only(study) else "")
@@ -168,7 +168,7 @@ def _lower(text: str) -> str:
 
 
 def scene_tables() -> dict[str, Any]:
-    """Values for templates on all scenes: uses, starts to the last bit, units, the largest bound of the reference (rad)."""
+    """Template values on all scenes: uses, starts to the last bit, units, the largest bound of the reference (rad)."""
     uses, starts, bounds = [], [], []
     for scene in scenes().values():
         bounds.append(float(reference(scene, np.array([scene.horizon]))["axis_error_bound"].values[0]))

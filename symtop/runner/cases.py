@@ -119,7 +119,7 @@ class StudyCases:
 def status(
     study: Study, results: Path, *, quick: bool = False, full: bool = False, why: bool = False
 ) -> list[dict[str, Any]]:
-    """Scene, integrator, state and message of every case; with `why` also what has changed for stale and missing ones."""
+    """Scene, integrator, state and message of every case; with `why` also the changes for stale and missing ones."""
     cases = StudyCases.stored(study, results, quick=quick, full=full)
     stored = store.stored(cases.results, study)
     older: dict[str, list[Path]] = {}
