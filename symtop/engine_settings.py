@@ -97,8 +97,7 @@ def i_use(
 
     An engine is one of `SETTINGS` or a map, such as "mujoco-euler". With an `accuracy`, the advice is for that and
     for the step; `limits` are further arguments of `recommend`. `step_size` is in the units of the scene, by default
-    1/240, `horizon` by default the scene's. Raises SymtopError for an unknown engine and numbers out of range. It takes
-    seconds.
+    1/240, `horizon` by default the scene's. Raises SymtopError for an unknown engine and numbers out of range.
     """
     maps = _settings()
     if engine in registry.methods():

@@ -1,8 +1,7 @@
 """The battery: the table of all claims, with the integrators that each applies to and the function that measures it.
 
-It judges registered integrators, built-in or of plug-ins, and bare steps from an adapter, only through their solvers. A
-claim is refuted only if its defect is far above the uncertainty of the measurement; both numbers are in the claims
-table (`symtop.judging.findings.Ledger`).
+It judges registered integrators and bare steps from an adapter, only through their solvers. A claim is refuted only if
+its defect is far above the uncertainty of the measurement; both numbers are in the claims table (`findings.Ledger`).
 """
 
 from collections.abc import Callable

@@ -1,9 +1,8 @@
 """compare(): error against cost of several methods on one scene, as one dataset.
 
 The setting of each method is searched for each target error (`symtop.measure.settings.seek`), from loose targets to
-tight ones, until one is not met; then steps are doubled until a run fails or has only a few steps. The dataset holds
-all runs. Runs that ended well are timed afterwards, against each other (`symtop.measure.timing`), so that a slow spell
-of the machine affects all methods alike.
+tight ones, until one is not met; then steps are doubled until a run fails or has only a few steps. All runs are kept.
+Good runs are then timed against each other (`symtop.measure.timing`): a slow spell of the machine affects all alike.
 """
 
 import math

@@ -102,8 +102,7 @@ def judge(
     such as "p_phi", "energy"; `energy` is "kept" or "bounded". The step runs in a process of its own: if it hangs or
     crashes, the verdict is undecided, with the reason. `quick` makes shorter runs. On a top the step is also tried at
     random starts, times and steps; `seed`, which the findings name, repeats the same. `autonomous` says that it was
-    written for y' = f(y), whatever f is called with. `tell` is called with an `About` and then with each finding, as
-    they are made.
+    written for y' = f(y), whatever f is called with. `tell` is called with an `About`, then with each new finding.
 
     Returns a `Ledger`: ``ledger["order"]`` is a finding, ``print(ledger)`` shows all of them,
     ``ledger.dataset()`` is the same as a Dataset, ``ledger.refuted`` names the claims that are false. Raises

@@ -37,8 +37,7 @@ def described(
     """Give the variables of a dataset, in groups too, their long names, units and flags.
 
     `own` is the table of the study. A group with an ``axis_bound`` is an error table. A variable that no table declares
-    keeps its attributes. `units` are those of `netcdf.describe`; `of_body` holds True if any scene is a body without
-    symmetry, False if any is a symmetric top.
+    keeps its attributes. `units` is that of `netcdf.describe`; `of_body` has `Scene.of_body` of each scene.
     """
     for group, variables in ((path, one.variables) for path, one in netcdf.groups(data).items()):
         known = netcdf.VARIABLES | (ERROR_TABLE if "axis_bound" in variables else {})

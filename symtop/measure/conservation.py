@@ -3,8 +3,7 @@
 A trend is the slope of the least-squares line through the means of `BLOCKS` equal stretches, with Student's 95 %
 interval, widened for the autocorrelation of the residuals of the line. Samples are never commensurate with the
 nutation, so that a fast oscillation averages out. Rounding errors add up to a random walk, which has no slope but
-wanders: in 33 % of cases its interval is too narrow (white noise: 3 %). Near rounding the exponent of growth, 1/2, is
-therefore the more reliable sign.
+wanders: in 33 % of cases its interval is too narrow (white noise: 3 %); the exponent of growth, 1/2, is more reliable.
 
 An exponent of error ~ t^alpha is the least-squares slope of the logarithm of the largest error in logarithmic windows:
 
@@ -14,8 +13,7 @@ An exponent of error ~ t^alpha is the least-squares slope of the logarithm of th
 
 The interval of the exponent treats the windows as independent. The largest values of one random walk are not: of 400
 walks of 4000 samples, whose fitted exponents spread by 0.17, the interval covers the true 0.5 in 69 %; for sums of a
-walk it covers 3/2 in 48 %. `behaviour` calls 84 % of the walks that are not "kept" a random walk, 10 % a drift, 6 %
-bounded.
+walk it covers 3/2 in 48 %. `behaviour` calls 84 % of walks that are not "kept" a random walk, 10 % drift, 6 % bounded.
 
 In the angles chart p_phi and p_psi are parameters of a state. The rates of the trajectory imply the momenta
 
@@ -119,9 +117,8 @@ def law(fit: Fit) -> str:
 def behaviour(size: float, slope: float, interval: float, grain: float = 1.0, rounding: float = 0.0) -> str:
     """How well a run keeps a constant whose largest change is `size` and grows as t^slope (95 %: +- interval).
 
-    Every study uses this rule. `grain` is the rounding error of the constant in units of the machine epsilon, 1 or more
-    (`Scene.energy_grain`); `rounding` is the change that rounding explains in methods without compensated summation, if
-    it is above ``RUN_ROUNDING * grain``.
+    Every study uses this rule. `grain` is the rounding error of the constant in machine epsilons, 1 or more
+    (`Scene.energy_grain`); `rounding` is the change explained by rounding in sums without compensation, if larger.
 
         kept          size <= RUN_ROUNDING grain, whatever the exponent; or size <= rounding, and not bounded
         bounded       the exponent is nearest to 0, and its interval excludes 1/2: an error of the step, however small

@@ -14,9 +14,8 @@ Explicit methods do not keep |e| or |q| at one. A wrong length does not change t
 
 A trajectory of another program is checked first. A quaternion determines the attitude, the axis and theta; so do theta,
 phi and psi; theta and phi determine the axis; an axis determines theta. Vectors are scaled to length one, and the
-deviation of their length is an error of its own, ``axis_length`` or ``quaternion_length``. A late deviation may be
-large in a valid run (SciPy's RK45 at 1e-3 takes |q| to 1.4 on `spheroid`); with a wrong column or unit the first sample
-deviates as well.
+deviation of their length is an error of its own, ``axis_length`` or ``quaternion_length``. It may become large in a
+valid run (SciPy's RK45 at 1e-3 takes |q| to 1.4 on `spheroid`), but is small at first unless a column or unit is wrong.
 """
 
 import contextlib
@@ -113,9 +112,8 @@ def errors(
     `precision` is that of `reference`; the closed form costs 1 us a sample, and its rounding does not grow with time.
 
     Warns (`SymtopWarning`) if a foreign trajectory starts elsewhere than the scene, extends beyond a hundred of its
-    horizons, or holds NaN.
-    Raises SymtopError for data that are no such trajectory, for an unknown scene or one with another top or start than
-    the data have, and if there is neither a `scene` nor one in the data.
+    horizons, or holds NaN. Raises SymtopError for data that are no such trajectory, for an unknown scene or one with
+    another top or start than the data have, and if there is neither a `scene` nor one in the data.
     """
     one_of("precision", precision, PRECISIONS)
     if isinstance(run, xr.Dataset) and "member" in run.dims and not isinstance(scene, (str, Scene, type(None))):
@@ -351,11 +349,8 @@ def doubles(name: str, values: Any) -> charts.Array:
 
 
 def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:
-    """SymtopError for quaternions that match the true attitude only if read in another convention.
-
-    The first sample far from the truth decides: near some attitudes two conventions agree.
-    """
-    true = truth["quaternion"].values
+    """SymtopError for quaternions that match the true attitude only if read in another convention."""
+    true = truth["quaternion"].values  # near some attitudes two conventions agree: the first sample far off decides
     far = np.flatnonzero(charts.attitude_distance(quaternion, true) > FAR)
     if not far.size:
         return

@@ -20,8 +20,7 @@ The interval is Student's, for the degrees of freedom that the data leave, and n
 for 93 to 97 % of synthetic curves with an h^2 correction and the scatter of sampled maxima; that of a straight line
 covers it for less than 4 %. On 100 random tops it covers the order of 11 symmetric methods for 93 to 100 %, but only
 for 77 % that of rk4 and for 17 % that of tsit5-fixed, whose leading error term is small, so that its slopes are near 6.
-An interval covers the scatter, not the bias of steps that are too long; the error terms of one step (`judging`) show
-that.
+An interval covers the scatter, not the bias of too long steps, which the error terms of one step (`judging`) show.
 
 One rule, `order_verdict`, says for every study whether a measured slope confirms a declared order.
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, theorem II.3.2 (even powers of a symmetric method).

@@ -1,8 +1,7 @@
 """Published values of this problem, compared with values computed here.
 
-Each entry names its source, the published value, ours, and the kind of comparison: with ``printed`` digits, with a
-printed ``formula``, or of ``consistency`` with data that the source started from. Values agree if they round to the
-same digits.
+Each entry names its source, the published value, ours, and the kind of comparison: with ``printed`` digits, a printed
+``formula``, or for ``consistency`` with the source's own data. Values agree if they round to the same digits.
 """
 
 import math

@@ -3,9 +3,8 @@
 The table comes from a stored study of cost (`benchmarks/candidates.py`), which counts force evaluations on random tops
 and measures the time of one. A row is for one quantity, accuracy, length in nutations and class of `NEEDS`, and some
 rows only for methods that exist for a body without symmetry. Its variants are a set of which, on most random tops of
-every kind, at least one costs little more than the cheapest method. If rows are made from half of the tops, the best
-of five variants costs at most 1.1 times the least on 96 to 100 % of the other tops over 10 nutations, and on 88 to
-100 % over 1000.
+every kind, at least one costs little more than the cheapest method. If rows are made from half of the tops, one of five
+variants costs at most 1.1 times the least on 96 to 100 % of the other tops over 10 nutations, 88 to 100 % over 1000.
 """
 
 import functools
@@ -31,8 +30,7 @@ def cheapest(
 ) -> list[str]:
     """Variants of the classes `needs` (empty: `ANY`), mostly the cheapest first; none if the table has no such row.
 
-    Accuracy and length are the nearest in the table, in logarithms. Rows of several classes are interleaved: first the
-    first variants of all rows, then the second ones.
+    Accuracy and length are the nearest in the table, in logarithms. The rows of several classes are interleaved.
     """
     rows, shown = _rows(), SHOWN_AS.get(quantity, quantity)
     length = min({key[0] for key in rows}, key=lambda value: abs(math.log(value / max(nutations, 1e-3))))

@@ -47,12 +47,9 @@ def smallest_charts(observe: str) -> list[Integrator]:
 
 
 def compared(observe: str) -> list[Integrator]:
-    """Every method to compare, in its `smallest_charts` for "axis" or in each chart with "attitude".
-
-    Methods with `exact_steps` are left out: they evaluate a closed form that other problems do not have.
-    """
+    """Every method to compare, in its `smallest_charts` for "axis" or in each chart with "attitude"."""
     every = smallest_charts(observe) if observe == "axis" else variants(observe)
-    return [one for one in every if not one.exact_steps]
+    return [one for one in every if not one.exact_steps]  # these evaluate a closed form that other problems do not have
 
 
 def least_tolerance(method: Integrator) -> float:
@@ -219,8 +216,7 @@ def search(
 def at_accuracy(method: Integrator, ratio: float) -> float:
     """The factor from the work of a run to the work at exactly the accuracy, if the run's error is `ratio` times that.
 
-    The work of a method of order p grows as error^(-1/p). A ratio below `LEAST`, with which a search ends only at the
-    coarsest setting, counts as `LEAST`.
+    The work of a method of order p grows as error^(-1/p). A ratio below `LEAST` occurs only at the coarsest setting.
     """
     return float(min(max(ratio, LEAST), 1.0) ** (1.0 / (method.order or math.inf)))
 

@@ -1,8 +1,7 @@
 """The structure of one step: is it symplectic, is it symmetric (time-reversible), is it a map of the state alone?
 
-A step is evaluated only through a solver, as a run of one step from a start z = (theta, phi, psi, p_theta, p_phi,
-p_psi), so that any plug-in can be judged. Its result is a vector Y(z) in the chart's own variables, whose Poisson
-brackets are known at any point:
+A step is evaluated only through a solver, as a run of one step from z = (theta, phi, psi, p_theta, p_phi, p_psi), so
+that any plug-in can be judged. Its result is a vector Y(z) in the chart's variables, whose Poisson brackets are known:
 
     angles      (theta, phi, psi, p_theta, p_phi, p_psi)    {q_i, p_j} = delta_ij
     nutation    (theta, p_theta)                             likewise, of z = (theta, p_theta)

@@ -228,10 +228,7 @@ def _time(cells: list[_Cell], done: dict[str, xr.Dataset]) -> bool:
 
 
 def timed_rows(cells: "list[tuple[Scene, Integrator, float, list[dict[str, Any]]]]") -> None:
-    """Time all runs with outcome "ok" against each other; adds "seconds" and "seconds_spread" to their rows.
-
-    A cell is a scene, a method, a horizon and its rows, with "setting_value" and "outcome" each.
-    """
+    """Time all runs with outcome "ok" against each other; adds "seconds" and "seconds_spread" to the rows of cells."""
     rows, calls, firsts = [], list[Callable[[], object]](), list[Callable[[], object]]()
     for scene, method, horizon, runs in cells:
         rows += (ended := [one for one in runs if one["outcome"] == "ok"])

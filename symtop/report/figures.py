@@ -110,7 +110,7 @@ def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: S
 APART = 3.0  # pixels between points that represent a line
 MOST_SPOTS = 40  # points of a line between its ends where its name is tried
 BESIDE = (16.0, 10.0)  # pixels: a name so near to a point of another line seems to belong to that
-LINE, WRONG, ELSEWHERE = 0.8, 8.0, (0.0, 2.0, 6.0)  # costs: a covered point, such a near point; last, first, inner point
+LINE, WRONG, ELSEWHERE = 0.8, 8.0, (0.0, 2.0, 6.0)  # costs: a covered point, a near one; last, first, inner point
 ASIDE = {"left": 0.0, "right": 2.0, "center": 14.0}  # cost of the alignment of a name
 PLACES = (*((dx, dy, side) for dx, side in ((5, "left"), (-5, "right")) for dy in (0, -5, 5, -9, 9)),
           *((0, dy, "center") for dy in (-11, 11, -15, 15)))  # fmt: skip

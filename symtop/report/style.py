@@ -61,7 +61,7 @@ DASHES = {  # dash patterns of lines by family; other families have solid lines
     "splitting": (0, (6.0, 1.2)), "runge-kutta": (0, (3.0, 1.2)), "lie-group": (0, (6.0, 1.2, 1.0, 1.2)),
     "taylor": (0, (1.5, 0.8)), "library": (0, (1.0, 1.6)), "engine": (0, (3.0, 1.2, 1.0, 1.2)),
 }  # fmt: skip
-ADAPTIVE = (0, (6.0, 1.2, 1.0, 1.2, 1.0, 1.2))  # dashes of adaptive Runge-Kutta methods, for a figure may have both kinds
+ADAPTIVE = (0, (6.0, 1.2, 1.0, 1.2, 1.0, 1.2))  # of Runge-Kutta methods with a tolerance
 UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata left out, so that files are reproducible
 _MARKERS = "osv^<>DPXph8dH"
 
@@ -107,7 +107,7 @@ def look(name: str) -> Look:
 
 
 def line(name: str, scale: float = 1.0) -> dict[str, Any]:
-    """Keyword arguments of ``plot`` for an integrator or a variant: colour, line, and marker of `scale` times its size."""
+    """Arguments of ``plot`` for an integrator or a variant: colour, line, and marker of `scale` times its size."""
     one = look(name)
     return {"color": one.color, "ls": one.dash, "marker": one.marker, "fillstyle": one.fill, "ms": scale * one.size}
 
@@ -160,7 +160,7 @@ def publish(figure: Any, target: Path) -> None:
 
 
 def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
-    """Write a figure in the format of the file's ending; ``savefig`` would draw a PNG or a PDF twice, once for layout."""
+    """Write a figure in the format of the ending; ``savefig`` would draw a PNG or a PDF twice, once for layout."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
 

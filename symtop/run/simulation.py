@@ -176,8 +176,7 @@ def simulate(
     ("nutation", "axis", "attitude"; default: that of the scene) picks the smallest chart of the integrator that
     determines it; a variant, such as ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` is
     sampled at every step. The number of steps is horizon/step_size, rounded; the attribute ``step_size`` is the step
-    made. ``sampling`` is "uniform", "nearest steps" (to uniform times), or "dithered", to cover all phases of a
-    nutation.
+    made. ``sampling`` is "uniform", "nearest steps" (to uniform times), or "dithered", to cover all nutation phases.
 
     With `times`, an increasing row (n,) of numbers of at least 0 instead of `horizon` and `samples`, the run is sampled
     at these and ends at the last; ``sampling`` is "at times". Adaptive methods are sampled at any time. Fixed steps are
@@ -187,9 +186,8 @@ def simulate(
     Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a large
     error is expected; it does not change the run. It compares a piece of the run with the closed form ("exact", tops
     only) or with an accurate integration ("series", always for bodies). A function as `guard` is called with the
-    sentence instead; False turns the guard off. `budget` is the most steps of a fixed-step run (`MOST_STEPS` by
-    default; more are refused) and the most force evaluations, or Taylor steps, of any other, which ends
-    `out_of_budget`.
+    sentence instead; False turns it off. `budget` is the most steps of a fixed-step run (`MOST_STEPS` by default; more
+    are refused) and the most force evaluations, or Taylor steps, of any other, which ends `out_of_budget`.
 
     Raises SymtopError for invalid arguments. A run that fails raises no exception: see ``outcome``.
     """

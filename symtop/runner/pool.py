@@ -1,9 +1,8 @@
 """Compute the cases of a study in this process, in worker processes, or on a dask cluster.
 
 Worker processes are Pebble's: a time limit also ends compiled code, and if a worker dies, only its own case fails. They
-are kept for the next study. Few cases, and those of integrators registered in this process only, are computed here. A
-dask cluster computes untimed cases; its workers need this version of symtop, the studies, and the results folder at the
-same path.
+are kept for the next study. Few cases, and those of integrators registered in this process only, are computed here. On
+a dask cluster, for untimed cases, workers need this version of symtop, the studies, and results at the same path.
 
 If a case fails, the failure is recorded and the others go on; an error of the machine (a full disk) is raised.
 """

@@ -2,8 +2,7 @@
 
 A case is computed only if no file has its fingerprint in its name: an interrupted study resumes, an unchanged one ends
 in seconds. Two commands may share one folder: each case is computed by one of them. The caller passes the function that
-writes figures. The findings, NAME.json, hold the facts of a study and the names of its tables, figures and charts, for
-the report.
+writes figures. The findings, NAME.json, hold facts and the names of tables, figures and charts, for the report.
 """
 
 import contextlib

@@ -142,8 +142,7 @@ class Heartbeat(ctypes.Structure):
     """Counts calls of a step, in memory shared with a forked process: ``with heartbeat.call(h): step(...)``.
 
     `calls` is the number of calls begun; `step` is the h of the last one, which is running if `inside` and may take
-    `allowed` seconds. Its exceptions become SymtopError. If `forward_only`, because a step backwards did not return,
-    such steps are refused.
+    `allowed` seconds. Exceptions become SymtopError. `forward_only`: refuse steps backwards, for one did not return.
     """
 
     _fields_ = (("calls", c_long), ("step", c_double), ("inside", c_bool), ("allowed", c_double))

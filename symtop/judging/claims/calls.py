@@ -4,8 +4,7 @@ A call is repeated, then repeated after a step somewhere else: if the result dif
 last force, and its runs depend on earlier runs. If the loop over steps is foreign, a run of n + m steps is compared
 with runs of n and of m steps: a loop that sums its time and stops too late or too soon is off by a step, a multistep
 method by less. The same is done with long runs, n and m random, whatever the loop, once in a new process. The m steps
-begin at a state whose last bit is changed, so that nothing kept for that state can be used. At last the first call is
-repeated.
+begin at a state with its last bit changed, so that nothing kept for it can be used. Then the first call is repeated.
 """
 
 import contextlib

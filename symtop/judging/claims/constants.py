@@ -17,9 +17,8 @@ A Cayley map keeps |L|^2/2 + c e_z - (h mgl)^2 (1 - e_z^2)/8 with c = h mgl/2 ta
 residual of the fit must vanish. Source: Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147.
 
 In the space frame p_phi = L_z and p_psi = L.e are computed from the states, whatever the run reports; in angles, where
-they are parameters of a state, those implied by the rates are compared with the reported ones
-(`symtop.measure.conservation`). The only constant of a map of (theta, p_theta) is the energy with the p_phi and p_psi
-of the start, which are parameters.
+they are parameters of a state, the reported ones are compared with those that the rates imply (`measure.conservation`).
+The only constant of a map of (theta, p_theta) is the energy with the p_phi and p_psi of the start.
 """
 
 import math

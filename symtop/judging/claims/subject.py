@@ -1,8 +1,7 @@
 """The subject of a judgement: a registered integrator or a bare step, with the scene, its claims and limits of runs.
 
-The length of the runs of a bare step follows from the time of one step, so that a method in Python is judged in a
-minute and a compiled one in seconds; the findings name the numbers of steps. For a registered integrator it follows
-from its implementation.
+The length of runs follows from the time of one step, so that a bare step in Python is judged in a minute and a compiled
+one in seconds; the findings name the numbers of steps. For a registered integrator its implementation decides.
 
 A bare step is given as a function, a class, a solver, a file or a command, which selects its adapter.
 """

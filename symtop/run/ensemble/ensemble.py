@@ -1,8 +1,7 @@
 """ensemble(): many tops or bodies, one integrator, each with a step and a horizon of its own -> one dataset.
 
 Members are computed in chunks (`symtop.run.ensemble.chunks`), on threads or on a cluster, and a member has the same
-bits as in `simulate`. An ensemble too large for memory is written to a file as it is computed (`Stream`), and resumed
-from there.
+bits as in `simulate`. An ensemble too large for memory is written to a file (`Stream`), and resumed from there.
 """
 
 import contextlib

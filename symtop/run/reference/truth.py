@@ -10,11 +10,9 @@ By default the values are the closed form in double. Three errors add up at a ti
     formulas     any other error: none is known
 
 The third is looked for at every requested time. The angles, the axis and the quaternion are evaluated independently and
-must agree on the attitude; theta' and phi' must reproduce the energy and p_phi. Where they do not, to `SUSPICIOUS`, the
-bound is pi, the largest error possible.
+must agree on the attitude; theta' and phi' must reproduce the energy and p_phi. If not, to `SUSPICIOUS`, bounds are pi.
 
-A *certificate* is a comparison of the closed form of a scene with independent checks, made once; each kind includes
-the one before it:
+A *certificate* is one comparison of a scene's closed form with independent checks; each kind includes the one before:
 
     digits        its angles, axis and attitude at `CHECKS` times and at the fastest moment before each, up to
                   `REACH` nutations, against the same formulas in 40 digits: finds errors of rounding
@@ -33,8 +31,7 @@ or that takes more than a million steps, there is no reference.
 With a `precision` the values are heyoka's integration of the equations of motion in that arithmetic, compared with the
 closed form in 40 digits at some thirty times (`symtop.run.reference.independent_checks`). This is an independent check
 and has digits beyond double, stored as pairs, ``theta + theta_lo``. Where an integration visibly differs from the
-closed form, that distance is its bound. Results are cached on disk in files with a hash of the values, so that a
-damaged one is noticed and computed again.
+closed form, that distance is its bound. Results are cached on disk with a hash, by which damaged ones are recognised.
 """
 
 import functools
@@ -114,14 +111,12 @@ def reference(
     iterated, "integration" also with heyoka in long double; each once per scene, and stored on disk.
     Attributes: ``bound`` from what the bounds are derived, ``certificate`` with what the closed form of this scene has
     been compared, and the result, ``arithmetic`` in which its constants were computed, ``conditioning`` how much the
-    motion amplifies a change of its start (`symtop.run.reference.sensitivity`): bounds hold for the motion from exactly
-    the doubles given.
+    motion amplifies a change of its start (`symtop.run.reference.sensitivity`): bounds are for exactly these doubles.
 
     For a body without symmetry: ``quaternion``, ``axis`` (its third), ``theta``, ``momentum`` (L in the space frame),
     ``energy``, ``p_phi``, ``quaternion_lo``, and the bounds of axis, attitude and theta.
 
-    Raises SymtopError for times that are negative, not finite or none, and for those beyond a body's reference, see
-    above.
+    Raises SymtopError for times that are negative, not finite or none, and for those beyond a body's reference.
     """
     chosen = find_scene(scene, bodies=True)
     moments = real_numbers("times", times)
