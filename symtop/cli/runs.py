@@ -265,7 +265,7 @@ def ensemble(
         from symtop.run.ensemble import bodies as random_bodies, ensemble as runs
         from symtop.run.ensemble.population import check_memory, population
 
-        whole("members", members, 1, random_bodies.MOST if bodies else math.inf)  # which is n in Python
+        whole("members", members, 1, random_bodies.MOST if bodies else math.inf)  # the argument n of `population`
         check_memory("members", members)
         draw = partial(random_bodies.body_population, epsilon=epsilon) if bodies else population
         sample = draw(members, seed=seed, kind=kind)

@@ -246,7 +246,7 @@ def timed_rows(cells: "list[tuple[Scene, Integrator, float, list[dict[str, Any]]
 
 
 def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:
-    """The table of a cell extended to `size` settings by rows "not_run"; all are, without a hash, if there is none."""
+    """The table of a cell, extended by rows "not_run" to `size` settings; only such rows and no hash if it is None."""
     blank = as_table([blank_row(cell.method) | {"message": ""} | (SPENT if cell.timed else {})] * size)
     if table is None:
         return blank.assign(made_of=((), ""))

@@ -79,7 +79,7 @@ BEGIN = 0.23  # nutations: t0
 UNSTABLE = 1e4  # amplification by the motion above which errors of runs follow no power of the step
 CLEAR = 1e-9  # noise of the h^1 term in double precision; rounding of a step to single precision causes 1e-8
 CONVERGES, ROUNDED, FALLS = "converges", 1e-10, (1e4, 10.0)  # converges: an error falls to a tenth over four decades
-STAYS, FEWEST = 0.5, 3  # least ratio of errors, over the last decade of steps and so many runs, that stay the same
+STAYS, FEWEST = 0.5, 3  # errors of the last decade of steps, 3 or more, do not fall if their ratio is above 0.5
 SHARPLY, BESIDE_NEXT = 1e-5, 1e-3  # a wrong term with a defect below this, or this part of the next, shows in no slope
 ABOVE, FINEST_RUNS, SPREAD = 10.0, 5, 10.0  # finest errors beyond 10 bounds, and the factor by which they fit h^p
 

@@ -2,8 +2,9 @@
 
 Whether a step preserves the Poisson bracket, and whether it is symmetric, is measured by `symtop.measure.step_map` in
 every chart of a method. The answer of a chart is no if the defect is clearly above the error of the differencing, yes
-if it is negligible, else undecided; that of a method is no if any chart's is no, yes if one is yes and none no. A no is
-measured again at half the step: a true defect falls by a power of two; one that vanishes was an unconverged iteration.
+if it is negligible, and undecided between. A method fails if one chart fails, and passes if one passes and none fails.
+A failure is measured again at half the step, where a true defect is smaller by a power of two; a defect that almost
+vanishes there came from an iteration that had not converged.
 
 For the pole, a run goes through theta = 0 exactly, and must continue correctly on the other side. A method in the space
 frame claims to pass, one in angles claims nothing; both are run, with a step and with half of it.
