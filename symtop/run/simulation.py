@@ -39,7 +39,7 @@ MOST_SAMPLES = 10_000_000
 MOST_SWINGS = 1e8  # periods in an adaptive run: several minutes with the fastest method, taylor
 WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider range of phases empty are dithered
 USUAL = 1e-3  # rad: the error at which an error message proposes a step if none was given
-SAME = 8.0 * EPSILON  # relative: times that differ by less are the same; products and quotients of decimals do
+SAME = 8.0 * EPSILON  # relative: times that differ by less are the same, because products are rounded
 BRIEF = 0.01  # nutations: the length of the run of an adaptive method that is sampled at its start only
 STRETCHES = 17  # equal ranges of phase; two of them are less than `WIDEST_GAP`
 

@@ -43,7 +43,7 @@ from symtop.run.trajectory import LABELS
 
 CHUNK = 65_536  # values of one column in a chunk: half a megabyte, which stays in a core's cache
 CHUNK_STEPS = 5_000_000  # most steps in a chunk: 0.01 s in lanes, to 1 s
-SHARES, LEAST_STEPS = 16, 200_000  # least chunks of an ensemble, unless they have fewer steps (1 ms or more) than this
+SHARES, LEAST_STEPS = 16, 200_000  # an ensemble has at least 16 chunks, unless these had fewer steps (1 ms) than this
 HARMLESS = 1e100  # states and momenta below it have a finite energy: no inertia is below 1e-40
 UNKNOWN_STEPS = 1000  # the steps assumed of a member of an adaptive method or of a closed form
 READ_TOGETHER = 4096  # members whose angles a thread makes continuous at a time

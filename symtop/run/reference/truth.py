@@ -9,8 +9,9 @@ By default the values are the closed form in double. Three errors add up at a ti
                  along its path, an angle of that times the angular velocity
     formulas     any other error: none is known
 
-The third is looked for at every requested time. The angles, the axis and the quaternion are evaluated independently and
-must agree on the attitude; theta' and phi' must reproduce the energy and p_phi. If not, to `SUSPICIOUS`, bounds are pi.
+The third kind is checked for at every requested time: the angles, the axis and the quaternion are evaluated separately
+and must agree on the attitude, and theta' and phi' must reproduce the energy and p_phi. If these differ by more than
+`SUSPICIOUS`, the bound is pi.
 
 A *certificate* is one comparison of a scene's closed form with independent checks; each kind includes the one before:
 
