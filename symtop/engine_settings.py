@@ -1,7 +1,7 @@
-"""What the settings of a physics engine make of a scene, and which method does as well: `recommend --i-use`.
+"""The errors of the settings of a physics engine on a scene, and a method as accurate: `recommend --i-use`.
 
-An engine has settings, and each setting is a map (`symtop.methods.engines`). All of them are run with the step of the
-user against the true motion; the best is then the accuracy that `symtop.advise.recommend` is asked for.
+An engine has settings, and each setting is a map (`symtop.methods.engines`). All are run with the user's step and
+compared with the true motion; the least error is then the accuracy for `symtop.advise.recommend`.
 """
 
 import math
@@ -18,7 +18,7 @@ from symtop.model import scenes
 from symtop.model.scenes import Scene, horizon_of
 
 STEP = 1.0 / 240.0  # s
-WORST = 0.5  # rad: an axis that is further off needs no method to match it
+WORST = 0.5  # rad: with a larger least error no method is recommended
 SETTINGS = {  # the maps of an engine by its settings, the default first
     "mujoco": {
         "Euler": "mujoco-euler", "implicit": "mujoco-implicit", "implicitfast on a free body": "mujoco-implicit",
@@ -42,10 +42,10 @@ SETTINGS = {  # the maps of an engine by its settings, the default first
 
 @dataclass(frozen=True)
 class EngineAdvice:
-    """Axis errors (rad) of an engine's settings at a step, and a method that does as well as the best of them.
+    """Axis errors (rad) of an engine's settings at a step, and a method as accurate as the best of them.
 
-    `errors` has the settings in the order of the engine, the default first; pi is a run that ended early. `advice` is
-    None if even the best setting is no accuracy to match. `gain` is how many times fewer force evaluations it takes.
+    `errors` has the settings in the order of the engine, the default first; pi for a run that ended early. `advice` is
+    None if even the least error is above `WORST`. `gain` is the ratio of force evaluations, best setting to method.
     """
 
     scene: str
@@ -56,7 +56,7 @@ class EngineAdvice:
     best: str
     gain: float
     advice: Advice | None
-    unit: str = ""  # of time, as it follows a number
+    unit: str = ""  # of time, to append to a number
 
     def __str__(self) -> str:
         default, maps = next(iter(self.errors)), _settings()[self.engine]
@@ -85,7 +85,7 @@ class EngineAdvice:
 
 
 def _settings() -> dict[str, dict[str, str]]:
-    """The maps by the settings of each engine, and each map by itself where no engine has its name."""
+    """The maps by settings of each engine, and each map as an engine of its own unless an engine has its name."""
     return SETTINGS | {name: {name: name} for name in registry.engines() if name not in SETTINGS}
 
 
@@ -93,11 +93,11 @@ def i_use(
     engine: str, scene: "str | Scene", *, step_size: float | None = None, horizon: float | None = None,
     accuracy: float | None = None, **limits: Any,
 ) -> EngineAdvice:  # fmt: skip
-    """What the settings of an engine make of a scene at a step, and which method does as well for how much less.
+    """The errors of an engine's settings on a scene at a step, and a method as accurate as the best, with its cost.
 
     An engine is one of `SETTINGS` or a map, such as "mujoco-euler". With an `accuracy`, the advice is for that and
-    for the step; `limits` are what else `recommend` takes. `step_size` is in the units of the scene, 1/240 by default,
-    `horizon` its own by default. Raises SymtopError for an unknown engine and numbers out of range. It takes seconds.
+    for the step; `limits` are further arguments of `recommend`. `step_size` is in the units of the scene, by default
+    1/240, `horizon` by default the scene's. Raises SymtopError for an unknown engine and numbers out of range.
     """
     maps = _settings()
     if engine in registry.methods():
@@ -108,7 +108,7 @@ def i_use(
     end = start.horizon if horizon is None else horizon_of(horizon)
     if h >= end:
         raise SymtopError(f"step_size must be below the horizon {end:g}, not {h:g}", "step_size")
-    if start.of_body:  # a horizon to which its motion is not known is refused
+    if start.of_body:  # refuse a horizon beyond its reference
         settings.judgeable(start, "axis", end)
     runs = {}
     for name, one in maps[engine].items():
@@ -121,7 +121,7 @@ def i_use(
         limits["step_size"] = h
     elif limits.get("quantity") not in (None, "axis"):
         raise SymtopError(f"quantity must be axis where there is no accuracy, not {limits['quantity']!r}", "quantity")
-    limits["quantity"] = limits.get("quantity") or "axis"  # of a body it is the attitude elsewhere
+    limits["quantity"] = limits.get("quantity") or "axis"  # for bodies `recommend` would take the attitude
     target = error if accuracy is None else accuracy
     has_target = accuracy is not None or 0.0 < error <= WORST
     advice = recommend(start, accuracy=target, horizon=end, **limits) if has_target else None
