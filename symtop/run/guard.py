@@ -293,7 +293,10 @@ def _length_lost(probe: Probe, horizon: float) -> tuple[str, float] | None:
 
 
 def _own_growth(motion: Integrated, method: Integrator, chart: str, plan: Plan, piece: float) -> float:
-    """The factor by which a method multiplies a small change in a piece of the run more than the motion does; or 1."""
+    """The factor by which a method multiplies a small change in a piece of the run more than the motion does; or 1.
+
+    It is a lower bound, as it divides by the square of the motion's own factor.
+    """
     steps = max(1, round(min(piece, STEPS[method.implementation] * plan.step_size) / plan.step_size))
     top, marks = motion.scene.top, Plan.steps(plan.step_size, _marks(steps, motion.points))
     pair = [solve(method, chart, top, start, marks).states for start in (motion.scene.start, motion.moved())]
@@ -431,8 +434,8 @@ def _coarse(
     """The trouble of a step that is too long for a pole or for the nutation, or in resonance with it; else None."""
     marks, step, frequency = expected.marks, plan.step_size, expected.marks.frequency
     if expected.growth > 1.0:
-        words = f"steps of {step:.4g} multiply a small change {expected.growth:.1g} times as much as the motion does"
-        return Trouble(f"{size}: {words} in a short run", SMALL_TURN / frequency)
+        times = f"at least {expected.growth:.1g} times as much as the motion does"
+        return Trouble(f"{size}: steps of {step:.4g} multiply a small change {times}", SMALL_TURN / frequency)
     if chart == "angles" and marks.rate * step > COARSE:
         return Trouble(
             f"{size}: the axis passes the {marks.pole} pole at {marks.gap:.2g} rad and precesses there by "
