@@ -34,6 +34,7 @@ from symtop_studies.cost.tops import NATURAL  # noqa: E402
 RESULTS = Path("results")
 KEPT = RESULTS / "machines"
 ROWS = [*((needs, False) for needs in cells.CLASSES[:-1]), (cells.CLASSES[0], True)]  # and those that keep constants
+UNKNOWN = "not kept"  # a cost on a machine of which the first choice alone is kept
 NEAR = 10.0  # times the best: safe choices that are kept
 
 
@@ -84,7 +85,7 @@ def _cost(chosen: dict[str, Any], there: dict[str, Any]) -> float:
 
 
 def _times(cost: float) -> str:
-    return "not kept" if math.isnan(cost) else f"over {NEAR:g}" if math.isinf(cost) else number(cost, 3)
+    return UNKNOWN if math.isnan(cost) else f"over {NEAR:g}" if math.isinf(cost) else number(cost, 3)
 
 
 def _words(row: dict[str, Any]) -> str:
@@ -117,23 +118,21 @@ def main() -> int:
         return 1
     first, second, pair = min(pairs, key=lambda each: each[2].same)  # that agree least
     names = first["processor"], second["processor"]
-    header = [
-        "what can be supplied, and error",
-        *(f"on {name}" for name in names),
-        "the first on the second",
-        "and back",
-    ]
-    table = pages.Table("Where two processors choose differently", header, pair.differing)
+    costs = ["the first's choice on the second", "the second's choice on the first"]
+    known = [k for k in range(2) if any(row[3 + k] != UNKNOWN for row in pair.differing)]
+    header = ["what can be supplied, and error", *(f"on {name}" for name in names), *(costs[k] for k in known)]
+    rows = [[*row[:3], *(row[3 + k] for k in known)] for row in pair.differing]
+    table = pages.Table("Where two processors choose differently", header, rows)
     sentence = (
-        f"Of {pair.cells} choices of the front page's first table {pair.same} are the same on {names[0]} and on "
-        f"{names[1]}, and {pair.clear_same} of the {pair.clear} whose lead is beyond the error of measurement on one "
-        f"of them. Where they differ, the other's choice costs at most {_times(pair.most)} times the best."
+        f"{pair.same} of {pair.cells} choices of the front page's first table are the same on {names[0]} and on "
+        f"{names[1]}: {pair.clear_same} of {pair.clear} where one of them shows a lead beyond the error of measurement. "
+        f"Where they differ, the other's choice costs at most {_times(pair.most)} times the best."
     )
     print(f"{table.text}\n{sentence}")
     page = pages.findings(
         "machines", "Another processor", "Does another processor choose the same methods?", table,
-        "Errors and evaluations are the same on every processor, to rounding; prices are not. The last two columns are "
-        "the time of a choice on the other processor over the least there.", [], answer=sentence, cases=len(kept),
+        "Errors and evaluations are the same on every processor, to rounding; prices are not. A choice on the other "
+        "processor is timed in units of the least there.", [], answer=sentence, cases=len(kept),
         facts=pair._asdict() | {"differing": len(pair.differing)},
         **measured.record(measured.circumstances(), "python -m benchmarks.machines"),
     )  # fmt: skip
