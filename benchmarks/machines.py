@@ -125,7 +125,7 @@ def main() -> int:
     table = pages.Table("Where two processors choose differently", header, rows)
     sentence = (
         f"{pair.same} of {pair.cells} choices of the front page's first table are the same on {names[0]} and on "
-        f"{names[1]}: {pair.clear_same} of {pair.clear} where one of them shows a lead beyond the error of measurement. "
+        f"{names[1]}: {pair.clear_same} of {pair.clear} where either shows a lead beyond the error of measurement. "
         f"Where they differ, the other's choice costs at most {_times(pair.most)} times the best."
     )
     print(f"{table.text}\n{sentence}")
