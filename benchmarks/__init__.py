@@ -1,1 +1,1 @@
-"""What a step costs beside the same step in C, and what a run costs beside other libraries."""
+"""The cost of a step compared with the same step in C, and of a run compared with other libraries."""

@@ -1,4 +1,4 @@
-"""How right the closed form in double is: 10,000 tops of 26 families against 50 digits, and the arithmetic they needed.
+"""Errors of the closed form in double for 10,000 tops of 26 families against 50 digits, and the arithmetic they needed.
 
     python -m benchmarks.accuracy [TOPS OF EACH FAMILY] [PROCESSES]
 
@@ -26,7 +26,7 @@ from symtop.model.top import Angles, SymmetricTop, flat
 
 DIGITS, SEED, EACH, PIECE = 50, 25, 385, 11
 NUTATIONS = (1.0371, 1000.37, 1000000.37)
-QUANTITIES = ("theta", "phi", "psi", "axis")  # rad; of phi and psi what exceeds the last digit
+QUANTITIES = ("theta", "phi", "psi", "axis")  # rad; phi and psi: the part that exceeds their last digit
 CONSTANTS = (
     "rate of the phase (relative)",
     "phase at the start (quarter periods)",
@@ -40,7 +40,7 @@ MARKS = (at.ARITHMETIC, at.RATE_ERROR, at.VALUE_ERROR)
 
 
 class Examined(NamedTuple):
-    """What many tops showed."""
+    """Largest errors of many tops, and the arithmetic that they needed."""
 
     motion: Array  # (nutations, quantities), largest errors
     constants: Array  # (5,), largest errors
@@ -49,20 +49,20 @@ class Examined(NamedTuple):
 
     @property
     def tops(self) -> int:
-        """How many were examined."""
+        """Number of tops."""
         return self.arithmetic.total()
 
     def share(self, arithmetic: str) -> float:
-        """Of the tops, those whose constants needed it."""
+        """Fraction of the tops whose constants needed this arithmetic."""
         return self.arithmetic[arithmetic] / self.tops
 
     def largest(self, quantity: str) -> float:
-        """Over all times."""
+        """Largest error of a quantity over all times."""
         return float(self.motion[:, QUANTITIES.index(quantity)].max())
 
 
 def short(top: SymmetricTop, start: Angles) -> tuple[Array, int]:
-    """The constants without the last resort, interpreted, and their status."""
+    """The constants by the interpreted `motion_constants`, whatever their status, and that status."""
     out = [0.0] * at.SIZE
     status = constants.motion_constants(flat(top, start), out)
     return np.array(out), status
@@ -83,13 +83,13 @@ def deviation(ours: Array, true: Array) -> Array:
     for place in set(range(at.SIZE)) - pairs:
         x, y = ours[place], true[place]
         if x != y and not (math.isnan(x) and math.isnan(y)):
-            noise = 1e-29 * max(1.0, largest)  # of numbers that vanish for a reason, such as b - a u at a cusp
+            noise = 1e-29 * max(1.0, largest)  # allowed for numbers that vanish exactly, such as b - a u at a cusp
             units = max(units, max(abs(x - y) - noise, 0.0) / math.ulp(y))
     return np.array([rate, apart(at.QUARTERS + 2), means, starts, units])
 
 
 def motion_errors(form: ClosedForm, precise: PreciseForm) -> tuple[Array, Array]:
-    """Errors (nutations, quantities) of one form, and what is allowed of each."""
+    """Errors (nutations, quantities) of one form, and the largest allowed ones."""
     period = form.nutation_period if math.isfinite(form.nutation_period) else 1.0
     times = period * np.array(NUTATIONS)
     motion, axis, ctx = form(times), form.axis(times), context(DIGITS)
@@ -107,7 +107,7 @@ def motion_errors(form: ClosedForm, precise: PreciseForm) -> tuple[Array, Array]
 
 
 def examine(kind: str, count: int, first: int) -> Examined:
-    """Some tops of one family."""
+    """Examine some tops of one family."""
     motion, constants, arithmetic, broken = np.zeros((3, 4)), np.zeros(5), Counter[str](), []
     for top, start in tops(count, SEED, [kind], first):
         form, precise = ClosedForm(top, start), PreciseForm(top, start, digits=DIGITS)
@@ -122,14 +122,14 @@ def examine(kind: str, count: int, first: int) -> Examined:
 
 
 def _pieces(each: int) -> Iterator[tuple[str, int, int]]:
-    """The work in pieces of a second: family, count, number of the first."""
+    """Pieces of work of about a second: family, count, number of the first top."""
     for first in range(0, each, PIECE):
         for kind in REGIMES:
             yield kind, min(PIECE, each - first), first
 
 
 def measure(each: int = EACH, jobs: int = 2, *, said: bool = False) -> Examined:
-    """So many tops of each family, by so many processes."""
+    """Examine this many tops of each family in this many processes."""
     closed_form.compile_now()
     total, pieces = Examined(np.zeros((3, 4)), np.zeros(5), Counter(), []), list(_pieces(each))
     with ProcessPoolExecutor(jobs) as pool:

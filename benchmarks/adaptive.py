@@ -1,4 +1,4 @@
-"""`dop853-compiled` beside the same method as a plain loop in C: steps, evaluations, the time of one.
+"""`dop853-compiled` against the same method as a plain loop in C: steps, evaluations, time of an evaluation.
 
 python -m benchmarks.adaptive        (needs gcc)
 
@@ -38,7 +38,7 @@ class Row(NamedTuple):
 
 
 def in_c(chart: str, scene: symtop.Scene, tolerance: float, end: float) -> Callable[[], tuple[np.ndarray, int, int]]:
-    """A run of the C loop: the state at the end, as the equations have it, steps and evaluations."""
+    """A run of the C loop: the final state in the variables of the equations, steps and evaluations."""
     par, start = FORMULATIONS[chart].prepare(scene.top, scene.start)
     rows = [np.pad(row, (0, 12 - len(row))) for row in (*DOP853.a, DOP853.b, DOP853.error, DOP853.third)]
     table, constants = np.concatenate(rows), np.array(numbers(par))
@@ -59,7 +59,7 @@ def in_c(chart: str, scene: symtop.Scene, tolerance: float, end: float) -> Calla
 def measure(
     chart: str, tolerance: float, nutations: float = NUTATIONS, batches: int = 40, name: str = "spheroid"
 ) -> Row:
-    """Both on one scene."""
+    """Time the kernel and the C loop on one scene."""
     scene = symtop.scene(name)
     end = nutations * scene.nutation_period
     solver, plan = symtop.integrator("dop853-compiled").solvers[chart], Plan.until([end], tolerance)

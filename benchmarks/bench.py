@@ -1,4 +1,4 @@
-"""Kernels beside C, alone and in lanes, what starting costs, the time to an accuracy: results/bench.json in the report.
+"""Kernels against C, alone and in lanes, the cost of starting, the time to an accuracy: writes results/bench.json.
 
 make bench        (needs gcc; the twins are built into benchmarks/build)
 """
@@ -15,7 +15,7 @@ from symtop.core import netcdf
 
 
 class Results(NamedTuple):
-    """All that is measured here."""
+    """The results of all benchmarks of this page."""
 
     kernels: Sequence[kernels.Row]
     startup: Mapping[str, float]
@@ -40,7 +40,7 @@ def tables(results: Results) -> list[Table]:
 
 
 def verdict(results: Results) -> list[str]:
-    """What the numbers say."""
+    """The conclusions, as sentences."""
     run, one_step = whole_run.verdict(results.parts, results.one_step)
     return [
         *kernels.verdict(results.kernels), *lanes.verdict(results.lanes), *ensemble.verdict(results.ensemble),
@@ -63,7 +63,7 @@ def findings(results: Results, facts: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def rows(items: Sequence[Any]) -> list[dict[str, Any]]:
-    """Named tuples as JSON has them."""
+    """Named tuples as dictionaries for JSON."""
     return [item._asdict() for item in items]
 
 

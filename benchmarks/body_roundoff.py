@@ -23,7 +23,7 @@ from symtop.model.body import Attitude
 from symtop.model.charts import BODY, View
 from symtop.run.long_run import scattered, windows
 
-RUNS = {"kahan-li-8": 60.37, "series-general": 40.37}  # steps in a natural period, commensurate with nothing
+RUNS = {"kahan-li-8": 60.37, "series-general": 40.37}  # steps in a natural period: a ratio that is no simple fraction
 SCENES = ("check-case-2", "heavy-brick")
 NEAR, DECADES = 1e-3, 2.5
 

@@ -35,26 +35,26 @@ from symtop.methods.framework.registry import NEEDS, integrator
 from symtop.run.simulation import likely_step
 
 PRICED_AT = 1e-8  # tolerance at which the study takes the price of an evaluation
-TIE = 1.1  # costs of a ratio below this are level
-SHARE = 0.95  # of the scenes, on which a method of the table costs at most `TIE` times the least
+TIE = 1.1  # costs with a ratio below this count as equal
+SHARE = 0.95  # of the scenes need a method of the table that costs at most `TIE` times the least
 CLASSES = {ranking.ANY: advise.OF_ANY, **{need: (need,) for need in NEEDS if need != "solution"}}
 SEED = 2027  # of the scenes of a check; the study draws with another
-SPANS, ACCURACIES = (3.0, 300.0), (1e-10, 1e-3)  # nutations and errors that are drawn, evenly in the logarithm
+SPANS, ACCURACIES = (3.0, 300.0), (1e-10, 1e-3)  # ranges in which nutations and errors are drawn, log-uniformly
 QUANTITIES = ("axis", "axis", "axis", "attitude", "energy")
-PRICED = 1e-6  # accuracy of the runs that prices are made of
-NEXT, ROUNDS = 1.5, 25  # foreseen cost, over the least, of what is timed; how often
-ADVISED = "advised"  # the run that is
-PATIENCE = 8.0  # times the least cost so far that a run may be foreseen to take
-MOST = 1e6  # evaluations of it
-LONGEST = 1e7  # evaluations of a run of the advice: a minute or more of vain trials elsewhere
-SHORT = 0.01  # nutations of the run of a step or few, which takes as long as a call
+PRICED = 1e-6  # accuracy of the runs that prices are computed from
+NEXT, ROUNDS = 1.5, 25  # variants are timed up to this predicted cost over the least; rounds of timing
+ADVISED = "advised"  # name of the advised run
+PATIENCE = 8.0  # a run may be predicted to take this many times the least cost so far
+MOST = 1e6  # most evaluations of such a run
+LONGEST = 1e7  # most evaluations of a compiled trial of the advice: trials with more take minutes
+SHORT = 0.01  # nutations of a run of few steps, whose time is that of a call
 
 
 def cover(costs: np.ndarray, count: int) -> list[int]:
-    """Places of the variants, `count` or fewer, that between them cost at most `TIE` times the least on most tops.
+    """Indices of up to `count` variants, one of which costs at most `TIE` times the least on as many tops as possible.
 
-    `costs` is (variants, tops), infinite where a variant does not get there. Between equals the smaller mean excess is
-    first; variants that get nowhere are left out.
+    `costs` is (variants, tops), infinite where a variant misses the target. Among equals the smaller mean excess is
+    first; variants that always miss it are left out.
     """
     best = costs.min(axis=0)
     ratio = costs[:, np.isfinite(best)] / best[np.isfinite(best)]
@@ -105,7 +105,7 @@ def scenes(count: int) -> "list[tuple[symtop.Scene, str, float]]":
 def prices(quantity: str) -> dict[str, tuple[float, float]]:
     """Seconds of an evaluation and of a call of each candidate, from two runs on one scene, timed against each other.
 
-    As in the study, the energy is not asked of a method that keeps it: any step would do.
+    As in the study, methods that conserve the energy are not asked for it: any step would meet the accuracy.
     """
     scene = symtop.scene("goldstein")
     known = advise._everyone(advise._Question(scene, PRICED, quantity, scene.horizon, advise.OF_ANY))
@@ -155,7 +155,7 @@ class Row(NamedTuple):
     advised: str
     best: str
     advice: float
-    table: float  # of the best that the table names
+    table: float  # excess of the best method that the table names
 
 
 def excess(count: int) -> list[Row]:

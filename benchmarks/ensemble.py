@@ -1,4 +1,4 @@
-"""Many tops in one call of `symtop.ensemble` against as many calls of `simulate`, and what the call is made of.
+"""Many tops in one call of `symtop.ensemble` against as many calls of `simulate`, and the parts of the call.
 
 python -m benchmarks.ensemble
 
@@ -6,8 +6,8 @@ Both make the same runs of the same tops, to the same bits. Calls of `simulate` 
 the population, without its guard, which an ensemble does not have, and with it, as a user calls it. Rounds of all of
 them alternate, and the best of each counts.
 
-The setting is what an error of 1e-3 takes: 100 steps a nutation period in the median of the population. It bounds what
-an ensemble can be worth: a step of strang[axis] is 152 sums and products, 76 cycles for eight tops on a processor that
+An error of 1e-3 needs 100 steps a nutation period in the median of the population: the setting here. It limits how much
+an ensemble can gain: a step of strang[axis] is 152 sums and products, 76 cycles for eight tops on a processor that
 begins two vector operations a cycle, and no way of calling it makes it less. `verdict` says how often the steps alone,
 on all cores, go into the time of `simulate`.
 
@@ -43,7 +43,7 @@ class Item(NamedTuple):
     """One part of an ensemble, or a way of making its runs."""
 
     name: str
-    seconds: float  # for each member
+    seconds: float  # for one member
     ratio: float  # how many times faster than `simulate` with its guard
 
 
@@ -75,7 +75,7 @@ def measure() -> list[Item]:
         return run
 
     def stepped(times: int) -> Callable[[], object]:
-        """So many times the steps, and the last state alone."""
+        """A function that makes `times` as many steps and returns the last state only."""
         return lambda: solver.many(numbers, plan.step_size, times * plan.marks[:, -1:])
 
     def whole(threads: int, shown: tuple[str, ...] | None) -> Callable[[], object]:
@@ -130,13 +130,13 @@ class Call(NamedTuple):
     """One call of `ensemble` as a user makes it: seconds."""
 
     method: str
-    beside: float  # a member takes beside its steps
-    step: float  # of a member, all that the long call takes divided by its steps
-    alone: float  # a step of one long run
+    beside: float  # time of a member apart from its steps
+    step: float  # time of the long call over the steps of all its members
+    alone: float  # time of a step of one long run
 
 
 def calls() -> list[Call]:
-    """The call with an explicit method and an implicit one."""
+    """Time the call with an explicit method and with an implicit one."""
     tops, scene, rows = symtop.population(CALLED, seed=1), symtop.scene("spheroid"), []
     h = scene.nutation_period / LONG[0]
     for method in (METHOD, "midpoint"):
@@ -156,7 +156,7 @@ def calls() -> list[Call]:
 
 
 def said_of(rows: Sequence[Call]) -> list[str]:
-    """What the calls of a user take."""
+    """Sentences: the times of the calls of a user."""
     return [
         f"`symtop.ensemble` of {CALLED} tops, {row.method}, two samples of the axis, {cores()} cores: "
         f"{row.beside * 1e6:.2f} us a member beside its steps, {row.step * 1e9:.2f} ns a step, "
@@ -166,7 +166,7 @@ def said_of(rows: Sequence[Call]) -> list[str]:
 
 
 def verdict(items: Sequence[Item]) -> list[str]:
-    """How much faster an ensemble is, and how much it could be."""
+    """Sentences: how much faster an ensemble is, and the limit that its steps alone set."""
     took = {item.name: item for item in items}
     fast = max((item for item in items if item.name.startswith(WHOLE)), key=lambda item: item.ratio)
     said = (
@@ -179,7 +179,7 @@ def verdict(items: Sequence[Item]) -> list[str]:
 
 
 def table(items: Sequence[Item]) -> Table:
-    """Every part, and every way of making the runs."""
+    """Times of all parts, and of all ways of making the runs."""
     return Table(
         f"A member of an ensemble: {NUTATIONS * PER_NUTATION} steps of {METHOD} [{CHART}], {SAMPLES} samples, "
         f"{MEMBERS} tops",

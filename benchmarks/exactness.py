@@ -91,7 +91,7 @@ def of_random_tops(count: int = TOPS) -> np.ndarray:
 
 
 def of_edges() -> Iterator[str]:
-    """What a step could refuse, and what it does instead: a line each with the error and the parts of a step."""
+    """A line for each special case of a step, with the error and the number of parts of the step."""
     spheroid, separatrix = symtop.scene("spheroid"), symtop.scene("separatrix")
     start, T = spheroid.start, spheroid.nutation_period
     free = SymmetricTop(spheroid.top.I1, spheroid.top.I3, 0.0)
@@ -117,7 +117,7 @@ def of_edges() -> Iterator[str]:
 
 
 def forgetful() -> Loop:
-    """The loop of the map, with sums in one double."""
+    """The loop of the map with sums in one double, which lose what they round off."""
     return Loop(exact_discrete.begin, _forgetting, exact_discrete.observe, exact_discrete.enter,
                   exact_discrete.present_axis, accumulate_plainly)  # fmt: skip
 

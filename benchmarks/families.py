@@ -1,6 +1,6 @@
 """Random tops of 26 families, everything between a fast top and one that grazes a pole, sleeps or climbs for ever.
 
-Each family draws from the same generic top and bends it: what a family is about stands in its name. Small gaps, down to
+Each family draws the same generic top and changes it as the name of the family says. Small gaps, down to
 the last digit, are chosen from a few sizes, so that exact coincidences are among the members.
 """
 
@@ -45,7 +45,7 @@ def _grazing(d: Draw, side: float) -> tuple[SymmetricTop, Angles]:
 
 
 def _nearly_steady(d: Draw) -> tuple[SymmetricTop, Angles]:
-    """I3 w3 phi' = I1 phi'^2 cos theta + mgl, but for a gap."""
+    """I3 w3 phi' = I1 phi'^2 cos theta + mgl, up to a small gap."""
     precession, cosine = d.sign * d.spread(0.3, 30.0), math.cos(d.theta)
     spin = (d.I1 * precession**2 * cosine + d.mgl) / (d.I3 * precession) - precession * cosine
     gap = d.pick(0.0, 1e-14, 1e-10, 1e-6)
@@ -53,7 +53,7 @@ def _nearly_steady(d: Draw) -> tuple[SymmetricTop, Angles]:
 
 
 def _near_separatrix(d: Draw) -> tuple[SymmetricTop, Angles]:
-    """At a turning point with b = a and alpha = beta, but for gaps."""
+    """At a turning point with b = a and alpha = beta, up to small gaps."""
     theta = d.uniform(0.2, 3.0)
     precession = math.sqrt(2.0 * d.mgl / d.I1 / (1.0 + math.cos(theta))) * (1.0 + d.pick(0.0, 1e-14, -1e-11, 1e-8))
     spin = precession * (d.I1 + (d.I1 - d.I3) * math.cos(theta)) / d.I3 * (1.0 + d.pick(0.0, 1e-14, -1e-11, 1e-8))

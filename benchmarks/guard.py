@@ -42,10 +42,10 @@ from symtop.run.motion import Exact, Integrated
 from symtop.run.simulation import make_plan
 
 CHUNK = 100
-SEEDS = {"tops": 29, "bodies": 1125, "hostile": 1125}  # of bodies others than those that the guard was mended on
+SEEDS = {"tops": 29, "bodies": 1125, "hostile": 1125}  # other bodies than those with which the guard was corrected
 NUTATIONS = (10.0, 100.0, 1000.0)  # of tops
 SAMPLES = {"tops": 501, "bodies": 201, "hostile": 201}
-MOST_TURNS = 1e3  # of a hostile body about any axis
+MOST_TURNS = 1e3  # most turns of a hostile body about any axis
 TABLES = Path("results") / "tables"
 ANSWER = (
     "Hardly. Of the wrong runs of tops the guard is silent on {silent[0]} with the closed form (exact) and on "
@@ -65,7 +65,7 @@ SUMMED = ["runs", "guard", "wrong: silent", "worst silent (rad)", "correct: warn
 
 
 class Run(NamedTuple):
-    """What was run, what the guard expected and what came of it."""
+    """One run: its problem and method, the guard's scores with and without the truth, and its error."""
 
     k: int
     stratum: str
@@ -78,7 +78,7 @@ class Run(NamedTuple):
     whole: bool  # the guard's trial was the whole run
     outcome: str
     error: float  # rad, largest of the axis or of the attitude
-    exact: float  # scores
+    exact: float  # score with the truth; the next: with an integration
     series: float
 
 
@@ -146,7 +146,7 @@ SAMPLERS = {"tops": tops, "bodies": bodies, "hostile": hostile}
 
 
 def one(name: str, k: int) -> Run:
-    """Draw run k and do it: 2 to 500 steps a period, or a tolerance of 0.1 to 1e-13."""
+    """Draw and make run k: 2 to 500 steps a period, or a tolerance of 0.1 to 1e-13."""
     scene, draw = SAMPLERS[name](k)
     of_top = name == "tops"
     known = [m for m in integrators().values() if m.control is not None and (of_top or BODY in m.solvers)]
@@ -176,7 +176,7 @@ def one(name: str, k: int) -> Run:
 
 
 def _off(scene: Scene, chart: str, times: Any, states: Any) -> Any:
-    """Rad by which states are off the truth."""
+    """Errors of states against the truth, rad."""
     if not scene.of_body:
         return axis_distance(axes(chart, states), closed_form(scene).axis(times))
     truth = integrator("taylor-longdouble")
@@ -185,7 +185,7 @@ def _off(scene: Scene, chart: str, times: Any, states: Any) -> Any:
 
 
 def score(motion: Integrated, method: Integrator, chart: str, plan: Plan) -> tuple[float, bool]:
-    """What the guard expects, rad, and whether its trial was the whole run."""
+    """The error that the guard expects, rad, and whether its trial was the whole run."""
     expected = guard.forecast(motion.scene, method, chart, plan, motion)
     value = max(expected.axis_error, expected.rounding)
     silent = guard.trouble(motion, method, chart, plan, expected) is None
@@ -193,14 +193,14 @@ def score(motion: Integrated, method: Integrator, chart: str, plan: Plan) -> tup
 
 
 def chunk(name: str, first: int) -> list[Run]:
-    """`CHUNK` runs."""
+    """Make `CHUNK` runs from number `first` on."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         return [one(name, k) for k in range(first, first + CHUNK)]
 
 
 def kept(name: str) -> list[Run]:
-    """The runs that were made."""
+    """The stored runs of a sampler."""
     path = TABLES / f"guard-{name}.csv"
     if not path.exists():
         return []
@@ -223,14 +223,14 @@ def make(name: str, count: int, workers: int) -> None:
             file.flush()
 
 
-PARTS = {  # of runs, by their error; ended early is none of these
+PARTS = {  # ranges of the error of runs that did not end early
     "beyond 10 limits": (10.0 * guard.EXPECTED, math.inf), "1 to 10 limits": (guard.EXPECTED, 10.0 * guard.EXPECTED),
     "a tenth to 1": (0.1 * guard.EXPECTED, guard.EXPECTED), "below a tenth": (-1.0, 0.1 * guard.EXPECTED),
 }  # fmt: skip
 
 
 def counts(runs: list[Run], guarded: str) -> list[str]:
-    """Warned of and all, of runs that ended early and of each part."""
+    """Texts "warnings of runs", for the runs that ended early and for each of `PARTS`."""
     ended = [run for run in runs if run.outcome != "ok"]
     rest = [run for run in runs if run.outcome == "ok"]
     parts = [ended, *([run for run in rest if low < run.error <= high] for low, high in PARTS.values())]
@@ -238,7 +238,7 @@ def counts(runs: list[Run], guarded: str) -> list[str]:
 
 
 def curve(runs: list[Run], guarded: str) -> tuple[Any, Any]:
-    """Shares of right runs that are warned of, and of wrong ones, for every limit of the score."""
+    """Fractions of right and of wrong runs that are warned of, for every limit of the score."""
     rest = [run for run in runs if run.outcome == "ok"]
     score_of, wrong = np.array([[getattr(run, guarded), run.error > guard.EXPECTED] for run in rest]).T
     order = np.argsort(-score_of, kind="stable")
@@ -247,7 +247,7 @@ def curve(runs: list[Run], guarded: str) -> tuple[Any, Any]:
 
 
 def grouped(runs: list[Run], by: str) -> dict[str, list[Run]]:
-    """Runs by a column, by whether the trial was the whole run, or by the control."""
+    """Runs grouped by the value of their field `by`."""
     parts: dict[str, list[Run]] = {}
     for run in runs:
         value = getattr(run, by)
@@ -286,7 +286,7 @@ def draw(known: dict[str, list[Run]], target: Path) -> None:
 
 
 def summed(name: str, runs: list[Run], guarded: str) -> list[str]:
-    """How many wrong runs were silent and how many correct ones were warned of: a row under `SUMMED`."""
+    """A row under `SUMMED`: numbers of wrong runs without a warning and of correct ones with one."""
     wrong = [run for run in runs if run.outcome == "ok" and run.error > guard.EXPECTED]
     right = [run for run in runs if run.outcome == "ok" and run.error <= guard.EXPECTED]
     silent = [run for run in wrong if not getattr(run, guarded) > guard.EXPECTED]
@@ -298,7 +298,7 @@ def summed(name: str, runs: list[Run], guarded: str) -> list[str]:
 
 
 def page(results: Path) -> None:
-    """Write what was found: counts by population, and by stratum, class of method, horizon and control."""
+    """Write the page: counts by population, and by stratum, class of method, horizon and control."""
     facts, known = measured.circumstances(), {name: kept(name) for name in SAMPLERS}
     header = ["runs", "guard", "ended early", *PARTS]
     rows = list[list[str]]()
@@ -323,7 +323,7 @@ def page(results: Path) -> None:
 
 
 def written(summary: list[list[str]], table: Table, **others: Any) -> dict[str, Any]:
-    """What results/guard.json holds: the summary, a row under `SUMMED` each, and the counts."""
+    """The contents of results/guard.json: the rows under `SUMMED` and the counts."""
     alt = "Curves of wrong runs warned of against right runs warned of, near one."
     silent, false = ([row[column] for row in summary] for column in (2, 4))  # tops, with the closed form first
     words = pages.findings(

@@ -1,4 +1,4 @@
-"""Runs of up to 10^8 nutations: does the phase diagram's prediction hold where the study cannot afford to run?
+"""Runs of up to 10^8 nutations: does the phase diagram's prediction hold beyond the runs of the study?
 
     python -m benchmarks.horizon [--nutations 1e8]        two minutes of a quiet core; writes results/horizon.json
 
@@ -19,7 +19,7 @@ from symtop.report.formats import counted, listed
 from symtop.runner import scripts
 
 NAME, STEPS, TOPS, SEED = "takahashi-imada[axis]", 8.74, 8, 1
-FINE = 1118.72  # steps a nutation of the runs that show the walk of rounding
+FINE = 1118.72  # steps a nutation of the runs in which rounding dominates and grows as a random walk
 FITTED = 1e4  # nutations
 
 

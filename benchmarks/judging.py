@@ -1,4 +1,4 @@
-"""Every method of `tests/judging/blind` judged quickly: a line for each kind of claim, what it resolves and its cost.
+"""`judge` on every method of `tests/judging/blind`: a line for each kind of claim, with its resolution and its cost.
 
     python -m benchmarks.judging          or with --full, of judging without --quick
 

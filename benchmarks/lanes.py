@@ -36,20 +36,20 @@ from symtop.model.top import flat
 
 MEMBERS = 4 * W
 SPREAD = 0.001  # of theta, from one neighbour to the next
-CALL, FASTER = 2e-3, 6  # seconds: long against what is done once for a member; about how much faster lanes are
+CALL, FASTER = 2e-3, 6  # seconds, long against the set-up of a member; rough speed-up by lanes
 BATCHES, BATCH = 25, 0.002
 ON_GROUPS = "explicit on Lie groups"
-LEAST = {  # times the kernel for one, by kind
+LEAST = {  # required speed over the kernel for one, by kind
     "explicit": 7.0, ON_GROUPS: 5.0, "midpoint and trapezoidal": 6.0, "gauss": 3.0,
 }  # fmt: skip
 FIXED = {f"{pair.name}-fixed" for pair in PAIRS}
-UNLIMITED = {"series", "exact-discrete"} | FIXED  # a step alone is vectors already, or most of its time a chain
+UNLIMITED = {"series", "exact-discrete"} | FIXED  # one step uses vectors already, or is mostly a dependency chain
 OTHERS, WIDE = "other implicit", "series, exact-discrete and pairs with fixed steps"  # no limit is set for them
 THREADED = {("strang", "axis"): 20_000, ("srkn-14-6", "attitude"): 3000}  # steps: some 10 ms a piece
 PIECES = 8  # for two threads
 HORIZON = 8.0
 TOLERANCES = (1e-6, 1e-9)
-RIVAL = ("srkn-14-6", "axis")  # in lanes, to the error that heyoka reaches
+RIVAL = ("srkn-14-6", "axis")  # run in lanes with the error that heyoka reaches
 LADDER = np.unique(np.rint(np.geomspace(8, 2000, 120)).astype(int))  # steps, 5 % apart
 
 
@@ -66,7 +66,7 @@ class Row(NamedTuple):
 
 
 class Threads(NamedTuple):
-    """What two threads do with one method."""
+    """The speed-up of one method by two threads."""
 
     name: str
     chart: str
@@ -87,7 +87,7 @@ class Batch(NamedTuple):
 
 
 class Measured(NamedTuple):
-    """All that is measured here."""
+    """All measurements of this benchmark."""
 
     rows: Sequence[Row]
     threads: Sequence[Threads]
@@ -128,7 +128,7 @@ def solver_of(name: str, chart: str) -> FixedStep:
 
 
 def together(solver: FixedStep, count: int, h: float, steps: int) -> Any:
-    """A call that runs so many members for so many steps."""
+    """A function that runs `count` members for this many steps."""
     given = members(count), np.full(count, h), np.full((count, 1), steps)
     return lambda: solver.many(*given)
 
@@ -222,7 +222,7 @@ def batches() -> list[Batch]:
 
 
 def verdict(measured: Measured) -> list[str]:
-    """How much faster lanes are, and how they stand beside threads and heyoka's batches."""
+    """Sentences: how much faster lanes are, compared with threads and heyoka's batches."""
     said = []
     for kind in (*LEAST, WIDE, OTHERS):
         rows = sorted((row for row in measured.rows if kind_of(row.name) == kind), key=lambda row: row.ratio)
@@ -250,7 +250,7 @@ def verdict(measured: Measured) -> list[str]:
 
 
 def tables(measured: Measured) -> list[Table]:
-    """What the report shows."""
+    """The tables of the report."""
     return [
         Table(
             f"A step of {MEMBERS} tops in lanes, one core",
@@ -282,7 +282,7 @@ def tables(measured: Measured) -> list[Table]:
 
 
 def measure() -> Measured:
-    """All of it."""
+    """Measure steps, threads and batches."""
     return Measured(steps(), threads(), batches())
 
 

@@ -20,7 +20,7 @@ def circumstances() -> dict[str, Any]:
 
 
 def record(facts: Mapping[str, Any], command: str, versions: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """What findings hold of it: a sentence, the command and the provenance; `versions` are those of other packages."""
+    """The record in findings: a sentence, the command and the provenance; `versions`: those of other packages."""
     core = json.loads(facts["dependencies"])
     given = {name: core[name] for name in ("heyoka", "numba", "numpy", "scipy")} | dict(versions or {})
     sentence = (

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from symtop.report.formats import table
 
-ROWS, TABLES = 5, 4  # that the page shows; the rest stands in what the command prints
+ROWS, TABLES = 5, 4  # shown by the page; the command prints all
 
 
 class Table(NamedTuple):
@@ -32,7 +32,7 @@ def findings(
     *, answer: str = "", further: Sequence[str] = (), captions: Mapping[str, tuple[str, str]] | None = None,
     **others: Any,
 ) -> dict[str, Any]:  # fmt: skip
-    """What NAME.json holds; `captions`: caption and text for the blind of each figure, `sentences` or a table.
+    """The contents of NAME.json; `captions`: caption and alt text of each figure; `sentences` can be a table.
     The `answer` to the question comes first.
 
     From "How to read it" on the page is for reference: the `further` sentences and the tables.

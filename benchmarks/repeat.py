@@ -35,7 +35,7 @@ from symtop_studies.cost.tops import KINDS, NATURAL  # noqa: E402
 OVERLAP, BARE = 0.95, 0.15
 BY_HAND = ("rk4[axis]", "strang[axis]", "dop853-compiled[axis]", "takahashi-imada[axis]", "gauss-4[axis]")
 LENGTH = 20.0  # nutations of the runs by hand
-MOVED = (  # between two runs of the studies that stood in the place of this one
+MOVED = (  # between two runs of the studies that this one replaced
     Cell("short", "axis", 1e-3, NATURAL),
     Cell("long", "axis", 1e-12, NATURAL),
     Cell("short", "attitude", 1e-3, NATURAL),
@@ -59,7 +59,7 @@ def label(cell: Cell) -> str:
 
 
 def compare(first: xr.DataTree, second: xr.DataTree) -> dict[str, Any]:
-    """Print what is the same and what is not, and count it."""
+    """Print and count what agrees between the two runs and what differs."""
     both, asked = (first, second), list(every_cell(first))
     compare_prices(*(pricing.prices(data) for data in both))
     winners = [winners_of(tuple(cells.contest(data, cell) for data in both)) for cell in asked]
@@ -107,12 +107,12 @@ def winners_of(pair: tuple[Contest, ...]) -> set[str]:
 
 
 def safe_of(pair: tuple[tuple[list[Safe], bool], ...]) -> set[str]:
-    """The same of safe choices."""
+    """The safe choices that are first in a cell, if both runs call one."""
     return {choices[0].name for choices, _ in pair} if all(called for _, called in pair) else set()
 
 
 def shares_of(one: Contest, other: Contest) -> list[tuple[Standing, Standing]]:
-    """What both runs say of each variant that wins anywhere in one of them."""
+    """The standings in both runs of each variant that wins on some top in one of them."""
     there = {standing.name: standing for standing in other.standings}
     pairs = [(standing, there[standing.name]) for standing in one.standings if standing.name in there]
     return [pair for pair in pairs if pair[0].share or pair[1].share]

@@ -1,4 +1,4 @@
-"""What a second process is worth: a study's accuracy grid with one worker and with two, kernels compiled before.
+"""Speed-up by a second process: a study's accuracy grid with one worker and with two, kernels compiled before.
 
     python benchmarks/scaling.py [STUDY]
 

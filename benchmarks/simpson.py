@@ -1,4 +1,4 @@
-"""What is published of the Simpson variational integrator on the Lagrange top, point by point, and what it costs.
+"""Published properties of the Simpson variational integrator on the Lagrange top, each measured again, and its cost.
 
     python -m benchmarks.simpson [SCENE]
 
@@ -25,7 +25,7 @@ from symtop.measure.timing import bare_run, timings
 from symtop.model.scenes import Scene, scene as find_scene
 
 SIMPSON, MIDPOINT, CLASSICAL = "galerkin-simpson", "midpoint", "rk4"
-OTHERS = ("strang", "gauss-4", "takahashi-imada")  # of the cost: the usual splitting, Gauss of the same order, the best
+OTHERS = ("strang", "gauss-4", "takahashi-imada")  # for `cost`: the usual splitting, Gauss of the same order, the best
 ROWS = (f"{SIMPSON}[angles]", f"{MIDPOINT}[angles]", f"{CLASSICAL}[angles]", *(f"{name}[axis]" for name in OTHERS))
 PER_NUTATION = (60, 90, 135, 200)
 LONG = 1000.0  # nutations
@@ -91,7 +91,7 @@ def reduced(scene: Scene) -> Point:
 
 
 def points(scene: Scene) -> list[Point]:
-    """All points on a scene."""
+    """All published properties, measured on a scene."""
     return [*convergence(scene), *conservation(scene), reduced(scene)]
 
 

@@ -1,4 +1,4 @@
-"""What a user waits for before the first number: import and first use."""
+"""Times until a user sees the first number: import and first use."""
 
 import os
 import subprocess
@@ -22,7 +22,7 @@ def _process(code: str, cache: str | None = None) -> float:
 
 
 def measure(repeats: int = 3) -> dict[str, float]:
-    """Seconds of each; the smallest of `repeats`, but for the cold start, which happens once."""
+    """Seconds of each, the smallest of `repeats`; the cold start is timed once."""
     with tempfile.TemporaryDirectory() as cache:
         cold = _process(FIRST, cache)
         warm = min(_process(FIRST, cache) for _ in range(repeats))
@@ -37,5 +37,5 @@ def measure(repeats: int = 3) -> dict[str, float]:
 
 
 def table(seconds: Mapping[str, float]) -> Table:
-    """What is waited for."""
+    """The times as a table."""
     return Table("Starting", ["what", "ms"], [[name, f"{value * 1e3:.2f}"] for name, value in seconds.items()])

@@ -1,4 +1,4 @@
-"""A sweep of a thousand starts, each run with its truth and its errors, and what a certificate for each would cost.
+"""Time of a sweep of a thousand starts with the truth and errors of each run, and the cost of a certificate for each.
 
     python -m benchmarks.sweep [STARTS] [CERTIFIED]
 
@@ -24,7 +24,7 @@ STARTS, CERTIFIED = 1000, 20
 
 
 class Swept(NamedTuple):
-    """Seconds of a sweep and what it found."""
+    """Seconds of a sweep and the errors of its runs."""
 
     starts: int
     seconds: float

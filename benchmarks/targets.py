@@ -23,12 +23,12 @@ LADDER = np.unique(np.rint(np.geomspace(24, 60_000, 260)).astype(int))  # steps,
 
 
 def plan_of(steps: int) -> Plan:
-    """Start to horizon, one sample."""
+    """The plan of a run from the start to the horizon with one sample at the end."""
     return Plan.steps(HORIZON / steps, [steps], HORIZON)
 
 
 def steps_needed(method: symtop.Integrator, scene: symtop.Scene, chart: str, accuracy: float) -> int | None:
-    """The fewest steps on the ladder from which on every run is accurate enough."""
+    """The least number of steps on the ladder such that it and all larger ones are accurate enough."""
     true = symtop.ClosedForm(scene.top, scene.start).quaternion([HORIZON])[0]
     fewest = None
     for steps in LADDER[::-1]:
@@ -42,7 +42,7 @@ def steps_needed(method: symtop.Integrator, scene: symtop.Scene, chart: str, acc
 
 
 class Reached(NamedTuple):
-    """What one method takes to the accuracy."""
+    """Steps and time of one method to the accuracy."""
 
     name: str
     steps: int

@@ -101,7 +101,7 @@ def _free() -> dict[str, tuple[Callable[[], object], int]]:
 
 
 def _of_many() -> list[Row]:
-    """The forms of many tops at once, for each of them, and a reference that has been asked for before."""
+    """Times per top of the forms of many tops at once, and the time of a reference that is cached."""
     numbers = np.array([flat(*pair) for pair in _tops("double-double", COUNT)])
     forms, times = ClosedForms(numbers), np.linspace(0.0, 20.0, 11)
     calls = {
@@ -118,7 +118,7 @@ def _of_many() -> list[Row]:
 
 
 def table(rows: Sequence[Row]) -> Table:
-    """Every call."""
+    """The times of all calls as a table."""
     return Table(
         "The closed form",
         ["call", "median (us)", "99 % below (us)"],

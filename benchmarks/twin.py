@@ -36,7 +36,7 @@ EXACT = (*FAST, "-ffp-contract=off")  # gcc fuses nothing by itself: rounds like
 
 
 class Kernel(NamedTuple):
-    """What one solver gives its compiled loop for one run."""
+    """The arguments that a solver passes to its compiled loop for one run."""
 
     march: Loop
     par: Any
@@ -54,7 +54,7 @@ def kernel_of(method: Integrator, chart: str, scene: Scene, h: float) -> Kernel:
 
 
 def _macros(rule: Any, chart: str = "") -> dict[str, int]:
-    """What numba, too, knows when it compiles: the length of the table, and the chart."""
+    """What numba also knows at compile time, as C macros: the lengths of the table, and the chart."""
     lengths = {
         "drift": "DRIFTS",
         "nodes": "NODES",
@@ -149,7 +149,7 @@ class Twin:
         self._start = np.array(kernel.march.enter(kernel.par, kernel.rule, kernel.state, kernel.h))
 
     def __call__(self, steps: int) -> tuple[np.ndarray, int]:
-        """The state after so many steps, as the kernel steps it, and the work it took."""
+        """The state after `steps` steps, in the kernel's own variables, and the work."""
         state, work = self._start.copy(), ctypes.c_long()
         done = self._march(
             self._par.ctypes.data, self._rule.ctypes.data, state.ctypes.data, self.kernel.h, steps, ctypes.byref(work)
@@ -159,13 +159,13 @@ class Twin:
         return state, work.value
 
     def shown(self, steps: int) -> tuple[np.ndarray, int]:
-        """The state after so many steps, as the Python kernel shows it, and the work it took."""
+        """The state after `steps` steps, in the variables that a run returns, and the work."""
         (state, work), kernel = self(steps), self.kernel
         return np.array(kernel.march.present(kernel.par, kernel.rule, tuple(state.tolist()), steps, kernel.h)), work
 
 
 def ours(kernel: Kernel, steps: int) -> tuple[np.ndarray, int]:
-    """The same from the Python kernel."""
+    """The state and the work after `steps` steps of the Python kernel."""
     done = kernel.march(kernel.par, kernel.rule, kernel.state, kernel.h, np.array([steps]))
     return done.states[-1], done.work
 

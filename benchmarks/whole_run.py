@@ -1,4 +1,4 @@
-"""What one call of `simulate` is made of, and what one step of every compiled fixed-step method costs as a run.
+"""Times of the parts of one call of `simulate`, and of a run of one step of every compiled fixed-step method.
 
 The items of a run are timed by themselves, all in one go: the plan, the guard, the solver, the columns, the dataset and
 its attributes. What is left between their sum and the whole is Python between them. Beside each stands its time in
@@ -31,7 +31,7 @@ class Item(NamedTuple):
 
     name: str
     seconds: float
-    steps: float  # the same in steps of the method
+    steps: float  # the time in steps of the method
 
 
 def measure() -> list[Item]:
@@ -90,7 +90,7 @@ def tables(items: Sequence[Item], steps: Mapping[str, float]) -> list[Table]:
 
 
 def verdict(items: Sequence[Item], steps: Mapping[str, float]) -> list[str]:
-    """What a run and its largest parts take, and a run of one step at most."""
+    """Sentences: the times of a run, of its largest parts, and of the slowest run of one step."""
     took = {item.name: item.seconds * 1e6 for item in items}
     slowest = max(steps, key=lambda name: steps[name])
     run = (

@@ -1,8 +1,8 @@
-"""The studies that ship with symtop: one folder a question."""
+"""The studies that ship with symtop: one folder for each question."""
 
-# of the report; others follow
+# in the report; all other studies follow
 ORDER = (
     "speed", "cost", "truth", "convergence", "factors", "drift", "stability", "claims", "reduction", "oscillators",
     "notebook",
 )  # fmt: skip
-FORMER = dict.fromkeys(("population", "work_precision", "phase_diagram"), "cost")  # names that studies had
+FORMER = dict.fromkeys(("population", "work_precision", "phase_diagram"), "cost")  # former names of studies

@@ -1,4 +1,4 @@
-"""Calls in a process of their own: what a study measures there meets no memory, code or plug-in of other cases."""
+"""Calls of functions in a new process, so that memory, code and plug-ins of other cases do not affect a measurement."""
 
 import json
 import pickle
@@ -13,13 +13,13 @@ START = (
 
 
 def call(function: Callable[..., Any], *arguments: Any) -> Any:
-    """What a function of a study's module returns, as JSON has it; a case that names it depends on its code."""
+    """Call a study's function in a new process; returns its result as JSON has it. A case's hash includes its code."""
     question = pickle.dumps((function, arguments))
     done = subprocess.run([sys.executable, "-c", START], input=question, stdout=subprocess.PIPE, check=True)  # noqa: S603
     return json.loads(done.stdout.splitlines()[-1])
 
 
 def answer() -> None:
-    """What the process does: function and arguments are pickled on standard input, the answer is its last line."""
+    """The new process: reads the pickled function and arguments on standard input, prints the result as last line."""
     function, arguments = pickle.load(sys.stdin.buffer)  # noqa: S301  (of the process that started this one)
     print(json.dumps(function(*arguments)))  # noqa: T201

@@ -1,4 +1,4 @@
-"""Answers about one dataset that its figures, tables and sentences all ask for, computed once."""
+"""A cache of results computed from one dataset, which its figures, tables and sentences all use."""
 
 import functools
 from collections.abc import Callable, Hashable
@@ -7,12 +7,12 @@ from typing import Any, Concatenate, ParamSpec, TypeVar
 P = ParamSpec("P")
 Answer = TypeVar("Answer")
 
-# By function: the data, and answers by the other arguments; not in the closure, which is part of a fingerprint.
+# By function: the data, and results by the other arguments; not in a closure, which is part of a function's hash.
 _answers: dict[Callable[..., Any], tuple[Any, dict[Hashable, Any]]] = {}
 
 
 def of_one_dataset(function: Callable[Concatenate[Any, P], Answer]) -> Callable[Concatenate[Any, P], Answer]:
-    """The same function, which keeps its answers about one object at a time; neither these nor the data may change."""
+    """Decorator: cache the results of a function for one dataset at a time; nobody may change them or the data."""
 
     @functools.wraps(function)
     def remembered(data: Any, /, *args: P.args, **kwargs: P.kwargs) -> Answer:

@@ -1,11 +1,11 @@
 """`recommend`: the cheapest integrator, with its step or tolerance, that meets an accuracy on a scene.
 
-    1. Candidates. A table that was made from the study of cost names five (`symtop.measure.ranking`). One more is tried
-       if the trials disagree with it: three of the five fail, its fourth or fifth is the fastest, or two are level.
-       Where it does not answer, or nothing of it gets there, every compiled method is a candidate.
+    1. Candidates. A table from the study of cost names five methods (`symtop.measure.ranking`). A sixth is tried if the
+       trials disagree with the table: three of the five fail, its fourth or fifth is the fastest, or two are almost
+       equally fast. If the table has no such row, or none of its methods serves, every compiled method is a candidate.
     2. Trials. The step or tolerance of each candidate is searched for on 120 nutations of the scene at most
        (`symtop.measure.settings`), against the closed form and a target lowered by the law of growth; one run is timed.
-       Settings are found to a factor: times are compared as they would be at the very accuracy.
+       Errors reach the target to a factor only: times are scaled to the error asked for.
     3. Confirmation. The three fastest candidates, and others as fast, are run to the whole horizon, if a budget of
        force evaluations allows it, and their settings are corrected, to some 5 % of a step.
 
@@ -16,13 +16,12 @@ The confidence of the advice is one of:
     extrapolated               it was not run to the end
     none                       no method meets the accuracy; the integrator is None
 
-The answer is the best method that neither is made for this very top (`Integrator.needs`) nor evaluates its solution;
-the best of those is named beside it. At a step that the user has there is nothing to search for: all methods run with
-it.
+The recommended method neither is made for the symmetric top only nor evaluates its solution (`Integrator.needs`); the
+best of those methods is named in addition. With a given step there is no search: all methods run with that step.
 
-An accuracy below the bound of the reference is answered with ``none`` before any run. The closed form is no candidate:
-it is what errors are measured by, and a top with friction, drive or another body attached has none. For the top as it
-stands it is mostly the fastest way, and the advice says so with its time.
+For an accuracy below the bound of the reference the confidence is ``none``, without a run. The closed form is no
+candidate: errors are measured by it, and a top with friction, drive or another body attached has no closed form. For
+the pure top it is mostly the fastest way, and the advice says so with its time.
 """
 
 import math
@@ -50,54 +49,33 @@ from symtop.run.guard import MOST_STEPS
 from symtop.run.plugins import loaded
 
 KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
-THIS_TOP = ("this-top", "solution")  # needs of what is named beside the answer, unless it is asked for
-OF_ANY = tuple(need for need in NEEDS if need not in THIS_TOP)  # of what is the answer, unless others are asked for
-COMMA = re.compile(r",\s*(?![^(]*\))")  # between words of `NEEDS`, one of which is f(t, y)
-KEPT = {"energy": ("energy",), "momenta": ("p_phi", "p_psi")}  # claims, by what a user wants kept
-KERNELS = 0.65  # of a method: some have one in common
+THIS_TOP = ("this-top", "solution")  # needs of methods that are only named in addition, unless the user asks for them
+OF_ANY = tuple(need for need in NEEDS if need not in THIS_TOP)  # needs of methods that may be recommended by default
+COMMA = re.compile(r",\s*(?![^(]*\))")  # a comma between words of `NEEDS`, not that in f(t, y)
+KEPT = {"energy": ("energy",), "momenta": ("p_phi", "p_psi")}  # the claims for each value of `keeps`
+KERNELS = 0.65  # expected kernels to compile per method: some methods share one
 FEW = 5  # methods of the table that are tried
-AGREED, TIED = 3, 1.1  # of them meet the accuracy at least, the fastest is one of so many first, and none as fast
-FINALISTS, LEVEL = 3, 1.3  # methods that are run to the whole horizon, and those that cost so little more than the best
+AGREED, TIED = 3, 1.1  # a sixth is tried if fewer serve, the fastest is not among the first 3, or the next is as fast
+FINALISTS, LEVEL = 3, 1.3  # least methods run to the whole horizon; ratio of costs up to which others are, too
 TOO_DEAR = 40.0  # a search ends at this multiple of the evaluations of the cheapest candidate so far
-CHEAP = 1e5  # evaluations that no search ends at: it may have begun with a step that is far too fine
-LESS = 3e7  # most evaluations of a run once `AGREED` methods have failed and none serves: often none does
-HOPELESS = (settings.STOPPED, settings.BUDGET, settings.TRIED)  # why they failed
+CHEAP = 1e5  # evaluations below which no search ends: it may have begun with a step that is far too fine
+LESS = 3e7  # most evaluations of a run after `AGREED` methods have failed and none has served: then often none does
+HOPELESS = (settings.STOPPED, settings.BUDGET, settings.TRIED)  # the reasons of failure that count for `LESS`
 CONFIDENCE = {
     "checked": "measured to the end",
     "at the reference's limit": "measured to the end, as far as the reference can tell",
     "extrapolated": "extrapolated from a short run",
 }
-SETTINGS = {  # the maps of an engine by its settings, the default first
-    "mujoco": {
-        "Euler": "mujoco-euler", "implicit": "mujoco-implicit", "implicitfast on a free body": "mujoco-implicit",
-        "RK4 of 4.0": "rkmk4", "RK4 up to 3.17": "mujoco3-rk4",
-    },
-    "bullet": {"rigid body": "bullet-float32", "multibody": "mujoco-euler", "rigid body, flags 0": "no-gyro-float32"},
-    "pybullet": {"multibody": "mujoco-euler"},
-    "dart": {"default": "mujoco-euler"},
-    "jolt": {"default": "no-gyro-float32", "gyroscopic force on": "jolt-float32"},
-    "physx": {"default": "no-gyro-float32", "gyroscopic forces on": "physx-float32"},
-    "havok": {"default": "no-gyro-float32"},
-    "rapier": {"default": "rapier-float32"},
-    "cannon-es": {"default": "no-gyro-linear"},
-    "ode": {"default": "ode", "gyroscopic mode off": "no-gyro-linear"},
-    "lammps": {"fix rigid": "lammps-rigid", "fix rigid/nve": "no-squish"},
-    "yade": {"exactAsphericalRot": "yade", "rotAlgorithm delValle2023": "spiral"},
-    "jsbsim": {"default": "jsbsim-default", "Buss2 and AB2": "jsbsim-buss2"},
-    "exudyn": {"RK44": "rkmk4"},
-}  # fmt: skip
 MISSES_AT_STEP = "Not accurate enough at this step, each with its error"
-STEP = 1.0 / 240.0  # s
-LEAD = 1.05  # a shorter time than that is not called one
-WORST = 0.5  # rad: an axis that is further off needs no method to match it
-CLOSE = 0.85  # of the margin: the least error of a finalist, if few runs find such a setting
-ROUNDS = 15  # in which finalists are timed
-MARGIN = 0.8  # fraction of the accuracy that a run must meet at its samples; between them its error may be larger
+LEAD = 1.05  # least ratio of times with which the closed form is called the fastest way
+CLOSE = 0.85  # a search for a finalist ends at an error between this part of the target and the target
+ROUNDS = 15  # of timing, for finalists
+MARGIN = 0.8  # part of the accuracy that the errors at samples must meet; between samples errors may be larger
 
 
 @dataclass(frozen=True)
 class Advice:
-    """A recommended integrator with its step or tolerance, and how sure that is.
+    """A recommended integrator with its step or tolerance, and the confidence of that.
 
     `expected_error` is the largest error of `quantity` expected over `horizon`; `seconds` is the wall time of the bare
     run on this machine. `closed_form` compares it with the evaluation of the closed form. `fails` says why other
@@ -135,8 +113,8 @@ class _Question(NamedTuple):
     accuracy: float
     quantity: str
     horizon: float
-    needs: tuple[str, ...]  # of the methods that may be recommended; empty: of any
-    step: float | None = None  # that they must have
+    needs: tuple[str, ...]  # of the methods that may be recommended; empty: the default
+    step: float | None = None  # the step of all methods, if given
     max_step: float = math.inf
     general: bool = False
     keeps: Collection[str] = ()
@@ -144,7 +122,7 @@ class _Question(NamedTuple):
 
     @property
     def goal(self) -> str:
-        """What is asked for, in words."""
+        """The question in words."""
         until = f"t = {self.horizon:g}{self.scene.second}"
         return f"{self.quantity} error {self.accuracy:g} on {self.scene.name} to {until}"
 
@@ -152,16 +130,16 @@ class _Question(NamedTuple):
         return Advice(self.scene.name, self.quantity, self.accuracy, self.horizon, **facts)
 
     def trial(self, run: settings.Met) -> "_Trial":
-        """A candidate that was run to the horizon."""
+        """The trial of a candidate that was run to the horizon; seconds are not known yet."""
         confidence = "checked" if run.error + run.bound <= self.accuracy else "at the reference's limit"
         return _Trial(run, run.error, math.nan, confidence, self.horizon)
 
     def allows(self, method: Integrator) -> bool:
-        """Is a method what the user can use, before its error is known?"""
+        """Does a method meet the user's conditions, apart from its error?"""
         claims = [claim for kept in self.keeps for claim in KEPT[kept]]
         conserving = all(declared(method, claim) in ("kept", "bounded") for claim in claims)
         fixed = self.step is None and self.max_step == self.pace == math.inf
-        suits = not self.general or BODY in integrator(method.method).solvers  # whatever the chart of a variant
+        suits = not self.general or BODY in integrator(method.method).solvers  # in any chart
         return conserving and (fixed or method.fixed_step) and suits
 
 
@@ -176,11 +154,11 @@ class _Trial(NamedTuple):
 
     @property
     def a_step(self) -> float:
-        """Seconds of a step; infinite for a method that has none."""
+        """Seconds of a step; infinite for a method without fixed steps."""
         return self.seconds * self.run.setting / self.horizon if self.run.integrator.fixed_step else math.inf
 
     def cost(self, question: _Question) -> float:
-        """Seconds at the very accuracy, with no longer steps than the user's; of the run itself where its step is."""
+        """Seconds of a run with exactly the accuracy, and steps up to `max_step`; of the run itself at a given step."""
         ratio = 1.0 if question.step is not None else self.error / question.accuracy
         part = max(settings.at_accuracy(self.run.integrator, ratio), self.run.setting / question.max_step)
         return self.seconds * part
@@ -200,19 +178,18 @@ def recommend(
 
     `accuracy` is the largest error of `quantity`, by default of the axis, over the run: radians for ``axis``,
     ``attitude`` and ``theta``, and relative for others, energy and momenta by the scales of `symtop.errors`. `horizon`
-    is the scene's own by default. Of a body without symmetry the `quantity` is the attitude by default, the candidates
-    are the methods of the chart ``body``, and `keeps` may be "energy" alone. `needs` leaves out methods that need
-    something else (`Integrator.needs`), for example ``("derivative", "kicks")``, or by what you can supply, ``"f(t, y),
-    torque, free motion"``; without them, what is made for this very top is not the answer but named beside it
-    (`Advice.beside`).
+    is the scene's own by default. For a body without symmetry the `quantity` is the attitude by default, the candidates
+    are the methods of the chart ``body``, and `keeps` may only be "energy". `needs` excludes methods with other needs
+    (`Integrator.needs`), for example ``("derivative", "kicks")``, or by what you can supply, ``"f(t, y), torque, free
+    motion"``; without it, methods for the symmetric top only are not recommended but named in `Advice.beside`.
 
-    `step_size` is the step that you have: every method of fixed step runs with it, and the fastest that is good enough
-    is the answer. `max_step` is the longest step, `time_a_step` the most seconds of one on this machine. `general`
-    leaves out what does not run on bodies without symmetry, `keeps` ("energy", "momenta" or both) what lets them drift.
+    With `step_size` every method of fixed step runs with that step, and the fastest that is accurate enough is
+    recommended. `max_step` is the longest step, `time_a_step` the most seconds of one on this machine. `general`
+    excludes methods that do not run on bodies without symmetry, `keeps` ("energy", "momenta" or both) those that let
+    these drift.
 
-    Raises SymtopError for arguments that are out of range, and for a `horizon` to which the motion of a body is not
-    known. It runs what it recommends: once the candidates are compiled, from 0.1 s to half a minute, and minutes where
-    rounding stops most methods or all.
+    Raises SymtopError for arguments out of range, and for a `horizon` beyond the reference of a body. Candidates are
+    run: once they are compiled, this takes 0.1 s to half a minute, and minutes if rounding stops most methods.
     """
     scene = scenes.scene(scene, bodies=True)
     quantity = ("attitude" if scene.of_body else "axis") if quantity is None else quantity
@@ -248,7 +225,7 @@ def recommend(
         source = f"tried all {search.widened} compiled methods that you can use"
     elif search.of_table:
         source = f"tried the {search.of_table} methods that {source}"
-    # Times of the user's own methods in plain Python say nothing beside those of compiled ones.
+    # times of the user's methods in plain Python cannot be compared with those of compiled ones
     every = registry.integrators().values()
     if own := [one.name for one in every if one.implementation == "python" and not is_built_in(one.name)]:
         fails["Not tried, as only compiled methods are timed"] = own
@@ -259,14 +236,14 @@ def recommend(
 
 
 def _words(given: object) -> list[object]:
-    """Words of a list, or of a text with commas between them; none of None."""
+    """The entries of a list, or of a text with commas; empty for None."""
     if isinstance(given, str):
         return [*COMMA.split(given.strip())]
     return [] if given is None else [*given] if isinstance(given, Iterable) else [given]
 
 
 def _needs(choice: Collection[object]) -> tuple[str, ...]:
-    """Names of `NEEDS`, by these or by words: a word that completes no need stands for all that have it."""
+    """Names of `NEEDS`, from names or words of them: words that make up no need whole select all that contain them."""
     parts = {name: set(COMMA.split(words)) for name, words in NEEDS.items()}
     terms = dict.fromkeys([*NEEDS, *sorted(set().union(*parts.values()))])
     given = COMMA.split(", ".join(str(one).strip() for one in choice)) if choice else []
@@ -277,14 +254,14 @@ def _needs(choice: Collection[object]) -> tuple[str, ...]:
 
 
 class _Search:
-    """Trials of candidates, and of others if the `menu`, which they are from, does not serve."""
+    """Trials of candidates, `names`, and of all methods if those of the table, `menu`, do not serve."""
 
     def __init__(self, question: _Question, names: Collection[str], menu: list[str]) -> None:
         self.question, self.names, self.menu = question, names, menu
         self.trials: list[_Trial] = []  # the fastest first
-        self.fails: dict[str, list[str]] = {}  # names of methods by why they are no answer
-        self.errors_at_step: dict[str, float] = {}  # errors of those that run with the user's step
-        self.widened = 0  # methods that there are, if all had to be tried
+        self.fails: dict[str, list[str]] = {}  # names of methods by the reason why they failed
+        self.errors_at_step: dict[str, float] = {}  # errors of methods that are too inaccurate at the given step
+        self.widened = 0  # the number of all methods, if all had to be tried
         self._try(names)
         costs = {name: one.cost(question) for one in self.trials if (name := one.run.integrator.name) in menu}
         first, second, *_ = [*costs.values(), math.inf, math.inf]
@@ -297,7 +274,7 @@ class _Search:
         self._general = [one for one in self.trials if one.run.integrator.needs not in no_answer]
 
     def answers(self) -> list[_Trial]:
-        """The finalists that were run to the end, the fastest first."""
+        """The finalists, which were run to the end, the fastest first."""
         ranked = self._confirmed(self._general, FINALISTS)
         if not ranked and self.menu:
             everyone = _everyone(self.question._replace(needs=self.question.needs or OF_ANY))
@@ -307,11 +284,11 @@ class _Search:
         return _timed(self.question, ranked, self.fails, ROUNDS)
 
     def beside(self) -> list[_Trial]:
-        """The fastest that is made for this very top, run to the end."""
+        """The fastest method made for the symmetric top only, run to the end; empty without one."""
         return _timed(self.question, self._confirmed(self._of_top, 1), self.fails)
 
     def _try(self, names: Collection[str]) -> None:
-        """Those of high order first: they are the cheapest at most accuracies, and their cost ends other searches."""
+        """Try methods, high orders first: these are the cheapest at most accuracies, and limit the other searches."""
         files.expected[0] = math.ceil(KERNELS * len(names))
         for number, method in enumerate(sorted(map(integrator, names), key=lambda method: -(method.order or 0)), 1):
             post(f"trying method {number} of {len(names)}")
@@ -324,7 +301,7 @@ class _Search:
         self.trials = sorted(timed, key=lambda one: one.cost(self.question))
 
     def _confirmed(self, trials: Sequence[_Trial], most: int) -> list[_Trial]:
-        """Of these trials so many of the first, or as many as it takes to have one, run to the end."""
+        """Confirm the first `most` trials and those as fast, or more until one is confirmed."""
         ranked: list[_Trial] = []
         costs = [one.cost(self.question) for one in trials]
         for number, trial in enumerate(trials):
@@ -333,7 +310,7 @@ class _Search:
         return ranked
 
     def _sort_in(self, trial: "_Trial | str | float", trials: list[_Trial], method: Integrator) -> None:
-        """To the trials, or its name to those that fail for the same reason, or with its error to those that miss."""
+        """Add the result of `_try` or `_confirm` to `trials`, `fails` (a reason) or `errors_at_step` (an error)."""
         if isinstance(trial, _Trial):
             trials.append(trial)
         elif isinstance(trial, str):
@@ -343,7 +320,7 @@ class _Search:
 
 
 def _everyone(question: _Question) -> list[str]:
-    """Every compiled method that the user can use, in each chart that shows the quantity."""
+    """Every compiled method that the user can use, in each chart that determines the quantity."""
     if question.scene.of_body:
         names = [method.name for method in registry.methods().values() if BODY in method.solvers]
     else:
@@ -359,16 +336,16 @@ def _everyone(question: _Question) -> list[str]:
 
 
 def _same(variant: str, usable: Sequence[str]) -> str | None:
-    """The usable name of a stored variant, of the same method in another chart if need be; None if there is none."""
+    """The name in `usable` of a variant, or of its method in another chart; None if there is neither."""
     method = split_name(variant)[0]
     return next((name for name in (variant, *usable) if name in usable and split_name(name)[0] == method), None)
 
 
 def _menu(question: _Question) -> list[str]:
-    """Of the methods that the user can use, the first six that the table names; none where it does not answer.
+    """The first six usable methods of the table; empty if it has no such row.
 
-    Where energy or momenta of a top are to be kept, the table's methods that do so come first, and then those of every
-    class; on bodies their order is another.
+    With `keeps`, for a top, the table's methods that keep these come first, then those of every class; for bodies the
+    table does not apply.
     """
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None or question.max_step < math.inf or question.pace < math.inf:
@@ -384,7 +361,7 @@ def _menu(question: _Question) -> list[str]:
 
 
 def _candidates(question: _Question) -> tuple[list[str], str]:
-    """Names of methods to try, and a phrase on their origin."""
+    """The names of methods to try, and a phrase on their origin."""
     everyone = _everyone(question)
     if not everyone:
         return everyone, "no compiled method is within these limits"
@@ -399,7 +376,7 @@ def _candidates(question: _Question) -> tuple[list[str], str]:
 
 
 def _try(question: _Question, method: Integrator, patience: float, most: float = math.inf) -> "_Trial | str | float":
-    """A candidate's setting and cost from short runs, or the reason why it has none, or its error at the step."""
+    """A trial with a setting from short runs, or the reason of failure, or the error if too large at a given step."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
         try:
@@ -424,7 +401,7 @@ def _try(question: _Question, method: Integrator, patience: float, most: float =
 
 
 def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]], rounds: int = 5) -> list[_Trial]:
-    """The trials by their times, measured against each other; steps that take too long fail."""
+    """The trials with times, measured against each other, the fastest first; slow steps are noted in `fails`."""
     runs = [one.run for one in trials]
     times = settings.seconds(question.scene, runs, question.quantity, question.horizon, rounds)
     pairs = zip(trials, times, strict=True)
@@ -436,7 +413,7 @@ def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]
 
 
 def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
-    """The trial run to the whole horizon, if not too much, with its setting corrected; or the reason why it fails."""
+    """The trial run to the whole horizon, if affordable, with its setting corrected; or the reason why it fails."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
         return trial
@@ -507,7 +484,7 @@ def _the_motion(question: _Question, limit: float) -> Advice:
 
 
 def _carries(question: _Question, method: Integrator) -> str:
-    """Does a method of a top carry over to a body without symmetry?"""
+    """A sentence on whether a method of a top carries over to a body without symmetry."""
     if question.scene.of_body:
         return ""
     if method.general is not True:
@@ -523,7 +500,7 @@ def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
 
 
 def _lines(question: _Question, method: Integrator, **setting: float) -> dict[str, str]:
-    """The command and the Python line that make the recommended run; no command for a scene that has no name here."""
+    """The command and the Python line of the recommended run; no command for a scene that is not registered."""
     scene, _, _, horizon = question[:4]
     in_catalogue = scenes.all_scenes().get(scene.name) == scene
     of, until = f'"{scene.name}"' if in_catalogue else "scene", f", horizon={horizon!r}" * (horizon != scene.horizon)
@@ -549,13 +526,13 @@ def _exact_seconds(question: _Question) -> float:
 
 
 def _without_steps(question: _Question, best: float) -> str:
-    """What the closed form costs beside a run of `best` seconds (nan if there is none), and why it is not advised."""
+    """Sentences on the time of the closed form, compared with a run of `best` seconds (nan: none)."""
     scene, _, quantity, horizon = question[:4]
     if scene.of_body:
         return "A free body needs no integrator: symtop.reference evaluates its exact motion." if scene.top.free else ""
     limit = settings.judgeable(scene, quantity, horizon)
     error = f", with an error below {limit:.1g}" if math.isfinite(limit) else ""
-    if not closed_form.load():  # to compile it takes 10 s, and its time interpreted says nothing
+    if not closed_form.load():  # compiling takes 10 s, and its time without compiling is of no use
         return f"The closed form, integrator exact, takes no step{error}."
     seconds = _exact_seconds(question)
     if not best > LEAD * seconds:
@@ -564,95 +541,3 @@ def _without_steps(question: _Question, best: float) -> str:
     fastest = f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us"
     why = "Integrators are compared for what they do where it does not exist."
     return f"{fastest}, {_times(best / seconds)} less{error}. {why}"
-
-
-@dataclass(frozen=True)
-class EngineAdvice:
-    """Axis errors (rad) of an engine's settings at a step, and a method that does as well as the best of them.
-
-    `errors` has the settings in the order of the engine, the default first; pi is a run that ended early. `advice` is
-    None if even the best setting is no accuracy to match. `gain` is how many times fewer force evaluations it takes.
-    """
-
-    scene: str
-    engine: str
-    step_size: float
-    horizon: float
-    errors: dict[str, float]
-    best: str
-    gain: float
-    advice: Advice | None
-    unit: str = ""  # of time, as it follows a number
-
-    def __str__(self) -> str:
-        default, maps = next(iter(self.errors)), _settings()[self.engine]
-        run = f"step {self.step_size:g}{self.unit}, to t = {self.horizon:g}{self.unit}"
-        lines = [f"{self.engine} on {self.scene}, {run}: the axis is off by"]
-        for name, value in self.errors.items():
-            error = f"{value:.2e} rad" if value < math.pi else "ended early "
-            lines.append(f"    {error}  {name} ({maps[name]})")
-        near = self.errors[self.best] <= WORST
-        if self.best != default and near:
-            times = self.errors[default] / (self.errors[self.best] or math.nan)
-            nearer = f", {times:.3g} times nearer than {default}" if self.errors[default] < math.pi else ""
-            lines.append(f"Its best setting is {self.best}{nearer}.")
-        if not near:
-            none = f"No setting is within {WORST:g} rad: none is better than another, and there is nothing to match."
-            lines.append(none)
-        if self.advice is None:
-            return "\n".join([*lines, *["With --accuracy it names a method for the error that you need."] * (not near)])
-        if (accuracy := self.advice.accuracy) != self.errors[self.best] or self.advice.integrator is None:
-            serving = ", ".join(name for name, value in self.errors.items() if value <= accuracy) or "none"
-            within = [f"Settings within {accuracy:g} rad at this step: {serving}."] * (self.advice.quantity == "axis")
-            return "\n".join([*lines, *within, str(self.advice)])
-        much = f"{self.gain:.3g} times fewer" if self.gain >= 1.0 else f"{1.0 / self.gain:.3g} times more"
-        work = f" with {much} force evaluations" if math.isfinite(self.gain) else ""  # the exact motion makes none
-        return "\n".join([*lines, f"As near as {self.best}{work}: {self.advice.reason}"])
-
-
-def _settings() -> dict[str, dict[str, str]]:
-    """The maps by the settings of each engine, and each map by itself where no engine has its name."""
-    return SETTINGS | {name: {name: name} for name in registry.engines() if name not in SETTINGS}
-
-
-def i_use(
-    engine: str, scene: "str | Scene", *, step_size: float | None = None, horizon: float | None = None,
-    accuracy: float | None = None, **limits: Any,
-) -> EngineAdvice:  # fmt: skip
-    """What the settings of an engine make of a scene at a step, and which method does as well for how much less.
-
-    An engine is one of `SETTINGS` or a map, such as "mujoco-euler". With an `accuracy`, the advice is for that and
-    for the step; `limits` are what else `recommend` takes. `step_size` is in the units of the scene, 1/240 by default,
-    `horizon` its own by default. Raises SymtopError for an unknown engine and numbers out of range. It takes seconds.
-    """
-    maps = _settings()
-    if engine in registry.methods():
-        raise SymtopError(f"engine must be a physics engine or a map of one, not the method {engine!r}: compare "
-                          "methods with `symtop compare`", "engine")  # fmt: skip
-    one_of("engine", engine, maps)
-    start, h = scenes.scene(scene, bodies=True), STEP if step_size is None else positive("step_size", step_size)
-    end = start.horizon if horizon is None else horizon_of(horizon)
-    if h >= end:
-        raise SymtopError(f"step_size must be below the horizon {end:g}, not {h:g}", "step_size")
-    if start.of_body:  # a horizon to which its motion is not known is refused
-        settings.judgeable(start, "axis", end)
-    runs = {}
-    for name, one in maps[engine].items():
-        post(f"running {one}")
-        runs[name] = settings.attempt(start, integrator(one), h, end, "axis")
-    errors = {name: min(run.error, math.pi) for name, run in runs.items()}
-    best = min(errors, key=lambda name: errors[name])
-    error = errors[best]
-    if accuracy is not None:
-        limits["step_size"] = h
-    elif limits.get("quantity") not in (None, "axis"):
-        raise SymtopError(f"quantity must be axis where there is no accuracy, not {limits['quantity']!r}", "quantity")
-    limits["quantity"] = limits.get("quantity") or "axis"  # of a body it is the attitude elsewhere
-    target = error if accuracy is None else accuracy
-    has_target = accuracy is not None or 0.0 < error <= WORST
-    advice = recommend(start, accuracy=target, horizon=end, **limits) if has_target else None
-    gain = math.nan
-    if advice is not None and advice.integrator is not None and (setting := advice.step_size or advice.tolerance):
-        needed = settings.attempt(start, integrator(advice.integrator), setting, end, "axis")
-        gain = runs[best].evaluations / needed.evaluations
-    return EngineAdvice(start.name, engine, h, end, errors, best, gain, advice, start.second)

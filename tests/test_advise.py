@@ -11,7 +11,7 @@ import pytest
 import symtop
 from benchmarks import candidates
 from symtop import advise
-from symtop.advise import SETTINGS, i_use
+from symtop.engine_settings import SETTINGS, i_use
 from symtop.measure import settings
 from symtop.methods.framework.registry import NEEDS, engines
 from symtop.model.exact import closed_form
@@ -268,6 +268,7 @@ def test_advice_on_drawn_scenes_costs_little_more_than_the_best_and_meets_it_on_
     assert np.median([row.advice for row in rows]) <= candidates.TIE, rows
 
 
+@pytest.mark.quick
 def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
     serving = usable("axis", ("derivative", "kicks"))
     assert {symtop.integrator(name).needs for name in serving} == {"derivative", "kicks"}
@@ -282,6 +283,7 @@ def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
     assert [advise._needs([words]) for words in NEEDS.values()] == [(name,) for name in NEEDS]
 
 
+@pytest.mark.quick
 def test_what_is_made_for_this_top_is_named_beside_the_answer():
     advice = symtop.recommend("spheroid", accuracy=1e-6, horizon=8.0)
     assert symtop.integrator(advice.integrator).needs not in ("this-top", "solution")
@@ -383,6 +385,7 @@ def test_the_command_of_a_plug_in_loads_it_and_a_cover_prefers_what_nothing_befo
     assert symtop.recommend("spheroid", accuracy=1e-6, needs="solution").command.endswith(f" --plugin '{file}'")
 
 
+@pytest.mark.quick
 def test_who_has_the_solution_is_given_the_exact_motion_with_its_price():
     """Negative controls: with a step there is none, and beside the derivative it is a line and not the answer."""
     advice = symtop.recommend("spheroid", accuracy=1e-6, needs="solution", horizon=20.0)
@@ -426,6 +429,7 @@ def test_mujoco_is_told_its_best_setting_and_the_gain_of_another_method():
     assert advice.gain > 1.0
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("engine", ["bullet", "yade", "mujoco-euler"])
 def test_an_engine_is_told_of_by_its_settings_and_a_map_by_itself(engine):
     """Bullet and yade are names of maps, too."""

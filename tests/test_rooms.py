@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 ROOT = Path(__file__).resolve().parents[1]
 ORDER = (  # from the ground up
     ("core",), ("model",), ("methods",), ("run",), ("measure",), ("judging", "runner"), ("report",),
-    ("advise",),  # a module in the root, as it is part of the public face
+    ("advise",), ("engine_settings",),  # modules in the root, as they are part of the public face
     ("explore",),
     ("cli",),
     ("__main__",),  # python -m symtop

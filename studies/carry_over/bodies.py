@@ -1,9 +1,9 @@
-"""The bodies of the study, by family: their true motion at the times of the samples, and the errors of many runs.
+"""The bodies of the study, by family: their reference motion at the times of the samples, and the errors of many runs.
 
-A family has the members of one `symtop.body_population`. Those of heavy families with a number have the same draws at
-every epsilon. Samples fall where those of the study of cost do, in natural periods. The truth of a free body is exact;
-that of a heavy one a Taylor series at rounding, whose bound is four times its distance from a series of another order,
-with a floor (`FLOOR`): a target is asked of a body if the bound is at most `CLEAR` of it.
+A family has the members of one `symtop.body_population`. Heavy families named by epsilon have the same draws at every
+epsilon. Samples fall where those of the study of cost do, in natural periods. The reference of a free body is exact;
+that of a heavy one is a Taylor series at rounding, whose bound is four times its distance from a series of another
+order, plus `FLOOR`. A target is asked of a body if the bound is at most `CLEAR` times the target.
 
     axis      angle between the directions of the centre of mass (of a free body, of its third axis), rad
     attitude  angle of the turn between, rad
@@ -39,8 +39,8 @@ FAMILIES: dict[str, tuple[str, float | None]] = {  # kind of body and epsilon
     "0.3": ("heavy", 0.3), CHAOTIC: (CHAOTIC, 0.3), FREE: (FREE, None),
 }  # fmt: skip
 QUANTITIES = ("axis", "attitude")  # that have targets
-ASKED = (1e-3, 1e-6, 1e-9)  # of the targets: the truth of a heavy body does not judge finer ones
-FLOOR = 2e-14  # rad; rounding of the two series has a part in common
+ASKED = (1e-3, 1e-6, 1e-9)  # the targets that are asked: the reference of a heavy body cannot judge finer ones
+FLOOR = 2e-14  # rad, of the bound, as part of the rounding is the same in both series
 
 
 class Bodies:
@@ -55,7 +55,7 @@ class Bodies:
 
     @property
     def known(self) -> NDArray[np.bool_]:
-        """Whose motion is known well enough for some target."""
+        """The members whose reference is accurate enough for some target."""
         return np.asarray(self.truth[1] <= CLEAR * ASKED[0])
 
     @cached_property
@@ -108,7 +108,7 @@ class Bodies:
         moments, centre, weight, _, energy, scale, start = (part[chosen, np.newaxis] for part in self.numbers)
         true = self.truth[0][chosen]
         with np.errstate(all="ignore"):  # a run may have blown up
-            q, M = states[..., :4], states[..., 4:]  # a length of q that is not one counts in energy and momenta
+            q, M = states[..., :4], states[..., 4:]  # an error of |q| counts in energy and momenta
             up, lifted = np.stack(vertical(*np.moveaxis(q, -1, 0)), axis=-1), rotated(q, M)
             q = unit(q)
             axes = (rotated(one, np.broadcast_to(centre, M.shape)) for one in (q, true))
@@ -146,7 +146,7 @@ def run_steps(
 
 @functools.lru_cache(maxsize=2 * len(FAMILIES))
 def bodies_of(family: str, count: int, seed: int, periods: float) -> Bodies:
-    """The bodies of a family; made once and kept, for every method runs the same."""
+    """The bodies of a family, cached, as every method runs the same."""
     kind, epsilon = FAMILIES[family]
     members = body_population(count, seed=seed, kind=kind, epsilon=epsilon)
     return Bodies(scenes_of(members), members["stratum"].values.tolist(), periods)
@@ -162,5 +162,5 @@ def as_tops(bodies: Bodies) -> Tops:
 
 
 def grain(values: Array) -> Array:
-    """Errors, but none below rounding."""
+    """Errors, raised to `EPSILON` where they are below it."""
     return np.maximum(values, EPSILON)

@@ -1,8 +1,8 @@
 """Bodies compared with symmetric tops: tau of the rankings, winners, steps, silent wrong runs, growth, order.
 
-A cost is in seconds, evaluations x price + call. A method's median is over the bodies of a family whose truth judges
-the target; not reached is infinite, and infinite ones tie. Families with a number have the same members, so that they
-are resampled together.
+A cost is in seconds, evaluations x price + call. A method's median is over the bodies of a family whose reference can
+judge the target; a target that is not reached costs infinity, and infinite costs tie. Families named by epsilon have
+the same members, so that they are resampled together.
 """
 
 from collections.abc import Iterable, Iterator
@@ -27,20 +27,20 @@ SAME, PART = 0.9, 0.8  # tau
 LEVEL, DOUBLE, SEVERAL = 1.1, 2.0, 5.0  # factors
 EXPONENT, LOWER = 0.25, 0.5
 STEPS = 69.92  # a period, of the count of silent wrong runs
-LEAST = 0.01  # share of grown steps that counts where there are fewer
+LEAST = 0.01  # lower limit on the share of grown steps: smaller shares count as this one
 CHAOS = 1000.0  # growth in ten periods
 DRAWS = 100
-UNREACHED = 1e300  # seconds, the median cost of what half of the bodies do not reach
+UNREACHED = 1e300  # seconds, the median cost of a target that half of the bodies do not reach
 ANY = "any body"
-WITHIN = 2.5  # times the least median of a class: who comes as close runs over a hundred periods
-MOST_OF = 0.95  # of the methods
+WITHIN = 2.5  # methods with a median up to this many times the least of their class run over a hundred periods
+MOST_OF = 0.95  # share of the methods
 SPANS = ("short", "long")
 YES, FACTOR, PARTLY, NO = "carries over", "with a factor", "in part", "does not"
 OTHERS = tuple(name for name in FAMILIES if name != SYMMETRIC)
 
 
 class Costs(NamedTuple):
-    """Seconds of methods on the bodies of a family, and what prices are wrong by."""
+    """Seconds of methods on the bodies of a family, and the relative errors of their prices."""
 
     names: list[str]
     needs: list[str]
@@ -57,7 +57,7 @@ class Interval(NamedTuple):
 
 
 def label(name: str) -> str:
-    """A method of bodies without its chart."""
+    """The name of a variant in the chart `body` without that chart."""
     return name.removesuffix(f"[{BODY}]")
 
 
@@ -85,12 +85,12 @@ def costs(data: xr.DataTree, family: str, target: float, quantity: str = "axis",
 
 
 def judged_bodies(table: Costs) -> NDArray[np.int64]:
-    """The bodies that are asked."""
+    """The bodies of which the target is asked."""
     return np.flatnonzero(~np.isnan(table.values).all(axis=0))
 
 
 def medians(values: Array) -> Array:
-    """Over bodies, along the last axis; of ties that are not reached a number that ties as well."""
+    """Medians over bodies, along the last axis; `UNREACHED` where the median is not reached, so that these tie."""
     return np.minimum(np.nan_to_num(np.median(values, axis=-1), nan=UNREACHED, posinf=UNREACHED), UNREACHED)
 
 
@@ -107,7 +107,7 @@ def tau_of(first: Array, second: Array) -> float:
 def bootstrap_tau(
     first: Costs, second: Costs, rows: tuple[list[int], list[int]], paired: bool, draws: int = DRAWS
 ) -> Interval:
-    """Tau of the medians of two rows of methods, with bodies and prices drawn; without draws no interval."""
+    """Tau of the medians of two lists of methods; with `draws`, an interval by bootstrap of bodies and prices."""
     bodies, others = judged_bodies(first), judged_bodies(second)
     if bodies.size < 3 or others.size < 3:
         return Interval(*(float("nan"),) * 3)
@@ -126,7 +126,7 @@ def bootstrap_tau(
         else:
             pair = tuple(part[generator.integers(part.size, size=part.size)] for part in (bodies, others))
         priced = (medians(part[:, drawn]) for part, drawn in zip((a, b), pair, strict=True))
-        # a price does not rank what is not reached
+        # prices do not change the rank of targets that are not reached
         taus.append(tau_of(*(np.where(one < UNREACHED, one * p[k], one) for one, p in zip(priced, price, strict=True))))
     ends = np.nanquantile(taus, ENDS).tolist() if np.isfinite(taus).any() else (float("nan"),) * 2
     return Interval(value, *ends)
@@ -168,7 +168,7 @@ def own_tau(data: xr.DataTree, family: str, target: float) -> Interval:
 
 
 def classes(data: xr.DataTree) -> list[str]:
-    """The classes of `needs` that methods of bodies have, and all together."""
+    """The classes of `needs` that methods of bodies have, and `ANY` for all of them."""
     present = set(map(str, group_of(data, "short")["needs"].values))
     return [*(name for name in NEEDS if name in present), ANY]
 
@@ -186,7 +186,7 @@ def winner(data: xr.DataTree, family: str, target: float, needs: str = ANY, span
 
 @of_one_dataset
 def cheapest(data: xr.DataTree, family: str, target: float, needs: str = ANY, span: str = "short") -> list[str]:
-    """The methods of a class whose median costs are level, up to `LEVEL` times the least, the least first."""
+    """The methods of a class with a median cost up to `LEVEL` times the least, the cheapest first."""
     table = costs(data, family, target, span=span)
     rows, bodies = of_class(table, needs), judged_bodies(table)
     middle = medians(table.values[np.ix_(rows, bodies)]) if bodies.size and rows else np.array([UNREACHED])
@@ -230,7 +230,7 @@ def contenders(data: xr.DataTree) -> list[str]:
 
 @of_one_dataset
 def safest(data: xr.DataTree, family: str, target: float, span: str = "short", without: str = "") -> dict[str, Safe]:
-    """By method its safe setting and seconds: `symtop_studies.cost.ranking.safe`; `without` one stratum."""
+    """By method its safe setting and seconds (`symtop_studies.cost.ranking.safe`), on all strata but `without`."""
     group, tariff, ladders = group_of(data, span), prices(data), list[Ladder]()
     part = group.sel(quantity="axis").sel(target=target, method="nearest")
     work = group["work"]
@@ -278,12 +278,12 @@ def price_factors(data: xr.DataTree) -> dict[str, float]:
     return {name: float(tariff.at(name, at)[0][0] / tariff.at(other, at)[0][0]) for name, other in pairs.items()}
 
 
-# ---- what goes wrong -------------------------------------------------------------------------------------------------
+# ---- wrong runs and errors -------------------------------------------------------------------------------------------
 
 
 @of_one_dataset
 def silent(data: xr.DataTree, name: str, family: str, stratum: str = "") -> float:
-    """The share of bodies whose run of a method with `STEPS` steps a period is wrong without a sign.
+    """The share of bodies whose run with `STEPS` steps a period is wrong although energy and momenta are kept.
 
     `stratum` is a stratum of free bodies, or regular or chaotic by growth in ten periods; empty for all.
     """
@@ -334,7 +334,7 @@ def exponent(time: Array, error: Array, quantity: str) -> float:
 
 
 def orders(data: xr.DataTree) -> Iterator[tuple[str, str, float, float]]:
-    """Method, family, order seen, order seen at epsilon = 0."""
+    """Method, family, measured order, measured order at epsilon = 0."""
     order = group_of(data, "short")["order"]
     for name in fixed_steps(data):
         first = float(order.sel(variant=name, family=SYMMETRIC))
@@ -391,12 +391,12 @@ def lost(data: xr.DataTree, family: str, place: int) -> float:
 
 
 def ranking_verdict(one: Interval) -> str:
-    """Of an interval of tau."""
+    """The verdict on an interval of tau."""
     return NO if one.high < PART else YES if one.low >= SAME else PARTLY
 
 
 def factor_verdict(factor: float, with_factor: float = DOUBLE) -> str:
-    """Of a factor, either way."""
+    """The verdict on a factor or its reciprocal, whichever is larger."""
     size = max(factor, 1.0 / factor) if factor > 0.0 else np.inf
     return YES if size <= LEVEL else FACTOR if size <= with_factor else NO
 

@@ -18,16 +18,16 @@ from .limits import LEVELS, MOST
 from .measures import CHECKED
 
 SHOWN = ("0.1", "0.3", CHAOTIC, FREE)  # families of the short table
-NEEDLE = "needle"  # a stratum of free bodies whose spin the natural period does not tell
+NEEDLE = "needle"  # a stratum of free bodies, for which the natural period says nothing of the spin
 STRATA = ("regular", CHAOTIC)
-IN_PART = (  # facts that a run of some methods may not measure, and those of a family
+IN_PART = (  # facts that are missing if only some methods were run; below, those of each family
     "price", "price_high", "growth_1_judged", "growth_3_judged", "lost_0", "lost_3", "engines", "engine_steps", "grid",
 )  # fmt: skip
 OF_FAMILY_IN_PART = (
     "limit_{}_low", "limit_{}_least", "limit_{}_of", "order_{}_seen", "order_{}_top", "order_{}_declared",
     "long_tau_{}", "long_of_{}",
 )  # fmt: skip
-FIRST_TRIED = ("dop853-compiled-fixed", "tsit5-fixed", "vern9-fixed")  # what to begin with, given f(t, y) alone
+FIRST_TRIED = ("dop853-compiled-fixed", "tsit5-fixed", "vern9-fixed")  # recommended first, with f(t, y) alone
 
 
 def words(family: str) -> str:
@@ -41,19 +41,19 @@ def decades(target: float) -> int:
 
 
 def worst_tau(data: xr.DataTree, family: str, span: str = "short") -> by.Interval:
-    """Tau of the target with the least."""
+    """The least tau over all targets, with the least ends of its interval (`least`)."""
     return least([by.tau(data, family, target, span=span) for target in ASKED])
 
 
 def long_tau(data: xr.DataTree, family: str) -> tuple[float, int]:
-    """Tau over the long runs, of the target with the least, and how many bodies it is of."""
+    """The least tau over all targets in the long runs, and the number of bodies that it is computed from."""
     each = {target: by.tau(data, family, target, span="long").value for target in ASKED}
     target = min(ASKED, key=lambda one: float(np.nan_to_num(each[one], nan=math.inf)))
     return each[target], by.judged_bodies(by.costs(data, family, target, span="long")).size
 
 
 def least(each: list[by.Interval]) -> by.Interval:
-    """The least number, low end and high end of all: which target has the least number may be noise."""
+    """The least value, low end and high end of all, each by itself, as which interval is the lowest may be noise."""
     known = [one for one in each if not math.isnan(one.value)]
     return by.Interval(*(min(ends) for ends in zip(*known, strict=True))) if known else each[0]
 
@@ -64,7 +64,7 @@ def tau_words(one: by.Interval) -> str:
 
 
 def worst_winner(data: xr.DataTree, family: str) -> by.Interval:
-    """The cost of those that are level with the winner of tops over the best of each body, the most of all targets."""
+    """Cost of methods within `LEVEL` of the winner on tops, over the least on each body: the most of all targets."""
     each = [by.transferred(data, family, target, best=name)
             for target in ASKED for name in by.cheapest(data, SYMMETRIC, target)]  # fmt: skip
     return max((one for one in each if not math.isnan(one.value)), key=lambda one: one.value,
@@ -72,10 +72,10 @@ def worst_winner(data: xr.DataTree, family: str) -> by.Interval:
 
 
 class Pooled(NamedTuple):
-    """Factors of all methods and targets: those within the budget, and how many are beyond it."""
+    """Factors of all methods and targets: a summary of those within the budget, and how many exceed it."""
 
-    middle: float  # median of those within
-    most: float  # what `MOST_OF` of those within stay below
+    middle: float  # median of those within the budget
+    most: float  # the `MOST_OF` quantile of those within the budget
     beyond: int
     asked: int
 
@@ -88,7 +88,7 @@ class Pooled(NamedTuple):
 
     @property
     def verdict(self) -> str:
-        """Of the upper end; in part at best where so many are beyond the budget that the end of all is not known."""
+        """The verdict on the upper end; "in part" at best where so many exceed the budget that this is not known."""
         told = by.factor_verdict(self.most)
         return by.worst((told, by.PARTLY)) if self.beyond > (1.0 - MOST_OF) * self.asked else told
 
@@ -112,27 +112,27 @@ def own_steps(data: xr.DataTree, family: str, without: str = "") -> Pooled:
 
 
 def first_steps(data: xr.DataTree, family: str) -> list[float]:
-    """The same of `FIRST_TRIED` at each target that they reach on tops; without needles, inf beyond the budget.
+    """`own_steps` of the methods `FIRST_TRIED` at each target they reach on tops; no needles, inf beyond the budget.
 
-    They are named: which one is the cheapest at a target hangs on the noise of prices, and their factors differ.
+    The methods are fixed, because which is the cheapest at a target depends on the noise of prices.
     """
     return [factor for target in ASKED for name, factor in by.own_factors(data, family, target, NEEDLE).items()
             if label(name) in FIRST_TRIED]  # fmt: skip
 
 
 def most_within(values: list[float]) -> float:
-    """The most of those that are finite."""
+    """The largest of the finite values."""
     return max(filter(math.isfinite, values), default=math.nan)
 
 
 def silent_share(data: xr.DataTree, family: str) -> float:
-    """Mean share over methods of runs that are wrong without a sign."""
+    """Share of wrong runs that keep energy and momenta, the mean over methods."""
     shares = by.silent_shares(data, family)
     return float(np.nanmean(shares)) if np.isfinite(shares).any() else math.nan
 
 
 def silent_orders(data: xr.DataTree, family: str) -> tuple[float, float, float]:
-    """The same of methods by order: the least and the most of order 2, and the most of those from order 4 on."""
+    """These shares by order of the methods: the least and the most of order 2, and the most from order 4 on."""
     shares = by.silent_shares(data, family)
     orders = np.array([integrator(name).order or 0 for name in by.fixed_steps(data)])
     two, four = shares[orders == 2], shares[orders >= 4]
@@ -142,12 +142,12 @@ def silent_orders(data: xr.DataTree, family: str) -> tuple[float, float, float]:
 
 
 def over(share: float, before: float) -> float:
-    """A share over that of tops; where tops have none, what it has beyond none in units of `LEAST`, and 1."""
+    """The ratio of a share to that of tops; if that is 0, 1 + share / `LEAST`."""
     return share / before if before else 1.0 + share / by.LEAST
 
 
 def silent_words(data: xr.DataTree, family: str) -> str:
-    """Shares of runs that are wrong without a sign, in a table."""
+    """Shares of wrong runs that keep energy and momenta, in a table."""
     mean, tops = (percent(silent_share(data, one), 1) for one in (family, SYMMETRIC))
     low, most, four = silent_orders(data, family)
     span = f"{100.0 * low:.0f} to {percent(most)}"
@@ -174,9 +174,9 @@ def exponents_within(data: xr.DataTree, family: str) -> tuple[int, int]:
 
 
 def order_gap(data: xr.DataTree, family: str, claimed: bool = False) -> tuple[float, str]:
-    """By how much the order seen is lower than at epsilon = 0 at most, and of which method.
+    """The largest amount by which a measured order is below that at epsilon = 0, and the method.
 
-    What is `claimed` is the declared order, or the one that is seen at epsilon = 0 where that is lower.
+    With `claimed`, below the declared order, or below the one at epsilon = 0 where that is lower.
     """
     gaps = [(min(first, (integrator(name).order or math.inf) if claimed else math.inf) - one, name)
             for name, kind, one, first in by.orders(data) if kind == family]  # fmt: skip
@@ -184,20 +184,20 @@ def order_gap(data: xr.DataTree, family: str, claimed: bool = False) -> tuple[fl
 
 
 def growth_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
-    """Exponents of growth beside those of tops: how many are as near as they may be, and how near all of them are."""
+    """Exponents of growth against those of tops: how many agree within `EXPONENT`, and the largest difference."""
     (within, known), gap = exponents_within(data, family), exponent_gap(data, family)[0]
     verdict = YES if within >= MOST_OF * known else NO
     return f"{within} of {known} exponents within {by.EXPONENT}, all within {at_most(gap)}", verdict
 
 
 def limit_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
-    """Linear limits over those at epsilon = 0: median, and what 5 % fall below."""
+    """Linear limits over those at epsilon = 0: the median and the 5 % quantile."""
     low, middle = limit_ends(data, family)
     return f"{number(middle, 3)}, down to {number(low, 2)} times", by.factor_verdict(min(low, 1.0))
 
 
 def limit_ends(data: xr.DataTree, family: str) -> tuple[float, float]:
-    """What 5 % of the factors of linear limits fall below, and their median."""
+    """The 5 % quantile of the factors of linear limits, and their median."""
     ratio = by.limit_factors(data, family)
     return tuple(np.nanquantile(ratio, (1.0 - MOST_OF, 0.5)).tolist()) if ratio.size else (math.nan, math.nan)
 
@@ -210,7 +210,7 @@ def resonance_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
 
 
 def engine_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
-    """Tau of engines' maps, of the step with the lesser, and the bodies lost at once with the longer step."""
+    """Tau of engines' maps, the lower of both steps, and the bodies lost in the first period with the longer step."""
     if "engines" not in data.children:
         return "nan", NO
     places = range(len(LEVELS))
@@ -225,7 +225,7 @@ def engine_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
 
 
 def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
-    """By line of the table the number of a family and its verdict; no number where nothing was measured."""
+    """By row of the table the number of a family and its verdict; no number where nothing was measured."""
     tau, best = worst_tau(data, family), worst_winner(data, family)
     taken, own = steps(data, family), own_steps(data, family)
     share, before = silent_share(data, family), silent_share(data, SYMMETRIC)
@@ -262,7 +262,7 @@ LINES = {
 
 
 def carry(data: xr.DataTree) -> pd.DataFrame:
-    """The answer: a line for each thing, a column for each kind of body, number and verdict."""
+    """The main table: a row for each verdict, a column for each kind of body, with number and verdict in a cell."""
     each = {family: cells(data, family) for family in SHOWN}
     rows = [{ANSWER: text} | {words(family): sentence(*each[family][line]) for family in SHOWN}
             for line, text in LINES.items()]  # fmt: skip
@@ -275,7 +275,7 @@ def carry(data: xr.DataTree) -> pd.DataFrame:
 
 
 def short(data: xr.DataTree) -> pd.DataFrame:
-    """What the front page says of it: ranking, steps and runs that are wrong without a sign."""
+    """The table of the front page: ranking, steps, and wrong runs that keep energy and momenta."""
     columns: dict[str, list[str]] = {ANSWER: ["ranking by cost", "safe steps", "wrong, energy and momenta kept"]}
     for family in ("0.3", FREE):
         tau, taken = worst_tau(data, family), own_steps(data, family)
@@ -391,7 +391,7 @@ def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
 
 
 def rankings(data: xr.DataTree) -> pd.DataFrame:
-    """Tau by family, target and quantity, with the ceiling, and over the long runs."""
+    """Tau by family, target and quantity, with the ceiling (`comparison.ceiling`), also for the long runs."""
     rows = []
     for span in [one for one in by.SPANS if one in data.children]:
         for quantity in ("axis", "attitude"):
@@ -409,7 +409,7 @@ def rankings(data: xr.DataTree) -> pd.DataFrame:
 
 
 def winners(data: xr.DataTree) -> pd.DataFrame:
-    """By class, target and family the cheapest in the median, the safe choice, and what the winner of tops costs."""
+    """By class, target and family the cheapest in the median, the safe choice, and the cost of the winner on tops."""
     rows = []
     for needs in by.classes(data):
         for target in ASKED:
@@ -442,7 +442,7 @@ def step_table(data: xr.DataTree) -> pd.DataFrame:
 
 
 def silent_table(data: xr.DataTree) -> pd.DataFrame:
-    """Shares of runs that are wrong without a sign, by method, family and stratum."""
+    """Shares of wrong runs that keep energy and momenta, by method, family and stratum."""
     about = data["bodies"].to_dataset().isel(variant=0).sel(scene="short")
     rows = []
     for family in FAMILIES:
@@ -464,7 +464,7 @@ def growth_table(data: xr.DataTree) -> pd.DataFrame:
 
 
 def order_table(data: xr.DataTree) -> pd.DataFrame:
-    """The order seen, by method and family, with the declared one."""
+    """The measured order, by method and family, with the declared one."""
     rows: dict[str, dict[str, Any]] = {}
     for name, family, value, first in by.orders(data):
         line = rows.setdefault(name, {"method": name, "declared": integrator(name).order, words(SYMMETRIC): first})

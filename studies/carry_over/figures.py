@@ -1,4 +1,4 @@
-"""The study's figures: tau of rankings, factors of safe steps, runs that are wrong without a sign."""
+"""The study's figures: tau of rankings, factors of safe steps, wrong runs that keep energy and momenta."""
 
 from typing import Any
 
@@ -88,10 +88,10 @@ def draw_silent(data: xr.DataTree) -> Any:
     figure, ((axis,),) = style.panels(1, 1, height=2.9)
     names = [one for one in NAMED if one in by.fixed_steps(data)]
     none = 50.0 / by.group_of(data, "short").sizes["member"]  # half a body
-    for k, name in enumerate(names):  # beside each other, since many are wrong on none
+    for k, name in enumerate(names):  # side by side, as many methods are wrong on no body
         shares, look = [max(100.0 * by.silent(data, name, family), none) for family in FAMILIES], style.line(name)
         places = np.arange(len(shares)) + 0.07 * (k - 0.5 * (len(names) - 1))
-        axis.plot(places[:-2], shares[:-2], label=label(name), **look)  # the others are no farther ones
+        axis.plot(places[:-2], shares[:-2], label=label(name), **look)  # chaotic and free bodies: no line
         axis.plot(places[-2:], shares[-2:], **(look | {"ls": "none"}))
     axis.axhspan(0.7 * none, 1.4 * none, color=style.GREY, alpha=0.2, lw=0)
     _families(axis, [*FAMILIES])

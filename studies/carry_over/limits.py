@@ -11,10 +11,10 @@ Its frequencies are those in the axes of the body: the fastest is omega. A step 
 y', with Gamma brought to length one. By that half turn y' is odd in y, so that y' of a small y over its size is a
 slope to second order; y grows where the spectral radius of the slopes is above one.
 
-    limit        h omega from which on a displacement grows by `GROWING` a step, or a step cannot be made, on a grid
-                 and by bisection; NaN where none up to `MOST` is; 0 of a rotation that is itself unstable
-    grown        share of steps below that limit (below `MOST` without one) at which a tilt of `TILT` comes `FACTOR`
-                 times as far as the sum of the amplitudes of its small oscillations
+    limit        least h omega at which a displacement grows by `GROWING` a step, or a step fails, found on a grid and
+                 by bisection; NaN if there is none up to `MOST`; 0 for a rotation that is itself unstable
+    grown        share of steps below that limit (below `MOST` without one) at which a tilt of `TILT` grows to `FACTOR`
+                 times the sum of the amplitudes of its small oscillations
     error, lost  of engines' maps: largest error of the axis, rad, and whether it is above `WRONG` in the first period
 
 Source: Routh, Advanced Dynamics of a System of Rigid Bodies, section 214 (the sleeping body); Hairer, Lubich, Wanner,
@@ -39,11 +39,11 @@ from .bodies import CHAOTIC, FAMILIES, FREE, Bodies, run_level
 
 MOST = 10.0  # rad; h omega of the longest step
 BISECTIONS = 20
-NUDGE = 1e-5  # of Gamma, and of M over its own size
-SHORTEST = 0.1  # rad, of the grid: below it a growth by `GROWING` needs an order below two
+NUDGE = 1e-5  # displacement of Gamma, and of M relative to its size
+SHORTEST = 0.1  # rad, the first h omega of the grid: below it a growth by `GROWING` needs an order below two
 TILT, FACTOR = 0.05, 2.0  # rad
 STEPS = 300
-UNSTABLE = 1e-9  # a growth of the motion itself, over omega
+UNSTABLE = 1e-9  # growth rate of the motion itself over omega, from which on a rotation counts as unstable
 LEVELS = (6, 8)  # of the ladder: 70 and 280 steps a period
 STEADY = tuple(name for name in FAMILIES if name != CHAOTIC)
 
@@ -101,7 +101,7 @@ def displaced(variant: Integrator, rows: Array, h: Array, marks: NDArray[np.int6
 
 
 def radius(variant: Integrator, bodies: Upright, h: Array) -> Array:
-    """Spectral radius of the linearised steps h (n, k), as many of each body; infinite where a step fails."""
+    """Spectral radius of the linearised steps h (n, k), k for each body; infinite where a step fails."""
     n, k = h.shape
     momentum = bodies.moments[:, 2] * np.abs(bodies.spin) + np.sqrt(np.abs(bodies.weight) * bodies.moments[:, 0])
     size = np.stack([np.ones(n), np.ones(n), momentum, momentum], axis=1)
@@ -116,7 +116,7 @@ def radius(variant: Integrator, bodies: Upright, h: Array) -> Array:
 
 
 def limits(variant: Integrator, bodies: Upright, omega: Array, grid: float) -> Array:
-    """h omega from which on a displacement grows, (n,), on a grid so wide; NaN where none up to `MOST` does."""
+    """Least h omega at which a displacement grows, (n,), by a grid of that spacing; NaN if none up to `MOST` does."""
     phases = np.arange(SHORTEST, MOST + 0.5 * grid, grid)
     grows = radius(variant, bodies, phases / omega[:, np.newaxis]) > 1.0 + GROWING
     first = np.argmax(grows, axis=1)
@@ -129,7 +129,7 @@ def limits(variant: Integrator, bodies: Upright, omega: Array, grid: float) -> A
 
 
 def reach(bodies: Upright, y: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """omega, how far small oscillations from y (n, 4) tilt at most, and whether the rotation is stable, each (n,)."""
+    """omega, the largest tilt of small oscillations from y (n, 4), and whether the rotation is stable, each (n,)."""
     values, modes = np.linalg.eig(bodies.slopes)
     parts = np.linalg.solve(modes, y[..., np.newaxis].astype(complex))[..., 0]
     ways = modes[:, :2] * parts[:, np.newaxis]  # Gamma of each mode, whose real part runs round an ellipse
@@ -165,7 +165,7 @@ def steady_table(variant: Integrator, count: int, seed: int, grid: float, places
 
 
 def engine_table(variant: Integrator, drawn: dict[str, Bodies]) -> xr.Dataset:
-    """The largest error of the axis, and whether it is lost at once, by family, level and member."""
+    """The largest error of the axis, and whether it is above `WRONG` in the first period, by family, level, member."""
     count = len(next(iter(drawn.values())).period)
     found = np.full((2, len(drawn), len(LEVELS), count), np.nan)
     for row, bodies in enumerate(drawn.values()):

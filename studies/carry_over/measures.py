@@ -1,11 +1,11 @@
-"""What a case measures: costs and verdicts of a method on every family, growth exponents, what is known of bodies.
+"""The measurements of a case: costs and verdicts of a method on every family, growth exponents, facts about bodies.
 
 Variables over `family`, `quantity`, `target`, `member`, `level`:
 
-    cost, met_at       as in the study of cost: evaluations, and the setting, that reach the target
+    cost, met_at       as in the study of cost: force evaluations, and the setting, with which the target is reached
     work, setting      evaluations of the median body at each level, and the setting
-    status             0 not run, 1 right, 2 wrong and seen in energy, momenta or outcome, 3 wrong without a sign
-    order              that is seen between the two finest settings with an error in `ASYMPTOTE`
+    status             0 not run, 1 right, 2 wrong, with a change of energy, momenta or outcome, 3 wrong without any
+    order              measured between the two finest settings with an error in `ASYMPTOTE`
     error_attitude, error_energy   median over bodies, at `time` natural periods (group growth)
 """
 
@@ -27,7 +27,7 @@ from .bodies import ASKED, FREE, SYMMETRIC, Bodies, as_tops, grain, run_level, r
 
 STATUS = tuple(range(2, 8))  # levels whose verdicts are kept: 4.37 to 140 steps a period
 ASYMPTOTE = (1e-9, 1e-3)  # rad
-CHECKED = 4  # heavy bodies of a family whose truth is compared with an integration that has a bound
+CHECKED = 4  # heavy bodies of a family whose reference is compared with an integration that has an error bound
 GROWN = {  # steps a natural period: an error that is neither rounding nor as large as the motion for `doublings`
     "strang": 64, "five-rotations": 64, "kahan-li-8": 16, "srkn-11-6": 16, "lie-variational": 128, "gauss-4": 32,
     "rk4": 64, "tsit5-fixed": 32, "dop853-compiled-fixed": 8, "rkmk-se3-4": 64, "series-general": 4,
@@ -75,7 +75,7 @@ def _family(variant: Integrator, bodies: Bodies, budget: float) -> xr.Dataset:
 
 
 def verdicts(done: Climb) -> Array:
-    """The status of each member at each level, (LEVELS, n); one that has left with an accurate run is right."""
+    """The status of each member at each level, (LEVELS, n); one that left the ladder with an accurate run is right."""
     ran, error = np.isfinite(done.work), done.errors["axis"]
     kept = done.ended & (done.errors["energy"] <= KEPT) & (done.errors[MOMENTA] <= KEPT)
     status = np.where(error <= WRONG, 1.0, np.where(kept, 3.0, 2.0))
@@ -95,10 +95,10 @@ def observed_order(errors: Array) -> float:
 
 
 def growth_table(variant: Integrator, count: int, doublings: int, seed: int) -> xr.Dataset:
-    """Median errors of regular bodies at times that double: exponents are read off them.
+    """Median errors of regular bodies at times that double, from which growth exponents are computed.
 
-    Of bodies whose truth judges the finest target to the last time: of others, many of which turn chaotic, what is
-    measured may be the error of the truth.
+    Only bodies whose reference can judge the finest target up to the last time count: for others, many of which turn
+    chaotic, the difference may be the error of the reference.
     """
     at = FIRST_TIME * 2.0 ** np.arange(doublings)
     steps = GROWN[variant.method]
@@ -126,7 +126,7 @@ def growth_table(variant: Integrator, count: int, doublings: int, seed: int) -> 
 
 
 def about(drawn: dict[str, Bodies], *, long: bool) -> xr.Dataset:
-    """Of each family: growth of a disturbance over ten periods, bounds of the truth, and a check of these."""
+    """Of each family: growth of a disturbance over ten periods, error bounds of the references, a check of these."""
     n = len(next(iter(drawn.values())).period)
     grown, bounds = np.full((len(drawn), n), np.nan), np.full((len(drawn), n), np.nan)
     strata, gap, known = np.full((len(drawn), n), "", dtype="U16"), np.full(len(drawn), np.nan), []
@@ -147,7 +147,7 @@ def about(drawn: dict[str, Bodies], *, long: bool) -> xr.Dataset:
 
 
 def _checked(bodies: Bodies, k: int) -> float:
-    """How far the truth of a body is from an integration with a bound, over both bounds: above 1 refutes them."""
+    """Distance of a body's reference from an integration with a bound, over the sum of both bounds: above 1 refutes."""
     body, start = bodies.scenes[k].top, bodies.scenes[k].start
     motion = HeavyBody(body.moments, body.torque, start.quaternion, body.momentum(start), body.momentum_lo(start))
     exact = motion.samples(bodies.times[k])  # NaN from where it is not known

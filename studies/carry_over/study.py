@@ -1,10 +1,10 @@
 """Which verdicts on the symmetric top carry over to a body without symmetry, and by what factor?
 
-This is the plan. It was written down before a full run; the page says what turned out otherwise.
+This docstring is the plan, stated before the first full run; the page says where the results differ from it.
 
 *Populations* (`bodies`): heavy bodies at a distance epsilon from Lagrange's top in moments and centre of mass, the
 same draws at every epsilon of 0, 0.01, 0.03, 0.1, 0.3; chaotic ones at 0.3; free ones, near symmetric to needles. 400
-of each over 10 natural periods, and the first 100 over 100, each asked for the errors that its truth can judge.
+of each over 10 natural periods, and the first 100 over 100, each with the targets that its reference can judge.
 *Methods*: all compiled ones in the chart `body`, by what they need of a user; and on the bodies of epsilon = 0, as
 tops, the same methods in their smallest chart of the top.
 *Measured* by the ladder of settings, the prices and the two protocols of the study of cost: the error of the axis (the
@@ -21,14 +21,14 @@ refuted for a kind of bodies, and withdrawn there, where
                 carries over up to `LEVEL` times, with a factor between
     steps       of a class, the safe steps a period (for 95 % of the bodies) over those at epsilon = 0: it carries over
                 up to `LEVEL`, with a factor up to `DOUBLE`, and not beyond, by the method that grows most of 20
-    own step    the same for the steps of the top's own charts: can a user take the number of the README?
+    own step    the same for the steps of the top's own charts: is the number in the README valid for the body?
     silent      of the runs at `STEPS` steps a period, the share that is off by more than 0.1 rad with energy and
                 momenta kept to 1 %: it carries over within a factor `LEVEL`, with a factor within `SEVERAL`
     growth      exponents of attitude and energy errors with time on regular bodies are off by more than `EXPONENT`
     order       the order seen between the two finest settings is lower by more than `LOWER`
 
 Of the targets of a family the worst decides. Prices of kernels that use the symmetry are expected not to carry over:
-their ratio is told. Linear limits, resonances and the maps of engines are no part of this plan.
+their ratio is reported. Linear limits, resonances and the maps of engines are not part of this plan.
 
 *Addendum*, written after the first full run and before any of the following was measured (`limits`). Steady bodies: 24
 bodies a family, the same draws at every epsilon, turn upright about the third axis, with the centre of mass on it and
@@ -122,13 +122,13 @@ def grid(*, quick: bool = False) -> list[Case]:
 
 
 def follow_up(data: xr.DataTree) -> list[Case]:
-    """The long runs of those that come near the cheapest of their class."""
+    """The long runs of the methods whose cost is near the least of their class."""
     asked = FULL if data[SHORT].sizes["member"] >= FULL[SHORT]["count"] else QUICK
     return [Case("bodies", name, asked[LONG], group=LONG) for name in comparison.contenders(data)]
 
 
 def measure(case: Case) -> xr.Dataset:
-    """The table of a method on bodies or tops, growth, limits, engines, prices, or what is known of bodies."""
+    """The table of a method on bodies or tops, growth, limits, engines, prices, or facts about bodies."""
     asked = case.settings
     if case.group == PRICES:
         return measured(asked["integrators"], asked["rounds"], asked["batch"])

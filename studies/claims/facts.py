@@ -1,4 +1,4 @@
-"""Facts and the table of the study: every finding in a line, how many there are of each verdict, and the long runs."""
+"""Facts and tables of the study: every finding in a row, how many there are of each verdict, and the long runs."""
 
 from collections import Counter
 from typing import Any
@@ -18,19 +18,19 @@ FIRST = ("refuted", "undecided", "confirmed", "measured", "inapplicable")  # of 
 
 
 def parts(data: xr.Dataset) -> tuple[xr.Dataset, pd.DataFrame]:
-    """What was measured of integrators, and the findings on those that make planted false claims."""
+    """The dataset without the integrators with planted false claims, and the findings on those."""
     false = data["variant"].isin(list(LIES))
     return data.isel(variant=~false), ledger(data.isel(variant=false))
 
 
 def caught(entries: pd.DataFrame) -> pd.Series:
-    """Of each planted integrator, by its name: is its false claim refuted?"""
+    """For each integrator with a planted false claim, by name: is that claim refuted?"""
     lies = entries[entries["claim"] == entries["integrator"].map(LIES)]
     return lies.set_index("integrator")["verdict"] == "refuted"
 
 
 def ledger(data: xr.Dataset) -> pd.DataFrame:
-    """A line a finding, the refuted ones first; an integrator that is no longer registered is of the family "other"."""
+    """A row for each finding, the refuted first; an integrator that is no longer registered has the family "other"."""
     names = ["scene", "variant", "claim", "declared", "measured", "verdict", "value", "resolution", "why"]
     frame = data[names[3:]].to_dataframe().reset_index()[names]
     frame = frame[frame["verdict"].isin(VERDICTS)].rename(columns={"variant": "integrator"})
@@ -46,7 +46,7 @@ def by_kind(entries: pd.DataFrame) -> tuple[pd.DataFrame, pd.DataFrame]:
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
-    """How many claims have each verdict, how many lies are caught, and how many steps the long runs have."""
+    """How many claims have each verdict, how many planted false claims are refuted, and the steps of the long runs."""
     data, false = parts(data)
     refuted = caught(false)
     every = ledger(data)
@@ -82,7 +82,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
 
 
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
-    """Every finding, what is found of the false claims, and what each method does on the free body."""
+    """Every finding on tops, the findings on the planted false claims, and those on the free body."""
     data, false = parts(data)
     lies = false[false["claim"] == false["integrator"].map(LIES)]
     entries, bodies = by_kind(ledger(data))

@@ -23,7 +23,7 @@ SAID = {
 }
 TITLES = {"runge-kutta": "Runge-Kutta", "lie-group": "Lie-group", "taylor": "Taylor", "discrete-lagrangian":
           "discrete-Lagrangian", "library": "SciPy"}  # fmt: skip
-ROWS = {  # what a name alone does not say
+ROWS = {  # labels of claims whose name alone is not clear
     "energy": "energy over time", "p_phi": "$p_\\varphi$ over time", "p_psi": "$p_\\psi$ over time",
     "axis_length": "length of the axis", "reported": "reported momenta", "invariant": "own invariant",
     "work": "work of a step", "pole": "at a pole",
@@ -57,7 +57,7 @@ def draw_ledger(entries: pd.DataFrame, lies: pd.Series) -> Picture:
         for line, claim in enumerate(CLAIMS):
             count = counts[family].get(claim, pd.Series(dtype=int))
             left, words = column - 0.5, [word for word in FIRST if word in count]
-            for word in words:  # as wide as its share of the methods
+            for word in words:  # its width is its share of the methods
                 width = count[word] / count.sum()
                 axis.add_patch(Rectangle((left, line - 0.5), width, 1.0, facecolor=COLORS[word], lw=0.0))
                 left += width

@@ -1,7 +1,6 @@
 """Integrators that make one false claim each: the plug-ins in `liars`, each judged by a fresh process as any other is.
 
-A battery that finds every claim true shows little by itself. Beside the claims that hold stand these, which it must
-refute, for what each of them gets wrong.
+They check the battery itself: it must refute the false claim of each of them, besides confirming true claims.
 """
 
 from pathlib import Path
@@ -20,8 +19,8 @@ from symtop.run import plugins
 from symtop.runner.study import Case
 
 LIARS = Path(__file__).with_name("liars")
-PREFIX = "planted-"  # of their names in the study, so that no plug-in of a user is taken for one of them
-FALSE = {  # file: the claim that is false first of all
+PREFIX = "planted-"  # of their names in the study, so that no user's plug-in is taken for one of them
+FALSE = {  # file: the claim that is false
     "wrong-start": "order", "symplectic-rk4": "symplectic", "coefficients-swapped": "order", "hidden-kick": "symmetric",
     "one-newton": "energy", "coefficient-off": "order", "verlet-swapped": "order", "leaking-momentum": "p_phi",
     "leaking-chart": "p_phi", "reported-leak": "reported", "copied-momenta": "p_psi", "copied-in-angles": "reported",
@@ -37,7 +36,7 @@ def file_of(name: str) -> Path:
 
 
 def cases(quick: bool) -> list[Case]:
-    """One case an integrator."""
+    """One case for each integrator."""
     return [
         Case(SCENE, name, {"quick": quick, "code": file_hash(file_of(name))}) for name in (QUICK if quick else LIES)
     ]
@@ -51,7 +50,7 @@ def findings(name: str, quick: bool) -> list[dict[str, Any]]:
 
 
 def measured(case: Case) -> xr.Dataset:
-    """The findings on one of them. A fresh process loads it, so that no other case of this one meets it."""
+    """The findings on one of them. A fresh process loads it, so that other cases of this process are not affected."""
     each = fresh_process.call(findings, case.integrator, case.settings["quick"])
     columns = {name: [np.nan if one[name] is None else one[name] for one in each] for name in Finding._fields}
     claims = columns.pop("claim")

@@ -21,7 +21,7 @@ LEFT_OUT = {  # tags of scenes, with the reason; all claims of all integrators t
 
 
 def cases(quick: bool) -> list[Case]:
-    """One case an integrator and scene, one an integrator on a free body, and those that make false claims."""
+    """A case for each integrator and scene, for each integrator on a free body, and for each planted false claim."""
     methods = integrators().values()
     bodies = [Case(facts.FREE, method.name, {"quick": True}) for method in methods if BODY in method.solvers]
     every = [Case(name, method.name, {"quick": quick}) for name in grid_scenes(LEFT_OUT) for method in methods]
@@ -34,7 +34,7 @@ def measure(case: Case) -> xr.Dataset:
         return planted.measured(case)
     where = scene(case.scene, bodies=True)
     found = judge(integrator(case.integrator), where, quick=case.settings["quick"]).dataset().assign(chart="every")
-    if where.of_body:  # whose claims are others: each has its place among all
+    if where.of_body:  # a body has other claims: put each in its place among all
         blank = {name: "" for name, column in found.data_vars.items() if column.dtype.kind == "U"}
         found = found.reindex(claim=facts.EVERY, fill_value=blank).assign(chart=BODY)
     return found

@@ -30,7 +30,7 @@ from .measures import (
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
-    """How many orders are confirmed, what the named methods and the best of each order pay, how tolerances are met."""
+    """How many orders are confirmed, the work within each order, and how errors compare with tolerances."""
     words = [one.verdict for one in judged(data).values()]
     part, _ = named_variants(data)
     every = cheapest(data).query("ranked")
@@ -69,12 +69,12 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
 
 
 def first(costs: pd.DataFrame) -> tuple[str | None, float | None]:
-    """Variant and work of the first line, if there is one."""
+    """Variant and work in the first row, or None without one."""
     return (None, None) if costs.empty else (str(costs.iloc[0]["variant"]), float(costs.iloc[0]["work"]))
 
 
 def cheapest(data: xr.Dataset) -> pd.DataFrame:
-    """Force evaluations a nutation a variant with a step pays for `TARGET`, over the scenes; the least first.
+    """Force evaluations a nutation that each fixed-step variant needs for `TARGET`, median over scenes, least first.
 
     A median over fewer than `LEAST_SCENES` scenes is not ranked, and comes last.
     """
@@ -92,7 +92,7 @@ def cheapest(data: xr.Dataset) -> pd.DataFrame:
 
 
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
-    """What an error costs by variant; every order; every adaptive variant on every scene."""
+    """The work for an error by variant; every order; every adaptive variant on every scene."""
     costs = cheapest(data).drop(columns="ranked")
     costs = costs.rename(columns={"work": "force evaluations a nutation, median over scenes", "most": "largest"})
     return {"costs": costs, "orders": orders(data), "tolerances": tolerances(data)}

@@ -1,4 +1,4 @@
-"""Figures of the study: the named methods together, and what every order costs."""
+"""Figures of the study: the named methods together, and the work of the variants of every order."""
 
 from typing import Any
 
@@ -74,7 +74,7 @@ def _named(data: xr.Dataset) -> Picture:
 
 
 def _history(cell: xr.Dataset) -> tuple[Any, Any]:
-    """Times (nutations) and the largest change of the energy in windows of time; no change at all has no place."""
+    """Times (nutations) and the largest change of the energy in windows of time; NaN where it is zero."""
     time, change = cell["history_time"].values, cell["history_energy"].values
     good = np.isfinite(time) & np.isfinite(change) & (time > 0.0)
     if not good.any():
@@ -85,7 +85,7 @@ def _history(cell: xr.Dataset) -> tuple[Any, Any]:
 
 
 def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Picture:
-    """A line a variant, grouped by order: the work for `TARGET`, over the scenes."""
+    """One row for each variant, grouped by order: the work for `TARGET`, over the scenes."""
     labels, scenes = merged(stepping(data), MAIN), [str(name) for name in data["scene"].values]
     known = {name: [works[one, name] for one in scenes if (one, name) in works] for name in labels}
     middle = {name: float(np.median([one.work for one in part])) for name, part in known.items() if part}

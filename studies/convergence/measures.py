@@ -1,4 +1,4 @@
-"""Numerics of the study: orders, what they say of the declared ones, and how errors follow a tolerance.
+"""Numerics of the study: measured orders, verdicts on the declared ones, and errors as a function of the tolerance.
 
 The dataset has the columns of `symtop.measure.accuracy.error_table`, over ``scene``, ``variant`` (the name of one,
 ``rk4[axis]``) and ``setting``, and ``horizon`` over the first two.
@@ -23,13 +23,13 @@ from symtop.run.simulation import integrate
 
 MAIN = "axis"  # every chart shows it
 OTHERS = ("attitude", "theta", "energy")
-NAMED = ("midpoint", "trapezoidal", "stormer-verlet", "rk4", "rk45", "dop853", "taylor")  # that every reader knows
-LEAST_SCENES = 3  # of a median that is ranked
+NAMED = ("midpoint", "trapezoidal", "stormer-verlet", "rk4", "rk45", "dop853", "taylor")  # well-known methods
+LEAST_SCENES = 3  # a median over fewer scenes is not ranked
 FEW = 9  # variants that a figure has room for
-HISTORY_STEPS, HISTORY_TOLERANCE = 100.0, 1e-6  # a nutation; of their runs for the energy over time
+HISTORY_STEPS, HISTORY_TOLERANCE = 100.0, 1e-6  # steps a nutation, and tolerance, of the runs for the energy over time
 LARGE = LARGEST_ERROR  # radians: larger errors follow no power of the step
-ABOVE_BOUND = 100.0  # times the reference's own error bound: smaller errors may be the reference's
-SAME = 0.02  # variants of a method whose errors differ by less are drawn as one
+ABOVE_BOUND = 100.0  # errors below this many times the reference's error bound may be errors of the reference
+SAME = 0.02  # relative: variants of a method whose errors differ by less are drawn as one
 
 Pairs = dict[tuple[str, str], Fit]  # by scene and variant
 
@@ -75,7 +75,7 @@ class Judged(NamedTuple):
 
 
 def judged(data: xr.Dataset) -> dict[tuple[str, str], Judged]:
-    """What the slopes of every variant say of its declared order, on every scene."""
+    """The verdict of the measured slopes on the declared order of every variant, on every scene."""
     by_quantity = {quantity: fits(data, quantity) for quantity in (MAIN, *OTHERS)}
     result = {}
     for pair, main in by_quantity[MAIN].items():
@@ -141,19 +141,19 @@ def energy_history(on: Scene, variant: Integrator, nutations: float) -> xr.Datas
 
 
 class Efficiency(NamedTuple):
-    """What a variant pays for an axis error: force evaluations per nutation."""
+    """The work of a variant for an axis error: force evaluations per nutation."""
 
     work: float
-    foreseen: bool  # by the law error = C h^p, since the error does not lie between those of two runs
+    foreseen: bool  # extrapolated by error = C h^p, as the error does not lie between those of two runs
 
 
 def efficiencies(data: xr.Dataset, error: float) -> dict[tuple[str, str], Efficiency]:
     """The work for an axis error of every variant with a fixed step on every scene where it is known.
 
-    It lies between the two runs next to the error, on a straight line of logarithms, if every shorter step has less.
-    Elsewhere the law says it of a variant that has an order to trust: a step h costs E force evaluations, so that
-    C h^p = error takes E T (C / error)^(1/p) of them in a nutation T. E is the median over the steps of the fit, and an
-    implicit method, which iterates more at longer steps, pays more there.
+    It is interpolated, linearly in logarithms, between the two runs next to the error, if all shorter steps have
+    smaller errors. Otherwise it is extrapolated for a variant with a reliable order: a step h costs E evaluations, so
+    that C h^p = error takes E T (C / error)^(1/p) of them in a nutation T. E is the median over the steps of the fit;
+    an implicit method iterates more at longer steps, and needs more there.
     """
     foretold = {}
     for (name, label), fit in fits(data, MAIN).items():
@@ -185,9 +185,9 @@ TARGET = 1e-6  # rad, the axis error at which costs are compared
 
 
 def named_variants(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
-    """The named methods on the first scene, on the axis if they step it, and their labels.
+    """The methods `NAMED` on the first scene, on the axis if they have that chart, and their labels.
 
-    Where there are few variants, or none of these methods, all are named, without a chart that another covers.
+    If there are few variants, or none of these methods, all variants, but no attitude chart beside an axis chart.
     """
     every = list(map(str, data["variant"].values))
     names = [name for name in every if split_name(name)[0] in NAMED]
@@ -201,7 +201,7 @@ def named_variants(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
 
 
 def ratios(data: xr.Dataset) -> dict[str, np.ndarray]:
-    """Axis errors over tolerances of every adaptive variant on all scenes, where the tolerance rules."""
+    """Axis errors over tolerances of every adaptive variant on all scenes, above rounding and below `LARGE`."""
     by_name: dict[str, list[np.ndarray]] = {}
     for (on, name), fit in tolerance_fits(data).items():
         cell = data.sel(scene=on, variant=name)

@@ -22,12 +22,12 @@ LEFT_OUT = {  # tags of scenes, with the reason
 }
 WHOLE = "spheroid"  # runs to its horizon; the other scenes run for `NUTATIONS` at most
 NUTATIONS = 8.0
-MOST_STEPS = 1e6  # of a run
+MOST_STEPS = 1e6  # limit on the steps of a run
 HISTORY = (1000.0, 100.0)  # nutations of the run that shows the energy over time: in full, and quick
 
 
 def cases(quick: bool) -> list[Case]:
-    """Every method in every chart: steps from ten a nutation to so short that rounding rules, tolerances likewise."""
+    """Every method in every chart: from ten steps a nutation to steps where rounding dominates, tolerances likewise."""
     names = grid_scenes(TAGS if quick else LEFT_OUT)
     return [case for name in names for case in on_scene(name, quick)]
 

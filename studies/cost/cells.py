@@ -1,7 +1,7 @@
-"""What the study's dataset says: costs of all variants on all tops, contests, safe settings, silent failures.
+"""Results from the study's dataset: costs of all variants on all tops, contests, safe settings, silent failures.
 
-The dataset is a tree. Groups "short" and "long" hold the variants over the two horizons (see `ladder`), "tops" what is
-known of the tops, "prices" the seconds of an evaluation and of a call (see `prices`), "confirmed" the safe settings on
+The dataset is a tree. Groups "short" and "long" hold the variants over the two horizons (see `ladder`), "tops" numbers
+of the tops, "prices" the seconds of an evaluation and of a call (see `prices`), "confirmed" the safe settings on
 other tops (see `confirm`), "far" and "checks" the phase diagram (see `far`). A cost is in seconds, force evaluations x
 price at the tolerance that meets the error + call, or in force evaluations. Variants are compared where they show the
 same quantity: the axis in every chart but the attitude chart of a method that has the axis chart, which steps the same
@@ -36,14 +36,14 @@ POPULATIONS = {"strata": tuple(STRATA), NATURAL: (NATURAL,)}  # kinds of tops in
 GENERAL = "any body"  # whatever a method needs, if it exists for a body without symmetry
 CLASSES = (*(name for name in NEEDS if name != "solution"), GENERAL)
 SECONDS, EVALUATIONS = "seconds", "evaluations"
-WITHIN = 2.5  # times the least cost of a class over ten nutations: who comes as close runs over a thousand
-CLOSER = 1.25  # the same of an attitude chart, which has no part but in contests of the attitude
-OFTEN = 0.1  # of the tops
+WITHIN = 2.5  # variants up to this many times the least cost of their class over ten nutations run over a thousand
+CLOSER = 1.25  # the same for attitude charts, which take part in contests of the attitude only
+OFTEN = 0.1  # share of the tops on which that must be so
 CONFIRMED = "confirmed"  # the group of safe settings that were run on other tops
 
 
 class Cell(NamedTuple):
-    """A question: who reaches a target of a quantity over a horizon, on the tops of a population or a kind."""
+    """One comparison of variants: a target of a quantity over a horizon, on the tops of a population or a kind."""
 
     horizon: str
     quantity: str
@@ -61,7 +61,7 @@ class Costs(NamedTuple):
 
 
 def horizons(data: xr.DataTree) -> list[str]:
-    """The groups of variants that are there."""
+    """The horizons whose groups are in the dataset."""
     return [name for name in HORIZONS if name in data.children]
 
 
@@ -127,7 +127,7 @@ def costs(data: xr.DataTree, cell: Cell, unit: str = SECONDS) -> Costs:
 
 @of_one_dataset
 def contest(data: xr.DataTree, cell: Cell) -> Contest:
-    """The contest of a cell in hindsight."""
+    """The contest of a cell in hindsight: with the best setting for each top."""
     return hindsight(*costs(data, cell), prices(data).marked)
 
 
@@ -166,15 +166,15 @@ def mean_work(data: xr.DataTree, cell: Cell, name: str) -> Array:
 
 
 class Dear(NamedTuple):
-    """The safe choice of the fewest evaluations."""
+    """The safe choice with the fewest evaluations."""
 
     best: Safe
     evaluations: float  # of a run with its safe setting
-    price: float  # s that an evaluation takes longer than here where it is the fastest of all; 0 if it is that here
+    price: float  # s by which an evaluation must take longer for it to be the fastest of all; 0 if it is so already
 
 
 def dearer(data: xr.DataTree, cell: Cell) -> Dear | None:
-    """The safe choice where an evaluation takes long; None if no choice reaches the error."""
+    """The safe choice if evaluations are expensive; None if no choice reaches the error."""
     choices = [one for one in safest(data, cell)[0] if np.isfinite(one.seconds)]
     counts = []
     for one in choices:
@@ -192,7 +192,7 @@ def dearer(data: xr.DataTree, cell: Cell) -> Dear | None:
 
 
 def served_over_interpolated(data: xr.DataTree, cell: Cell, name: str) -> float:
-    """The safe setting that other tops of a cell showed over the interpolated one; 1 where no other tops were run."""
+    """The safe setting confirmed on other tops over the interpolated one; 1 where no other tops were run."""
     there = (cell.horizon, cell.quantity, cell.tops) == ("short", "axis", NATURAL) and CONFIRMED in data.children
     if not there or name not in data[CONFIRMED]["variant"].values:
         return 1.0
@@ -202,10 +202,10 @@ def served_over_interpolated(data: xr.DataTree, cell: Cell, name: str) -> float:
 
 
 def advised(data: xr.DataTree, others: Sequence[str]) -> dict[str, list[float]]:
-    """By variant the safe settings for each target on natural tops, over ten nutations; NaN where none is asked for.
+    """By variant the safe settings for each target on natural tops, over ten nutations; NaN for other targets.
 
-    Of those within `WITHIN` of the cheapest of their class, of those of the cheapest that keep every constant, and of
-    the `others`.
+    For variants within `WITHIN` of the cheapest of their class, also of those that keep every constant, and for the
+    `others`.
     """
     asked: dict[str, list[float]] = {}
     for place, target in enumerate(targets(data)):
@@ -232,7 +232,7 @@ def fewest(data: xr.DataTree, cell: Cell) -> str | None:
 
 
 def asked_tops(data: xr.DataTree, cell: Cell) -> NDArray[np.bool_]:
-    """Which tops of a cell are asked: those of whose variants some was."""
+    """The tops of a cell of which the target is asked for some variant."""
     group = data[cell.horizon].to_dataset()["cost"].isel(scene=0).sel(quantity=cell.quantity, target=cell.target)
     mask = chosen(data, cell.horizon, cell.tops)
     return np.asarray(~np.isnan(on_tops(group, mask)).all(axis=0))
@@ -295,13 +295,13 @@ def winner(data: xr.DataTree, cell: Cell) -> dict[str, Any]:
 
 
 class Health(NamedTuple):
-    """Of one variant over ten nutations, by setting and kind of top: numbers of tops, (settings, kinds)."""
+    """Numbers of tops (settings, kinds) of one variant over ten nutations, by setting and kind of top."""
 
     setting: Array  # steps a nutation, or tolerances
     drawn: Array  # (kinds,)
     wrong: Array
     silent: Array
-    dropped: Array  # not run any more: the budget of a run would have been exceeded
+    dropped: Array  # not run, as the budget of a run would have been exceeded
 
 
 def health(data: xr.DataTree, name: str) -> Health:
@@ -315,9 +315,9 @@ def health(data: xr.DataTree, name: str) -> Health:
 
 
 def guard_counts(data: xr.DataTree) -> pd.DataFrame:
-    """What the guard says of runs, by chart and whether its trial covers the run whole: warned of wrong and of others.
+    """Numbers of wrong and of other runs, and of guard warnings, by chart and by whether its trial was the whole run.
 
-    ``between`` are runs off by more than `EXPECTED`, at which it warns, and less than `WRONG`.
+    ``between`` are runs with an error above `EXPECTED`, from which on the guard warns, and below `WRONG`.
     """
     group = data["short"].to_dataset().isel(scene=0)[["foretold", "measured", "watched", "whole", "chart", "control"]]
     runs = group.to_dataframe().dropna(subset=["foretold"])

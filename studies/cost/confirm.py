@@ -1,12 +1,12 @@
-"""The safe setting of a variant, run: on tops that it was not chosen from, seen at `SAMPLES` times.
+"""The safe setting of a variant checked: runs on tops that it was not chosen from, sampled at `SAMPLES` times.
 
 The ladder's safe setting is interpolated between two that were run, from errors at a dozen times, and is an order
 statistic of the tops that it serves. All three make it too coarse. Here a variant begins with that setting, rounded as
 tables print it, on other tops of the natural population, and goes on to finer ones until `SAFE` of the tops keep the
-error. The first that serves them is the one that is advised.
+error. The first setting with which they do is recommended.
 
-Variables over `target`: interpolated(target), served(target), the setting, inf where none was found, and share(target),
-of the tops that are asked.
+Variables over `target`: interpolated(target) and served(target), the settings, inf where none was found, and
+share(target), of the tops of which the target is asked.
 """
 
 import math
@@ -24,10 +24,10 @@ from .ranking import SAFE
 from .tops import Tops, natural
 
 SAMPLES = 200  # of a run
-DENSE = 40.0  # times a nutation on whose multiples an adaptive run is sampled
-FINER = {True: 1.03, False: 0.7}  # from one setting to the next, by whether the step is fixed
+DENSE = 40.0  # grid points a nutation, on which the samples of an adaptive run lie
+FINER = {True: 1.03, False: 0.7}  # factor from one setting to the next, by whether the step is fixed
 DIGITS = {True: 3, False: 1}  # of a setting, in tables
-MOST = {True: 4.0, False: 10.0}  # times as many steps as interpolated, or as fine a tolerance, which has one digit
+MOST = {True: 4.0, False: 10.0}  # limit on the ratio to the interpolated setting, of steps and of tolerances
 
 
 def rounded(setting: float, fixed: bool) -> float:
@@ -38,7 +38,7 @@ def rounded(setting: float, fixed: bool) -> float:
 
 
 def share_served(variant: Integrator, numbers: Array, nutations: float, setting: float, target: float) -> float:
-    """The share of the tops, rows (n, 9), whose axis is off by `target` at most, of those of which it is asked."""
+    """The share of the tops, rows (n, 9), with an axis error of at most `target`, of those of which it is asked."""
     fixed, (chart,) = variant.fixed_step, variant.solvers
     tops = Tops(numbers, nutations, first=setting if fixed else DENSE, samples=SAMPLES)
     asked = np.flatnonzero(tops.asked([target])["axis"][0])
@@ -52,7 +52,7 @@ def share_served(variant: Integrator, numbers: Array, nutations: float, setting:
 
 
 def confirm(variant: Integrator, members: int, seed: int, nutations: float, start: Sequence[float]) -> xr.Dataset:
-    """The settings that serve `SAFE` of so many tops, from the interpolated ones `start` on; NaN: not asked."""
+    """Settings with which `SAFE` of the tops meet each target, from the interpolated `start` on; NaN: not asked."""
     numbers, fixed = natural(members, seed), variant.fixed_step
     served, share = np.full((2, len(TARGETS)), np.nan)
     for place, (target, first) in enumerate(zip(TARGETS, start, strict=True)):

@@ -27,12 +27,12 @@ LEFT_OUT = {  # methods, by the reason, which the page states
 }  # fmt: skip
 NOTHING = "none within the budget"
 STEPS = (4.37, 17.48, 69.92)  # a nutation, of the table of silent failures
-QUOTED, FINE = "rk4[axis]", 69.92  # whose wrong runs the page quotes, at so many steps a nutation
+QUOTED, FINE = "rk4[axis]", 69.92  # the variant whose wrong runs the page quotes, and its steps a nutation
 KNOWN = (
     QUOTED, "dop853-compiled-fixed[axis]", "gauss-4[axis]", "strang[axis]", "takahashi-imada[axis]", "srkn-14-6[axis]",
     "midpoint[angles]", "stormer-verlet[angles]",
 )  # fmt: skip
-HAVE = (  # methods that people have, of the table of their settings
+HAVE = (  # common methods, for a table of their settings
     "rk4[axis]", "rk45-compiled[axis]", "dop853-compiled[axis]", "strang[axis]", "stormer-verlet[angles]",
     "midpoint[angles]",
 )  # fmt: skip
@@ -48,7 +48,7 @@ def decades(target: float) -> int:
 
 
 def serves(name: str) -> str:
-    """What follows the name of a variant of a method that runs on symmetric bodies alone, as it is here."""
+    """The suffix " (symmetric)" for a variant whose implementation here is for symmetric bodies only, else ""."""
     method = integrator(split_name(name)[0])
     return "" if BODY in method.solvers or method.needs == "this-top" else " (symmetric)"
 
@@ -59,7 +59,7 @@ def setting_words(name: str, value: float) -> str:
 
 
 def facts(data: xr.DataTree) -> dict[str, Any]:
-    """What is safe, and the fastest in hindsight; what is wrong unseen; the guard; the map; the prices; the effort."""
+    """The safe choices, the fastest in hindsight, silent failures, the guard, the map, the prices, the work of all."""
     known, group, spans = prices(data), data["short"].to_dataset(), cells.horizons(data)
     return {
         "safe": SAFE, "tie": TIE, "wrong": WRONG, "kept": KEPT, "near": far.TIE, "processes": PROCESSES,
@@ -88,12 +88,12 @@ def span_facts(data: xr.DataTree, span: str) -> dict[str, float | None]:
 
 
 def over(data: xr.DataTree) -> str:
-    """What the front page shows of an error that no setting within the budget keeps."""
+    """The text of the front page for an error that no setting within the budget keeps."""
     return f"not within {count(span_facts(data, 'short')['budget'] or 0.0)} evaluations"
 
 
 def winners_facts(data: xr.DataTree) -> dict[str, Any]:
-    """The safe choices for any body and of each class, where a count of evaluations misleads most, who wins twice."""
+    """Safe choices for any body and each class; where counts of evaluations mislead; agreement of both protocols."""
     named: dict[str, Any] = {"safe_called": 0}
     misled: list[tuple[Any, ...]] = []
     for target in cells.targets(data):
@@ -122,7 +122,7 @@ def _safe(key: str, data: xr.DataTree, cell: Cell) -> dict[str, Any]:
 
 
 def confirmed_facts(data: xr.DataTree) -> dict[str, float | None]:
-    """How many settings were run on other tops, at how many times, and how many times finer they became, as steps."""
+    """How many settings were run on other tops, at how many times, and the median factor by which steps got finer."""
     table = confirmed(data)
     steps = table[table["steps"]]
     finer = float((steps["served"] / steps["interpolated"]).median()) if len(steps) else None
@@ -143,7 +143,7 @@ def silent_facts(data: xr.DataTree) -> dict[str, Any]:
 
 
 def guard_facts(data: xr.DataTree) -> dict[str, int]:
-    """Runs longer than its trial that the guard was asked about and warned of: wrong ones and right ones."""
+    """Numbers of wrong and right runs longer than the guard's trial, and of its warnings among them."""
     rows = cells.guard_counts(data)
     rows = rows[~rows["whole"]]
     return {"expected": EXPECTED} | {f"guard_{key}{end}": int(rows[f"{key}{end}"].sum())
@@ -151,7 +151,7 @@ def guard_facts(data: xr.DataTree) -> dict[str, int]:
 
 
 def far_facts(data: xr.DataTree) -> dict[str, Any]:
-    """The map: where splittings win, how many were predicted, and what checks of those say."""
+    """The phase diagram: where splittings win, how many cells are predicted, and the results of checks."""
     ends = "_clear", "_short", "_long"
     names = [f"map_{quantity}{end}" for quantity in far.QUANTITIES for end in ends]
     names += ["map_tops", "map_methods", "predicted", "checks", "checks_runs", "checks_told", "checks_longest"]
@@ -182,7 +182,7 @@ def far_facts(data: xr.DataTree) -> dict[str, Any]:
 
 
 def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
-    """What to use; winners in both protocols; by kind; other quantities; settings run; prices; silent runs; guard."""
+    """Recommended methods; winners by protocol, kind and quantity; settings run; prices; silent runs; guard."""
     kinds = [Cell("short", "axis", target, kind) for kind in KINDS[:-1] for target in cells.targets(data)]
     others = [cell for quantity in ("attitude", "energy") for cell in cells.cells(data, quantity)]
     return {
@@ -195,9 +195,9 @@ def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
 
 
 def use(data: xr.DataTree) -> pd.DataFrame:
-    """The safe choice of each class at each error, over the shorter runs, and what that at `AT` keeps.
+    """The safe choice of each class at each error, in the shorter runs, and the constants kept by that at `AT`.
 
-    The second line is of an f that takes longer, the third of those methods of the first that keep energy and momenta.
+    The second row is for a slower f, the third for the methods of the first row that keep energy and momenta.
     """
     rows = list[dict[str, str]]()
     lines = [(NEEDS[needs], needs, False) for needs in CLASSES[:-1]]
@@ -219,9 +219,9 @@ def use(data: xr.DataTree) -> pd.DataFrame:
 
 
 def slower(data: xr.DataTree) -> list[dict[str, str]]:
-    """The safe choice of f(t, y) alone where f takes so much longer that the fewest evaluations lead at every error.
+    """The row of safe choices with f(t, y) alone if f is so slow that the fewest evaluations win at every error.
 
-    A cell has the evaluations in the place of the time; nothing if those that lead here have the fewest.
+    A cell has the evaluations in the place of the time; no row if the winners have the fewest already.
     """
     each = {target: cells.dearer(data, Cell("short", "axis", target, NATURAL, CLASSES[0]))
             for target in cells.targets(data)}  # fmt: skip
@@ -237,9 +237,9 @@ def slower(data: xr.DataTree) -> list[dict[str, str]]:
 
 
 def keeps(name: str) -> str:
-    """Which constants of the motion a variant keeps, in a table: what it declares, and what is linear in its state.
+    """The constants of the motion that a variant keeps, for a table: those declared, and those linear in its state.
 
-    A method that uses f alone keeps what is linear: p_phi = L_z, where L is stepped.
+    A method that uses f alone keeps the linear ones: p_phi = L_z, if L is part of the state.
     """
     method = integrator(name)
     words = {claim: declared(method, claim) for claim in ("p_phi", "p_psi", "axis_length", "energy")}
@@ -251,7 +251,7 @@ def keeps(name: str) -> str:
 
 
 def have(data: xr.DataTree) -> pd.DataFrame:
-    """What methods that people have need for each error: the safe setting, its time, and that over the least."""
+    """For common methods at each error: the safe setting, its time, and the ratio to the least time."""
     rows = [{"you have": name} for name in HAVE if name in data["short"]["variant"].values]
     for target in cells.targets(data)[:3]:
         known = cells.reached(data, target)
@@ -287,7 +287,7 @@ def winners(data: xr.DataTree, each: list[dict[str, Any]]) -> pd.DataFrame:
 
 
 def confirmed(data: xr.DataTree) -> pd.DataFrame:
-    """Settings that were run on other tops, one a row: interpolated, and the first that served, with its share."""
+    """Settings run on other tops, one a row: the interpolated one, and the first that is safe, with its share."""
     header = ["variant", "error", "steps", "interpolated", "served", "share"]
     if cells.CONFIRMED not in data.children:
         return pd.DataFrame(columns=header)
@@ -298,12 +298,12 @@ def confirmed(data: xr.DataTree) -> pd.DataFrame:
 
 
 def lead(called: bool, best: Any, marked: list[str]) -> str:
-    """Is the lead beyond the intervals?"""
+    """The text for a lead: "called", "price too noisy", "none", or "" without a winner."""
     return "" if best is None else "called" if called else "price too noisy" if best.name in marked else "none"
 
 
 def price_list(data: xr.DataTree) -> pd.DataFrame:
-    """Price of an evaluation and of a call, the spread between processes, and what runs in the inner loop."""
+    """Price of an evaluation and of a call, the spread between processes, and the kind of the inner loop."""
     known, rows = prices(data), []
     for place, name in enumerate(known.names):
         price, call = (float(part[0]) for part in known.at(name, np.array([TOLERANCE])))
@@ -317,7 +317,7 @@ def price_list(data: xr.DataTree) -> pd.DataFrame:
 
 
 def silent(data: xr.DataTree) -> pd.DataFrame:
-    """Shares of all tops of a kind that are wrong, silent and dropped, of methods that people know."""
+    """Shares of all tops of a kind with wrong, silent and dropped runs, for well-known methods."""
     rows = []
     for name in (name for name in KNOWN if name in data["short"]["variant"].values):
         one = cells.health(data, name)

@@ -1,18 +1,18 @@
 """Runs of up to a million nutations: errors at all horizons, measured within a budget and predicted beyond it.
 
-A horizon H ends a stretch of the run in which `SAMPLES` whole steps are looked at, golden fractions apart, so that no
-two fall on the same phase of the nutation. The error up to H is the largest so far:
+Before each horizon H the run is sampled after `SAMPLES` whole steps, golden fractions apart, so that no two fall on the
+same phase of the nutation. The error up to H is the largest so far:
 
     axis     angle between the axes at the same time, rad
     energy   |E - E0| / (E0 - p_psi^2/2 I3 - min V)
     shape    distance of (u, u'/omega), u = cos(theta), from the true orbit u'^2 = f(u), to first order in it:
              |u'^2 - f(u)| / |grad|,  grad = (f'(u), 2 omega u'),  f = (1 - u^2)(alpha - beta u) - (b - a u)^2
 
-The last has no time in it: neither a phase nor a turn about the vertical changes it (`symtop.measure.phase` measures
-the same by a search for the nearest time). Steps are cut to 24 bits, so that step number times step is exact.
+The last is independent of time: neither a phase nor a turn about the vertical changes it (`symtop.measure.phase`
+measures the same by a search for the nearest time). Steps are cut to 24 bits, so that step number times step is exact.
 
-The phase diagram is a view of these runs, by the study's model of cost and its interpolation between settings: for a
-target and a horizon the variant with the least median cost over the tops. A cell is predicted if for most tops one of
+The phase diagram is computed from these runs, by the study's model of cost and its interpolation between settings: for
+a target and a horizon the variant with the least median cost over the tops. A cell is predicted if for most tops one of
 the two settings of the winner was not run as far as the horizon. Predictions are checked on the same kind of tops:
 cells at the horizons of `CHECKED_AT` are run in full by the winner and the next variant at the settings on both sides.
 """
@@ -42,9 +42,9 @@ from .tops import FIRST as FEWEST_STEPS, Tops, natural
 
 QUANTITIES = ("axis", "energy", "shape")
 MOST = {"axis": 2.0, "energy": 1.0, "shape": 1.0}  # the largest power of the horizon (see `laws`)
-PER_DECADE = 4  # stretches; every other end is a column of the picture
-FIRST, LAST = 1.0, 6.0  # decades of the horizon, in nutations
-SAMPLES = 12  # of a stretch
+PER_DECADE = 4  # horizons a decade; every other one is a column of the picture
+FIRST, LAST = 1.0, 6.0  # log10 of the first and the last horizon, in nutations
+SAMPLES = 12  # before each horizon
 CANDIDATES = (  # what can win on any body: the cheapest variants of each family over ten and a thousand nutations.
     # Adams' method is not among them: an evaluation with its history costs six times that of vern9.
     "midpoint[angles]", "strang-drift-first[axis]", "chin-4a[axis]", "srkn-6-4[axis]", "aba-10-4[axis]",
@@ -54,13 +54,13 @@ CANDIDATES = (  # what can win on any body: the cheapest variants of each family
     "series-general-adaptive[axis]", "taylor[axis]",
 )  # fmt: skip
 TARGETS = tuple(float(target) for target in np.logspace(-2, -12, 11))
-TIE = 1.25  # of medians
+TIE = 1.25  # medians with a ratio below this count as equal
 CHECKED_TARGETS, CHECKED_AT = (1e-3, 1e-6, 1e-9), (1e5, 3.16e5, 1e6)
 COARSEST = 2.0 * FEWEST_STEPS  # steps a nutation; halved from setting to setting
 LOOSEST = 1e-2  # tolerance; divided by ten
-LEAST_STEPS = 4.0  # a nutation, of what energy and shape are asked: longer steps may keep them and miss the motion
-DONE = 3e-13  # an error at ten nutations that no finer setting is asked to improve
-BITS = 24  # of a step
+LEAST_STEPS = 4.0  # a nutation, for energy and shape to count: with longer steps they may be kept by a wrong motion
+DONE = 3e-13  # error at ten nutations below which no finer setting is run
+BITS = 24  # of a step size
 CHECKED_TOPS = 4
 
 
@@ -70,7 +70,7 @@ def drifts_of(variant: Integrator) -> bool:
 
 
 class Shown(NamedTuple):
-    """What runs have shown, (n, samples), and their force evaluations (n,)."""
+    """Samples of n runs, (n, samples, ...), and their force evaluations (n,)."""
 
     states: Array
     momenta: Array
@@ -79,7 +79,7 @@ class Shown(NamedTuple):
 
 
 def horizons() -> Array:
-    """Ends of all stretches, in nutations."""
+    """All horizons, in nutations."""
     return np.logspace(FIRST, LAST, round((LAST - FIRST) * PER_DECADE) + 1)
 
 
@@ -101,7 +101,7 @@ def steps_of(tops: Tops, per_nutation: float) -> Array:
 
 
 def places(ends: Array) -> Array:
-    """Where samples lie, (horizons, samples), in nutations: golden fractions of the last fifth before each end."""
+    """Times of samples (horizons, samples), in nutations: golden fractions of the last fifth before each horizon."""
     fractions = np.sort(np.mod(GOLDEN * np.arange(1, SAMPLES), 1.0))
     return np.asarray(ends[:, np.newaxis] * np.append(0.8 + 0.2 * fractions, 1.0))
 
@@ -115,7 +115,7 @@ def setting_of(variant: Integrator, level: int) -> float:
 
 
 class Asked(NamedTuple):
-    """Runs of all tops with one setting: steps a nutation or a tolerance, and the ends of the stretches to look at."""
+    """A request for runs of all tops with one setting: steps a nutation or a tolerance, and the horizons."""
 
     setting: float
     ends: Array
@@ -123,7 +123,7 @@ class Asked(NamedTuple):
 
 
 def run(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Shown, Array]]:
-    """The runs of all tops with each setting, and the times (n, samples) of what they show.
+    """The runs of all tops with each setting, and the times (n, samples) of their samples.
 
     Those of a fixed step go side by side, the settings too, in one call.
     """
@@ -138,14 +138,14 @@ def run(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[
 
 
 def together(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Shown, Array]]:
-    """The runs of a fixed step. A call wants as many samples of all; those that nobody asked for are dropped."""
+    """The runs of a fixed step, in one call, which needs equally many samples of all; extra samples are dropped."""
     marks = []
     for setting, ends, _ in wanted:
         whole = np.maximum(np.rint(places(ends).ravel() * setting), 1).astype(np.int64)
         marks.append(np.maximum.accumulate(whole))
     each, n = [np.unique(one) for one in marks], len(tops.period)
     most = max((one.size for one in each), default=0)
-    if any(one[-1] < most for one in each):  # a run with fewer steps than another has samples
+    if any(one[-1] < most for one in each):  # a run with fewer steps than `most` samples
         return [made for asked in wanted for made in together(variant, tops, [asked])]
     if not wanted:
         return []
@@ -161,7 +161,7 @@ def together(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[t
 
 
 def filled(marks: NDArray[np.int64], count: int) -> NDArray[np.int64]:
-    """Marks, and the first steps that are none, `count` in all; the last of them stays the last."""
+    """The marks with the first other steps added, `count` in all; the last mark stays the last."""
     free = np.setdiff1d(np.arange(1, count + 1), marks)[: count - marks.size]
     return np.union1d(marks, free)
 
@@ -210,7 +210,7 @@ def measured(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[t
 
 
 def ladder(variant: Integrator, tops: Tops, levels: int, steps: float, budget: float) -> xr.Dataset:
-    """All settings of a variant, measured as far as `steps` and `budget` (evaluations of a run) go, then foretold.
+    """All settings of a variant, measured as far as `steps` and `budget` (evaluations of a run) allow, then predicted.
 
     Over `quantity`, `setting`, `horizon`, `member`: ``error``, the largest up to the horizon, and of its law the
     leading ``power`` and the free exponent ``slope`` with its ``interval``. ``setting_value`` is the steps a nutation
@@ -255,9 +255,9 @@ def grain_of(tops: Tops) -> Array:
 
 
 def predicted(seen: Array, work: Array, far: Array, grain: Array, *, drifts: bool) -> xr.Dataset:
-    """Errors at all horizons from the largest in the measured stretches (quantities, settings, horizons, n).
+    """Errors at all horizons, from the largest at the measured ones (quantities, settings, horizons, n).
 
-    `grain` (n,) is the rounding of the energy in one evaluation: no walk has longer steps.
+    `grain` (n,) is the rounding of the energy in one evaluation, the longest step of a random walk.
     """
     w = np.minimum(laws.walk(seen[1], work[:, np.newaxis] * far[:, np.newaxis]), grain)
     evaluations = np.swapaxes(work[:, np.newaxis] * far[:, np.newaxis], 1, 2)  # settings, n, horizons
@@ -294,7 +294,7 @@ class Diagram(NamedTuple):
     names: list[str]
     horizons: Array
     costs: Array  # seconds a nutation, inf where not reached
-    winner: NDArray[np.int64]  # -1 where nobody reaches the target
+    winner: NDArray[np.int64]  # index of a variant, -1 where none reaches the target
     second: NDArray[np.int64]
     ratio: Array  # cost of the second over that of the winner
     predicted: NDArray[np.bool_]
@@ -308,15 +308,15 @@ class Diagram(NamedTuple):
 
 
 def runs_of(data: xr.DataTree, name: str) -> xr.Dataset:
-    """What was measured of a variant: without padding, with errors of runs that failed or have no law infinite."""
+    """The runs of a variant: without padding; errors are infinite for runs that failed or have no growth law."""
     one = data["far"].to_dataset().isel(scene=0).sel(variant=name)
     one = one.isel(setting=np.flatnonzero(np.isfinite(one["setting_value"].values)))
-    dead = np.isnan(one["work"]).all("member")  # it failed within ten nutations: there is nothing more to measure
+    dead = np.isnan(one["work"]).all("member")  # all failed within ten nutations: there is no more to measure
     return one.assign(error=one["error"].fillna(np.inf), reach=one["reach"].where(~dead, np.inf))
 
 
 def variants_of(data: xr.DataTree, quantity: str) -> list[str]:
-    """Variants of a panel: those that conserve the energy by construction keep it and the shape at any step."""
+    """Variants of a panel; energy and shape leave out those that conserve the energy by construction at any step."""
     group = data["far"].to_dataset().isel(scene=0)
     return [
         str(name) for name in group["variant"].values
@@ -325,7 +325,7 @@ def variants_of(data: xr.DataTree, quantity: str) -> list[str]:
 
 
 def price_of(data: xr.DataTree, name: str, settings: Array) -> Array:
-    """Seconds of a force evaluation at each setting; the call has no part in runs of many nutations."""
+    """Seconds of a force evaluation at each setting; the cost of the call is negligible in runs of many nutations."""
     return prices(data).at(name, np.where(integrator(name).fixed_step, np.nan, settings))[0]
 
 
@@ -337,7 +337,7 @@ def diagram(data: xr.DataTree, quantity: str) -> Diagram:
         one = runs_of(data, name)
         errors = one["error"].sel(quantity=quantity).transpose("setting", "horizon", "member").values.astype(float)
         work = one["work"].transpose("setting", "member").values
-        work = np.where(np.isfinite(work), work, 1.0)  # of a run that failed: its infinite error answers nothing
+        work = np.where(np.isfinite(work), work, 1.0)  # of a failed run, whose error is infinite: any number
         work = work * price_of(data, name, one["setting_value"].values)[:, np.newaxis]
         seconds = np.stack([cost_to_reach(work, errors[:, k], TARGETS) for k in range(errors.shape[1])], axis=1)
         places = np.arange(len(work))[:, np.newaxis, np.newaxis]
@@ -410,7 +410,7 @@ def check(asked: Any) -> xr.Dataset:
 
 
 def checks(data: xr.DataTree) -> pd.DataFrame:
-    """The predicted cells that were run in full, a line a run and top.
+    """The predicted cells that were run in full, one row for each run and top.
 
     ``told``: does the run meet or miss the target as predicted? ``ratio`` is the error over the predicted one, of
     errors below 1 alone.

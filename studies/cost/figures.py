@@ -22,7 +22,7 @@ from .facts import serves
 from .ranking import run_lengths
 from .tops import NATURAL
 
-FAMILIAR = (  # of figure 1: methods that people know
+FAMILIAR = (  # well-known methods, in figure 1
     "rk4[axis]", "rk45-compiled[axis]", "tsit5-fixed[axis]", "dop853-compiled[axis]", "dop853-compiled-fixed[axis]",
     "gauss-8[axis]", "stormer-verlet[angles]", "strang[axis]", "takahashi-imada[axis]", "srkn-14-6[axis]",
     "midpoint[angles]", "taylor[axis]", "series[axis]",
@@ -51,7 +51,7 @@ def pictures(data: xr.DataTree) -> list[Picture]:
 
 
 def draw_accuracy(data: xr.DataTree) -> Any:
-    """Error against the seconds of a safe run: the fastest for any body at each error, and methods that people know."""
+    """Error against the seconds of a safe run: the fastest for any body at each error, and well-known methods."""
     each = {target: cells.reached(data, target) for target in cells.targets(data)}
     every = list(dict.fromkeys(name for known in each.values() for name in known))
     figure, axes = panels(1, 1, height=4.0)
@@ -82,7 +82,7 @@ def _safe_names(data: xr.DataTree) -> list[str]:
 
 
 def draw_run_lengths(data: xr.DataTree) -> Any:
-    """The share of natural tops that each variant has solved within so many force evaluations, one panel a target."""
+    """The share of natural tops that each variant solves within a number of force evaluations, a panel per target."""
     asked = [Cell("short", "axis", target, NATURAL) for target in cells.targets(data)]
     each = [cells.costs(data, cell, EVALUATIONS) for cell in asked]
     firsts = filter(None, (cells.fewest(data, cell) for cell in asked))
@@ -132,7 +132,7 @@ def draw_map(data: xr.DataTree) -> Any:
 
 
 def _colors(names: list[str]) -> dict[str, str]:
-    """A colour for each variant: its own, or one that is left if a variant with more cells has that."""
+    """A colour for each variant: its own, or an unused one if a variant with more cells has that."""
     colors: dict[str, str] = {}
     for name in names:
         every = [style.look(name).color, *LEFT, *style.SHADES["engine"], *style.SHADES["other"]]
@@ -146,7 +146,7 @@ def letters(colors: dict[str, str]) -> list[str]:
 
 
 def _panel(axis: Any, panel: far.Diagram, painted: dict[str, str]) -> None:
-    """Cells in the colours and with the letters of variants, small ones at a tie, paler and hatched where predicted."""
+    """Cells in the colours and with letters of variants; small letters at a tie; predicted cells pale and hatched."""
     x, y = np.log10(panel.horizons), np.log10(far.TARGETS)
     dx, dy = 0.5 * (x[1] - x[0]), 0.5 * (y[0] - y[1])
     colors = np.ones((*panel.winner.shape, 3))

@@ -1,17 +1,17 @@
-"""One variant on all tops: runs from coarse to fine settings, and what they cost and hide.
+"""One variant on all tops: runs from coarse to fine settings, their costs, and their silent failures.
 
 Steps are halved from setting to setting, tolerances divided by ten. A member leaves the ladder
 
     when every quantity has reached the finest target that is asked of it,
-    before a run that is foreseen to take more force evaluations than the budget,
-    when no target that is left can be reached within the budget: the error falls with the declared order or, if that is
-    more, as from the last setting to this, and a tenth of the target's distance is forgiven,
+    before a run that is predicted to take more force evaluations than the budget,
+    when no target that is left can be reached within the budget: the error is predicted to fall with the declared order
+    or, if that is faster, as from the last setting to this, and may exceed the target by `FORGIVEN`,
     when two settings below `NEAR_ROUNDING` have the same error: rounding; three tolerances, since the error of a method
     whose order depends on the tolerance falls by steps.
 
-The energy is asked from `LEAST_STEPS` a nutation on, because longer steps may keep it and miss the motion. A run is
-*wrong* if its axis is off by more than `WRONG`; it is a *silent failure* if nothing warns of it: it ended `ok` and kept
-the energy and both momenta to `KEPT`. A member that left with an accurate run is right at all finer settings.
+The energy is asked from `LEAST_STEPS` a nutation on, because with longer steps it may be kept by a wrong motion. A run
+is *wrong* if its axis error is above `WRONG`; it is a *silent failure* if, besides, it ended `ok` and kept the energy
+and both momenta to `KEPT`. A member that left with an accurate run counts as right at all finer settings.
 
 Variables over `quantity`, `target`, `member`, `level`, `kind` (of tops), `guarded`, `named` (scenes):
 
@@ -23,7 +23,7 @@ Variables over `quantity`, `target`, `member`, `level`, `kind` (of tops), `guard
     drawn(kind)                                    members with a nutation; at a level the rest of `runs` was dropped
     foretold, measured (level, guarded)            axis error, rad: of the guard's forecast, and of the run
     watched(level, guarded)                        the larger error of energy and momenta, infinite if it ended badly
-    whole(level, guarded)                          1 if the guard's trial was the whole run, and nothing was foretold
+    whole(level, guarded)                          1 if the guard's trial was the whole run, so that it had no forecast
     scene_error, scene_work (level, named)         axis error and force evaluations on the named scenes
     made, evaluated                                runs of the ladder, and their force evaluations
 """
@@ -51,16 +51,16 @@ from symtop.run.guard import forecast
 from .ranking import cost_to_reach
 from .tops import ASKED, FIRST, KINDS, MOMENTA, NATURAL, SCENE, Tops
 
-LEVELS = 15  # settings at most
-WRONG = 0.1  # rad
-KEPT = 0.01  # of the energy of the nutation, of the larger momentum
-ASYMPTOTIC = 1e-2  # rad; an error below this falls as the order says
-FORGIVEN = 10.0
+LEVELS = 15  # largest number of settings
+WRONG = 0.1  # rad, axis error above which a run is wrong
+KEPT = 0.01  # limit on a kept change, relative to the energy of the nutation and to the larger momentum
+ASYMPTOTIC = 1e-2  # rad; an error below this falls with the order of the method
+FORGIVEN = 10.0  # a predicted error up to this many times a target still counts as reaching it
 BLOCK = 256  # members of an adaptive variant that climb together: as many starts as heyoka's conversion remembers
 DIGITS = 10  # bits of a cost that are stored, 0.1 %
 Members = NDArray[np.int64]  # places of members
 
-GUARDED_LEVELS = 10  # of them are shown to the guard: up to 559 steps a nutation
+GUARDED_LEVELS = 10  # settings at which the guard is tested: up to 559 steps a nutation
 
 
 class Level(NamedTuple):
@@ -82,7 +82,7 @@ class Climb(NamedTuple):
 
 
 def quantities_of(variant: Integrator, twin: bool) -> tuple[str, ...]:
-    """What a variant is judged by: the attitude alone where the axis chart has the same axis (`twin`).
+    """The quantities a variant is judged by: the attitude alone if the axis chart has the same axis (`twin`).
 
     The energy is not asked of a variant that claims to conserve it: any step would do.
     """
@@ -143,7 +143,7 @@ def in_turn(variant: Integrator, numbers: Array, plans: Sequence[Plan]) -> Level
 
 
 def one_by_one(variant: Integrator, members: Iterable[tuple[SymmetricTop, Angles]], plans: Sequence[Plan]) -> Level:
-    """The same of tops and starts."""
+    """Runs of tops and starts one after another, with equally many samples each."""
     (chart,), shape = variant.solvers, (len(plans), plans[0].times.size)
     states, momenta = np.full((*shape, DIMENSIONS[chart]), np.nan), np.full((*shape, 2), np.nan)
     work, outcome = np.empty(len(plans)), np.empty(len(plans), dtype=np.int64)
@@ -158,7 +158,7 @@ def climb(
     variant: Integrator, tops: Any, asked: dict[str, NDArray[np.bool_]], budget: float,
     run: Callable[..., Level] = run_level,
 ) -> Climb:  # fmt: skip
-    """All runs of a variant on `tops`, or on others with the same properties; `asked` (targets, n) by quantity."""
+    """All runs of a variant on `tops`, or on another object with these properties; `asked` (targets, n) by quantity."""
     n, (chart,) = len(tops.period), variant.solvers
     names = (*asked, *(name for name in ("axis", "energy", MOMENTA) if name not in asked))
     blank = np.full((LEVELS, n), np.nan)
@@ -247,7 +247,7 @@ def costs_of(
     variant: Integrator, done: Climb, asked: dict[str, NDArray[np.bool_]], names: Sequence[str],
     firsts: dict[str, int] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """The variables ``cost``, ``met_at`` and ``setting``; of some quantities the levels before a first do not count."""
+    """The variables ``cost``, ``met_at`` and ``setting``; `firsts` gives the first level that counts for a quantity."""
     settings = np.array([setting_of(variant, level) for level in range(LEVELS)])
     set_to = np.where(np.isfinite(done.work), settings[:, np.newaxis], np.nan)
     costs, met = (np.full((len(names), len(TARGETS), done.work.shape[1]), np.nan, np.float32) for _ in range(2))
@@ -264,7 +264,7 @@ def costs_of(
 def typical_work(variant: Integrator, done: Climb, tops: Any) -> Array:
     """Force evaluations of the median top of each kind, (LEVELS, kinds); NaN below the least tolerance of a variant.
 
-    A top that left takes as much more at a finer setting as the tops that stayed.
+    The work of a top that left the ladder is extrapolated by the growth of the work of those that stayed.
     """
     work = done.work.copy()
     for level in range(1, LEVELS):
@@ -298,9 +298,9 @@ def _healthy(done: Climb, tops: Tops) -> dict[str, Array]:
 
 
 def guarded_runs(variant: Integrator, tops: Tops, done: Climb, guarded: int, budget: float) -> dict[str, Array]:
-    """What the guard foretells, what is watched and what is measured, for the first members; (LEVELS, guarded).
+    """Axis errors by the guard's forecast and of the runs, and errors of constants, of the first members.
 
-    The error of a run that ends early is infinite, foretold or measured.
+    Arrays (LEVELS, guarded). The error of a run that ends early is infinite, in the forecast and in the run.
     """
     (chart,) = variant.charts()
     seen = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured", "whole")}

@@ -1,4 +1,4 @@
-"""How errors of many runs grow, and what they will be beyond the last horizon that was measured: arithmetic on arrays.
+"""Growth laws of the errors of many runs, for prediction beyond the last measured horizon: arithmetic on arrays.
 
 The largest errors E_k in stretches that end at the horizons H_k are fitted in relative terms by one power, or by two:
 
@@ -10,20 +10,20 @@ at the end: an oscillation whose largest values scatter must not pass for a drif
 angle cannot grow any further, and points before the last `DECADES` are left out.
 
 A map that loses energy loses as much in every nutation, so that energy and shape grow as H at most. The phase is the
-integral of a frequency that hangs on the energy, and grows as H^2 at most. Which form a law has is known in part: a
-variant that is neither symplectic nor keeps the energy by construction drifts, however small its drift beside its
-oscillation, so that of such a variant any positive second coefficient of energy and shape is taken, and one of the
-phase at the level `LOOSE`. A drift that is still hidden at the last measured horizon is not foretold.
+integral of a frequency that depends on the energy, and grows as H^2 at most. The form of a law is known in part: a
+variant that is neither symplectic nor keeps the energy by construction drifts, however small its drift is compared with
+its oscillation, so that for such a variant any positive second coefficient of energy and shape is taken, and one of the
+phase at the level `LOOSE`. A drift that is still hidden at the last measured horizon is not predicted.
 
-What rounding adds is a walk: with w the smallest energy error over sqrt(evaluations) that any setting of a variant
-showed, but no more than the rounding of the energy itself,
+Rounding adds a random walk: with w the smallest energy error over sqrt(evaluations) of all settings of a variant, but
+no more than the rounding of the energy itself,
 
     energy, shape   w sqrt(N)                        N evaluations up to the horizon
     axis            2 pi H w sqrt(N) / sqrt(3)       the phase under a walk of the energy, whose period changes with it
 
-both with coefficient one, so that they are orders of magnitude, and no more than what the run itself leaves room for:
-the period of a fast top hardly changes with the energy of its nutation, and the axis walks much less than that. They
-are added in quadrature.
+both with coefficient one, so that they are orders of magnitude, and limited by the measured errors (`least`): the
+period of a fast top hardly changes with the energy of its nutation, and its axis walks much less. They are added in
+quadrature.
 """
 
 import math
@@ -37,11 +37,11 @@ from symtop.model.charts import Array
 
 POWERS = (0.0, 0.5, 1.0, 1.5, 2.0)
 PAIRS = ((0.0, 0.5), (0.0, 1.0), (0.0, 1.5), (0.0, 2.0), (1.0, 2.0))
-DECADES = 2.5
-SATURATED = 0.2
-FEWEST = 4  # points of a fit
-DOUBT, LOOSE = 1e-4, 0.025
-SHARE = 0.1  # of the error at the end
+DECADES = 2.5  # of the horizon, before the last measured point: earlier points are not fitted
+SATURATED = 0.2  # errors from here on are not fitted: an angle cannot grow much further
+FEWEST = 4  # least number of points of a fit
+DOUBT, LOOSE = 1e-4, 0.025  # significance levels of the coefficients of a pair of powers
+SHARE = 0.1  # least part of the second power in the error at the end
 LATE = 4  # points a decade
 
 
@@ -122,15 +122,15 @@ def walk(energy: Array, evaluations: Array) -> Array:
 
 
 def rounding(quantity: str, w: Array, horizons: Array, evaluations: Array) -> Array:
-    """What rounding adds, of `evaluations` (..., horizons) and `w` that fits before them."""
+    """The error by rounding, for `evaluations` (..., horizons) and `w`, which must broadcast with them."""
     walked = w * np.sqrt(evaluations)
     return np.asarray(walked * 2.0 * math.pi * horizons / math.sqrt(3.0) if quantity == "axis" else walked)
 
 
 def least(errors: Array, told: Array, noise: Array) -> Array:
-    """What a run's `noise` (n, horizons) is multiplied with, (n,), so as not to exceed what its measured errors allow.
+    """Factors (n,) that limit the `noise` (n, horizons) of each run to what its measured errors allow.
 
-    Where the law `told` fits them to a part m, noise in quadrature is at most sqrt(2 m) of the last error.
+    If the law `told` fits the errors within a relative misfit m, noise in quadrature is at most sqrt(2 m) of the last.
     """
     measured = np.isfinite(errors) & (errors > 0.0)
     last = np.max(np.where(measured, np.arange(errors.shape[1]), 0), axis=1)[:, np.newaxis]

@@ -1,4 +1,4 @@
-"""What a force evaluation and a call cost, in five fresh processes, and how far that can be trusted.
+"""Times of a force evaluation and of a call, measured in five fresh processes, and their errors.
 
 The study counts force evaluations, because a count is the same on every machine. Seconds are
 
@@ -19,8 +19,9 @@ slopes would be an outlier: a short run that was disturbed makes a slope too sma
     error    standard error of a median over n processes, 1.25 s/sqrt(n), times Student's 2.78/1.96 for five; s from the
              quartiles, at least `GRAIN`
 
-Variants with a spread above `NOISY`, or with fewer than `ENOUGH` slopes, are timed by five more processes, in the
-company of some quiet ones; the quieter five count. One that is noisy then is marked and never ranked first.
+Variants with a spread above `NOISY`, or with fewer than `ENOUGH` slopes, are timed by five more processes, with
+some that are not noisy; the five processes with the smaller spread count. One that is still noisy is marked and never
+ranked first.
 
 heyoka is timed as its own `propagate_until`, with nothing of symtop around it. The solver of `taylor[axis]`, which
 samples by dense output, is timed in the same rounds, and the ratio is a table.
@@ -50,17 +51,17 @@ from .tops import FIRST
 
 PROCESSES = 5
 ENOUGH = 3  # of them; a quick pass starts no more
-COMPANY = 8  # variants whose slopes have a common factor; with fewer it would hide their own noise
+COMPANY = 8  # least number of variants for a common factor of a process; with fewer it would hide their own noise
 BATCHES = "first", "again"  # of processes: those that time every variant, and those that time the noisy ones again
 FINE = 5  # FIRST 2^FINE steps a nutation
 TOLERANCES = tuple(10.0**-decade for decade in range(2, 16, 2))
-TOLERANCE = 1e-8  # of variants whose order is the same at all
+TOLERANCE = 1e-8  # at which variants are timed whose order does not depend on it
 KIND, CLEAR = "slow", 0.3  # rad between a pole and the axis of the top that is timed
 DRAWN = 64  # tops that it is chosen from
-LENGTHS = (0.1, 50.0)  # nutations of the short run, a few steps, which is nearly all call, and of the long one
+LENGTHS = (0.1, 50.0)  # nutations of the short run, whose time is nearly all that of the call, and of the long one
 FLOOR = 1e-9  # seconds: the dozen multiplications of two cross products take as long at four a cycle
 NOISY = 0.10
-GRAIN = 0.04  # two runs, with and without company on the machine, differ by that where their processes do not
+GRAIN = 0.04  # relative: two runs, on an idle and on a busy machine, differ by that even if their processes agree
 OUTER = 1.35  # standard deviations between the quartiles of a normal distribution
 MEDIAN, STUDENT = 1.25, 2.78 / 1.96
 HEYOKA, SAMPLED = "taylor[axis]", "with dense output"
@@ -173,7 +174,7 @@ def spread_of(values: Array) -> Array:
 
 
 def combined(price: Array, call: Array) -> tuple[Array, Array, Array, Array]:
-    """Prices, calls, relative errors and spreads (variants, tolerances) of (processes, variants, tolerances)."""
+    """Prices, calls, relative errors and spreads (variants, tolerances), from (processes, variants, tolerances)."""
     good = np.where(price >= FLOOR, price, np.nan)
     with np.errstate(all="ignore"), warnings.catch_warnings():
         warnings.simplefilter("ignore")  # variants that a batch has not timed
@@ -189,13 +190,13 @@ def combined(price: Array, call: Array) -> tuple[Array, Array, Array, Array]:
 
 
 def quiet_median(values: Array) -> Array:
-    """The median over tolerances of what was timed; infinite where nothing was."""
+    """The median over the tolerances that were timed; infinite where none was."""
     return np.array([np.median(row[np.isfinite(row)]) if np.isfinite(row).any() else np.inf for row in values])
 
 
 @of_one_dataset
 def prices(data: xr.DataTree) -> Prices:
-    """The prices of a dataset: for each variant those of the quieter five processes."""
+    """The prices of a dataset: for each variant those of the five processes with the smaller spread."""
     group = data["prices"].to_dataset().transpose("scene", "variant", "priced_at")
     names = [str(name) for name in group["variant"].values]
     of_batch = [str(name).partition("-")[0] for name in group["scene"].values]

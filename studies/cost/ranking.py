@@ -3,15 +3,15 @@
     cost       log-log interpolation between the last miss (E1, e1) and the first hit (E2, e2) behind it:
                log E = log E1 + (log E2 - log E1) log(e1/target)/log(e1/e2)
     slowdown   cost over the least cost of any variant on the same top
-    wins       on the share of tops, of those that some variant solves, on which all others cost at least `TIE` times
-               as much; on others the variants within `TIE` of the least are level
+    wins       the share of tops, of those that some variant solves, on which all others cost at least `TIE` times as
+               much; on other tops the variants within `TIE` of the least are level
     safe       the cost at the one setting with which `SAFE` of the tops meet the error
 
-A hit that a finer setting misses is luck and no hit. Intervals hold the draw of the tops and the prices: a bootstrap
+A hit that a finer setting misses does not count. Intervals are for the draw of the tops and for the prices: a bootstrap
 draws tops with replacement, the same for all variants, and each variant's price from a log-normal distribution of its
-relative error. One more top is drawn with the n that were run, of which nothing is known: any variant may win it, and
-no setting serves it. So a share of 1 has an interval, and neither a lead on a few tops nor an upper end of what serves
-`SAFE` of fewer than some 70 is certain. A lead is called if `SURE` of the draws have it. Sources: Efron and Tibshirani,
+relative error. One more top, of which nothing is known, is drawn with the n that were run: any variant may win it, and
+no setting serves it. So a share of 1 has an interval, and neither a lead on a few tops nor the upper end of a safe cost
+from fewer than some 70 tops is certain. A lead is called if `SURE` of the draws have it. Sources: Efron and Tibshirani,
 An Introduction to the Bootstrap (1993); run-length distributions: Hoos and Stuetzle, J. Autom. Reasoning 24
 (2000) 421.
 """
@@ -27,18 +27,18 @@ from numpy.typing import NDArray
 from symtop.model.charts import Array
 
 TIE = 1.1  # costs of a ratio below this are level
-SAFE = 0.95  # of the tops
+SAFE = 0.95  # share of the tops that a safe setting serves
 DRAWS = 200  # of the bootstrap
-SURE = 0.995  # of the draws have a lead that is called
-ENDS = (0.025, 0.975)  # of an interval
-CLOSE = 2.0  # a variant that never comes as close to the least cost wins in no draw
+SURE = 0.995  # a lead is called if at least this share of the draws has it
+ENDS = (0.025, 0.975)  # quantiles at the ends of an interval
+CLOSE = 2.0  # a variant that costs at least this many times the least on every top wins in no draw
 
 
 def cost_to_reach(work: Array, errors: Array, targets: Sequence[float]) -> Array:
     """Work (targets, n) that reaches each target, inf where none of the runs does.
 
     `work` and `errors` are (settings, n), coarse to fine; NaN where a member was not run. A failed run has an infinite
-    error. Where the coarsest run meets the target, its work is the answer. `work` may be any number of a setting.
+    error. Where the coarsest run meets the target, its work is returned. `work` may be any number of a setting.
     """
     ran = np.isfinite(work)
     last = ran.sum(axis=0) - 1
@@ -58,7 +58,7 @@ def cost_to_reach(work: Array, errors: Array, targets: Sequence[float]) -> Array
 
 
 def wins(costs: Array) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
-    """Of costs (variants, n): where a variant wins beyond ties, and where it is level with the cheapest or wins."""
+    """For costs (variants, n): where a variant wins without a tie, and where it wins or is level with the cheapest."""
     with np.errstate(invalid="ignore"):
         level = costs < TIE * np.min(costs, axis=0, initial=np.inf)
     return level & (level.sum(axis=0) == 1), level
@@ -85,12 +85,12 @@ def factors(errors: Array, draws: int = DRAWS) -> Array:
 
 @functools.cache
 def drawn(n: int) -> NDArray[np.int64]:
-    """How often each of n tops is drawn, and in the last place the one of which nothing is known, (`DRAWS`, n + 1)."""
+    """How often each of n tops is drawn, and, in the last place, the unknown one, (`DRAWS`, n + 1)."""
     return np.random.default_rng(2).multinomial(n + 1, np.full(n + 1, 1.0 / (n + 1)), size=DRAWS)
 
 
 class Standing(NamedTuple):
-    """How a variant does in a cell, in hindsight: the best setting for each top."""
+    """The result of a variant in a cell, in hindsight: with the best setting for each top."""
 
     name: str
     share: float  # of wins, of the tops that a variant solves
@@ -146,7 +146,7 @@ def hindsight(names: Sequence[str], costs: Array, errors: Array, marked: Sequenc
 
 
 class Ladder(NamedTuple):
-    """What a safe choice needs of one variant: by top the setting that meets the error, and by setting the seconds."""
+    """The input of a safe choice, of one variant: by top the setting that meets the error, by setting the seconds."""
 
     name: str
     met_at: Array  # (n,) steps a nutation or tolerance, inf or NaN where the error is not met
@@ -157,7 +157,7 @@ class Ladder(NamedTuple):
 
 
 class Safe(NamedTuple):
-    """The one setting with which `SAFE` of the tops meet the error, and what it costs."""
+    """The one setting with which `SAFE` of the tops meet the error, and its cost with an interval."""
 
     name: str
     setting: float  # inf where it is not met within the budget
@@ -167,7 +167,7 @@ class Safe(NamedTuple):
 
 
 def _rank(n: int) -> int:
-    """How many of n are at least `SAFE` of them."""
+    """The least number of n that is at least `SAFE` of them."""
     return math.ceil(SAFE * n - 1e-9)
 
 

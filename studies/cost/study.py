@@ -3,9 +3,9 @@
 One ladder of settings (`ladder`), one model of cost, force evaluations times their price plus the call (`prices`), one
 ranking with intervals (`ranking`). In the first round every variant, a method in one chart, climbs the ladder on the
 tops of two populations and the named scenes (`tops`) over ten nutations, and five processes time an evaluation. In the
-second the variants that come within `WITHIN` of the cheapest of their class climb it over a thousand, the settings that
-are advised are run on other tops (`confirm`), variants whose price is noisy are timed again, and cells of the phase
-diagram that were predicted are run (`far`).
+second the variants within `WITHIN` of the cheapest of their class climb it over a thousand, recommended settings are
+run on other tops (`confirm`), variants whose price is noisy are timed again, and cells of the phase diagram that were
+predicted are run (`far`).
 """
 
 import numpy as np
@@ -23,8 +23,8 @@ from .tops import NATURAL, named, tops_of
 SEED = 1
 SHORT, LONG, TOPS, PRICES, FAR, CHECKS = "short", "long", "tops", "prices", "far", "checks"  # groups of cases
 SAFE = cells.CONFIRMED
-# Twice as many tops would make the intervals of shares a tenth narrower and call 5 more of 100 winners, none of them
-# another: most of the width is the error of the prices.
+# With twice as many tops the intervals of shares would be a tenth narrower and 5 more of 100 leads be called, with the
+# same winners: most of the width is the error of the prices.
 FULL = {
     SHORT: {"strata": 400, "natural": 400, "seed": SEED, "nutations": 10.0, "budget": 4e4, "guarded": 60},
     LONG: {"strata": 150, "natural": 100, "seed": SEED, "nutations": 1000.0, "budget": 5e5, "guarded": 0},
@@ -72,7 +72,7 @@ def grid(*, quick: bool = False) -> list[Case]:
 
 
 def follow_up(data: xr.DataTree) -> list[Case]:
-    """The long runs of those that may win, their settings on other tops, noisy prices, and checks of the map."""
+    """Long runs of possible winners, recommended settings on other tops, noisy prices again, checks of the map."""
     quick = cells.members(data, SHORT) < FULL[SHORT]["natural"]
     asked = (QUICK if quick else FULL)[LONG]
     known = prices(data)
@@ -112,7 +112,7 @@ def measure(case: Case) -> xr.Dataset:
 
 
 def about_tops(tops) -> xr.Dataset:  # type: ignore[no-untyped-def]
-    """What the closed form knows of the tops: kind, width of the nutation and regime."""
+    """Numbers of the tops by the closed form: kind, width of the nutation and regime."""
     return xr.Dataset(
         {
             "kind_place": ("member", tops.kinds.astype(float)),

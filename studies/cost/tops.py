@@ -1,19 +1,19 @@
-"""The tops of the study: their scales, the truth at the times of the samples, and the errors of many runs at once.
+"""The tops of the study: their scales, the closed form at the times of samples, and the errors of many runs at once.
 
 Everything is an array over members, because ten thousand scenes would take a hundred times the time of their runs. The
-formulas are those of `symtop.measure.errors` and `symtop.model.scenes`, and the tests hold them together:
+formulas are those of `symtop.measure.errors` and `symtop.model.scenes`, and tests compare both:
 
     axis, attitude   angle between, rad                      energy   |E - E0| / (E0 - p_psi^2/2 I3 - min V)
     momenta          the larger of |p_phi - ref| and |p_psi - ref|, over max(|p_phi|, |p_psi|)
 
 A run of a variant with fixed step makes FIRST 2^k steps a nutation. Its samples fall on the same times at every k, a
-dozen that are not commensurate with the nutation, so that the truth is computed once. Of the largest error of 2000
-samples they see 93 to 100 % in the median run, and half in one of twenty; it is the same for all variants. The
+dozen that are not commensurate with the nutation, so that the closed form is computed once. Their largest error is 93
+to 100 % of that of 2000 samples in the median run, and half of it in one of twenty, for all variants alike. The
 coarsest run is that coarse because a step of 14 stages meets 1e-6 at four a nutation.
 
-Two populations and the named scenes stand one behind the other:
+The members are those of two populations, followed by the named scenes:
 
-    strata     `symtop.population`: six kinds, chosen to hold what is hard (25, 25, 15, 10, 10 and 15 % of the tops)
+    strata     `symtop.population`: six kinds, chosen to include hard ones (25, 25, 15, 10, 10 and 15 % of the tops)
     natural    homogeneous spheroids that turn about a pole of their surface, let go anywhere. In units where
                I1 = mgl = 1 and time is counted in 1/g, g = sqrt(mgl/I1):
                    inertia     axes of ratio r, log-uniform from 1/4 to 4, so that I3/I1 = 0.4/(0.2 + 1.2 r^2)
@@ -47,7 +47,7 @@ FIRST = 1.0925  # steps a nutation of the coarsest run
 SAMPLES = 12
 ASKED = ("axis", "attitude", "energy")  # quantities that have targets
 MOMENTA = "momenta"
-CLEAR = 0.1  # a target is asked where the truth's bound is at most this part of it
+CLEAR = 0.1  # a target is asked where the error bound of the closed form is at most this part of it
 NATURAL, SCENE = "natural", "scene"
 KINDS = (*STRATA, NATURAL, SCENE)
 DRAWS = 8  # uniform numbers of a natural top
@@ -56,7 +56,7 @@ LEFT_OUT = {  # tags of scenes, with the reason
     "steady": "no nutation: every target is wider than it",
     "unstable": "errors grow with the motion",
 }
-TOGETHER = 512  # members whose errors are computed at a time: what is between states and errors stays in the cache
+TOGETHER = 512  # members whose errors are computed at a time, so that intermediate arrays stay in the cache
 
 
 def sample_marks(steps: int, samples: int = SAMPLES) -> NDArray[np.int64]:
@@ -66,7 +66,7 @@ def sample_marks(steps: int, samples: int = SAMPLES) -> NDArray[np.int64]:
 
 
 class Shown(Protocol):
-    """What n runs have shown, such as `symtop.methods.framework.lanes.Many`."""
+    """Samples of n runs, such as `symtop.methods.framework.lanes.Many`."""
 
     @property
     def states(self) -> Array:
@@ -118,7 +118,7 @@ class Tops:
 
     @cached_property
     def energy_scale(self) -> Array:
-        """What energy errors are divided by, (n,): `Scene.energy_scale`, the energy of the nutation."""
+        """The divisor of energy errors, (n,): `Scene.energy_scale`, the energy of the nutation."""
         return scenes.energy_scales(self.numbers, self.forms.theta_range)
 
     @cached_property
@@ -142,11 +142,10 @@ class Tops:
         return np.stack([low, high, np.where(turned, -p_psi, p_psi), p_phi], axis=1)
 
     def bounds(self) -> dict[str, Array]:
-        """The least error of each quantity that the truth can judge over the horizon, (n,).
+        """The least error of each quantity that can be judged against the closed form over the horizon, (n,).
 
-        That of the axis and the attitude is the rounding of the closed form, which `symtop.run.reference.truth`
-        states. Variants in the angles chart show phi and psi as doubles, whose rounding is an angle; it counts for all
-        variants.
+        That of the axis and the attitude is the rounding of the closed form (`symtop.run.reference.truth`). Variants in
+        the angles chart return phi and psi as doubles, whose rounding is an angle; it counts for all variants.
         """
         turns = (np.abs(self.forms.phi_per_period) + np.abs(self.forms.psi_per_period)) * self.nutations
         grain = (np.abs(self.energy) + np.abs(self.numbers[:, 2])) / self.energy_scale
@@ -223,7 +222,7 @@ def named() -> dict[str, Array]:
 
 @functools.lru_cache(maxsize=3)
 def tops_of(strata: int, natural_tops: int, seed: int, nutations: float) -> Tops:
-    """So many tops of both populations and the named scenes; made once and kept, for every variant runs the same."""
+    """Tops of both populations and the named scenes; cached, as every variant runs the same."""
     drawn = population(strata, seed=seed)
     parts = np.stack([drawn[name].values for name in NUMBERS], axis=1), natural(natural_tops, seed), [*named().values()]
     places = [KINDS.index(name) for name in drawn["stratum"].values]

@@ -32,7 +32,7 @@ MEANING = {
     "growing": "grows by no single law", "drift": "drifts steadily", FAILED: "a run ended early",
 }  # fmt: skip
 CLOSE = 0.1  # a prediction that is further off, relative, counts as missed
-WHOLE = 0.99  # of the longest run of a scene: a shorter run counts as shortened
+WHOLE = 0.99  # share of the longest run of a scene, below which a run counts as shortened
 NAMES = {  # of the facts of each group
     HISTORIES: "nutations steps tolerance own variants holding shortened shortest energy_lost "
     "energy_drifts energy_lost_most energy_lost_worst momentum_lost bounded_runs bounded_as_t lost_runs lost_faster",
@@ -43,7 +43,7 @@ NAMES = {  # of the facts of each group
 
 
 def facts(data: xr.DataTree) -> dict[str, Any]:
-    """What was held fixed, and what became of constants and phase; changes are relative."""
+    """The settings of the runs, and how constants and phase changed; changes are relative."""
     answers: dict[str, Any] = dict.fromkeys(" ".join(NAMES.values()).split()) | {
         "rounding": RUN_ROUNDING,  # the largest change that a million steps of rounding explain
         "per_nutation": PER_NUTATION,  # steps of the long runs
@@ -120,7 +120,7 @@ def of_losses(horizons: xr.Dataset) -> dict[str, Any]:
 
 
 def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
-    """What became of the constants; every variant; losses of phase."""
+    """How many variants keep or lose each constant; every variant; losses of phase."""
     groups = {name: group.to_dataset() for name, group in data.children.items()}
     made: dict[str, pd.DataFrame] = {}
     if HISTORIES in groups:
@@ -131,7 +131,7 @@ def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
 
 
 def behaviour_table(histories: xr.Dataset) -> pd.DataFrame:
-    """How many variants fare how with each constant, and the least and the largest change among them."""
+    """For each constant and behaviour, how many variants show it, and the least and the largest change among them."""
     fate, rows = fates(histories), []
     for constant in CONSTANTS:
         for word in (*BEHAVIOURS, FAILED):
@@ -143,7 +143,7 @@ def behaviour_table(histories: xr.Dataset) -> pd.DataFrame:
 
 
 def variant_table(histories: xr.Dataset) -> pd.DataFrame:
-    """Every variant over all scenes, that with the largest change of the energy first."""
+    """Every variant over all scenes, sorted by the change of the energy, the largest first."""
     names = {f"{one}_largest": f"change of {one}" for one in CONSTANTS}
     table = fates(histories).rename(columns=names).replace(dict.fromkeys(CONSTANTS, MEANING))
     table["phase error (rad)"] = histories["phase_largest"].max("scene").values

@@ -1,12 +1,12 @@
-"""What a long run does to the constants of the motion and to its phase: histories, and laws of growth.
+"""Changes of the constants of the motion and of its phase in a long run: histories, and laws of growth.
 
 The root mean square over the members of an ensemble grows as n^1/2 where each is a random walk. One walk may return to
 zero and its largest value says little; drawing members with replacement (bootstrap) gives the interval. Source of the
 laws of rounding: Brouwer, Astron. J. 46 (1937) 149; of the interval: Efron, Ann. Statist. 7 (1979) 1.
 
-When a tolerance is lost is foretold by the parabola error = a + b t + c t^2 through a short run: b is a wrong frequency
-and c the drift of the frequency that comes with a drift of energy. A c or an a that is not significant is left out: one
-of less than four standard errors, which are error_k^2 = rest.rest/(n - m) (A^T A)^-1_kk of the columns A (n, m).
+The time at which an error reaches a tolerance is predicted by the parabola error = a + b t + c t^2 through a short run:
+b is a wrong frequency and c the drift of the frequency that comes with a drift of energy. A c or an a of less than four
+standard errors is left out; these are error_k^2 = rest.rest/(n - m) (A^T A)^-1_kk of the columns A (n, m).
 """
 
 import math
@@ -25,7 +25,7 @@ from symtop.model.scenes import Scene
 from symtop.run.simulation import integrate
 
 DRAWS, SEED = 2000, 1937  # of the bootstrap
-BLOCKS = 50
+BLOCKS = 50  # equal stretches of a run, over each of which an error is averaged
 
 
 def nutation_phase(scene: Scene, time: Array, theta: Array, theta_dot: Array) -> Array:
@@ -42,7 +42,7 @@ def nutation_phase(scene: Scene, time: Array, theta: Array, theta_dot: Array) ->
 
 
 def history(scene: Scene, method: Integrator, **settings: Any) -> xr.Dataset:
-    """One run and what became of the constants of the motion and of its phase.
+    """One run, with the changes of the constants of the motion and of its phase.
 
     Dimension ``sample``: ``sample_time`` and, for energy, p_phi and p_psi, ``NAME_residual``. For each of them the
     ``largest``, the linear ``slope`` with its ``interval`` and ``rise``, and the ``exponent`` of growth over the last
@@ -84,7 +84,7 @@ def ensemble_growth(steps: ArrayLike, drifts: ArrayLike, least: float) -> Ensemb
 
 
 class Horizon(NamedTuple):
-    """When an error reaches a tolerance: foretold, with the parabola it comes from."""
+    """The predicted time at which an error reaches a tolerance, and the coefficients of the parabola."""
 
     time: float  # inf if it never does
     constant: float

@@ -36,7 +36,7 @@ def losses(horizons: xr.Dataset) -> dict[str, xr.Dataset]:
 
 
 def worst_behaviour(histories: xr.Dataset, name: str) -> str:
-    """What became of a constant (see `behaviour`) on the scene where it fared worst; `histories` of one integrator."""
+    """The worst behaviour (see `behaviour`) of a constant over all scenes; `histories` of one integrator."""
     if not (histories["outcome"] == "ok").all():
         return FAILED
     columns = (histories[f"{name}_{part}"].values for part in ("largest", "exponent", "exponent_interval"))
@@ -46,13 +46,13 @@ def worst_behaviour(histories: xr.Dataset, name: str) -> str:
 
 
 def grain(scene_name: str, name: str) -> float:
-    """The rounding of a constant on a scene, in units of the machine's: that of an energy is over the nutation's."""
+    """The rounding of a constant on a scene, in machine epsilons; an energy's is relative to that of the nutation."""
     known = scenes()
     return known[scene_name].energy_grain if name == "energy" and scene_name in known else 1.0
 
 
 def fates(histories: xr.Dataset) -> pd.DataFrame:
-    """A line a variant: what became of each constant on the scene where it fared worst, and its largest change.
+    """One row for each variant: the worst behaviour of each constant over all scenes, and its largest change.
 
     Columns NAME, one of `BEHAVIOURS` or `FAILED`, and NAME_largest, relative, for each of `CONSTANTS`.
     """
@@ -67,7 +67,7 @@ def fates(histories: xr.Dataset) -> pd.DataFrame:
 def phases_by_energy(histories: xr.Dataset) -> dict[str, Array]:
     """Growth exponents of the phase error of all runs, by what the energy does: "bounded", "lost" or "kept"."""
     groups: dict[str, list[float]] = {"bounded": [], "lost": [], "kept": []}
-    for name in histories["scene"].values:  # a run may keep on one scene what others of its variant lose elsewhere
+    for name in histories["scene"].values:  # a variant may keep the energy on one scene and lose it on another
         one = histories.sel(scene=[name])
         for word, slope in zip(fates(one)["energy"], one["phase_exponent"].squeeze("scene").values, strict=True):
             if word != FAILED and np.isfinite(slope):
@@ -76,12 +76,12 @@ def phases_by_energy(histories: xr.Dataset) -> dict[str, Array]:
 
 
 def as_time(slopes: Array) -> Array:
-    """Which errors grow as t, to `AS_TIME` of the exponent."""
+    """Which errors grow as t: their exponent is 1 within `AS_TIME`."""
     return np.abs(slopes - 1.0) <= AS_TIME
 
 
 def faster(slopes: Array) -> Array:
-    """Which errors grow faster."""
+    """Which errors grow faster than t."""
     return slopes > 1.0 + AS_TIME
 
 

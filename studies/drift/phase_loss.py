@@ -1,4 +1,4 @@
-"""When a phase error reaches a tolerance: predicted from a thousand nutations, and measured on a run that gets there.
+"""The time at which a phase error reaches a tolerance: predicted from a thousand nutations, and measured.
 
 Each method gets a step of its own, chosen so that the phase error reaches `LOST` after a few thousand nutations: from
 the frequency error that a few nutations show and the order that the method declares. A run of `SHORT` nutations then

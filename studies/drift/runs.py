@@ -1,6 +1,6 @@
 """Long runs: histories of every method, and windows and ensembles of the four whose modified energy is known.
 
-`rounding` shows how the modified energy of an ensemble wanders off by rounding, and what plain sums would do. Each
+`rounding` measures how rounding changes the modified energy of an ensemble, with compensated and with plain sums. Each
 member starts a hundredth of a radian from the one before; its step is the same fraction of its own nutation. Drift is
 the mean modified energy of a window less that of the first window of a long run (see `modified_energy` and `long_run`;
 its level is fitted to 4096 samples there), relative to the energy's scale. The best that can be had is Brouwer's law: a
@@ -56,7 +56,7 @@ def members(scene: Scene, count: int) -> list[Scene]:
 
 
 def gauges_of(scenes: Sequence[Scene], method: Integrator, per_nutation: float) -> list[Gauge]:
-    """What watches each long run: one fit to a run's beginning, whatever sums go on from there."""
+    """The gauge of each long run, fitted to its beginning; the same for compensated and for plain sums."""
     return [watch(one, method, one.nutation_period / per_nutation) for one in scenes]
 
 
@@ -97,11 +97,11 @@ def rounding(scene: Scene, method: Integrator, steps: int, per_nutation: float, 
     """Drift of the modified energy of `count` starts over `steps` steps, and of `PLAIN_MEMBERS` with plain sums.
 
     Dimension ``window``: ``elapsed`` (see `elapsed_steps`), ``drift`` (member, window), its root mean square ``rms``
-    over the members; ``end``, the last rms, and the ``exponent`` of its growth, fitted from as many steps on as the
-    first window has, with ``exponent_interval``; each of these again as ``plain_drift``, ... with plain sums. ``p_phi``
-    and ``p_psi`` are the largest relative changes with compensated sums. ``late`` and ``plain_late`` are the rms over
-    the last decade of steps, because at one moment a walk may be anywhere, of the members that ran with both sums;
-    ``gain`` is their ratio. All that is said of what compensated sums gain rests on these three.
+    over the members; ``end``, the last rms, and the ``exponent`` of its growth, fitted from the end of the first window
+    on, with ``exponent_interval``; each of these again as ``plain_drift``, ... with plain sums. ``p_phi`` and ``p_psi``
+    are the largest relative changes with compensated sums. ``late`` and ``plain_late`` are the rms over the last decade
+    of steps, as a single value of a random walk says little, of the members that ran with both sums; ``gain`` is their
+    ratio. All statements on the gain of compensated sums use these three.
     """
     columns: dict[str, Any] = {}
     scenes = members(scene, count)
@@ -129,9 +129,9 @@ def run_history(
     scene: Scene, method: Integrator, *, horizon: float, samples: int, step_size: float | None = None,
     tolerance: float | None = None,
 ) -> xr.Dataset:  # fmt: skip
-    """What `history` returns, and ``nutations``, ``steps_a_nutation`` or ``tolerance`` of the run.
+    """The dataset of `history`, with ``nutations``, ``steps_a_nutation`` and ``tolerance`` of the run.
 
-    NaN stands for what a method does not have; ``own_tolerance`` is true for a method that ran at its own default.
+    The last two are NaN for a method without them; ``own_tolerance`` is true for one that ran at its own default.
     """
     given: dict[str, Any] = {"step_size": step_size, "tolerance": tolerance}
     data = history(scene, method, horizon=horizon, samples=samples, **{k: v for k, v in given.items() if v is not None})

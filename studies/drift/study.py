@@ -83,7 +83,7 @@ def history_settings(on: Scene, method: Integrator, steps: int) -> dict[str, flo
 
 
 def measure(case: Case) -> xr.Dataset:
-    """A history with its growth, the windows of a long run, an ensemble, or a loss of phase: what the group says."""
+    """A history with its growth, the windows of a long run, an ensemble, or a loss of phase, by the case's group."""
     return MEASURES[case.group](scene(case.scene), integrator(case.integrator), **case.settings)
 
 

@@ -15,12 +15,12 @@ from .measures import BODIES, FREQUENCIES, HORIZON, SCENES
 
 SLOW, FAST = SCENES
 BETWEEN = (400.0, 3000.0)  # steps a nutation that the measured order is taken between
-NEAR = 5.0  # degrees: a top of the population is followed
-USUAL = 240.0  # steps a second that are quoted
-KEPT = 0.01  # relative change of the energy or the spin in the long run, beyond which it is not kept
-ROUNDING = 1e-12  # rad: below, rounding rules
-LOST = 1.0  # rad: the axis is anywhere
-WORSE = 1.5  # times the least error, beyond which the shortest step is worse than a longer one
+NEAR = 5.0  # degrees: a top of the population counts as followed if the error at the end is below this
+USUAL = 240.0  # steps a second, the usual rate, for which numbers are quoted
+KEPT = 0.01  # limit on the relative change of a kept energy or spin in the long run
+ROUNDING = 1e-12  # rad: smaller errors are dominated by rounding
+LOST = 1.0  # rad: with a larger error the direction of the axis is lost
+WORSE = 1.5  # the shortest step is worse than a longer one if its error is above this many times the least
 BESIDE = "strang[axis]"  # quoted beside the maps of engines
 
 
@@ -50,13 +50,13 @@ def long_time(data: xr.DataTree) -> float:
 
 
 def frame(data: xr.DataTree, variable: str, variant: str, scene: str = SLOW, *, long: bool = False) -> float:
-    """A number at the usual step, or with the usual evaluations a second, after the short time or the long one."""
+    """A variable at the usual rate of steps, or of evaluations, a second, after the short time or the `long` one."""
     horizon = long_time(data) if long else HORIZON
     return float(read(data, "tops", variable, scene=scene, variant=variant, rate=USUAL, horizon=horizon))
 
 
 def lines(data: xr.DataTree) -> pd.DataFrame:
-    """A line a variant, by name; errors are rad, `share` that of the population, `group` the order of its map."""
+    """One row for each variant, by name; errors in rad, `share` of followed tops, `group` the order of its map."""
     groups = (group for key, group in data.children.items() if key != "bodies")
     names = dict.fromkeys(str(name) for group in groups for name in group["variant"].values)
     every = pd.DataFrame(_lines(data, names or {BESIDE: None})).set_index("variant", drop=False)
@@ -85,7 +85,7 @@ def _lines(data: xr.DataTree, names: dict[str, None]) -> Iterator[dict[str, Any]
 
 
 def on_bodies(data: xr.DataTree) -> pd.DataFrame:
-    """A line a variant, by name: largest attitude errors (rad) on each free body at each frequency, and whose it is."""
+    """One row for each variant: largest attitude errors (rad) on each free body at each rate; order; engine or not."""
     names = [str(name) for name in data["bodies"]["variant"].values] if "bodies" in data.children else []
     every = pd.DataFrame(index=pd.Index(names, name="variant"))
     entries = [integrator(name) for name in names]
@@ -100,7 +100,7 @@ def on_bodies(data: xr.DataTree) -> pd.DataFrame:
 
 
 def facts(data: xr.DataTree) -> dict[str, Any]:
-    """The two ends of the field, at equal steps and equal cost, and what decides. Errors are rad."""
+    """The best and the worst maps, at equal steps and equal cost; the effect of the gyroscopic term. Errors in rad."""
     every = lines(data)
     maps = every[every["engine"] & ~every["single"]]
     turned, without = maps[maps["term"]], maps[~maps["term"]]
@@ -145,7 +145,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
 
 
 def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
-    """What the order decides; every map at the usual step."""
+    """Errors by the order of a map; every map at the usual step; errors on free bodies."""
     every = lines(data).sort_values("slow", kind="stable")
     groups = every[every["engine"] & ~every["single"]].groupby("group")
     columns = {"slow": f"error on {SLOW} (rad)", "fast": f"error on {FAST} (rad)", "share": "share of tops followed"}

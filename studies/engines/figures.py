@@ -26,7 +26,7 @@ ERROR = f"largest axis error within {HORIZON:g} s (rad)"
 
 
 def pictures(data: xr.DataTree) -> Iterator[Picture]:
-    """Errors against steps, and at the same cost, of what was measured."""
+    """The figures of errors against steps and at the same cost, if these were measured."""
     known = lines(data)
     colors = {row["variant"]: color(row) for _, row in known.iterrows()}
     if known["best"].notna().any():
@@ -41,7 +41,7 @@ def color(row: pd.Series) -> str:
 
 
 def key(figure: Any, shades: Iterable[str]) -> None:
-    """The colours that a figure has and its marks, below it."""
+    """The legend of the colours in a figure, below it."""
     said = ["no gyroscopic term", *(f"order {order:g}" for order in COLORS if order), "no engine, for comparison"]
     for label, shade in zip(said, [*COLORS.values(), OURS], strict=True):
         if shade in shades:

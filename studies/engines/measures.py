@@ -50,7 +50,7 @@ def azimuth(e: np.ndarray) -> float:
 
 
 def judged(there: Scene, variant: Integrator, h: float, horizon: float) -> dict[str, float]:
-    """One run, and what became of it."""
+    """The errors of one run (see the head of this module), by name, and its number of steps."""
     chart, top = variant.charts()[0], there.top
     steps = max(SAMPLES, round(horizon / h))
     between = max(1, min(math.ceil(WINDING * horizon / (there.nutation_period * SAMPLES)), steps // SAMPLES))
@@ -74,14 +74,14 @@ def judged(there: Scene, variant: Integrator, h: float, horizon: float) -> dict[
 
 
 def ladder(there: Scene, variant: Integrator, most: float) -> xr.Dataset:
-    """The axis error after `HORIZON` from few steps a nutation to many, at most so many in all."""
+    """The axis error within `HORIZON` against steps a nutation, with at most `most` steps in a run."""
     counts = PER_NUTATION[PER_NUTATION * HORIZON / there.nutation_period <= most]
     runs = [judged(there, variant, there.nutation_period / count, HORIZON) for count in counts]
     return xr.Dataset({"axis": ("per_nutation", [one["axis"] for one in runs])}, coords={"per_nutation": counts})
 
 
 def frames(there: Scene, variant: Integrator, horizons: tuple[float, float]) -> xr.Dataset:
-    """Errors after a short time and a long one, at so many steps a second and at so many evaluations of the torque."""
+    """Errors after a short and a long time, at `FREQUENCIES` steps a second, and as many evaluations of the torque."""
 
     def at(rates: Sequence[float]) -> list[list[dict[str, float]]]:
         return [[judged(there, variant, 1.0 / rate, horizon) for horizon in horizons] for rate in rates]
@@ -96,7 +96,7 @@ def frames(there: Scene, variant: Integrator, horizons: tuple[float, float]) -> 
 
 
 def followed(there: Scene, variant: Integrator) -> xr.Dataset:
-    """The largest errors on a body without symmetry within `HORIZON`, at so many steps a second; pi of a lost run."""
+    """The largest errors on a body without symmetry within `HORIZON`, at each of `FREQUENCIES`; pi after a failure."""
     rows = {"attitude": [], "axis": [], "energy": []}
     for rate in FREQUENCIES:
         run = simulate(there, variant, step_size=1.0 / rate, horizon=HORIZON, samples=SAMPLES + 1, guard=False)

@@ -1,8 +1,8 @@
 """How well do the integrators of physics engines follow a top?
 
-Their maps run a slow top and a fast one: from few steps a nutation to many, at the steps that people use, over 10 s and
-over 1000 s, and on tops that nobody picked, and two free bodies without symmetry, a racket that flips and NASA's check
-case 2. Some methods of the catalogue run beside them.
+Their maps run a slow top and a fast one, from few steps a nutation to many, and at usual step sizes over 10 s and over
+1000 s; a random population of tops; and two free bodies without symmetry, a racket that flips and NASA's check case 2.
+Some methods of the registry run beside them for comparison.
 """
 
 import functools
@@ -26,11 +26,11 @@ ON_BODIES = ("strang[body]", "rk4[body]", "kahan-li-6[body]")
 SEED = 1
 ORDINARY = {"steps": 1.5e6, "long": 1000.0, "members": 400}
 QUICK = {"steps": 3e4, "long": 20.0, "members": 100}
-FRAME = 1.0 / 240.0  # unit of time, on the population
+FRAME = 1.0 / 240.0  # step size in units of time, on the population
 
 
 def variant_names() -> list[str]:
-    """Every map on the axis, or the attitude if it has no other chart, and what is compared with them."""
+    """Every map on the axis, or the attitude if it has no other chart, and the variants of `COMPARED`."""
     charts = {name: entry.charts() for name, entry in engines().items()}
     return [f"{name}[{'axis' if 'axis' in known else known[0]}]" for name, known in charts.items()] + list(COMPARED)
 

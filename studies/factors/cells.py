@@ -33,7 +33,7 @@ SAMPLES = 501  # of a public call, the default of `simulate`
 
 DORMAND_PRINCE = "Dormand-Prince 5(4)"
 SCIPYS = {DORMAND_PRINCE: "RK45", "DOP853": "DOP853"}  # SciPy's names
-# methods by scheme, the charts they are taken in; a method without charts is taken in all it has
+# by scheme: its methods and the charts in which each is used, () for all that it has
 COMPILED_SCHEMES: dict[str, dict[str, tuple[str, ...]]] = {
     DORMAND_PRINCE: {"rk45-compiled": ()},
     "rk4": {"rk4": ()},
@@ -76,7 +76,7 @@ class Cell:
 
 
 def cells(schemes: Sequence[str] | None = None) -> list[Cell]:
-    """The cells of some schemes, or of all; those of one scheme and chart begin with the cheapest language."""
+    """The cells of some schemes, or of all; within a scheme and chart the fastest language comes first."""
     known, grid = integrators(), list[Cell]()
     for scheme, methods in COMPILED_SCHEMES.items():
         for name in methods:
@@ -115,7 +115,7 @@ def caller(scene: Scene, cell: Cell, call: str, setting: float, horizon: float) 
 
 
 def _solve_ivp(scene: Scene, cell: Cell, tolerance: float, horizon: float) -> Callable[[], object]:
-    """What a user of SciPy writes: parameters and start at hand, one call."""
+    """One call of `solve_ivp` as a user of SciPy writes it; parameters and start are computed beforehand."""
     import numpy as np
     from scipy.integrate import solve_ivp
 

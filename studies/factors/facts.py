@@ -1,4 +1,4 @@
-"""Facts and tables of the study: what one factor does, by ratios of times that differ in nothing else."""
+"""Facts and tables of the study: the effect of one factor, as the ratio of two times that differ in it alone."""
 
 from typing import Any
 
@@ -24,9 +24,9 @@ from .cells import (
 )  # fmt: skip
 from .measures import LEAST, NOISY
 
-NOISY_SHARE = 0.02  # of noisy times, beyond which none is compared
-TIE = 0.1  # times that differ by less are level
-GOAL = ["scene", "horizon", "target"]  # at which times are compared
+NOISY_SHARE = 0.02  # limit on the share of noisy times; with more, no times are compared
+TIE = 0.1  # relative: times that differ by less count as equal
+GOAL = ["scene", "horizon", "target"]  # only times of the same goal are compared
 FACTORS = ["method", "chart", "language", "call"]
 USUAL = (DORMAND_PRINCE, "angles", SCIPY_PYTHON, SOLVE_IVP)
 STEPS = (
@@ -48,7 +48,7 @@ WATERFALL = ["factor", "from", "to", "variant", "call", "time (s)", "times faste
 
 
 def timed(data: xr.Dataset) -> pd.DataFrame:
-    """A line a measured time: its goal, the levels of its four factors, its numbers."""
+    """One row for each measured time: its goal, the levels of its four factors, its numbers."""
     names = ["seconds", "spread", "axis", "force_evaluations"]
     frame = data[names].to_dataframe().dropna(subset=["seconds"]).reset_index()
     known = {cell.name: cell.key for cell in cells()}
@@ -57,21 +57,21 @@ def timed(data: xr.Dataset) -> pd.DataFrame:
 
 
 def noisy(data: xr.Dataset) -> tuple[int, int]:
-    """How many times differ too much from process to process, and how many there are."""
+    """The number of times whose spread between processes is above `NOISY`, and the number of all times."""
     spread = data["spread"].values
     return int(np.sum(spread > NOISY)), int(np.isfinite(spread).sum())
 
 
 def compared(data: xr.Dataset) -> pd.DataFrame:
-    """The times that are compared: all, or none where the machine was too busy."""
+    """The times that are compared: all, or none if too many are noisy because the machine was busy."""
     frame, (loud, every) = timed(data), noisy(data)
     return frame.iloc[:0] if loud > NOISY_SHARE * every else frame
 
 
 def fastest(part: pd.DataFrame, call: str = KERNEL, language: str | None = None, tie: float = TIE) -> pd.Series | None:
-    """The least time of a call, in any language or in one; of those that are level with it, one in the smallest chart.
+    """The row with the least time of a call, in any or one language; of times within `tie` that of the smallest chart.
 
-    So that a tie does not decide which charts the waterfall shows: the axis is all that the targets ask for.
+    So noise does not decide which chart the waterfall shows; the targets need the axis only.
     """
     taken = part[(part["call"] == call) & (part["language"] == (language or part["language"]))]
     level = taken[taken["seconds"] <= (1.0 + tie) * taken["seconds"].min()]
@@ -82,8 +82,8 @@ def fastest(part: pd.DataFrame, call: str = KERNEL, language: str | None = None,
 def waterfall(part: pd.DataFrame, *, call_first: bool = False) -> pd.DataFrame:
     """From SciPy's RK45 in angles, called by `solve_ivp`, to the fastest kernel; each line changes one factor.
 
-    The call is changed to `simulate` first and to the bare kernel last, or to the bare kernel at once. Empty if the way
-    was not timed.
+    The call is changed to `simulate` first and to the bare kernel last, or to the bare kernel at once. Empty if a time
+    on this path is missing.
     """
     known = {tuple(row[FACTORS]): row for _, row in part.iterrows()}
     end = fastest(part)
@@ -121,7 +121,7 @@ def first_goal(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def pairs(frame: pd.DataFrame) -> pd.DataFrame:
-    """What changing one factor does, wherever the other three can be held: the ratio of every pair of times."""
+    """The ratio of every pair of times that differ in one factor alone, for the changes in `STEPS`."""
     answers = []
     for factor, before, after in STEPS if len(frame) else ():
         held = [*GOAL, *(other for other in FACTORS if other != factor)]
@@ -132,7 +132,7 @@ def pairs(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def effects(frame: pd.DataFrame) -> pd.DataFrame:
-    """What one factor does over the whole factorial."""
+    """Count, median, least and largest of these ratios, for each change of a factor."""
     ratios = pairs(frame).groupby(["factor", "before", "after"], sort=False)["ratio"]
     return ratios.agg(["count", "median", "min", "max"]).reset_index()
 
@@ -150,7 +150,7 @@ def charts(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def against_scipy(frame: pd.DataFrame) -> pd.DataFrame:
-    """SciPy's methods, each in its fastest chart, beside the fastest compiled variant: called by a user, and inside."""
+    """SciPy's methods, each in its fastest chart, and the fastest compiled variant: whole calls, and kernels alone."""
     rows = []
     for goal, part in frame.groupby(GOAL, sort=False):
         for scheme in SCIPYS:
@@ -167,7 +167,7 @@ def against_scipy(frame: pd.DataFrame) -> pd.DataFrame:
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
-    """The waterfall, the largest effect of each factor, SciPy, the charts, and what the numbers are worth."""
+    """The waterfall, the largest effect of each factor, SciPy, the charts, and the noise of the times."""
     every, frame, (loud, count) = timed(data), compared(data), noisy(data)
     part, beside, ratios = first_goal(frame), against_scipy(frame), charts(frame)
     answers: dict[str, Any] = {
@@ -190,7 +190,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
 
 
 def _ends(part: pd.DataFrame, bars: pd.DataFrame, bare: pd.DataFrame) -> dict[str, Any]:
-    """Goal, beginning and end of both waterfalls: as called, and of the bare solvers."""
+    """Goal, beginning and end of both waterfalls: of whole calls, and of the bare solvers."""
     if bars.empty or bare.empty:
         return dict.fromkeys(
             (*GOAL, "start", "start_time", "end", "end_time", "called", "bare_start", "bare_end", "bare", "around")
@@ -205,7 +205,7 @@ def _ends(part: pd.DataFrame, bars: pd.DataFrame, bare: pd.DataFrame) -> dict[st
 
 
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
-    """The effects, SciPy, the charts, and every time; what was not timed with the reason."""
+    """The effects, SciPy, the charts, and every time, or the reason why a cell has none."""
     frame = compared(data)
     reasons = data["reason"].to_dataframe().reset_index().query(f"{'reason'} != ''")
     times = {"axis": "error reached (rad)", "seconds": "time (s)", "force_evaluations": "force evaluations"}

@@ -22,16 +22,16 @@ from symtop.model.scenes import Scene
 
 from .cells import CALLS, COMPILED, NUMPY, SCIPY_NUMBA, SCIPY_PYTHON, Cell, caller, cells  # fmt: skip
 
-LEAST = 0.7  # of the target: the search ends with an error from here to the target, if nine runs suffice
+LEAST = 0.7  # of the target: the search ends at an error between this and the target, or after nine runs
 PATIENCE = {COMPILED: 2e6, SCIPY_NUMBA: 4e4, SCIPY_PYTHON: 4e4, NUMPY: 4e4}  # force evaluations of one run
-FINER = 1e-3  # of the target: the tolerance that a second search begins with
-NOISY, TRIES = 0.25, 4  # the distance of the quartiles over the median of a time that is taken again; how often in all
-ENOUGH = 0.03  # seconds of a function's samples in one process; a longer one has one, the median of five is of five
-WARM = 0.01  # of the horizon: a run that loads and compiles what the timed one calls
+FINER = 1e-3  # of the target: the tolerance with which a second search begins
+NOISY, TRIES = 0.25, 4  # a time with (upper - lower quartile)/median above this is measured again, so often in all
+ENOUGH = 0.03  # seconds of samples of a function in one process; a longer function gets one sample
+WARM = 0.01  # of the horizon: length of a run that loads and compiles the code of the timed one
 
 
 class Goal(NamedTuple):
-    """An accuracy over a horizon, and what takes part."""
+    """An accuracy over a horizon, and the languages and calls that are compared there."""
 
     nutations: float
     target: float
@@ -67,7 +67,7 @@ def settle(scene: Scene, grid: Sequence[Cell], goal: Goal) -> dict[Cell, setting
 
 
 class Runs(NamedTuple):
-    """What a fresh process times on a scene: (variant, call, setting, horizon) of each run, in so many rounds."""
+    """The runs that a new process times on a scene, (variant, call, setting, horizon) of each, in `rounds` rounds."""
 
     scene: Scene
     runs: list[tuple[str, str, float, float]]
@@ -92,9 +92,9 @@ def timed(asked: Runs, processes: int) -> Array:
 
 
 def settled_times(asked: Runs, processes: int) -> tuple[Array, Array]:
-    """As `timed`, and how often each was taken.
+    """As `timed`, and how often each time was measured.
 
-    Those that are noisy are taken again, and of all processes the least count, as many as before.
+    Noisy times are measured again by as many processes; of all, the least are kept, as many as before.
     """
     taken, tries = timed(asked, processes), np.ones(len(asked.runs))
     for _ in range(TRIES - 1):

@@ -70,7 +70,7 @@ def solver(chart: str, step: Step) -> Solver:
 
 
 def in_numpy(name: str, charts: tuple[str, ...], step: Step, order: int, summary: str) -> Integrator:
-    """The record of a plain loop; it is not in the registry."""
+    """The `Integrator` of a plain loop; it is not in the registry."""
     solvers = {chart: solver(chart, step) for chart in charts}
     return Integrator(
         name=name, family="other", summary=summary, solvers=solvers, implementation="python", order=order, explicit=True

@@ -21,7 +21,7 @@ from .measures import Goal, factorial
 GOALS = (
     (10.0, 1e-6, LANGUAGES, CALLS),
     (10.0, 1e-9, LANGUAGES, CALLS),
-    (1000.0, 1e-6, (COMPILED,), (KERNEL,)),  # long enough that a call's own time does not count
+    (1000.0, 1e-6, (COMPILED,), (KERNEL,)),  # long enough for the overhead of a call to be negligible
 )
 ROUNDS = 5  # of all cells, in each process
 PROCESSES = (5, 2)  # that are started for the times of a scene, in full and quick
@@ -29,7 +29,7 @@ BATCH = (0.0015, 0.001)  # seconds, in full and quick
 
 
 def cases(quick: bool) -> list[Case]:
-    """One case a scene: what is compared is timed together."""
+    """One case for each scene: times that are compared are measured together."""
     names = grid_scenes(TAGS if quick else ALL_BUT_TWO, lambda one: math.isfinite(one.nutation_period))
     settings = {
         "schemes": list(QUICK) if quick else None,

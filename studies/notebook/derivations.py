@@ -1,6 +1,6 @@
-"""The notebook's two derivations of the equations of motion, its two energies and its cubic, as it has them.
+"""The notebook's two derivations of the equations of motion, its two energies and its cubic, in its own form.
 
-"The hard way" integrates the second-order Euler-Lagrange equations in (phi, theta, psi) as they stand. "The easy way"
+"The hard way" integrates the second-order Euler-Lagrange equations in (phi, theta, psi) unchanged. "The easy way"
 eliminates both momenta: with a = p_psi/I1, b = p_phi/I1 and beta = 2 mgl/I1,
 
     phi' = (b - a cos theta)/sin^2 theta,     psi' = a I1/I3 - phi' cos theta
@@ -99,7 +99,7 @@ def nutation_cubic(scene: Scene) -> Cubic:
 
 
 def with_alpha(scene: Scene, alpha: float, sign: float) -> Scene:
-    """The scene with the rate theta' of that sign that alpha means at its start; SymtopError if there is none."""
+    """The scene with the rate theta', of that sign, that gives it this alpha; SymtopError if there is none."""
     u = math.cos(scene.start.theta)
     square = float(nutation_cubic(scene)._replace(alpha=alpha)(u)) / (1.0 - u * u)
     if square < 0.0:

@@ -1,4 +1,4 @@
-"""Facts and the table of the study of the notebook: what is reproduced, what is kept, and from when on."""
+"""Facts and the table of the study of the notebook: its numbers reproduced, and the errors of energy and momenta."""
 
 import cmath
 import math
@@ -29,7 +29,7 @@ BY_PART = ("end", "energy", "behind", "ahead", "long", "turned")
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
-    """What the notebook printed, how far its own means reproduce it, and what each method keeps."""
+    """The notebook's printed numbers, how far its own solver reproduces them, and the constants each method keeps."""
     top, (polar, equatorial) = notebook_top()
     runs = present(data)
     discrete = data.sel(variant=[name for name in runs if name != SOLVER])
@@ -53,12 +53,12 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
 
 
 def order_two(runs: Iterable[str]) -> list[str]:
-    """Those of the discrete methods that declare order two, each map once: not in three coordinates besides."""
+    """The discrete methods that declare order two, without the unreduced forms, which are the same maps."""
     return [name for name in map(str, runs) if integrator(name).order == 2 and "-unreduced[" not in name]
 
 
 def of_the_solver(data: xr.Dataset, discrete: xr.Dataset) -> dict[str, Any]:
-    """What needs the notebook's solver: derivations, paths, alpha, and its energy against that of others."""
+    """The facts that need the notebook's solver: derivations, paths, alpha, and its energy error against others'."""
     if SOLVER not in data["variant"].values:
         parts = (f"{part}_{name}" for part in PARTS.values() for name in BY_PART)
         return dict.fromkeys((*OF_SOLVER, *parts))
@@ -96,7 +96,7 @@ def present(data: xr.Dataset) -> list[str]:
 
 
 def turned(data: xr.Dataset, scene: str) -> float:
-    """The angle about the vertical, in degrees, by which the notebook's path is best turned from that of the axis."""
+    """The angle about the vertical, in degrees, that best turns the true path of the axis into the notebook's."""
     run = data.sel(scene=scene, variant=SOLVER)
     drawn = axis_from_angles(run["hard_theta"].values, run["hard_phi"].values + 0.5 * math.pi)
     true = axis_from_angles(run["true_theta"].values, run["true_phi"].values)
@@ -116,7 +116,7 @@ def powers(data: xr.Dataset) -> pd.DataFrame:
 
 
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
-    """What every variant keeps, to the notebook's end and far beyond it."""
+    """Errors of the constants of every variant, up to the notebook's end and far beyond it."""
     rows, last = [], float(data["long_time"].max())
     for name in present(data):
         for scene in map(str, data["scene"].values):

@@ -1,4 +1,4 @@
-"""Figures of the study of the notebook: the energy far beyond its end, and why it stays bounded."""
+"""Figures of the study of the notebook: the energy error far beyond its end, and the modified energy."""
 
 import math
 

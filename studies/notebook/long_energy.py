@@ -1,7 +1,7 @@
-"""When a discrete method keeps the energy better than the notebook's solver: both run on, far beyond the notebook.
+"""From when on a discrete method keeps the energy better than the notebook's solver, in runs far beyond the notebook.
 
-A discrete Lagrangian has an energy error of O(h^2) from the first nutation on, and it stays there. The solver begins
-with the error of its tolerance, and that grows about as t. The two cross at some time, which is measured here with the
+A discrete Lagrangian has an energy error of O(h^2) from the first nutation on, which does not grow. The solver begins
+with an error of its tolerance, which grows about as t. The time at which they cross is measured here with the
 notebook's own settings: largest error so far against the time, on a logarithmic grid of times.
 """
 

@@ -1,9 +1,9 @@
-"""What is computed and stored of one integrator on one of the notebook's two scenes.
+"""The measurements on one integrator on one of the notebook's two scenes.
 
-Every integrator has its residuals: how far energy and momenta are from their start. The notebook's own solver has also
-its path, the two derivations side by side, and (second scene) what the printed alpha means; two discrete methods
-have their modified energy (formulas and source: `symtop.run.modified_energy`), from which the energy itself can only
-oscillate by O(h^2).
+For every integrator: residuals, the differences of energy and momenta from their start. For the notebook's own solver
+also its path, a comparison of the two derivations, and (second scene) the rate that belongs to the printed alpha; for
+two discrete methods their modified energy (formulas and source: `symtop.run.modified_energy`), about which the energy
+itself oscillates by O(h^2).
 """
 
 from collections.abc import Sequence
@@ -23,7 +23,7 @@ from symtop.run.simulation import integrate
 from .derivations import easy_way, energies, hard_way, nutation_cubic, six_variables, with_alpha
 
 SOLVER = "lsoda[angles]"  # the default solver of the notebook's system is of this family
-SOLVER_TOLERANCE = 2.6e-7  # chosen: at it LSODA keeps as many figures as the notebook reports; its own is not known
+SOLVER_TOLERANCE = 2.6e-7  # with it LSODA keeps as many figures as the notebook reports, whose tolerance is unknown
 STEPS_A_NUTATION = 118.02  # of every discrete method; no whole number, so that samples and nutation do not lock
 MIDPOINT = "midpoint[angles]"
 MODIFIED = (MIDPOINT, "stormer-verlet[angles]")  # variants whose modified energy is stored
@@ -53,7 +53,7 @@ def residual_history(scene: Scene, name: str, setting: float) -> xr.Dataset:
 
 
 def notebook_path(scene: Scene) -> xr.Dataset:
-    """theta, theta' and phi by the notebook's solver on its six variables, and the truth; dimension ``path``."""
+    """theta, theta' and phi by the notebook's solver on six variables, and by the closed form; dimension ``path``."""
     times = np.linspace(0.0, scene.horizon, PATH_SAMPLES)
     hard = integrated(hard_way(scene), six_variables(scene), times, "LSODA", SOLVER_TOLERANCE)
     truth = closed_form(scene)(times)
@@ -82,7 +82,7 @@ def both_derivations(scene: Scene) -> xr.Dataset:
 
 
 def alpha_table(scene: Scene, alpha: float) -> xr.Dataset:
-    """What a start at rest has for alpha, and the rate of theta that the printed alpha means."""
+    """The alpha of a start at rest, and the rate of theta that belongs to the printed alpha."""
     rate = with_alpha(scene, alpha, 1.0).start.theta_dot
     return xr.Dataset({"alpha_at_rest": nutation_cubic(scene).alpha, "alpha_rate": rate})
 

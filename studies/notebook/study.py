@@ -1,7 +1,8 @@
 """Does symtop reproduce its notebook, and from when on do discrete methods keep the energy better?
 
 The notebook derives the equations of the heavy top from its Lagrangian, integrates them with a library's solver, and
-watches the energy and the two momenta slip. Its figures are drawn again here by its own means, beside the truth.
+plots the errors of the energy and of the two momenta. The same solver and equations are compared here with the closed
+form.
 
 A discrete Lagrangian conserves the momenta at any step (Noether's theorem, derived in `page.md`) and
 generates a symplectic map, which bounds the energy. A Runge-Kutta method in the angles has neither property.
@@ -29,7 +30,7 @@ def cases(quick: bool) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    """Residuals of every method; beside them the solver's derivations, and the modified energy."""
+    """Residuals of every method; of the solver also its derivations, of two methods the modified energy."""
     start, method = scene(case.scene), case.integrator
     period = start.nutation_period
     if method == SOLVER:

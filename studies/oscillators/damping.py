@@ -1,6 +1,6 @@
-"""What is known of the damped oscillator's discrete motion, and the damped top's true motion.
+"""Exponents of the damped oscillator's discrete motion, and the damped top's reference motion.
 
-The truth of the damped top is a pair of integrations by DOP853 at tolerance 1e-13. One has the six Euler-Lagrange
+The reference of the damped top is a pair of integrations by DOP853 at tolerance 1e-13. One has the six Euler-Lagrange
 equations, the other the four of `symtop.methods.lagrangian.damped_top`.
 """
 
@@ -63,7 +63,7 @@ def six_variables(scene: Scene, friction: Friction, times: Array, solver: str, t
 
 
 def damped_truth(scene: Scene, friction: Friction, times: Array) -> tuple[Array, float]:
-    """The same at tolerance 1e-13, and its largest distance (rad) in any angle from the four equations' motion."""
+    """`six_variables` at tolerance 1e-13, and their largest distance (rad) in any angle from the four equations."""
     solver = ("DOP853", 1e-13)
     six = six_variables(scene, friction, times, *solver)
     four = integrated(*four_equations(scene, friction), times, *solver)

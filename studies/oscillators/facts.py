@@ -15,7 +15,7 @@ from .measures import AGAINST_RK45, HORIZON, LONG, OSCILLATORS, RK45, RULES, TOP
 from .quartic_measures import ERROR, MAPS, PERIODS, QUARTICS, STEP, STEPS, oscillator_of, quartic_order
 
 CRITICAL = "damping-2"  # the scene of critical damping
-COLUMNS = {  # what some variants alone have, and its dimension
+COLUMNS = {  # variables that only some variants have: their dimension
     "step_size": "setting", "position_error": "setting", "exponent_error": "setting",
     "energy_error": "sample", "update_gap": "seed_step",
     "top_step_size": "top_setting", "theta_error": "top_setting",
@@ -25,7 +25,7 @@ COLUMNS = {  # what some variants alone have, and its dimension
 
 
 def whole(data: xr.Dataset) -> xr.Dataset:
-    """The dataset with every scene, variant and column that is asked for, NaN where nothing was measured."""
+    """The dataset with every scene, variant and column that the facts use, NaN where nothing was measured."""
     chosen = data.drop_vars("chart").reindex(
         scene=[*OSCILLATORS, *TOPS, *QUARTICS], variant=list(dict.fromkeys([*RULES, ONE_SIDED, RK45, *MAPS]))
     )
@@ -64,7 +64,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
 
 
 def ends(name: str, values: Iterable[float]) -> dict[str, float | None]:
-    """The least and the most of those that were measured."""
+    """The least and the largest finite value, under the names NAME_least and NAME_most; None without one."""
     known = [value for value in values if math.isfinite(value)]
     return {f"{name}_least": min(known, default=None), f"{name}_most": max(known, default=None)}
 

@@ -23,7 +23,7 @@ LOOKS = {name: style.Look(style.ORANGE, "v") if name == "mcmillan" else style.lo
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
-    """Friction first, then the exact map; of what was measured."""
+    """The figure of friction, then that of the exact map, if these were measured."""
     drawn = []
     for draw, every, names in (
         (draw_orders, OSCILLATORS, SYMBOLS), (draw_maps, QUARTICS, MAPS),

@@ -1,7 +1,7 @@
-"""What is computed and stored of the damped oscillator and of the damped top.
+"""The measurements on the damped oscillator and on the damped top.
 
 The oscillator (m = k = 1, released from x = 1 at rest; times in units of sqrt(m/k)) has an analytic solution. The
-damped top has none: its truth is a pair of integrations (see `damping`).
+damped top has none: its reference is a pair of integrations (see `damping`).
 """
 
 from collections.abc import Sequence
@@ -101,7 +101,7 @@ def _rk45_at_cost(oscillator: Oscillator, evaluations: int, times: Array) -> tup
 
 
 def notebook_history(oscillator: Oscillator, h: float, horizon: float) -> xr.Dataset:
-    """The notebook's experiment: analytic, its update, ours from the same two positions, and its guess at the forces.
+    """The notebook's experiment: exact positions, its update, the midpoint rule from the same two, its guess at forces.
 
     Dimension ``seed_step``. The notebook starts on the slow mode, x = Re exp(lambda t), from two exact positions.
     """

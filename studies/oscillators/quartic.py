@@ -1,4 +1,4 @@
-"""The planar quartic oscillator: the step from the seed's harmonic oscillator to the top, with its exact map.
+"""The planar quartic oscillator, with its exact map: between the harmonic oscillator and the top.
 
     x'' = (2 sigma |x|^2 + 3 b) x,      E = |x'|^2/2 - 3 b |x|^2/2 - sigma |x|^4/2,      J = Im(conj(x) x'),   x complex
 
@@ -19,7 +19,8 @@ the exact one has B = delta = 0, A = cos w h and r = w/sin w h, w^2 = -3 b:
 the exact discrete Lagrangian that textbooks give. All differ from it by h^2 in A and B and by h^3 in delta.
 
 wp(t) = sigma |x|^2 + b for every E and J, with g2 = 12 b^2 - 8 sigma E and g3 = 8 b (sigma E - b^2) + 4 sigma^2 J^2.
-The truth is a Taylor series in whole numbers of 2^-96, for lengths and times near 1; it knows no elliptic function.
+The reference is a Taylor series in fixed point with 96 fractional bits, for lengths and times near 1, without elliptic
+functions.
 Sources: McMillan, in Topics in Modern Physics (1971) 219; Suris, The Problem of Integrable Discretization (2003);
 Marsden and West, Acta Numerica 10 (2001) 357, part 1.6 (exact discrete Lagrangian).
 """
@@ -38,9 +39,9 @@ from symtop.model.charts import Array
 from symtop.model.exact.elliptic import differences, half_period, roots
 from symtop.model.scenes import Scene
 
-BITS, ORDER, PER_PERIOD = 96, 20, 48  # of the truth: its terms fall by 10 an order, to 1e-20
-REAL = 1e-7  # imaginary part over size of what counts as a real root
-LOST = 1e3  # a length that no motion here comes near: the steps after it are not made
+BITS, ORDER, PER_PERIOD = 96, 20, 48  # of the reference series: its terms fall by 10 an order, to 1e-20
+REAL = 1e-7  # a root counts as real if its imaginary part over its size is below this
+LOST = 1e3  # a length far above that of any motion here: a path ends where it exceeds this
 
 
 class Quartic(NamedTuple):
@@ -98,7 +99,7 @@ def of_top(scene: Scene) -> tuple[Quartic, Quartic]:
 
 
 def exact(oscillator: Quartic, h: float) -> Map:
-    """The map that is the motion, for 0 < h < T/2."""
+    """The map whose steps are the true motion, for 0 < h < T/2."""
     g2, g3 = oscillator.invariants
     above = differences(roots(g2, g3), h)
     aD, D, delta = one_oscillator(above, g2, g3, oscillator.sigma, oscillator.b, oscillator.momentum)
@@ -106,12 +107,12 @@ def exact(oscillator: Quartic, h: float) -> Map:
 
 
 def mcmillan(oscillator: Quartic, h: float) -> Map:
-    """Its limit for small steps: A and B to order h^2, and no turn."""
+    """McMillan's map, the limit of the exact one for small steps: A and B to order h^2, and no turn."""
     return Map(1.5 * oscillator.b * h * h, -oscillator.sigma * h * h, 1.0 / h, 0.0)
 
 
 def _explicit(rule: Map, kick: Callable[[float], float], oscillator: Quartic, steps: int) -> Array:
-    """x_0 ... of a map of the common form with f - 1 for a kick; the start's p belongs to x' by B."""
+    """x_0 ... of a map of the common form, with f - 1 as the kick; the start's p follows from x' by B."""
     x, v = oscillator.position, oscillator.velocity
     s = abs(x) ** 2
     p = v - rule.B * (x.conjugate() * v).real / (1.0 + rule.B * s) * x

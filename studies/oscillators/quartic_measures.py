@@ -1,6 +1,6 @@
-"""What is computed and stored of the planar quartic oscillator (`quartic`).
+"""The measurements on the planar quartic oscillator (`quartic`).
 
-Scenes are oscillators: a plain harmonic one, two that are no top, and the two of spheroid. Times are in periods T.
+Scenes are oscillators: a harmonic one, two that belong to no top, and the two of spheroid. Times are in periods T.
 """
 
 from collections.abc import Sequence
@@ -33,7 +33,7 @@ STEP, ERROR = "quartic_step", "quartic_error"
 
 
 def oscillator_of(name: str) -> Quartic:
-    """The oscillator of a scene of this part."""
+    """The oscillator of a scene in `QUARTICS`."""
     return PLAIN[name] if name in PLAIN else of_top(scene(TOP))[CHI.index(name)]
 
 
@@ -51,7 +51,7 @@ def quartic_table(name: str, method: str, per_period: Sequence[float], periods: 
 
 
 def _true_paths(oscillator: Quartic, per_period: Sequence[float], periods: float) -> list[Array]:
-    """Positions at the points of every step."""
+    """For each step size, the true positions after each of its steps."""
     times = [oscillator.period / steps * np.arange(int(periods * steps) + 1) for steps in per_period]
     true, order = np.empty(sum(map(len, times)), complex), np.argsort(np.concatenate(times), kind="stable")
     true[order] = true_path(oscillator, np.concatenate(times)[order])

@@ -1,13 +1,13 @@
 """What becomes of a discrete Lagrangian under friction?
 
-The notebook integrated a damped oscillator by the discrete Lagrangian, and stopped at a guess about the forces. What it
-was after is done here: the virtual work of the force F over one step splits into F_d^- at its start and F_d^+ at its
-end, and the forced discrete Euler-Lagrange equations are
+The notebook integrated a damped oscillator by the discrete Lagrangian, and stopped at a guess about the forces. Here
+they follow from the virtual work of the force F over one step, which splits into F_d^- at its start and F_d^+ at its
+end; the forced discrete Euler-Lagrange equations are
 
     D1 L_d(q1, q2) + D2 L_d(q0, q1) + F_d^-(q1, q2) + F_d^+(q0, q1) = 0.
 
 Without friction the harmonic oscillator has an exact discrete Lagrangian in closed form. So have the planar quartic
-oscillator and, by two of these, the top (`quartic`): the line from the seed to `exact-discrete`.
+oscillator (`quartic`) and, by two of these, the top (`exact-discrete`).
 """
 
 import xarray as xr
@@ -37,7 +37,7 @@ def cases(quick: bool) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    """Errors against the analytic solution, or against the damped top's truth; ``chart`` is what was stepped in."""
+    """Errors against the analytic solution or the damped top's reference; ``chart`` names the variables of the run."""
     plan, method = case.settings, case.integrator
     if case.scene in quartic_measures.QUARTICS:
         table = quartic_measures.quartic_table(case.scene, method, plan["steps"], plan["periods"])

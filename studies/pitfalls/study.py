@@ -21,10 +21,10 @@ from symtop.run.simulation import integrate
 from symtop.runner.study import Case, Picture, Study
 
 TERM, FALLING, POLE = "goldstein", "sleeping-unstable", "bruls-cardona-arnold"  # scenes
-WITHOUT, WITH, RIGHT = "no-gyro[axis]", "jolt[axis]", "strang[axis]"  # the gyroscopic term; the last no engine's
+WITHOUT, WITH, RIGHT = "no-gyro[axis]", "jolt[axis]", "strang[axis]"  # engines without and with the term; a splitting
 ANGLES, AXIS = "rk4[angles]", "rk4[axis]"
 LADDER = [32.0 * 2.0**k for k in range(10)]  # steps a nutation
-SAMPLES, CLOSE, WRONG = 301, 0.1, 0.01  # of a run; rad, asked of the engine with the term; rad, of a wrong run
+SAMPLES, CLOSE, WRONG = 301, 0.1, 0.01  # of a run; rad, a target for the engine with the term; rad, of a wrong run
 ENDED = "ended, in the angles"
 LABELS = {WITHOUT: "without the term", WITH: "with the term", RIGHT: "Strang splitting"}
 
@@ -68,7 +68,7 @@ def run_of(data: xr.Dataset, on: str, name: str) -> xr.Dataset | None:
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
-    """How wrong each is: largest errors of the axis (rad) and of the energy (1), and when the run at the pole ended."""
+    """Largest errors of the axis (rad) and of the energy (relative) in each, and when the run at the pole ended."""
     keys = "steps", "without", "without_energy", "needed", "falling", "falling_energy", "ended"
     known: dict[str, Any] = dict.fromkeys(keys) | _warned(data)
     if (without := run_of(data, TERM, WITHOUT)) is not None:
@@ -86,7 +86,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
 
 
 def _warned(data: xr.Dataset) -> dict[str, int]:
-    """How many runs were wrong or ended early, and of how many of these and of the others the guard warned."""
+    """How many runs were wrong or ended early, how many were not, and in how many of each the guard warned."""
     made = np.isfinite(data["steps"])
     bad = ((data["axis"].max("sample") > WRONG) | (data["outcome"] != "ok")) & made
     warned = data["warned"] > 0.0

@@ -30,7 +30,7 @@ from symtop.methods.lagrangian.discrete_lagrangian import Quadrature, rule_of
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 
-TOLERANCE = 1e-10  # rad: Newton's last correction; the one after it would be its square
+TOLERANCE = 1e-10  # rad, of Newton's last correction: the next one would be its square
 Step = Callable[[float, float, float], tuple[float, float]]  # (theta, p_theta, h) -> increments of theta and p_theta
 
 
@@ -91,13 +91,13 @@ def routhian_galerkin_step(scene: Scene) -> Step:
 
 
 def is_galerkin(method: Integrator) -> bool:
-    """Is it `galerkin-simpson`, whatever its name?"""
+    """Is it the kernel of `galerkin-simpson`, under any name?"""
     solver = inside(method.solvers.get("angles"))
     return solver is not None and solver.loop is galerkin.march
 
 
 def reduced_first(scene: Scene, method: Integrator) -> Step | None:
-    """The step that comes of reducing before discretising as this integrator does; None if it is not known."""
+    """The step of this integrator's discretisation applied after reduction; None if it is not known."""
     if is_galerkin(method):
         return routhian_galerkin_step(scene)
     rule = rule_of(method)
@@ -108,7 +108,7 @@ def path(scene: Scene, step: Step, h: float, steps: int) -> Array:
     """theta and p_theta of a scene after 0, 1, ... `steps` steps, shape (steps + 1, 2)."""
     states, low = np.empty((steps + 1, 2)), np.zeros(2)
     states[0] = scene.start.theta, scene.top.I1 * scene.start.theta_dot
-    for k in range(steps):  # the kernels compensate their sums: a plain sum here would be the larger difference
+    for k in range(steps):  # compensated sums as in the kernels: rounding of plain sums would exceed the difference
         addend = np.array(step(*states[k], h)) + low
         states[k + 1] = states[k] + addend
         low = addend - (states[k + 1] - states[k])
@@ -116,7 +116,7 @@ def path(scene: Scene, step: Step, h: float, steps: int) -> Array:
 
 
 def kernel_path(scene: Scene, method: Integrator, h: float, steps: int) -> Array:
-    """The same of a fixed-step integrator in the angles chart."""
+    """`path` of a fixed-step integrator in the angles chart."""
     plan = Plan.steps(h, np.arange(steps + 1))
     return method.solvers["angles"](scene.top, scene.start, plan).states[:, :2]
 

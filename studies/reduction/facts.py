@@ -10,7 +10,7 @@ import xarray as xr
 from .measures import CHART_PERIODS, COMMUTES, COMPARED_STEPS, GAPS, chart_ratios, commutation_order
 
 WORST = "largest difference (rad)"
-AS_FAST = 1.1  # times as long: what the noise of a time hides
+AS_FAST = 1.1  # times with a ratio up to this are equal within their noise
 
 
 def cells(data: xr.Dataset, variable: str) -> list[tuple[str, str, xr.Dataset]]:
@@ -27,7 +27,7 @@ def cells(data: xr.Dataset, variable: str) -> list[tuple[str, str, xr.Dataset]]:
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
-    """Which rules commute with the reduction (rad), how far an unreduced form is from its kernel, what charts cost."""
+    """Which rules commute with the reduction (rad), how far an unreduced form is from its kernel, times of charts."""
     gaps, kernels, charts = tables(data).values()
     compared = cells(data, "theta_gap")
     same, apart = (gaps[(gaps[WORST] < COMMUTES) == wanted] for wanted in (True, False))
@@ -61,7 +61,7 @@ def listed(names: Iterable[str]) -> str | None:
 
 
 def commutation(data: xr.Dataset) -> pd.DataFrame:
-    """The difference of reducing first and last by scene and rule; no power of h where it is rounding."""
+    """The difference between reducing first and last, by scene and rule; no power of h where it is rounding."""
     rows = []
     for scene, rule, cell in cells(data, "commutation_gap"):
         gap, worst = cell["commutation_gap"].dropna("commutation_step").values, float(cell["commutation_gap"].max())

@@ -1,4 +1,4 @@
-"""One motion computed with more variables and with fewer, cost and error side by side.
+"""Cost and error of one motion computed with more variables and with fewer.
 
 In exact arithmetic a reduced kernel and its unreduced form are one map, so that their distance is rounding.
 Times are of the bare solver, from start to horizon with two samples, and interleaved (see `symtop.measure.timing`).
@@ -26,7 +26,7 @@ from symtop.run.simulation import simulate
 from .commutation import gap, reduced_first
 
 BATCH = 0.005  # seconds, of runs in several charts
-TIMED_STEPS = 20_000  # of a timed run: a call costs as much as a hundred of them
+TIMED_STEPS = 20_000  # of a timed run: the overhead of a call is that of a hundred steps
 COMPARED_STEPS = 10_000  # of a reduced kernel and its unreduced form
 COMMUTES = 1e-13  # rad: two paths of a few thousand steps with compensated sums are that close if they are one method
 CHART_PERIODS = 32.0  # nutations: long enough that the call itself does not count
@@ -81,7 +81,7 @@ def chart_ratios(cell: xr.Dataset) -> list[Ratio]:
 
 
 def unreduced_forms() -> dict[str, str]:
-    """The registered reduced integrators that have an unreduced form, which steps the same rule: its name by theirs."""
+    """By name of a registered reduced integrator, the name of its unreduced form, which steps the same rule."""
     forms: dict[object, str] = {}
     for method in integrators().values():
         kernel = inside(method.solvers["angles"]) if "angles" in method.solvers else None

@@ -45,7 +45,7 @@ def cases(quick: bool) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    """The part of the question that a case asks."""
+    """The dataset of a case, by its part: charts, unreduced forms, or commutation."""
     start, method, plan = scene(case.scene), integrator(case.integrator), case.settings
     if plan["part"] == "charts":
         return measures.chart_table(start, method, plan["settings"], plan["horizon"], plan["batches"])

@@ -1,4 +1,4 @@
-"""Facts and the table of the study: what each method takes to reach an error."""
+"""Facts and the table of the study: the time of each method to reach an error."""
 
 import math
 from typing import Any
@@ -15,7 +15,7 @@ from symtop.runner.study import REFERENCE
 SHOWN = "goldstein"  # the scene of the figure
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)  # rad
 SCIPY, SAME = "rk45[axis]", "rk45-compiled[axis]"  # the same formulas, called through SciPy and compiled
-BESIDE = "dop853-compiled[axis]"  # which people know, beside the fastest at 1e-9 rad
+BESIDE = "dop853-compiled[axis]"  # a well-known method, compared with the fastest at 1e-9 rad
 
 
 def shown(data: xr.Dataset) -> xr.Dataset:
@@ -32,7 +32,7 @@ def cost(cell: xr.Dataset, target: float) -> float:
 
 
 def met_by_coarsest(cell: xr.Dataset, target: float) -> bool:
-    """Does the coarsest run that ended meet the target, so that a coarser one, which was not tried, may cost less?"""
+    """Does the coarsest run that ended well meet the target? Then a coarser one, which was not tried, may cost less."""
     error = cell["axis"].values
     return bool((error[np.isfinite(error)][:1] <= target).any())
 
@@ -52,7 +52,7 @@ def on_f_alone(name: str) -> bool:
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
-    """The fastest methods on f(t, y) alone at each error (s), and over them DOP853 and SciPy's RK45."""
+    """The fastest methods on f(t, y) alone at each error (s); DOP853 relative to them; SciPy's RK45 to the compiled."""
     part = shown(data)
     answers: dict[str, Any] = {
         "scene": str(part["scene"].values), "nutations": float(part["nutations"]),
@@ -79,7 +79,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
 
 
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
-    """Microseconds of a run to each error in the figure, the fastest at 1e-6 rad first; which are upper bounds."""
+    """Microseconds of a run to each error in the figure, the fastest at 1e-6 rad first, and which are upper bounds."""
     part = shown(data)
     by_target = {target: costs(data, target) for target in TARGETS}
     names = dict.fromkeys(name for target in (1e-6, *TARGETS) for name in by_target[target])

@@ -1,4 +1,4 @@
-"""Figure 1, error against run time, and the chart of all runs to point at."""
+"""Figure 1, error against run time, and the interactive chart of all runs."""
 
 import math
 from itertools import product
@@ -13,9 +13,9 @@ from symtop.runner.study import REFERENCE, Chart, Picture, Series
 
 from .facts import shown
 
-SCIPY = (0, (1.2, 1.4))  # the line of what is called through SciPy
-ADAPTED = ("RK45", "DOP853, adaptive")  # which are drawn as on the page of costs, where both have one colour
-NAMES = {  # beside the lines; others have the names of their methods
+SCIPY = (0, (1.2, 1.4))  # line style of methods called through SciPy
+ADAPTED = ("RK45", "DOP853, adaptive")  # labels of methods drawn with the same line style as on the page of costs
+NAMES = {  # labels of lines; other lines are labelled with the name of the method
     "stormer-verlet[angles]": "Störmer-Verlet", "midpoint[angles]": "midpoint (discrete Lagrangian)",
     "trapezoidal[angles]": "trapezoidal (discrete Lagrangian)",
     "galerkin-gauss-8[angles]": "Galerkin-Gauss 8 (discrete Lagrangian)",
@@ -74,7 +74,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 
 
 def timed(data: xr.Dataset) -> xr.Dataset:
-    """The same with its times in microseconds."""
+    """The dataset with its times in microseconds."""
     return data.assign(seconds=1e6 * data["seconds"])
 
 
@@ -94,7 +94,7 @@ def charts(data: xr.Dataset) -> list[Chart]:
 
 
 def _points(cell: xr.Dataset) -> list[tuple[float | str | None, ...]]:
-    """Costs and errors of each run with three digits, None where there is none, and its setting in words."""
+    """Costs and errors of each run to three digits, None where one is missing, and the setting as text."""
     columns = [cell[key].values for key in (*COSTS.values(), *ERRORS.values())]
     made = []
     for k in np.flatnonzero(np.isfinite(cell["seconds"].values)):

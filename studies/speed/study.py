@@ -1,9 +1,9 @@
-"""How fast are the methods that people know at the accuracy I need?
+"""How fast are well-known methods at the accuracy I need?
 
 A few methods on a few scenes, each at settings from coarse to fine: the largest errors of a run, its force evaluations,
-and the seconds that it takes. A method runs in the angles or the axis chart, and again in the attitude chart for the
-error of the attitude, which the axis chart does not show. All runs on a scene are timed against each other, since a
-slow minute of the machine would else be a slow method. The closed form, which needs no integrator, is among them.
+and its time in seconds. A method runs in the angles or the axis chart, and again in the attitude chart for the error of
+the attitude, which the axis chart does not show. All runs on a scene are timed in interleaved order, so that a change
+of the machine's speed affects all methods alike. The closed form, which needs no integrator, is among them.
 """
 
 from typing import Any
@@ -38,7 +38,7 @@ SETTINGS, MOST_STEPS = 12, 3e5
 
 
 def cases(quick: bool) -> list[Case]:
-    """Every method that is there, in its charts, and the closed form, on every scene."""
+    """Every method of `METHODS` in the registry, in its charts, and the closed form, on every scene."""
     names = [f"{name}[{chart}]" for name, charts in METHODS.items() if name in integrators() for chart in charts]
     names.insert(0, REFERENCE)
     asked = {"lengths": LENGTHS[:1] if quick else LENGTHS, "settings": 7 if quick else SETTINGS}
@@ -46,7 +46,7 @@ def cases(quick: bool) -> list[Case]:
 
 
 def follow_up(data: xr.Dataset) -> list[Case]:
-    """The times of all runs on a scene against each other, a case a scene, but `without` those that have no error."""
+    """One case for each scene, which times all its runs together, `without` those that have no error."""
     names, lengths = data["variant"].values.tolist(), data["nutations"].values.tolist()
     asked = {"lengths": lengths, "settings": data.sizes["setting"], "integrators": names}
     ended = (data["axis"].notnull() | data["attitude"].notnull()).transpose("scene", "variant", "nutations", "setting")

@@ -1,8 +1,8 @@
-"""What the maps of outcomes say in numbers: how far a method is accurate, and from where on it commonly fails.
+"""Numbers computed from the maps of outcomes: up to which setting a method is accurate, from which it commonly fails.
 
 The *reach* of a row is the largest setting (step or tolerance) up to which every run of the row is accurate. "Slow" and
-"fast" tops are the rows below and above the spin that lets the top sleep upright, r < 1 and r > 3; quoted is the reach
-that nine rows in ten have. A run *fails* if it loses energy, crosses a turning point or ends early; a method fails from
+"fast" tops are the rows below and above the spin that lets the top sleep upright, r < 1 and r > 3; quoted is the lower
+10 % quantile of the reach. A run *fails* if it loses energy, crosses a turning point or ends early; a method fails from
 the smallest setting on at which, and at every larger one, at least half of the rows fail.
 """
 
@@ -19,17 +19,17 @@ from .measures import MECHANISMS
 from .outcome_maps import NOT_RUN, SETTLED
 
 SLOW, FAST = 1.0, 3.0  # relative spin
-LOWER_SHARE = 0.1  # of the rows may reach less far than what is quoted
-COMMON = 0.5  # of the rows must fail, at every larger setting too, before a threshold is quoted
-LASTING = 3  # settings at least, beyond a threshold: at the last one "every larger" would say nothing
+LOWER_SHARE = 0.1  # the quantile of the reach that is quoted
+COMMON = 0.5  # share of the rows that must fail, at every larger setting too, for a threshold to be quoted
+LASTING = 3  # least number of settings from a threshold on: with one, "every larger setting" would mean nothing
 NEAR, FAR = 1e-4, 0.1  # gaps delta: next to a pole, and well away from it
 
 
 class Failure(NamedTuple):
     """From which setting on a method commonly fails, and how."""
 
-    setting: float  # NaN if no `LASTING` settings follow at each of which at least `COMMON` of the rows fail
-    kind: str  # what most of the failed runs do from there on (anywhere); empty without a failed run
+    setting: float  # NaN if there are no `LASTING` settings at each of which at least `COMMON` of the rows fail
+    kind: str  # the most frequent verdict on failed runs from there on (with NaN: on all); empty without any
 
 
 class OutcomeMap(NamedTuple):
@@ -39,7 +39,7 @@ class OutcomeMap(NamedTuple):
     parameter: np.ndarray
     settings: np.ndarray  # steps in nutation periods, or tolerances
     control: str  # step_size, tolerance or none
-    made: np.ndarray  # (parameters, settings): was it run, or had the scene settled (`outcome_maps`)?
+    made: np.ndarray  # (parameters, settings): true if it was run, false if the scene had settled (`outcome_maps`)
 
     @property
     def reach(self) -> np.ndarray:

@@ -27,7 +27,7 @@ NAMES = (  # of all facts that are measured
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
-    """How far methods are accurate and how they fail; what each mechanism does. Steps of maps are in nutations."""
+    """Up to which setting methods are accurate, how they fail, and the mechanisms. Steps of maps are in nutations."""
     answers: dict[str, Any] = dict.fromkeys(NAMES)
     answers |= {"periods": PERIODS, "slow": SLOW, "fast": FAST, "near": NEAR, "barely": BARELY, "lost": LOST,
               "common": COMMON, "tried": MOST}  # fmt: skip
@@ -80,7 +80,7 @@ def slow_is_finer(one: OutcomeMap) -> bool:
 
 
 def pole_facts(part: xr.Dataset) -> dict[str, Any]:
-    """Of how many variants of fixed step a pole halves the accurate step, in angles and in other charts."""
+    """For how many fixed-step variants a pole halves the accurate step, in angles and in other charts."""
     halved: dict[bool, list[bool]] = {True: [], False: []}
     for name, method in methods_of(part).items():
         halves = halved_by_pole(map_of(part.sel(variant=name)))
@@ -115,7 +115,7 @@ def sleeping_facts(part: xr.Dataset) -> dict[str, Any]:
 
 
 def separatrix_facts(part: xr.Dataset) -> dict[str, Any]:
-    """By how much the law of the early error misses (1/λ), and whose runs outlast it."""
+    """The error of the prediction from the early error (1/λ), and the variants with runs that last longer."""
     names = ", ".join(f"`{name}`" for name in outlasting(part))
     early = lawful(part) & (part["broken"] > 0.0)
     return {"law_middle": float(pd.Series(misses(part)).median()), "law_runs": misses(part).size,
@@ -123,7 +123,7 @@ def separatrix_facts(part: xr.Dataset) -> dict[str, Any]:
 
 
 def sampling_facts(part: xr.Dataset) -> dict[str, Any]:
-    """What an energy error sampled once a nutation hides, and the share of the solver in that of the midpoint rule."""
+    """Energy errors sampled once a nutation against true ones, and the solver's part in that of the midpoint rule."""
     hidden, ratios = sampled(part)
     answers: dict[str, Any] = {"sampled": len(hidden) + len(ratios), "hidden": len(hidden),
                                "small": sum(ratio > 10.0 for ratio in ratios.values())}  # fmt: skip
@@ -180,7 +180,7 @@ LIMITS = {  # header: scene, variable
 
 
 def limits_table(data: xr.Dataset) -> pd.DataFrame:
-    """Limits of every variant of fixed step, the least linear limit first; of several steps the longest."""
+    """Limits of every fixed-step variant, the least linear limit first; of several step sizes those of the longest."""
     there = {key: one for key, one in LIMITS.items() if one[0] in data["scene"].values and one[1] in data}
     columns = {
         key: data[name].sel(scene=scene).transpose("variant", ...).values for key, (scene, name) in there.items()

@@ -1,8 +1,8 @@
 """Measurements of single mechanisms of failure: resonance, the separatrix, and sampling.
 
-`surviving_displacements` displaces a steady precession and finds how far that may be without its running away within
-some thousands of steps. A linear analysis calls every step below the limit stable; at a third of a turn a step
-(`linear_stability`) some small displacement is lost all the same.
+`surviving_displacements` finds the largest displacement of a steady precession that does not run away within some
+thousands of steps. By a linear analysis every step below the limit is stable; at a third of a turn a step
+(`linear_stability`) some small displacements run away all the same.
 
 `separatrix_horizon` follows the top that rises towards the upright and never reaches it. Near the upright
 z = sin(theta) exp(i phi) obeys I1 z'' - i p_psi z' = mgl z, so that a deviation grows as exp(lambda t) with
@@ -31,12 +31,12 @@ from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, flat
 from symtop.run.linear_stability import trace, with_momenta
 
-RUNS_AWAY = 4.0  # times the displacement; an island that a resonance has bent is at most three times as long as wide
+RUNS_AWAY = 4.0  # times the displacement; an island deformed by a resonance is at most three times as long as wide
 LOST = 0.1  # rad, axis error at which a run next to the separatrix has lost its accuracy
-LONGEST = 40.0  # 1/lambda, of a run next to the separatrix
-LEAST, MOST, TRIED = 1e-4, 0.3, 8  # rad, the displacements tried; how many are
-HALVINGS = 5  # how often the gap above the last that survives is halved: it ends at 4 %
-SEEN = 3.0  # 1/lambda, the time at which its early error is read
+LONGEST = 40.0  # length of a run next to the separatrix, in units of 1/lambda
+LEAST, MOST, TRIED = 1e-4, 0.3, 8  # the least and the largest displacement tried, rad, and how many are tried
+HALVINGS = 5  # bisections between the last displacement that survives and the first that does not: to 4 %
+SEEN = 3.0  # the time, in units of 1/lambda, at which the early error of such a run is measured
 
 
 def _run(method: Integrator, scene: Scene, start: Angles, plan: Plan) -> tuple[str, View]:
@@ -48,7 +48,7 @@ def _run(method: Integrator, scene: Scene, start: Angles, plan: Plan) -> tuple[s
 def survives(
     method: Integrator, scene: Scene, centres: ArrayLike, displacements: ArrayLike, h: ArrayLike, steps: int
 ) -> NDArray[np.bool_]:
-    """Do steady precessions at theta = `centres` stay near themselves that are displaced by so many radians?
+    """Do steady precessions at theta = `centres`, displaced by `displacements` (rad), stay near their centres?
 
     Arrays over runs, which are made in one call where the method has one, in lanes if it can.
     """

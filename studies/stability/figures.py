@@ -1,4 +1,4 @@
-"""Figures of the stability study: the maps of known variants, and four ways to fail beside what theory says."""
+"""Figures of the stability study: the maps of known variants, and four mechanisms of failure with their theory."""
 
 from collections.abc import Iterator, Mapping
 from typing import Any
@@ -26,7 +26,7 @@ KNOWN = (  # the variants whose maps are drawn, if they are there
     "yoshida-4[axis]", "gauss-8[axis]", "rk45-compiled[axis]", "dop853[axis]", "lsoda[axis]", "taylor[axis]",
 )  # fmt: skip
 MOST, COLUMNS = len(KNOWN), 4  # maps in a figure, and beside each other
-OUTCOMES = {  # as the key names them; what ends early for any reason is one of them
+OUTCOMES = {  # colours, by the labels of the legend; all reasons for an early end have one
     **dict(zip((SAID[name] for name in JUDGED), (style.GREEN, style.YELLOW, style.ORANGE, style.PURPLE), strict=True)),
     EARLY: style.BLACK, SAID["wrong"]: style.SKY, "accurate, not run": "#9FDAC8",
 }  # fmt: skip
@@ -35,7 +35,7 @@ LINES = {"linear_limit": ("small nutations grow beyond", "-"),
 SETTINGS = {"step_size": "step (nutations)", "tolerance": "tolerance"}
 NAMED = ("stormer-verlet[angles]", "midpoint[angles]", "strang[axis]", "cayley[axis]", "gauss-4[axis]", "rk4[axis]")
 THEORY = {"color": style.BLACK, "lw": 0.9, "ls": (0, (1, 1.5)), "zorder": 4, "label": "theory"}
-SLEEPS, WIDTHS = 2.0, 1.75  # spin from which the motion sleeps; times the largest shift of theory that are drawn
+SLEEPS, WIDTHS = 2.0, 1.75  # spin from which the motion sleeps; half the drawn range, over the largest shift of theory
 OTHERS = {"color": style.GREY, "alpha": 0.5, "zorder": 1, "label": "all others, lines or dots"}
 
 
@@ -62,7 +62,7 @@ def _chosen(shown: Mapping[str, OutcomeMap]) -> dict[str, OutcomeMap]:
 
 
 def _atlas(part: xr.Dataset, shown: Mapping[str, OutcomeMap]) -> Any:
-    """A map a variant: spin upwards, step or tolerance to the right; each control begins a row."""
+    """One panel for each variant: spin upwards, step or tolerance to the right; each control begins a row."""
     places: dict[int, str] = {}
     for control in SETTINGS:
         first = -(-(max(places, default=-1) + 1) // COLUMNS) * COLUMNS
@@ -105,14 +105,14 @@ def _atlas(part: xr.Dataset, shown: Mapping[str, OutcomeMap]) -> Any:
 
 
 def _ends(values: Any) -> tuple[float, float]:
-    """Both ends of an axis of cells at logarithmically even values, as decimal logarithms."""
+    """Lower and upper edge of cells centred at logarithmically even values, as decimal logarithms."""
     low, high = np.log10(values[[0, -1]])
     half = 0.5 * (high - low) / (values.size - 1) if values.size > 1 else 0.5
     return float(low - half), float(high + half)
 
 
 def _lines(axis: Any, part: xr.Dataset, x: str, y: str, dots: bool = False) -> None:
-    """A line, or dots, a variant; of many those that are not known in grey and without a name."""
+    """A line, or dots, for each variant; if there are many, those not in `NAMED` are grey and without a label."""
     variants = list(map(str, part["variant"].values))
     named = chosen(variants, NAMED, len(NAMED))
     for name in variants:

@@ -17,16 +17,16 @@ from symtop.model.top import Angles, SymmetricTop
 from symtop.run.linear_stability import NO_TRACE, Trace, few_steps, nutation_growth, trace
 
 TILT = 1e-5  # rad, of the sleeping top
-STEADILY = 1e-7  # t - 2 beyond rounding
-GROWING = 1e-4  # growth of a nutation per step that counts, for a method that is not symmetric
-FAR = 0.01  # rad, of a precession that has drifted away in some steps
+STEADILY = 1e-7  # t - 2 above this is more than rounding
+GROWING = 1e-4  # least growth of a nutation per step that counts, for a method that is not symmetric
+FAR = 0.01  # rad, drift of a precession beyond which its growth cannot be measured
 
 
 def sleep_margin(method: Integrator, spin: float, h: float) -> float:
     """Above zero while the method's upright top sleeps at this spin w3 and step, below when it falls; 1 at most.
 
-    x (1 - x) 4 with x = t^2/4d: the two ways to end it, x = 1 (a pair of frequencies meets) and x = 0 (the step turns
-    the top by half a turn), are both simple sign changes.
+    4 x (1 - x) with x = t^2/4d: both ends of the stability, x = 1 (a pair of frequencies meets) and x = 0 (a step turns
+    the top by half a turn), are simple sign changes of it.
     """
     body = SymmetricTop(1.0, 1.0, 1.0)
     chart = method.chart_for("axis")
@@ -50,7 +50,7 @@ def sleep_margin(method: Integrator, spin: float, h: float) -> float:
 
 
 def sign_changes(function: Callable[[float], float], grid: np.ndarray) -> list[float]:
-    """Where a function changes its sign between neighbours of a grid, by bisection; jumps through NaN do not count."""
+    """Where a function changes sign between neighbours of a grid, by bisection; intervals with a NaN do not count."""
     values = [function(float(x)) for x in grid]
     roots = []
     for left, right, low, high in zip(grid[:-1], grid[1:], values[:-1], values[1:], strict=True):
@@ -128,10 +128,10 @@ def _limit_of_growth(method: Integrator, scene: Scene, grid: np.ndarray) -> floa
 
 
 def _growing(method: Integrator, scene: Scene, h: float, frequency: float) -> float:
-    """By how much the growth of small nutations in a step exceeds what counts; NaN where that cannot be followed.
+    """By how much the growth of small nutations in a step exceeds its threshold; NaN where it cannot be measured.
 
-    What counts is `GROWING`, and the way that the precession itself goes meanwhile: some methods drift to another
-    inclination, where nutations have another size, and `FAR` away none is left next to which growth could be told.
+    The threshold is the larger of `GROWING` and the drift of the precession itself: some methods drift to another
+    inclination, where nutations have another size, and after a drift of `FAR` growth cannot be told from it.
     """
     factor, size, _ = nutation_growth(method, scene, h, method.chart_for("axis"), frequency)
     return factor - 1.0 - max(GROWING, size) if size < FAR else math.nan

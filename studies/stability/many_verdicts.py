@@ -1,9 +1,9 @@
 """Verdicts on many runs in one compiled pass, as `symtop.measure.verdicts.judgement` has them one by one.
 
-The order of the rules saves work: the axis error is looked at from the last sample backwards and no further than the
-first one that is too large, the energy of those runs only whose axis stayed where the true motion goes. An inclination
-is compared with a bound b without an arc tangent, theta > b where sin(theta) cos(b) > sin(b) cos(theta), 0 <= theta, b
-<= pi, and so are two angles between axes.
+The order of the rules saves work: the axis error is computed from the last sample backwards, up to the first one that
+is too large, and the energy only for runs whose axis stays in the range of the true motion. An inclination is compared
+with a bound b without an arc tangent, theta > b where sin(theta) cos(b) > sin(b) cos(theta), 0 <= theta, b <= pi, and
+so are two angles between axes.
 """
 
 import functools
@@ -33,19 +33,19 @@ SAID["wrong"] = f"wrong motion, energy error below {100.0 * DRIFT:g} %"
 
 
 class Judged(NamedTuple):
-    """What became of runs, (scenes, settings) or one row of them."""
+    """Verdicts on runs, (scenes, settings) or one row of them."""
 
     verdict: NDArray[np.uint8]  # index into VERDICTS
     axis_error: Array  # rad, largest over the run; NaN if it ended early
 
     @classmethod
     def empty(cls, scenes: int, settings: int) -> "Judged":
-        """Room for so many."""
+        """Arrays for the runs of n scenes at m settings, to be filled in."""
         return cls(np.zeros((scenes, settings), np.uint8), np.full((scenes, settings), math.nan))
 
 
 class Truths(NamedTuple):
-    """What the runs of m scenes are judged by."""
+    """The numbers of m scenes by which runs are judged."""
 
     constants: Array  # (m, constants of a closed form)
     # (m, 12): I1, I3, mgl, nutation period, `barriers`, energy scale, p_phi -+ p_psi where it has a sign, rounding
@@ -57,12 +57,12 @@ class Truths(NamedTuple):
         return self.scenes[:, 3]
 
     def part(self, scenes: NDArray[np.int64]) -> "Truths":
-        """The same for some of the scenes."""
+        """The truths of the scenes with these indices."""
         return Truths(self.constants[scenes], self.scenes[scenes])
 
 
 def truths(scenes: Sequence[Scene]) -> Truths:
-    """Closed forms and bounds of scenes, whose numbers are kept for the last 1024 of them."""
+    """Closed forms and bounds of scenes; the bounds of the last 1024 scenes are cached."""
     forms = ClosedForms([flat(scene.top, scene.start) for scene in scenes])
     return Truths(forms.constants, np.array([_numbers(scene) for scene in scenes]))
 
@@ -83,9 +83,9 @@ def judge_runs(
 
     `phases` (n, samples) are the times of the samples in nutation periods, NaN beyond the last of a run; `states`
     (m, n, samples, dimension) those of a chart, known by its dimension, `momenta` (m, n, samples, 2) p_phi and p_psi as
-    the run showed them, and `outcome` (m, n) indices into `OUTCOMES`. A run that shows a state that is not finite, or a
-    quaternion that is not of length one, and says nothing of it has ended there. The error of an inaccurate run is the
-    first, counted from its end, that is too large; that of the settings `followed` (n,) is the largest.
+    the run returned them, and `outcome` (m, n) indices into `OUTCOMES`. A run with outcome "ok" and a state that is not
+    finite, or a quaternion that is not of length one, counts as ended there. The error of an inaccurate run is the
+    first, counted from its end, that is too large; at the settings `followed` (n,) it is the largest.
     """
     judged = Judged.empty(*outcome.shape)
     counts = np.isfinite(phases).sum(axis=1)

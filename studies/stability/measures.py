@@ -1,4 +1,4 @@
-"""What a case of the study measures: one dataset for each mechanism of failure and each integrator.
+"""The measurements of a case: one dataset for each mechanism of failure and each integrator.
 
 Outcomes are stored as bytes, an index into `VERDICTS`; 254 means that a scene had settled (`outcome_maps`) and was not
 run, 255 that there is no such cell. Steps are in nutation periods of the scene they belong to; phases are h omega, the
@@ -24,9 +24,9 @@ from .outcome_maps import SETTLED, family, outcome_map
 from .solver_tolerance import solver_sweep, textbook_midpoint
 
 PERIODS = 10.0  # nutations of a run of a map over spin, as in the other studies' short runs
-SOUGHT_PHASE, SOUGHT_STEPS = 10.0, 300  # h omega up to which a linear limit is looked for, at so many steps
-CURVE_STEPS = 48  # steps at which it is looked for at every spin of a map
-PAST_RESONANCE = 1.05  # times the resonant step: far enough for what a resonance kills to live again
+SOUGHT_PHASE, SOUGHT_STEPS = 10.0, 300  # a linear limit is searched up to this h omega, at so many steps
+CURVE_STEPS = 48  # steps at which it is searched at every spin of a map
+PAST_RESONANCE = 1.05  # times the resonant step: beyond the resonance, where displacements survive again
 
 
 def map_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
@@ -71,10 +71,10 @@ def family_limits(name: str, method: Integrator, parameter: float, longest: floa
 
 
 def resonance_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
-    """What survives of a displaced steady precession against h omega, and where the linearised map has its limits.
+    """Which displacements of a steady precession survive, against h omega, and the limits of the linearised map.
 
-    The limits are looked for at 300 steps up to h omega = 10, one that is NaN is not there; then narrow windows between
-    these steps, as `windows` says.
+    The limits are searched at 300 steps up to h omega = 10, NaN if there is none; then narrow windows of growth between
+    these steps (`Window`).
     """
     scene = scenes.scene(name)
     omega = scene.top.nutation_frequency(scene.top.momenta(scene.start))
@@ -106,7 +106,7 @@ def sleeping_table(name: str, method: Integrator, settings: Mapping[str, Any]) -
 
 
 def separatrix_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
-    """How long runs next to the separatrix stay right, and how long their early error says that they will."""
+    """How long runs next to the separatrix stay accurate, and the prediction of that from their early error."""
     rows = [separatrix_horizon(method, scenes.scene(name), float(value)) for value in settings["ladder"]]
     names = "early_error", "horizon", "predicted_horizon", "broken"  # in the order of a Horizon
     return xr.Dataset(
@@ -115,7 +115,7 @@ def separatrix_table(name: str, method: Integrator, settings: Mapping[str, Any])
 
 
 def sampling_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
-    """An energy error as it looks once a nutation and at every step; for discrete Lagrangians, the solver's share."""
+    """An energy error sampled once a nutation and at every step; for discrete Lagrangians, the solver's part in it."""
     scene, rule = scenes.scene(name), rule_of(method)
     once, every = sampled_energy_error(method, scene, settings["steps"], settings["periods"])
     table: dict[str, Any] = {
@@ -148,7 +148,7 @@ MECHANISMS = {  # by the scene on which each is measured; every other scene has 
 }
 
 
-NEARLY = 1.9  # |t| of a maximum on the grid that may hide a window
+NEARLY = 1.9  # a maximum of |t| on the grid above this may hide a window
 TRIED = 200  # steps between the neighbours of a maximum
 
 

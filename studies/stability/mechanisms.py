@@ -1,4 +1,4 @@
-"""What the measurements of single mechanisms say, each read from its scene of the dataset."""
+"""Results of the measurements of single mechanisms, each computed from its scene of the dataset."""
 
 import math
 
@@ -11,13 +11,13 @@ from symtop.model.scenes import scene as scene_of
 from .atlas import methods_of
 from .failures import growth_rate
 
-BARELY = 0.02  # rad: a top that is lost at a smaller displacement is lost to a resonance
-NEXT = 1.05  # times the largest displacement up to which all stay, at most: the first that was lost
-REVIVAL = 3.0  # times more survives past a resonance than in it; what stays dead beyond is no resonance
-LEAST_SAMPLED = 1e-14  # an energy error that is rounding
-LEAST_ASKED = 1e-12  # an energy error at every step from which on one asks what samples show of it
-OUTLASTS = 5.0  # 1/λ: two digits more than the early error has
-EARLY = 1e-15, 1e-2  # rad, axis errors that predict the time next to a separatrix: above rounding, still small
+BARELY = 0.02  # rad: a resonance is a step at which some displacement below this runs away
+NEXT = 1.05  # upper bound of the ratio of the first displacement that runs away to the last that survives
+REVIVAL = 3.0  # past a resonance displacements over this many times larger survive; otherwise it is no resonance
+LEAST_SAMPLED = 1e-14  # energy errors up to this are rounding
+LEAST_ASKED = 1e-12  # only energy errors at every step above this are compared with sampled ones
+OUTLASTS = 5.0  # in units of 1/λ, the time in which an error grows by two digits
+EARLY = 1e-15, 1e-2  # rad, range of early axis errors that predict the time next to a separatrix: no rounding, small
 
 
 def measured(data: xr.Dataset, scene: str, variable: str) -> bool:
@@ -45,7 +45,7 @@ def limits(part: xr.Dataset) -> dict[str, float]:
 
 
 def resonant(part: xr.Dataset) -> dict[str, float]:
-    """By variant the linearly stable steps (h omega) where some small displacement is lost, and none just past."""
+    """By variant the resonant step (h omega): linearly stable, but small displacements run away, and none just past."""
     phases = {}
     for name, cell in variants_with(part, "third_turn_phase").items():
         at, past = float(cell["surviving_at_third_turn"]), float(cell["surviving_past_third_turn"])
@@ -83,7 +83,7 @@ def misses(part: xr.Dataset) -> NDArray[np.float64]:
 
 
 def sampled(part: xr.Dataset) -> tuple[list[str], dict[str, float]]:
-    """Variants whose energy error is at rounding if sampled once a nutation; how much too small those of others look.
+    """Variants whose energy error is at rounding if sampled once a nutation; for others, true over sampled error.
 
     No ratio is formed with a number at rounding.
     """

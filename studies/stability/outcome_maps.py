@@ -1,4 +1,4 @@
-"""Outcome maps: what became of some 10^4 runs of one integrator, over two parameters.
+"""Outcome maps: the outcomes of some 10^4 runs of one integrator, over two parameters.
 
 The columns of a map are settings of the integrator's control: steps in nutation periods, or tolerances. Its rows are
 scenes of a family. A *spin* family is one scene with its spin changed, in units of the spin that lets it sleep upright,
@@ -9,16 +9,15 @@ so that it is a pendulum at r = 0.1 and a fast gyroscope at r = 30. The *grazing
 of 1.1 delta. Every run is compared with the closed form.
 
 Compiled methods run whole columns of a map in one call, in lanes where the method has them: the runs of a column have
-equally many steps, so that no lane waits for another. Other methods run one after another. The constants of a row's
+equally many steps, so that all lanes end together. Runs of other methods follow each other. The constants of a row's
 closed form are computed once, and all runs are judged in compiled passes (`many_verdicts`). Samples are
 taken at the same fractions of a nutation for every spin, and these are not commensurate with the nutation.
 
-Half of the steps of a map stand in its shortest octave, where most methods have long been accurate. So a map is run
-from long steps to short ones, and a scene that was accurate at every step over a factor of 2 (at every tolerance over a
-factor of 10, at four settings at least) has *settled*: it is not run at shorter ones, but at five settings, evenly over
-the map, that check it. If it is not accurate at one of them, it is run at every setting. All 134 maps of the study were
-once run as a whole: the 5.2 million cells that are left out were accurate, every one. After a factor of 1.5, 4 of 4.8
-million were not.
+Half of the steps of the runs in a map belong to its shortest octave of step sizes, where most methods are accurate. So
+a map is run from long steps to short ones, and a scene that was accurate at every step over a factor of 2 (at every
+tolerance over a factor of 10, at four settings at least) has *settled*: of shorter ones it is run only at five, evenly
+over the map, as a check. If it is not accurate at one of them, it is run at every setting. In full runs of all 134
+maps, all 5.2 million cells that this leaves out were accurate. With a factor of 1.5, 4 of 4.8 million were not.
 """
 
 import functools
@@ -43,11 +42,11 @@ from .many_verdicts import Judged, judge_runs, truths
 
 NOT_RUN, SETTLED = 255, 254  # stored where a map has no run, and where a run was not made as it would be accurate
 SAMPLES = 49  # of a run
-MOST = 100_000  # samples of the runs that are made in one call: 6 MB, which stay nearer to the processor than 26
-SPAN = 1.1  # between the settings of one call: a scene that settles among them is run at all of them
-SETTLED_STEPS, SETTLED_TOLERANCES = 2.0, 10.0  # accurate over this factor, a scene is accurate at smaller settings
-SETTLED_AFTER = 4  # settings at least
-BUDGET = 2e6  # force evaluations: a run at a tolerance of 1e-10 takes 1e5, one whose steps shrink until they vanish 1e8
+MOST = 100_000  # limit on the samples of the runs in one call: 6 MB, which fit in the cache better than 26
+SPAN = 1.1  # largest ratio of settings in one call: a scene that settles among them is run at all of them
+SETTLED_STEPS, SETTLED_TOLERANCES = 2.0, 10.0  # a scene settles if it is accurate at all settings over this factor
+SETTLED_AFTER = 4  # least number of these settings
+BUDGET = 2e6  # force evaluations: a run at a tolerance of 1e-10 takes 1e5, one whose steps shrink to nothing 1e8
 CHECKED = 5  # settings, evenly over the map, at which all scenes are run
 
 
@@ -133,7 +132,7 @@ def together(runs: RowPlan, solver: FixedStep, columns: slice, tops: Array, peri
 
 
 def group_below(runs: RowPlan, end: int, n: int, alone: Collection[int]) -> int:
-    """The first of the neighbouring settings up to `end` (exclusive) that are run in one call for n rows.
+    """Index of the first of the successive settings up to `end` (exclusive) that are run in one call for n rows.
 
     They are sampled equally often, have no more than `MOST` samples and differ by a factor `SPAN` at most. A setting
     that is in `alone` is by itself.
@@ -217,7 +216,7 @@ class _Descent:
         self.made[rows, columns] = True
 
     def _settle(self, rows: NDArray[np.int64], columns: slice) -> None:
-        """Which of the scenes are accurate at every setting from a while ago down to this one?"""
+        """Update which scenes have settled, after runs of some scenes at neighbouring settings."""
         before = self.settled[rows]
         for k in reversed(range(columns.start, columns.stop)):
             good = self.judged.verdict[rows, k] == 0
@@ -235,7 +234,7 @@ def outcome_map(
 ) -> Mapped:  # fmt: skip
     """Run and judge a whole map of the family of scenes called `name`: a row a scene, a column a setting, growing.
 
-    Every scene is run at the settings `followed`, where the axis errors of inaccurate runs are the largest; at others
-    they are some that are too large. If it is None, those are all settings.
+    Every scene is run at the settings `followed`, all if it is None; there axis errors are the largest of a run. At
+    other settings the axis error of an inaccurate run is any one that is too large.
     """
     return _Descent(name, parameters, method, settings, periods, followed).descend()

@@ -1,7 +1,7 @@
-"""What the solver of an implicit method does to the constants of the motion, apart from the method itself.
+"""Errors of the constants of the motion that come from the solver of an implicit method, apart from the method itself.
 
-The midpoint rule is solved to a given tolerance and no better. What the exact solution of its equation does to energy
-and momenta is the method's error; what comes on top of it is the solver's. `textbook_midpoint` is the iteration that
+The midpoint rule is solved to a given tolerance and no better. The change of energy and momenta with an exact solution
+of its equation is the method's error; any further change is the solver's. `textbook_midpoint` is the iteration that
 most texts give, Newton's from free flight, theta1 = theta + h p/I1. The kernel of this package starts from a cubic
 through past steps and follows its last correction to first order, so that it reaches the same error in fewer
 iterations. Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, section VIII.6.
@@ -19,7 +19,7 @@ from symtop.methods.lagrangian.discrete_lagrangian import Quadrature
 from symtop.model import top as model
 from symtop.model.scenes import Scene
 
-SAMPLES = 4001  # of a run, evenly
+SAMPLES = 4001  # of a run, evenly spaced
 
 _force = register_jitable(model.effective_force)
 _stiffness = register_jitable(model.effective_stiffness)
@@ -53,7 +53,7 @@ _march = compile_kernel(_textbook_midpoint)
 
 
 class SolverError(NamedTuple):
-    """What a badly solved equation does to the constants of the motion."""
+    """Errors of the constants of the motion if the equation is solved to a given tolerance."""
 
     energy: float  # largest |E - E0|
     momentum: float  # largest |p - p0| of p_phi and p_psi

@@ -15,13 +15,13 @@ from . import facts, figures
 from .measures import MECHANISMS, PERIODS, map_table
 
 FAMILY = "cusp"  # let go at theta = 0.8 with any spin
-NOT_SLEEPING = {  # variants that do not take part in the mechanism "sleeping"
+NOT_SLEEPING = {  # variants left out of the mechanism "sleeping", by the reason
     "steps shrink towards the upright: millions in three samples, and the threshold of the motion": (
         "stormer-verlet-reversible[angles]",
     )
 }
 QUICK = (5, 3)  # settings and rows of a map of a slow method
-FINER = 2.0  # cells of a map whose runs go side by side in lanes, over those of other maps: one a dot of the picture
+FINER = 2.0  # cells of a map with runs in lanes over those of other maps: then each cell is a pixel of the picture
 
 
 def solves_slowly(method: Integrator) -> bool:
@@ -39,7 +39,7 @@ def finer(method: Integrator) -> float:
 def axes(method: Integrator, steps: np.ndarray, values: np.ndarray, quick: bool) -> tuple[list[float], list[float]]:
     """Settings and rows of a map: steps, tolerances from 1e-10 to 0.5, or nothing to set.
 
-    There are more where runs go in lanes and fewer where one takes milliseconds; the map's "grid" says what was run.
+    There are more for runs in lanes and fewer where a run takes milliseconds; a map's variable "grid" says how many.
     """
     factor = 1.0 if quick else finer(method)
     if factor > 1.0:
@@ -101,7 +101,7 @@ def cases(quick: bool) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    """The table of one mechanism for one integrator; a map over spin where the scene is that of no mechanism."""
+    """The table of one mechanism for one integrator; a map over spin if no mechanism belongs to the scene."""
     return MECHANISMS.get(case.scene, map_table)(case.scene, integrator(case.integrator), case.settings)
 
 

@@ -1,4 +1,4 @@
-"""The sources of truth, what is measured and stored of each on one scene, and how close their bounds are."""
+"""The sources of reference motions, the errors of each on one scene, and how close their bounds are."""
 
 import functools
 import time
@@ -28,14 +28,14 @@ DIGITS = 45  # of the closed form that every source is compared with
 
 # Variables of the dataset; dimension horizon (s). Sources are the values of the dimension integrator.
 ERROR = "axis"  # rad, largest distance of the axis from the closed form in 45 digits over the last nutation
-BOUND = "axis_bound"  # rad, what the reference claims; NaN for a source without a bound of its own
+BOUND = "axis_bound"  # rad, the bound that the reference states; NaN for a source without one
 SECONDS = "seconds"
 
 
 def source_errors(scene: Scene, source: str, horizons: list[float]) -> xr.Dataset:
     """`ERROR`, `BOUND` and `SECONDS` of one source at each horizon (dimension ``horizon``).
 
-    One integration shows the error and, at its checks, what bounds it: the times at which a run is read change no step.
+    One integration gives the error and, by its checks, the bound: the times at which a run is sampled change no step.
     """
     precision, chart = SOURCES[source]
     columns: dict[str, list[float]] = {ERROR: [], BOUND: [], SECONDS: []}

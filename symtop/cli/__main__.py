@@ -1,8 +1,7 @@
-"""The command ``symtop``, also ``python -m symtop.cli``: `main`, and then the end of the process at once.
+"""The command ``symtop``, also ``python -m symtop.cli``: run `main`, then end the process without Python's cleanup.
 
-Python would first take apart what was compiled: seconds for hundreds of megabytes of kernels, in which the prompt does
-not come back. Where other threads still work, they are waited for as usual. Linear algebra has one thread:
-`symtop.core.parallel` says why.
+The cleanup of hundreds of megabytes of compiled kernels would take seconds. If other threads still run, the process
+waits for them as usual. Linear algebra has one thread: `symtop.core.parallel` says why.
 """
 
 import atexit
@@ -13,9 +12,9 @@ import threading
 
 
 def run(name: str | None = None) -> None:
-    """Run the command line of this process, which is shown as `name`, and end it with its exit code."""
+    """Run the command line of this process, with `name` in its messages, and exit with its exit code."""
     if heard := signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # Ctrl-C during imports has no traceback
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback for Ctrl-C during imports
     from symtop.cli.main import main
     from symtop.core.parallel import VARIABLES
     from symtop.core.signals import UNREAD
@@ -26,16 +25,16 @@ def run(name: str | None = None) -> None:
     try:
         main(prog_name=name)
     except SystemExit as end:
-        signal.signal(signal.SIGINT, signal.SIG_DFL)  # a second Ctrl-C, while threads end, has no traceback
+        signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback for a second Ctrl-C while threads end
         alone = all(thread.daemon or thread is threading.main_thread() for thread in threading.enumerate())
         if not alone or not (end.code is None or isinstance(end.code, int)):
             raise
         atexit._run_exitfuncs()
         code = end.code or 0
-        for stream in filter(None, (sys.stdout, sys.stderr)):  # None, where it was closed
+        for stream in filter(None, (sys.stdout, sys.stderr)):  # a closed stream is None
             try:
                 stream.flush()
-            except OSError as error:  # nobody reads it, or the disk is full
+            except OSError as error:  # its reader has ended, or the disk is full
                 code = code or (UNREAD if isinstance(error, BrokenPipeError) else 1)
         os._exit(code)
 

@@ -1,4 +1,4 @@
-"""What the commands share: options, plug-ins, files to write, errors without a traceback, text that fits."""
+"""Helpers of all commands: options, plug-ins, output files, errors without a traceback, text that fits the terminal."""
 
 import contextlib
 import errno
@@ -26,30 +26,30 @@ from symtop.core.signals import INTERRUPTED, UNREAD, told_apart
 if TYPE_CHECKING:
     from symtop.model.scenes import Scene
 
-LONGEST_NAME = 80  # characters of the name of a file that are shown
+LONGEST_NAME = 80  # characters of a file name in a message
 ENDINGS = {"figure": (".png", ".svg", ".pdf"), "card": (".html", ".htm"), "badge": (".svg",)}  # by option
-NAMES = {  # what the shell completes: the module and its function
+NAMES = {  # for shell completion: the module and the function that returns the names
     "scenes": ("symtop.model.scenes", "scenes"), "all scenes": ("symtop.model.scenes", "all_scenes"),
     "studies": ("symtop.runner.scripts", "names"),
     "integrators": ("symtop.methods.framework.registry", "integrators"),
     "variants": ("symtop.methods.framework.registry", "variants"),
 }  # fmt: skip
-BODY, PERIODS = "body", 20.0  # the scene of the options of a body, and its horizon
-TEXT = (".csv", ".tsv", ".txt", ".json")  # what nobody reads as netCDF
-USAGE = {  # what click says of a value, and what we do
+BODY, PERIODS = "body", 20.0  # name of the scene made from the options of a body; its horizon in natural periods
+TEXT = (".csv", ".tsv", ".txt", ".json")  # endings that are refused for netCDF files
+USAGE = {  # patterns of click's messages, and their replacements
     "invalid value for '(.+?)': (.+) is not (?:a valid )?(.+)": r"\1 must be \3, not \2",
     r"invalid value for '\[?(.+?)(?:]...)?': File (.+) (?:does not exist|is a .+)": r"\1 must be a file, not \2",
     "must be float( range)?,": "must be a number,", "must be integer( range)?,": "must be a whole number,",
 }  # fmt: skip
-SILENT = ("explore",)  # commands that work until they are ended
+SILENT = ("explore",)  # commands without messages that they are still working
 
 
 def _load_plugins(ctx: click.Context, _: click.Parameter, files: tuple[str, ...]) -> None:
-    if files and not ctx.resilient_parsing:  # as shell completion parses
+    if files and not ctx.resilient_parsing:  # not during shell completion
         from symtop.run import plugins
 
         for file in files:
-            if ctx.info_name == "claims":  # a file that ends its process is told of
+            if ctx.info_name == "claims":  # report a file that crashes its process
                 from symtop.judging.remote import try_separately
 
                 try_separately(lambda file=file: len(plugins.load(file)), f"plugin {Path(file).name}")  # type: ignore[misc]
@@ -58,21 +58,21 @@ def _load_plugins(ctx: click.Context, _: click.Parameter, files: tuple[str, ...]
 
 
 class File(click.Path):
-    """A path in which ``~`` is the user's folder also after ``--option=``, where a shell leaves it."""
+    """A path in which ``~`` is expanded, also after ``--option=``, where a shell does not."""
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
-        """The path, expanded before it is looked at."""
+        """The path, expanded before click checks it."""
         home = isinstance(value, str) and value.startswith("~")
         return super().convert(str(at_home(value)) if home else value, param, ctx)
 
 
 def separated(_: click.Context, __: click.Parameter, names: str | None) -> list[str] | None:
-    """The names between commas."""
+    """A callback of options: the list of names separated by commas, or None."""
     return None if names is None else [name.strip() for name in names.split(",")]
 
 
 def completing(kind: str) -> Callable[[click.Context, click.Parameter, str], list[str]]:
-    """Shell completion of the names of all scenes, integrators or studies; after a bracket, of variants, rk4[axis]."""
+    """A function for shell completion of the names of `kind` in `NAMES`; after a bracket, of variants, rk4[axis]."""
 
     def complete(_: click.Context, __: click.Parameter, prefix: str) -> list[str]:
         module, function = NAMES["variants" if "[" in prefix and kind == "integrators" else kind]
@@ -83,7 +83,7 @@ def completing(kind: str) -> Callable[[click.Context, click.Parameter, str], lis
 
 
 def _numbers(count: int) -> Callable[[click.Context, click.Parameter, str | None], tuple[float, ...] | None]:
-    """The callback of an option of so many numbers with commas between."""
+    """The callback of an option of `count` numbers separated by commas."""
 
     def read(_: click.Context, option: click.Parameter, text: str | None) -> tuple[float, ...] | None:
         try:
@@ -98,7 +98,7 @@ def _numbers(count: int) -> Callable[[click.Context, click.Parameter, str | None
     return read
 
 
-OF_BODY = {  # options of a body: how many numbers, and what they are
+OF_BODY = {  # options of a body: number of values, metavar, help
     "body": (3, "I1,I2,I3", f"Principal moments of a body of your own, the scene {BODY}; I1 = I2 makes a top."),
     "mgl": (1, "NUMBER", "Its weight times the distance of its centre; free without."),
     "centre": (3, "X,Y,Z", "The direction of its centre in body axes; the third axis by default."),
@@ -108,7 +108,7 @@ OF_BODY = {  # options of a body: how many numbers, and what they are
 
 
 def body_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command the options of a body of the user's own; its scene, if that is `BODY`, is then made of them."""
+    """Add the options of a user's body to a command; the scene `BODY` is then replaced by one made from them."""
 
     @functools.wraps(command)
     def with_body(**settings: Any) -> None:
@@ -129,7 +129,7 @@ def body_options(command: Callable[..., None]) -> Callable[..., None]:
 
 
 def given_body() -> str:
-    """The options of the user's own body as they were given to this command; empty without one."""
+    """The options of a user's body in the command line of this command; empty without them."""
     given = {name: value for name, value in click.get_current_context().params.items() if name in OF_BODY and value}
     return " ".join(f"--{name} {','.join(map(repr, value))}" for name, value in given.items())
 
@@ -147,11 +147,11 @@ def _own_body(numbers: dict[str, Any]) -> "Scene":
         start = Angles.from_quaternion(start.quaternion, omega_body=start.omega_body)
         top = SymmetricTop(top.I1, top.I3, top.torque[2])
     purpose = f"a body of your own, over {PERIODS:g} natural periods"
-    return scenes.Scene(BODY, top, start, PERIODS * period, purpose, "axis")  # of tops: a body observes all of itself
+    return scenes.Scene(BODY, top, start, PERIODS * period, purpose, "axis")  # "axis" for a top; a body has one chart
 
 
 def step_of(scene: "str | Scene", settings: dict[str, Any]) -> float | None:
-    """The step of the options --step-size and --per-nutation, of which the second is taken out of `settings`."""
+    """The step from the options --step-size or --per-nutation; the second is removed from `settings`."""
     step, count = settings.get("step_size"), settings.pop("per_nutation")
     if step is not None and count is not None:
         raise SymtopError("give --step-size or --per-nutation, not both")
@@ -171,7 +171,7 @@ json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON i
 
 
 def scene_options(command: Callable[..., None]) -> Callable[..., None]:
-    """Give a command what those on a scene share: a body of the user's own, plug-ins, JSON."""
+    """Add the options of commands on a scene: a user's body, plug-ins, JSON."""
     return body_options(plugin_option(json_option(command)))
 
 
@@ -182,35 +182,35 @@ results_option = click.option(
 
 
 class Group(click.Group):
-    """Prints an error as one sentence that names options, and exits with code 2; 130 after Ctrl-C."""
+    """A group of commands that prints an error as one sentence and exits with code 2, or 130 after Ctrl-C."""
 
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
-        """The command of a line; from here on it says now and then that it works."""
+        """The command of a command line; from here on messages say that it is still working."""
         name, command, rest = super().resolve_command(ctx, args)
         if not ctx.resilient_parsing and name not in SILENT:
             ctx.with_resource(telling(str(name)))
         return name, command, rest
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  (click calls it so)
-        """In the order in which they were added, those that people use first."""
+        """The names of commands in the order in which they were added."""
         return list(self.commands)
 
     def invoke(self, ctx: click.Context) -> Any:
-        """Run a command."""
+        """Run a command, with errors as messages and exit codes."""
         try:
             with told_apart(), _warnings_as_lines():
                 return super().invoke(ctx)
         except SymtopError as error:
             warn(_in_options(error, self.commands.get(ctx.invoked_subcommand or "")))
             ctx.exit(2)
-        except KeyboardInterrupt:  # click's own answer is "Aborted!" and 1, which means that a case has failed
+        except KeyboardInterrupt:  # click would exit with 1, which here means that a case has failed
             warn("interrupted")
             ctx.exit(INTERRUPTED)
         except OSError as error:
             if error.errno == errno.EPIPE:
-                sys.stdout = None  # its reader has left
+                sys.stdout = None  # its reader has ended
                 ctx.exit(UNREAD)
             name, words = str(error.filename), f"cannot write what there is to say: {error.strerror}"
             if error.filename is not None:
@@ -222,14 +222,14 @@ class Group(click.Group):
             warn(words)
             ctx.exit(2)
         except Exception as error:
-            if not type(error).__module__.startswith("numba."):  # of a plug-in's kernel, where no solver is called
+            if not type(error).__module__.startswith("numba."):  # from a plug-in's kernel
                 raise
             warn(f"a kernel cannot be compiled: {words_of(error)}")
             ctx.exit(2)
 
 
 def _show(error: click.UsageError, file: Any = None) -> None:  # noqa: ARG001  (click calls it so)
-    """Print what is wrong with a command line in one sentence: what, which value, and what is allowed."""
+    """Print an error of a command line in one sentence: the option, its value, and what is allowed."""
     words = error.format_message().removesuffix(".").replace(". Did", "; did")
     words = words[0].lower() + words[1:]
     for click_says, we_say in USAGE.items():
@@ -243,10 +243,10 @@ click.UsageError.show = _show  # type: ignore[assignment, method-assign]
 
 
 def _in_options(error: SymtopError, command: click.Command | None) -> str:
-    """An error's sentence with the options of a command, and what helps where a scene or an integrator is unknown."""
+    """An error's message with names of options for arguments, and hints for an unknown scene or integrator."""
     parameters = command.params if command is not None else []
     options = [one for one in parameters if isinstance(one, click.Option)]
-    named = {str(one.name): max(one.opts, key=len) for one in reversed(options)}  # the first of a name
+    named = {str(one.name): max(one.opts, key=len) for one in reversed(options)}  # the first option of a name
     sentence = error.renamed({"quaternion": "--attitude", "omega_body": "--rates"} | named)
     if not isinstance(error, UnknownNameError) or error.parameters[0] not in ("scene", "integrator"):
         return sentence
@@ -278,12 +278,12 @@ def _warnings_as_lines() -> Iterator[None]:
 
 def warn(sentence: str) -> None:
     """Print a warning to the standard error."""
-    clear = "\r\x1b[K" if files.is_terminal(sys.stderr) else ""  # of a clock that stands in the line
+    clear = "\r\x1b[K" if files.is_terminal(sys.stderr) else ""  # clears a progress line
     click.echo(clear + fitted(f"symtop: {sentence}", sys.stderr), err=True)
 
 
 def as_text(content: Any) -> str:
-    """JSON of anything; a number that is not finite, of which JSON knows none, is null."""
+    """Content as JSON text; a number that is not finite becomes null."""
     return json.dumps(json.loads(json.dumps(content), parse_constant=lambda _: None), indent=1)
 
 
@@ -293,7 +293,7 @@ def say(sentence: str) -> None:
 
 
 def fitted(text: str, stream: TextIO | None) -> str:
-    """The text in lines that fit the terminal, if a terminal is what the stream goes to."""
+    """The text in lines that fit the terminal, if the stream is one."""
     return filled(text) if files.is_terminal(stream) else text
 
 
@@ -310,7 +310,7 @@ def say_written(*files: str | None, err: bool = False) -> None:
 
 
 def check_outputs(**files: str | None) -> None:
-    """Refuse, before a run, endings, folders and files that cannot be written; `files` by the names of options."""
+    """SymtopError for output files, by their options, with a wrong ending or that cannot be written, before a run."""
     options = dict[Path, str]()
     for name, file in files.items():
         if file is None:
@@ -335,7 +335,7 @@ def check_outputs(**files: str | None) -> None:
 
 
 def terminal_width() -> int:
-    """Columns of the terminal; 80 where there is none."""
+    """Columns of the terminal, at least 60; 80 if there is none."""
     return max(60, shutil.get_terminal_size((80, 24)).columns)
 
 
@@ -353,7 +353,7 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], width: int | Non
 
 
 def facts(pairs: dict[str, str]) -> str:
-    """Names and values, one a line; values that do not fit the terminal are broken and indented."""
+    """Names and values as text, one per line; values that do not fit the terminal are broken and indented."""
     formatter = click.HelpFormatter(width=terminal_width())
     formatter.write_dl(list(pairs.items()))
     return formatter.getvalue().rstrip()

@@ -11,7 +11,7 @@ from symtop.core.progress import ticking
 if TYPE_CHECKING:
     import xarray as xr
 
-TARGETS = (1e-3, 1e-6, 1e-9)  # whose cheapest runs are shown
+TARGETS = (1e-3, 1e-6, 1e-9)  # errors for which the cheapest runs are printed
 FACTS = ("quantity", "horizon", "nutations", "cost", "timed", "budget")
 COLUMNS = ("step_size", "tolerance", "steps_per_nutation", "error", "seconds", "seconds_spread", "force_evaluations")
 
@@ -69,7 +69,7 @@ def compare(
     timed, end, count = options["cost"] == "time", data.attrs["horizon"], data.attrs["nutations"]
     unit, period = " s" if data["reached_time"].attrs["units"] == "s" else "", period_word(data)
     many = f"{count:.3g}"
-    span = f" ({many} {period}{'s' * (many != '1')})" if count > 0.0 else ""  # and not of a motion that never returns
+    span = f" ({many} {period}{'s' * (many != '1')})" if count > 0.0 else ""  # 0: a separatrix
     say(f"{data['scene'].item()} to t = {end:.6g}{unit}{span}: the cheapest run by {options['cost']}")
     cost = "time" if timed else "force evaluations"
     say(f"steps a {period} or tolerance (tol), {cost}; error of {data.attrs['quantity']}")
@@ -90,7 +90,7 @@ def compare(
 
 
 def _record(cell: "xr.Dataset", target: float, place: int) -> dict[str, Any]:
-    """The cheapest run of a variant for a target, or why there is none."""
+    """The cheapest run of a variant for a target, or the reason why there is none, as a JSON record."""
     record = {"variant": str(cell["variant"].item()), "target": target, "reached": place >= 0}
     if place < 0:
         return record | {"reason": str(cell["reached"].sel(target=target).item())}

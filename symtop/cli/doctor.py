@@ -1,7 +1,7 @@
 """``symtop doctor``: checks of the packages, the caches, the folders and a few computed numbers.
 
 With ``--warm`` every kernel is compiled first: every method is run for two steps in each of its charts, alone and in an
-ensemble of two tops, beside the truth and its errors, in a process a core.
+ensemble of two tops, and the reference is computed, in one process per core.
 """
 
 import concurrent.futures
@@ -26,7 +26,7 @@ from symtop.core.files import DAY, by_last_use, cache_root, distrust, size_of
 from symtop.core.progress import progress_bar
 
 LEAST_SPACE = 500_000_000  # free bytes below which a full run of the studies may not fit on the disk
-LARGE_CACHE = 5_000_000_000  # bytes of a cache that the doctor advises to delete
+LARGE_CACHE = 5_000_000_000  # bytes above which the advice is to delete a cache
 TAYLOR_GAP = 1e-12  # rad, allowed between the closed form and Taylor over one horizon
 MIDPOINT_GAP = 1e-2  # rad, allowed between the closed form and midpoint with a step of 0.001
 
@@ -64,7 +64,7 @@ def _machine(_: Path) -> list[Finding]:
 
 
 def _packages(_: Path) -> list[Finding]:
-    """Every requirement that applies to this machine, and whether its version is in range; one of an extra may lack."""
+    """Every requirement for this machine, and whether its version is in range; those of extras may be absent."""
     from packaging.requirements import Requirement
 
     extras = importlib.metadata.metadata("symtop").get_all("Provides-Extra") or []
@@ -88,7 +88,7 @@ def _packages(_: Path) -> list[Finding]:
 def _heyoka(_: Path) -> list[Finding]:
     if importlib.util.find_spec("heyoka") is None:
         words = "no Taylor series: heyoka is absent; it has wheels for Linux only, elsewhere try conda-forge"
-        return [Finding("precisions", words)]  # where it is required, `_packages` says that it lacks
+        return [Finding("precisions", words)]  # if it is required, `_packages` reports that
     from symtop.methods.taylor.heyoka import arithmetic, stepper
 
     findings = []
@@ -129,7 +129,7 @@ def _results(results: Path) -> list[Finding]:
 
 
 def _writable(topic: str, folder: Path, advice: str) -> Finding:
-    """Can the folder be written, or made in its nearest parent, and is there space on its disk?"""
+    """The finding on whether a folder can be written, or made in its nearest parent, and its disk has space."""
     place = next((path for path in (folder, *folder.resolve().parents) if path.exists()), Path("/"))
     try:
         with tempfile.TemporaryFile(dir=place):
@@ -140,7 +140,7 @@ def _writable(topic: str, folder: Path, advice: str) -> Finding:
 
 
 def _self_check(_: Path) -> list[Finding]:
-    """Published values, and three ways to compute one motion, against each other."""
+    """Findings on published values, and on midpoint and taylor against the closed form."""
     from symtop.measure.published import published_values
     from symtop.run.simulation import simulate
 
@@ -172,11 +172,11 @@ CHECKS: dict[str, Callable[[Path], list[Finding]]] = {
     "self-check": _self_check,
 }  # fmt: skip
 SCENE, BODY_SCENE = "goldstein", "heavy-brick"
-PERIODS = 0.02  # of a nutation: the length of a run that compiles
+PERIODS = 0.02  # nutations: the length of a run that compiles a kernel
 
 
 def _run(name: str) -> str:
-    """Compile what a variant runs alone and in an ensemble, or the truth without a name; returns why it could not."""
+    """Compile the kernels of a variant, alone and in an ensemble, or of the reference for name ""; returns an error."""
     from symtop.methods.framework.registry import integrator
     from symtop.model.lazy_kernel import LAZY
     from symtop.model.scenes import scene
@@ -205,7 +205,7 @@ def _run(name: str) -> str:
 
 
 def variants() -> list[str]:
-    """Every variant, ``method[chart]``, that compiles something."""
+    """Every variant, ``method[chart]``, of a compiled method."""
     from symtop.methods.framework.registry import integrators
 
     compiled = [method for method in integrators().values() if method.implementation == "compiled"]

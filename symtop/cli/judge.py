@@ -1,4 +1,4 @@
-"""``symtop claims``, ``judge`` and ``recommend``: what integrators claim, measured, and which of them to use."""
+"""``symtop claims``, ``judge`` and ``recommend``: measure the claims of integrators, and find the cheapest."""
 
 import dataclasses
 import sys
@@ -12,8 +12,9 @@ from symtop.core.errors import SymtopError
 from symtop.core.progress import ticking
 from symtop.judging import FORMS
 
-BESIDE, NUTATIONS, MOST_BESIDE = ("rk4", "strang", "dop853", "taylor"), 10.0, 2e4  # of runs, and their evaluations
-LONGEST_BESIDE = 5.0  # seconds of a run of the judged step, which may be slow
+# methods in the figure of a judged step, length of their runs, most evaluations of one
+BESIDE, NUTATIONS, MOST_BESIDE = ("rk4", "strang", "dop853", "taylor"), 10.0, 2e4
+LONGEST_BESIDE = 5.0  # seconds of a run of the judged step
 
 
 @click.command(short_help="Judge an integrator of your own.")
@@ -104,7 +105,7 @@ def judge(
 
 
 def _check(form: str | None, **files: str | None) -> None:
-    """Refuse, before a step is judged, files that cannot be written, and a figure that would be empty."""
+    """SymtopError, before a step is judged, for files that cannot be written and for a figure that would be empty."""
     check_outputs(**files)
     if files["figure"] is not None and form == "separable":
         raise SymtopError("--figure shows errors of the axis, of which a map of (theta, p_theta) has none")
@@ -113,7 +114,7 @@ def _check(form: str | None, **files: str | None) -> None:
 def _draw_beside(
     target: str, scene: str, file: str | None, quiet: bool, options: dict[str, Any], seconds_a_step: float
 ) -> None:
-    """Draw a step's error against force evaluations beside `BESIDE`, if a file was named, and say who comes first."""
+    """Draw a step's error against force evaluations with those of `BESIDE`, if `file` is given, and print a ranking."""
     if file is None:
         return
     with ticking("comparing"):
@@ -127,7 +128,7 @@ def _draw_beside(
         on = find_scene(scene, bodies=True)
         stepper = open_target(target, options["form"], options["chart"], on=on, adaptive=options["adaptive"])
         methods = [integrator(stepper, order=options["order"]), *BESIDE]
-        # `compare` counts a step as one force evaluation at least
+        # `compare` counts at least one force evaluation per step
         budget = min(MOST_BESIDE, LONGEST_BESIDE / max(seconds_a_step, 1e-9))
         data = compare(on, methods, cost="evaluations", nutations=NUTATIONS, budget=budget, quiet=True)
         draw_compare(data, file)
@@ -213,14 +214,14 @@ def recommend(scene: Any, accuracy: float | None, engine: str | None, as_json: b
     symtop recommend goldstein --i-use mujoco --step-size 0.002
     """
     with ticking("loading"):
-        from symtop import advise
+        from symtop import advise, engine_settings
     if accuracy is None and engine is None:
         raise SymtopError("recommend needs --accuracy, for example 1e-6, or --i-use")
     options |= {"step_size": common.step_of(scene, options), "needs": options["needs"] or ()}
     with ticking("trying methods"):
         answer: Any
         if engine is not None:
-            answer = advise.i_use(engine, scene, accuracy=accuracy, **options)
+            answer = engine_settings.i_use(engine, scene, accuracy=accuracy, **options)
             advice = answer.advice if accuracy is not None else None
         else:
             answer = advice = advise.recommend(scene, accuracy=accuracy or 0.0, **options)

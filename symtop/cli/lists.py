@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from symtop.model.scenes import Scene
 
 wide_option = click.option("--wide", is_flag=True, help="Every column, however wide the table becomes.")
-Record = dict[str, Any]  # what is shown of one entry, by column
+Record = dict[str, Any]  # the values of one entry by column
 FLAGS = "e explicit, i implicit, s symplectic, t symmetric in time, - not so, ? not known"
 PACKAGE = f"""\
 @software{{symtop,
@@ -35,7 +35,7 @@ def _print(
     records: list[Record], short: list[Record], note: str, one: Record | None, page: Callable[[Record], str],
     *, wide: bool, as_json: bool,
 ) -> None:  # fmt: skip
-    """Print one entry in full, or all records as a table of the `short` ones, or with all columns, or as JSON."""
+    """Print the entry `one` with `page`, if given, else a table of the `short` records; with options all, or JSON."""
     if one is not None and (as_json or not wide):
         click.echo(as_text([one]) if as_json else page(one))
     elif as_json:
@@ -93,15 +93,15 @@ def _flags(method: "Integrator") -> str:
 
 
 def _described(method: "Integrator") -> Record:
-    """The record of an integrator, its paragraph, its tolerances and its source."""
+    """The record of an integrator with its tolerances, its source and its description."""
     from symtop.methods.framework.registry import integrator
     from symtop.model.charts import BODY
 
     described: Record = {**method.record()}
     if method.conserves and BODY in method.solvers:
-        described["conserves"] += " of a top"  # of a body, Gauss methods lose p_phi, which Lie-group methods keep
+        described["conserves"] += " of a top"  # on a body Gauss methods do not keep p_phi, Lie-group methods do
     if method.conserves is not None and len(integrator(method.method).charts()) > 1:
-        where = "in every chart" if method.conserves else "common to all charts"  # some keep more in one of them
+        where = "in every chart" if method.conserves else "common to all charts"  # a chart may have more
         described["conserves"] += f" {where} of {method.method}"
     if method.default_tolerance is not None:
         described["default tolerance"] = f"{method.default_tolerance:g}"
@@ -116,7 +116,7 @@ def _integrator_page(described: Record) -> str:
     name, summary, about = (described.pop(key, "") for key in ("name", "summary", "about"))
     paragraphs = filter(None, (f"{name}: {summary}", *about.split("\n\n")))
     parts = [*(textwrap.fill(text, terminal_width()) for text in paragraphs), facts(described)]
-    with contextlib.suppress(SymtopError):  # a method of the user's own may name a source that is not known here
+    with contextlib.suppress(SymtopError):  # a user's method may name an unknown source
         parts.append(citation(name))
     return "\n\n".join(parts)
 

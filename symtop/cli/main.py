@@ -1,7 +1,7 @@
 """The command line: ``symtop integrators | scenes | run | compare | ensemble | study | judge | report | ...``.
 
-Exit codes: 0 fine; 1 a case or a check failed; 2 bad input, or a place that cannot be written; 3 a run ended early by
-its outcome (its dataset was written); 130 and 143 it was interrupted or terminated (what a study had computed is kept).
+Exit codes: 0 success; 1 a case or a check failed; 2 bad input, or a file that cannot be written; 3 a run ended early by
+its outcome (its dataset was written); 130 and 143 interrupted or terminated (results of a study so far are kept).
 A command imports heavy packages inside its function, so that ``symtop --help`` takes a tenth of a second.
 """
 
@@ -29,7 +29,7 @@ def main() -> None:
     143 terminated. eval "$(_SYMTOP_COMPLETE=bash_source symtop)" completes names.
     """
 
-    def announce() -> None:  # once, before the first kernel is compiled
+    def announce() -> None:  # called once, before the first kernel is compiled
         files.on_cold.clear()
         (warn if files.is_terminal(sys.stderr) else post)(files.compiling())
 

@@ -16,17 +16,17 @@ from symtop.core.errors import SymtopError, whole
 from symtop.core.progress import post, ticking
 from symtop.report.formats import FIRM, counted, duration
 
-FEWEST, FEW, MANY = 1000, 100_000, 20  # steps that are timed before a run of many times as many
-DECADES = 2.5  # of time, the last of a long run, in which the growth of a change is fitted
-LONG_ENOUGH = 0.5  # seconds of steps that are timed, beside those of a run of few
-SAME = 0.01  # relative difference of the step used from --step-size that is printed
-KERNELS = 5  # of an ensemble: periods, samples, starts, the step in lanes and alone
+FEWEST, FEW, MANY = 1000, 100_000, 20  # steps of a trial; a run of more than 20 times 100,000 steps is timed before
+DECADES = 2.5  # decades of time at the end of a long run, in which the growth of a change is fitted
+LONG_ENOUGH = 0.5  # seconds that a trial must take longer than one of `FEWEST` steps
+SAME = 0.01  # relative difference of the step used from --step-size above which it is printed
+KERNELS = 5  # kernels of an ensemble: periods, samples, starts, the step in lanes and alone
 DRAWN = ("seed", "kind", "epsilon")  # attributes of a population that say how it was drawn
-COMPARED, COMPARED_BODIES = 100_000, 1000  # members whose errors are shown, the first: of a million tops 1 GB
-PARAMETERS = ("I1", "I2", "I3", "mgl", "centre")  # and of tops: what is no start
+COMPARED, COMPARED_BODIES = 100_000, 1000  # first members whose errors are computed; of a million tops they take 1 GB
+PARAMETERS = ("I1", "I2", "I3", "mgl", "centre")  # variables of a population that are not of the start
 
 GUARD = "Warn of a large error by the closed form (exact, of tops) or by an integration (series)."
-OUTCOME = {"ok": "reached the horizon"}  # which says nothing yet of their errors
+OUTCOME = {"ok": "reached the horizon"}  # the printed words for an outcome
 EXECUTION = {
     "lanes": "32 at a time in vector registers (lanes)",
     "compiled, one after another": "one after another in compiled code",
@@ -109,7 +109,7 @@ def run(
 
 
 def _is_known(problem: Any, horizon: float, figure: str | None) -> bool:
-    """Is the motion of a body known to the horizon? If not a sentence says why; what is to be drawn is refused."""
+    """Is there a reference for a body up to the horizon? If not, warn why; SymtopError if `figure` is given."""
     from symtop.measure.settings import judgeable
 
     try:
@@ -124,7 +124,7 @@ def _is_known(problem: Any, horizon: float, figure: str | None) -> bool:
 
 
 def _judged(problem: Any, data: Any, figure: str | None) -> tuple[Any, Any]:
-    """Errors and verdict of a run, which is drawn, if there is a file."""
+    """Errors and verdict of a run, which is drawn to `figure`, if given."""
     from symtop.measure.errors import errors
     from symtop.measure.verdicts import judgement
     from symtop.run.reference.truth import reference
@@ -139,18 +139,18 @@ def _judged(problem: Any, data: Any, figure: str | None) -> tuple[Any, Any]:
 
 
 def estimate(steps: float, run: Callable[[int], object]) -> None:
-    """Say before a run of so many steps how long it takes, if that is above ten seconds; `run` makes a few steps."""
+    """Warn before a run how long it takes, if above ten seconds; `run` makes a number of steps, for timing."""
     from symtop.measure.timing import first_call
     from symtop.run.guard import MOST_STEPS
 
     if not MANY * FEW < steps <= MOST_STEPS:  # more are refused
         return
     with ticking("timing some steps"):
-        run(FEWEST)  # which compiles
+        run(FEWEST)  # compiles the kernel
         few, fixed, seconds = FEWEST, first_call(partial(run, FEWEST)), 0.0
         while seconds < LONG_ENOUGH and few * MANY < steps:
             few *= 4
-            seconds = first_call(partial(run, few)) - fixed  # what a run takes whatever its steps does not count
+            seconds = first_call(partial(run, few)) - fixed  # without the fixed cost of a run
     took = seconds * steps / (few - FEWEST)
     post("running")  # no longer compiling
     if took > 10.0:
@@ -205,11 +205,11 @@ def long(
     if data.sizes["window"]:
         rows = []
         steps_made = data["steps"].values
-        for name in (OF_BODY if problem.of_body else QUANTITIES)[:-1]:  # but for theta
+        for name in (OF_BODY if problem.of_body else QUANTITIES)[:-1]:  # except theta
             least, most, mean = (data[f"{name}_{kind}"].values for kind in ("least", "largest", "mean"))
             sizes = np.maximum.accumulate(np.maximum(np.abs(least), np.abs(most)))
             fit = power_law(steps_made, sizes, steps_made > steps_made[-1] / 10.0**DECADES)
-            grows = f"t^{abs(fit.slope):.2f}" if math.isfinite(fit.slope) else ""  # sizes so far depend on each other
+            grows = f"t^{abs(fit.slope):.2f}" if math.isfinite(fit.slope) else ""  # no interval
             words = "|L|" if name == "momentum" else name
             rows.append([words, *(f"{float(value):+.3e}" for value in (least.min(), most.max(), mean[-1])), grows])
         click.echo(table(["change since the start", "least", "largest", "last window's mean", "grows as"], rows))
@@ -265,7 +265,7 @@ def ensemble(
         from symtop.run.ensemble import bodies as random_bodies, ensemble as runs
         from symtop.run.ensemble.population import check_memory, population
 
-        whole("members", members, 1, random_bodies.MOST if bodies else math.inf)  # which is n in Python
+        whole("members", members, 1, random_bodies.MOST if bodies else math.inf)  # the argument n of `population`
         check_memory("members", members)
         draw = partial(random_bodies.body_population, epsilon=epsilon) if bodies else population
         sample = draw(members, seed=seed, kind=kind)
@@ -274,7 +274,7 @@ def ensemble(
     if figure is not None and not compared:
         needed = " or ".join(SHOWN_BY[name] for name in words)
         raise SymtopError(f"--figure needs {needed} among --variables, whose errors it shows")
-    wrong, own = dict[str, Any](), dict[str, Any]()  # errors over time, and the largest, of each member
+    wrong, own = dict[str, Any](), dict[str, Any]()  # errors over time, and the largest errors, of each member
 
     def added(data: Any) -> Any:
         few, results = (part.isel(member=slice(0, most)) for part in (sample, data))
@@ -316,7 +316,7 @@ def ensemble(
 
 
 def _columns(sample: Any, errors: dict[str, Any], words: dict[str, str]) -> Any:
-    """The members, ``I1`` and ``start_theta``, the largest ``axis_error`` of each, and the draw, for a file of runs."""
+    """Variables for a file of runs: members (``I1``, ``start_theta``, ...), largest errors; attributes of the draw."""
     import numpy as np
     import xarray as xr
 

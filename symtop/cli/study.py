@@ -1,4 +1,4 @@
-"""``symtop study``, ``report`` and ``archive``: studies, the page of all findings, and the bundle of all data."""
+"""``symtop study``, ``report`` and ``archive``: run studies, write the page of all findings, bundle all data."""
 
 import shlex
 import sys
@@ -88,7 +88,7 @@ def study(
 
 
 def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick: bool = False) -> "list[Study]":
-    """The studies of those names, each once, or all; of the integrators in `only` alone, where they have such cases."""
+    """The studies of these names, each once, or all; restricted to cases of the integrators in `only`, if given."""
     from symtop.methods.framework.registry import integrator
     from symtop.runner import scripts
 
@@ -96,7 +96,7 @@ def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick
     if not chosen:
         raise SymtopError(f"name a study or use --all; known: {', '.join(scripts.names())}")
     for name in only:
-        integrator(name)  # refused with the nearest names if there is none
+        integrator(name)  # raises an error with similar names if there is none
     studies = [scripts.load(name) for name in chosen]
     if not only:
         return studies
@@ -117,10 +117,10 @@ def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick
 def run_all(
     pool: "Pool", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], **options: Any
 ) -> int:
-    """Bring studies up to date, each concluded while the next one is computed; 1 if cases failed."""
+    """Bring studies up to date; findings of each are made while the next one is computed; exit code 1 if cases fail."""
     from symtop.report import style
 
-    save = style.sketch if grid["quick"] else style.publish  # quick figures are to look at, not to print
+    save = style.sketch if grid["quick"] else style.publish  # quick figures are not for print
     options |= {"save": save, "beside": len(studies) > 1, **grid}
     summaries = [_summary(findings, results, as_json) for findings in _in_order(pool, studies, results, options)]
     if as_json:
@@ -131,19 +131,19 @@ def run_all(
 
 
 def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict[str, Any]) -> Iterator[dict[str, Any]]:
-    """The findings of studies in their order, while later ones are computed; then what stopped one, if any."""
+    """Yield the findings of studies in order, while later ones are computed; then raise the first error, if any."""
     from symtop.runner import run, store
     from symtop.runner.study import StudyError
 
-    waiting: deque[tuple[Any, Any]] = deque()  # studies, and what waits for their findings
+    waiting: deque[tuple[Any, Any]] = deque()  # (study, `Started`) whose findings have not been yielded
     refused: list[SymtopError] = []
 
     def findings() -> Iterator[dict[str, Any]]:
-        """Those of the first that waits; a study that has none, as one that compares methods, stops no other."""
+        """Yield those of the first waiting study; a study without findings, by a StudyError, does not stop others."""
         try:
             yield waiting[0][1].result()
         except StudyError as error:
-            _tell(waiting[0][1].failures, str(error))  # which may be why
+            _tell(waiting[0][1].failures, str(error))  # they may be the cause
             refused.append(error)
         waiting.popleft()
 
@@ -168,7 +168,7 @@ def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict
 
 
 def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str, Any]:
-    """The summary of a study's findings, which are printed but for JSON: its answer, and where the rest is."""
+    """The summary of a study's findings for JSON; without JSON also print it, with its answer and its files."""
     from symtop.report.template import answer
 
     name = findings["study"]
@@ -188,14 +188,14 @@ def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str
 
 
 def _tell(failures: Sequence[str], sentence: str = "") -> None:
-    """Print the cases that failed, but for one that a sentence holds."""
+    """Print the messages of failed cases, except one that `sentence` contains."""
     for failure in failures:
         if failure not in sentence:
             click.echo(f"  {failure}", err=True)
 
 
 def show_status(studies: "list[Study]", results: Path, why: bool, as_json: bool, grid: dict[str, bool]) -> int:
-    """Print the state of every case, and with `why` the reason; 1 if some have failed."""
+    """Print the state of every case, and with `why` the reason; exit code 1 if some have failed."""
     from symtop.runner import cases
 
     states = {study.name: cases.status(study, results, why=why, **grid) for study in studies}
@@ -220,7 +220,7 @@ def show_status(studies: "list[Study]", results: Path, why: bool, as_json: bool,
 def check_all(
     pool: "Pool", studies: "list[Study]", results: Path, as_json: bool, grid: dict[str, bool], **options: Any
 ) -> int:
-    """Compute stored cases again and compare; 1 if anything is different."""
+    """Compute stored cases again and compare; exit code 1 if anything differs."""
     from symtop.runner.cases import check
 
     checks = [check(study, results, pool, **options, **grid) for study in studies]

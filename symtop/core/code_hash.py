@@ -1,19 +1,19 @@
-"""What a number was made of: a mapping from labels to hashes, found without running anything.
+"""All that a computed number depends on, as a mapping from labels to hashes, found without running anything.
 
     code symtop/methods/runge_kutta/gauss.py    the functions and classes of a file that are reached
     integrator gauss-2, scene goldstein         values: coefficients, numbers
-    package numba, processor, settings          where it was computed, and what was asked for
+    package numba, processor, settings          where it was computed, and with which arguments
 
 The digest of a mapping is the hash of all of it; two mappings are compared label by label, which says *why* a stored
 number is stale. Cases of studies, cached kernels and references, checkpoints and figures are all identified this way.
 
 `Code` goes from a function to its instructions, constants, names and defaults, to what it closes over, to the globals
-that it names, attributes of modules among them, and to what it imports when it runs; from a class to its methods and
-bases; from an instance to its class and attributes. Comments, docstrings and line numbers are no part of code. By name
-alone count functions that look up what they are given (`by_name`), `PLUMBING`, which moves numbers without making any,
-and libraries, with their version (`packages`). Lists, dicts and sets under a module's lower-case names, the state of a
-process, do not count, or in a user's file by what the file says outside of functions; nor do fields of a dataclass with
-the metadata ``words``; a file of a known package that a constant names by its path counts as a whole.
+that it names (attributes of modules included) and to what it imports when it runs; from a class to its methods and
+bases; from an instance to its class and attributes. Comments, line numbers and docstrings (but those of functions
+inside functions) do not count. By name alone count functions that look something up (`by_name`), the files of
+`PLUMBING`, which store and pass on numbers but compute none, and libraries, with their version (`packages`). Lists, dicts and sets under a module's lower-case names are state
+of a process and do not count (in a user's file its statements outside of functions count instead); nor do fields of a
+dataclass with the metadata ``words``. A file of a known package whose path is a constant counts as a whole.
 """
 
 import ast
@@ -37,7 +37,7 @@ import numpy as np
 Reasons = dict[str, str]
 
 LENGTH = 20  # hexadecimal digits of a digest
-COMPUTING = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "mpmath")  # packages that numbers pass through
+COMPUTING = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "mpmath")  # packages that may change a number
 
 
 def hashed(*parts: str) -> str:
@@ -68,7 +68,7 @@ def merged(mappings: Iterable[Mapping[str, str]]) -> Reasons:
 
 @functools.cache
 def file_hash(path: Path) -> str:
-    """Hash of a file as it was when it was first asked for."""
+    """Hash of a file's content at the first call; later changes of the file are not seen."""
     return hashlib.sha256(path.read_bytes()).hexdigest()[:LENGTH]
 
 
@@ -82,7 +82,7 @@ def version(package: str) -> str:
 
 @functools.cache
 def processor() -> str:
-    """This machine's processor: its name, which virtual machines of several kinds share, and its model."""
+    """This machine's processor: its name, and its family and model, as different virtual machines share a name."""
     about: dict[str, str] = {}
     with contextlib.suppress(OSError), Path("/proc/cpuinfo").open(encoding="utf-8") as lines:
         about = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
@@ -91,7 +91,7 @@ def processor() -> str:
 
 
 def packages(*names: str) -> Reasons:
-    """Versions of packages; by default those that numbers pass through, and Python, whose code differs by version."""
+    """Versions of packages; by default those of `COMPUTING` and of Python, whose bytecode differs by version."""
     python = {} if names else {"package python": ".".join(platform.python_version_tuple()[:2])}
     return {f"package {name}": version(name) for name in names or COMPUTING} | python
 
@@ -103,7 +103,7 @@ roots: dict[str, Path] = {PACKAGE.name: PACKAGE}  # name of a known package: its
 
 
 def add_root(name: str, folder: Path) -> None:
-    """Make a package known."""
+    """Make a package known: its code counts file by file, not by the package's version."""
     if roots.get(name) != folder.resolve():
         roots[name] = folder.resolve()
         for cached in (_path, file_label, is_library):
@@ -115,14 +115,14 @@ _path = functools.cache(lambda name: Path(name).resolve())
 
 @functools.cache
 def file_label(path: Path) -> str:
-    """The name of a file: with its package if that is known, by itself otherwise."""
+    """The path of a file in its package, such as symtop/core/jit.py, if that is known; otherwise its name alone."""
     root = next((name for name, folder in roots.items() if folder in path.parents), "")
     return f"{root}/{path.relative_to(roots[root]).as_posix()}" if root else path.name
 
 
 @functools.cache
 def is_library(package: str) -> bool:
-    """Does a top-level package count by name and version: one of Python's own, or one that is installed?"""
+    """Does a top-level package count by name and version (Python's own and installed ones), and not by its code?"""
     if package in roots:
         return False
     with contextlib.suppress(ImportError, ValueError):
@@ -141,7 +141,7 @@ def _of_library(module: str | None) -> bool:
 Parts = Callable[[Any], Iterable[Any]]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-STATE = (list, dict, set)  # under a module's lower-case name
+STATE = (list, dict, set)  # types of globals that do not count under a module's lower-case name
 SHIPPED = ("symtop.", "symtop_studies.")
 DEFINING = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom
 PLAIN = (type(None), bool, int, float, complex, str, bytes, np.generic)
@@ -160,18 +160,18 @@ _CONTAINERS: tuple[tuple[Any, Parts], ...] = (
 
 @functools.cache
 def _is_plumbing(file: str) -> bool:
-    """Does a file move numbers without making any, as Python's own do?"""
+    """Is a file one of `PLUMBING` or of Python's own library, which compute no numbers of the project?"""
     return _path(file) in PLUMBING or _path(contextlib.__file__).parent in _path(file).parents
 
 
 def by_name(function: Function) -> Function:
-    """Let a function count by its name, as a decorator: it looks up what it is given, and that is counted by itself."""
+    """Decorator: count a function by its name alone. For functions that look something up, which counts by itself."""
     _by_name.add(function)
     return function
 
 
 def _order(key: object) -> str:
-    """By what the keys of a dict are sorted: the same in every process, unlike the address in a function's `repr`."""
+    """Sort key for the keys of a dict: the same in every process, unlike the address in a function's `repr`."""
     return f"{key.__module__}.{key.__qualname__}" if isinstance(key, (FunctionType, type)) else repr(key)
 
 
@@ -180,14 +180,14 @@ class Part:
     """A function, class or constant: its label, what it holds itself, and the parts that it leads to."""
 
     label: str
-    file: str  # its label; empty for values that no file holds
+    file: str  # label of its file; empty for values that no file holds
     thing: object = field(repr=False)  # held, so that its id stays its own
     values: list[str] = field(default_factory=list, repr=False)
     parts: "dict[int, Part]" = field(default_factory=dict, repr=False)
 
 
 class Code:
-    """Functions, classes and constants that things lead to, each looked at once; `also`: what is compiled for one."""
+    """Finds the functions, classes and constants that things lead to; `also(f)` gives more of them for a function f."""
 
     def __init__(self, also: Parts = lambda _: ()) -> None:
         self._also = also
@@ -197,7 +197,7 @@ class Code:
         self._held: dict[int, tuple[object, str]] = {}  # values of the present part by id, each with its hash
 
     def reached(self, label: str, *things: object) -> list[Part]:
-        """The parts that things lead to, the first of them, under that label, the things themselves."""
+        """All parts that things lead to; the first one, labelled `label`, stands for the things themselves."""
         reached: dict[int, Part] = {}
         ahead = [Part(label, "", things)]
         self._open += ahead
@@ -211,7 +211,7 @@ class Code:
         return list(reached.values())
 
     def reasons(self, label: str, *things: object) -> Reasons:
-        """Hashes of things and of all that they lead to, by file; values that no file holds have that label."""
+        """Hashes of things and of all that they lead to, by file; values that no file holds stand under `label`."""
         return by_file(self.reached(label, *things))
 
     def _look_into(self, thing: Any) -> None:
@@ -260,7 +260,7 @@ class Code:
         else:
             values, begin = self._at.values, len(self._at.values)
             if id(thing) not in self._held:
-                self._held[id(thing)] = thing, "itself"  # where a cycle leads back to it
+                self._held[id(thing)] = thing, "itself"  # noted where a cycle of references leads back to it
                 self._add_value(thing)
                 self._held[id(thing)] = thing, hashed(*values[begin:])
                 del values[begin:]
@@ -297,7 +297,7 @@ class Code:
             self._add_all((type(thing), *(getattr(thing, name) for name in counted)))
         else:
             self._add_class(type(thing))
-            self._note(str(getattr(thing, "__name__", "")))  # of a function of C
+            self._note(str(getattr(thing, "__name__", "")))  # of a function written in C
             if not _of_library(type(thing).__module__):
                 self._add(getattr(thing, "__dict__", None))
                 names = (name for kind in type(thing).__mro__ for name in kind.__dict__.get("__slots__", ()))
@@ -330,14 +330,14 @@ class Code:
 
 
 def _statements(file: Path) -> str:
-    """Hash of what a user's file says outside of functions and classes: what its lists begin with."""
+    """Hash of the statements of a user's file outside of functions, classes and imports, which fill its lists."""
     with contextlib.suppress(OSError, SyntaxError, ValueError):  # no file, as at a prompt
         return hashed(*(ast.dump(one) for one in ast.parse(file.read_bytes()).body if not isinstance(one, DEFINING)))
     return ""
 
 
 def by_file(parts: Iterable[Part]) -> Reasons:
-    """Hashes of parts, those of a file together."""
+    """Hashes of parts by label; the parts of one file have one hash together."""
     texts: dict[str, set[str]] = {}
     for part in parts:
         label = f"code {part.file}" if part.file else part.label
@@ -363,7 +363,7 @@ def references(function: FunctionType) -> Iterator[object]:
 
 
 def named_globals(function: FunctionType) -> Iterator[tuple[str, object]]:
-    """The globals that a function names and what it imports when it runs, with the attributes of modules among them."""
+    """Name and value of each global that a function names or imports when it runs, attributes of modules included."""
     inside = list(codes(function.__code__))
     names = sorted({name for code in inside for name in code.co_names})
     package = function.__globals__.get("__package__") or ""
@@ -379,7 +379,7 @@ def named_globals(function: FunctionType) -> Iterator[tuple[str, object]]:
 
 
 def _imports(code: CodeType, package: str) -> Iterator[tuple[str, object]]:
-    """What the import statements in a function's code give, by name; libraries count by theirs."""
+    """Name and value of what import statements in a function's code bind, but for libraries, which count by name."""
     if _IMPORT not in code.co_code[::2]:
         return
     steps = [step for step in dis.get_instructions(code) if step.opname != "EXTENDED_ARG"]
@@ -395,5 +395,5 @@ def _imports(code: CodeType, package: str) -> Iterator[tuple[str, object]]:
                 if not hasattr(module, part):
                     importlib.import_module(f"{name}.{part}")
             yield from [(f"{name}.{part}", getattr(module, part)) for part in names.argval or ()] or [(name, module)]
-        except ImportError:  # of an optional package
+        except ImportError:  # an optional package is not installed
             yield name, "absent"

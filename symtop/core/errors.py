@@ -1,7 +1,7 @@
 """Errors of the user and errors of other people's code, each as one sentence.
 
 Within `foreign_code`, around a call of a plug-in's solver or a user's study, whatever is raised becomes a SymtopError,
-errors beside `Exception` included; Ctrl-C and SIGTERM pass.
+also what is no `Exception`; the exceptions of Ctrl-C and SIGTERM pass unchanged.
 """
 
 import contextlib
@@ -16,7 +16,7 @@ from symtop.core.signals import is_of_user
 
 LONGEST_PART = 255  # bytes of a name in a folder
 SHOWN = 80  # characters of a name that are shown
-ENTRY = "an entry of "  # a row, before its name
+ENTRY = "an entry of "  # stands before the name of a row in messages about one of its entries
 MAGIC = (b"\x89HDF", b"CDF")  # the first bytes of netCDF files
 
 
@@ -40,7 +40,7 @@ class SymtopError(ValueError):
 
 
 class UnknownNameError(SymtopError):
-    """A name, `value`, that is none of those that are known."""
+    """A name that is not among the known ones; `value` is that name."""
 
     value: object = None
 
@@ -50,7 +50,7 @@ class SymtopWarning(UserWarning):
 
 
 def shown(value: object) -> str:
-    """A value in words, whatever it is: its own `repr` may raise anything."""
+    """The `repr` of a value, or if that raises anything, its type."""
     try:
         return repr(value)
     except Exception:  # noqa: BLE001
@@ -60,7 +60,7 @@ def shown(value: object) -> str:
 def finite(name: str, value: object, least: float = -math.inf) -> float:
     """Return `value` as a float; refuse anything that is not one finite real number, or is below the least."""
     number = math.nan
-    # float() would read a number in them; one in an array of one entry, below NumPy 2.4
+    # float() accepts all of these: text, booleans and, below NumPy 2.4, arrays of one entry
     other = getattr(value, "ndim", 0) or getattr(getattr(value, "dtype", None), "kind", "") in ("b", "U", "S", "c")
     if not (other or isinstance(value, (bool, str, bytes, bytearray)) or type(value).__name__ == "MaskedConstant"):
         with contextlib.suppress(TypeError, ValueError, OverflowError):
@@ -107,7 +107,7 @@ def file_path(name: str, value: object) -> Path:
 
 
 def check_replaceable(path: Path) -> None:
-    """Refuse to replace what is there and is no netCDF file: a script, a device, a folder; SymtopError."""
+    """Raise SymtopError if `path` exists and is no netCDF file, but a script, a device or a folder."""
     if path.is_dir():
         raise SymtopError(f"cannot write {path}: it is a folder")
     head = b""
@@ -130,7 +130,7 @@ def at_home(path: str | os.PathLike[str]) -> Path:
 
 def row(name: str, values: object) -> list[float]:
     """Return `values` as a list of finite floats; refuse anything that is not a row of them."""
-    with contextlib.suppress(TypeError):  # nothing to go through, such as an array without dimensions
+    with contextlib.suppress(TypeError):  # not iterable, such as an array without dimensions
         entries = None if isinstance(values, (str, bytes, dict, set)) else list(values)  # type: ignore[call-overload]
         if entries is not None:
             return [finite(f"{ENTRY}{name}", value) for value in entries]
@@ -146,7 +146,7 @@ def label(name: str, value: object) -> str:
 
 
 def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
-    """Return `value` if it is one of `allowed`; otherwise name the nearest of them."""
+    """Return `value` if it is one of `allowed`; otherwise raise UnknownNameError, which names the nearest of them."""
     options = list(allowed)
     if isinstance(value, str) and value in options:
         return value
@@ -159,12 +159,12 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
 
 
 LONGEST = 300  # characters that are shown of the message of an error or a process
-_COMPILING = "(step: nopython frontend)"  # numba says it before each cause, from the loop inwards; the last counts
+_COMPILING = "(step: nopython frontend)"  # numba's text before each cause, from the loop inwards; the last is the cause
 _TRACE = r",? (?:defined at |raised from |File \"|During: |There are \d+ candidate)"  # what follows a cause
 
 
 def words_of(error: BaseException) -> str:
-    """The type of an error and what it says, in one line, if it can be said."""
+    """The type and the message of an error, in one line."""
     try:
         message = " ".join(str(error).split())
     except Exception:  # noqa: BLE001  (its own __str__ may raise anything)
@@ -183,7 +183,7 @@ def last_words(output: bytes) -> str:
 
 @contextlib.contextmanager
 def foreign_code(what: str, kind: type[SymtopError] = SymtopError) -> Iterator[None]:
-    """Within it, whatever is raised becomes an error of that kind: `what` failed, and how. One of that kind passes."""
+    """Turn whatever the block raises into an error of that kind, "`what` failed: ..."; one of that kind passes."""
     try:
         yield
     except BaseException as error:

@@ -1,8 +1,8 @@
-"""Files: those that are whole or absent, the cache of what can be made again, and locks.
+"""Files that are written completely or not at all, the cache folder, and file locks.
 
 The cache holds compiled kernels, references and checkpoints of long runs. Every use of an entry sets its time of
 modification, at most once a day. Entries that nobody used for `UNUSED` days are removed, and those used longest ago
-until the folder is small enough. Another process may be doing the same.
+until the folder is small enough. Several processes may do so at the same time.
 """
 
 import contextlib
@@ -23,23 +23,23 @@ from symtop.core.errors import SymtopError, SymtopWarning
 DAY = 86_400.0  # seconds
 UNUSED = 30  # days
 
-A_KERNEL, CLOSED_FORM = 3.0, 7  # seconds of a core to compile one; the closed form takes as long as so many
-expected = [1]  # kernels that what runs now may have to compile
+A_KERNEL, CLOSED_FORM = 3.0, 7  # seconds to compile a kernel on one core; the closed form takes this many times as long
+expected = [1]  # how many kernels the running command may have to compile
 
 
 def is_terminal(stream: TextIO | None) -> bool:
-    """Is somebody watching this stream of the process, which is None where it was closed?"""
+    """Is this stream a terminal? A standard stream of the process that was closed is None."""
     return stream is not None and stream.isatty()
 
 
 def compiling() -> str:
-    """What a command says before it compiles."""
+    """The message before a compilation: how many kernels there are to compile, and how long that may take."""
     count = f"up to {expected[0]} kernels" if expected[0] > 1 else "a kernel"
     return f"compiling {count}, about {A_KERNEL * expected[0]:.0f} s on one core, once"
 
 
 def _tell() -> None:
-    """Say once, to somebody who is watching, that kernels are being compiled."""
+    """Print once, on a terminal or in a notebook, that kernels are being compiled."""
     on_cold.remove(_tell)
     if "ipykernel" in sys.modules or is_terminal(sys.stderr):
         print(f"symtop: {compiling()}", file=sys.stderr, flush=True)  # noqa: T201  (no warning: nothing is wrong)
@@ -55,16 +55,16 @@ def cache_root() -> Path:
 
 
 def make_private(folder: Path) -> None:
-    """Make a folder, and those above it that are missing, for nobody but this user."""
+    """Make a folder and its missing parents, which only this user can access."""
     if not folder.is_dir():
         make_private(folder.parent)
         folder.mkdir(0o700, exist_ok=True)
 
 
 def distrust(path: Path) -> tuple[str, str]:
-    """Why code from this file or folder may be somebody else's, and how to mend it; "" and "" if only we can write it.
+    """Why another user may have written this file or folder, and what to do about it; "" and "" if nobody else can.
 
-    What the system's administrator owns is trusted, and so is what is not there.
+    What the system's administrator owns is trusted, and so is a path that does not exist.
     """
     try:
         status = path.stat()
@@ -78,7 +78,7 @@ def distrust(path: Path) -> tuple[str, str]:
 
 
 def is_trusted(path: Path) -> bool:
-    """Can nobody else have written this file or folder of compiled code? A warning says why not, once."""
+    """Can no other user have written this file or folder of compiled code? If one can, warn once and say why."""
     why, remedy = distrust(path)
     if why:
         _warn(f"kernels are compiled in memory, because {why}; {remedy}")
@@ -114,7 +114,7 @@ def prune(folder: Path, most_bytes: int) -> None:
 
 
 def by_last_use(folder: Path) -> list[Path]:
-    """The entries of a folder, the one used last first; partial files, whose names begin with a dot, are none."""
+    """The entries of a folder, most recently used first, without partial files, whose names begin with a dot."""
     times = {}
     for entry in folder.glob("[!.]*"):
         with contextlib.suppress(OSError):
@@ -124,10 +124,10 @@ def by_last_use(folder: Path) -> list[Path]:
 
 @contextlib.contextmanager
 def replacing(path: str | os.PathLike[str], suffix: str = "", mode: int = 0o666) -> Iterator[Path]:
-    """A file to write to in place of `path`, which it replaces in one move if all goes well and not at all if not.
+    """Yield a temporary file to write to; it replaces `path` in one move if the block succeeds, and not if it fails.
 
-    The user's umask restricts `mode`, and of a link what it names is replaced. Raises SymtopError if the disk is full,
-    the folder cannot be written to, or `path` is a folder.
+    The user's umask restricts `mode`. Of a symbolic link, the target is replaced. Raises SymtopError if the disk is
+    full, the folder cannot be written to, or `path` is a folder.
     """
     if "\0" in str(path):
         raise SymtopError(f"a path must not hold a null character, as {str(path)!r} does")
@@ -141,7 +141,7 @@ def replacing(path: str | os.PathLike[str], suffix: str = "", mode: int = 0o666)
         with contextlib.ExitStack() as stack:
             stack.callback(partial.unlink, missing_ok=True)
             yield partial
-            with partial.open("rb+") as file:  # on Windows what is only read cannot be brought to the disk
+            with partial.open("rb+") as file:  # Windows flushes no file that is open for reading only
                 os.fsync(file.fileno())
             partial.replace(target)
     except OSError as error:
@@ -149,7 +149,7 @@ def replacing(path: str | os.PathLike[str], suffix: str = "", mode: int = 0o666)
 
 
 def sweep(path: Path) -> None:
-    """Remove partial files of writers that were killed, its parts' too; call it only while nobody else writes it."""
+    """Remove what killed writers of `path` and of its parts left; call it only while no other process writes them."""
     ours = path.parent.glob(f".{glob.escape(path.name)}.*.part*")
     for partial in (*ours, *path.with_name(f"{path.name}.parts").glob(".*.????????.part*")):
         partial.unlink(missing_ok=True)
@@ -157,22 +157,22 @@ def sweep(path: Path) -> None:
 
 try:
     import fcntl
-except ImportError:  # no such locks here: two processes may then compute the same, and write the same file
+except ImportError:  # a system without these locks: two processes may compute the same and write the same file
     fcntl = None  # type: ignore[assignment]
 
-NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)  # of file systems that have none, as some of clusters
+NO_LOCKS = (errno.ENOLCK, errno.ENOSYS, errno.EOPNOTSUPP)  # errors of file systems without locks, as on some clusters
 
 
 def lock_path(path: Path) -> Path:
-    """The lock of a file, and of every other one of its stem."""
+    """The lock file of `path`, which all files of that folder and stem share."""
     return path.with_name(f".{path.stem}.lock")
 
 
 @contextlib.contextmanager
 def locked(path: Path, *, wait: bool) -> Iterator[bool]:
-    """Hold a file's lock, so that nobody else computes it; yields False if somebody else holds it and `wait` is false.
+    """Hold a file's lock, so that no other process computes it; yields False if one holds it and `wait` is false.
 
-    The lock's file is there while it is held, and afterwards if its holder was killed.
+    The lock file exists while the lock is held, and afterwards if its holder was killed.
     """
     if fcntl is None:
         yield True
@@ -195,7 +195,7 @@ def locked(path: Path, *, wait: bool) -> Iterator[bool]:
                     raise
             if os.fstat(file.fileno()).st_nlink == 0:  # its holder removed it while we waited
                 continue
-            os.utime(file.fileno())  # since when it is held
+            os.utime(file.fileno())  # the time of the file says since when the lock is held
             try:
                 yield True
             finally:
@@ -205,7 +205,7 @@ def locked(path: Path, *, wait: bool) -> Iterator[bool]:
 
 @contextlib.contextmanager
 def only_writer(path: Path) -> Iterator[Path]:
-    """The folder of a file's parts, while nobody else writes that file; SymtopError if another process does."""
+    """Lock a file for writing and yield the folder of its parts; SymtopError if another process is writing it."""
     folder = path.with_name(f"{path.name}.parts")
     with locked(folder, wait=False) as ours:
         if not ours:

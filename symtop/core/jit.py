@@ -1,14 +1,14 @@
 """Compilation of kernels with numba, with a disk cache that never serves stale numbers.
 
 numba stamps a cached kernel with the file of the function itself and does not see edits in the files it calls, so that
-an old kernel can return old numbers in silence; and it compiles again what only moved down by a line. Here the folder
+an old kernel can silently return old numbers; and it recompiles a function that only moved by a line. Here the folder
 of a kernel is named after a hash of everything it is compiled from (`symtop.core.code_hash`): instructions, constants
 and values of its functions, wherever they stand, and the versions of Python and numba. The first time a process saves a
 kernel it removes those that nobody used for 30 days, and the oldest ones beyond `MOST_BYTES`.
 
-Beside it stands `fused`, a b + c with one rounding, which numba lacks. A number on the grid of its last place plus a
-correction that hardly changes from step to step is rounded the same way every time, a bias of up to half a unit in the
-last place; the exact product has random digits below that grid, and added before the rounding they remove the bias.
+The module also compiles `fused`, a b + c with one rounding, which numba lacks. A sum of a number and a correction that
+hardly changes from step to step is rounded the same way every time, a bias of up to half a unit in the last place. The
+exact product has random digits below the last place; added before the rounding, they remove the bias.
 """
 
 import contextlib
@@ -49,15 +49,15 @@ set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new
 to_fixed_tuple: Any = fixed_tuple  # in a kernel: to_fixed_tuple(array, n)
 
 MOST_BYTES = 200_000_000  # of kernels that are kept, about 2000 of them
-OPTIONS = {"error_model": "numpy", "nogil": True}  # division by zero gives infinity, as in C; threads run at once
-HASH = hashlib.sha256().digest_size  # bytes before the code in its file
+OPTIONS = {"error_model": "numpy", "nogil": True}  # division by zero gives infinity, as in C; no Python lock
+HASH = hashlib.sha256().digest_size  # length in bytes of the hash that a code file begins with
 FORMAT = "bitcode and machine code"  # of what is stored of a kernel
-SHIPPED = PACKAGE / "kernels"  # bitcode that a wheel brings, by kernel
-NAMED = ("modname", "qualname", "unique_name", "mangled_name", "env_name", "args")  # of a kernel, as numba describes it
-WITHIN = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # kernels alone call it: 14 % less to compile
-WRAPPERS = ("_ZN7cpython", "cfunc.")  # names of functions that Python and C can call
+SHIPPED = PACKAGE / "kernels"  # bitcode that comes with a wheel, a folder for each kernel
+NAMED = ("modname", "qualname", "unique_name", "mangled_name", "env_name", "args")  # of numba's record of a kernel
+WITHIN = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # for functions only kernels call: 14 % less to compile
+WRAPPERS = ("_ZN7cpython", "cfunc.")  # how the names of functions begin that Python and C can call
 INLINED = {"forceinline": True, **WITHIN}
-UNUSABLE = (OSError, ValueError, LookupError, RuntimeError, zlib.error, AttributeError, TypeError)  # disk, or numba
+UNUSABLE = (OSError, ValueError, LookupError, RuntimeError, zlib.error, AttributeError, TypeError)  # of files or numba
 _ARRAYS = [types.Array(kind, n, "C") for kind in (types.float64, types.int64) for n in (1, 2, 3)]
 RETURNED = {repr(kind): kind for kind in (types.none, types.boolean, types.int64, types.float64, *_ARRAYS)}
 
@@ -73,8 +73,8 @@ overload(sincos, jit_options=INLINED, strict=False)(lambda *_: polynomials)
 def register_jitable(function: Function, options: dict[str, Any] = INLINED) -> Function:
     """Let kernels call a plain function, inlined wherever they do: LLVM would keep the larger ones as calls.
 
-    A function is registered once: numba would add another overload each time, and what a kernel is made of would hang
-    on how many loops a process has built before.
+    A function is registered once: numba would add another overload each time, and the hash of a kernel's code would
+    depend on how many loops the process has built before.
     """
     if function not in _registered:
         _registered.add(function)
@@ -84,7 +84,7 @@ def register_jitable(function: Function, options: dict[str, Any] = INLINED) -> F
 
 @by_name
 def by_length(*functions: tuple[int, Callable[..., Any]]) -> Callable[..., Any]:
-    """A function (par, x, ...) that is one of several by the length of the tuple x, in Python and in kernels."""
+    """A function (par, x, ...) that calls the one of `functions` for the length of the tuple x, also in kernels."""
     known = dict(functions)
     for function in known.values():
         register_jitable(function)
@@ -109,24 +109,24 @@ def _overloads(function: FunctionType) -> Iterator[object]:
 
 
 def code_of(thing: object) -> list[Part]:
-    """What a kernel, or anything that holds kernels, is compiled from; the same whatever a process has run before."""
-    for function, is_inlined in marked:  # by modules without numba, so far
+    """The parts that a kernel, or an object with kernels, is compiled from, whatever the process has run before."""
+    for function, is_inlined in marked:  # by the modules loaded so far that do not import numba
         register_jitable(function, INLINED if is_inlined else OPTIONS | WITHIN)
     return Code(_overloads).reached("kernel", thing, OPTIONS, sys.version_info[:2], numba.__version__)
 
 
 def code() -> Code:
-    """What looks for code, as numba compiles it; a function counts alike before and after a kernel registers it."""
+    """A `Code` that follows numba's overloads; a function's hash is the same before and after it is registered."""
     return Code(lambda function: () if function in _registered else _overloads(function))
 
 
 class _Library(JITCodeLibrary):  # type: ignore[misc]
     """The code of a kernel, or of a function that kernels call.
 
-    What a kernel calls is simplified function by function and linked into it; numba also optimises each as a whole,
-    which takes 15 % of a compilation and is done again with the kernel. Nor has it machine code of its own: nobody
-    would run that, as Python and C call a function through a wrapper, which inner ones lack. A kernel's code hides
-    them: numba numbers names by process, and of two kernels from disk one would call the other's.
+    numba simplifies each function that a kernel calls and links it into the kernel. It also optimises each as a whole,
+    which takes 15 % of a compilation and is done again with the kernel: that is left out here. Such a function gets no
+    machine code of its own either, as Python and C could call it only through a wrapper, which it lacks. Its name is
+    internal to the kernel: numba numbers names by process, and one kernel from disk could call a function of another.
     """
 
     bitcode = b""  # of a kernel with all that it calls, before it is optimised for a processor
@@ -135,7 +135,7 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
         return [one for one in self._final_module.functions if not one.is_declaration]
 
     def _own(self) -> set[str]:
-        """The names by which a kernel is called; none if it is no kernel."""
+        """The names under which Python and C call a kernel; none for a function that only kernels call."""
         wrappers = {one.name for one in self._defined() if one.name.startswith(WRAPPERS)}
         return wrappers | {name.removeprefix(WRAPPERS[1]) for name in wrappers}
 
@@ -160,24 +160,24 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
 class _Cache:
     """The code of one kernel in its folder, by signature: bitcode, which serves any processor, and machine code.
 
-    A file is named after what its code hangs on and begins with a hash: of bitcode with that name, of machine code with
-    the bitcode that it was made of. None holds a pickle, but code is a program, too: what somebody else may have
-    written is not read. Bitcode may also be in `SHIPPED`, which is trusted as the package is. A full disk or a damaged
-    file costs a compilation and not the run.
+    A file is named after all that its code depends on. It begins with a hash of its content and of its name (bitcode)
+    or of the bitcode that it was made from (machine code). A file that another user may have written is not read, as
+    its code would be executed. Bitcode may also be in `SHIPPED`, which is trusted as the package is. After an error of
+    the disk or with a damaged file the kernel is compiled, and the run goes on.
     """
 
     def __init__(self, folder: Path) -> None:
         self.cache_path = folder
 
     def files(self, signature: Any, codegen: Any) -> tuple[Path, Path, Path]:
-        """Of the machine code, of the bitcode, and of the bitcode that a wheel may have brought."""
+        """Paths of the machine code, of the bitcode, and of the bitcode that may have come with a wheel."""
         system, *processor = codegen.magic_tuple()
         stem = hashed(json.dumps([*map(_words, signature)]), system, llvmlite.__version__)
         code = self.cache_path / f"{stem}.{hashed(*processor)}.code"
         return code, self.cache_path / f"{stem}.bitcode", SHIPPED / self.cache_path.name / f"{stem}.bitcode"
 
     def load_overload(self, signature: Any, context: Any) -> Any:
-        """The compiled kernel, as numba asks for it; None, and whoever listens is told, if it has to be compiled."""
+        """The kernel from disk, for numba; if it has to be compiled, None, after a call of the functions `on_cold`."""
         context.refresh()
         for of in (1, 2):
             with contextlib.suppress(*UNUSABLE):
@@ -188,7 +188,7 @@ class _Cache:
         return None
 
     def save_overload(self, signature: Any, result: Any) -> None:
-        """Keep a compiled kernel, if what is written says all that another process needs."""
+        """Store a compiled kernel, for numba, unless the file would lack something that another process needs."""
         with contextlib.suppress(*UNUSABLE):
             library, kernel, constants = result.library, result.fndesc, result.environment.consts
             about = {name: getattr(kernel, name) for name in NAMED} | {"library": library.name}
@@ -204,7 +204,7 @@ class _Cache:
 
 
 def _loaded(arguments: tuple[Any, ...], context: Any, entry: bytes, code: Path) -> Any:
-    """A kernel from its bitcode, with the machine code if that is there; otherwise that is made, and kept."""
+    """A kernel from its bitcode and its machine code in the file `code`; missing machine code is made and stored."""
     head, _, bitcode = entry.partition(b"\n")
     about = json.loads(head)
     returned = _type(about["returned"])
@@ -217,7 +217,7 @@ def _loaded(arguments: tuple[Any, ...], context: Any, entry: bytes, code: Path) 
     if library._compiled_object is None:
         library._optimize_final_module()
     library._finalize_final_module()
-    if library._compiled:  # now
+    if library._compiled:  # in this call
         with contextlib.suppress(OSError, SymtopError):
             _write(code, library._get_compiled_object(), entry)
     kernel = PythonFunctionDescriptor(
@@ -253,7 +253,7 @@ def _name(file: Path) -> bytes:
 
 
 def _read(file: Path, of: bytes) -> bytes:
-    """What was written there of something; ValueError if it was not, or may have been by somebody else."""
+    """The content of a file written with `of`; ValueError if it was not, or another user may have written it."""
     if SHIPPED not in file.parents and not is_trusted(file):
         raise ValueError("the code on disk may be somebody else's")
     whole = file.read_bytes()
@@ -263,7 +263,7 @@ def _read(file: Path, of: bytes) -> bytes:
 
 
 def _write(file: Path, content: bytes, of: bytes) -> None:
-    """Replace a file in one move, a process's first one after making room."""
+    """Replace a file in one move; a process's first call removes old kernels before. `of` enters the file's hash."""
     if not _pruned:
         _pruned.append(file)
         prune(file.parent.parent, MOST_BYTES)
@@ -273,7 +273,7 @@ def _write(file: Path, content: bytes, of: bytes) -> None:
 
 
 def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
-    """Compile a kernel as a `_Library`; environments get addresses with its code. The caller holds numba's lock."""
+    """Compile a kernel as a `_Library`; environments are set once its code has addresses. Call with numba's lock."""
     codegen = kernel.targetctx.codegen()
     own = vars(codegen)
     if "set_env" in own:
@@ -296,7 +296,7 @@ def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
 
 @functools.cache
 def is_lean() -> Any:
-    """Has numba what `_Library` needs, which is private? If not, it compiles as it does. The trial stays; 0.06 s."""
+    """A test kernel, if numba has the private parts that `_Library` needs; else None, for numba's own way. 0.06 s."""
     part = register_jitable(lambda x: x + 1.0, OPTIONS | WITHIN)
     kernel = njit(**OPTIONS)(lambda x: 2.0 * part(x))
     with contextlib.suppress(Exception):
@@ -306,10 +306,10 @@ def is_lean() -> Any:
 
 
 def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
-    """numba's compilation, of a kernel that is not on disk by one process at a time: the next ones load it.
+    """`compiling`, run by one process at a time for a kernel that is not on disk: the others wait and load it.
 
-    Python looks for no cyclic garbage meanwhile, which takes 9 % less time, and 100 MB more for the largest kernel.
-    numba's lock is taken first, as its own nested compilations take it first.
+    The garbage collector is off meanwhile: 9 % less time, and 100 MB more memory for the largest kernel. numba's lock
+    is taken before that of the file, as its own nested compilations take it first.
     """
 
     @functools.wraps(compiling)
@@ -318,7 +318,7 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
             if gc.isenabled():
                 stack.callback(gc.enable)
                 gc.disable()
-            with contextlib.suppress(AttributeError):  # numba notes the begin and end of every call of LLVM: 4 %
+            with contextlib.suppress(AttributeError):  # numba's callbacks at every call of LLVM take 4 % of the time
                 noting = ffi.lib._lock._cblist
                 stack.callback(noting.extend, noting[:])
                 noting.clear()
@@ -355,7 +355,7 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
 
 
 def _named(function: Any, made_of: str) -> FunctionType:
-    """The function under a name of its own: LLVM finds machine code by name, and numba counts names by process."""
+    """The function under a unique name: LLVM finds machine code by name, and numba numbers names by process."""
     own = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__,
                        function.__closure__)  # fmt: skip
     own.__qualname__, own.__module__ = f"{function.__qualname__}_{made_of[:16]}", function.__module__
@@ -363,10 +363,10 @@ def _named(function: Any, made_of: str) -> FunctionType:
 
 
 def is_cached(kernel: Any, signature: Any, *, bitcode: bool = False) -> bool:
-    """Is a kernel's machine code in memory or on disk, or, if that is asked for, at least its bitcode on disk?"""
+    """Is a kernel's machine code in memory or on disk? With `bitcode`, its bitcode on disk is enough."""
     if signature in kernel.overloads:
         return True
-    with contextlib.suppress(AttributeError, TypeError, OSError):  # numba's own cache, another numba, or no way there
+    with contextlib.suppress(AttributeError, TypeError, OSError):  # numba's own cache, another numba, or unreadable
         files = kernel._cache.files(signature, kernel.targetctx.codegen())
         return any(file.is_file() for file in files[: 3 if bitcode else 1])
     return False

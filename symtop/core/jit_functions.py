@@ -1,6 +1,6 @@
-"""Functions that kernels call, marked where they stand without importing numba.
+"""Decorators that mark functions for use in kernels without importing numba.
 
-`symtop.core.jit` registers what is marked here when it is first loaded, and compiles it as it stands. A marked
+`symtop.core.jit` registers the marked functions before it compiles a kernel, and compiles them unchanged. A marked
 function remains a plain function: interpreted, it returns the bits that it returns when compiled, provided that it
 
     adds, subtracts, multiplies, divides and takes square roots of doubles (IEEE 754 leaves no choice there),

@@ -1,7 +1,7 @@
-"""Labelled datasets: names and units of variables, provenance, and files that are whole or absent.
+"""Labelled datasets: names and units of variables, provenance, and files that are written completely or not at all.
 
-Conventions are CF-1.11 where it applies. Only maps of bytes and numbers in single precision, which a study has rounded,
-are compressed: round-off does not compress. No time stamps inside, so that equal inputs give equal bytes.
+Conventions are CF-1.11 where it applies. Only unsigned integers and single-precision numbers, which a study has
+rounded, are compressed: digits of round-off do not compress. Without time stamps, equal inputs give equal bytes.
 """
 
 import contextlib
@@ -33,8 +33,8 @@ one_thread = threading.RLock()  # two threads inside the netCDF library at once 
 class Column(NamedTuple):
     """A line of a table of variables."""
 
-    entry: tuple[str, ...]  # long name, units in SI, where they differ: units of a problem without any
-    flags: dict[int, str]
+    entry: tuple[str, ...]  # long name, units in SI, and if they differ those of a dimensionless problem
+    flags: dict[int, str]  # the meaning of each value of an integer variable
 
 
 def read_columns(file: Path | None) -> dict[str, Column]:
@@ -59,23 +59,23 @@ CONVENTIONS = {"Conventions": "CF-1.11", "source": "symtop", "history": f"made b
 
 Tree = TypeVar("Tree", bound=xr.Dataset | xr.DataTree)
 
-LITTLE = 1_000_000  # with fewer free bytes a write error is reported as a full disk
+LITTLE = 1_000_000  # bytes: with less free space a write error is reported as a full disk
 ROOT = Path(__file__).resolve().parents[2]
-_DEPENDENCIES = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath")  # told in every file
+_DEPENDENCIES = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath")  # in each file
 
 
 def _git(*arguments: str) -> str:
-    """What git says of the checkout that this is; empty where there is none, or no git."""
+    """The output of a git command on symtop's own checkout; empty if there is none, or no git."""
     command = ["git", "-C", str(ROOT), *arguments]
     with contextlib.suppress(OSError, subprocess.SubprocessError):
-        if (ROOT / ".git").exists():  # git would take that of a folder above
+        if (ROOT / ".git").exists():  # git would use the repository of a folder above
             return subprocess.run(command, capture_output=True, text=True, timeout=10, check=True).stdout.strip()  # noqa: S603
     return ""
 
 
 @functools.cache
 def provenance(*, changes: bool = False) -> dict[str, str]:
-    """What made a dataset: versions, revision, machine. Flat strings, as netCDF wants them.
+    """The provenance of a dataset: versions, revision, machine. Flat strings, as netCDF needs them.
 
     With `changes`, the revision is marked if the checkout holds code that is not committed (a report says so).
     """
@@ -91,7 +91,7 @@ def provenance(*, changes: bool = False) -> dict[str, str]:
 
 
 def groups(data: xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
-    """The datasets of a tree by their paths in it, its root under the empty name; a dataset is a root alone."""
+    """The datasets of a tree by their paths in it, "" for its root; a dataset counts as a root without children."""
     if isinstance(data, xr.Dataset):
         return {"": data}
     return {node.path.strip("/"): node.to_dataset(inherit=False) for node in data.subtree}
@@ -99,14 +99,14 @@ def groups(data: xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
 
 @functools.cache
 def variable_attributes(name: str, units: str) -> dict[str, str]:
-    """The long name and units of a variable, or of the low half of one, NAME_lo; none of what symtop does not know."""
+    """The long name and units of a variable, or of its low half, NAME_lo; nothing for a name symtop does not know."""
     whole = name.removesuffix("_lo")
     known = label(VARIABLES[whole], units) if whole in VARIABLES else {}
     return known | {"long_name": f"{known['long_name']}, low half"} if known and whole != name else known
 
 
 def label(entry: tuple[str, ...], units: str, elsewhere: str = "") -> dict[str, str]:
-    """Attributes of a variable with such an entry in `VARIABLES`; `elsewhere` ends a name whose units are not SI's."""
+    """Attributes from an entry of `VARIABLES`; `elsewhere` is added to the long name if the units are not the SI's."""
     long_name, *choice = entry
     if units == "SI" or len(set(choice)) < 2:
         elsewhere = ""
@@ -114,10 +114,10 @@ def label(entry: tuple[str, ...], units: str, elsewhere: str = "") -> dict[str, 
 
 
 def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree:
-    """Give variables without a long name theirs and units, and a dataset, or a tree's root, provenance and attributes.
+    """Label the variables without a long name; give the dataset, or the tree's root, provenance and attributes.
 
-    `units` is that of the scene: "SI", or empty for a problem without units, where all but angles have the unit "1".
-    Variables that were labelled as those of such a problem get the units of the scene.
+    `units` is that of the scene: "SI", or empty for a dimensionless problem, where all but angles have the unit "1".
+    Variables that were labelled as those of a dimensionless problem get the units of the scene.
     """
     for group in groups(data).values():
         for name, variable in group.variables.items():  # ``group[name]`` would make a DataArray
@@ -130,7 +130,7 @@ def describe(data: Tree, title: str, units: str = "", **attributes: Any) -> Tree
 def attributes_of(title: str, **attributes: Any) -> dict[str, Any]:
     """The attributes of a dataset: conventions, title, those given, as text or numbers of 64 bits, and provenance."""
     plain: dict[str, Any] = {}
-    for key, value in attributes.items():  # of NumPy, too, as somebody's solver may count steps
+    for key, value in attributes.items():  # a plug-in's solver may count steps in NumPy's types
         number = int(value) if isinstance(value, np.integer) else value
         number = float(value) if isinstance(value, np.floating) else number
         is_plain = isinstance(number, (str, float)) or (type(number) is int and abs(number) < 2**63)
@@ -166,10 +166,10 @@ def _encoding(data: xr.Dataset) -> dict[Any, dict[str, Any]]:
 
 
 def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
-    """Write a netCDF file so that it is whole or not there, whatever happens meanwhile; a tree as netCDF groups.
+    """Write a netCDF file that is complete or absent, whatever happens meanwhile; a tree becomes netCDF groups.
 
-    In a worker of dask, xarray asks the scheduler for a lock first, and waits for ever if that is gone. A file that is
-    being written has a name of its own, so that no lock is needed.
+    In a worker of dask, xarray asks the scheduler for a lock first, and waits for ever if the scheduler has ended. Each
+    writer here has a temporary file of its own, so that no lock is needed.
     """
     encoding: Any = {f"/{name}": _encoding(group) for name, group in groups(data).items()}
     with deferred(), replacing(path) as partial, contextlib.ExitStack() as stack:
@@ -181,7 +181,7 @@ def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
             with one_thread:
                 whole = encoding if isinstance(data, xr.DataTree) else encoding["/"]
                 data.to_netcdf(partial, engine="netcdf4", encoding=whole)
-        except RuntimeError as error:  # the netCDF library's own word for a disk that is full
+        except RuntimeError as error:  # the netCDF library's error for a full disk, among others
             full = shutil.disk_usage(partial.parent).free < LITTLE
             raise OSError(None, f"no room is left in {partial.parent}" if full else str(error)) from error
     return Path(path)
@@ -196,12 +196,12 @@ def array_hash(values: Any) -> str:
 
 
 def content_hash(data: xr.Dataset) -> str:
-    """Hash of all values and their dimensions, so that a damaged or foreign file cannot pass for a good one."""
+    """Hash of all values and their dimensions, by which a damaged or foreign file is recognised."""
     digest = hashlib.sha256()
     for name in sorted(str(name) for name in data.variables):
         values = np.ascontiguousarray(data.variables[name].values)
         digest.update(f"{name}{data.variables[name].dims}{values.shape}".encode())
-        text = values.dtype.kind in "OUT"  # kept as it is written, however it is stored
+        text = values.dtype.kind in "OUT"  # counts by its characters, however it is stored
         digest.update("\0".join(map(str, values.ravel())).encode() if text else values.dtype.kind.encode())
         digest.update(b"" if text else values.tobytes())
     return digest.hexdigest()
@@ -209,7 +209,7 @@ def content_hash(data: xr.Dataset) -> str:
 
 @contextlib.contextmanager
 def _netcdf(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Hold the netCDF library, and say in a sentence what it could not read."""
+    """Hold the netCDF library's lock; any error in the block becomes a SymtopError that names the file."""
     try:
         with deferred(), one_thread:
             yield
@@ -220,7 +220,7 @@ def _netcdf(path: str | os.PathLike[str]) -> Iterator[None]:
 def read(path: str | os.PathLike[str]) -> xr.Dataset:
     """Load a netCDF file completely into memory and close it."""
     with _netcdf(path), xr.open_dataset(path, engine="netcdf4") as data:
-        return data.load().drop_encoding()  # which has the length of its longest text: longer ones would be cut
+        return data.load().drop_encoding()  # an encoding keeps the longest text's length: longer ones would be cut
 
 
 def read_any(path: str | os.PathLike[str]) -> xr.Dataset | xr.DataTree:

@@ -17,7 +17,7 @@ _contexts = threading.local()  # its attributes are the thread's own
 
 
 def context(digits: int) -> Any:
-    """An mpmath context of that many decimal digits, a thread's own: threads spoil the digits of `mpmath.mp`."""
+    """An mpmath context of that many decimal digits, one for each thread, as all threads share `mpmath.mp`."""
     mine: dict[Any, Any] = vars(_contexts)
     if digits not in mine:
         from mpmath.ctx_mp import MPContext  # mpmath costs 0.1 s to import

@@ -19,7 +19,7 @@ Result = TypeVar("Result")
 MOST_THREADS = 1024
 AHEAD = 2  # pieces for each thread that are computed before their turn: results that wait take memory
 _stop = threading.local()
-_starting = threading.Lock()  # a process, whose environment is set while it starts
+_starting = threading.Lock()  # held while a process starts, as its environment is set meanwhile
 
 
 class StoppedError(Exception):
@@ -85,6 +85,6 @@ class OneThread(SpawnProcess):
 
 
 class OneThreadEach(SpawnContext):
-    """What pools start such processes with."""
+    """The multiprocessing context with which pools start such processes."""
 
     Process: ClassVar[Any] = OneThread

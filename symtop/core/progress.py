@@ -1,6 +1,6 @@
-"""Progress of what takes long: a bar or a clock on a terminal, and a line now and then where nobody watches.
+"""Progress of long work: a bar or the elapsed time on a terminal, and a line every few seconds in a pipe.
 
-Threads write both: neither numba nor heyoka holds Python's lock for half a second of a compilation.
+Threads write both, also during compilations: neither numba nor heyoka holds Python's lock for half a second.
 """
 
 import contextlib
@@ -12,20 +12,20 @@ from typing import Any
 
 from symtop.core.files import is_terminal
 
-BEAT = 1.0  # seconds from one drawing to the next, although nothing is finished
+BEAT = 1.0  # seconds between drawings of a bar, even if no part of the work has finished
 FIRST, EVERY = 2.0, 9.0  # seconds to the first line of a command in a pipe, and from one to the next
-listeners: list[Callable[[str], object]] = []  # of the command that runs
+listeners: list[Callable[[str], object]] = []  # functions that `post` calls
 
 
 def post(words: str) -> None:
-    """Say what is being done to those who listen, such as the lines of a command in a pipe."""
+    """Pass a description of the present work to all `listeners`, such as the one of `telling`."""
     for hear in listeners:
         hear(words)
 
 
 @contextlib.contextmanager
 def progress_bar(words: str, *, quiet: bool = False, **options: Any) -> Iterator[Any]:
-    """A progress bar of tqdm, or without options the words and the time since, where somebody is watching."""
+    """A progress bar of tqdm on a terminal; without options it shows `words` and the elapsed time."""
     from tqdm import tqdm
 
     options = options or {"total": 1, "bar_format": "{desc}: {elapsed}"}
@@ -48,14 +48,14 @@ def progress_bar(words: str, *, quiet: bool = False, **options: Any) -> Iterator
 
 
 def ticking(words: str) -> contextlib.AbstractContextManager[Any]:
-    """Some words and the time since, posted, and drawn each second on a terminal until the end."""
+    """Post `words`, and show them with the elapsed time on a terminal, each second until the block ends."""
     post(words)
     return progress_bar(words) if is_terminal(sys.stderr) else contextlib.nullcontext()  # without importing tqdm
 
 
 @contextlib.contextmanager
 def telling(words: str) -> Iterator[None]:
-    """Some words, or those last posted, in lines on a standard error that is no terminal, from two seconds on."""
+    """Print `words`, or those last posted, now and then to a standard error that is no terminal, after two seconds."""
     if sys.__stderr__ is None or is_terminal(sys.stderr):
         yield
         return
@@ -63,7 +63,7 @@ def telling(words: str) -> Iterator[None]:
 
     def tell() -> None:
         wait = FIRST
-        with contextlib.suppress(OSError):  # its reader has left
+        with contextlib.suppress(OSError):  # the reader of the pipe has ended
             while not ended.wait(wait):
                 seconds, wait = time.monotonic() - began, EVERY
                 print(f"symtop: {posted[-1]}, {seconds:.0f} s", file=sys.__stderr__, flush=True)

@@ -1,8 +1,8 @@
-"""Requests of the user, heard as exceptions of their own: to end (SIGTERM, SIGHUP), and to interrupt (SIGINT).
+"""Signals of the user, raised as exceptions of their own: to end (SIGTERM, SIGHUP), and to interrupt (SIGINT).
 
-An exception of its own tells a request from what a plug-in raises. It may start between any two instructions, also
-between taking a lock and entering the block that gives it back. Where a library does so (xarray's lock of HDF5: of
-twenty interrupted writes one left it taken, and the next waited for ever), a request is `deferred` until it is done.
+Own types tell a signal from what a plug-in raises. The exception may start between any two instructions, also between
+taking a lock and entering the block that releases it. Around calls of a library that does so (xarray's lock of HDF5: of
+twenty interrupted writes one left it locked, and the next waited for ever), signals are `deferred` to the call's end.
 """
 
 import contextlib
@@ -16,14 +16,14 @@ HANGUP = getattr(signal, "SIGHUP", signal.SIGTERM)  # Windows has none
 
 
 class TerminatedError(SystemExit):
-    """Somebody has asked this process to end; it does so with code 143 unless this is caught."""
+    """SIGTERM or SIGHUP has reached this process, which ends with code 143 unless this is caught."""
 
     def __init__(self) -> None:
         super().__init__(TERMINATED)
 
 
 class InterruptedByUser(KeyboardInterrupt):
-    """Somebody has pressed Ctrl-C; only this is raised for it while `told_apart`."""
+    """The user has pressed Ctrl-C (SIGINT), within `told_apart`."""
 
 
 def _end(*_: object) -> None:
@@ -63,15 +63,15 @@ def ending_on_sigterm() -> Iterator[None]:
 
 
 def told_apart() -> contextlib.AbstractContextManager[None]:
-    """Raise InterruptedByUser on SIGINT, in the main thread: no KeyboardInterrupt of a plug-in passes for it."""
+    """Raise InterruptedByUser on SIGINT, in the main thread, to tell Ctrl-C from a plug-in's KeyboardInterrupt."""
     return _handling(signal.SIGINT, signal.default_int_handler, _interrupt)
 
 
 @contextlib.contextmanager
 def deferred() -> Iterator[None]:
-    """Hear SIGINT, SIGTERM and SIGHUP at the end of the block, in the main thread.
+    """Delay SIGINT, SIGTERM and SIGHUP to the end of the block, in the main thread.
 
-    Where they end the process, they still do. For calls of milliseconds: until one is over, Ctrl-C has no effect.
+    A signal without a handler still ends the process at once. For calls of milliseconds: Ctrl-C waits for their end.
     """
     requests: list[int] = []
     numbers = {signal.SIGINT, signal.SIGTERM, HANGUP} if _in_main_thread() else ()
@@ -84,17 +84,17 @@ def deferred() -> Iterator[None]:
     finally:
         for number, handler in usual.items():
             signal.signal(number, handler)
-        with contextlib.ExitStack() as stack:  # each is heard, whatever the one before raises
+        with contextlib.ExitStack() as stack:  # each is raised, whatever the one before raises
             for number in reversed(dict.fromkeys(requests)):
                 stack.callback(signal.raise_signal, number)
 
 
 @contextlib.contextmanager
 def at_most(seconds: float | None, *, processor: bool = True) -> Iterator[None]:
-    """Raise TimeoutError in Python code of the main thread after so much time of the processor, or of the clock.
+    """Raise TimeoutError in Python code of the main thread after so much processor time, or wall-clock time.
 
-    It is raised again each second, for code that catches everything. Compiled code hears it when it returns; elsewhere,
-    where the system has no such timer, and for None, there is no limit.
+    It is raised again each second, for code that catches everything. Compiled code is stopped only when it returns.
+    There is no limit in other threads, on a system without such a timer, and for None.
     """
     if seconds is None or not _in_main_thread() or not hasattr(signal, "setitimer"):
         yield
@@ -111,11 +111,11 @@ def at_most(seconds: float | None, *, processor: bool = True) -> Iterator[None]:
     finally:
         left = signal.setitimer(timer, 0.0)[0]
         signal.signal(number, before)
-        signal.setitimer(timer, max(outer[0] - (seconds - left), 1e-3) if outer[0] else 0.0, outer[1])  # one around it
+        signal.setitimer(timer, max(outer[0] - (seconds - left), 1e-3) if outer[0] else 0.0, outer[1])  # an outer limit
 
 
 def is_of_user(error: BaseException) -> bool:
-    """Is it a request of the user? Without `told_apart` every KeyboardInterrupt counts as one."""
+    """Was it raised by a signal of the user? Outside of `told_apart` every KeyboardInterrupt counts as one."""
     if isinstance(error, KeyboardInterrupt):
         return isinstance(error, InterruptedByUser) or signal.getsignal(signal.SIGINT) is not _interrupt
     return isinstance(error, TerminatedError)

@@ -6,13 +6,13 @@
 and n modulo 4 says which of the two is the sine of x, and with which sign. S and C, of degree 5, minimise the largest
 relative error for |r| <= pi/4, each coefficient rounded before the next is fitted; that leaves 3.9e-18 and 9.0e-20.
 
-Errors, with all that is rounded: at most 0.56 and 0.63 times 2.2e-16 for 0 < x < pi/2, relative, and no larger at both
-ends, because pi/2 is subtracted in two parts and t is what r rounds off; without t they are 0.76 and 0.96. Elsewhere
-at most 1.1e-16 for |x| < 1e12, absolute. Beyond 1e15 doubles are no angles any more: both numbers stay below 1.01, and
-mean nothing. NaN and infinities give NaN.
+Relative errors, rounding included: at most 0.56 and 0.63 times 2.2e-16 for 0 < x < pi/2, and no larger at both ends,
+because pi/2 is subtracted in two parts and t is the rounding error of r; without t they are 0.76 and 0.96. Elsewhere
+the absolute error is at most 1.1e-16 for |x| < 1e12. Beyond 1e15 the spacing of doubles is too coarse for angles: both
+results stay below 1.01 in size and have no meaning. NaN and infinities give NaN.
 
-The C library is as exact and alone as fast, but LLVM vectorises no loop over tops that calls it: a step of 32 takes
-a third of the time with the polynomials (`benchmarks/sines.py`). The operations are the same in such a loop and
+The C library is as accurate, and as fast for one number, but LLVM does not vectorise a loop over tops that calls it: a
+step of 32 takes a third of the time with the polynomials (`benchmarks/sines.py`). The operations are the same in it and
 outside of it, and so are the bits. Source: Muller, Elementary Functions, chapters 3, 5 and 11.
 """
 
@@ -41,12 +41,12 @@ COSINE = (
 )
 TO_QUADRANTS = 0.6366197723675814  # 2/pi
 QUARTER, QUARTER_LOW = 1.5707963267948966, 6.123233995736766e-17  # pi/2
-UNITS, FOURS = 6755399441055744.0, 27021597764222976.0  # 1.5 2^52, 1.5 2^54: a sum with them is rounded to 1, to 4
+UNITS, FOURS = 6755399441055744.0, 27021597764222976.0  # 1.5 2^52, 1.5 2^54: adding one rounds to a multiple of 1, of 4
 DIAGONAL = 0.7071067811865476
 
 
 def sincos(x: Any) -> Any:
-    """Sine and cosine of an angle. Compiled it is `polynomials`; outside of it, the library of its argument."""
+    """Sine and cosine of an angle: in compiled code by `polynomials`, in Python by `math` or NumPy."""
     if isinstance(x, float):  # NumPy takes ten times as long for one number
         return math.sin(x), math.cos(x)
     return np.sin(x), np.cos(x)

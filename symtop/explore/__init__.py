@@ -1,5 +1,5 @@
-"""The explorer: a page with sliders; each change of one is a run beside the exact motion.
+"""The explorer: a page with sliders, each change of which makes a run and compares it with the exact motion.
 
-`answers` computes, `server` speaks HTTP, with the standard library, and the page is plain JavaScript: it works without
-a network.
+`answers` computes, `server` is an HTTP server by the standard library, and the page is plain JavaScript: it works
+without a network.
 """

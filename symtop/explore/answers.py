@@ -1,11 +1,11 @@
-"""The explorer's answers: one run beside the exact motion, as a dataset, and as a script; a map; friction.
+"""The explorer's answers: a run with the exact motion, as arrays, as a dataset and as a script; a map; friction.
 
-The page sends a flat mapping of numbers and names, which `setup` reads. The script gives the numbers of the page to the
-last bit.
+The page sends a flat mapping of numbers and names, which `setup` reads. The script reproduces the numbers of the page
+to the last bit.
 
 The map is one method on one top over a grid of steps and spins, as one ensemble. A cell is the run from the page's
 start with its own psi_dot (row) and step size (column). Its value is the largest angle in radians between its axis and
-the exact one over nine samples; a run that ended early has none.
+the exact one over nine samples, or NaN if the run ended early.
 """
 
 import base64
@@ -37,18 +37,18 @@ from symtop.run.trajectory import Trajectory
 
 TOP = ("I1", "I3", "mgl")
 START = ("theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")
-OF_BODY, RATES = ("I1", "I2", "I3", "mgl"), ("w1", "w2", "w3")  # the rest of a body and its start is its scene's
-MOST_STEPS = 2_000_000  # of one run; the common kernels take a quarter of a second for them
+OF_BODY, RATES = ("I1", "I2", "I3", "mgl"), ("w1", "w2", "w3")  # other numbers of a body and its start are the scene's
+MOST_STEPS = 2_000_000  # of one run; common kernels take a quarter of a second for them
 MOST_WORK = {"compiled": 2e6, "python": 2e5}  # of an adaptive run: force evaluations or Taylor steps
-MOST_SECONDS = 2.0  # of an adaptive run, where that much work would take longer
-LONG_ENOUGH = 0.02  # seconds of a trial that says what work costs
-FIRST_TRIAL = 16.0
+MOST_SECONDS = 2.0  # of an adaptive run; a lower budget is set if `MOST_WORK` would take longer
+LONG_ENOUGH = 0.02  # seconds of a trial from which the cost of work is computed
+FIRST_TRIAL = 16.0  # work of the first trial
 SAMPLES_A_NUTATION = 60
-FEWEST_SAMPLES, MOST_SAMPLES = 601, 4001  # of one run, whatever its nutations
+FEWEST_SAMPLES, MOST_SAMPLES = 601, 4001  # limits for the samples of one run
 PORTRAIT = 361  # points of the exact phase curve, over one nutation
-COLUMNS, ROWS = 48, 32  # steps, spins
+COLUMNS, ROWS = 48, 32  # numbers of steps and of spins in a map
 MAP_SAMPLES = 9
-MOST_MAP_STEPS = 20_000_000  # of all cells: seconds of an implicit method
+MOST_MAP_STEPS = 20_000_000  # of all cells: they take an implicit method seconds
 OSCILLATOR_HORIZON, MOST_OSCILLATOR_STEPS = 25.0, 10_000
 MOST_FRICTION = 1e6
 MOST_TOP_STEPS, MOST_TOP_EVALUATIONS = 100_000, 50_000  # of the damped top: half a second for either
@@ -65,12 +65,12 @@ class Setup:
 
     @property
     def budget(self) -> float | None:
-        """The most work of an adaptive run, which ends there and says so; None for a fixed step."""
+        """The most work of an adaptive run, which ends there as "out_of_budget"; None for a fixed step."""
         return _budget(self) if self.method.control == "tolerance" else None
 
     @property
     def samples(self) -> int:
-        """The number of samples: 60 a nutation, within what a page can draw."""
+        """The number of samples: 60 per nutation, within the limits of a page."""
         period = self.scene.nutation_period
         resolved = np.isfinite(period) and period > 0.0
         samples = SAMPLES_A_NUTATION * self.scene.horizon / period if resolved else FEWEST_SAMPLES
@@ -78,7 +78,7 @@ class Setup:
 
     @property
     def arguments(self) -> dict[str, Any]:
-        """The arguments of `simulate` beside the scene, the method and the guard."""
+        """The arguments of `simulate` except the scene, the method and the guard."""
         control = {} if self.setting is None else self.method.given(self.setting)
         return control | {"observe": "attitude", "samples": self.samples, "budget": self.budget}
 
@@ -87,10 +87,10 @@ _budgets: dict[tuple[str, bool, int], float] = {}  # by method, kind of body and
 
 
 def _budget(config: Setup) -> float:
-    """As much work as takes two seconds, from a trial of the run itself, and at most `MOST_WORK`.
+    """The work that takes two seconds, from trials of the run itself, but at most `MOST_WORK`.
 
-    The cost of an evaluation differs a thousandfold between methods, and that of a Taylor step also grows as the
-    tolerance shrinks: no field of an integrator says as much.
+    The cost of an evaluation differs by a factor of 1000 between methods, and that of a Taylor step also grows as the
+    tolerance falls: no attribute of an integrator predicts it.
     """
     tolerance = config.setting or 1.0
     key = config.method.name, config.scene.of_body, math.floor(math.log10(tolerance))
@@ -99,12 +99,12 @@ def _budget(config: Setup) -> float:
         return _budgets[key]
 
     def trial(work: float) -> tuple[float, bool]:
-        before = time.thread_time()  # what other threads do meanwhile does not count
+        before = time.thread_time()  # without the time of other threads
         asked: dict[str, Any] = {"tolerance": config.setting, "observe": "attitude", "samples": 2, "budget": work}
         run = integrate(config.scene, config.method, **asked)
         return time.thread_time() - before, run.outcome == "out_of_budget"
 
-    trial(FIRST_TRIAL)  # its kernels are compiled
+    trial(FIRST_TRIAL)  # compiles its kernels
     work, (fixed, longer) = FIRST_TRIAL, trial(FIRST_TRIAL)
     seconds = fixed
     while longer and seconds - fixed < LONG_ENOUGH:
@@ -113,14 +113,14 @@ def _budget(config: Setup) -> float:
             break
         seconds, longer = trial(work)
     if not longer:
-        return most  # it ends before: nothing is to be learned, nor to be afraid of
+        return most  # the run ends with less work than the trial
     cost = (seconds - fixed) / (work - FIRST_TRIAL) if work < most else 0.0
     affordable = MOST_SECONDS / cost if cost > 0.0 else most
     return _budgets.setdefault(key, float(f"{min(most, affordable):.2g}"))
 
 
 def setup(fields: Mapping[str, Any]) -> Setup:
-    """The run that a page asks for. Raises SymtopError if a field is missing or out of range."""
+    """The run that the fields of a page define. Raises SymtopError if a field is missing or out of range."""
     of_body = fields.get("I2") is not None or str(fields.get("base")) in body_scenes()
     names = (OF_BODY, RATES) if of_body else (TOP, START)
     missing = [name for name in (*names[0], *names[1], "horizon", "integrator") if name not in fields]
@@ -145,18 +145,18 @@ def setup(fields: Mapping[str, Any]) -> Setup:
 
 
 def dataset(config: Setup, warn: Callable[[str], object]) -> xr.Dataset:
-    """The run as `simulate` returns it; `warn` gets the sentence of the guard, if it has one."""
+    """The run as a dataset of `simulate`; `warn` is called with the guard's warning, if there is one."""
     return simulate(config.scene, config.method, **config.arguments, guard=warn)
 
 
 def answer(config: Setup) -> dict[str, Any]:
-    """A run beside the exact motion: attitudes, residuals, errors, and the sentences of the outcome and the guard.
+    """A run and the exact motion: attitudes, residuals, errors, and the messages of the outcome and the guard.
 
-    Arrays are base64 of float32, over `time`: ``attitude`` and ``truth`` (w, x, y, z in turn), ``theta``, ``energy``,
+    Arrays are base64 of float32, over `time`: ``attitude`` and ``truth`` (rows w, x, y, z), ``theta``, ``energy``,
     ``p_phi`` and ``p_psi`` (relative changes since the start), ``axis_error`` and ``attitude_error`` in radians. Values
-    after a failure are NaN. Of a top also ``p_theta``, and the exact phase curve, ``true_theta`` and ``true_p_theta``,
-    one nutation at 361 times; of a body ``middle`` and ``true_middle``, the share of the angular momentum along the
-    axis of the middle moment, which changes its sign where the body flips.
+    after a failure are NaN. For a top also ``p_theta``, and the exact phase curve, ``true_theta`` and ``true_p_theta``,
+    one nutation at 361 times; for a body ``middle`` and ``true_middle``, the part of the angular momentum along the
+    axis of the middle moment, which changes its sign when the body flips.
     """
     began = time.perf_counter()
     warnings: list[str] = []
@@ -205,7 +205,7 @@ def answer(config: Setup) -> dict[str, Any]:
 
 
 def _middle(scene: Scene, run: Trajectory) -> np.ndarray:
-    """The share of a body's angular momentum along the axis of its middle moment, (n,)."""
+    """The component of a body's angular momentum along the axis of its middle moment, divided by |L|; (n,)."""
     middle = np.eye(3)[np.argsort(scene.top.moments)[1]]
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
         along = np.sum(rotated(run.quaternion, middle) * run.momentum, axis=1)
@@ -219,7 +219,7 @@ def _float32(values: Any) -> str:
 
 
 def _curves(largest: dict[str, float], message: str = "", /, **arrays: Any) -> dict[str, Any]:
-    """What the views of friction are drawn of."""
+    """The answer for the views with friction: message, largest errors, and arrays as base64."""
     return {"message": message, "largest": largest, "arrays": {name: _float32(one) for name, one in arrays.items()}}
 
 
@@ -249,7 +249,7 @@ def outcome_map(config: Setup, steps: np.ndarray, spins: np.ndarray) -> dict[str
     step, spin = (each.ravel() for each in np.meshgrid(steps, spins))
     numbers = asdict(scene.top) | asdict(scene.start) | {"psi_dot": spin}
     members = xr.Dataset({name: ("member", np.broadcast_to(number, step.size)) for name, number in numbers.items()})
-    for some in (slice(-COLUMNS, None), slice(None)):  # the kernel of the first may have to be compiled
+    for some in (slice(-COLUMNS, None), slice(None)):  # the first call, of one row, compiles the kernel
         began = time.perf_counter()
         runs = ensemble(
             members.isel(member=some), config.method, step_size=step[some], horizon=scene.horizon, samples=MAP_SAMPLES,
@@ -270,7 +270,7 @@ def _friction(fields: Mapping[str, Any]) -> float:
 
 
 def damped(fields: Mapping[str, Any]) -> tuple[float, float]:
-    """Friction and step of the oscillator: `friction` (0 to 1e6) and `oscillator_step`. SymtopError for others."""
+    """Friction and step of the oscillator: `friction` (0 to 1e6), `oscillator_step`. SymtopError if out of range."""
     friction, step = _friction(fields), positive("step", fields.get("oscillator_step"))
     least, most = OSCILLATOR_HORIZON / MOST_OSCILLATOR_STEPS, OSCILLATOR_HORIZON / 2.0
     if not least <= step <= most:
@@ -279,10 +279,10 @@ def damped(fields: Mapping[str, Any]) -> tuple[float, float]:
 
 
 def oscillator(friction: float, step: float) -> dict[str, Any]:
-    """The notebook's oscillator x'' + b x' + x = 0 from x = 1 at rest, as base64 of float32 over ``time``.
+    """The damped oscillator x'' + b x' + x = 0 from x = 1 at rest, as base64 of float32 over ``time``.
 
-    ``midpoint`` and ``trapezoidal`` are forced discrete Lagrangians, ``guess`` is what the notebook tried; ``exact`` is
-    over ``exact_time``. `largest` has the largest error of x of the two rules.
+    ``midpoint`` and ``trapezoidal`` are forced discrete Lagrangians, ``guess`` is that of `notebook_positions`;
+    ``exact`` is over ``exact_time``. `largest` has the largest errors of x of the two rules.
     """
     body, steps = Oscillator(damping=friction), max(2, round(OSCILLATOR_HORIZON / step))
     paths = {
@@ -310,7 +310,7 @@ def inclination(config: Setup, friction: float) -> dict[str, Any]:
     """Theta in degrees with the torques -b phi'/2 and -b psi' for friction b, as base64 of float32 over ``time``.
 
     ``midpoint`` is the forced discrete Lagrangian, NaN after a failure; ``exact``, over ``exact_time``, ends where the
-    axis comes near a pole. `largest` has the largest difference in degrees, `message` says what ended early.
+    axis comes near a pole. `largest` has the largest difference in degrees, `message` says which of them ended early.
     """
     scene, torque = config.scene, Friction(0.5 * friction, friction)
     steps = max(1, round(scene.horizon / (config.setting or scene.horizon)))
@@ -332,7 +332,7 @@ def inclination(config: Setup, friction: float) -> dict[str, Any]:
 
 
 def script(config: Setup) -> str:
-    """A Python script that makes the same dataset, to the bit."""
+    """A Python script that makes the same dataset, bit for bit."""
     scene, name, samples = config.scene, config.method.name, config.samples
     options = "" if config.method.control is None else f", {config.method.control}={config.setting!r}"
     options += "" if config.budget is None else f", budget={config.budget!r}"

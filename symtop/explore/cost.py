@@ -1,8 +1,8 @@
-"""Error against run time of a few methods on the scene of the page, and the runs that it shows.
+"""Error against run time of a few methods on the scene of the page, and the times of its own runs.
 
-The runs of a line are those of `symtop.compare`, and all runs of a chart are timed against each other. It takes
-seconds, so that a thread does it while the page asks again. Runs are stored by scene and variant, the last chart by
-scene. The page asks anew when a slider has moved: a chart that is no longer the newest is left.
+The runs of a line are those of `symtop.compare`, and all runs of a chart are timed against each other. This takes
+seconds and is done in a thread, while the page polls. Runs are cached by scene and variant, the last chart by scene.
+After a slider has moved the page requests another chart: the computation of the older one is then ended.
 """
 
 import functools
@@ -21,24 +21,24 @@ from symtop.model.charts import BODY
 from symtop.model.scenes import Scene
 from symtop.run.simulation import chart_of
 
-BESIDE = ("stormer-verlet", "strang", "rk4", "gauss-4", "dop853-compiled")  # whatever method is chosen
-SHARE = 0.1  # of the evaluations that `compare` spends on a run
-MOST_LINES, MOST_CHARTS = 500, 100  # that are stored
-REPEATS, LONG = 9, 0.05  # of the timing of a run; seconds of one that is not repeated
+BESIDE = ("stormer-verlet", "strang", "rk4", "gauss-4", "dop853-compiled")  # methods in every chart
+SHARE = 0.1  # budget of a run, as part of that of `compare`
+MOST_LINES, MOST_CHARTS = 500, 100  # most that are cached
+REPEATS, LONG = 9, 0.05  # repetitions of a timed run; seconds of a run that is not repeated
 
-_charts: dict[Scene, dict[str, dict[str, Any]]] = {}  # the lines by the names of their methods
-_newest: list[tuple[Any, ...]] = []  # scene and methods of the chart that is computed
+_charts: dict[Scene, dict[str, dict[str, Any]]] = {}  # by scene, the lines by the names of their methods
+_newest: list[tuple[Any, ...]] = []  # scene and methods of the chart that is being computed
 _at_work = threading.Lock()
 
 
 def question(fields: Mapping[str, Any]) -> list[Setup]:
-    """The run that a page shows and, if it names a `second` method, the one beside it. SymtopError as `setup`."""
+    """The run of the page and, if it names a `second` method, a second run. Raises SymtopError as `setup`."""
     first, other = setup(fields), str(fields.get("second") or "")
     return [first, setup({**fields, "integrator": other})] if other else [first]
 
 
 def _variants(setups: list[Setup]) -> dict[str, Integrator]:
-    """Those of the question first, each in the chart that the page shows, by the name of the method."""
+    """The variants of a chart by the names of their methods, those of the page first; all determine the attitude."""
     scene, beside = setups[0].scene, map(integrator, BESIDE)
     methods = [*(one.method for one in setups), *(one for one in beside if not scene.of_body or BODY in one.solvers)]
     return {one.name: one.variant(chart_of(one, scene.observes, "attitude")) for one in methods if one.control}
@@ -46,7 +46,7 @@ def _variants(setups: list[Setup]) -> dict[str, Integrator]:
 
 @functools.lru_cache(MOST_LINES)
 def _runs(scene: Scene, name: str) -> list[tuple[float, str, float]]:
-    """Setting, outcome and largest error (rad), of the axis or of a body's attitude, of each run of a line."""
+    """Setting, outcome and largest error (rad; of the axis, or of a body's attitude) of each run of a line."""
     variant, quantity = integrator(name), "attitude" if scene.of_body else "axis"
     budget = SHARE * BUDGET[variant.implementation] * min(variant.speed, 1.0)
     data = compare(scene, [variant], quantity=quantity, cost="evaluations", budget=budget, quiet=True).isel(variant=0)
@@ -55,7 +55,7 @@ def _runs(scene: Scene, name: str) -> list[tuple[float, str, float]]:
 
 
 def _compute(scene: Scene, variants: dict[str, Integrator], key: tuple[Any, ...]) -> None:
-    """The lines of a chart, unless somebody asks for another meanwhile."""
+    """Compute the lines of a chart; end early if another chart is requested meanwhile."""
     rows: dict[str, list[dict[str, Any]]] = {}
     messages: dict[str, str] = {}
     with _at_work:
@@ -78,7 +78,7 @@ def _compute(scene: Scene, variants: dict[str, Integrator], key: tuple[Any, ...]
 
 
 def _line(name: str, rows: list[dict[str, Any]], message: str) -> dict[str, Any]:
-    """Seconds and errors of the good runs of a method, and how many failed."""
+    """Seconds and errors of the runs of a method with outcome "ok", and the number of failed ones."""
     good = [one for one in rows if one["outcome"] == "ok" and one["error"] > 0.0]
     failed = sum(one["outcome"] != "ok" for one in rows)
     numbers = {name: [one[name] for one in good] for name in ("seconds", "error")}
@@ -86,9 +86,9 @@ def _line(name: str, rows: list[dict[str, Any]], message: str) -> dict[str, Any]
 
 
 def _seconds(one: Setup) -> float | None:
-    """Run time of a run of the page, the least of some; None if it does not end well.
+    """The least of several times of a run of the page; None if its outcome is not "ok".
 
-    Not `timings`, which has the closed form compiled and so waits for whatever else is.
+    `timings` is not used, because it compiles the closed form and waits for other compilations.
     """
     chart = chart_of(one.method, one.scene.observes, "attitude")
     setting = math.nan if one.setting is None else one.setting
@@ -100,9 +100,9 @@ def _seconds(one: Setup) -> float | None:
 
 
 def chart(setups: list[Setup]) -> dict[str, Any]:
-    """The lines that are there, how many are still to come, and the seconds of the runs that the page shows.
+    """The lines that are computed, the number of missing ones, and the seconds of the runs of the page.
 
-    While a chart is computed its lines are those of the last one on the scene.
+    While a chart is being computed, its lines are those of the last chart on the scene.
     """
     scene, variants = setups[0].scene, _variants(setups)
     last, key = _charts.get(scene, {}), (scene, *variants)

@@ -6,8 +6,8 @@
     POST /map  /cost                    a grid of runs; error against run time
     POST /oscillator  /damped-top       the damped oscillator; the damped top
 
-It listens on 127.0.0.1. It answers only requests that name this machine as their host, and POST requests only if they
-send JSON and a browser names no other origin, so that a page from elsewhere cannot use it.
+It listens on 127.0.0.1. It answers only requests with this machine as their host, and POST requests only if they send
+JSON and have no foreign origin, so that pages of other sites cannot use it.
 """
 
 import contextlib
@@ -29,10 +29,10 @@ from symtop.core.parallel import cores
 from symtop.explore import answers, cost
 
 STATIC = Path(__file__).parent / "static"
-KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}  # of its files
+KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}  # of static files
 PATIENCE = 60.0  # seconds to wait for the rest of a request, or for the next one of a connection
-MOST_WAITING = 256  # connections that the system holds until a thread takes them
-MOST_OPEN, FEW, HURRY = 256, 64, 2.0  # connections at once; those beyond a few wait so many seconds for a request
+MOST_WAITING = 256  # length of the system's queue of connections
+MOST_OPEN, FEW, HURRY = 256, 64, 2.0  # most connections at once; with more than 64, wait only 2 s for a request
 BUSY = b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 2\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
 LONGEST_BODY = 65_536  # bytes of a POST request
 POLICY = "default-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -43,7 +43,7 @@ def _netcdf(config: answers.Setup) -> bytes:
         return netcdf.write(answers.dataset(config, str), Path(folder) / "explored.nc").read_bytes()
 
 
-# What reads the question, what answers it in JSON, or in bytes of the type that follows.
+# by path: the function that parses the request, the one that answers it, and the type of the answer (JSON or bytes)
 JSON = "application/json"
 ACTIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any], str]] = {
     "/run": (answers.setup, answers.answer, JSON),
@@ -54,18 +54,18 @@ ACTIONS: dict[str, tuple[Callable[[Any], Any], Callable[[Any], Any], str]] = {
     "/damped-top": (answers.damped_top, lambda values: answers.inclination(*values), JSON),
     "/map": (answers.grid, lambda grid: answers.outcome_map(*grid), JSON),
 }
-_at_work = threading.BoundedSemaphore(cores())  # of 200 runs that take turns in the interpreter 42 took over a minute
+_at_work = threading.BoundedSemaphore(cores())  # without it, 42 of 200 concurrent runs took over a minute
 
 
 class Server(ThreadingHTTPServer):
-    """A thread for each connection, `MOST_OPEN` at most; what one fails of is nobody else's business."""
+    """A server with one thread per connection, at most `MOST_OPEN`; an error in one does not affect the others."""
 
     request_queue_size = MOST_WAITING
     daemon_threads = True
     report_time = 0.0  # when the last refusal was reported
 
     def process_request(self, request: Any, client_address: Any) -> None:
-        """Give the connection a thread, or refuse it (503) and say so, at most once a second."""
+        """Start a thread for the connection, or refuse it (503) and report that, at most once a second."""
         if threading.active_count() <= MOST_OPEN:
             super().process_request(request, client_address)
             return
@@ -75,11 +75,11 @@ class Server(ThreadingHTTPServer):
         with contextlib.suppress(OSError):
             request.settimeout(0.0)
             request.sendall(BUSY)
-            request.recv(LONGEST_BODY)  # closed with unread bytes, the answer would be lost
+            request.recv(LONGEST_BODY)  # closing with unread bytes would discard the answer
         self.shutdown_request(request)
 
     def handle_error(self, request: Any, client_address: Any) -> None:  # noqa: ARG002
-        """Say in one line what went wrong, unless the browser has only left."""
+        """Report an error in one line, unless the browser has only closed the connection."""
         error = sys.exception()
         if error is not None and not isinstance(error, (ConnectionError, TimeoutError)):
             sys.stderr.write(f"symtop: a request failed: {words_of(error)}\n")
@@ -93,7 +93,7 @@ class Handler(BaseHTTPRequestHandler):
 
     @property
     def timeout(self) -> float:  # type: ignore[override]
-        """Seconds to wait for bytes: where many connections are open, an idle one makes room."""
+        """Seconds to wait for bytes; if many connections are open, idle ones are closed soon."""
         return PATIENCE if threading.active_count() <= FEW else HURRY
 
     def handle(self) -> None:
@@ -102,7 +102,7 @@ class Handler(BaseHTTPRequestHandler):
             super().handle()
 
     def do_GET(self) -> None:
-        """The page, its files and the catalogue."""
+        """Send the page, its files or the catalogue."""
         if not self._is_local():
             return
         file = {one.name: one for one in STATIC.iterdir()}.get(self.place.removeprefix("/") or "page.html")
@@ -121,7 +121,7 @@ class Handler(BaseHTTPRequestHandler):
         return self.path.partition("#")[0].partition("?")[0]
 
     def send_error(self, code: int, message: str | None = None, explain: str | None = None) -> None:  # noqa: ARG002
-        """What the standard library refuses, a method or a line that it cannot read, in plain text."""
+        """Answer a request that the standard library refuses (its method or a malformed line) in plain text."""
         self.close_connection = True
         if code == 501:
             code, message = 405, f"{self.command} is not answered here; GET, HEAD and POST are"
@@ -129,7 +129,7 @@ class Handler(BaseHTTPRequestHandler):
         self._reply(int(code), f"{sentence}\n".encode(), "text/plain; charset=utf-8")
 
     def do_POST(self) -> None:
-        """One of the actions."""
+        """Answer one of the `ACTIONS`."""
         if not self._is_local():
             return
         if self.place not in ACTIONS:
@@ -156,7 +156,7 @@ class Handler(BaseHTTPRequestHandler):
                     return
                 answer = action(config)
         except SymtopError as error:
-            # The page shows the sentence in place of a run, as an ordinary answer; a file cannot be replaced by it.
+            # the page shows the message instead of a run, so it is a regular answer; instead of a file it is an error
             self._refuse(200 if self.place not in ("/netcdf", "/script") else 400, str(error))
         except Exception as error:  # noqa: BLE001  (the page shows it, and the server keeps running)
             self._refuse(500, f"the run failed: {type(error).__name__}: {' '.join(str(error).split())}")
@@ -164,7 +164,7 @@ class Handler(BaseHTTPRequestHandler):
             self._reply(200, json.dumps(answer).encode() if kind == JSON else answer, kind)
 
     def _has_left(self) -> bool:
-        """Has the browser closed the connection while its question waited?"""
+        """Has the browser closed the connection while its request waited?"""
         try:
             readable, _, _ = select.select([self.connection], [], [], 0.0)
             return bool(readable) and not self.connection.recv(1, socket.MSG_PEEK)
@@ -172,9 +172,9 @@ class Handler(BaseHTTPRequestHandler):
             return True
 
     def _is_local(self) -> bool:
-        """Does the request name this machine, and a POST no page of another origin?
+        """Is this machine the host of the request, and the origin of a POST? If not, refuse it.
 
-        The check refuses a foreign name that resolves to 127.0.0.1.
+        This also refuses a foreign host name that resolves to 127.0.0.1.
         """
         origin, site = self.headers.get("Origin"), self.headers.get("Sec-Fetch-Site", "none")
         foreign = origin not in (None, f"http://{self.headers.get('Host')}") or site not in ("none", "same-origin")
@@ -207,11 +207,11 @@ class Handler(BaseHTTPRequestHandler):
             self.wfile.write(body)
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Print nothing for a request."""
+        """Do not log requests."""
 
 
 def serve(port: int = 0) -> ThreadingHTTPServer:
-    """A server on this machine, not yet running; port 0 takes a free one. SymtopError if the port is taken."""
+    """A server on this machine, not yet running; port 0 selects a free one. SymtopError if the port is in use."""
     try:
         return Server(("127.0.0.1", port), Handler)
     except (OSError, OverflowError) as error:

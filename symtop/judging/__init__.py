@@ -1,4 +1,4 @@
 """Declared properties of an integrator against measured ones."""
 
-# what a step from elsewhere may be; here, as the command line names them before it loads a judge
+# the forms of a foreign step; defined here so that the command line need not import the rest of the package
 FORMS = ("ode", "separable", "rotation", "scipy", "diffrax", "torch", "jax", "shared", "program")

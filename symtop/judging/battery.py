@@ -1,7 +1,7 @@
-"""The battery: one table of every claim, whom it is asked of and what measures it, through nothing but the solvers.
+"""The battery: the table of all claims, with the integrators that each applies to and the function that measures it.
 
-It judges registered integrators, ours and a plug-in's, and bare steps from an adapter. A claim is refuted only far
-beyond what the measurement itself leaves in doubt; both numbers are in the ledger (`symtop.judging.findings`).
+It judges registered integrators and bare steps from an adapter, only through their solvers. A claim is refuted only if
+its defect is far above the uncertainty of the measurement; both numbers are in the claims table (`findings.Ledger`).
 """
 
 from collections.abc import Callable
@@ -21,7 +21,7 @@ class Stage(NamedTuple):
     """Claims that are measured together."""
 
     claims: tuple[str, ...]
-    applies: tuple[str, ...]  # to a registered "integrator", on a "body" or not, a bare "step", such a map of a "plane"
+    applies: tuple[str, ...]  # a registered "integrator", any method on a "body", a bare "step", a map of the "plane"
     measure: Callable[[Subject], list[Finding]]
 
 
@@ -40,12 +40,12 @@ CLAIMS = tuple(claim for stage in TABLE if "integrator" in stage.applies for cla
 
 
 def stages(kind: str) -> list[Stage]:
-    """What applies to a `Subject.kind`."""
+    """The stages that apply to a `Subject.kind`."""
     return [stage for stage in TABLE if kind in stage.applies]
 
 
 def measure(stage: Stage, subject: Subject) -> list[Finding]:
-    """The findings of a stage; undecided, and why, if its measurement breaks. A step that makes no call raises."""
+    """The findings of a stage; undecided, with the reason, if its measurement fails. SymtopError if "calls" fails."""
     if subject.in_plane and "plane" not in stage.applies:
         return [inapplicable(claim, "a map of (theta, p_theta) does not show it") for claim in stage.claims]
     try:
@@ -58,13 +58,13 @@ def measure(stage: Stage, subject: Subject) -> list[Finding]:
 
 
 def unmeasured(claims: tuple[str, ...], method: Integrator, why: str) -> list[Finding]:
-    """The findings on claims that could not be measured: why not is said once."""
+    """Undecided findings on claims that could not be measured; only the first states the reason in full."""
     reasons = [why, *[AS + claim_name(claims[0])] * (len(claims) - 1)]
     return [undecided(claim, declared(method, claim), words) for claim, words in zip(claims, reasons, strict=True)]
 
 
 def judge(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
-    """Measure every claim of a registered method on a scene; `quick` shortens the runs. On a body there are three."""
+    """Measure every claim of a registered method on a scene; `quick` shortens the runs. On a body: three claims."""
     subject = Subject(method, scene, quick)
     findings = [finding for stage in stages(subject.kind) for finding in measure(stage, subject)]
     return Ledger(method.name, scene.name, tuple(findings), subject.traces)

@@ -1,9 +1,8 @@
-"""compare(): what methods cost on one scene for the error that they make, as one dataset.
+"""compare(): error against cost of several methods on one scene, as one dataset.
 
-The setting of each method is sought for each target (`symtop.measure.settings.seek`), from loose targets to tight
-ones, until one is not met; then steps are doubled until a run fails or has a few steps. Every run is kept. Runs that
-ended well are timed afterwards, against each other (`symtop.measure.timing`): a slow spell of the machine hits all
-methods alike.
+The setting of each method is searched for each target error (`symtop.measure.settings.seek`), from loose targets to
+tight ones, until one is not met; then steps are doubled until a run fails or has only a few steps. All runs are kept.
+Good runs are then timed against each other (`symtop.measure.timing`): a slow spell of the machine affects all alike.
 """
 
 import math
@@ -29,7 +28,7 @@ from symtop.run.simulation import chart_of, likely_step
 
 COSTS = ("time", "evaluations")
 BUDGET = {"compiled": 3e6, "python": 5e4}  # force evaluations of a run
-REASONS = {  # of `seek`, as a cell of a table has room for them
+REASONS = {  # the reasons of `seek`, shortened for the cell of a table
     settings.STOPPED: "rounding or the limits of its setting", settings.BUDGET: "budget", settings.FAILED: "it fails",
     settings.TRIED: "it converges slowly or not at all",
 }  # fmt: skip
@@ -39,13 +38,13 @@ def compare(
     scene: "str | Scene", methods: Any, *, horizon: float | None = None, nutations: float | None = None,
     quantity: str = "axis", cost: str = "time", budget: float | None = None, quiet: bool = False,
 ) -> xr.Dataset:  # fmt: skip
-    """Error against run time, or against force evaluations, of some methods on one scene.
+    """Error against run time, or against force evaluations, of several methods on one scene.
 
     `methods` are names, variants such as ``rk4[axis]`` or records; a method without a chart runs in the smallest one
-    that shows the `quantity` (axis, attitude, theta, energy, p_phi or, of a top, p_psi). A function, a class,
-    ``FILE.py:NAME`` or a library is a step in the chart of the axis, or of a body, as `judge` takes it without a form.
-    Runs go to the `horizon`, the scene's own by default, or over so many `nutations`. With the `cost` "evaluations"
-    nothing is timed. `budget` is the most force evaluations of a run, by default 3e6, for plain Python 5e4.
+    that determines the `quantity` (axis, attitude, theta, energy, p_phi or, for a top, p_psi). A function, a class,
+    ``FILE.py:NAME`` or a library is a step in the axis chart, or of a body, as `judge` takes it without a form.
+    Runs go to the `horizon`, by default that of the scene, or over a number of `nutations`. With the `cost`
+    "evaluations" nothing is timed. `budget` is the most force evaluations of a run, by default 3e6, in Python 5e4.
 
     Dimensions ``variant``, ``setting`` (coarse to fine), ``target`` (1e-3, 1e-6, 1e-9, 1e-12). Variables: those of
     `sweep`, errors and work of every run, and
@@ -53,12 +52,12 @@ def compare(
         error, error_bound          those of the `quantity`, rad or relative as in `symtop.errors`
         seconds, seconds_spread     least of some run times, s, and their (median - least) / least: of one call of the
                                     solver, as the attribute ``timed`` says; NaN for runs that failed
-        steps_per_nutation          of an adaptive method the mean; an eighth of the horizon is the unit on a separatrix
+        steps_per_nutation          the mean of an adaptive method; per eighth of the horizon on a separatrix
         outcome, message            "ok", or how the run ended; "raised", with the message, if the scene was refused
         reached(variant, target)    "met", or why not
         exact_seconds               run time of the exact motion
 
-    Raises SymtopError for arguments that make no sense. `symtop.plot` draws the dataset.
+    Raises SymtopError for invalid arguments. `symtop.plot` draws the dataset.
     """
     problem = find_scene(scene, bodies=True)
     one_of("quantity", quantity, settings.OF_BODY if problem.of_body else QUANTITIES)
@@ -75,7 +74,7 @@ def compare(
     names = [one.name for one in variants]
     if not names or len(set(names)) < len(names):
         raise SymtopError(f"methods must be one or more, each once, not {names!r}", "methods")
-    if problem.of_body:  # a horizon to which its motion is not known is refused before any run
+    if problem.of_body:  # refuse a horizon beyond its reference before any run
         settings.judgeable(problem, quantity, end)
 
     def runs_of(method: Integrator) -> tuple[list[dict[str, Any]], list[str]]:
@@ -125,7 +124,7 @@ def compare(
 
 
 def find(method: Any, on: Scene) -> Integrator:
-    """A method by its name, its record, or as what `judge` takes: a step in the chart of the axis, or of a body."""
+    """The integrator of a name, a record, or a step as `judge` takes it, in the axis chart or of a body."""
     if isinstance(method, Integrator):
         return method
     library = str(method).partition(":")[0].endswith(LIBRARIES)
@@ -142,7 +141,7 @@ def _runs(
 
     def run(setting: float) -> tuple[float, float]:
         if setting not in rows:
-            limit = 2.0 * budget if method.adaptive else None  # rk45 at 1e-2 may shrink its steps
+            limit = 2.0 * budget if method.adaptive else None  # rk45 at 1e-2 may make tiny steps
             rows[setting] = error_row_or_message(scene, method, setting, horizon, observe, limit)
             rows[setting]["setting_value"] = setting
         error, work = (float(rows[setting][name]) for name in (quantity, "force_evaluations"))
@@ -184,14 +183,14 @@ def _runs(
 
 
 def cheapest(data: xr.Dataset, target: float) -> np.ndarray:
-    """Place along ``setting`` of each variant's cheapest run within a target, or -1; its cost is that of `compare`."""
+    """The index along ``setting`` of each variant's cheapest run with an error within `target`, or -1; (variants,)."""
     cost = data["seconds" if data.attrs["cost"] == "time" else "force_evaluations"].values
     good = (data["outcome"].values == "ok") & (data["error"].values <= target) & np.isfinite(cost)
     return np.where(good.any(axis=1), np.argmin(np.where(good, cost, np.inf), axis=1), -1)
 
 
 def ranked(data: xr.Dataset) -> tuple[float, dict[str, float]]:
-    """Force evaluations that every variant can spend, and the least error of each within them, the best first."""
+    """The largest number of force evaluations that all variants reach, and their least errors with it, best first."""
     work = data["force_evaluations"].where((data["outcome"] == "ok") & (data["force_evaluations"] > 0.0))  # 0: unknown
     most = float(work.max("setting").min())
     errors = data["error"].where(work <= most).min("setting").to_series().dropna()

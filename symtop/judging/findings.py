@@ -1,7 +1,7 @@
-"""The claims ledger: one finding a claim, one ledger an integrator, as a dataset, as sentences and as a report.
+"""The claims table of an integrator, a `Ledger` with one finding per claim, as a dataset, as sentences, as a report.
 
-A verdict is `confirmed`, `refuted`, `measured` (nothing was claimed), `undecided` (and why), or `inapplicable` (and
-why). `value` is the number that a verdict rests on, `resolution` the least that the battery can tell from a true claim.
+A verdict is `confirmed`, `refuted`, `measured` (nothing was claimed), `undecided` or `inapplicable` (both with the
+reason). `value` is the number that decides, `resolution` the least value that the battery can tell from a true claim.
 """
 
 import math
@@ -17,7 +17,7 @@ import xarray as xr
 from symtop.core.errors import SymtopError, shown
 
 VERDICTS = ("confirmed", "refuted", "measured", "undecided", "inapplicable")
-LONGEST, CUT = 240, " [...]"  # characters of somebody else's error message, and how it ends if it had more
+LONGEST, CUT = 240, " [...]"  # characters of a foreign error message, and the end of one that was longer
 
 
 def claim_name(claim: str) -> str:
@@ -30,7 +30,7 @@ class Measured(NamedTuple):
 
     kind: str = ""
     number: float = math.nan
-    text: str = ""  # of the whole, where it is not "kind, number"
+    text: str = ""  # the whole as text, if that is not "kind, number"
 
     def __str__(self) -> str:
         if self.text or math.isnan(self.number):
@@ -46,15 +46,15 @@ NOTHING = Measured()
 
 
 class Finding(NamedTuple):
-    """One cell of the ledger."""
+    """One row of the claims table."""
 
     claim: str
     declared: str
     measured: Measured
     verdict: str
     why: str  # a clause that completes "CLAIM is VERDICT: ..."
-    value: float = math.nan  # the number that the verdict rests on
-    resolution: float = math.nan  # the least such number that the battery can tell from a true claim
+    value: float = math.nan  # the number that decides
+    resolution: float = math.nan  # the least value that the battery can tell from a true claim
 
     def sentence(self, name: str) -> str:
         """The verdict in words."""
@@ -62,20 +62,20 @@ class Finding(NamedTuple):
         return f"{name}, {claim_name(self.claim)}: {claimed}; {self.verdict}: {self.why}."
 
     def plain(self) -> dict[str, str | float | None]:
-        """The finding as JSON can hold it: no number is null."""
+        """The finding as values for JSON; a number that is not finite becomes None."""
         numbers = {name: getattr(self, name) for name in ("value", "resolution")}
         finite = {name: number if math.isfinite(number) else None for name, number in numbers.items()}
         return self._asdict() | {"measured": str(self.measured)} | finite
 
 
 def error_units(name: str) -> str:
-    """The unit of an error of a trajectory, rad of angles; none of a length."""
+    """The unit of an error of a trajectory, to append to a number: rad for angles, empty for lengths."""
     none = {"axis_length": "", "quaternion_length": ""}
     return (none | {"momentum": " times |L|", "rates": " rad per unit time"}).get(name, " rad")
 
 
 def yes_no(value: bool | int | None) -> str:
-    """A claim in a word: yes, no, a number, or nothing."""
+    """A claim as text: "yes", "no", a number, or "" for None."""
     if value is None:
         return ""
     return ("yes" if value else "no") if isinstance(value, bool) else str(value)
@@ -84,43 +84,43 @@ def yes_no(value: bool | int | None) -> str:
 def agreement(
     claim: str, declared: bool | None, yes: bool | None, why: str, value: float, resolution: float
 ) -> Finding:
-    """The finding on a claim that is true or false; `yes` is None of neither."""
+    """The finding on a claim that is true or false, from the measured answer `yes`; None is undecided."""
     verdict = "measured" if declared is None else "confirmed" if declared == yes else "refuted"
     measured, verdict = (NOTHING, "undecided") if yes is None else (Measured(yes_no(yes), value), verdict)
     return Finding(claim, yes_no(declared), measured, verdict, why, value, resolution)
 
 
 def undecided(claim: str, declared: str, why: str) -> Finding:
-    """A claim that could not be judged; somebody else's long message is cut."""
+    """The finding on a claim that could not be judged; a reason above `LONGEST` characters is cut."""
     short = why.rstrip(".") if len(why) <= LONGEST else why[: LONGEST - len(CUT)].rsplit(" ", 1)[0] + CUT
     return Finding(claim, declared, NOTHING, "undecided", short)
 
 
 def inapplicable(claim: str, why: str, declared: str = "") -> Finding:
-    """A claim that cannot be asked, and why."""
+    """The finding on a claim that does not apply, with the reason."""
     return Finding(claim, declared, NOTHING, "inapplicable", why)
 
 
 class About(NamedTuple):
-    """What is judged through an adapter, once it is open."""
+    """Facts about a step that is judged through an adapter."""
 
     name: str = ""
     chart: str = ""
     implementation: str = ""
     seconds_a_step: float = 0.0
-    seed: int = 0  # of what was drawn at random
+    seed: int = 0  # of the random starts, times and steps
     nutation: float = math.nan  # period of the scene, in its unit of time
 
 
 @dataclass(frozen=True)
 class Ledger:
-    """Everything that was found about one integrator; as text the report of the command."""
+    """The claims table of one integrator; as text, the report of `symtop judge`."""
 
     integrator: str
     scene: str
     findings: tuple[Finding, ...]
-    traces: dict[str, np.ndarray]  # errors by step, defects by differencing width, length of the long run
-    about: About = field(default_factory=About)  # of a step that came through an adapter
+    traces: dict[str, np.ndarray]  # data for figures: errors by step, defects by differencing width, long runs
+    about: About = field(default_factory=About)  # facts about a step from an adapter
     implied: frozenset[str] = frozenset()  # claims that follow from those that were made
 
     def __str__(self) -> str:
@@ -138,11 +138,11 @@ class Ledger:
         return by_claim[claim]
 
     def __iter__(self) -> Iterator[str]:
-        """The claims, so that ``in`` asks for one of them."""
+        """Iterate over the names of the claims, which ``in`` tests."""
         return iter([finding.claim for finding in self.findings])
 
     def dataset(self) -> xr.Dataset:
-        """Dimensions ``claim``, ``setting`` (of the order), ``width`` (of the differencing), ``window`` (in time)."""
+        """The table as a dataset over ``claim``, with traces over ``setting`` (order), ``width`` and ``window``."""
         rows = [one._replace(measured=str(one.measured)) for one in self.findings]  # type: ignore[arg-type]
         columns: dict[str, Any] = {
             name: ("claim", [getattr(one, name) for one in rows]) for name in Finding._fields[1:]
@@ -155,10 +155,10 @@ class Ledger:
         return xr.Dataset(columns, {"claim": list(self)}, attributes)
 
 
-WIDTH, AS = 100, "as with "  # how the reason begins of a claim that was not judged for the same as another
+WIDTH, AS = 100, "as with "  # characters in a line; the begin of a reason that refers to that of another claim
 UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (0.0, "ns"))
 KEPT = {"energy": "the energy", "p_phi": "p_phi", "p_psi": "p_psi", "axis_length": "|e|", "momentum": "the momentum"}
-SAYS = {  # of what was measured: {0} is its number, {1} its text
+SAYS = {  # phrases for measured values: {0} is the number, {1} the text
     "wrong limit": "as h -> 0 it goes to another motion, {0:.1e} away",
     "kept": "kept, to {0:.0e}", "bounded": "bounded, within {0:.1e}", "drift": "drifts, by {0:.1e}",
     "random walk": "wanders as rounding does, by {0:.1e}", "growing": "changes, by {0:.1e}, and may grow",
@@ -174,13 +174,13 @@ SAYS = {  # of what was measured: {0} is its number, {1} its text
 
 
 def pace(seconds: float) -> str:
-    """A short time in the unit that suits it: 5.4 us, 4.8 ms."""
+    """A short time as text with a suitable unit: 5.4 us, 4.8 ms."""
     size, unit = next(one for one in UNITS if not float(f"{seconds:.3g}") < one[0])
     return f"{seconds / (size or 1e-9):.3g} {unit}"
 
 
 def heading(about: About, scene: str) -> str:
-    """What is judged."""
+    """The first line of a report: name, chart, scene, time of a step and seed."""
     cost = f", {pace(about.seconds_a_step)} a step" if about.seconds_a_step else ""
     chart = f" in the {about.chart} chart" if about.chart else ""
     seed = f", seed {about.seed}" if about.seed else ""
@@ -188,7 +188,7 @@ def heading(about: About, scene: str) -> str:
 
 
 def line(finding: Finding, width: int = WIDTH) -> str:
-    """A finding in one line, and its reason below where a claim does not hold; empty for what goes without saying."""
+    """A finding in one line, with the reason below it if a claim does not hold; empty for trivial findings."""
     claim, declared, measured, verdict, why, value, _ = finding
     silent = verdict == "inapplicable" or claim == "explicit" or measured.kind in ("a function", "its states'")
     if silent and not declared:
@@ -207,7 +207,7 @@ def line(finding: Finding, width: int = WIDTH) -> str:
 
 
 def description(findings: Sequence[Finding]) -> str:
-    """What the method is, whatever is claimed of it: "order 2, symplectic, reversible, keeps p_phi; not p_psi"."""
+    """The measured properties of a method in a phrase: "order 2, symplectic, reversible, keeps p_phi; not p_psi"."""
     measured = {one.claim: one.measured for one in findings}
     errors = ((one.claim.removesuffix("_error"), one) for one in findings if one.claim.endswith("_error"))
     true = {"axis_length": "one", "quaternion_length": "one"}
@@ -238,7 +238,7 @@ def _listed(names: Sequence[str]) -> str:
 
 
 def summary(ledger: Ledger) -> str:
-    """What the method is, what its runs were, and how many claims hold: those made, and those that follow from them."""
+    """The end of a report: the runs, the measured properties, and the verdicts on the claims made and implied."""
     counts = []
     for follows in (False, True):
         claimed = [one for one in ledger.findings if one.declared and (one.claim in ledger.implied) is follows]
@@ -251,7 +251,7 @@ def summary(ledger: Ledger) -> str:
 
 
 def _runs(ledger: Ledger) -> str:
-    """The steps and the lengths of the runs, and the steps that fail, in steps a nutation; empty of a trajectory."""
+    """The steps per nutation and the lengths of the runs, and the steps that failed; empty for a trajectory."""
     traces, words, of_body = ledger.traces, [], ledger.about.chart == "body"
     period = "natural period" if of_body else "nutation"
     if "steps_run" in traces and (steps := float(traces["steps_run"])):

@@ -1,13 +1,13 @@
-"""judge(): anybody's integrator against its claims in a process of its own; or a trajectory, as far as it shows them.
+"""judge(): test a foreign integrator against its claims in a process of its own, or a trajectory without its method.
 
-*A trajectory without a method*: its errors are against the true motion of the scene (`symtop.measure.errors`). Where
-the angular momentum L in space is there, energy and momenta are recomputed from it, whatever the file reports,
+*A trajectory*: its errors are against the true motion of the scene (`symtop.measure.errors`). If it has the angular
+momentum L in space, energy and momenta are recomputed from that, whatever the file reports,
 
     E = |L|^2/2 I1 + (L.e)^2 (1/I3 - 1/I1)/2 + mgl e_z,      p_phi = L_z,      p_psi = L.e,
 
-and else they are those of the file. Rates beside an attitude are a momentum, too. On a body without symmetry E is that
+otherwise those of the file are used. Rates together with an attitude also give L. On a body without symmetry E is that
 of `symtop.model.body`, there is no p_psi, and the momentum and the rates have errors of their own: rates may be right
-where the attitude is wrong. A text file has a line of names and then numbers, with commas or blanks between: time,
+where the attitude is wrong. A text file has a line of names and then numbers, separated by commas or blanks: time,
 elapsed since the start of the scene, and any of
 
     ex ey ez           the axis, a unit vector in space, z up       theta phi psi         Euler angles (z-x-z), rad
@@ -57,17 +57,17 @@ VECTORS = {
 SCALARS = ("time", "theta", "phi", "psi", *CONSTANTS)
 OF_STATES = ("axis", "attitude", "theta", "momentum", "rates")
 LENGTHS = ("axis_length", "quaternion_length")
-SINGLE = 1e-6  # how far from one single precision leaves the length of a vector, which is then not worth a line
-SHOWN = 3  # of what is wrong with a line of names
-AGREE = 1e-3  # rad from the axis to the third axis of the quaternion: more than the digits of a file leave
-FEWEST = 100  # samples by which a law of growth is judged
-SHORTEST, DECADES = 0.2, 2.0  # of the end of a run, in which it is judged
-SEEDS = 1_000_000_000
+SINGLE = 1e-6  # a length that differs less from one, as by single precision, gets no finding
+SHOWN = 3  # most faults of a line of names in a message
+AGREE = 1e-3  # rad: largest angle between the axis and the third axis of the quaternion, above the rounding of a file
+FEWEST = 100  # samples from which a law of growth is judged
+SHORTEST, DECADES = 0.2, 2.0  # decades of time at the end of a run in which it is judged: least and most
+SEEDS = 1_000_000_000  # random seeds are below this
 OPENING = 60.0  # seconds for loading a file and its imports
-# seconds for the claims of one stage: at most, for all stages together, and at least however many were spent
-PLUGIN = 600.0  # of a registered integrator
+PLUGIN = 600.0  # seconds for a stage of a registered integrator
+# seconds for a stage of a step: at most, for all stages together, and at least in any case
 VERDICT, QUICK_VERDICT = (45.0, 120.0, 15.0), (12.0, 40.0, 6.0)
-SHORTER = 4.0  # times, beyond their pace: the runs of a stage that took too long, made again
+SHORTER = 4.0  # factor by which the runs of a stage that took too long are shorter when it is repeated
 SLOW = "; make a step faster", "; judge it without --quick, or make a step faster"  # the second with --quick
 
 
@@ -78,9 +78,9 @@ def judge(
     adaptive: bool = False, autonomous: bool = False, quick: bool = False, seed: int | None = None,
     tell: Callable[[About | Finding], object] | None = None,
 ) -> Ledger:  # fmt: skip
-    """Judge anything that steps: its order, structure, invariants and drift on the top, beside what is claimed of it.
+    """Judge a foreign integrator: measure its order, structure, invariants and drift, and compare them with its claims.
 
-    `target` is one of (`form` says which where it does not show)
+    `target` is one of (`form` says which, if that is ambiguous)
 
         ode       a function step(f, t, y, h) -> y for y' = f(t, y), or "FILE.py:NAME"
         separable a function step(state, h, dT, dV) -> state of (theta, p_theta), or "FILE.py:NAME"
@@ -97,17 +97,16 @@ def judge(
 
     `chart` says what y is: "axis" (e, L), shape (6,); "attitude" (q, L), shape (7,); "angles" (theta, phi, psi and
     their rates), shape (6,), in radians and the units of the scene's top. A scene of a body without symmetry is for a
-    trajectory and for the forms ode, with y = (q, M), M in body axes, rotation and scipy; of a step it shows the order,
-    the energy and the momentum. Claims that are not made are measured all the same. `conserves` holds names such as
-    "p_phi", "energy"; `energy` is "kept" or "bounded". The step runs in a process of its own: one that hangs or crashes
-    costs a verdict and says so. `quick` makes shorter runs. On a top it is also tried at starts, times and steps that
-    are drawn at random; `seed`, which the findings name, draws the same again. `autonomous` says that it was written
-    for y' = f(y), whatever f is called with.
-    `tell` is handed what is judged and then each finding, as they are made.
+    trajectory and for the forms ode, with y = (q, M), M in body axes, rotation and scipy; for a step, the order, the
+    energy and the momentum are measured on it. Properties without a claim are measured, too. `conserves` holds names
+    such as "p_phi", "energy"; `energy` is "kept" or "bounded". The step runs in a process of its own: if it hangs or
+    crashes, the verdict is undecided, with the reason. `quick` makes shorter runs. On a top the step is also tried at
+    random starts, times and steps; `seed`, which the findings name, repeats the same. `autonomous` says that it was
+    written for y' = f(y), whatever f is called with. `tell` is called with an `About`, then with each new finding.
 
     Returns a `Ledger`: ``ledger["order"]`` is a finding, ``print(ledger)`` shows all of them,
     ``ledger.dataset()`` is the same as a Dataset, ``ledger.refuted`` names the claims that are false. Raises
-    SymtopError for a target that cannot be loaded and claims that make no sense.
+    SymtopError for a target that cannot be loaded and for invalid claims.
     """
     one_of("chart", chart, CHARTS)
     if not isinstance(energy, str | None) or energy not in ENERGY_ERRORS:
@@ -200,9 +199,9 @@ def read(target: Any) -> dict[str, Any]:
 
 
 def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy: str | None) -> list[Finding]:
-    """A finding for each error and each constant that the samples show, or that is claimed: then it is undecided.
+    """A finding for each error and each constant that the samples determine; undecided for one only claimed.
 
-    Raises SymtopError for data that are no trajectory, or name another top or start than the scene's.
+    Raises SymtopError for data that are no trajectory, or that have another top or start than the scene.
     """
     if isinstance(target, (str, Path)) and str(target).lower().endswith(".nc"):
         target = netcdf.read(target)
@@ -244,7 +243,7 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
 
 
 def _refuse_contradiction(states: Trajectory, scene: Scene) -> None:
-    """Refuse an axis that is another one than that of the quaternion beside it, by its order if that explains it."""
+    """SymtopError if axis and quaternion of a trajectory disagree, naming another convention if that explains it."""
     if states.axis is None or states.quaternion is None:
         return
     apart = axis_distance(states.axis, axis_from_quaternion(states.quaternion))
@@ -256,7 +255,7 @@ def _refuse_contradiction(states: Trajectory, scene: Scene) -> None:
 
 
 def _from_states(scene: Scene, states: Trajectory) -> dict[str, np.ndarray]:
-    """Energy and momenta by the angular momentum and the axis; nothing where one of them is not there."""
+    """Energy and momenta from the angular momentum and the attitude; empty if one of these is missing."""
     axis, L, q = states.axis, states.momentum, states.quaternion
     if L is None or axis is None or (scene.of_body and q is None):
         return {}
@@ -268,7 +267,7 @@ def _from_states(scene: Scene, states: Trajectory) -> dict[str, np.ndarray]:
 
 
 def _error(name: str, scene: Scene, time: np.ndarray, deviation: xr.Dataset) -> Finding:
-    """The largest error of a quantity and its law of growth, of the samples that are not lost."""
+    """The finding on the largest error of a quantity and its law of growth, from the samples that are not NaN."""
     there = np.isfinite(deviation[name].values)
     if not there.any():
         return undecided(f"{name}_error", "", f"all of its {there.size} samples are lost")
@@ -286,15 +285,15 @@ def _error(name: str, scene: Scene, time: np.ndarray, deviation: xr.Dataset) -> 
 
 
 def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, scene: Scene) -> Finding:
-    """What became of a constant of the motion, beside what is claimed of it."""
+    """The finding on the change of a constant of the motion, with the claim `declared`."""
     there = ~np.isnan(values)
     if not there.any():
         return undecided(name, declared, f"all of its {there.size} samples are lost")
     time, values = time[there], values[there]
     scale, grain = (scene.energy_scale, scene.energy_grain) if name == "energy" else (scene.momentum_scale, 1.0)
     true = getattr(scene.top.momenta(scene.start), name) if name != "energy" else scene.top.energy(scene.start)
-    times = time if time[-1] else [1.0]  # of a start alone nothing grows
-    decades = math.log10(max(times[-1] / scene.time_scale(), 1.0))  # from the first nutation on: it switches errors on
+    times = time if time[-1] else [1.0]  # with a single sample at the start nothing grows
+    decades = math.log10(max(times[-1] / scene.time_scale(), 1.0))  # after the first nutation, in which errors begin
     change = constant_of(times, (values - values[0]) / scale, min(max(decades, SHORTEST), DECADES))
     if time.size < FEWEST:
         change = change._replace(exponent=math.nan)
@@ -312,7 +311,7 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
 def _findings(
     subject: Subject, process: Process, began: float, limits: tuple[float, float, float]
 ) -> Iterator[Finding]:
-    """The findings on each claim, undecided where the process was lost: all of a step that makes no call."""
+    """The findings of all stages. Claims of a stage whose process was lost are undecided; of all, if it was "calls"."""
     most, together, least = limits
     todo = stages(subject.kind)
     for stage in todo:
@@ -338,7 +337,7 @@ def _findings(
 
 
 def judge_separately(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
-    """The ledger of a registered integrator, of `symtop.judging.battery.judge`, with what is not ours in a process."""
+    """The `Ledger` of a registered integrator, as `symtop.judging.battery.judge`; foreign solvers run in a process."""
     heartbeat.reset(quick=quick)
     limits = PLUGIN, math.inf, PLUGIN
     with Process(lambda: solvers_of(method)) as process:

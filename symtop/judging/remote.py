@@ -1,9 +1,9 @@
-"""What is judged, in a process of its own that answers calls; the verdict is computed in the one that asks.
+"""Run the judged code in a process of its own, which answers calls; verdicts are computed in the calling process.
 
-The process is forked, so that any function can be judged, and its answers are JSON: whatever it does to the judge's
-code in its memory, or writes, changes no threshold here. A call that does not return is ended with its process, and the
-rest of its stage is undecided; if it was a step backwards, the next process refuses such steps. Where the system cannot
-fork, or JAX is loaded here, whose threads a fork would lose, all is called in this process and has no limits.
+The process is forked, so that any function can be judged, and answers in JSON: foreign code that changes symtop in its
+memory, or writes output, cannot change a verdict. If a call does not return, its process is killed, and the rest of its
+stage is undecided; if it was a step backwards, the next process refuses such steps. If the system cannot fork, or JAX
+is loaded, whose threads a fork would lose, everything is called in this process, without limits.
 """
 
 import contextlib
@@ -36,18 +36,18 @@ from symtop.model.top import Angles, SymmetricTop
 
 Table = dict[str, Callable[..., Any]]
 THREADED = "jax"  # hangs in a process that was forked after its import
-LOOK = 0.05  # seconds between two looks
-PATIENCE = 60.0  # seconds for what is only loaded
-FORMS = {"rotation": ROTATION, "matrix": MATRIX, "plane": REDUCED}  # others have that of their chart
-FACTS = ("name", "chart", "implementation", "own_loop", "takes_field")  # of a stepper, that are sent
+LOOK = 0.05  # seconds between two checks for an answer
+PATIENCE = 60.0  # seconds for loading
+FORMS = {"rotation": ROTATION, "matrix": MATRIX, "plane": REDUCED}  # other steppers have the form of their chart
+FACTS = ("name", "chart", "implementation", "own_loop", "takes_field")  # attributes of a stepper that are sent
 
 
 class Process(contextlib.AbstractContextManager["Process"]):
-    """A process that calls the functions of the table that `make` returns there; a context, at whose end it ends."""
+    """A worker process that calls functions of the table that `make` returns in it; a context manager that ends it."""
 
     def __init__(self, make: Callable[[], Table]) -> None:
         self.make, self.lost, self.limit, self.began = make, "", 0.0, 0.0
-        self.calls, self.late = 0, 0.0  # calls of a step before `limit` began to count; seconds of one, if it passed
+        self.calls, self.late = 0, 0.0  # calls of a step before `allow`; mean seconds of one, if `limit` was exceeded
         self.forked = "fork" in multiprocessing.get_all_start_methods() and THREADED not in sys.modules
         self.table: Table | None = None
         self.process: Any = None
@@ -66,12 +66,12 @@ class Process(contextlib.AbstractContextManager["Process"]):
     end = __exit__
 
     def allow(self, seconds: float) -> None:
-        """What is called from now on may take so long together; what was lost may be tried again."""
+        """Limit the total time of the following calls; a process that was lost is started again."""
         self.lost, self.limit, self.began = "", seconds, clock(self.process.pid if self.process else 0)
         self.calls, self.late = heartbeat.calls, 0.0
 
     def call(self, name: str, *args: Any) -> Any:
-        """What a function of the table returns; SymtopError if it raises, or once its process has ended."""
+        """Call a function of the table in the process; SymtopError if it raises or the process has ended."""
         if self.lost:
             raise SymtopError(self.lost)
         if not self.forked:
@@ -101,7 +101,7 @@ class Process(contextlib.AbstractContextManager["Process"]):
         self.output = tempfile.TemporaryFile()  # noqa: SIM115  (closed with the process)
         self.process = context.Process(target=_serve, args=(self.make, self.pipe, theirs, self.output), daemon=True)
         with warnings.catch_warnings():
-            # Newer versions of Python warn of threads; the child uses none of theirs. Filters belong to all threads
+            # newer versions of Python warn of a fork with threads, which the child does not use
             warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
             heartbeat.inside = False
             self.process.start()
@@ -109,7 +109,7 @@ class Process(contextlib.AbstractContextManager["Process"]):
         self.began = clock(self.process.pid)
 
     def _answer(self) -> Any:
-        """What the process sends; SymtopError if it ends, hangs in a call or takes longer than it may."""
+        """The answer of the process; SymtopError if it ends, hangs in a call or exceeds `limit`."""
         calls, since = heartbeat.calls, clock(self.process.pid)
         while not self.pipe.poll(LOOK):
             now = clock(self.process.pid)
@@ -138,13 +138,13 @@ class Process(contextlib.AbstractContextManager["Process"]):
 
 
 def _serve(make: Callable[[], Table], asking: Any, pipe: Any, output: Any) -> None:
-    os.setsid()  # what it starts is ended with it
-    asking.close()  # forked along; open, it would keep this process waiting for a judge that was killed
+    os.setsid()  # a process group, so that its children can be killed with it
+    asking.close()  # inherited; left open, it would keep this process waiting after its parent was killed
     for stream in (1, 2):
         os.dup2(output.fileno(), stream)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    faulthandler.disable()  # a crash is reported by the one that waits
-    warnings.simplefilter("ignore")  # what a step warns of, as a step that blows up does, is no answer
+    faulthandler.disable()  # the parent reports a crash
+    warnings.simplefilter("ignore")  # warnings of a step, for instance of overflow, are not reported
     table: Table = {}
     while True:
         try:
@@ -160,7 +160,7 @@ def _serve(make: Callable[[], Table], asking: Any, pipe: Any, output: Any) -> No
 
 
 def clock(pid: int) -> float:
-    """Seconds, less those that a process has waited for a processor, which Linux counts; elsewhere all time counts."""
+    """Seconds, without the time that process `pid` waited for a processor; only Linux counts that."""
     try:
         waited = int(Path(f"/proc/{pid}/schedstat").read_text(encoding="ascii").split()[1]) * 1e-9
     except (OSError, IndexError, ValueError):
@@ -169,7 +169,7 @@ def clock(pid: int) -> float:
 
 
 def try_separately(call: Callable[[], Any], what: str) -> None:
-    """Make a call in a process of its own first; SymtopError if that ends it or takes too long."""
+    """Try a call in a process of its own; SymtopError that `what` cannot be loaded if it crashes or takes too long."""
     with Process(lambda: {"call": call}) as process:
         process.allow(PATIENCE)
         with contextlib.suppress(SymtopError):
@@ -182,7 +182,7 @@ def try_separately(call: Callable[[], Any], what: str) -> None:
 
 
 def table_of(opened: Callable[[], Stepper]) -> Table:
-    """The functions of a stepper that `Remote` asks for."""
+    """The functions of a stepper that `Remote` calls, by name."""
     stepper: Any = opened()
 
     def march(since: float, *args: Any) -> tuple[Any, ...]:
@@ -201,7 +201,7 @@ def table_of(opened: Callable[[], Stepper]) -> Table:
 
 
 class Remote(Stepper):
-    """A stepper whose steps are made in a process."""
+    """A stepper whose steps are made in a worker process."""
 
     def __init__(self, process: Process) -> None:
         self.process, facts = process, process.call("about")
@@ -211,11 +211,11 @@ class Remote(Stepper):
             setattr(self, name, facts[name])
 
     def clock(self) -> float:
-        """Seconds, less those in which the process waited for a processor."""
+        """Seconds, without the time that the process waited for a processor."""
         return clock(self.process.process.pid) if self.process.process else time.monotonic()
 
     def renew(self) -> None:
-        """The next call is of a new process."""
+        """End the process; the next call starts a new one, without memory of earlier calls."""
         self.process.end()
 
     def march(self, top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> Array:
@@ -224,7 +224,7 @@ class Remote(Stepper):
         return np.array(states, dtype=float).reshape(marks.size, y.size)
 
     def along(self, f: Any, t: float, y: Array, h: float, marks: Marks) -> Array:
-        """The states at the marks for a right-hand side that can be sent, from a time t on."""
+        """The states at the marks for a right-hand side that can be pickled, from time t on."""
         states, times = self.process.call("along", f, t, y, h, marks)
         getattr(f, "times", set[float]()).update(map(float, times))
         return np.array(states, dtype=float).reshape(marks.size, y.size)
@@ -239,12 +239,12 @@ def _run(process: Process, name: str, top: SymmetricTop, start: Angles, plan: Pl
 
 
 def separated(method: Integrator, process: Process) -> Integrator:
-    """The same, with solvers that run in a process, whose table is `solvers_of`; the package's own stay here."""
+    """The method with its foreign solvers called in a process with the table `solvers_of`; symtop's stay here."""
     foreign = [chart for chart, one in method.solvers.items() if not getattr(one, "__module__", "").startswith(OWN)]
     solvers = {chart: functools.partial(_run, process, chart) for chart in foreign}
     return replace(method, solvers=dict(method.solvers) | solvers)
 
 
 def solvers_of(method: Integrator) -> Table:
-    """A method's solvers by their charts, whose runs are checked before they are sent."""
+    """A table of a method's solvers by chart, for `Process`; their runs are checked before they are sent."""
     return {chart: lambda *args, chart=chart: solve(method, chart, *args)._asdict() for chart in method.solvers}

@@ -1,10 +1,10 @@
 """Error against step or tolerance: the table that convergence and work-precision studies are made of.
 
-The largest error over a run is that of its samples. Over ten nutations `SAMPLES` of them leave no peak out; over a
-thousand there is about one a nutation, and if they come at nearly the same phase of each, the peaks stay unseen for
-as long as the phase takes to drift: 331 even samples read up to 20 % too little. `enough_samples` chooses a number of
-samples whose stride is a golden section of a nutation beyond whole ones, so that any few in a row see all phases; what
-is read is then within 5 % of the error of a dense run.
+The largest error over a run is the largest at its samples. Over ten nutations `SAMPLES` of them miss no peak; over a
+thousand there is about one per nutation, and if all fall at nearly the same phase, they miss the peaks for as long as
+the phase takes to drift: 331 even samples read up to 20 % too little. `enough_samples` chooses the number of samples so
+that the stride is a whole number of nutations plus a golden section of one. Any few consecutive samples then cover all
+phases, and the result is within 5 % of the largest error of a densely sampled run.
 """
 
 import math
@@ -23,14 +23,14 @@ from symtop.run.reference.truth import reference
 from symtop.run.simulation import integrate
 
 SAMPLES = 1001
-DENSE = 5.0  # samples a nutation from which on their phases need no care
-GOLDEN_CLOSE = 0.01  # of a nutation: a stride this near to the golden section is one
-ENOUGH = {"compiled": 1e9, "python": 2e4}  # force evaluations of a run after which no finer setting is tried
+DENSE = 5.0  # samples per nutation above which the phase of the samples does not matter
+GOLDEN_CLOSE = 0.01  # nutations: largest distance of an accepted stride from the golden section
+ENOUGH = {"compiled": 1e9, "python": 2e4}  # after a run with more force evaluations no finer setting is run
 COUNTS = ("step_size", "tolerance", "steps", "force_evaluations", "newton_iterations", "outcome", "reached_time")
 
 
 def enough_samples(scene: Scene, horizon: float) -> int:
-    """How many even samples of a run show its largest error to 5 %."""
+    """The number of equidistant samples from which the largest error of a run is read to 5 %."""
     period = scene.nutation_period
     if not math.isfinite(period) or SAMPLES * period > DENSE * horizon:
         return SAMPLES
@@ -43,7 +43,7 @@ def enough_samples(scene: Scene, horizon: float) -> int:
 def error_table(
     scene: Scene, method: Integrator, settings: Sequence[float], horizon: float, observe: str | None = None
 ) -> xr.Dataset:
-    """Largest and final error of every quantity at each setting, with the work it took and how it ended.
+    """Largest and final error of every quantity at each setting, with the work and the outcome of the run.
 
     Dimension ``setting``. ``axis`` ... hold the maximum over the run, ``axis_end`` ... the error at the horizon,
     ``axis_bound`` ... the least error that the reference can judge (its own bound plus rounding).
@@ -57,7 +57,7 @@ def error_table(
 
 
 def blank_row(method: Integrator) -> dict[str, float | str]:
-    """The entries of a run that was not made."""
+    """The row of the error table for a run that was not made: NaN, with the outcome "not_run"."""
     names = (*COUNTS, "implementation", *(name + end for name in QUANTITIES for end in ("", "_end", "_bound")))
     return dict.fromkeys(names, math.nan) | {"outcome": "not_run", "implementation": method.implementation}
 
@@ -71,7 +71,7 @@ def error_row(
     scene: Scene, method: Integrator, setting: float, horizon: float, observe: str | None = None, *,
     phases: bool = False, budget: float | None = None,
 ) -> dict[str, float | str]:  # fmt: skip
-    """One run's entries in an error table; with `phases` the errors of its frequencies, too; `budget` of `simulate`."""
+    """One run's row of an error table, with `phases` also its frequency errors; `budget` is that of `simulate`."""
     control: dict[str, Any] = {"horizon": horizon, "samples": enough_samples(scene, horizon), "observe": observe}
     run = integrate(scene, method, budget=budget, **control | method.given(setting))
     truth = reference(scene, run.time, precision="closed-form")

@@ -1,14 +1,14 @@
-"""Long names, units and flags of the columns of stored datasets, as CF has them; each column is declared once.
+"""Long names, units and flags of the columns of stored datasets, as in the CF conventions; each is declared once.
 
-What several datasets have stands in `symtop/core/variables.tsv`, errors in `symtop.measure.errors.ERRORS`. Columns of
-one study stand beside it in ``columns.tsv``, or NAME.tsv beside a study of one's own in NAME.py. A table has five cells
-a line, separated by tabs (`netcdf.read_columns`):
+Columns of several datasets are declared in `symtop/core/variables.tsv`, errors in `symtop.measure.errors.ERRORS`.
+Columns of one study are declared in ``columns.tsv`` beside it, or in NAME.tsv beside a user's own study NAME.py. A
+table has five cells a line, separated by tabs (`netcdf.read_columns`):
 
     variable        its name, or group/name: without a group, of every group of the study that does not have its own
-    units           in SI, "1" of a pure number, none of text; seconds of a machine are seconds in any scene
-    without_units   of a problem without units, where they differ
-    flags           of numbers that stand for words: "0 no, 1 yes"
-    long_name       what it is; of an error, of what and against what
+    units           in SI; "1" for a pure number, empty for text; computing times are in seconds whatever the scene
+    without_units   the units on a scene without physical units, where they differ
+    flags           meanings of coded numbers: "0 no, 1 yes"
+    long_name       what the column holds; for an error, of which quantity and against which reference
 """
 
 from collections.abc import Collection, Mapping
@@ -36,8 +36,8 @@ def described(
 ) -> netcdf.Tree:  # fmt: skip
     """Give the variables of a dataset, in groups too, their long names, units and flags.
 
-    `own` is the table of the study. A group with an ``axis_bound`` is an error table. What no table declares keeps the
-    name that it may have been given. `units` are those of `netcdf.describe`; `of_body` says whether scenes are bodies.
+    `own` is the table of the study. A group with an ``axis_bound`` is an error table. A variable that no table declares
+    keeps its attributes. `units` is that of `netcdf.describe`; `of_body` has `Scene.of_body` of each scene.
     """
     for group, variables in ((path, one.variables) for path, one in netcdf.groups(data).items()):
         known = netcdf.VARIABLES | (ERROR_TABLE if "axis_bound" in variables else {})

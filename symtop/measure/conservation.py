@@ -1,10 +1,9 @@
-"""What a run does to the constants of the motion: residuals, their trends and growth, and momenta only reported.
+"""Conservation in a run: residuals of the constants of the motion, their trend and growth, and a check of the momenta.
 
 A trend is the slope of the least-squares line through the means of `BLOCKS` equal stretches, with Student's 95 %
-interval, widened by the correlation of what the line leaves over. Samples are never commensurate with the
-nutation, so that a fast oscillation averages out. A random walk, which is what rounding makes, has no slope but
-wanders: in 33 % of cases its interval is too narrow (white noise: 3 %), so that near rounding the exponent of growth,
-1/2, is the better witness.
+interval, widened for the autocorrelation of the residuals of the line. Samples are never commensurate with the
+nutation, so that a fast oscillation averages out. Rounding errors add up to a random walk, which has no slope but
+wanders: in 33 % of cases its interval is too narrow (white noise: 3 %); the exponent of growth, 1/2, is more reliable.
 
 An exponent of error ~ t^alpha is the least-squares slope of the logarithm of the largest error in logarithmic windows:
 
@@ -12,17 +11,17 @@ An exponent of error ~ t^alpha is the least-squares slope of the logarithm of th
     means   bounded   random walk (rounding     steady drift (phase of   phase under a random       phase under a steady
                       at its best)              a symplectic method)     walk of the energy         drift of the energy
 
-The interval of the exponent takes the windows as independent. The largest values of one random walk are not: its own
-exponent, 0.5, lies within in 69 % of 400 walks of 4000 samples, which spread by 0.17, and 3/2 of a walk's sum in 48 %.
-Of walks that are not kept 84 % are called a random walk by `behaviour`, 10 % a drift, 6 % bounded.
+The interval of the exponent treats the windows as independent. The largest values of one random walk are not: of 400
+walks of 4000 samples, whose fitted exponents spread by 0.17, the interval covers the true 0.5 in 69 %; for sums of a
+walk it covers 3/2 in 48 %. `behaviour` calls 84 % of walks that are not "kept" a random walk, 10 % drift, 6 % bounded.
 
-In the angles chart p_phi and p_psi are parameters of a state. What the trajectory itself says of them are its rates,
+In the angles chart p_phi and p_psi are parameters of a state. The rates of the trajectory imply the momenta
 
     p_psi = I3 (psi' + phi' cos theta),    p_phi = I1 phi' sin^2 theta + p_psi cos theta,
 
 phi' and psi' by central differences of order 8 over nine consecutive steps. They differ from the momenta of a method by
-its error of a step, which oscillates with the nutation and does not grow. A run that loses its momenta and reports
-those of its start shows a difference that drifts, as far as its momenta do (`from_increments`).
+its error of a step, which oscillates with the nutation and does not grow. If a run loses its momenta but reports those
+of its start, the difference drifts as much as the momenta do (`from_increments`).
 """
 
 import math
@@ -45,9 +44,9 @@ from symtop.run.trajectory import Trajectory
 CONSTANTS = ("energy", "p_phi", "p_psi")
 LAWS = {0.0: "bounded", 0.5: "random walk", 1.0: "linear", 1.5: "t^3/2", 2.0: "quadratic"}
 RUN_ROUNDING = 3e-13  # relative: the largest change that a million steps of rounding explain where sums are compensated
-WALK = 100.0  # times what rounding explains: a larger growth as t^1/2 is no walk of rounding
-BLOCKS = 24
-SLACK = 0.1  # an exponent this near to that of a law, beyond its interval, still is that law
+WALK = 100.0  # times the rounding error: a change that grows as t^1/2 and is larger is not attributed to rounding
+BLOCKS = 24  # equal stretches of a run whose means a trend is fitted to
+SLACK = 0.1  # an exponent agrees with that of a law if they differ by no more than this, or than its interval
 
 
 class Trend(NamedTuple):
@@ -59,7 +58,7 @@ class Trend(NamedTuple):
 
 
 class Changed(NamedTuple):
-    """What became of a quantity that the true motion keeps: its size, its trend and its law of growth."""
+    """The change of a constant of the motion over a run: its size, its trend and its law of growth."""
 
     largest: float  # NaN if there is no finite sample
     slope: float  # of the trend, per unit time
@@ -79,7 +78,7 @@ def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> C
 
 
 def residuals(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
-    """Relative change of those of energy, p_phi and p_psi that a run shows since the start, signed."""
+    """Signed relative change since the start of energy, p_phi and p_psi, of those that the run has; each (n,)."""
     scales = {"energy": scene.energy_scale, "p_phi": scene.momentum_scale, "p_psi": scene.momentum_scale}
     values = {name: shown for name in CONSTANTS if (shown := getattr(run, name)) is not None}
     return {name: (shown - shown[0]) / scales[name] for name, shown in values.items()}
@@ -93,7 +92,7 @@ def growth(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> Fit:
 def tops(
     time: ArrayLike, residual: ArrayLike, decades: float = 2.0, count: int = 12
 ) -> tuple[list[float], list[float]]:
-    """Middles of `count` logarithmic windows that fill the last `decades`, and the largest |residual| in each."""
+    """Middles of `count` logarithmic windows over the last `decades` of time, and the largest |residual| in each."""
     t, r = np.asarray(time, float), np.abs(np.asarray(residual, float))
     edges = np.geomspace(t[-1] / 10.0**decades, t[-1], count + 1)
     middles, largest = [], []
@@ -106,7 +105,7 @@ def tops(
 
 
 def law(fit: Fit) -> str:
-    """The name of the exponent that a fit agrees with, within its interval or `SLACK`; otherwise the exponent."""
+    """The law in `LAWS` that a fitted exponent agrees with; "t^..." with none, "undecided" with more than one."""
     if not math.isfinite(fit.slope):
         return "not judged"
     nearest = min(LAWS, key=lambda exponent: abs(exponent - fit.slope))
@@ -116,17 +115,17 @@ def law(fit: Fit) -> str:
 
 
 def behaviour(size: float, slope: float, interval: float, grain: float = 1.0, rounding: float = 0.0) -> str:
-    """What became of a constant whose largest change is `size` and grows as t^slope (95 %: +- interval).
+    """How well a run keeps a constant whose largest change is `size` and grows as t^slope (95 %: +- interval).
 
-    The one rule of every study. `grain` is the rounding of the constant in units of the machine's, 1 or more (see
-    `Scene.energy_grain`); `rounding` is what rounding explains beyond ``RUN_ROUNDING * grain``, where sums are plain.
+    Every study uses this rule. `grain` is the rounding error of the constant in machine epsilons, 1 or more
+    (`Scene.energy_grain`); `rounding` is the change explained by rounding in sums without compensation, if larger.
 
         kept          size <= RUN_ROUNDING grain, whatever the exponent; or size <= rounding, and not bounded
         bounded       the exponent is nearest to 0, and its interval excludes 1/2: an error of the step, however small
         random walk   nearest to 1/2, the interval excludes 0 and 1, and size <= `WALK` times rounding
         drift         nearest to 1 or larger, and the interval excludes 1/2
-        growing       anything else: the interval does not tell two laws apart, a growth as t^1/2 that is too large for
-                      rounding, or no exponent (NaN)
+        growing       anything else: the interval includes two laws, or the change grows as t^1/2 but is too large for
+                      rounding, or there is no exponent (NaN)
     """
     if size <= RUN_ROUNDING * grain:
         return "kept"
@@ -152,7 +151,7 @@ def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
     t_mean = np.array([part.mean() for part in np.array_split(t, BLOCKS)])
     r_mean = np.array([part.mean() for part in np.array_split(r, BLOCKS)])
     slope, error, _, rest = line(t_mean, r_mean)
-    # first-order autocorrelation r of the residuals leaves (1-r)/(1+r) of them independent; r is biased by about -4/n
+    # with first-order autocorrelation r, a fraction (1-r)/(1+r) of the residuals is independent; r has a bias of -4/n
     power = float(rest @ rest)
     memory = float(rest[1:] @ rest[:-1]) / power + 4.0 / BLOCKS if power > 0.0 else 0.0
     memory = min(max(memory, 0.0), 0.95)
@@ -161,25 +160,25 @@ def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
 
 
 STENCIL = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
-REACH = 4  # steps to either side
-PLACES = 240
-FEWEST = 4000  # steps: in a shorter run places would meet
-SURE = 8.0  # intervals of the trend
-LEAST = 1e-8  # relative: what differences of angles of many turns leave in doubt
-SHARE = 0.5  # of the drift of the increments' momentum: what the difference drifts by if the run hides it
+REACH = 4  # steps of the stencil to either side
+PLACES = 240  # places of a run where rates are differenced
+FEWEST = 4000  # steps: in a shorter run the stencils would overlap
+SURE = 8.0  # half-widths of the 95 % interval that a drift must exceed
+LEAST = 1e-8  # relative: the least drift that counts, above the rounding of differences of angles of many turns
+SHARE = 0.5  # least ratio of the drift of the difference to the drift of the implied momentum, if a run hides it
 
 
 class Difference(NamedTuple):
-    """How far reported momenta are from those of the states."""
+    """How far the momenta that a run reports drift from those that its rates imply."""
 
     name: str  # of the momentum that differs more
     size: float  # relative to the larger momentum
-    floor: float  # a smaller one is rounding
-    how: str
+    floor: float  # a smaller size is rounding
+    how: str  # where it was measured, in words
 
 
 def from_increments(method: Integrator, scene: Scene, plan: Plan) -> Difference | None:
-    """The drift of the difference over a run as long as `plan`, in the angles chart; None if the run is short."""
+    """The drift of reported against implied momenta over a run like `plan` in the angles chart; None if too short."""
     steps = int(plan.marks[-1])
     if steps < FEWEST:
         return None
@@ -204,7 +203,7 @@ def from_increments(method: Integrator, scene: Scene, plan: Plan) -> Difference 
 
 
 def momenta_of(top: SymmetricTop, around: Array, h: float) -> tuple[Array, Array]:
-    """p_phi and p_psi (places,) of nine consecutive states (places, 9, 4) in angles."""
+    """p_phi and p_psi (places,) that the rates imply, from nine consecutive states (places, 9, 4) in angles."""
     theta = around[:, REACH, 0]
     phi_dot, psi_dot = ((around[:, :, k] - around[:, REACH, None, k]) @ STENCIL / h for k in (2, 3))
     p_psi = top.I3 * (psi_dot + phi_dot * np.cos(theta))

@@ -1,4 +1,4 @@
-"""Datasets over scene and variant: made of those of single cases, and compared with each other."""
+"""Datasets over scene and variant: combined from the datasets of single cases, and compared with each other."""
 
 import math
 from collections.abc import Sequence
@@ -13,9 +13,9 @@ from symtop.core.errors import SymtopError
 Combined = xr.Dataset | xr.DataTree  # what a study measured: a tree if its cases are in groups
 Cell = tuple[str, str, xr.Dataset]  # a scene, a variant and what was measured
 
-# in the names of variables of measured times, or of such a time over a count
+# a variable whose name contains one of these is a measured time, or derived from one
 CLOCKED = ("seconds", "reliable", "spread", "first_call", "alone", "together")
-PRICES = ("price", "call", "sampled")  # names of measured times in a fresh process
+PRICES = ("price", "call", "sampled")  # full names of further measured times, taken in a fresh process
 
 
 def combine(cases: list[tuple[Any, xr.Dataset]]) -> Combined:
@@ -42,7 +42,7 @@ def _dense(cases: list[tuple[Any, xr.Dataset]]) -> xr.Dataset:
     """
     cells: list[Cell] = []
     for case, data in cases:
-        if "variant" in data.dims:  # one that measured several counts as one for each
+        if "variant" in data.dims:
             cells += [(case.scene, str(name), data.sel(variant=name, drop=True)) for name in data["variant"].values]
         else:
             cells.append((case.scene, case.integrator, data))
@@ -73,7 +73,7 @@ def _dense(cases: list[tuple[Any, xr.Dataset]]) -> xr.Dataset:
 
 
 def _coordinates(cells: list[Cell]) -> tuple[dict[str, int], dict[str, Any]]:
-    """The largest size of each dimension, and its coordinate if it has one, which shorter ones begin."""
+    """The largest size of each dimension, and its coordinate if it has one; shorter coordinates must begin it."""
     sizes: dict[str, int] = {}
     longest: dict[str, Any] = {}
     for scene, method, data in cells:
@@ -91,7 +91,7 @@ def _coordinates(cells: list[Cell]) -> tuple[dict[str, int], dict[str, Any]]:
 
 
 def _blank(kinds: "Sequence[np.dtype[Any]]") -> tuple[Any, Any]:
-    """What stands for nothing in an array of values of those types, and the type that can hold all of them."""
+    """The fill value for missing cells of an array of values of those types, and a type that can hold all of them."""
     if any(kind.kind in "OUT" for kind in kinds):
         return "", object
     kind = np.result_type(*kinds)
@@ -99,12 +99,12 @@ def _blank(kinds: "Sequence[np.dtype[Any]]") -> tuple[Any, Any]:
 
 
 def as_text(values: Any) -> Any:
-    """Text of any length as text of one length: archives hold no objects."""
+    """An array of Python strings as an array of fixed-width strings, because archives hold no objects."""
     return values.astype(str) if values.dtype == object else values
 
 
 def differences(stored: Combined, again: Combined, *, attributes: bool = True) -> list[str]:
-    """In what two datasets, or trees of them, differ besides measured times and where they were made."""
+    """Sentences on how two datasets, or trees of them, differ, except in measured times and provenance."""
     ours, theirs = netcdf.groups(stored), netcdf.groups(again)
     return [f"group {name} is in one of them only" for name in sorted(ours.keys() ^ theirs.keys())] + [
         f"{name}: {difference}" if name else difference

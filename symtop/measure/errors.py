@@ -1,4 +1,4 @@
-"""Errors of a run against the truth, in quantities that no chart can distort.
+"""Errors of a run against the true motion, in quantities that do not depend on the chart.
 
     axis       angle between the axes, rad                   attitude   angle of the rotation between, rad
     theta      |theta - theta_ref|, rad                      energy     |E - E_ref| / energy of the nutation
@@ -10,13 +10,12 @@ nutation is 9.2e-5, and the kinetic energy, nearly all spin, 5000. Both momenta 
 vanish. Radians and momenta never share a norm. Of a body without symmetry the scale of the energy is that of the start,
 kinetic and |mgl|, and that of p_phi and of the vector L is |L|.
 
-The length of e or q, which explicit methods let leave one, is no part of an angle; it counts in the energy and the
-momenta.
+Explicit methods do not keep |e| or |q| at one. A wrong length does not change the angles, but the energy and momenta.
 
-A trajectory of another program is checked first. A quaternion shows the attitude, the axis and theta; theta, phi and
-psi the same; theta and phi the axis; an axis shows theta. Vectors are scaled to length one, and what they are off it is
-an error of its own, ``axis_length`` or ``quaternion_length``. SciPy's RK45 at 1e-3 takes |q| to 1.4 on `spheroid`, so
-that a late length refutes nothing; a wrong column or another unit is off in the first sample as well.
+A trajectory of another program is checked first. A quaternion determines the attitude, the axis and theta; so do theta,
+phi and psi; theta and phi determine the axis; an axis determines theta. Vectors are scaled to length one, and the
+deviation of their length is an error of its own, ``axis_length`` or ``quaternion_length``. It may become large in a
+valid run (SciPy's RK45 at 1e-3 takes |q| to 1.4 on `spheroid`), but is small at first unless a column or unit is wrong.
 """
 
 import contextlib
@@ -50,12 +49,12 @@ QUANTITIES: dict[str, str] = {
     "p_phi": "relative error of p_phi",
     "p_psi": "relative error of p_psi",
 }
-OF_BODY = {  # in the place of these, and one that tops do not have
+OF_BODY = {  # for bodies without symmetry: replaces "energy" and adds "momentum"
     "energy": "energy error / (T0 + |mgl|)",
     "momentum": "relative error of the momentum",
 }
 
-ERRORS = {  # what each is of and against what, and its units
+ERRORS = {  # long name, with the reference of the error, and units
     "axis": ("angle between the axis and the true axis", "rad"),
     "attitude": ("angle of the rotation between the attitude and the true attitude", "rad"),
     "theta": ("error of theta against the true motion", "rad"),
@@ -64,21 +63,21 @@ ERRORS = {  # what each is of and against what, and its units
     "p_psi": ("error of p_psi against that of the start, relative to the larger momentum", "1"),
     "momentum": ("error of the angular momentum in the space frame, relative to that of the start", "1"),
 }
-SCALES = {  # what they are relative to, and of bodies without symmetry
+SCALES = {  # the scale of a relative error for a top, and for a body without symmetry
     "the energy of the nutation": "the kinetic energy of the start and |mgl|",
     "the larger momentum": "the momentum of the start",
 }  # fmt: skip
 
 
 def against(words: str, of_body: Collection[bool]) -> str:
-    """A long name with what errors are relative to, of tops, of bodies or of both."""
+    """A long name with the scales that apply: of tops (`of_body` has False), of bodies (has True) or of both."""
     for top, body in SCALES.items():
         words = words.replace(top, " or of bodies ".join([top] * (False in of_body) + [body] * (True in of_body)))
     return words
 
 
 def quantity_words(data: xr.Dataset, quantity: str) -> str:
-    """The words for a quantity of a dataset of errors, with the scale that its long name has."""
+    """The label of a quantity of a dataset of errors, with the scale that the long name of its variable states."""
     name, body = str(data[quantity].attrs.get("long_name", "")), next(iter(SCALES.values()))
     if body not in name:
         return QUANTITIES[quantity]
@@ -89,33 +88,32 @@ def errors(
     run: xr.Dataset | Mapping[str, Any], scene: "str | Scene | xr.Dataset | Iterable[str | Scene] | None" = None, *,
     precision: str = "closed-form",
 ) -> xr.Dataset:  # fmt: skip
-    """The errors of a run, or of anybody's trajectory of a scene, at every sample, and how far they can be trusted.
+    """The errors of a run, or of another program's trajectory of a scene, at every sample, and their uncertainty.
 
     `run` is a dataset of `simulate` (or one read back from its file), which holds its top and start; a `scene` (a Scene
     or a name) must then be the same. A member of an `ensemble` needs its scene; samples without a time are left out.
-    For a whole ensemble `scene` are its members, a dataset or scenes, and all is returned over ``member`` and ``time``.
-    With a `scene` it is also any Dataset or mapping with ``time`` (n,), elapsed since the start, increasing, and one of
+    For a whole ensemble `scene` are its members, a dataset or scenes, and the result is over ``member`` and ``time``.
+    With a `scene`, `run` may be any Dataset or mapping with increasing ``time`` (n,) since the start, and one of
 
         axis         (n, 3)  unit vectors along the top's axis in the space frame, z up
         quaternion   (n, 4)  w, x, y, z from body to space, either sign; the body's third axis is the top's
         theta        (n,)    inclination in [0, pi], rad; with phi, and psi, the other two Euler angles (z-x-z)
 
-    and, where there are any, ``energy``, ``p_phi``, ``p_psi`` (n,), in the units of the scene's top; of a body without
-    symmetry ``momentum`` (n, 3) in space, too.
+    and optionally ``energy``, ``p_phi``, ``p_psi`` (n,) in the units of the scene's top, and for a body without
+    symmetry also ``momentum`` (n, 3) in space.
 
     Returns a Dataset over ``time`` with those of ``axis``, ``attitude``, ``theta`` (rad), ``energy``, ``p_phi``,
-    ``p_psi`` or ``momentum`` (relative, scaled as in `symtop.measure.errors`) that the data show; of a trajectory with
-    an axis or a quaternion of its own ``axis_length`` or ``quaternion_length``, how far that is from length one, which
-    no angle shows; it is refused if its first sample is off by more than 0.5. ``NAME_bound`` (n,)
-    is the least error that can be told from none: the bound of the reference and the rounding of the compared doubles.
-    Samples that are NaN, as after a failure, stay NaN: the largest error is ``max("time", skipna=False)``, NaN of a run
-    that ended early (or of a member of fewer steps than samples); without it, that before the end. `precision` is that
-    of `reference`; the closed form costs a microsecond a sample, and its rounding does not grow with time.
+    ``p_psi`` or ``momentum`` (relative, scaled as in `symtop.measure.errors`) that follow from the data. For a foreign
+    trajectory with axis or quaternion, ``axis_length`` or ``quaternion_length`` is the deviation of its length from
+    one, which angles do not show; a first sample off by more than 0.5 is refused. ``NAME_bound`` (n,) is the least
+    error that can be distinguished from zero: the bound of the reference and the rounding of the compared doubles.
+    Samples that are NaN, as after a failure, stay NaN. ``max("time", skipna=False)`` is therefore NaN for a run that
+    ended early (or a member with fewer steps than samples); with ``skipna`` it is the largest error before the end.
+    `precision` is that of `reference`; the closed form costs 1 us a sample, and its rounding does not grow with time.
 
-    Warns (`SymtopWarning`) where a foreign trajectory starts elsewhere than the scene, goes on for a hundred of its
-    horizons, or holds NaN.
-    Raises SymtopError for data that are no such trajectory, an unknown scene, one of another top or start than the data
-    name, and no scene where they name none.
+    Warns (`SymtopWarning`) if a foreign trajectory starts elsewhere than the scene, extends beyond a hundred of its
+    horizons, or holds NaN. Raises SymtopError for data that are no such trajectory, for an unknown scene or one with
+    another top or start than the data have, and if there is neither a `scene` nor one in the data.
     """
     one_of("precision", precision, PRECISIONS)
     if isinstance(run, xr.Dataset) and "member" in run.dims and not isinstance(scene, (str, Scene, type(None))):
@@ -124,7 +122,7 @@ def errors(
 
 
 def _of_run(run: Any, scene: Any, precision: str, warn: Callable[[str], object]) -> xr.Dataset:
-    """The errors of one run or trajectory; `warn` is handed what is doubtful."""
+    """The errors of one run or trajectory; calls `warn` with each warning."""
     foreign = scene is not None and "integrator" not in getattr(run, "attrs", {})
     run = sampled(run) if isinstance(run, xr.Dataset) else run
     chosen = scene_of(run) if scene is None else find_scene(scene, bodies=True)
@@ -167,10 +165,10 @@ def _of_run(run: Any, scene: Any, precision: str, warn: Callable[[str], object])
 
 
 def _of_members(runs: xr.Dataset, members: Any, precision: str) -> xr.Dataset:
-    """The errors of every member, as alone; a warning that several have comes once, with their number."""
+    """The errors of every member, computed singly; all their warnings are given as one, with their number."""
     given, n = read_members(members), runs.sizes["member"]
     refuse_others(given, runs)
-    tables, doubtful = [], list[str]()  # collected so, for a record of warnings takes those of other threads, too
+    tables, doubtful = [], list[str]()  # `warnings.catch_warnings` would also record warnings of other threads
     for i, (top, start) in enumerate(members_of(given.numbers)):
         one = runs.isel(member=i)
         end = float(one["horizon"]) if "horizon" in one else float(np.nanmax(one["time"].values))
@@ -197,16 +195,16 @@ def error_bound(scene: Scene, run: Trajectory, truth: xr.Dataset, quantity: str)
     if quantity == "momentum":
         return np.asarray(true["attitude_error_bound"].values + 4.0 * EPSILON)
     bound: charts.Array = true[f"{quantity}_error_bound"].values + EPSILON
-    if quantity == "attitude" and run.quaternion is None:  # phi and psi come as doubles; their rounding is an angle
+    if quantity == "attitude" and run.quaternion is None:  # phi and psi are doubles: add their rounding error
         bound = bound + 0.5 * EPSILON * (np.abs(true["phi"].values) + np.abs(true["psi"].values))
     return bound
 
 
 def errors_against(scene: Scene, run: Trajectory, truth: xr.Dataset) -> dict[str, charts.Array]:
-    """Error of every quantity that a run shows at every sample (n,); NaN where the run had failed.
+    """Error of every quantity that a run determines, at every sample (n,); NaN where the run had failed.
 
-    Where the reference knows a value beyond double, the difference is taken from both of its halves: a run that is
-    right to its last digit has the error of that digit and not zero. `truth` is `reference` at the same times.
+    `truth` is `reference` at the same times. Where it has a value as a pair of doubles, both are subtracted, so that a
+    correctly rounded value has its rounding error and not zero.
     """
     true = {name: variable.values for name, variable in truth.variables.items()}
     units = {"theta": 1.0, "energy": scene.energy_scale, "p_phi": scene.momentum_scale, "p_psi": scene.momentum_scale}
@@ -228,19 +226,19 @@ def errors_against(scene: Scene, run: Trajectory, truth: xr.Dataset) -> dict[str
     return columns
 
 
-LENGTH = 0.5  # how far from one the length of an axis or a quaternion may begin: farther off it is no unit vector
+LENGTH = 0.5  # largest deviation from one of the length of the first axis or quaternion; else it is no unit vector
 UNIT_VECTORS = ("axis", "quaternion")
-FAR, NEAR = 0.1, 0.01  # rad from the true attitude: another order of a quaternion, and the right one
-BEYOND = 100.0  # horizons: milliseconds for seconds are a thousand
+FAR, NEAR = 0.1, 0.01  # rad from the true attitude: farther is a wrong convention of a quaternion, nearer the right one
+BEYOND = 100.0  # horizons: a longer run probably has another unit of time (milliseconds for seconds: a factor 1000)
 SHAPES = {"axis": (3,), "quaternion": (4,), "momentum": (3,), **dict.fromkeys(("theta", "phi", "psi", *CONSTANTS), ())}
-ENOUGH = ("axis", "quaternion", "theta")  # one of them there must be
+ENOUGH = ("axis", "quaternion", "theta")  # a trajectory needs one of them
 
 
 def scene_of(run: xr.Dataset | Mapping[str, Any]) -> Scene:
-    """The scene that a dataset of `simulate` says that it was made of; SymtopError for any other data."""
+    """The scene in the attributes of a dataset of `simulate`; SymtopError for any other data."""
     attributes = getattr(run, "attrs", {})
     try:
-        end = attributes["horizon"] or 1.0  # a run that is shown at 0 alone
+        end = attributes["horizon"] or 1.0  # the horizon is 0 for a run sampled only at its start
         return Scene(str(attributes["scene"]), _stored(run, "top"), _stored(run, "start"), end)
     except (KeyError, TypeError, ValueError) as error:
         of = "members" if "member" in getattr(run, "sizes", ()) else "scene"
@@ -249,7 +247,7 @@ def scene_of(run: xr.Dataset | Mapping[str, Any]) -> Scene:
 
 
 def refuse_other_scene(run: xr.Dataset | Mapping[str, Any], scene: Scene) -> None:
-    """Refuse data that say of which top and start they are, if those are not the scene's."""
+    """SymtopError for data with a top or start in their attributes that is not the scene's."""
     attributes = getattr(run, "attrs", {})
     for name, own in (("top", scene.top), ("start", scene.start)):
         if _stored(run, name) not in (None, own):
@@ -259,7 +257,7 @@ def refuse_other_scene(run: xr.Dataset | Mapping[str, Any], scene: Scene) -> Non
 
 
 def _stored(run: xr.Dataset | Mapping[str, Any], name: str) -> Any:
-    """The ``top`` or the ``start`` that data say that they are of; None if they do not say."""
+    """The ``top`` or the ``start`` in the attributes of data; None without one."""
     for kind in (SymmetricTop, RigidBody) if name == "top" else (Angles, Attitude):
         with contextlib.suppress(KeyError, TypeError, ValueError):
             return kind(**json.loads(getattr(run, "attrs", {})[name]))
@@ -267,8 +265,8 @@ def _stored(run: xr.Dataset | Mapping[str, Any], name: str) -> Any:
 
 
 def sampled(run: xr.Dataset) -> xr.Dataset:
-    """A run without the samples that it does not have: members of an ensemble fill their rows with times of NaN."""
-    # of other data a time that is no number is refused later
+    """A run without samples whose time is NaN, which pad the shorter members of an ensemble."""
+    # in other data a time of NaN is an error, raised in `checked`
     if "integrator" not in run.attrs or "time" not in run or run["time"].dims != ("time",):
         return run
     there = np.isfinite(doubles("time", run["time"]))
@@ -276,7 +274,7 @@ def sampled(run: xr.Dataset) -> xr.Dataset:
 
 
 def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
-    """The known variables of a foreign trajectory, an axis and a quaternion at length one; SymtopError for all else."""
+    """A foreign trajectory with axis and quaternion scaled to length one; SymtopError for any other data."""
     if not isinstance(data, Mapping):  # a Dataset is one
         must = "a Dataset or a mapping with time and axis, quaternion or theta"
         raise SymtopError(f"data must be {must}, not {type(data).__name__}")
@@ -299,9 +297,9 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
         raise SymtopError(f"data must hold {words}")
     for name in UNIT_VECTORS:
         if name in columns:
-            largest = np.abs(columns[name]).max(axis=1)  # by which squares neither overflow nor vanish
+            largest = np.abs(columns[name]).max(axis=1)  # divide by it, so that squares neither overflow nor underflow
             length = largest * np.linalg.norm(columns[name] / np.where(largest > 0.0, largest, 1.0)[:, None], axis=1)
-            off = (length == 0.0) | np.isinf(length)  # and has no direction
+            off = (length == 0.0) | np.isinf(length)  # such a vector has no direction
             first = int(np.argmax(~np.isnan(length)))
             off[first] |= np.abs(length[first] - 1.0) > LENGTH
             if off.any():
@@ -310,24 +308,24 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
                 raise SymtopError(f"{name} must be {must}, but its length is {place}")
             columns[name] = columns[name] / length[:, None]
     theta = columns.get("theta", np.zeros(1))
-    if (off := (theta < 0.0) | (theta > float(np.float32(np.pi)))).any():  # which is above pi
+    if (off := (theta < 0.0) | (theta > float(np.float32(np.pi)))).any():  # float32(pi) > pi
         place = f"{theta[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
         raise SymtopError(f"theta must be radians from the vertical in [0, pi], but it is {place}")
     return Trajectory(time, **columns)
 
 
 def check_shapes(columns: Mapping[str, charts.Array], count: int) -> None:
-    """Refuse columns that have no row for each of so many times."""
+    """SymtopError for columns that do not have the shape (count, ...) of `SHAPES`."""
     for name, values in columns.items():
         if values.shape != (shape := (count, *SHAPES[name])):
             raise SymtopError(f"{name} must have the shape {shape}, one row for each time, not {values.shape}")
 
 
 def completed(data: Trajectory) -> Trajectory:
-    """The same with the axis, the attitude and theta that follow from what is there."""
+    """The trajectory with axis, attitude and theta added where its other variables determine them."""
     angles, axis, attitude, theta = [data.theta, data.phi, data.psi], data.axis, data.quaternion, data.theta
     known = [angle is not None for angle in angles]
-    with np.errstate(all="ignore"):  # of samples that are NaN
+    with np.errstate(all="ignore"):  # samples may be NaN
         if attitude is None and all(known):
             attitude = charts.quaternion_from_angles(*angles)
         if axis is None and attitude is not None:
@@ -340,10 +338,10 @@ def completed(data: Trajectory) -> Trajectory:
 
 
 def doubles(name: str, values: Any) -> charts.Array:
-    """Doubles of anything that holds real numbers, a table's text too; NaN where a sample is lost (None, masked)."""
+    """Any array of real numbers, or of their text, as doubles; NaN where a sample is missing (None, masked)."""
     try:
         given = np.ma.filled(values.astype(float), np.nan) if np.ma.isMaskedArray(values) else np.asarray(values)
-        # complex numbers and dates are none
+        # complex numbers and dates are refused
         return given.astype(np.float64, casting="same_kind" if given.dtype.kind in "cmM" else "unsafe")
     except (TypeError, ValueError, OverflowError) as error:
         kind = getattr(values, "dtype", type(values).__name__)
@@ -351,8 +349,8 @@ def doubles(name: str, values: Any) -> charts.Array:
 
 
 def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:
-    """Refuse quaternions that are the true attitude only when they are read in another convention."""
-    true = truth["quaternion"].values  # near which a scene may begin where two conventions agree
+    """SymtopError for quaternions that match the true attitude only if read in another convention."""
+    true = truth["quaternion"].values  # near some attitudes two conventions agree: the first sample far off decides
     far = np.flatnonzero(charts.attitude_distance(quaternion, true) > FAR)
     if not far.size:
         return
@@ -365,7 +363,7 @@ def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:
 
 
 def elsewhere(time: charts.Array, errors: Mapping[str, charts.Array]) -> list[str]:
-    """Whether a trajectory starts as the scene does, in words if it does not."""
+    """A warning if the first sample of a trajectory is far from the true motion, as a list of at most one sentence."""
     for name in ("attitude", "axis", "theta"):
         if name in errors and errors[name][0] > FAR:
             place = f"at t = {time[0]:.6g}, is {errors[name][0]:.2g} rad from the true {name}"
@@ -374,7 +372,7 @@ def elsewhere(time: charts.Array, errors: Mapping[str, charts.Array]) -> list[st
 
 
 def doubts(time: charts.Array, errors: Mapping[str, charts.Array], horizon: float) -> list[str]:
-    """What is wrong with a foreign trajectory as a whole: times far beyond the scene's horizon, samples of NaN."""
+    """Warnings about a foreign trajectory: times far beyond the scene's horizon, samples that are NaN."""
     sentences = []
     if time[-1] > BEYOND * horizon:
         far = f"{time[-1]:.6g}, {time[-1] / horizon:.3g} times the horizon {horizon:.6g}"

@@ -10,17 +10,17 @@ standard error and a wrong slope. Here log error is fitted by
     log C + p log h + a h^q + b h^2q + c h^3q,
 
 by least squares. At the coarsest step of the fit a, b, c have priors of mean 0 and deviation 1/2, 1/4, 1/8, as a series
-has: where the steps span too little to tell a h^q from a power, the prior decides, and its doubt is in the interval. A
-point counts if its error is above ten times the reference's own bound and the run's round-off, below 1e-2, and
-h omega < 0.45 for a method of order 2 (in proportion more for higher orders, whose steps have more stages). Points
+has: where the steps span too little to tell a h^q from a power, the prior decides, and its uncertainty is part of the
+interval. A point counts if its error is above ten times the reference's own bound and the run's round-off, below 1e-2,
+and h omega < 0.45 for a method of order 2 (in proportion more for higher orders, whose steps have more stages). Points
 within a hundred times the bound weigh less. The coarsest points are dropped while the correction exceeds `CORRECTION`
 there or the interval exceeds `WIDEST`.
 
 The interval is Student's, for the degrees of freedom that the data leave, and never less than `RESOLVED`. It covers p
 for 93 to 97 % of synthetic curves with an h^2 correction and the scatter of sampled maxima; that of a straight line
 covers it for less than 4 %. On 100 random tops it covers the order of 11 symmetric methods for 93 to 100 %, but only
-for 77 % that of rk4 and for 17 % that of tsit5-fixed, whose first term is small: its slopes are near 6, whatever their
-scatter. An interval holds the scatter and not what steps too long hide; the terms of a step (`judging`) show that.
+for 77 % that of rk4 and for 17 % that of tsit5-fixed, whose leading error term is small, so that its slopes are near 6.
+An interval covers the scatter, not the bias of too long steps, which the error terms of one step (`judging`) show.
 
 One rule, `order_verdict`, says for every study whether a measured slope confirms a declared order.
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, theorem II.3.2 (even powers of a symmetric method).
@@ -34,21 +34,21 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-LEAST = 5
-LARGEST_ERROR = 1e-2
-FLOOR = 1e3  # times the reference's bound: a finest error beyond it has not met rounding
-LARGEST_PHASE = 0.45  # h omega
-WIDEST = 0.2  # 95 % interval of a slope that still says something
-CORRECTION = 0.7  # of log error, by which it differs from a straight line at the coarsest step
-TERMS, PRIOR = 3, 0.5  # of the series; at the coarsest step the k-th is of the size PRIOR^k
-ITERATIONS, SMOOTH = 12, 1e-12  # of the scatter; the least that it is taken to be
-LEVEL = 30.0  # times the least error: up to there errors may be round-off
-RESOLVED = 1e-3  # half-width of an interval: rounding shifts slopes by less than this
-EXACT = 1e-2  # of an error: the reference's bound, beyond which a point weighs less
-MISSES = 5.0  # standard deviations: a finest point further off the curve of the others has met round-off
-VISIBLE = 0.01  # of an error, likewise
-BESIDE = 0.05  # a slope this near to the declared order, beyond its interval, still is that order
-CLEARLY = 0.4  # a slope further off than this, beyond its interval, is another order: orders are whole numbers
+LEAST = 5  # points of a fit
+LARGEST_ERROR = 1e-2  # of a point that counts
+FLOOR = 1e3  # times the reference's bound: a finest error above it has not reached rounding
+LARGEST_PHASE = 0.45  # h omega of a point that counts, for a method of order 2
+WIDEST = 0.2  # largest half-width of the 95 % interval of an accepted fit
+CORRECTION = 0.7  # largest correction of log error to the straight line, at the coarsest step of an accepted fit
+TERMS, PRIOR = 3, 0.5  # correction terms of the series; prior deviation of the k-th at the coarsest step: PRIOR^k
+ITERATIONS, SMOOTH = 12, 1e-12  # for the scatter of the points; the least scatter assumed
+LEVEL = 30.0  # times the least error: only smaller errors may be round-off
+RESOLVED = 1e-3  # least half-width of an interval: rounding shifts slopes by less than this
+EXACT = 1e-2  # ratio of the reference's bound to an error above which a point weighs less
+MISSES = 5.0  # standard deviations: a finest point further off the curve of the others has reached round-off
+VISIBLE = 0.01  # of log error: the finest point must also be at least this far off
+BESIDE = 0.05  # a declared order at most this far beyond the interval of a slope is confirmed
+CLEARLY = 0.4  # a declared order further than this beyond the interval is refuted: orders are whole numbers
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ class Fit(NamedTuple):
 def line(x: Array, y: Array) -> tuple[float, float, tuple[float, float], Array]:
     """The least-squares line through points (n,), n at least 3.
 
-    Its slope, the standard error of that, the point of means, which is on the line, and what the line leaves.
+    Returns its slope, the slope's standard error, the point of means, which is on the line, and the residuals (n,).
     """
     middle = x.mean(), y.mean()
     dx, dy = x - middle[0], y - middle[1]
@@ -81,14 +81,14 @@ def line(x: Array, y: Array) -> tuple[float, float, tuple[float, float], Array]:
 
 
 def student(freedom: int) -> float:
-    """By how much a standard error is multiplied for a 95 % interval."""
-    from scipy.special import stdtrit  # what scipy.stats asks, which takes a second to import
+    """The factor from a standard error to the half-width of a 95 % interval: the 97.5 % quantile of Student's t."""
+    from scipy.special import stdtrit  # scipy.stats calls this function, but takes a second to import
 
     return float(stdtrit(freedom, 0.975))
 
 
 def power_law(x: ArrayLike, y: ArrayLike, used: ArrayLike | None = None) -> Fit:
-    """Least squares of log y on log x over the used points, a straight line; NaN with fewer than three."""
+    """The straight line fitted to log y against log x by least squares over the `used` points; NaN for fewer than 3."""
     x, y = np.asarray(x, float), np.asarray(y, float)
     mask = np.isfinite(x) & np.isfinite(y) & (x > 0.0) & (y > 0.0)
     if used is not None:
@@ -104,10 +104,10 @@ def order(
     step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, omega: float, claim: int | None = None, *,
     symmetric: bool | None = None,
 ) -> Fit:  # fmt: skip
-    """The order of a method as h -> 0, from errors at several steps; `bound` is the least error that can be judged.
+    """The order of a method as h -> 0, from errors at several steps; `bound` is the error bound of the reference.
 
-    `claim` is the declared order and only widens the range of steps. The series of a `symmetric` method goes on in h^2.
-    A fit that cannot be judged says why.
+    `claim` is the declared order, which only widens the range of steps. The series of a `symmetric` method is in h^2.
+    If no order can be read off, the slope is NaN and `reason` says why.
     """
     h, e, b = (np.asarray(values, float) for values in np.broadcast_arrays(step_size, error, bound))
     rank = np.unique(h, return_index=True)[1]  # a step that was taken twice is one point
@@ -129,10 +129,10 @@ def order(
 
 
 def _round_off(h: Array, e: Array) -> float:
-    """The level where the errors of a run, from fine to coarse steps, stop falling; 0 if they never do.
+    """The round-off level of errors, given from fine to coarse steps; 0 if the errors fall down to the finest step.
 
-    Near the least error, a step whose error is not larger than the next finer one's by the root of their ratio, and all
-    finer ones, have met round-off. Its level is their median.
+    A step with an error near the least one has reached round-off, and so have all finer steps, if its error is not
+    larger than that of the next finer step by the square root of the ratio of the steps. The level is their median.
     """
     good = np.isfinite(e)
     h, e = h[good], e[good]
@@ -145,11 +145,11 @@ def _round_off(h: Array, e: Array) -> float:
 
 
 def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> str:
-    """The one rule of every study: what a measured slope says of a declared order.
+    """The verdict of a measured slope on a declared order; every study uses this rule.
 
-    confirmed   the interval, widened by `BESIDE`, holds the declared order
-    refuted     the slope is off by more than `CLEARLY` beyond its interval, or one of the `others` (the same
-                method's slopes in other quantities, whose errors may fall faster by chance) is as much lower
+    confirmed   the interval, widened by `BESIDE`, contains the declared order
+    refuted     the declared order is more than `CLEARLY` outside the interval, or as far above that of one of `others`
+                (the same method's slopes in other quantities; a faster fall of those may be chance)
     undecided   the slope lies between, or could not be measured
     measured    nothing is declared
     """
@@ -165,7 +165,7 @@ def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> s
 
 
 def _widest(h: Array, e: Array, b: Array, power: int) -> tuple[float, float, float, slice] | None:
-    """Slope, interval and constant of the series over the widest window of points that it describes; the window."""
+    """Fit the series over the widest window of points that it describes: slope, interval, constant, window, or None."""
     first, last = 0, h.size
     while last - first >= LEAST:
         window = slice(first, last)
@@ -185,10 +185,10 @@ def _widest(h: Array, e: Array, b: Array, power: int) -> tuple[float, float, flo
 
 
 def _regularised(columns: Array, values: Array, weights: Array) -> tuple[Array, Array, float]:
-    """Coefficients, their standard errors and the degrees of freedom, where the terms have the prior `PRIOR`.
+    """Weighted least squares with the prior `PRIOR` on the terms: coefficients, standard errors, degrees of freedom.
 
-    The prior is a row for each term, weighed by the scatter of the values. The scatter is found by iteration: the sum
-    of squares over n less the trace of the hat matrix.
+    The prior adds a row for each term, scaled by the scatter of the values. The variance of the scatter is found by
+    iteration: the sum of squares divided by n minus the trace of the hat matrix.
     """
     count, terms = values.size, columns.shape[1] - 2
     prior = np.diag([0.0, 0.0, *(PRIOR**-k for k in range(1, terms + 1))])[2:]

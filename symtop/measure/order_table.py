@@ -1,15 +1,15 @@
-"""The errors that an order is read from, and the orders of every quantity in them.
+"""Tables of errors against step sizes from which an order is fitted, and the fit of the order in any quantity.
 
-A ladder of steps that spans all decades of error has few steps where a method of high order is asymptotic: of order 12,
-ten decades of error are one of step. If the ladder does not show the order, `ASYMPTOTIC` more steps are put between
-rounding and `DECADES` above it. Where double precision runs out before the error is a power of the step, a splitting is
-run in long double: in the axis chart a composition of exact drifts and kicks is
+A ladder of steps that spans all decades of error has few steps where a method of high order is asymptotic: for order
+12, ten decades of error are less than one of step. If the order cannot be fitted, `ASYMPTOTIC` more steps are added,
+whose errors lie between rounding and `DECADES` above it. Where double precision runs out before the error is a power of
+the step, a splitting is run in long double: in the axis chart a composition of exact drifts and kicks is
 
     drift a:  e turns about L by the angle a h |L|/I1        kick b:  L += b h mgl (z x e)
 
-so that its coefficients are all that is needed to run it in any arithmetic; a mantissa of 64 bits gives three more
-decades of error. The coefficients are doubles, summed to 1 again. The error is that of the axis at the end, against
-both halves of a reference in long double. Methods with a modified potential or another rotation are not run.
+so that its coefficients suffice to run it in any arithmetic; a mantissa of 64 bits gives three more decades of error.
+The coefficients are doubles, rescaled so that they sum to 1. The error is that of the axis at the end, against both
+parts of a reference in long double. Methods with a modified potential or another rotation are not run.
 """
 
 import functools
@@ -31,18 +31,18 @@ from symtop.model.scenes import Scene
 from symtop.run.reference.independent_checks import have_heyoka
 from symtop.run.reference.truth import reference
 
-ASYMPTOTIC, DECADES = 12, 3.0  # steps that are added, and the decades of error that they fill
-ABOVE_ROUNDING = 20.0  # times the bound: the least error that an added step is to have
-FURTHER = 0.5  # an error that does not fall must not ask for a million times the steps
+ASYMPTOTIC, DECADES = 12, 3.0  # steps that are added, and the decades of error that they span
+ABOVE_ROUNDING = 20.0  # times the bound: the least error that an added step should have
+FURTHER = 0.5  # times the finest useful step: no added step is finer, even if the error hardly falls with the step
 
 
 def observable(method: Integrator) -> str:
-    """The attitude, if the method shows it in any chart."""
+    """The quantity to observe: "attitude" if the method has a chart that determines it, else "axis"."""
     return "attitude" if set(method.solvers) & {"angles", "attitude"} else "axis"
 
 
 def asymptotic_steps(table: xr.Dataset, quantity: str, power: int) -> list[float]:
-    """More steps where errors are a power of the step, from above rounding `DECADES` up; none if all are rounding."""
+    """Added steps, whose errors reach from just above rounding `DECADES` up; none if all errors are rounding."""
     h, error, bound = (table[name].values for name in ("step_size", quantity, f"{quantity}_bound"))
     judged = np.flatnonzero(np.isfinite(error) & (error > 2.5 * ABOVE_ROUNDING * bound))
     if judged.size == 0:
@@ -55,7 +55,7 @@ def asymptotic_steps(table: xr.Dataset, quantity: str, power: int) -> list[float
 def order_table(
     scene: Scene, method: Integrator, settings: list[float], horizon: float, quantity: str, *, dense: bool = True
 ) -> xr.Dataset:
-    """The error table of a method (see `error_table`) with `quantity` observed, and more steps if they are needed."""
+    """The `error_table` of a method with `quantity` observed, and with more steps if they are needed for its order."""
     table = error_table(scene, method, settings, horizon, observe=quantity)
     if not method.fixed_step or not dense or math.isfinite(order_fit(scene, method, table, quantity, horizon).slope):
         return table
@@ -70,9 +70,9 @@ def order_table(
 def order_fit(scene: Scene, method: Integrator, table: xr.Dataset, quantity: str, horizon: float) -> Fit:
     """The order in one quantity of an error table, against the step, or the mean step of an adaptive method.
 
-    A method of high order makes few steps a nutation, and the largest error at so few times scatters. Where
-    it cannot be judged, the error at the end is, which is smooth in h; and for axis and attitude, last, that of a run
-    in long double, whose steps are not among those of the table.
+    A method of high order makes few steps per nutation, and the largest error at so few times scatters. If its order
+    cannot be judged, that of the error at the end is used, which is smooth in h, and if that fails, for axis and
+    attitude, that of the runs in long double, whose steps are not among those of the table.
     """
     step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
     bound, omega = table[f"{quantity.removesuffix('_end')}_bound"].values, 2.0 * math.pi / scene.nutation_period
@@ -90,15 +90,15 @@ def order_fit(scene: Scene, method: Integrator, table: xr.Dataset, quantity: str
 
 Wide = np.longdouble
 NUTATIONS = 1.37  # length of a run
-STEPS_A_NUTATION = 5.0, 45.0
+STEPS_A_NUTATION = 5.0, 45.0  # of the coarsest and the finest run
 RUNS = 40
-BOUND = 8.0 * float(np.finfo(Wide).eps)  # what a start and a run of a hundred steps leave
+BOUND = 8.0 * float(np.finfo(Wide).eps)  # rounding error of the start and of a run of a hundred steps
 
 
 def extended_errors(scene: Scene, method: Integrator) -> xr.Dataset | None:
     """``extended_step``, ``extended_error`` (rad, of the axis at the end) and ``extended_bound`` over ``extended``.
 
-    None for a method that is no such composition, and where long double is double or there is no reference in it.
+    None if the method is no such composition, if long double is only double, or if there is no reference in it.
     """
     stages = _composition(scene, method)
     if stages is None or not have_heyoka() or np.finfo(Wide).eps == EPSILON:
@@ -115,7 +115,7 @@ def extended_errors(scene: Scene, method: Integrator) -> xr.Dataset | None:
 
 
 def _composition(scene: Scene, method: Integrator) -> Stages | None:
-    """The stages of a step of 1, if the method drifts exactly and kicks plainly."""
+    """The stages of a step of size 1 if the method composes exact drifts and unmodified kicks, else None."""
     solver: Any = method.solvers.get("axis", method.solvers.get("attitude"))
     if not hasattr(solver, "setup"):
         return None
@@ -126,7 +126,7 @@ def _composition(scene: Scene, method: Integrator) -> Stages | None:
 
 
 def _ends(scene: Scene, stages: Stages, horizon: float, counts: NDArray[np.int64]) -> Any:
-    """The axes (n, 3) after each of the ascending `counts` of steps, in long double; all runs take a step together."""
+    """The final axes (n, 3) of runs with each of the ascending `counts` of steps, in long double, advanced together."""
     top, start, step = scene.top, scene.start, Wide(horizon) / counts.astype(Wide)
     theta, phi, *rates = map(Wide, (start.theta, start.phi, start.theta_dot, start.phi_dot, start.psi_dot))
     axes = np.tile(np.array(charts.axis_parts(np, theta, phi))[:, np.newaxis], counts.size)
@@ -153,7 +153,7 @@ def _ends(scene: Scene, stages: Stages, horizon: float, counts: NDArray[np.int64
 
 
 def extended_order_data(table: xr.Dataset) -> tuple[Any, Any, Any] | None:
-    """Steps, errors and bounds in long double of an error table that has them."""
+    """Steps, errors and bounds of the runs in long double in an error table; None if it has none."""
     if "extended_error" not in table or not math.isfinite(float(table["extended_error"].max())):
         return None
     part = table.dropna("extended", subset=["extended_error"])

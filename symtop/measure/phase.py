@@ -1,10 +1,10 @@
-"""What kind of error it is: the wrong shape, the right shape too early, or the right shape turned too far.
+"""The error of a run split into an error of shape, a shift in time (nutation lag) and a turn (precession lag).
 
 The height u = cos(theta) of the axis obeys u'^2 = (1 - u^2)(alpha - beta u) - (b - a u)^2, so (u, u'/omega), with
 omega = 2 pi/T, runs round one closed curve, smooth even where the axis grazes a pole. From a sample (t; u, u', phi):
 
     tau             time at which the true motion is nearest to (u, u'/omega): Gauss-Newton from a table of one nutation
-    shape           the distance that is left, in units of the axis's length: no shift in time and no turn removes it
+    shape           the distance at tau, in units of the axis's length: no shift in time and no turn removes it
     nutation lag    omega (tau - t), rad
     precession lag  sin(theta) (phi - phi_true(tau)), rad: how far the axis is turned about the vertical, lag apart
 
@@ -15,9 +15,9 @@ To first order the axis error is made of these three. If the run's mean frequenc
 
 where s and r are slopes of least-squares lines over all samples, that of r weighted by sin^2(theta) because phi means
 little near a pole. A steady precession has no nutation: its period and its nutation lag are NaN. Between samples the
-nutation lag must change by less than half a nutation, or it is counted on the wrong branch; whether a pole is passed on
-its right or left is not told apart. Not to be confused with the
-error at equal times, which for a periodic motion is mostly lag and grows with the horizon while the shape does not.
+nutation lag must change by less than half a nutation, or it is counted on the wrong branch; passing a pole on its right
+and on its left are not distinguished. The shape error is not the error at equal times, which for a periodic motion is
+mostly lag and grows with the horizon while the shape error does not.
 """
 
 import functools
@@ -38,14 +38,14 @@ FREQUENCIES: dict[str, str] = {
     "precession_rate": "relative error of precession rate",
 }
 TABLE = 256  # points of the true curve from which the search for tau starts
-SWEEPS = 4  # of Gauss-Newton: the error falls from 1e-2 to rounding in three
+SWEEPS = 4  # iterations of Gauss-Newton: the error falls from 1e-2 to rounding in three
 CLEAR = 0.25  # of the largest sin(theta): nearer to a pole, the branch of phi is taken from the neighbours
-LEAST_RATE = 1e-3  # of omega: below it a mean precession is an accident, and its errors are relative to this
+LEAST_RATE = 1e-3  # of omega: errors of a slower mean precession are relative to this
 Array = Any
 
 
 class Split(NamedTuple):
-    """Shape error, nutation lag (time, the sign of early) and precession lag (of phi, rad) at every sample."""
+    """Shape error, nutation lag (time, positive if early) and precession lag (of phi, rad) at every sample."""
 
     shape: Array
     lag: Array
@@ -65,7 +65,7 @@ def _curve(scene: Scene, times: Array) -> tuple[Array, Array, Array, Array, Arra
 
 @functools.lru_cache(maxsize=64)
 def _table(top: SymmetricTop, start: Angles) -> tuple[Array, Array, Array]:
-    """Times of one nutation, the true curve there, (2, TABLE), and half the squares of its points' lengths."""
+    """Times over one nutation (TABLE,), the true curve there (2, TABLE), and half the squared norms of its points."""
     scene = Scene("table", top, start, 1.0)
     period = scene.nutation_period
     times = period * np.arange(TABLE) / TABLE
@@ -75,7 +75,7 @@ def _table(top: SymmetricTop, start: Angles) -> tuple[Array, Array, Array]:
 
 
 def nutates(scene: Scene) -> bool:
-    """Does the true motion have a nutation to speak of, and one that returns?"""
+    """Does the true motion have a nutation wider than `STEADY` and of finite period?"""
     low, high = closed_form(scene).theta_range
     return high - low > STEADY and math.isfinite(scene.nutation_period)
 
@@ -86,7 +86,7 @@ def split(scene: Scene, run: Trajectory) -> Split:
 
 
 def split_states(scene: Scene, t: Array, u: Array, du: Array, phi: Array) -> Split:
-    """The same of states (n,) by u = cos(theta), u' and phi."""
+    """Shape error and lags of states (n,), given by the times t, u = cos(theta), u' and phi."""
     period = scene.nutation_period
     omega = 2.0 * math.pi / period if math.isfinite(period) else 1.0
     if not nutates(scene):
@@ -107,7 +107,7 @@ def split_states(scene: Scene, t: Array, u: Array, du: Array, phi: Array) -> Spl
     turns = np.rint((np.unwrap(lag, period=period) - lag) / period)
     off = np.abs(x * across - y * along) / np.hypot(along, across)
     turn = phi - phi_true - rate * rest - turns * closed_form(scene).phi_per_period
-    # next to a pole phi may jump by pi, and the lag seem to make whole turns
+    # next to a pole phi may jump by pi, which would appear in the lag as whole turns
     sine = np.sqrt(np.maximum(1.0 - u_true * u_true, 0.0))
     clear = sine > CLEAR * np.max(sine)
     guide = np.interp(t, t[clear], np.unwrap(turn[clear]))
@@ -116,24 +116,24 @@ def split_states(scene: Scene, t: Array, u: Array, du: Array, phi: Array) -> Spl
 
 
 def _slope(t: Array, values: Array, bound: Array, weights: Array) -> tuple[float, float]:
-    """Weighted least-squares slope, and the largest one that values within a bound can have."""
+    """Weighted least-squares slope of the values, and the largest slope that errors within `bound` can cause."""
     middle = t - np.average(t, weights=weights)
     spread = np.sum(weights * middle * middle)
     return float(np.sum(weights * middle * values) / spread), float(np.sum(weights * np.abs(middle) * bound) / spread)
 
 
 def phase(scene: Scene, run: Trajectory, truth: xr.Dataset) -> dict[str, float]:
-    """Errors of the `FREQUENCIES` of a run, and with ``_bound`` behind the name what the reference can judge of these.
+    """Errors of the `FREQUENCIES` of a run; ``NAME_bound`` is the least error that the reference can judge.
 
-    All NaN if it failed or has fewer than three samples.
+    All NaN if the run failed or has fewer than three samples.
     """
     if run.outcome != "ok" or run.time.size < 3:
         return {f"{name}{end}": math.nan for end in ("", "_bound") for name in FREQUENCIES}
     form, t = closed_form(scene), run.time
     sine = np.maximum(np.sin(run.theta), EPSILON)
-    with np.errstate(over="ignore", invalid="ignore"):  # a run may be far from anything
+    with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
         parts = split(scene, run)
-    # on a separatrix the whole run is the time scale, not `Scene.time_scale`: a rate is judged over what was seen
+    # on a separatrix the time scale is the length of the run, not `Scene.time_scale`
     period = scene.nutation_period if math.isfinite(scene.nutation_period) else float(t[-1])
     omega, swings = 2.0 * math.pi / period, nutates(scene)
     mean_rate = form.phi_per_period / form.nutation_period if math.isfinite(form.nutation_period) else 0.0

@@ -1,7 +1,7 @@
-"""Published values of this problem, computed anew.
+"""Published values of this problem, compared with values computed here.
 
-Each entry names its source, the value, ours, and what the comparison is worth: ``printed`` digits, a printed
-``formula``, or a ``consistency`` with what the source was built from. Values agree if they round to the same digits.
+Each entry names its source, the published value, ours, and the kind of comparison: with ``printed`` digits, a printed
+``formula``, or for ``consistency`` with the source's own data. Values agree if they round to the same digits.
 """
 
 import math
@@ -12,7 +12,7 @@ import numpy as np
 from symtop.model.scenes import closed_form, scene as find_scene
 from symtop.run.reference.truth import reference
 
-TRAJECTORY, START, OTHER_BODY = "trajectory", "start", "another body"  # the last tests SciPy beside us, not symtop
+TRAJECTORY, START, OTHER_BODY = "trajectory", "start", "another body"  # the last tests SciPy, not symtop
 
 
 class Published(NamedTuple):

@@ -1,10 +1,10 @@
-"""Which variants, methods in one chart, are the fastest on random tops: the table ``candidates.tsv``.
+"""The fastest variants (a method in one chart) on random tops, read from the table ``candidates.tsv``.
 
-It was made from a stored study of cost (`benchmarks/candidates.py`), which counts force evaluations on random tops and
-measures what one costs. A row holds the variants that between them were next to the cheapest on most random tops of
-every kind, for an accuracy of a quantity, a length in nutations, a class of `NEEDS`, and, in some, only of methods that
-exist for a body without symmetry. Made from half of the tops, five of a row come within 1.1 times the least on 96 to
-100 % of the others over 10 nutations, and on 88 to 100 % over 1000.
+The table comes from a stored study of cost (`benchmarks/candidates.py`), which counts force evaluations on random tops
+and measures the time of one. A row is for one quantity, accuracy, length in nutations and class of `NEEDS`, and some
+rows only for methods that exist for a body without symmetry. Its variants are a set of which, on most random tops of
+every kind, at least one costs little more than the cheapest method. If rows are made from half of the tops, one of five
+variants costs at most 1.1 times the least on 96 to 100 % of the other tops over 10 nutations, 88 to 100 % over 1000.
 """
 
 import functools
@@ -12,10 +12,10 @@ import math
 from collections.abc import Collection
 from pathlib import Path
 
-SHOWN_AS = {"theta": "axis"}  # quantities that the study has under another name
+SHOWN_AS = {"theta": "axis"}  # quantities without rows of their own, and the quantity whose rows are used
 TABLE = Path(__file__).with_name("candidates.tsv")
 ASKED = ("nutations", "quantity", "accuracy", "needs", "general")  # columns of the table, before the variants
-ANY = "any"  # class of needs: whatever is not made for this very top
+ANY = "any"  # class of needs: every method but those made for the symmetric top only
 MENU = 6  # variants in a row
 
 
@@ -28,9 +28,9 @@ def _rows() -> dict[tuple[float, str, float, str, bool], list[str]]:
 def cheapest(
     needs: Collection[str], quantity: str, accuracy: float, nutations: float, *, general: bool = False
 ) -> list[str]:
-    """Variants of the classes `needs` (empty: `ANY`), mostly the cheapest first; none where the table says nothing.
+    """Variants of the classes `needs` (empty: `ANY`), mostly the cheapest first; none if the table has no such row.
 
-    Accuracy and length are the nearest in the table, in logarithms. Of several classes the firsts of all come first.
+    Accuracy and length are the nearest in the table, in logarithms. The rows of several classes are interleaved.
     """
     rows, shown = _rows(), SHOWN_AS.get(quantity, quantity)
     length = min({key[0] for key in rows}, key=lambda value: abs(math.log(value / max(nutations, 1e-3))))

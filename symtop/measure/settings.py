@@ -1,4 +1,4 @@
-"""The setting of a method, a step or a tolerance: its limits, ladders of them, and the search for one.
+"""The setting of a method, a step size or a tolerance: its limits, ladders of settings, and the search for one.
 
 The error of a quantity over a horizon T follows C T^a s^p: s the setting, p the order of a fixed-step method and about
 1 of an adaptive one, a the law of growth (energy, momenta and mean frequencies 0 and angles 1 for maps that are
@@ -21,18 +21,18 @@ from symtop.model.scenes import Scene
 from symtop.run.simulation import chart_of, likely_step
 
 LEAST_RUN = 6.37  # steps of a run: fewer samples do not show its error; not commensurate with the nutation
-LEAST_STEPS = 4.37  # a nutation, where the error of a constant is asked: long steps may keep it and miss the motion
+LEAST_STEPS = 4.37  # per nutation, in a search by a constant's error: longer steps may keep it and miss the motion
 LOOSEST = 0.4  # tolerance
-TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)  # axis errors, rad, that studies of costs ask for
+TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)  # axis errors, rad, at which studies compare costs
 ANGLES = ("axis", "attitude", "theta")
 OF_BODY = (*ANGLES, "energy", "p_phi")  # quantities of a body without symmetry
 TEDIOUS = 1e-8  # the least tolerance of an implicit method in Python: radau at 1e-12 takes a minute for ten nutations
 SHORT = 120.37  # nutations of a trial run: in a dozen, the growth of unstable motions is not seen
-LEAST = 0.3  # of the target: the least error that ends a search
+LEAST = 0.3  # a search ends at an error between this part of the target and the target
 TRIES = 9  # runs of a search
-MOST_EVALUATIONS = {"compiled": 3e8, "python": 3e5}  # of one run
-FLAT, NEAR_ROUNDING = 1.3, 1e-8  # a finer setting that gains less has met rounding, if its error is below this
-STAIR = 0.1  # what becomes of a tolerance at least that has gained nothing
+MOST_EVALUATIONS = {"compiled": 3e8, "python": 3e5}  # force evaluations of one run
+FLAT, NEAR_ROUNDING = 1.3, 1e-8  # errors below the second have reached rounding if a finer setting gains less than FLAT
+STAIR = 0.1  # a tolerance at which the error did not fall is next multiplied by this or less
 
 STOPPED = "Stopped by rounding or by what the method's settings allow"
 BUDGET = "Not within the work that a run may take"
@@ -41,15 +41,15 @@ TRIED = f"Not within {TRIES} runs"
 
 
 def smallest_charts(observe: str) -> list[Integrator]:
-    """Every method in each chart that shows `observe`, but for the attitude's where it has one of the axis alone."""
-    larger = ("attitude",)  # it costs more for the same axis and angular momentum
+    """Every method in each chart that determines `observe`, but not in "attitude" if it also has the chart "axis"."""
+    larger = ("attitude",)  # this chart costs more for the same axis and angular momentum
     return [one for one in variants(observe) if one.charts() != larger or "axis" not in integrator(one.method).charts()]
 
 
 def compared(observe: str) -> list[Integrator]:
-    """Every method in each chart that shows the "axis", the smallest, or the "attitude", but for `exact_steps`."""
+    """Every method to compare, in its `smallest_charts` for "axis" or in each chart with "attitude"."""
     every = smallest_charts(observe) if observe == "axis" else variants(observe)
-    return [one for one in every if not one.exact_steps]  # they step a solution that other problems do not have
+    return [one for one in every if not one.exact_steps]  # these evaluate a closed form that other problems do not have
 
 
 def least_tolerance(method: Integrator) -> float:
@@ -61,9 +61,9 @@ def least_tolerance(method: Integrator) -> float:
 def limits(scene: Scene, method: Integrator, horizon: float, quantity: str = "axis") -> tuple[float, float]:
     """The finest and the coarsest setting.
 
-    A step may be as long as the angles that it leads to are right: the states between two steps are reached by shorter
-    ones, whose errors are smaller. A run needs a few steps, whose errors are what is measured. Constants of the motion
-    and frequencies say nothing of the angles, and where their error is asked a step is at most a quarter of a nutation.
+    For angles a step may be as long as its error allows: states between two steps are reached by shorter steps, whose
+    errors are smaller. A run has at least `LEAST_RUN` steps, because errors are measured at steps. For constants of the
+    motion and frequencies, which do not show errors of the angles, a step is at most about a quarter of a nutation.
     """
     if method.fixed_step:
         longest = math.inf if quantity in ANGLES else scene.nutation_period / LEAST_STEPS
@@ -72,15 +72,15 @@ def limits(scene: Scene, method: Integrator, horizon: float, quantity: str = "ax
 
 
 def ladder(method: Integrator, scene: Scene, horizon: float, count: int = 9, most: float = 4e6) -> list[float]:
-    """`count` settings of a method, coarse to fine, evenly in the logarithm; NaN alone where there is nothing to set.
+    """`count` settings of a method, coarse to fine, evenly in the logarithm; [NaN] for a method without a setting.
 
-    Steps go from ten a nutation down to where the method meets round-off or makes `most` steps, tolerances from 1e-2
-    to the least. The finest step of a method of order p resolves a nutation about 10 * 10^(11/p) times; methods of high
-    order, whose steps have many stages, begin at five.
+    Steps go from ten per nutation to where the method reaches round-off or makes `most` steps in a run, tolerances from
+    1e-2 to the least. The finest step of a method of order p resolves a nutation about 10 * 10^(11/p) times; methods of
+    high order, whose steps have many stages, begin at five per nutation.
     """
     if method.fixed_step:
         period, power = scene.time_scale(horizon), method.order or 2
-        first = 10.37 if power <= 4 else 5.37  # nothing here may be commensurate with the nutation
+        first = 10.37 if power <= 4 else 5.37  # not commensurate with the nutation
         longest = max(math.log10(most * period / horizon / first), 0.5)
         decades = min(4.5, 11.0 / power + math.log10(10.37 / first), longest)
         return [period / (first * 10.0 ** (decades * k / (count - 1))) for k in range(count)]
@@ -91,9 +91,9 @@ def ladder(method: Integrator, scene: Scene, horizon: float, count: int = 9, mos
 
 
 def between(fine: float, low: float, coarse: float, high: float, goal: float) -> float:
-    """The setting between two whose errors are `low` and `high` at which the line through both in logs has `goal`."""
+    """The setting with error `goal`, by log-log interpolation between `fine` (error `low`) and `coarse` (`high`)."""
     if math.isinf(high) or low <= 0.0 or high > 1e6 * low:
-        part = 0.5  # the errors show no line
+        part = 0.5  # the errors follow no power law
     else:
         part = min(max(math.log(goal / low) / math.log(high / low), 0.1), 0.9)
     return float(fine * (coarse / fine) ** part)
@@ -103,17 +103,18 @@ def seek(
     run: Callable[[float], tuple[float, float]], guess: float, target: float, ends: tuple[float, float], power: float,
     *, fixed_step: bool = True, patience: float = math.inf, least: float = LEAST,
 ) -> float | str:  # fmt: skip
-    """The coarsest setting found whose error is at most the target, if possible `least` of it, or why there is none.
+    """The coarsest setting found whose error is at most `target`, if possible above `least * target`; else the reason.
 
     `run` takes a setting and returns the error, infinite after a failure, and the force evaluations of a run. `ends`
-    are the finest and the coarsest setting, `power` is that of the error in the setting. No run is begun that is
-    foreseen to take more than `patience` force evaluations.
+    are the finest and the coarsest setting, `power` is the exponent of the error in the setting. A run that is
+    estimated to take more than `patience` force evaluations is not begun.
     """
     (finest, coarsest), goal = ends, math.sqrt(least) * target
-    after_failure, finer, coarser = (0.4, 0.02, 8.0) if fixed_step else (0.01, 1e-5, 1e4)  # changes of a setting
+    # factors by which a setting changes: after a failed run, at the least and at the most
+    after_failure, finer, coarser = (0.4, 0.02, 8.0) if fixed_step else (0.01, 1e-5, 1e4)
     setting, why, smallest, flat = min(max(guess, finest), coarsest), TRIED, math.inf, 0
     met: tuple[float, float] | None = None  # the coarsest setting that meets the target, with its error
-    missed: tuple[float, float] | None = None  # the finest that does not
+    missed: tuple[float, float] | None = None  # the finest setting that misses it, with its error
     for _ in range(TRIES):
         last = setting
         error, evaluations = run(setting)
@@ -125,8 +126,8 @@ def seek(
         else:
             gains = met is not None or missed is None or not missed[1] < FLAT * error < NEAR_ROUNDING
             flat, missed = 0 if gains else flat + 1, (setting, error)
-            if flat == (1 if fixed_step else 2):  # an order that depends on the tolerance makes the error fall by steps
-                why = STOPPED  # a finer setting gains nothing
+            if flat == (1 if fixed_step else 2):  # if the order depends on the tolerance, the error falls in jumps
+                why = STOPPED
                 break
         if met is not None and missed is not None:
             if missed[0] < 1.15 * met[0]:
@@ -145,23 +146,23 @@ def seek(
 
 
 class Met(NamedTuple):
-    """A setting, the largest error measured with it over `horizon`, what the reference can judge, and its work."""
+    """A setting and the run with it: the largest error over `horizon`, the least judgeable error, and the work."""
 
     integrator: Integrator
     setting: float
     error: float
-    bound: float
+    bound: float  # the least error that the reference can judge
     horizon: float
-    evaluations: float
+    evaluations: float  # of the force
 
 
 def observed(quantity: str) -> str:
-    """What must be observed to see a quantity: the attitude only for itself."""
+    """The `observe` argument that a quantity needs: "attitude" for the attitude, "axis" for all others."""
     return "attitude" if quantity == "attitude" else "axis"
 
 
 def growth(method: Integrator, quantity: str) -> int:
-    """The exponent a of the error's growth with the horizon that the method's traits promise."""
+    """The exponent a of the error's growth with the horizon, from the declared symplecticity and symmetry."""
     return (quantity in ANGLES) + (not (method.symplectic or method.symmetric))
 
 
@@ -174,10 +175,10 @@ def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, qu
 
 
 def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
-    """The least error of a quantity that the reference can judge over a horizon; NaN if the motion does not show it."""
+    """The least error of a quantity that the reference can judge over a horizon; NaN if it has no such quantity."""
     if not scene.of_body:
         return attempt(scene, integrators()["exact"], math.nan, horizon, quantity).bound
-    try:  # a few steps of any method, as the reference and its bound know none
+    try:  # any method will do: the bound depends on the reference alone
         return attempt(scene, integrators()["rk4"], horizon / LEAST_RUN, horizon, quantity).bound
     except SymtopError as error:
         raise SymtopError(error.renamed({"times": "horizon"}), "horizon") from error
@@ -189,8 +190,8 @@ def search(
 ) -> Met | str:  # fmt: skip
     """The coarsest setting found that meets the accuracy over the horizon, or the reason why there is none.
 
-    It begins at an error of about (h/period)^p, or of the tolerance, unless there is a guess; no setting is above
-    `longest`. `patience` and `least` are those of `seek`.
+    Without a `guess` it begins at the setting expected to meet the accuracy if the error is about (h/period)^p, or at a
+    tenth of the accuracy for a tolerance. No setting is above `longest`. `patience` and `least` are those of `seek`.
     """
     finest, coarsest = limits(scene, method, horizon, quantity)
     ends, patience = (finest, min(coarsest, longest)), min(patience, MOST_EVALUATIONS[method.implementation])
@@ -213,22 +214,22 @@ def search(
 
 
 def at_accuracy(method: Integrator, ratio: float) -> float:
-    """What part of the work of a run is left at the very accuracy, of which its error is the part `ratio`.
+    """The factor from the work of a run to the work at exactly the accuracy, if the run's error is `ratio` times that.
 
-    That of a method of order p grows as error^(-1/p). An error below `LEAST` is of a setting that has no coarser one.
+    The work of a method of order p grows as error^(-1/p). A ratio below `LEAST` occurs only at the coarsest setting.
     """
     return float(min(max(ratio, LEAST), 1.0) ** (1.0 / (method.order or math.inf)))
 
 
 def rounded(scene: Scene, met: Met, accuracy: float, quantity: str) -> Met:
-    """The same with a finer setting of five digits if a run with that meets the accuracy too, and else as it was."""
+    """The result with its setting rounded down to five digits, if a run with that meets the accuracy; else `met`."""
     setting = float(Context(prec=5, rounding=ROUND_DOWN).create_decimal(repr(float(met.setting))))
     again = met if setting == met.setting else attempt(scene, met.integrator, setting, met.horizon, quantity)
     return again if again.error <= accuracy else met
 
 
 def seconds(scene: Scene, mets: Sequence[Met], quantity: str, horizon: float, batches: int = 5) -> list[float]:
-    """Wall times of bare runs to a horizon with settings, timed against each other; scaled from the runs that met."""
+    """Wall times of bare runs with the settings of `mets`, timed against each other, scaled to `horizon`; seconds."""
     runs = []
     for met in mets:
         chart = chart_of(met.integrator, scene.observes, observed(quantity))

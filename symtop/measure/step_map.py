@@ -1,24 +1,23 @@
-"""The structure of one step: does it preserve the bracket, does it retrace itself, is it one map at all?
+"""The structure of one step: is it symplectic, is it symmetric (time-reversible), is it a map of the state alone?
 
-A step is seen only through a solver, as a run of one step from a start z = (theta, phi, psi, p_theta, p_phi, p_psi), so
-that anybody's plug-in can be judged. What it shows is a vector Y(z) in the chart's own variables, whose brackets are
-known at any point:
+A step is evaluated only through a solver, as a run of one step from z = (theta, phi, psi, p_theta, p_phi, p_psi), so
+that any plug-in can be judged. Its result is a vector Y(z) in the chart's variables, whose Poisson brackets are known:
 
     angles      (theta, phi, psi, p_theta, p_phi, p_psi)    {q_i, p_j} = delta_ij
     nutation    (theta, p_theta)                             likewise, of z = (theta, p_theta)
     axis        (e, L)                                       {L_i, L_j} = eps_ijk L_k,  {e_i, L_j} = eps_ijk e_k
     attitude    (q, L)                                       the same L,  {q, L_i} = i-th unit vector times q, halved
 
-With D = dY/dz and J the canonical matrix, the step is symplectic (Lie-Poisson on the axis) if D J D^T = B(Y), which at
-a pole of the image is no harder than elsewhere. D comes from central differences of width w, w/2, w/4 ... and
-Richardson's extrapolation; its own error is the change from one extrapolation to the next, and a defect counts only
-beyond it. With shrinking w the raw defect of a symplectic map falls as w^2, that of any other map stays.
+With D = dY/dz and J the canonical matrix, the step is symplectic (Lie-Poisson on the axis) if D J D^T = B(Y), which
+has no singularity if Y is at a pole. D comes from central differences of width w, w/2, w/4 ... and Richardson's
+extrapolation; its error is estimated by the change from one extrapolation to the next, and a defect counts only if it
+is larger. With shrinking w the raw defect of a symplectic map falls as w^2, that of any other map stays.
 
 Momenta are in units of the larger of |p_phi| and |p_psi|, so that everything here is of order one.
-A symmetric method has step(-h) = step(h)^-1. An adaptive one has no step of a given h: it runs for that time, and the
-way back is the motion with all rates reversed. A method whose run of two steps is not two runs of one step (it tunes
-itself, or starts differently) is not one map. If it tunes one number t by its start, D = D_t + (dY/dt) (dt/dz)^T, and
-D J D^T - B has rank two when the map of a fixed t is symplectic: then the third singular value vanishes.
+A symmetric method has step(-h) = step(h)^-1. An adaptive one has no step of a given h: it runs for that time, and runs
+back with all rates reversed. If a run of two steps differs from two runs of one step (the method adapts a parameter to
+the start, or has a special first step), it is not one map. If it adapts one parameter t to its start, D = D_t +
+(dY/dt) (dt/dz)^T, and D J D^T - B has rank two when the map of fixed t is symplectic: the third singular value is zero.
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, II.1, VI.2, VII.2; Ridders, Adv. Eng. Softw. 4 (1982).
 """
 
@@ -40,15 +39,15 @@ from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 
 WIDEST = 0.04  # the first differencing width, in radians and units of the momenta
-WIDTHS = 5
-COARSE = 3e-3  # a step is coarse enough to show its structure if two halves of it differ by this
-LOOSE = 1e-3  # tolerance at which an adaptive method shows its structure
+WIDTHS = 5  # differencing widths, each half the one before
+COARSE = 3e-3  # the largest step is used that differs from two steps of half its size by less than this
+LOOSE = 1e-3  # tolerance of the runs of an adaptive method, loose enough to show a defect
 UNIT = 1e-12  # |e| = 1 and |q| = 1 within this
-APART = 0.01  # rad from a pole: nearer, angles know a state to 2e-16 over their square, and a term would look wrong
-UPRIGHT = 1e-15  # rad: no more than rounding leaves of pi
-LEAST_UNIT = 1e-3  # of 2 pi I1 over the nutation period
-SHARE = 0.37  # of a nutation: what an adaptive method is run for
-SEVERAL = 8  # steps, more than a method of several steps is started with
+APART = 0.01  # rad: nearer to a pole a state in angles has an error of 2e-16 over the square of this distance
+UPRIGHT = 1e-15  # rad: nearer to a pole an axis counts as vertical; pi itself is rounded by 1.2e-16
+LEAST_UNIT = 1e-3  # least unit of the momenta, in 2 pi I1 over the nutation period
+SHARE = 0.37  # nutations: the duration of the run of an adaptive method, and the first trial of a fixed step
+SEVERAL = 8  # steps, more than the starting steps of any multistep method
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ class StepMap:
     h: float
 
     def run(self, start: Angles, h: float, steps: int = 1) -> Run:
-        """A run of so many steps, sampled at its end; for an adaptive method a run for that time."""
+        """A run of `steps` steps of h, sampled at its end; for an adaptive method a run over the same time."""
         if self.method.fixed_step:
             plan = Plan.steps(h, [steps])
         else:
@@ -78,17 +77,17 @@ class StepMap:
         return self.scaled(done.states[-1], done.p_phi[-1], done.p_psi[-1])
 
     def scaled(self, state: Array, p_phi: float, p_psi: float) -> Array:
-        """A state of the chart as Y; the momenta are needed in angles alone."""
+        """A state of the chart as Y; p_phi and p_psi are used only in the angles chart."""
         if self.chart == "angles":
             theta, p_theta, phi, psi = state
             return np.array([theta, phi, psi, *(np.array([p_theta, p_phi, p_psi]) / self.unit)])
         return np.concatenate([state[:-3], state[-3:] / self.unit])
 
     def own(self, name: str) -> Any:
-        """What a solver of fixed steps may bring itself; None of one that does not.
+        """An optional function of a solver of fixed steps, by its name; None if the solver does not have it.
 
-        onward          a run of steps (top, start, lengths), each from where the last one ended: a start has
-                        |e| = 1 and |q| = 1, and cannot take up a state that has lost its length
+        onward          a run of steps (top, start, lengths), each from where the last one ended; runs from a start
+                        cannot replace it, for a start has |e| = 1 and |q| = 1 and a state may not
         there_and_back  a step and one from its end with all rates reversed (top, start, step size)
         """
         return getattr(self.method.solvers[self.chart], name, None) if self.method.fixed_step else None
@@ -98,7 +97,7 @@ class StepMap:
         return self.shown(self.run(self.angles(z), self.h if h is None else h))
 
     def angles(self, z: Array) -> Angles:
-        """The start that a point z stands for."""
+        """The start at a point z."""
         return angles_at(self.top, np.concatenate([z[:3], self.unit * z[3:]]))
 
     def at(self, start: Angles) -> Array:
@@ -108,7 +107,7 @@ class StepMap:
         return self.scaled(charts.space_state(self.chart, self.top, start), 0.0, 0.0)
 
     def motion(self, start: Angles) -> Callable[[float], Array]:
-        """Y of the true motion from a start after any time; of q the sign that is nearer to the start's."""
+        """Y of the true motion from a start as a function of time; q has the sign that is nearer to the start's q."""
         exact, before = closed_form(Scene("start", self.top, start, 1.0)), self.at(start)
         return lambda time: aligned(self.chart, self.at(Angles(*map(float, exact(time)))), before)
 
@@ -119,7 +118,7 @@ class StepMap:
         return np.array([start.theta, start.phi, start.psi, *scaled])
 
     def restart(self, y: Array) -> Angles:
-        """The start that a Y stands for; on the axis the spin angle is free and becomes zero."""
+        """The start with a given Y; in the axis chart the spin angle is arbitrary and set to zero."""
         if self.chart == "angles":
             return self.angles(y)
         state = np.concatenate([y[:-3], self.unit * y[-3:]])
@@ -130,7 +129,7 @@ class StepMap:
         return Angles(*(float(value) for value in (charts.theta_from_axis(state[:3]), phi, 0.0, *rates)))
 
     def length(self, y: Array) -> float:
-        """|e| or |q|; one in the angles, which have no such thing."""
+        """|e| or |q| of Y; 1 in the angles chart."""
         return 1.0 if self.chart == "angles" else float(np.linalg.norm(y[:-3]))
 
     def gap(self, first: Array, second: Array) -> float:
@@ -142,7 +141,7 @@ class StepMap:
 
 
 def angles_at(top: SymmetricTop, z: Array) -> Angles:
-    """The start at a point (theta, phi, psi, p_theta, p_phi, p_psi), not at a pole."""
+    """The start at (theta, phi, psi, p_theta, p_phi, p_psi); SymtopError at a pole."""
     theta, phi, psi, p_theta, p_phi, p_psi = (float(value) for value in z)
     if abs(math.sin(theta)) < UPRIGHT:
         raise SymtopError("a step is looked at beside a start of the scene, and its axis stays upright")
@@ -156,7 +155,7 @@ def one_step(method: Integrator, chart: str, scene: Scene, h: float) -> StepMap:
 
 
 def unit_of(scene: Scene) -> float:
-    """The larger of the momenta; of a motion that has next to none, a part of that of a nutation."""
+    """The unit of the momenta: the larger of |p_phi| and |p_psi|, but at least `LEAST_UNIT` (of 2 pi I1 / period)."""
     return float(max(scene.momentum_scale, LEAST_UNIT * scene.top.I1 * 2.0 * math.pi / scene.time_scale()))
 
 
@@ -170,7 +169,7 @@ def generic_start(scene: Scene) -> Angles:
 
 
 def drawn(scene: Scene, count: int, seed: int, *, same_top: bool) -> Iterator[Scene]:
-    """Starts whose axes are spread over all heights but the poles, on other tops unless they are to be the same."""
+    """Random starts whose axes are spread over all heights but the poles, on random tops or all on the `same_top`."""
     draw, rate = np.random.default_rng(seed), 2.0 * math.pi / scene.time_scale()
     for height in draw.permutation(count):
         cosine, top = 0.99 * (2.0 * (height + draw.uniform()) / count - 1.0), scene.top
@@ -182,13 +181,13 @@ def drawn(scene: Scene, count: int, seed: int, *, same_top: bool) -> Iterator[Sc
 
 
 def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Angles]:
-    """The map at a step so large that its structure shows, and the point to judge it at; SymtopError without one."""
+    """The map of a step large enough to show a defect, and the start to judge it at; SymtopError if there is none."""
     start, trial = generic_start(scene), one_step(method, chart, scene, SHARE * scene.time_scale())
     return coarsest(trial, start) if method.fixed_step else trial, start
 
 
 def coarsest(trial: StepMap, start: Angles) -> StepMap:
-    """The map of the largest step, from that of `trial` downwards, whose halves differ from it by less than COARSE."""
+    """The map of the largest step, from that of `trial` downwards, that two half steps match to within `COARSE`."""
     refusal = SymtopError(f"{trial.method.name} makes no step in the {trial.chart} chart")
     h = trial.h
     for _ in range(40):
@@ -203,7 +202,7 @@ def coarsest(trial: StepMap, start: Angles) -> StepMap:
 
 
 def canonical(size: int) -> Array:
-    """The brackets of so many angles and momenta, angles first."""
+    """The canonical matrix J (size, size), angles before momenta."""
     none, one = np.zeros((size // 2, size // 2)), np.eye(size // 2)
     return np.block([[none, one], [-one, none]])
 
@@ -228,17 +227,17 @@ class Defect(NamedTuple):
     """How far a step is from preserving the bracket."""
 
     size: float  # max |D J D^T - B|, extrapolated
-    rest: float  # the third singular value: what a number tuned by the start cannot explain
-    noise: float  # what the differencing leaves in doubt
+    rest: float  # the third singular value: zero if the defect comes from one parameter adapted to the start
+    noise: float  # estimated error of the differencing
     widths: Array
     raw: Array  # the defect from plain central differences of each width
 
 
 def symplectic_defect(step: StepMap, start: Angles) -> Defect:
-    """The defect of the bracket after one step from `start`, extrapolated to width zero, with its own error."""
+    """The defect of the bracket after one step from `start`, extrapolated to width zero, with its estimated error."""
     z = step.point(start)
     middle = step.image(z)
-    scale = min(1.0, math.sin(start.theta))  # near a pole everything changes over its distance
+    scale = min(1.0, math.sin(start.theta))  # near a pole the map varies over the distance from the pole
     widths = np.array([scale * WIDEST / 2.0**k for k in range(WIDTHS)])
     table = [[_differences(step, z, middle, width)] for width in widths]
     best, doubt = table[0][0], math.inf
@@ -258,7 +257,7 @@ def symplectic_defect(step: StepMap, start: Angles) -> Defect:
 def _differences(step: StepMap, z: Array, middle: Array, width: float) -> Array:
     columns = []
     for k in range(z.size):
-        if step.chart == "axis" and k == 2:  # nothing on the axis depends on psi
+        if step.chart == "axis" and k == 2:  # the variables of the axis chart do not depend on psi
             columns.append(np.zeros_like(middle))
             continue
         aside = width * np.eye(z.size)[k]
@@ -283,7 +282,7 @@ def _largest(matrix: Any) -> float:
 
 
 def return_miss(step: StepMap, start: Angles) -> float:
-    """Distance from the start after a step forth and back; a solver that takes no negative step runs reversed."""
+    """Distance from the start after a step forth and back; without negative steps the way back has reversed rates."""
     before = step.at(start)
     if (onward := step.own("onward")) is not None:
         try:
@@ -302,14 +301,14 @@ def return_miss(step: StepMap, start: Angles) -> float:
 
 
 def reversed_rates(start: Angles) -> Angles:
-    """The same attitude, every rate the other way round."""
+    """The start with the same attitude and all rates negated."""
     return Angles(start.theta, start.phi, start.psi, -start.theta_dot, -start.phi_dot, -start.psi_dot)
 
 
 def restart_gap(step: StepMap, start: Angles) -> float:
-    """How much a run of two steps, or of `SEVERAL` quarters, differs from them one by one: rounding, if it is a map.
+    """Difference between a run of two steps (or `SEVERAL` quarter steps) and as many runs of one: rounding for a map.
 
-    A step that does not keep |e| or |q| at one cannot be taken up again by a start: that is no evidence, and zero.
+    A step that does not keep |e| or |q| at one cannot be continued from a start: no evidence, and the result is zero.
     """
     if (onward := step.own("onward")) is not None:
         singly = step.shown(onward(step.top, start, (0.25 * step.h,) * SEVERAL))

@@ -1,7 +1,7 @@
 """sweep(): scenes x integrators x steps or tolerances -> one dataset of errors, work and outcomes.
 
-A cell, one integrator on one scene, is an error table (`symtop.measure.accuracy`). In a file it stands with the digest
-of all that its numbers depend on (`symtop.core.code_hash`), as the cases of a study do.
+A cell, one integrator on one scene, is an error table (`symtop.measure.accuracy`). A file stores it with the hash of
+everything that its numbers depend on (`symtop.core.code_hash`), as it does for the cases of a study.
 """
 
 import contextlib
@@ -31,8 +31,8 @@ from symtop.run.simulation import chart_of, make_plan
 
 KEEP_EVERY = 5.0  # seconds between two writings of the file
 RAISED = "raised"  # outcome of a run whose integrator raised an exception
-BATCHES, BATCH, PATIENCE = 15, 0.0005, 0.1  # of timings: samples of a run, seconds of one, seconds of all
-CLOSE = 0.01  # between the three least, with which there are enough
+BATCHES, BATCH, PATIENCE = 15, 0.0005, 0.1  # of timings: most samples of a run, seconds of one, seconds of all
+CLOSE = 0.01  # relative difference of the three least samples below which a run is not timed further
 SPENT = {"seconds": math.nan, "seconds_spread": math.nan}
 TIMED = (
     "one call of the method's solver from the start to the horizon, with two samples and nothing around it; the least "
@@ -43,7 +43,7 @@ _code = functools.cache(code)
 
 
 class _Cell(NamedTuple):
-    """One integrator on one scene with its settings, and what its numbers depend on."""
+    """One integrator on one scene with its settings; `made_of` is the hash of all that its numbers depend on."""
 
     scene: Scene
     method: Integrator
@@ -79,11 +79,11 @@ def sweep(
                                                        settings; "raised", with the message, if it raised an exception
 
     The attributes ``top`` and ``start`` are JSON by scene, and so is ``horizon`` if scenes differ in it. Cells are
-    computed on as many `threads` as there are cores. With a `path`, they are kept in that netCDF file as they
-    are done: the same call resumes a sweep that was interrupted, runs again what has changed (a setting, a scene, the
-    source of a method) or raised an exception, and ends in the same dataset, which the file then holds. More scenes and
-    integrators may be asked for than are in the file, but not fewer. Raises SymtopError for arguments that make no
-    sense, for a damaged file, and for one that another process is writing.
+    computed on `threads` threads, by default one per core. With a `path`, finished cells are stored in that netCDF
+    file: the same call resumes an interrupted sweep, recomputes cells that have changed (a setting, a scene, the source
+    of a method) or raised an exception, and returns the same dataset, which the file then holds. A call may name more
+    scenes and integrators than the file holds, but not fewer. Raises SymtopError for invalid arguments, for a damaged
+    file, and for one that another process is writing.
     """
     chosen = [find_scene(one, bodies=True) for one in listed(scenes)]
     methods = [find_integrator(one) for one in listed(integrators)]
@@ -105,7 +105,7 @@ def sweep(
             few = ", ".join(others[:MOST_NAMED]) + f" and {len(others) - MOST_NAMED} more" * bool(others[MOST_NAMED:])
             must = f"{few}: ask for these as well, or name another path"
             raise SymtopError(f"path {str(file)!r} holds what was not asked for, {must}")
-        # what raised is tried again: the cause may have been of the moment
+        # cells with an exception are computed again: the cause may have been temporary
         rest = [cell for cell in cells if cell.made_of not in done or RAISED in done[cell.made_of]["outcome"].values]
 
         def combined() -> xr.Dataset:
@@ -138,23 +138,23 @@ def sweep(
                     netcdf.write(combined(), file)
                 raise
         data = combined()
-        if file is not None and (changed or pairs != stored):  # in another order, it would not be what is returned
+        if file is not None and (changed or pairs != stored):  # also if only the order of the cells has changed
             netcdf.write(data, file)
     return data
 
 
 def attributes(scenes: list[Scene], horizons: dict[str, float]) -> dict[str, Any]:
-    """Tops and starts of a dataset, by the names of its scenes, and the horizon, by them if they differ in it."""
+    """Attributes ``top`` and ``start`` by scene name, and ``horizon``: a number, or by scene name if scenes differ."""
     ends = {*horizons.values()}
     records = {name: {one.name: asdict(getattr(one, name)) for one in scenes} for name in ("top", "start")}
     return {"horizon": horizons if len(ends) > 1 else ends.pop(), **records}
 
 
 def listed(things: Any) -> list[Any]:
-    """One thing, or several, as a list."""
+    """One object as a list of one; several as a list."""
     if isinstance(things, (str, Scene, Integrator)) or not isinstance(things, Iterable):
         return [things]
-    if hasattr(things, "keys"):  # a dataset, a table or a dict, which goes through its names
+    if hasattr(things, "keys"):  # a dataset, a table or a dict, whose iteration gives its names
         must = f"scenes and integrators must be names, objects or lists of them, not a {type(things).__name__}"
         raise SymtopError(f"{must}; for a dataset of tops there is ensemble")
     try:
@@ -176,7 +176,7 @@ def _cell(
     scene: Scene, method: Integrator, given: dict[str, list[float]], horizon: float | None, observe: str | None,
     timed: bool,
 ) -> _Cell:  # fmt: skip
-    """A cell, refused before anything is run if one of its runs could not be."""
+    """A cell; SymtopError before any run if one of its runs has invalid arguments."""
     until = scene.horizon if horizon is None else horizon_of(horizon)
     if method.fixed_step:
         if ("step_size" in given) is ("per_nutation" in given):
@@ -213,7 +213,7 @@ def error_row_or_message(
 
 
 def _time(cells: list[_Cell], done: dict[str, xr.Dataset]) -> bool:
-    """Time the cells that have no times; False if all have."""
+    """Time the cells in `done` that have no times yet; False if there were none."""
     waiting = [(cell, done[cell.made_of]) for cell in cells if done[cell.made_of]["seconds"].isnull().all()]
     runs: list[tuple[Scene, Integrator, float, list[dict[str, Any]]]] = []
     for cell, table in waiting:
@@ -228,7 +228,7 @@ def _time(cells: list[_Cell], done: dict[str, xr.Dataset]) -> bool:
 
 
 def timed_rows(cells: "list[tuple[Scene, Integrator, float, list[dict[str, Any]]]]") -> None:
-    """Time all runs of some scenes, variants and horizons that ended well, against each other, into their rows."""
+    """Time all runs with outcome "ok" against each other; adds "seconds" and "seconds_spread" to the rows of cells."""
     rows, calls, firsts = [], list[Callable[[], object]](), list[Callable[[], object]]()
     for scene, method, horizon, runs in cells:
         rows += (ended := [one for one in runs if one["outcome"] == "ok"])
@@ -238,7 +238,7 @@ def timed_rows(cells: "list[tuple[Scene, Integrator, float, list[dict[str, Any]]
     with foreign_code("a method that is timed"):
         if firsts:
             closed_form.compile_now()
-        for first in firsts:  # a call that loads code would pass for a long run, of which a batch has one call
+        for first in firsts:  # otherwise the calibration would time the loading of code and make batches of one call
             first()
         results = timings(calls, BATCHES, BATCH, warm=True, patience=PATIENCE, close=CLOSE) if calls else []
     for one, timing in zip(rows, results, strict=True):
@@ -246,7 +246,7 @@ def timed_rows(cells: "list[tuple[Scene, Integrator, float, list[dict[str, Any]]
 
 
 def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:
-    """A cell of so many settings; what was not run has no numbers and no digest."""
+    """The table of a cell, extended by rows "not_run" to `size` settings; only such rows and no hash if it is None."""
     blank = as_table([blank_row(cell.method) | {"message": ""} | (SPENT if cell.timed else {})] * size)
     if table is None:
         return blank.assign(made_of=((), ""))
@@ -256,7 +256,7 @@ def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:
 
 
 def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Dataset]]:
-    """Scenes and variants of an earlier sweep, and its error tables by their digests; SymtopError for another file."""
+    """The cells of an earlier sweep as (scene, variant), and its error tables by hash; SymtopError for another file."""
     if file is not None:
         files.sweep(file)
     if file is None or not file.exists():
@@ -281,7 +281,7 @@ def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Data
 
 
 def titled(cell: xr.Dataset) -> str:
-    """The name of a variant, and of one that is not compiled through what it runs: "dop853[axis] (SciPy)"."""
+    """The name of a variant; if it is not compiled, with the package or language it runs in: "dop853[axis] (SciPy)"."""
     name = str(cell["variant"].item())
     if "python" not in cell["implementation"].values:
         return name
@@ -290,12 +290,12 @@ def titled(cell: xr.Dataset) -> str:
 
 
 def period_word(data: xr.Dataset) -> str:
-    """What ``steps_per_nutation`` of a comparison counts in."""
+    """The name of the period that ``steps_per_nutation`` of a comparison refers to."""
     return "natural period" if str(data["variant"].values.flat[0]).endswith("[body]") else "nutation"
 
 
 def failed_setting(cell: xr.Dataset) -> str:
-    """Where a variant on a scene fails, "fails at 5.3 steps a nutation": the finest of its coarsest failed runs."""
+    """The setting at and above which all runs of a variant failed, in words, "fails at 5.3 steps a nutation"; or ""."""
     control = cell["step_size" if cell["step_size"].notnull().any() else "tolerance"].values
     order = np.argsort(-control)  # coarse to fine, with NaN at the end
     failed = ~np.isin(cell["outcome"].values[order], ("ok", "not_run"))

@@ -1,8 +1,8 @@
 """The time that a function call takes.
 
-The first call (compilation, caches) is stored apart. After it, calls are made in batches that last at least
-`BATCH` seconds, several functions interleaved in random order so that a slow spell of the machine hits all of
-them; every batch is kept. The minimum is the estimate (noise only adds), the spread says how far to trust it.
+The first call (compilation, caches) is stored apart. After it, calls are made in batches that last at least `BATCH`
+seconds, several functions interleaved in random order so that a slow spell of the machine affects all of them; every
+batch is kept. The minimum is the estimate, because noise only adds time; the spread shows how reliable it is.
 Batches come in rounds: one of every function, shuffled, then the next round. Samples of one round are neighbours in
 time, and the ratio of two of them is less noisy than the ratio of two minima.
 """
@@ -22,9 +22,9 @@ from symtop.model.scenes import Scene, scene
 from symtop.run.simulation import make_plan
 
 BATCH = 0.02  # seconds
-CLEAR = 1e-3  # seconds: a trial that long shows how many calls make a batch
-STRIDE = 16  # the calls of a trial grow at most so much
-ENOUGH = 5  # samples whose three least may agree
+CLEAR = 1e-3  # seconds: from a trial at least that long the number of calls in a batch is estimated
+STRIDE = 16  # largest factor by which the number of calls grows from one trial to the next
+ENOUGH = 5  # samples needed before the three least are compared with each other
 NOISY = 0.25  # relative spread beyond which a timing is not called reliable
 
 
@@ -46,7 +46,7 @@ class Timing(NamedTuple):
 
     @property
     def reliable(self) -> bool:
-        """Is the spread small enough for a verdict?"""
+        """Is the spread below `NOISY`?"""
         return self.spread < NOISY
 
 
@@ -58,14 +58,14 @@ def _batch(function: Callable[[], object], calls: int) -> float:
 
 
 def first_call(function: Callable[[], object]) -> float:
-    """Seconds of one call, with the compilation that it may bring about."""
+    """Seconds of one call, including any compilation that it causes."""
     return _batch(function, 1)
 
 
 def _calibrate(function: Callable[[], object], batch: float, once: float) -> tuple[int, list[float]]:
-    """How many calls last at least `batch` seconds, and a little more; if one does, with the times of those made."""
+    """How many calls last a little over `batch` seconds; if a single call does, also the times of the trial calls."""
     count, single = 1, [_batch(function, 1)]
-    if min(CLEAR, batch) <= single[0] < once:  # it may have met a pause, as when Python collects garbage
+    if min(CLEAR, batch) <= single[0] < once:  # once more: a garbage collection may have disturbed the first
         single.append(_batch(function, 1))
     elapsed = min(single)
     while elapsed < min(CLEAR, batch):
@@ -82,11 +82,11 @@ def timings(
 ) -> list[Timing]:  # fmt: skip
     """Time several functions against each other.
 
-    Those that are `warm`, called before, have no first call (NaN), and calls that turn out to be longer than a batch
-    are the first samples of their function: a long run costs no more calls than it has samples. A function has no more
-    samples, but `least` of them, if they have taken `patience` seconds together: a long one meets both fast and slow
-    moments of the machine. It has no more either once they `agree` within the part `close`. The closed form is compiled
-    before anything is timed, whoever calls it; if nothing that is timed does (not `exact`), it stays as it is.
+    With `warm`, functions have been called before: they have no first call (NaN), and a trial call that lasts longer
+    than a batch counts as a sample, so that a long run is called no more often than it has samples. A function gets no
+    more samples once it has `least` of them that took `patience` seconds together, because a long call averages fast
+    and slow moments of the machine, or once its samples `agree` to the relative difference `close`. The closed form is
+    compiled before anything is timed, unless no function uses it (`exact` is False).
     """
     if exact:
         closed_form.compile_now()
@@ -108,9 +108,9 @@ def timings(
 
 
 def agree(samples: Sequence[float], close: float) -> bool:
-    """Do the three least of `ENOUGH` samples differ by less than the part `close`?
+    """Do the three least of at least `ENOUGH` samples differ by less than `close`, relative to the least?
 
-    Fewer may agree on what is wrong: on a busy machine a batch that is interrupted takes one slice of time longer.
+    Fewer samples may agree on a wrong time: on a busy machine an interrupted batch takes one time slice longer.
     """
     least = sorted(samples)[:3]
     return len(samples) >= ENOUGH and least[2] < (1.0 + close) * least[0]
@@ -119,9 +119,9 @@ def agree(samples: Sequence[float], close: float) -> bool:
 def bare_run(
     scene: Scene, method: Integrator, chart: str, setting: float, horizon: float, budget: float | None = None
 ) -> Callable[[], Any]:
-    """A call of one of a method's solvers, start to horizon, with two samples and nothing around it.
+    """A call of a method's solver in one chart from start to horizon, with two samples and no checks around it.
 
-    Of heyoka it is the own loop, but with a budget, after which the caller may ask how the run ended.
+    For heyoka it is its own integration loop. With a `budget` it is the solver, whose result says how the run ended.
     """
     plan, _ = make_plan(scene, method, **method.given(setting), horizon=horizon, samples=2, budget=budget)
     solve = method.solvers[chart]
@@ -131,17 +131,17 @@ def bare_run(
     return lambda: solve(scene.top, scene.start, plan)
 
 
-SPAN = 0.03  # seconds of a worker in one turn
-TURNS = 7
-TRIES = 20  # to have all workers at once, the first time when they have to start
-DISTURBED = 1.05  # times as long as alone: beyond it timed cases run one after another
+SPAN = 0.03  # seconds for which a worker repeats the run in one turn
+TURNS = 7  # comparisons of one worker alone with all at once
+TRIES = 20  # attempts to have every worker process take one of the calls; at first some may still be starting
+DISTURBED = 1.05  # slowdown beyond which timed cases run one after another
 
 
 def timed_turn() -> tuple[int, float, float, float]:
-    """Process, begin, end and mean seconds of short runs of a compiled method for `SPAN` seconds."""
+    """Process id, begin, end and mean seconds of short runs of a compiled method, repeated for `SPAN` seconds."""
     run = bare_run(scene("spheroid"), integrator("strang"), "axis", 1e-3, 4.0)
     run()  # its kernel may have to be compiled
-    begin, count = time.monotonic(), 0  # of the clock that all processes share
+    begin, count = time.monotonic(), 0  # all processes share this clock
     while (end := time.monotonic()) < begin + SPAN:
         run()
         count += 1
@@ -149,10 +149,10 @@ def timed_turn() -> tuple[int, float, float, float]:
 
 
 def slowdown(submit: Callable[..., "Future[Any]"], size: int) -> float:
-    """How many times longer a run takes while `size` workers run; infinite if they never did at once.
+    """How many times longer a run takes while `size` workers run; infinite if they never ran at the same time.
 
-    Workers time the same run, one of them alone and all at once, in turns. Beside others it takes as long as alone
-    where cores share nothing that a run needs, and up to twice as long where two of them are threads of one core.
+    Workers time the same run, alternately one alone and all at once. The ratio is 1 where cores share nothing that a
+    run needs, and up to 2 where two workers run on two hardware threads of one core.
     """
 
     def at_once() -> list[tuple[int, float, float, float]]:

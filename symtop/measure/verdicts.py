@@ -1,13 +1,13 @@
-"""What became of a run, judged afterwards against the truth.
+"""The verdict on a finished run, judged against the true motion.
 
-An outcome that is not ok stands. A run that reached its end is, in this order,
+A run that failed keeps its outcome as the verdict. A run that reached its end is, in this order,
 
     accurate            the axis error is at most 1e-2 rad throughout, and at most a tenth of the nutation's width
     wrong_regime        the axis went where the true motion never goes: a tenth of the width beyond a turning point, or
                         past a pole on the other side (p_phi - p_psi or p_phi + p_psi changed its sign)
     drifting            the energy error grew with time and passed 1 % of the energy of the nutation
-    wrong               it grew, too, and stayed below 1 % so far
-    bounded_but_wrong   it did not grow, or is rounding: everything looks right except the answer
+    wrong               the energy error grew, but stayed below 1 %
+    bounded_but_wrong   the energy error did not grow, or is rounding: only the axis error shows that the run is wrong
 """
 
 import math
@@ -21,22 +21,22 @@ from numpy.typing import NDArray
 from symtop.model.scenes import Scene
 from symtop.run.guard import EXPECTED
 
-ACCURATE = EXPECTED  # rad, from which the guard warns; it is silent on less in a narrow nutation
-OUTSIDE = 0.1  # of the nutation's width, or rad if it has none
+ACCURATE = EXPECTED  # rad: largest accurate axis error; the guard warns if it expects more, however narrow the nutation
+OUTSIDE = 0.1  # margin beyond a turning point, in widths of the nutation, or in rad if there is no nutation
 STEADY = 1e-6  # rad; a nutation narrower than this is a steady precession, known to rounding only
-DRIFT = 0.01  # of the energy of the nutation, `Scene.energy_scale`
-GROWING = 1.3  # the second half's largest energy error over the first half's; bounded errors have 1
-ROUNDING = 1e-12  # of the energies that are summed, `Scene.energy_grain`: an error below that is not said to grow
-FEWEST = 8  # samples of half a run: fewer do not tell an energy that grows from one that oscillates
+DRIFT = 0.01  # energy error of a drifting run, in units of the energy of the nutation, `Scene.energy_scale`
+GROWING = 1.3  # an energy error grows if its maximum over the second half is this many times that over the first
+ROUNDING = 1e-12  # times `Scene.energy_grain`: an energy error below that is rounding and is not said to grow
+FEWEST = 8  # samples of half a run: with fewer, growth of the energy cannot be told from oscillation
 NO_GAP = 1e-9  # of the momentum scale: a gap p_phi -+ p_psi below this has no sign to change
 
 
 def barriers(scene: Scene) -> tuple[float, float, float, float]:
-    """What the axis of a scene never passes, and how exact a run has to be to have respected that; radians.
+    """Smallest and largest theta of the true motion, the margin allowed beyond them, and the largest accurate error.
 
-    The smallest and the largest theta, the margin, and the largest axis error that is still accurate.
+    All in rad. The error is that of the axis.
     """
-    if scene.of_body:  # it may point anywhere
+    if scene.of_body:  # the axis may point anywhere
         return 0.0, math.pi, OUTSIDE, ACCURATE
     low, high = scene.top.turning_cosines(scene.start)
     highest, lowest = math.acos(min(high, 1.0)), math.acos(max(low, -1.0))
@@ -45,9 +45,9 @@ def barriers(scene: Scene) -> tuple[float, float, float, float]:
 
 
 def pole_passed(scene: Scene, p_phi: Any, p_psi: Any) -> NDArray[np.bool_]:
-    """At which samples (...) of momenta the axis has passed a pole on the side that those of the start forbid."""
+    """For samples (...) of the momenta: has the axis passed a pole on the side that the start's momenta forbid?"""
     passed = np.zeros(np.shape(p_phi), dtype=bool)
-    if scene.of_body:  # which no momentum keeps from a pole
+    if scene.of_body:  # no momentum keeps its axis from a pole
         return passed
     momenta = scene.top.momenta(scene.start)
     least = NO_GAP * scene.momentum_scale
@@ -70,7 +70,7 @@ class Judgement(NamedTuple):
 
 
 def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgement:
-    """The verdict on a run with the given errors of the axis, of a body of its attitude; NaN counts as the worst."""
+    """The verdict on a run with the given axis errors (attitude errors for a body); NaN counts as the largest error."""
     times, ended = run["time"].values, str(run.attrs["outcome"])
     if ended != "ok":
         return Judgement(ended, float(run.attrs["reached_time"]), str(run.attrs["outcome_message"]))

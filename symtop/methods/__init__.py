@@ -1,1 +1,1 @@
-"""Integrators: four kernel families, the one stepping loop that drives them, and the registry."""
+"""Integrators: the families of kernels, the one stepping loop that drives them, and the registry."""

@@ -1,15 +1,15 @@
-"""Four doubles in one register: operations that a kernel writes down where LLVM does not find them by itself.
+"""Four doubles in one register: explicit vector operations for kernels that LLVM does not vectorise by itself.
 
 A recurrence whose every term needs all terms before it, a Taylor series, is unrolled completely and has no loop that
-could be vectorised. Written as arithmetic of `Vectors` it is, and an order of 20 takes a fifth of the time.
+could be vectorised. Written with the operations of `Vectors`, an order of 20 takes a fifth of the time.
 Every operation rounds as IEEE 754 says, and products are fused with sums where `fma` stands and nowhere else, so that
-the result does not hang on the processor.
+the result does not depend on the processor.
 
 `Components` writes the same operations on four scalars each, to the same bits: inside a loop over many members LLVM
-makes vectors of the members, and a component that nobody reads is not computed.
+makes vectors of the members, and does not compute components that are not used.
 
-A kernel in plain Python steps two runs at once on tuples of `two()`, two doubles in one register: +, - and * of such
-act on both, to the bits of each alone.
+A kernel in plain Python steps two runs at once on tuples of `two()`, two doubles in one register: +, - and * act on
+both, with the bits of each run alone.
 
 `times` and `with_item` take a row that is an array, or a tuple, if it is short: LLVM unrolls a loop over a tuple up to
 about 16 elements and copies the tuple in each pass beyond.
@@ -33,7 +33,7 @@ _VECTOR = ir.VectorType(_DOUBLE, LANES)
 
 
 class Vectors:
-    """Arithmetic of vectors of four doubles in the code that `builder` writes; scalars are values of LLVM, too."""
+    """Writes operations on vectors of four doubles with LLVM's `builder`; scalars are values of LLVM, too."""
 
     def __init__(self, builder: Any) -> None:
         self.builder = builder
@@ -141,7 +141,7 @@ _PAIR = ir.VectorType(_DOUBLE, 2)
 
 
 def _paired(builder: Any, first: Any, second: Any) -> Any:
-    """Two scalars in one register; what is there stays there."""
+    """Two scalars in one register; `first` itself if it is such a register already."""
     if first.type == _PAIR:
         return first
     half = builder.insert_element(ir.Constant(_PAIR, ir.Undefined), first, ir.Constant(_INDEX, 0))
@@ -149,7 +149,7 @@ def _paired(builder: Any, first: Any, second: Any) -> Any:
 
 
 def _of_both(name: str) -> Any:
-    """An operation of LLVM on two values of which a scalar stands for twice the same."""
+    """An operation of LLVM on two values, registers of two doubles or scalars, which stand for two equal ones."""
 
     @intrinsic
     def operation(typing, a, b):  # type: ignore[no-untyped-def]
@@ -162,7 +162,7 @@ def _of_both(name: str) -> Any:
 
 
 class _Two(types.Type):  # type: ignore[misc]
-    """Two doubles in one register, as numba knows them; a kernel hangs on its operations, too."""
+    """The numba type of two doubles in one register; its operations enter the hash of a kernel."""
 
     def __init__(self) -> None:
         super().__init__("two doubles")
@@ -171,7 +171,7 @@ class _Two(types.Type):  # type: ignore[misc]
 
 @functools.cache
 def two() -> Any:
-    """The one `_Two`; a call, so that no kernel's hash hangs on the number that numba gives a type in this process."""
+    """The only `_Two`; a function, so that no kernel's hash depends on numba's number of the type in this process."""
     return _Two()
 
 

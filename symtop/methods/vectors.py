@@ -77,7 +77,7 @@ def accumulate(state: Any, low: Any, dstate: Any) -> Any:
 
 @register_jitable
 def accumulate_plainly(state: Any, low: Any, dstate: Any) -> Any:
-    """Sums without compensation, as everybody else's loop has them: to compare."""
+    """Sums without compensation, for comparison, and for kernels that compensate themselves."""
     return summed(state, dstate), low
 
 

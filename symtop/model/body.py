@@ -28,11 +28,11 @@ from symtop.core.jit_functions import inlined, two_product
 from symtop.core.numbers import EPSILON
 from symtop.model.top import LARGEST, SLACK, bounded, unit, vector
 
-SYMMETRIC = 1e-9  # of the largest entry: how far a matrix may be from a symmetric one
+SYMMETRIC = 1e-9  # largest difference of a matrix from its transpose, relative to its largest entry
 
 
 class Placed(NamedTuple):
-    """The conserved momentum of a body, and one that a symmetric body conserves."""
+    """p_phi, which every body conserves, and M3 = p_psi, which a symmetric body conserves, too."""
 
     p_phi: float
     p_psi: float
@@ -45,13 +45,13 @@ def vertical(w: Any, x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
 
 
 def _as_stored(given: Sequence[float], scaled: Sequence[float]) -> tuple[float, ...]:
-    """Numbers scaled to length one; as they are given if that is their rounding, so that a stored body is the same."""
+    """`scaled`, numbers of length one; `given` if that agrees to rounding, so that a stored body is read unchanged."""
     near = all(abs(float(old) - new) <= 2.0 * EPSILON for old, new in zip(given, scaled, strict=True))
     return tuple(float(number) for number in (given if near else scaled))
 
 
 def _rows(name: str, value: Any) -> list[Any]:
-    """The entries of a list; SymtopError for what has none."""
+    """The entries of a list; SymtopError for what is not iterable."""
     with contextlib.suppress(TypeError):
         return list(value)
     raise SymtopError(f"{name} must be rows of 3 numbers, not {shown(value)}", name)
@@ -114,10 +114,10 @@ class RigidBody:
         """A body by its inertia matrix (3, 3) about the fixed point and the direction of its centre, in any axes.
 
         A heavy one needs `mgl`, its mass times gravity times the distance of the centre from the fixed point.
-        The matrix is diagonalised and the turn kept in `axes`. The third principal axis is that nearest to the centre,
-        and of a free body that beside which the other two moments are most alike in ratio; it points to the side of
-        `centre`. I1 <= I2 but where the third moment is the middle one. `in_principal` takes an attitude in the axes
-        of the matrix to one of this body.
+        The matrix is diagonalised and the rotation kept in `axes`. The third principal axis is the one nearest to the
+        centre; of a free body, the one for which the ratio of the other two moments is nearest to 1. It points to the
+        side of `centre`. I1 <= I2 unless the third moment is the middle one. `in_principal` converts an attitude in
+        the axes of the matrix to one of this body.
         """
         from scipy.spatial.transform import Rotation  # 0.1 s
 
@@ -180,7 +180,7 @@ class RigidBody:
 
     @property
     def free(self) -> bool:
-        """Has it no weight?"""
+        """Is mgl zero?"""
         return self.mgl == 0.0
 
     def in_principal(self, at: Attitude) -> Attitude:
@@ -194,7 +194,7 @@ class RigidBody:
         return self.I1 * w1, self.I2 * w2, self.I3 * w3
 
     def momentum_lo(self, at: Attitude) -> tuple[float, ...]:
-        """What the products in `momentum` are rounded by."""
+        """The rounding errors of the products in `momentum`."""
         return tuple(two_product(moment, rate)[1] for moment, rate in zip(self.moments, at.omega_body, strict=True))
 
     def kinetic(self, at: Attitude) -> float:

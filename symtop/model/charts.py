@@ -1,4 +1,4 @@
-"""The three charts of the top, the maps between them, what their states show, and distances that no chart can distort.
+"""The three charts of the top, maps between them, quantities of their states, and distances that no chart distorts.
 
     angles    theta, p_theta, phi, psi; p_phi and p_psi are parameters    singular at theta = 0, pi
     axis      e (3), L (3), space frame                                   singular nowhere
@@ -20,7 +20,7 @@ Distances are the angles of the smallest rotation, accurate for small angles: ``
 axes, twice that of the quaternions with the nearer sign for attitudes (2 acos has a floor of 1e-8).
 
 `readings`, `axes` and `continuous` are compiled passes over a few hundred states. They do the operations of `View` and
-`unwrapped` in their order, to the same bits; those answer until the kernels are loaded.
+`unwrapped` in their order, to the same bits; until their kernels are loaded they call those.
 """
 
 import math
@@ -172,7 +172,7 @@ def axis_distance(first: Array, second: Array, low: Array | float = 0.0) -> Arra
 def attitude_distance(first: Array, second: Array, low: Array | float = 0.0) -> Array:
     """Angle of the rotation between two orientations in radians, shape (...), to 1e-16 however small.
 
-    `second` is of length one and may have a low half; `first` may be of any length, which is no angle.
+    `second` is of length one and may have a low half; `first` may be of any length, which does not change the angle.
     """
     cosine = np.sum(first * second, axis=-1, keepdims=True)  # of half the angle, times the length of `first`
     sign = np.where(cosine < 0.0, -1.0, 1.0)
@@ -214,9 +214,9 @@ def space_momenta(chart: str, states: Any) -> tuple[Any, Any]:
 
 @dataclass(frozen=True, eq=False)
 class View:
-    """States of one chart, shape (..., dimension), with the momenta p_phi and p_psi that the run showed, shape (...).
+    """States of one chart, shape (..., dimension), with the momenta p_phi and p_psi that the run returned, shape (...).
 
-    The momenta are for the energy alone. Angles are unbounded in `angles`, and modulo a turn elsewhere (`unwrapped`).
+    The momenta enter the energy only. Angles are unbounded in `angles`, and modulo a turn elsewhere (`unwrapped`).
     All quantities have the shape (...), or (..., 3) and (..., 4) for vectors and quaternions.
     """
 
@@ -240,7 +240,7 @@ class View:
 
     @cached_property
     def momentum(self) -> Any:
-        """Angular momentum in the space frame; angles do not have it."""
+        """Angular momentum in the space frame; not for the chart `angles`, whose states do not hold it."""
         return lifted(self.states) if self.chart == BODY else self.states[..., -3:]
 
     @cached_property
@@ -277,7 +277,7 @@ class View:
 
     @cached_property
     def energy(self) -> Any:
-        """Total energy, with the momenta that the run showed."""
+        """Total energy, with the momenta that the run returned."""
         if self.chart == "angles":
             return self.top.reduced_energy(self.theta, self.p_theta, self.p_phi, self.p_psi)
         if self.chart == BODY:
@@ -294,14 +294,14 @@ class View:
         return space_energy(self.top, self.axis, self.momentum, 0.0)
 
 
-READING_SECONDS = 2e-5  # of NumPy beyond what the compiled function takes
+READING_SECONDS = 2e-5  # by which NumPy takes longer than the compiled function
 _NONE, _NO_ROOM = np.empty(0), np.empty((2, 0))
 
 
 def _read(
     states: Any, p_psi: Any, cosine: Any, sine: Any, twice: float, excess: float, mgl: float, axis: Any, seen: Any
 ) -> None:
-    """Axes (n, 3), and energies and p_theta in the two rows of `seen` if it has room, of states (n, 6 or 7)."""
+    """Fill in axes (n, 3), and energies and p_theta in the two rows of `seen` unless empty; states (n, 6 or 7)."""
     width = states.shape[1]
     for i in range(len(states)):
         if width == 7:
@@ -353,7 +353,7 @@ def readings(view: View) -> tuple[Array, Array, Array]:
 
 
 HALF, TURN = math.pi, 2.0 * math.pi
-UNWRAP_SECONDS = 1e-5  # of NumPy beyond what the compiled function takes, for a row
+UNWRAP_SECONDS = 1e-5  # by which NumPy takes longer than the compiled function, for a row
 
 
 def _unwrap(angles: Any, guides: Any, out: Any) -> None:

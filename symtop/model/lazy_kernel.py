@@ -1,10 +1,10 @@
-"""Functions that are interpreted at first and compiled once that is worth its while.
+"""Functions that are interpreted at first, and compiled when interpreting has taken as long as compiling would.
 
-A process that needs a handful of numbers should neither import numba nor compile. `LazyKernel` adds up what it
-interprets, and goes over to the compiled function after `LOADING` seconds if the kernel is in the cache (`IMPORTING`
-more without numba, half of what that takes: who has made 400 forms makes more), or after `patience` seconds, what
-compiling costs, if it is not. If its bitcode is there, the part `GENERATING` is enough: what is made of it is kept.
-Results do not depend on the way: the function keeps the rules of `symtop.core.jit_functions`.
+A process that needs few numbers should neither import numba nor compile. `LazyKernel` adds up the seconds of
+interpreting. It changes to the compiled function after `LOADING` seconds if the kernel is in the cache (`IMPORTING`
+more if numba is not imported, half of the time of the import), or after `patience` seconds, the time of compiling, if
+it is not. If the cache holds its bitcode only, `GENERATING` times `patience` is enough, and the machine code is stored.
+Results are the same either way, as the function keeps the rules of `symtop.core.jit_functions`.
 """
 
 import sys
@@ -12,24 +12,24 @@ import threading
 from collections.abc import Callable
 from typing import Any
 
-LOADING, IMPORTING = 0.05, 0.15  # seconds: a kernel from the cache, numba
-GENERATING = 0.02  # of what compiling costs
-LAZY: "list[LazyKernel]" = []  # of the modules that have been imported
+LOADING, IMPORTING = 0.05, 0.15  # seconds of interpreting before a kernel is loaded, and more before numba is imported
+GENERATING = 0.02  # time of machine code from bitcode, as a part of that of compiling
+LAZY: "list[LazyKernel]" = []  # all instances, of the modules that have been imported
 
 
 class LazyKernel:
     """A plain function and the types of its arguments as a kernel, in numba's words: ``"(float64, float64[::1])"``."""
 
     def __init__(self, function: Callable[..., Any], arguments: str, patience: float) -> None:
-        self.py_func, self.arguments, self.patience = function, arguments, patience  # the name that numba has for it
+        self.py_func, self.arguments, self.patience = function, arguments, patience  # `py_func` as in numba
         self.compiled: Any = None
         self._kernel: Any = None
         self._spent = self._look = 0.0  # seconds of interpreting, and after how many the cache is looked at again
-        self._lock = threading.Lock()  # a kernel half made is not for a second thread
+        self._lock = threading.Lock()  # no second thread may use a kernel before it is complete
         LAZY.append(self)
 
     def ready(self, seconds: float) -> bool:
-        """Is the compiled function the one to call, for work that takes `seconds` interpreted?"""
+        """Call the compiled function for work that takes `seconds` interpreted? Adds them up; may compile."""
         if self.compiled is not None:
             return True
         self._spent += seconds
@@ -50,7 +50,7 @@ class LazyKernel:
                 self.compiled = self._kernel
 
     def load(self) -> bool:
-        """Load it if it is in the cache, or its bitcode; whether the compiled function is there now."""
+        """Load the kernel if it or its bitcode is in the cache; returns whether the compiled function is loaded."""
         with self._lock:
             known = self.compiled is not None or self._worth() < self.patience
         if known:
@@ -58,7 +58,7 @@ class LazyKernel:
         return known
 
     def _worth(self) -> float:
-        """Seconds of interpreting that are worth the compiled function, which another process may have made since."""
+        """Seconds of interpreting after which to compile or load; another process may have compiled in the meantime."""
         from symtop.core.jit import compile_kernel, is_cached
 
         if self._kernel is None:

@@ -1,4 +1,4 @@
-"""Scenes: one top, one start, one horizon, and what the scene is there to show.
+"""Scenes: one top, one start, one horizon, and the purpose of the scene.
 
 The horizon and all times are in the units of the top (seconds, if its parameters are SI).
 """
@@ -33,15 +33,15 @@ TAGS = {  # by which studies choose; a scene without any is in every study
     "near_pole": "passes so close to a pole that the angles chart fails",
     "unstable": "unstable or nearly so: errors grow with the motion",
 }
-STEADY = 1e4  # times its rounding: a nutation of less energy is a steady precession
-SHORTEST = 1e-100  # horizon
+STEADY = 1e4  # a nutation with less energy than this many rounding errors of the energy is a steady precession
+SHORTEST = 1e-100  # the least horizon, in units of time
 NEXT_TO_POLE = 1e-9  # rad; V is not evaluated nearer to a pole, where it has a limit and 0/0
 
 
 def horizon_of(value: object) -> float:
-    """A horizon; SymtopError for one that is not positive, or so short that a step of it is lost in its last place.
+    """`value` as a horizon; SymtopError for one that is not positive, or below `SHORTEST`.
 
-    No rate is beyond 1e40, so that nothing moves in 1e-100. LSODA's own loop never ends below 1e-200.
+    No rate is above 1e40, so that nothing moves in 1e-100. LSODA's own loop never ends below 1e-200.
     """
     horizon = positive("horizon", value)
     if horizon < SHORTEST:
@@ -51,12 +51,12 @@ def horizon_of(value: object) -> float:
 
 @dataclass(frozen=True, slots=True)
 class Scene:
-    """A top, its start and a horizon; `observes` names the smallest thing the scene is watched for.
+    """A top, its start and a horizon; `observes` says how much of the motion a run must show.
 
     ``nutation`` is theta alone, ``axis`` the direction of the axis, ``attitude`` the whole orientation. `units` decides
     the units in datasets. Studies leave out scenes by their `tags`, any of `TAGS`. A `RigidBody` with an `Attitude` is
-    the scene of a body without symmetry: it observes ``body``, and what takes such a scene says so. `reference` names
-    where the scene was published.
+    the scene of a body without symmetry: it observes ``body``, and only functions that say so accept it. `reference`
+    names where the scene was published.
     """
 
     name: str
@@ -91,7 +91,7 @@ class Scene:
 
     @property
     def second(self) -> str:
-        """What follows a time: " s" of a scene in SI, nothing of one without units."""
+        """The unit after a time: " s" for a scene in SI, empty for one without units."""
         return " s" if self.units else ""
 
     @property
@@ -106,7 +106,7 @@ class Scene:
 
     @property
     def period_word(self) -> str:
-        """What a `nutation_period` is called."""
+        """The name of `nutation_period` in texts."""
         return "natural period" if self.of_body else "nutation"
 
     def time_scale(self, horizon: float | None = None) -> float:
@@ -120,8 +120,8 @@ class Scene:
 
         This height of the reduced motion above its steady precession bounds how far a wrong energy moves the turning
         points. A steady precession has none. There it is I1 omega^2/2, the energy of a small nutation with an amplitude
-        of one radian: a relative error is then the square of the amplitude (rad) that it could pay for. Of a body it is
-        the kinetic energy of the start and |mgl|.
+        of one radian: a relative error is then the square of the amplitude (rad) of a nutation with that energy. Of a
+        body it is the kinetic energy of the start plus |mgl|.
         """
         if self.of_body:
             return max(float(self.top.energy_scale(self.start)), TINY)
@@ -136,7 +136,7 @@ class Scene:
     def momentum_scale(self) -> float:
         """What errors of p_phi and p_psi are divided by: the larger of both in size, or of a body |L|, at the start.
 
-        Where that is zero to rounding, it is |L| or sqrt(|mgl| I1), which the weight gives.
+        Where that is zero to rounding, it is the larger of I1 |theta'| (of a body |L|) and sqrt(|mgl| I1).
         """
         if self.of_body:
             size = turning = math.hypot(*self.top.momentum(self.start))
@@ -168,7 +168,7 @@ def _energy_scale(top: SymmetricTop, start: Angles) -> float:
     depth = 0.5 * top.I1 * start.theta_dot**2 + height(start.theta) - height(top.steady_theta(momenta))
     rounding = EPSILON * (abs(top.energy(start)) + abs(top.mgl))
     scales = (depth, 0.5 * top.I1 * top.nutation_frequency(momenta) ** 2, abs(top.mgl))
-    return next((scale for scale in scales if scale > STEADY * rounding), max(*scales, TINY))  # the spin may hide all
+    return next((scale for scale in scales if scale > STEADY * rounding), max(*scales, TINY))  # all may be rounding
 
 
 @functools.lru_cache(maxsize=256)
@@ -341,7 +341,7 @@ _added: dict[str, Scene] = {}
 
 
 def register_scene(entry: Scene) -> Scene:
-    """Add a scene to the catalogue, so that studies and commands know it by name."""
+    """Add a scene to the catalogue, so that studies and commands find it by name."""
     if not isinstance(entry, Scene):
         raise SymtopError(f"register_scene needs a Scene, not {shown(entry)}")
     if entry.name in _catalogue() | _bodies() or _added.get(entry.name, entry) != entry:

@@ -77,7 +77,7 @@ def _euler_angles(theta: float, total: float, difference: float, rates: Sequence
     sine, phi, psi = math.sin(theta), 0.5 * (total + difference), 0.5 * (total - difference)
     c, s = math.cos(psi), math.sin(psi)
     swing = w1 * s + w2 * c
-    # so near a pole that phi' and psi', which nearly cancel, would round w3 by more than the tilt: the tilt goes
+    # so near a pole that the rounding of phi' and psi', which nearly cancel, changes w3 by more than the tilt: drop it
     if sine * sine * math.hypot(w1, w2, w3) < EPSILON * abs(swing) or theta in (0.0, math.pi):
         theta, psi = 0.0 if theta < 1.0 else math.pi, -math.atan2(w2, w1)
         phi = total - psi if theta == 0.0 else difference + psi
@@ -94,7 +94,7 @@ def effective_force(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -> An
 
 @inlined
 def half_angle_force(sin_x: Any, cos_x: Any, north: Any, south: Any, I1: Any, mgl: Any) -> Any:
-    """`effective_force` from the sine and cosine of theta/2, however a kernel comes by them."""
+    """`effective_force` from the sine and cosine of theta/2, for kernels that already have them."""
     up = north / (sin_x * sin_x)
     down = south / (cos_x * cos_x)
     tilt = sin_x * cos_x  # sin(theta)/2, and F = tilt (up + down)
@@ -120,8 +120,8 @@ def effective_potential(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -
     return lever * lever / (8.0 * I1) + mgl * (cos_x * cos_x - sin_x * sin_x)
 
 
-NUMBERS = ("I1", "I3", "mgl", "theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")  # that are a top and a start
-SLACK = 1e-12  # of the inequalities between moments: they come rounded
+NUMBERS = ("I1", "I3", "mgl", "theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")  # of a top and a start
+SLACK = 1e-12  # relative tolerance of the inequalities between moments, which are given rounded
 LARGEST = 1e40  # of any parameter or rate, and one over the smallest inertia: squares of squares stay finite
 BISECTIONS = 60  # of an interval of cosines at most 2 wide: to the last place
 
@@ -250,8 +250,8 @@ class SymmetricTop:
         """A solid spheroid; radii along and across its axis.
 
         Without a `pivot_distance`, inertia is about the *centre of gravity* and the polar radius is the lever arm, as
-        in the notebook that the project began with. With one the body is hung by a point of its axis that far from its
-        centre, and ``I1`` gains ``mass * pivot_distance^2`` (Huygens-Steiner).
+        in the study `notebook`. With one, the fixed point lies on the axis at that distance from the centre, and
+        ``I1`` gains ``mass * pivot_distance^2`` (Huygens-Steiner).
         """
         mass = positive("mass", mass)
         polar = positive("polar_radius", polar_radius)
@@ -268,7 +268,7 @@ class SymmetricTop:
     def from_inertia(
         cls, mass: float, at_centre: float, axial: float, distance: float, gravity: float = 9.81
     ) -> "SymmetricTop":
-        """Any symmetric body, by what is measured: moments of inertia about its centre of gravity.
+        """Any symmetric body, by its moments of inertia about the centre of gravity, as they are measured.
 
         `at_centre` is across the axis, `axial` along it; the fixed point is on the axis at a `distance` below the
         centre (negative: above, a hanging top). ``I1 = at_centre + mass distance^2`` (Huygens-Steiner).
@@ -364,8 +364,8 @@ def newton_between(
 ) -> float:
     """The root of a function that is negative at `below` and positive at `above`.
 
-    Newton's method from the middle, until a step is two units in the last place of the root; where a step leaves what
-    is known to hold the root, half of that. A slope that is k times too large ends as many times further off.
+    Newton's method from the middle, until a step is at most two units in the last place of the root; bisection where a
+    step leaves the interval that holds the root. With a slope k times too large the final error is k times larger.
     """
     x, before = 0.5 * (below + above), math.inf
     while x != before:
@@ -379,14 +379,14 @@ def newton_between(
 
 @functools.lru_cache(maxsize=1024)
 def _steady_theta(top: SymmetricTop, momenta: Momenta) -> float:
-    """The minimum of V, kept: the guard, the scale of the energy and the landmarks of a new start ask for one."""
+    """The minimum of V; cached, as the guard, the energy scale and the landmarks of a start all use it."""
     # a pole that these momenta allow is a minimum of V if (2 I3 w3)^2 >= 16 I1 mgl there
     if momenta.north == 0.0 and momenta.south * momenta.south >= 16.0 * top.I1 * top.mgl:
         return 0.0
     if momenta.south == 0.0 and momenta.north * momenta.north >= 16.0 * top.I1 * -top.mgl:
         return math.pi
     below, above = 1e-9, math.pi - 1e-9
-    if top.potential_slope(below, momenta) >= 0.0:  # the minimum is closer to the pole than anyone can tell
+    if top.potential_slope(below, momenta) >= 0.0:  # the minimum is within 1e-9 of the pole
         return 0.0
     if top.potential_slope(above, momenta) <= 0.0:
         return math.pi
@@ -421,7 +421,7 @@ def bisected(
 
 @inlined
 def _climb(cubic: tuple[float, float, float, float], start: float, u: float) -> float:
-    """u'^2 at the cosine u: the nutation cubic, below zero where the axis does not get to."""
+    """u'^2 at the cosine u: the nutation cubic, negative where the axis does not go."""
     excess, beta, a, b = cubic
     lever = b - a * u
     return (1.0 - u * u) * (excess + beta * (start - u)) - lever * lever

@@ -1,1 +1,1 @@
-"""Figures in one style, and the report page."""
+"""Figures in one style, the report page, cards of judged steps, and archives of results."""

@@ -1,4 +1,4 @@
-"""A bundle that can be cited: everything that the studies measured, in one zip for a repository of data.
+"""A citable bundle: all results of the studies in one zip file for a repository of data.
 
     README.md                     what each file and variable is, its units, and how it was made
     results/*.nc, *.json          datasets and findings of the studies and of the comparisons beside them
@@ -8,12 +8,12 @@
     versions.txt, machine.txt     every installed package; processor, cores, memory, system
     SHA256SUMS                    of all others, as ``sha256sum -c`` reads them
 
-Equal files make an equal bundle, but for the machine and the packages: it holds no time of its making.
+Equal files make an equal bundle, except for the machine and the packages: it contains no date.
 
-The states are a test set for integrators of other people: ten times a scene, from a tenth of its horizon to all of it,
+The states are a test set for other integrators, at ten times per scene, from a tenth of its horizon to all of it,
 written with six digits. They are those of the closed form in 40 digits (`symtop.model.exact.digits`), from the top, the
-start and the times as doubles hold them, so that a program that reads the printed numbers as doubles has the same
-problem. The sign of a quaternion is continued from the start.
+start and the times as doubles, so that a program that reads the printed numbers as doubles has the same problem. The
+sign of a quaternion is continuous from the start.
 """
 
 import functools
@@ -44,11 +44,11 @@ from symtop.report.template import environment
 from symtop.run.ensemble.population import memory
 
 NAME = f"symtop-{__version__}-data"
-EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every file in the bundle: zip has none before
+EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every file in the bundle, the first that zip can store
 
 
 def bundle(results: Path, target: Path | None = None) -> Path:
-    """Write the bundle of a results folder, whose report is written anew; returns the zip, NAME.zip there by default.
+    """Write the bundle of a results folder, and first its report; returns the zip file, by default NAME.zip there.
 
     Raises SymtopError if the folder holds no findings or the bundle cannot be written.
     """
@@ -77,7 +77,7 @@ def bundle(results: Path, target: Path | None = None) -> Path:
 
 
 def _stored(results: Path) -> list[Path]:
-    """The files of a results folder that are bundled: no cases, and no figure that the report does not show."""
+    """The files of a results folder that are bundled: no cases, and only figures and tables of the report."""
     gathered = page.gather(results)
     report_files = {results / kind / one["file"] for study in gathered for kind, items in (
         ("figures", study["pictures"]), ("tables", study["tables"])) for one in items}  # fmt: skip
@@ -87,7 +87,7 @@ def _stored(results: Path) -> list[Path]:
 
 
 def readme(results: Path, files: Mapping[str, bytes]) -> str:
-    """What is in the bundle, in Markdown: how it was made, its files, and every variable of every dataset."""
+    """The README in Markdown: how the bundle was made, its files, and every variable of every dataset."""
     listed = table(["file", "bytes"], [[name, f"{len(content):,}"] for name, content in sorted(files.items())])
     described = [_described(f"results/{path.name}", netcdf.read_any(path)) for path in sorted(results.glob("*.nc"))]
     described.append(_described("scenes/states.nc", states(list(scenes().values()))))
@@ -98,7 +98,7 @@ def readme(results: Path, files: Mapping[str, bytes]) -> str:
 
 
 def _described(name: str, data: xr.Dataset | xr.DataTree) -> str:
-    """One dataset: what it is, where it was made, and its variables, group by group."""
+    """A section of the README on one dataset: title, origin, and the variables of each group."""
     about = [data.attrs.get(key, "") for key in ("title", "question")]
     origin = ", ".join(str(data.attrs[key]) for key in ("symtop_revision", "processor") if key in data.attrs)
     parts = [f"### {name}", " ".join(filter(None, map(str, about))), f"Made by: {origin}." if origin else ""]
@@ -114,7 +114,7 @@ def _described(name: str, data: xr.Dataset | xr.DataTree) -> str:
 
 
 def _machine() -> str:
-    """The machine that makes the bundle, a fact a line."""
+    """The machine that makes the bundle, one fact per line."""
     facts = {key: value for key, value in netcdf.provenance().items() if key != "dependencies"}
     facts |= {"cores": str(os.cpu_count()), "system": platform.platform()}
     if math.isfinite(memory()):
@@ -123,14 +123,14 @@ def _machine() -> str:
 
 
 DIGITS, WORKING = 30, 40  # printed, and computed
-TIMES = 10  # a scene
+TIMES = 10  # per scene
 ANGLES = NUMBERS[3:]
 COLUMNS = (*ANGLES, "axis_x", "axis_y", "axis_z", "quaternion_w", "quaternion_x", "quaternion_y", "quaternion_z")
 TITLE = f"States of the scenes at {TIMES} times, from the closed form in {WORKING} digits"
 
 
 def even_times(end: float, count: int) -> list[float]:
-    """So many even times up to an end, of six digits each."""
+    """`count` equidistant times up to `end`, rounded to six digits."""
     return [float(f"{end * k / count:.6g}") for k in range(1, count + 1)]
 
 
@@ -139,7 +139,7 @@ def times_of(scene: Scene) -> list[float]:
     return even_times(scene.horizon, TIMES)
 
 
-@functools.lru_cache(maxsize=256)  # 0.2 s a scene, and a bundle asks three times
+@functools.lru_cache(maxsize=256)  # 0.2 s per scene, and a bundle calls it three times
 def precise(scene: Scene) -> list[list[Any]]:
     """The columns of `COLUMNS` at each time of a scene, as `mpmath.mpf` of 40 digits."""
     form = PreciseForm(scene.top, scene.start, WORKING)
@@ -147,7 +147,7 @@ def precise(scene: Scene) -> list[list[Any]]:
 
 
 def printed(number: Any, digits: int = DIGITS) -> str:
-    """A number with so many significant digits."""
+    """A number with `digits` significant digits."""
     from mpmath import nstr
 
     return str(nstr(number, digits, min_fixed=0, max_fixed=0, strip_zeros=False))

@@ -1,8 +1,8 @@
 """The card of a judged step, one self-contained page, and the badge for a README.
 
-Two figures, the errors over the step size with the order that they show, and the energy over the long run; below them
-the ledger, a row a claim, with the reason of each verdict. The badge says what the method is, or which claims are
-refuted, in SVG of a fixed width for each letter, so that it looks alike with any font.
+The card has two figures, errors against the step size with their order, and the energy over the long run; below them
+the claims table, with the reason of each verdict. The badge states the properties of the method, or the claims that are
+refuted, as SVG with a fixed width per letter, so that it looks the same with any font.
 """
 
 import io
@@ -24,13 +24,13 @@ from symtop.report.style import BLUE, GREEN, GREY, ORANGE, PAPER, VERMILLION, sl
 from symtop.report.template import environment
 
 LETTER = 6.6  # width of a letter of the badge, pixels
-LONGEST = 72  # letters of what a badge says
+LONGEST = 72  # letters of the text of a badge
 SIGNS = {"confirmed": "✓", "refuted": "✗", "measured": "=", "undecided": "?", "inapplicable": "–"}
 
 
 def figures(ledger: Ledger) -> tuple[Any, Any]:
-    """Two figures: errors over the step size, and the change of the energy over the long run."""
-    with mpl.rc_context(PAPER):  # the caller's settings and figures stay as they are
+    """Two figures: errors against the step size, and the change of the energy over the long run."""
+    with mpl.rc_context(PAPER):  # without changing the caller's settings
         both = Figure(figsize=(4.8, 3.9)), Figure(figsize=(4.8, 3.9))
         _order(both[0].subplots(), ledger)
         _energy(both[1].subplots(), ledger)
@@ -89,14 +89,14 @@ def _energy(axis: Any, ledger: Ledger) -> None:
 
 
 def _nothing(axis: Any, finding: Finding) -> None:
-    """A panel without points says why."""
+    """Write the reason into a panel without points."""
     words = textwrap.fill(finding.why or "it was not measured", 44)
     axis.text(0.5, 0.5, words, ha="center", va="center", transform=axis.transAxes)
     axis.set(xticks=[], yticks=[])
 
 
 def card(ledger: Ledger, path: str | Path) -> Path:
-    """Write the card, an HTML page; SymtopError for what is no ledger of a step, or cannot be written there."""
+    """Write the card, an HTML page; SymtopError if `ledger` is not one of a step, or the file cannot be written."""
     if not isinstance(ledger, Ledger):
         raise SymtopError(f"a card needs a ledger, which symtop.judge returns, not {shown(ledger)}", "ledger")
     if not ledger.about.chart:
@@ -120,7 +120,7 @@ def card(ledger: Ledger, path: str | Path) -> Path:
 
 
 def badge(ledger: Ledger) -> str:
-    """The badge: what the method is, in green without a claim that is refuted, in vermillion with one."""
+    """The badge as SVG: the method's properties in green, or its refuted claims in vermillion."""
     refuted = [claim_name(one.claim) for one in ledger.findings if one.verdict == "refuted"]
     words = f"refuted: {', '.join(refuted)}" if refuted else description(ledger.findings).partition(";")[0]
     if len(words) > LONGEST:

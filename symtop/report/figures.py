@@ -1,4 +1,4 @@
-"""What drawings of studies share: names of lines and rows, the grey band of the bound, which variants are named."""
+"""Helpers for the figures of studies: labels of lines and rows, the grey band of the bound, a choice of variants."""
 
 from collections.abc import Mapping, Sequence
 from itertools import product
@@ -12,21 +12,21 @@ from matplotlib.transforms import Bbox
 from symtop.report.style import LEAST_TEXT, ink
 
 SMALLEST = 1e-17  # where an error of exactly zero is drawn
-LOWEST = 1e-40  # below every panel
+LOWEST = 1e-40  # lower edge of the grey band, below every panel
 BELOW = "below the reference's error bound"
-MOST_NAMED = 9  # variants with a name of their own in a figure
+MOST_NAMED = 9  # variants that a figure labels
 
 
 def error_band(axis: Any, bounds: Any) -> float:
     """Shade all that lies below the median error bound of the reference; returns that bound, or 1e-16 without one."""
-    level = float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else 1e-16  # of the reference
+    level = float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else 1e-16
     shape = {"color": "#BBBBBB", "alpha": 0.45, "lw": 0, "label": BELOW, "transform": axis.get_yaxis_transform()}
-    axis.add_artist(Rectangle((0.0, LOWEST), 1.0, level - LOWEST, **shape))  # to the frame, which it does not move
+    axis.add_artist(Rectangle((0.0, LOWEST), 1.0, level - LOWEST, **shape))  # an artist does not change the limits
     return level
 
 
 def rows(axis: Any, names: Sequence[str], count: int = 0) -> None:
-    """Name the rows of a panel of dots, the first at the top; with room for `count` of them."""
+    """Label the rows of a panel of dots, the first at the top; with room for `count` rows."""
     axis.set_yticks(range(len(names)), names, fontsize=LEAST_TEXT)
     axis.set_ylim(max(count, len(names)) - 0.4, -0.6)
     axis.tick_params(axis="y", length=0)
@@ -34,12 +34,12 @@ def rows(axis: Any, names: Sequence[str], count: int = 0) -> None:
 
 
 def chosen(names: Sequence[str], known: Sequence[str], most: int = MOST_NAMED) -> list[str]:
-    """The variants that a figure names: all if they are few, otherwise those that are known, if any of them is."""
+    """The variants that a figure labels: all if they are few, otherwise those in `known`, or the first if none is."""
     return list(names) if len(names) <= most else [name for name in names if name in known] or list(names)[:most]
 
 
 def spread(places: Sequence[float], gap: float) -> list[float]:
-    """Places in [0, 1], as near to the given ones as their order and a gap allow (least squares)."""
+    """Positions in [0, 1] at least `gap` apart, in the order of `places` and nearest to these (least squares)."""
     from scipy.optimize import isotonic_regression
 
     order, gaps = np.argsort(places, kind="stable"), gap * np.arange(len(places))
@@ -52,11 +52,11 @@ def spread(places: Sequence[float], gap: float) -> list[float]:
 def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]]) -> None:
     """Write each name at the right of a panel, joined to the end of its line; `ends` are x, y and colour.
 
-    Limits and layout of the panel must be final but for the room that the names take.
+    Limits and layout of the panel must be final except for the space of the names.
     """
     if not ends:
         return
-    axis.figure.canvas.figure.draw_without_rendering()  # the root of a subfigure
+    axis.figure.canvas.figure.draw_without_rendering()  # the top-level figure, also for a subfigure
     height = axis.get_window_extent().height * 72.0 / axis.figure.dpi
     places = axis.transAxes.inverted().transform(axis.transData.transform([end[:2] for end in ends.values()]))
     heights = spread([float(np.clip(y, 0.0, 1.0)) for _, y in places], 1.2 * LEAST_TEXT / height)
@@ -69,10 +69,10 @@ def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]]) -> None:
 
 
 def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: Sequence[tuple[Any, Any]] = ()) -> None:
-    """Write the name of each line beside a point of it, at best the last, in its colour, where it covers little else.
+    """Write the name of each line beside one of its points, preferably the last, in its colour, covering little else.
 
-    `lines` have name, colour, x and y, and `others`, which have no name, x and y. Limits and layout of the panel must
-    be final.
+    `lines` are (name, colour, x, y), and `others` are (x, y) of lines without a name. Limits and layout of the panel
+    must be final.
     """
     if not lines:
         return
@@ -81,7 +81,7 @@ def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: S
     renderer, frame, point = figure.canvas.get_renderer(), axis.get_window_extent(), figure.dpi / 72.0
     marks = np.concatenate([_dense(axis, x, y) for *_, x, y in [*lines, *others]])
     dots = [axis.transData.transform(np.stack([x, y], axis=1)) for *_, x, y in lines]
-    halo = [withStroke(linewidth=2.5, foreground="white")]  # over the lines that a name covers
+    halo = [withStroke(linewidth=2.5, foreground="white")]  # makes a name readable over lines
     look: dict[str, Any] = {"textcoords": "offset points", "va": "center", "size": LEAST_TEXT, "weight": "bold"}
     boxes: list[Any] = []
     for place in sorted(range(len(lines)), key=lambda place: -len(lines[place][0])):
@@ -107,22 +107,22 @@ def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: S
         boxes.append(box)
 
 
-APART = 3.0  # pixels
-MOST_SPOTS = 40  # of a line between its ends, beside which its name is tried
-BESIDE = (16.0, 10.0)  # pixels to a dot of another line, whose the name seems to be
-LINE, WRONG, ELSEWHERE = 0.8, 8.0, (0.0, 2.0, 6.0)  # prices: a point of a line covered, such a dot; first end, inside
-ASIDE = {"left": 0.0, "right": 2.0, "center": 14.0}  # of the side of a name that is at its place
+APART = 3.0  # pixels between points that represent a line
+MOST_SPOTS = 40  # points of a line between its ends where its name is tried
+BESIDE = (16.0, 10.0)  # pixels: a name so near to a point of another line seems to belong to that
+LINE, WRONG, ELSEWHERE = 0.8, 8.0, (0.0, 2.0, 6.0)  # costs: a covered point, a near one; last, first, inner point
+ASIDE = {"left": 0.0, "right": 2.0, "center": 14.0}  # cost of the alignment of a name
 PLACES = (*((dx, dy, side) for dx, side in ((5, "left"), (-5, "right")) for dy in (0, -5, 5, -9, 9)),
           *((0, dy, "center") for dy in (-11, 11, -15, 15)))  # fmt: skip
 
 
 def _inside(points: Any, box: Any, margin: Any = 0.0) -> Any:
-    """Which points lie in a box or within a margin of it."""
+    """Which points (n, 2) lie in a box or within a margin of it; (n,)."""
     return np.all((points > box.min - margin) & (points < box.max + margin), axis=1)
 
 
 def _dense(axis: Any, x: Any, y: Any) -> Any:
-    """Points along a line on the screen, `APART` from each other."""
+    """Points (n, 2) along a line in pixels, `APART` from each other."""
     ends = axis.transData.transform(np.stack([x, y], axis=1))
     length = np.append(0.0, np.cumsum(np.hypot(*np.diff(ends, axis=0).T)))
     places = np.arange(0.0, length[-1] + APART, APART)

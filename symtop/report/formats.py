@@ -1,4 +1,4 @@
-"""Numbers, lists and tables as the report and the command line print them; the filters of templates."""
+"""Format numbers, lists and tables for the report and the command line; the filters of templates."""
 
 import math
 import re
@@ -9,9 +9,9 @@ from typing import Any
 FIRM = "\N{NO-BREAK SPACE}"
 RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LARGEST_PLAIN = 1e4  # larger numbers are written with a power of ten
-MOST_COUNTED = 1e9  # larger whole numbers are no counts
-FEW = 4  # names that a sentence has; the others are counted, since a long list is a table's
-PRINTED = re.compile(  # in a text: what stays as it is, a number in a program's form, and microseconds behind a number
+MOST_COUNTED = 1e9  # larger whole numbers are not written as counts
+FEW = 4  # most names in a sentence; the others are counted
+PRINTED = re.compile(  # matches code, links and comments (kept), numbers such as 1e-06, and "us" after a number
     r"(?P<same>`[^`]*`|\]\([^)]*\)|<!--.*?-->)|(?<![\w.])(?P<mantissa>\d(?:\.\d+)?)e(?P<power>[-+]?\d{1,3})(?!\w)"
     r"|(?:(?<=\d[ \N{NO-BREAK SPACE}])|(?<=\| )|(?<=\())us\b"
 )
@@ -19,7 +19,7 @@ UNITS = ((1e-9, "ns"), (1e-6, "µs"), (1e-3, "ms"), (1.0, "s"), (60.0, "min"), (
 
 
 def number(value: float, digits: int = 2, unit: str = "") -> str:
-    """A number with so many significant digits, and its unit: ``10⁻⁶ rad``, ``1.4 × 10⁻¹³``, ``0.012``, ``340``."""
+    """A number with `digits` significant digits, and its unit: ``10⁻⁶ rad``, ``1.4 × 10⁻¹³``, ``0.012``, ``340``."""
     rounded = float(f"{value:.{digits}g}")
     text = f"{value:.{digits}g}" if not 10.0**digits <= abs(rounded) < LARGEST_PLAIN else f"{value:.0f}"
     printed = typeset(text)
@@ -27,7 +27,7 @@ def number(value: float, digits: int = 2, unit: str = "") -> str:
 
 
 def typeset(text: str) -> str:
-    """A text with its numbers as `number` has them, ``10⁻⁶`` for 1e-06, and ``µs`` for us; not in code and links."""
+    """A text with numbers in the form of `number`, ``10⁻⁶`` for 1e-06, and ``µs`` for us; not in code and links."""
 
     def printed(match: re.Match[str]) -> str:
         if match["same"] or not match["power"]:
@@ -39,19 +39,19 @@ def typeset(text: str) -> str:
 
 
 def at_most(value: float, digits: int = 2, unit: str = "") -> str:
-    """The same, rounded up: what is at most 1.249 is at most ``1.3``, and not 1.2."""
+    """`number` of an upper bound, rounded up: ``1.3`` for 1.249."""
     upward = Context(prec=digits, rounding=ROUND_CEILING).create_decimal(repr(float(value)))
     return number(float(upward), digits, unit)
 
 
 def at_least(value: float, digits: int = 2, unit: str = "") -> str:
-    """The same, rounded down: what is at least 0.958 is at least ``0.95``, and not 0.96."""
+    """`number` of a lower bound, rounded down: ``0.95`` for 0.958."""
     downward = Context(prec=digits, rounding=ROUND_FLOOR).create_decimal(repr(float(value)))
     return number(float(downward), digits, unit)
 
 
 def count(value: float) -> str:
-    """A whole number, thousands apart: ``12,345``."""
+    """A whole number with separated thousands: ``12,345``."""
     return f"{value:,.0f}"
 
 
@@ -61,28 +61,28 @@ def percent(value: float, digits: int = 0) -> str:
 
 
 def power(value: float) -> str:
-    """The power of ten next to a positive number: ``10⁻⁶``."""
+    """The power of ten nearest to a positive number: ``10⁻⁶``."""
     return f"10{str(round(math.log10(value))).translate(RAISED)}"
 
 
 def fixed(value: float, digits: int = 2, unit: str = "") -> str:
-    """A number with so many digits after the point: ``1.90``."""
+    """A number with `digits` digits after the point: ``1.90``."""
     return f"{value:.{digits}f}{FIRM}{unit}" if unit else f"{value:.{digits}f}"
 
 
 def duration(seconds: float, digits: int = 2) -> str:
-    """A time, given in seconds, in the unit that suits it: ``5.4 µs``, ``176 µs``, ``4.8 ms``, ``2 h``."""
+    """A time, given in seconds, in a suitable unit: ``5.4 µs``, ``176 µs``, ``4.8 ms``, ``2 h``."""
     size, unit = next((one for one in reversed(UNITS) if abs(seconds) >= one[0]), UNITS[0])
     return number(seconds / size, digits, unit)
 
 
 def code(name: str) -> str:
-    """A name as it is typed."""
+    """A name as code in Markdown."""
     return f"`{name}`"
 
 
 def by_name(pairs: Sequence[tuple[str | None, str]], link: str = "to") -> str | None:
-    """Names with what each is named for, a name once: ```a` to 10⁻³, and `b` to 10⁻⁶ and 10⁻⁹``; None if one is."""
+    """Group pairs (name, value) by name: ```a` to 10⁻³, and `b` to 10⁻⁶ and 10⁻⁹``; None if one name is None."""
     groups: dict[str | None, list[str]] = {}
     for name, what in pairs:
         groups.setdefault(name, []).append(what)
@@ -93,7 +93,7 @@ def by_name(pairs: Sequence[tuple[str | None, str]], link: str = "to") -> str | 
 
 
 def cell(value: Any, digits: int = 3) -> str:
-    """What a cell of a table shows: a number with so many significant digits; nothing for what is missing."""
+    """The text of a cell of a table: a number with `digits` significant digits; empty for None and NaN."""
     if value is None or (isinstance(value, float) and math.isnan(value)):
         return ""
     if isinstance(value, bool):
@@ -120,16 +120,16 @@ def columns(records: Sequence[Mapping[str, Any]]) -> tuple[list[str], list[list[
 
 
 def listed(names: Sequence[str]) -> str:
-    """A list as a sentence has it: ``a, b and c``."""
+    """A list for a sentence: ``a, b and c``."""
     *first, last = names
     return f"{', '.join(first)} and {last}" if first else last
 
 
 def abridged(names: Sequence[str], most: int = FEW) -> str:
-    """The first names of a list as a sentence has them, and how many more there are."""
+    """The first `most` names of a list for a sentence, and the number of the others."""
     return listed([*names[:most], f"{len(names) - most} more"] if len(names) > most else names or ["none"])
 
 
 def counted(count: int, noun: str = "variant") -> str:
-    """So many things: ``1 variant``, ``12 variants``."""
+    """A count with its noun: ``1 variant``, ``12 variants``."""
     return f"{count} {noun}{'' if count == 1 else 's'}"

@@ -1,8 +1,8 @@
-"""Markdown of the report as HTML: figures with their captions, tables that scroll, formulas, charts to point at.
+"""Convert the Markdown of the report to HTML: figures with captions, scrolling tables, formulas, interactive charts.
 
-markdown-it-py reads the Markdown. What the report has beyond a text is recognised in its blocks: a paragraph that is
-one picture, with the paragraph below it, becomes a figure; a paragraph in bold above a table is its title. Formulas
-between ``$$``, and the markers of `symtop.report.template`, stand between pieces of Markdown.
+markdown-it-py parses the Markdown. A paragraph that is one image becomes a figure, with the paragraph below it as the
+caption; a paragraph in bold above a table is its title. Formulas between ``$$``, and the markers of
+`symtop.report.template`, are split off before.
 """
 
 import html
@@ -15,28 +15,28 @@ from typing import Any
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
-LONG = 27  # characters of a cell that may be broken into lines
-AT_ONCE = 2  # figures
+LONG = 27  # characters: longer cells may be broken into lines
+AT_ONCE = 2  # figures that are loaded at once; later ones when they are scrolled to
 MATHML = "http://www.w3.org/1998/Math/MathML"
 PIECES = re.compile(r"^<!-- (?P<kind>chart|table) (?P<name>\S+) -->$|^\$\$(?P<formula>.+?)\$\$$", re.MULTILINE)
 
 
 def slug(heading: str) -> str:
-    """The anchor of a heading, as GitHub and the site make it."""
+    """The anchor of a heading, in the form of GitHub and the documentation's site."""
     return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
 class Writer:
-    """Writes pieces of one page; `images` has source, width and height of each figure by its address.
+    """Converts the texts of one page; `images` has source, width and height of each figure by its address.
 
-    `markers` turns the kind and the name of a marker into HTML.
+    `markers` returns the HTML for the kind and the name of a marker; `reserved` anchors are not given again.
     """
 
     def __init__(
         self, images: Mapping[str, Mapping[str, Any]], markers: Callable[[str, str], str], *reserved: str
     ) -> None:
-        self.images, self.markers, self.anchors = images, markers, {*reserved}  # what links may lead to, each once
-        self._figures = 0  # figures so far: the first ones, of the front page, are loaded at once
+        self.images, self.markers, self.anchors = images, markers, {*reserved}  # unique
+        self._figures = 0  # number of figures so far
         self._parser = MarkdownIt("commonmark", {"html": False}).enable("table")
 
     def __call__(self, text: str) -> str:
@@ -48,7 +48,7 @@ class Writer:
         return "\n".join(filter(None, [*parts, self._markdown(text[end:])]))
 
     def anchor(self, name: str) -> str:
-        """A name for a thing on the page, with a number behind it if it was given before."""
+        """A unique anchor: the name, with a number appended if it is taken."""
         candidates = (f"{name}-{count}" for count in itertools.count(1))
         free = next(one for one in itertools.chain([name], candidates) if one not in self.anchors)
         self.anchors.add(free)
@@ -119,12 +119,12 @@ class Writer:
 
 
 def link(name: str, what: str) -> str:
-    """A sign beside a thing that leads to it."""
+    """A link, shown as #, to the anchor `name`."""
     return f'<a class="anchor" href="#{name}" aria-label="Link to {html.escape(what)}">#</a>'
 
 
 def _blocks(tokens: Sequence[Token]) -> list[Sequence[Token]]:
-    """The blocks of the highest level."""
+    """The tokens of each top-level block."""
     ends = [place + 1 for place, token in enumerate(tokens) if token.level == 0 and token.nesting <= 0]
     return [tokens[begin:end] for begin, end in itertools.pairwise([0, *ends])]
 
@@ -134,7 +134,7 @@ def _only(inline: Token, kind: str) -> bool:
 
 
 def _title(inline: Token) -> str:
-    """What a paragraph has in bold at its beginning, but for a sentence."""
+    """The bold text at the beginning of a paragraph, unless it is a sentence."""
     children = [one for one in inline.children or [] if one.type != "text" or one.content]
     bold = children[1].content if children and children[0].type == "strong_open" else ""
     return "" if bold.endswith(".") else bold

@@ -1,11 +1,11 @@
-"""The report: a front page and a page a study, from the findings that the studies left in the results folder.
+"""The report: a front page and one page per study, from the findings of the studies in the results folder.
 
-`report.md` holds what a reader decides by, beside its figures and tables; `reference.md` what only checks it: the pages
-of benchmarks from "How to read it" on, or all of one without a figure, the equations and scenes, and the provenance.
-`report.html` is made of both. The page of a study is its template, filled (`symtop.report.template`). A chart to point
-at is data for the page's script, each series with the look its integrator has in every figure; a table that is shown in
-part lies in `report.html` in full, to be searched and sorted. Nothing is fetched but figures; with `embed` they are in
-the page, for sending it alone.
+`report.md` has the results with their figures and tables; `reference.md` has material for checking: the pages of
+benchmarks from "How to read it" on, or in full if one has no figure, the equations and scenes, and the provenance.
+`report.html` has both. The page of a study is its filled template (`symtop.report.template`). An interactive chart is
+stored as data for the page's script, each series in the style of its integrator in all figures; a table that is shown
+in part is also stored in full in `report.html`, to be searched and sorted. The page loads only figures; with `embed`
+they are part of it, so that it is a single file.
 """
 
 import base64
@@ -35,12 +35,12 @@ from symtop.runner import run as runner
 PAGE, WORDS, REFERENCE = "report.html", "report.md", "reference.md"
 TEMPLATES = Path(__file__).parent / "templates"
 EQUATIONS = "The equations, the scenes and the exact motion"
-READING = "**How to read it.**"  # of the page of a benchmark, where its part for reference begins
+READING = "**How to read it.**"  # the begin of the part for `reference.md` in the page of a benchmark
 QUICK = "This is a quick pass on coarse grids, for checking that every study works."
 
 
 def prepared(chart: Mapping[str, Any]) -> str:
-    """JSON of a chart of the findings, safe inside a script element, without points that a log axis cannot show."""
+    """A chart of the findings as JSON for a script element, without points that a log axis cannot show."""
     panels = {title: [_series(name, points) for name, points in series] for title, series in chart["panels"].items()}
     content = {key: chart[key] for key in ("title", "x", "y", "choices", "marks") if key in chart} | {"panels": panels}
     return json.dumps(content, ensure_ascii=False, separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
@@ -64,11 +64,11 @@ def _series(name: str, points: Sequence[tuple[float | None, float | None, str]])
 
 
 def gather(results: Path) -> list[dict[str, Any]]:
-    """The findings that are in the folder: of all studies, in order, then of benchmarks.
+    """The findings in the folder: of all studies, in order, then of benchmarks.
 
-    A benchmark (`make peers`) may leave findings in the form of a study's, as NAME.json. They stay as they are when the
-    studies run again, so that their ``measured`` says when, where and with what, and ``command`` how to repeat it.
-    A study that ships with symtop has the page of its folder, any other the page that its findings hold.
+    A benchmark (`make peers`) may write findings in the form of a study's, as NAME.json. Runs of studies do not change
+    them, so that their ``measured`` says when, where and with what they were made, and ``command`` how to repeat it.
+    The page of a study that ships with symtop is that of its folder, any other page that of its findings.
     Raises SymtopError if findings are incomplete or a file is damaged, or there are none.
     """
     studies, gathered = list(runner.names()), []
@@ -97,13 +97,13 @@ def gather(results: Path) -> list[dict[str, Any]]:
 
 
 def has_studies(results: Path) -> bool:
-    """Does the folder hold findings, or what may have been some, that no benchmark has left?"""
+    """Does the folder hold findings, or damaged ones, that are not of a benchmark?"""
     contents = map(netcdf.read_json, results.glob("*.json"))
     return any(not (isinstance(one, dict) and one.get("measured")) for one in contents)
 
 
 def _stored(file: Path, remedy: str) -> Any:
-    """The content of a file, None if there is none; SymtopError if it is damaged."""
+    """The content of a JSON file, None if there is no file; SymtopError with the `remedy` if it is damaged."""
     try:
         return json.loads(file.read_text(encoding="utf-8")) if file.is_file() else None
     except (OSError, ValueError) as error:
@@ -111,7 +111,7 @@ def _stored(file: Path, remedy: str) -> Any:
 
 
 def _image(file: Path, *, embed: bool) -> dict[str, Any]:
-    """Address, width and height of a PNG or a GIF, so that the page does not move while its figures load."""
+    """Address, width and height of a PNG or a GIF; with the size the page does not move while figures load."""
     from PIL import Image
 
     with Image.open(file) as image:
@@ -121,7 +121,7 @@ def _image(file: Path, *, embed: bool) -> dict[str, Any]:
 
 
 def texts(results: Path, studies: Sequence[Mapping[str, Any]]) -> tuple[dict[str, str], dict[str, str]]:
-    """The parts of the report and those for reference, in Markdown, by name: "front", the studies, "measured", ..."""
+    """The parts of `report.md` and of `reference.md`, in Markdown by name: "front", the studies, "measured", ..."""
     parts, more, pages = dict[str, str](), dict[str, str](), {"measured": _link("How it was measured")}
     for study in studies:
         pages[study["study"]] = _link(formats.typeset(study["question"]), REFERENCE if _checks_only(study) else "")
@@ -150,7 +150,7 @@ def texts(results: Path, studies: Sequence[Mapping[str, Any]]) -> tuple[dict[str
 
 
 def _checks_only(study: Mapping[str, Any]) -> bool:
-    """Is it a benchmark of what ships with symtop, which has no figure?"""
+    """Is it a benchmark without a figure, so that its page belongs into `reference.md`?"""
     return bool(study["measured"]) and not study["pictures"]
 
 
@@ -163,12 +163,12 @@ def _link(heading: str, file: str = "") -> str:
 
 
 def _lower(text: str) -> str:
-    """A text whose headings are one level lower."""
+    """The text with all headings one level lower."""
     return re.sub(r"^(#+) ", r"\1# ", text, flags=re.MULTILINE)
 
 
 def scene_tables() -> dict[str, Any]:
-    """Of the scenes of the catalogue: uses, starts to the last bit, units, and the largest bound of the truth (rad)."""
+    """Template values on all scenes: uses, starts to the last bit, units, the largest bound of the reference (rad)."""
     uses, starts, bounds = [], [], []
     for scene in scenes().values():
         bounds.append(float(reference(scene, np.array([scene.horizon]))["axis_error_bound"].values[0]))
@@ -221,7 +221,7 @@ def write(results: Path, *, embed: bool = False) -> Path:
 
 
 def _whole(name: str, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
-    """A table in full, folded; the page's script builds it when it is opened."""
+    """A full table as a folded HTML element, which the page's script fills when it is opened."""
     cells = [["" if value != value else str(value) for value in row] for row in rows]  # noqa: PLR0124  (not a number)
     names = [formats.typeset(str(name)) for name in header]
     content = json.dumps({"header": names, "rows": cells}, ensure_ascii=False, separators=(",", ":"))

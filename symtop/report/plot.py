@@ -1,8 +1,8 @@
-"""Runs as pictures: on an Axes of the caller's (`plot`), or as a file of one run or of an ensemble.
+"""Figures of runs: on the caller's Axes (`plot`), or as a file of one run, a comparison or an ensemble.
 
-a run        its motion beside the true one, its errors, and the residuals of constants of the motion
-a sweep      the largest error against what was varied, or run time; a comparison likewise
-an ensemble  how the errors of its members spread as time goes on
+a run        its motion and the true one, its errors, and the residuals of constants of the motion
+a sweep      the largest error against the setting or the run time; a comparison likewise
+an ensemble  quantiles of the errors of its members over time
 """
 
 from pathlib import Path
@@ -41,11 +41,11 @@ from symtop.run.trajectory import Trajectory
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-LINES = ("-", "--", "-.", ":")  # of a sweep's scenes
+LINES = ("-", "--", "-.", ":")  # line styles of the scenes of a sweep
 AXES = {"seconds": "time of a run, one core (s)", "force_evaluations": "force evaluations of a run"}
 COLORS = {"axis": BLACK, "attitude": GREY, "theta": SKY, "energy": VERMILLION, "p_phi": GREEN, "p_psi": PURPLE}
-BANDS = ((0, 4, 0.18), (1, 3, 0.38))  # of `spread.LEVELS`, 1 to 99 % and 10 to 90 %, and how opaque
-MOST = {"axis": np.pi, "attitude": np.pi, "energy": 1e3}  # what is larger, and members that failed, are drawn here
+BANDS = ((0, 4, 0.18), (1, 3, 0.38))  # bands from 1 to 99 % and 10 to 90 %: indices in `spread.LEVELS`, opacity
+MOST = {"axis": np.pi, "attitude": np.pi, "energy": 1e3}  # larger errors, and those of failed members, are drawn here
 
 
 def plot(
@@ -55,17 +55,17 @@ def plot(
     """Draw a dataset of `simulate`, `errors`, `sweep`, `compare` or `ensemble`; return the Axes, new if `ax` is None.
 
         a run         the error of `quantity` over time, or a variable of the run itself (``phi``, ``p_theta``, ...)
-        its errors    (a dataset of `errors`) the error of `quantity` over time, and the least that can be seen
-        a sweep       the largest error of `quantity` against ``step_size`` or ``tolerance``, or work where
-                      some methods have one and some the other, or what `x` names, or run time if it is there: a line
-                      for each variant, dashed for further scenes; crosses are runs that failed, the grey band is what
-                      the reference cannot judge
-        a comparison  the same for one scene, of the quantity that is compared, with the time of the exact motion
-        an ensemble   quantiles over members of the error of `quantity` ("axis", of bodies "attitude", or "energy") over
-                      time; `members` are those that were run (the dataset does not hold them)
+        its errors    (a dataset of `errors`) the error of `quantity` over time, and the least that can be judged
+        a sweep       the largest error of `quantity` against the variable `x`, by default the run time if it was
+                      measured, else ``step_size`` or ``tolerance``, or work if some methods have one and some the
+                      other: a line for each variant, dashed for further scenes; crosses are failed runs, the grey band
+                      is below the reference's error bound
+        a comparison  the same for one scene, of the compared quantity, with the time of the exact motion
+        an ensemble   quantiles over members of the error of `quantity` ("axis", for bodies "attitude", or "energy")
+                      over time; `members` are those that were run (the dataset does not hold them)
 
-    Any other `quantity` is one of axis, attitude, theta, energy, p_phi, p_psi. Runs may share an `ax`: each has its
-    variant as a label, for ``ax.legend()``, and there is no title. Raises SymtopError for anything else.
+    `quantity` is one of axis, attitude, theta, energy, p_phi, p_psi, except as above. Runs may share an `ax`: each has
+    its variant as a label, for ``ax.legend()``, and there is no title. Raises SymtopError for invalid arguments.
     """
     if not isinstance(data, xr.Dataset):
         raise SymtopError(f"data must be a dataset of simulate, sweep or ensemble, not {type(data).__name__}")
@@ -83,7 +83,7 @@ def plot(
 
 
 def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
-    """A run, its errors, or the errors of somebody's trajectory, which name no integrator."""
+    """Draw a run, its errors, or the errors of a foreign trajectory, which have no integrator's name."""
     if "time" not in data:
         raise SymtopError("data must have the dimension time, setting or member, as simulate, sweep and ensemble give")
     times, has_bounds = data["time"].values, any(f"{name}_bound" in data for name in QUANTITIES)
@@ -110,11 +110,11 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
         ax.set_ylabel(f"{quantity} ({unit})" if unit else quantity)
     title, ended = (data.attrs.get(word, "") for word in ("title", "outcome_message"))
     words = f"{title}: {ended}" if ended else title
-    ax.set(xlabel=_clock(data), title="" if several else words)  # which would name one of them alone
+    ax.set(xlabel=_clock(data), title="" if several else words)  # a title would name only one of several
 
 
 def _clock(data: xr.Dataset) -> str:
-    """The name of the axis of time, with its unit on a scene that has units."""
+    """The label of the axis of time, with its unit on a scene that has units."""
     return "time (s)" if data["time"].attrs.get("units") == "s" else "time"
 
 
@@ -126,7 +126,7 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
     for dim in ("scene", "variant"):
         if dim not in data.coords:
             raise SymtopError(f"a sweep must have the {dim}s that it compares, as sweep gives them, not lack {dim}")
-        if dim not in data.dims:  # of one alone, as isel leaves it
+        if dim not in data.dims:  # a single one, as after `isel`
             data = data.expand_dims(dim)
     controls = [name for name in ("step_size", "tolerance") if name in data and data[name].notnull().any()]
     timed, compared = "seconds" in data and bool(data["seconds"].notnull().any()), "cost" in data.attrs
@@ -147,7 +147,7 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
             label = label if data.sizes["scene"] == 1 else f"{label} on {scene}"
             across, errors = cell[x].where(cell[x] > 0).values, np.maximum(cell[quantity].values, SMALLEST)
             good = np.flatnonzero(np.isfinite(across) & np.isfinite(errors))
-            good = good if compared else good[np.argsort(across[good])]  # which goes from coarse to fine, time or not
+            good = good if compared else good[np.argsort(across[good])]  # a comparison is in order of its settings
             ax.plot(across[good], errors[good], lw=1.4, label=label, **options)
             failed = across[(cell["outcome"].values != "ok") & np.isfinite(across)]
             ax.scatter(failed, np.full(failed.size, 0.985), 22.0, options["color"], marker="x", lw=1.0, **edge)
@@ -177,7 +177,7 @@ def _ensemble(ax: "Axes", data: xr.Dataset, quantity: str, members: Any) -> None
 
 
 def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Dataset, path: str | Path) -> None:
-    """Three panels in a file: theta and the truth's, errors in angles, residuals of energy and momenta."""
+    """Draw three panels to a file: theta and the true theta, errors of angles, residuals of energy and momenta."""
     figure, axes = panels(3, 1, height=1.7, sharex=True)
     times = run["time"].values
     motion, angles, constants = axes[:, 0]
@@ -201,13 +201,13 @@ def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Datase
 
 def _line(axis: Any, times: Any, values: Any, color: str, label: str) -> None:
     later = np.isfinite(values[1:])
-    if later.any():  # a logarithmic axis has no place for a line without a number
+    if later.any():  # a logarithmic axis cannot show a line of NaN only
         marker = "o" if later.sum() == 1 else None  # a line has two points at least
         axis.plot(times[1:], np.maximum(values[1:], SMALLEST), color=color, lw=1.0, label=label, marker=marker)
 
 
 def draw_ensemble(data: xr.Dataset, errors: dict[str, spread.Array], path: str | Path) -> None:
-    """A panel for each error of an ensemble in a file: quantiles of the `member_errors` (n, samples) against time."""
+    """Draw a panel for each error of an ensemble to a file: quantiles of `member_errors` (n, samples) against time."""
     drawn = {name: values for name, values in errors.items() if not np.isnan(values).all()} or errors
     figure, axes = panels(len(drawn), 1, height=2.1, sharex=True)
     for axis, (name, values) in zip(axes[:, 0], drawn.items(), strict=True):
@@ -228,13 +228,11 @@ def draw_ensemble(data: xr.Dataset, errors: dict[str, spread.Array], path: str |
 
 
 def _bands(axis: Any, data: xr.Dataset, quantity: str, own: spread.Array) -> None:
-    """Quantiles over members of an error against time, on one Axes, at places of `symtop.report.spread.at_places`.
+    """Draw quantiles over members of an error against time, at the places of `symtop.report.spread.at_places`.
 
-    The median is a line, with two bands about it, named at their right ends.
-
-    Errors beyond `MOST` are drawn there: angles do not exceed pi, and a quantile of runs that failed is named so. Where
-    all members have as many steps a nutation, a sample at a whole nutation is one for all of them, and energy errors
-    that return there, as those of a symplectic method do, dip: that is no error of the samples, which are dithered.
+    The median is a line, with two bands about it, labelled at their right ends. Errors beyond `MOST` are drawn there;
+    the label of a quantile says if it is of failed runs. If all members have equally many steps per nutation, a sample
+    at a whole nutation is one for all of them, and periodic energy errors, as of a symplectic method, show a dip there.
     """
     horizons = data["horizon"].values
     shared = (horizons == horizons[0]).all()
@@ -262,7 +260,7 @@ def _bands(axis: Any, data: xr.Dataset, quantity: str, own: spread.Array) -> Non
 
 
 def draw_compare(data: xr.Dataset, path: str | Path) -> None:
-    """The figure of a comparison in a file."""
+    """Draw the figure of a comparison to a file."""
     figure, axes = panels(1, 1, height=3.6)
     _sweep(axes[0, 0], data, "axis", None)
     save(figure, at_home(path))

@@ -1,11 +1,11 @@
-"""Errors of the members of an ensemble, and how they spread: quantiles over members at each sample.
+"""Errors of the members of an ensemble, and their quantiles over members at each sample.
 
     axis        angle between the member's axis and that of its closed form, rad
-    attitude    of bodies without symmetry, in its place: angle between the attitude and that of the true motion, rad
-    energy      abs(E - E0) / energy of the nutation, or of bodies / (T0 + |mgl|), the units of `errors`
+    attitude    for bodies without symmetry, instead: angle between the attitude and that of the true motion, rad
+    energy      abs(E - E0) / energy of the nutation, or for bodies / (T0 + |mgl|), the units of `errors`
 
 A member that has failed has an infinite error from there on, so that it counts among the worst and is not left out.
-Quantiles are those of the sample, without interpolation: an infinite one says that so many have failed.
+Quantiles are without interpolation: the quantile of a level is infinite if more members than that have failed.
 """
 
 import contextlib
@@ -33,7 +33,7 @@ QUANTITIES = {
 }
 SHOWN_BY = {"axis": "axis", "attitude": "quaternion", "energy": "energy"}  # variables of an ensemble
 LEVELS = (0.01, 0.1, 0.5, 0.9, 0.99)
-SAME_SHARE = 1e-9  # of a horizon: a sample that is later than a place by less than this is there
+SAME_SHARE = 1e-9  # of a horizon: a sample counts as at a place if it is later by less than this
 BLOCK = 1 << 20  # samples that are compared at a time
 
 
@@ -43,14 +43,14 @@ def kind_of(data: xr.Dataset) -> str:
 
 
 def so_many(count: int, kind: str) -> str:
-    """So many "tops" or "bodies" in words."""
+    """A count in words: "1 top", "3 bodies"."""
     return f"{count} {kind if count != 1 else {'tops': 'top', 'bodies': 'body'}[kind]}"
 
 
 def member_errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array:
     """Errors (n, samples) of an ensemble of these members; NaN beyond the samples of a run of few steps.
 
-    The attitudes of a body whose motion is not known to 1e-9 rad up to its last sample are not compared: NaN.
+    Errors of the attitude are NaN for a body without a reference to 1e-9 rad up to its last sample.
     """
     one_of("quantity", quantity, QUANTITIES[kind_of(data)])
     inputs = read_members(members)
@@ -65,7 +65,7 @@ def member_errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array
 
 @functools.lru_cache(maxsize=1)
 def _forms(plain: bytes) -> ClosedForms:
-    """The closed forms of members, kept from one quantity to the next: they take more than the comparison."""
+    """The closed forms of members, cached from one quantity to the next: they take longer than the comparison."""
     return ClosedForms(np.frombuffer(plain).reshape(-1, len(NUMBERS)))
 
 
@@ -75,7 +75,7 @@ def _errors(numbers: Array, data: xr.Dataset, quantity: str) -> Array:
     times = np.broadcast_to(data["time"].values, values.shape[:2])
     finite = np.isfinite(times)
     filled = np.where(finite, times, 0.0)
-    with np.errstate(all="ignore"):  # what a run blew up to is no error of this comparison
+    with np.errstate(all="ignore"):  # runs may have blown up
         if quantity == "energy":
             errors = np.abs(values - values[:, :1]) / _energy_scales(numbers)[:, None]
         elif quantity == "axis":
@@ -84,7 +84,7 @@ def _errors(numbers: Array, data: xr.Dataset, quantity: str) -> Array:
         else:
             errors, valid = np.full(times.shape, np.nan), np.zeros(times.shape, bool)
             for i, ((body, start), when) in enumerate(zip(members_of(numbers), filled, strict=True)):
-                with contextlib.suppress(SymtopError):  # a motion that is lost before the last time, as in chaos
+                with contextlib.suppress(SymtopError):  # if its reference ends before, as in chaos
                     true = body_samples("a member", body, start, when.tobytes(), precise=False)
                     errors[i] = charts.attitude_distance(values[i], true.quaternion, true.quaternion_lo)
                     valid[i] = True
@@ -98,13 +98,13 @@ def _energy_scales(numbers: Array) -> Any:
 
 
 def at_places(data: xr.Dataset, errors: Array) -> tuple[Array, Array]:
-    """Errors of members at places that are the same for all: shares (places,) of their horizons and errors (n, places).
+    """Errors of members at common places: parts (places,) of their horizons, and errors (n, places).
 
-    Where all members have all samples, sample k of each lies within half an interval between samples of the same share
-    (and within half a step; dithered samples are so far apart), and the place is the mean of these shares. Where runs
-    had fewer steps than samples, the places are those of as many even ones as the longest run has samples at which each
-    member has made a step, and each has there the error of its latest sample at or before the place: its error as it
-    was known by then. A failed run, which has samples to the end, stays infinitely wrong.
+    If all members have all samples, sample k of each lies within half a sampling interval and half a step of the same
+    part of its horizon (dithered samples vary by so much), and the place is the mean of these parts. If some runs had
+    fewer steps than samples, the places are equidistant, as many as the longest run has samples, from where each member
+    has made a step; a member has there the error of its latest sample at or before the place. A failed run, which has
+    samples to the end, stays infinitely wrong.
     """
     times = np.broadcast_to(data["time"].values, errors.shape)
     with np.errstate(invalid="ignore"):
@@ -113,7 +113,7 @@ def at_places(data: xr.Dataset, errors: Array) -> tuple[Array, Array]:
     if (counts == errors.shape[1]).all():
         return shares.mean(axis=0), errors
     places = np.linspace(0.0, 1.0, int(counts.max()))
-    places = places[places + SAME_SHARE >= shares[:, 1].max()] + SAME_SHARE  # at a start no method is wrong
+    places = places[places + SAME_SHARE >= shares[:, 1].max()] + SAME_SHARE  # without the start, where errors are zero
     latest = np.empty((len(errors), places.size))
     for i, count in enumerate(counts):
         latest[i] = errors[i, np.searchsorted(shares[i, :count], places, side="right") - 1]
@@ -121,7 +121,7 @@ def at_places(data: xr.Dataset, errors: Array) -> tuple[Array, Array]:
 
 
 def spread(errors: Array, levels: tuple[float, ...] = LEVELS) -> Array:
-    """Quantiles over members (levels, samples), of the members that have such a sample; NaN where none has."""
+    """Quantiles (levels, samples) over the members that have a sample; NaN where none has."""
     out = np.full((len(levels), errors.shape[1]), np.nan)
     there = ~np.isnan(errors).all(axis=0)
     out[:, there] = np.nanquantile(errors[:, there], levels, axis=0, method="inverted_cdf")
@@ -129,5 +129,5 @@ def spread(errors: Array, levels: tuple[float, ...] = LEVELS) -> Array:
 
 
 def largest(errors: Array) -> Array:
-    """The largest error of each member over its run, shape (n,); NaN where nothing was compared."""
+    """The largest error of each member over its run (n,); NaN if nothing was compared."""
     return np.asarray(np.fmax.reduce(errors, axis=1))

@@ -1,8 +1,8 @@
-"""One look for every figure: an integrator has the same colour, marker and line everywhere.
+"""The style of all figures: an integrator has the same colour, marker and line everywhere.
 
-Colours are those of Okabe and Ito, which readers with any common colour blindness can tell apart. Every series also has
-a marker of its own, and every family a line style, so that a figure can be read in grey. A figure is as wide as a page
-of print, 6.5 inches, and its text is at least 7 points high there.
+Colours are those of Okabe and Ito, which readers with any common colour blindness can distinguish. Every series also
+has a marker of its own, and every family a line style, so that a figure can be read in grey. A figure is as wide as the
+text of a printed page, 6.5 inches, and its text is at least 7 points high at that width.
 """
 
 import functools
@@ -19,7 +19,7 @@ from symtop.core.files import replacing, sweep
 
 WIDTH = 6.5  # inches, of a figure: the text block of a page
 LEAST_TEXT = 7.0  # points, of any text at that width
-DPI, SKETCHED = 200, 100
+DPI, SKETCHED = 200, 100  # of figures, and of those of a quick pass
 
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE, GREY = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F",
@@ -37,7 +37,7 @@ class Look(NamedTuple):
     dash: Any = "-"  # of the line: the family
 
 
-# Shades of a family: light enough to tell apart, of one hue so that families stay together.
+# shades of a family: distinguishable, and of one hue
 BLUES = (BLUE, "#7B9FD1", NAVY)
 GREENS = (GREEN, "#7CC9A8", "#00563F")
 ORANGES = (ORANGE, "#B37400", "#F5C766")
@@ -57,15 +57,15 @@ SHADES = {
     "engine": SKIES,
     "other": PURPLES,
 }
-DASHES = {  # of a line, by family; a family that is not here has a solid one
+DASHES = {  # dash patterns of lines by family; other families have solid lines
     "splitting": (0, (6.0, 1.2)), "runge-kutta": (0, (3.0, 1.2)), "lie-group": (0, (6.0, 1.2, 1.0, 1.2)),
     "taylor": (0, (1.5, 0.8)), "library": (0, (1.0, 1.6)), "engine": (0, (3.0, 1.2, 1.0, 1.2)),
 }  # fmt: skip
-ADAPTIVE = (0, (6.0, 1.2, 1.0, 1.2, 1.0, 1.2))  # of Runge-Kutta with a tolerance: a formula may be drawn both ways
-UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata that would change a file made again
+ADAPTIVE = (0, (6.0, 1.2, 1.0, 1.2, 1.0, 1.2))  # of Runge-Kutta methods with a tolerance
+UNDATED = {".svg": "Date", ".pdf": "CreationDate"}  # metadata left out, so that files are reproducible
 _MARKERS = "osv^<>DPXph8dH"
 
-_LOOKS = {  # of methods that people know, in one colour with fixed steps and through SciPy; `look` finds others
+_LOOKS = {  # of well-known methods, with one colour for variants of a formula; `look` finds others
     "midpoint": Look(BLUE, "o", 6.0), "trapezoidal": Look(SKY, "s"), "stormer-verlet": Look(GREEN, "^"),
     "strang": Look(LEAF, "<"), "cayley": Look(GREENS[1], ">"), "takahashi-imada": Look(GREENS[2], "P"),
     "yoshida-4": Look(GREENS[2], "p"), "srkn-14-6": Look(GREENS[1], "H"), "chin-4a": Look(TEAL, "D"),
@@ -85,8 +85,8 @@ FILLS = {"angles": "none", "axis": "full", "attitude": "left", "body": "top"}  #
 def look(name: str) -> Look:
     """Colour and marker of an integrator or a variant: the marker of ``rk4[angles]`` is open, of ``rk4[axis]`` full.
 
-    One that `_LOOKS` does not name gets a shade of its family and a marker that no other has, by its place in the
-    registry, to which others are added at the end; of a name that is not registered they follow from the name alone.
+    One that is not in `_LOOKS` gets a shade of its family and a marker as an unused pair, by its index in the registry,
+    to which others are added at the end; for a name that is not registered the pair follows from a hash of the name.
     """
     from symtop.methods.framework.registry import integrators, split_name
 
@@ -107,13 +107,13 @@ def look(name: str) -> Look:
 
 
 def line(name: str, scale: float = 1.0) -> dict[str, Any]:
-    """What ``plot`` needs to draw an integrator or a variant: colour, line, and marker of `scale` times its size."""
+    """Arguments of ``plot`` for an integrator or a variant: colour, line, and marker of `scale` times its size."""
     one = look(name)
     return {"color": one.color, "ls": one.dash, "marker": one.marker, "fillstyle": one.fill, "ms": scale * one.size}
 
 
 def ink(color: str) -> tuple[float, float, float]:
-    """A colour as dark as letters on white need it: itself, or darker (luminance at most 0.18, a contrast of 4.5)."""
+    """A colour for text on white: the colour itself, or darker (luminance at most 0.18, a contrast of 4.5)."""
     from matplotlib.colors import to_rgb
 
     part = np.array(to_rgb(color))
@@ -136,22 +136,22 @@ PAPER: dict[Any, Any] = {
 
 
 def use() -> None:
-    """Set matplotlib up for the report: no display, legible in print, reproducible bytes."""
+    """Set up matplotlib for the report: no display, legible in print, reproducible bytes."""
     mpl.use("Agg")
     plt.rcParams.update(PAPER)
 
 
 def save(figure: Any, target: Path, dpi: float = DPI) -> None:
-    """Write a figure as a PNG, an SVG or a PDF, whole or not at all, and close it."""
+    """Write a figure as a PNG, an SVG or a PDF, atomically, and close it."""
     _write(figure, target, dpi)
     plt.close(figure)
 
 
-sketch = functools.partial(save, dpi=SKETCHED)  # of a quick pass: half as many dots an inch, in half the time
+sketch = functools.partial(save, dpi=SKETCHED)  # for a quick pass, in half the time
 
 
 def publish(figure: Any, target: Path) -> None:
-    """Write a figure as a PNG and, for print, as a PDF beside it, laid out once."""
+    """Write a figure as a PNG and, for print, as a PDF beside it, with one layout; close it."""
     _write(figure, target)
     if target.suffix == ".png":
         figure.set_layout_engine("none")
@@ -160,7 +160,7 @@ def publish(figure: Any, target: Path) -> None:
 
 
 def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
-    """A figure in a file of its kind; ``savefig`` would draw a PNG or a PDF twice, once to lay it out."""
+    """Write a figure in the format of the ending; ``savefig`` would draw a PNG or a PDF twice, once for layout."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.backends.backend_pdf import FigureCanvasPdf
 
@@ -179,22 +179,22 @@ def _write(figure: Any, target: Path, dpi: float = DPI) -> None:
 
 
 def headline(figure: Any, message: str) -> None:
-    """Write a figure's one message above it, in lines of about the same length."""
+    """Write a title above a figure, in lines of about the same length."""
     widths = range(round(6.15 * figure.get_figwidth()), round(12.3 * figure.get_figwidth()) + 1)
     wrapped = [textwrap.wrap(message, width, break_on_hyphens=False) for width in widths]
-    lines = next(broken for broken in wrapped if len(broken) == len(wrapped[-1]))  # no last line of a single word
+    lines = next(broken for broken in wrapped if len(broken) == len(wrapped[-1]))  # the narrowest with the least lines
     figure.suptitle("\n".join(lines), x=0.01, ha="left", weight="bold")
 
 
 def panels(rows: int, columns: int, width: float = WIDTH, height: float = 2.3, **options: Any) -> Any:
     """A grid of axes, always two-dimensional, with room for a title above and a legend below; sizes in inches."""
     use()
-    tall = max(2.6, height * rows + 0.8)  # a study of one method has few rows, and its legend needs the room
+    tall = max(2.6, height * rows + 0.8)  # a figure of few rows needs the space for its legend
     return plt.subplots(rows, columns, figsize=(width, tall), squeeze=False, **options)
 
 
 def grid(count: int, columns: int, labels: tuple[str, str] = ("", ""), **options: Any) -> Any:
-    """A figure of `count` equal panels in so many columns, and its panels in reading order (one-dimensional).
+    """A figure of `count` equal panels in `columns` columns, and its panels in reading order (one-dimensional).
 
     `labels` are those of the x axes, below the lowest panel of each column, and of the y axes, at the left. `options`
     are those of `panels`.
@@ -205,14 +205,14 @@ def grid(count: int, columns: int, labels: tuple[str, str] = ("", ""), **options
     visible = axes.flat[:count]
     for axis in visible[-columns:]:
         axis.set_xlabel(labels[0])
-        axis.tick_params(which="both", labelbottom=True)  # shared axes leave it to a last row that may be hidden
+        axis.tick_params(which="both", labelbottom=True)  # with shared axes only the last row has labels
     for axis in visible[::columns]:
         axis.set_ylabel(labels[1])
     return figure, visible
 
 
 def few_ticks(*axes: Any, most: int = 6) -> None:
-    """At most so many labelled powers of ten on the logarithmic axes, and none of the lesser ticks is labelled."""
+    """Label at most `most` powers of ten on the logarithmic axes of panels, and no minor ticks."""
     from matplotlib.ticker import LogLocator, NullFormatter
 
     for panel in axes:
@@ -228,7 +228,7 @@ def legend_below(figure: Any, axes: Any) -> None:
     for axis in np.ravel(axes):
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
-    handles = dict(sorted(handles.items(), key=lambda one: isinstance(one[1], mpl.patches.Patch)))  # shades come last
+    handles = dict(sorted(handles.items(), key=lambda one: isinstance(one[1], mpl.patches.Patch)))  # patches last
     columns = max(1, min(len(handles), int(17.0 * figure.get_figwidth()) // (max(map(len, handles), default=0) + 6)))
     figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=columns, frameon=False)
 

@@ -1,7 +1,7 @@
 """The page of a study: its template, in Markdown, filled with its facts, tables and figures.
 
-A template is `page.md` beside the study's `study.py`, or NAME.md beside a study of one's own in NAME.py; without one,
-the page shows everything that the study has (`templates/plain.md`). In it stand
+A template is `page.md` beside the study's `study.py`, or NAME.md beside a user's own study NAME.py; without one, the
+page shows everything that the study has (`templates/plain.md`). A template contains
 
     {{ question }}                            the question of the study
     {{ f.NAME | number(2, "rad") }}           a fact in a format of `symtop.report.formats`
@@ -11,9 +11,9 @@ the page shows everything that the study has (`templates/plain.md`). In it stand
     The caption: what was found, and how it was drawn.
     {% endcall %}
 
-A sentence with a fact that was not measured is left out, and the page says once that there are such; `has("NAME", ...)`
-says whether facts were measured, and figures and tables made. A figure that was not drawn vanishes with its title and
-caption, a table without rows too.
+A sentence with a fact that was not measured is left out, and the page says once that sentences are missing.
+`has("NAME", ...)` is true if these facts were measured, and these figures and tables made. A figure that was not drawn
+is left out with its title and caption, and so is a table without rows.
 """
 
 import re
@@ -29,8 +29,8 @@ from symtop.report.formats import table
 
 MOST_ROWS = 15  # of a table on a page; the rest is in its CSV
 PLAIN = "plain.md"
-MARKER = "<!-- {kind} {name} -->"  # where the page in HTML has a chart, or a table in full
-GAP = "\N{OBJECT REPLACEMENT CHARACTER}"  # in place of what was not measured, until its sentence is left out
+MARKER = "<!-- {kind} {name} -->"  # replaced in HTML by an interactive chart or a full table
+GAP = "\N{OBJECT REPLACEMENT CHARACTER}"  # marks a fact that was not measured, until its sentence is removed
 PARTIAL = "*This run measured a part of the study; sentences about the rest are left out.*"
 
 Findings = Mapping[str, Any]
@@ -54,12 +54,12 @@ def filled(findings: Findings, results: Path, *, pages: Mapping[str, str] | None
 
 
 def counts() -> dict[str, int]:
-    """How many methods are compared, and how many maps of engines."""
+    """The numbers of methods and of maps of engines, for templates."""
     return {"methods": len(methods()), "maps": len(engines())}
 
 
 def front(template: str, studies: Sequence[Findings], results: Path, pages: Mapping[str, str]) -> str:
-    """A page on all studies: `fact("STUDY.NAME")` is a fact or None, figures and tables are named ``STUDY-NAME``."""
+    """The front page; in its template `fact("STUDY.NAME")` is a fact or None, figures and tables are ``STUDY-NAME``."""
     facts = {f"{study['study']}.{name}": value for study in studies for name, value in study["facts"].items()}
     titles = {study["title"]: pages.get(study["study"], "").partition("](")[2] for study in studies}
     context = {"pages": Links(pages), "fact": facts.get} | counts()
@@ -81,14 +81,14 @@ def answer(findings: Findings, results: Path) -> str:
 
 
 class Links(dict[str, str]):
-    """Links to pages by the names of studies; the name alone where there is no page."""
+    """Links to pages by the names of studies; the plain name if there is no page."""
 
     def __missing__(self, name: str) -> str:
         return name
 
 
 def environment(**options: Any) -> Any:
-    """Of the templates of the report, in which a name that is not given is an error."""
+    """The Jinja environment of the report's templates; an undefined name is an error."""
     from jinja2 import Environment, PackageLoader, StrictUndefined
 
     loader = PackageLoader("symtop", "report/templates")
@@ -96,12 +96,12 @@ def environment(**options: Any) -> Any:
 
 
 def rendered(template: str | None, name: str, context: Mapping[str, Any]) -> str:
-    """A template (None: the plain one) with what is given; SymtopError if it is wrong or names what is not there."""
+    """A template (None: the plain one) rendered with `context`; SymtopError for a faulty one or an undefined name."""
     from jinja2 import TemplateError
 
     ours = environment(autoescape=False, finalize=lambda value: GAP if value is None else value)
     ours.filters |= {one.__name__: _passing(one) for one in formats.FILTERS}
-    template = template and template.replace("endraw %}", "endraw +%}")  # which keeps the empty line that follows
+    template = template and template.replace("endraw %}", "endraw +%}")  # keeps the empty line after it
     try:
         ready = ours.get_template(PLAIN) if template is None else ours.from_string(template)
         text = ready.render(**context)
@@ -112,7 +112,7 @@ def rendered(template: str | None, name: str, context: Mapping[str, Any]) -> str
 
 
 def without_gaps(text: str) -> str:
-    """A text without the sentences and the items of lists in which something is missing."""
+    """A text without the sentences and list items that contain `GAP`."""
     blocks = [_known(block) if GAP in block else block for block in text.split("\n\n")]
     return "\n\n".join(filter(None, blocks))
 
@@ -125,7 +125,7 @@ def _known(block: str) -> str:
 
 
 def _passing(filter_: Callable[..., str | None]) -> Callable[..., str | None]:
-    """A format as a filter of templates: None, which was not measured, passes, and a name that is not there fails."""
+    """A format as a filter of templates: None (not measured) is passed on, and an undefined name is an error."""
     from jinja2 import Undefined
 
     def apply(value: Any, *options: Any, **keywords: Any) -> str | None:
@@ -136,14 +136,14 @@ def _passing(filter_: Callable[..., str | None]) -> Callable[..., str | None]:
 
 
 def _unwrapped(block: str) -> str:
-    """A paragraph or an item as one line, since it is filled with words of any length; other blocks as they are."""
+    """A paragraph or a list item as one line, because facts of any length are filled in; other blocks unchanged."""
     if re.match(r"[-*] |\d+[.)] ", block):
         return re.sub(r"\n +", " ", block)
     return block if re.match(r"[|#>`\s]|<!--|\$\$", block) else " ".join(block.split("\n"))
 
 
 def _names(studies: Sequence[Findings], results: Path, *, whole: bool = False) -> dict[str, Callable[..., Any]]:
-    """`figure`, `table` and `has` on the figures, tables and facts of some studies."""
+    """The functions `figure`, `table` and `has` of templates, for the figures, tables and facts of some studies."""
     pictures: dict[str, Any] = {}
     tables: dict[str, Any] = {}
     facts: set[str] = set()
@@ -157,7 +157,7 @@ def _names(studies: Sequence[Findings], results: Path, *, whole: bool = False) -
         if name not in pictures:
             return ""
         caption = " ".join(caller().split()) if caller else ""
-        if GAP in caption:  # what stands below a figure is its caption: there must be one
+        if GAP in caption:  # keep a caption, because the paragraph below a figure is taken for it
             caption = f"{_known(caption) or f'{title}.'} {GAP}"
         parts = [f"**{title}**" if title else "", f"![{alt}](figures/{pictures[name]['file']})", caption]
         return "\n\n".join(filter(None, [*parts, MARKER.format(kind="chart", name=chart) if chart else ""])) + "\n"

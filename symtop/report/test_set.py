@@ -1,9 +1,9 @@
 """A test set for any language: motions of 30 bodies at 100 times to 30 digits, with checkers in Python and in C.
 
 Two free bodies of each of five strata, ten heavy ones, five of them chaotic (`symtop.run.ensemble.bodies`), and ten
-symmetric tops as bodies. The states are those of `symtop.model.exact.body_digits`, whose numbers are whole: the same
-input makes the same files. A state of 17 digits is what doubles hold. Numbers of a problem and times are the doubles
-nearest to what is printed, in every file.
+symmetric tops as bodies. The states are those of `symtop.model.exact.body_digits`, which computes with integers, so
+that files are reproducible. A state of 17 digits determines its doubles. The numbers of a problem and the times are the
+doubles nearest to the printed numbers, in every file.
 """
 
 import tempfile
@@ -29,7 +29,7 @@ SHARES = {"short-axis": 2, "long-axis": 2, "near-separatrix": 2, "near-symmetric
           "chaotic": 5, "lagrange": 10}  # fmt: skip
 GIVEN = ("I1", "I2", "I3", "mgl", "cx", "cy", "cz", "qw", "qx", "qy", "qz", "wx", "wy", "wz")
 STATE = ("qw", "qx", "qy", "qz", "Lx", "Ly", "Lz")
-ROUNDED = {17: 4.5e-16, 30: 1e-29}  # rad, and of |L|: two states of so many digits may be so far apart
+ROUNDED = {17: 4.5e-16, 30: 1e-29}  # rad, and relative to |L|: the rounding error of states by their digits
 CHECKERS = ("check.py", "check.c")
 
 
@@ -40,17 +40,17 @@ def problems() -> list[Scene]:
 
 
 def times_of(scene: Scene) -> list[float]:
-    """The times of a problem, six digits each."""
+    """The times of a problem, rounded to six digits."""
     return even_times(PERIODS * scene.nutation_period, TIMES)
 
 
 def write(folder: str | Path, scenes: Sequence[Scene] | None = None) -> Path:
-    """Write the test set into a folder, which must be new or empty; a minute. `scenes` are other problems."""
+    """Write the test set, or one of other `scenes`, into a folder, which must be new or empty. It takes a minute."""
     path, scenes = file_path("folder", folder), list(scenes or problems())
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise SymtopError(f"the test set needs a folder that is new or empty, not {str(folder)!r}")
     path.mkdir(parents=True, exist_ok=True)
-    tempfile.TemporaryFile(dir=path).close()  # a folder that cannot be written is told of before the minutes
+    tempfile.TemporaryFile(dir=path).close()  # raises if the folder cannot be written
     motions = list[Digits]()
     for scene in scenes:
         post(f"test set: {len(motions)} of {len(scenes)} motions")
@@ -82,7 +82,7 @@ def _states_csv(scenes: Sequence[Scene], motions: Sequence[Digits], digits: int)
 
 
 def states(scenes: Sequence[Scene], motions: Sequence[Digits]) -> xr.Dataset:
-    """The states as pairs of doubles over ``problem`` and ``sample``, and what was given over ``problem``."""
+    """The states as pairs of doubles over ``problem`` and ``sample``, and the numbers of the problems."""
     variables: dict[str, Any] = {"time": (("problem", "sample"), [times_of(scene) for scene in scenes])}
     parts = {"quaternion": ("part", "1"), "momentum": ("component", "1")}
     for name, (dimension, units) in parts.items():

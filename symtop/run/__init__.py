@@ -1,1 +1,1 @@
-"""One run of one integrator, the truth beside it, and the guard before it."""
+"""Run integrators: single runs, ensembles and long runs, the guard's forecast, and the reference motion."""

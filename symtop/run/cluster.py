@@ -10,12 +10,12 @@ from typing import Any
 
 from symtop.core.errors import SymtopError, shown
 
-PATIENCE = 10  # seconds to wait for a scheduler's answer, or for a worker when there is none
+PATIENCE = 10  # seconds to wait for a scheduler's answer, or for its first worker
 ABSENT = "scheduler needs the package distributed: pip install 'symtop[distributed]'"
 
 
 def check_sent(address: object, work: object, name: str) -> None:
-    """Refuse an address that is no text, and work of a method, `name`, that cannot be sent to other processes."""
+    """SymtopError for an address that is no text, and for `work` of the method `name` that cannot be pickled."""
     if not isinstance(address, str) or not address:
         must = "the address of a dask scheduler, such as 'tcp://host:8786'"
         raise SymtopError(f"scheduler must be {must}, not {shown(address)}", "scheduler")
@@ -31,24 +31,24 @@ def check_sent(address: object, work: object, name: str) -> None:
 
 
 def connect(address: str) -> Any:
-    """The client of a scheduler that answers and has workers; SymtopError if there is none."""
+    """A dask client of the scheduler at `address`; SymtopError if it does not answer or has no workers."""
     try:
         import distributed
     except ImportError:
         raise SymtopError(ABSENT) from None
-    for name in ("client", "batched"):  # what they log of a lost scheduler is told here
+    for name in ("client", "batched"):  # a lost scheduler is reported here, not in their logs
         logging.getLogger(f"distributed.{name}").setLevel(logging.CRITICAL)
     client, failure = None, ""
     try:
-        with ThreadPoolExecutor(1) as apart:  # the caller's thread may run a loop of its own, as in a notebook
+        with ThreadPoolExecutor(1) as apart:  # the caller's thread may run an event loop, as in a notebook
             apart.submit(asyncio.run, _query(address)).result()
         with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # other versions there; the digest of every case is compared anyway
+            warnings.simplefilter("ignore")  # on differing versions; the hash of every case is compared anyway
             client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
             client.wait_for_workers(1, timeout=PATIENCE)
     except (OSError, ValueError, RuntimeError) as error:
         failure = " ".join((str(error) or type(error).__name__).split())[:120]
-    if failure:  # out of the handler, so that nothing holds on to what was half made
+    if failure:  # outside the handler, whose exception would keep a reference to the unfinished client
         leave(client)
         client = None
         gc.collect()  # a client that never connected closes itself here, and not under a lock of the next one
@@ -58,7 +58,7 @@ def connect(address: str) -> Any:
 
 
 async def _query(address: str) -> None:
-    """Raise TimeoutError if a scheduler does not answer: a client waits for ever for one that takes the connection."""
+    """TimeoutError if a scheduler accepts the connection but does not answer: a client would wait for ever."""
     from distributed import rpc
 
     async with asyncio.timeout(PATIENCE), rpc(address) as scheduler:
@@ -66,12 +66,12 @@ async def _query(address: str) -> None:
 
 
 def leave(client: Any) -> None:
-    """Close the connection, whatever state it is in, and do not wait for a scheduler that does not answer."""
+    """Close a client in any state, or None, without waiting for a scheduler that does not answer."""
     if client is not None:
         with contextlib.suppress(Exception):
             client.close(timeout=2.0)
 
 
 def width(client: Any) -> int:
-    """How many tasks to hand over at a time: enough that nobody waits, few enough to stop soon."""
+    """How many tasks to submit at a time: enough to keep all workers busy, few enough to stop soon."""
     return 4 * max(1, int(sum(client.ncores().values())))

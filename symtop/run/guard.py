@@ -1,4 +1,4 @@
-"""The guard: one sentence with a remedy before a run whose error is expected to be large, nothing before any other.
+"""The guard: a warning, one sentence with a remedy, before a run whose error is expected to be large.
 
 *The forecast.* The method itself is run for two nutations or a tenth of the run, and compared with the true motion
 (`symtop.run.motion`): the closed form of a top, or an integration of high order. A nutation is a closed orbit of the
@@ -7,10 +7,10 @@ exponentially), so that an error e_1 of one piece becomes after n pieces
 
     e_n = n e_1 + n (n-1)/2 N e_1,      N e_1 = e_2 - 2 e_1.
 
-Symplectic and symmetric methods commit no error along which N shears, and theirs grows linearly. Where two nutations
-cost too much, the probe takes a coarser step and scales its error by the declared order; the passage of a pole is
-then probed by itself at the step of the run. A probe in angles whose steps are long beside a pole, and one of a free
-body beside an unstable rotation, take in as many passages as they may: what few of them add may cancel.
+Symplectic and symmetric methods have N e_1 = 0: their error grows linearly. Where two nutations cost too much, the
+probe takes a coarser step and scales its error by the declared order; the passage of a pole is then probed separately
+at the step of the run. A probe in angles with long steps beside a pole, and one of a free body near an unstable
+rotation, are made as long as allowed, because the errors of a few passages may cancel.
 
 *The cause* is read from exact landmarks of the motion, in this order:
 
@@ -19,9 +19,9 @@ body beside an unstable rotation, take in as many passages as they may: what few
     pole          the axis precesses by a radian or more in one step at its closest approach to a pole (angles only)
     aliasing      fewer than two steps a nutation
     resonance     a step turns the nutation by a third or a quarter of a turn (Verlet at h omega = sqrt 3)
-    early end     the short run ended early, or the run will at the limit of its work
-    no order      the error need not fall with the step: a term is left out, or rounding decides
-    departure     an adaptive method's errors of its tolerance grow with the motion, which is unstable
+    early end     the probe ended early, or the run will end early at the limit of its work
+    no order      the error need not fall with the step: a term is left out, or rounding dominates
+    departure     the unstable motion amplifies errors of the size of an adaptive method's tolerance
     growth        the errors of the nutations add up until the horizon
 
 The guard never changes a run, and does not look at the number of samples: `simulate` dithers samples that would fall on
@@ -44,34 +44,34 @@ from symtop.run.linear_stability import Growth, nutation_growth, trace
 from symtop.run.motion import MOST_FOLDS, MOVED, SHEARED, UNSTABLE, Exact, Integrated, Landmarks
 from symtop.run.reference.sensitivity import SMALL
 
-STEPS = {"compiled": 2000, "python": 50}  # a probe of two nutations may take these
-AT_LEAST, AT_MOST = 0.25, 10.0  # of them a probe takes in any case, and where errors grow, up to the whole run
-SHARE = 0.1  # of the run, which a probe may always take, but no more than so many nutations (`Integrated`) and steps:
+STEPS = {"compiled": 2000, "python": 50}  # most steps of a probe of two nutations
+AT_LEAST, AT_MOST = 0.25, 10.0  # times `STEPS`: least steps of a probe, and of one where errors grow
+SHARE = 0.1  # of the run: a probe may always be so long, up to `Integrated.longest` nutations and `MOST_PROBED` steps
 MOST_PROBED = 20_000  # steps
-ROUNDED = 1e-13  # rad; a probe that is closer than this shows rounding, which grows as n^1.5
-PARTIAL = 10.0  # distrust of a probe shorter than a nutation: it may have missed where errors are made, or stretched
+ROUNDED = 1e-13  # rad: a smaller error of a probe is rounding, which grows as n^1.5
+PARTIAL = 10.0  # factor on the forecast from less than a nutation, which may miss where errors arise or are amplified
 AFFORDED = {"compiled": 12_000, "python": 1200}  # evaluations of a longer probe of an adaptive method
-THROUGH = 20.0  # times as many where the axis passes a pole closer than the tolerance, or a free body turns over
-MOST_WORK = {"compiled": 5e6, "python": 5e5}  # evaluations of any probe: beside a pole steps may shrink to nothing
-LOOSE = 1e-4  # tolerance from which a method in Python is probed for a whole nutation: a few of its steps
-LEAST_GROWTH = 0.05  # of the error of a piece: less growth from the first to the second is luck
-COMMITTED = 1e4, 1e7  # tolerances: an error that an adaptive method commits now and then, and one of variable order
-CLOSE, PASSING = 0.2, 100.0  # rad from a pole; tolerances that a step past it in the angles chart commits now and then
-WORTH = 1e-2  # rad: a law that grows an error faster is looked into where it leads beyond this
-RESOLVED = 0.3  # rad that the axis may precess in one step at a pole: coarser probes say nothing about the passage
+THROUGH = 20.0  # times `AFFORDED` where the axis passes a pole closer than the tolerance, or a free body turns over
+MOST_WORK = {"compiled": 5e6, "python": 5e5}  # evaluations of any probe: beside a pole steps may become tiny
+LOOSE = 1e-4  # tolerance above which a method in Python is probed for a whole nutation: a few of its steps
+LEAST_GROWTH = 0.05  # of the error of a probe: the least growth assumed from its first half to its second
+COMMITTED = 1e4, 1e7  # tolerances: the occasional large error of an adaptive method, and of one of variable order
+CLOSE, PASSING = 0.2, 100.0  # rad from a pole; tolerances: the occasional error of a step past it in the angles chart
+WORTH = 1e-2  # rad: stability is checked only if quadratic growth leads to a larger error
+RESOLVED = 0.3  # rad of precession in one step at a pole: a probe with more does not show the error of the passage
 
-EXPECTED = 1e-2  # rad; a larger forecast is worth a warning: the axis error from which a verdict calls a run wrong
-AIM = 1e-3  # rad, what a remedy aims at
-SMALL_TURN = 0.3  # h omega below which no method loses small nutations
-GROWS = 1e-3  # a step that multiplies small nutations by more than 1 + GROWS loses them
-NO_GROWTH = 3e-8  # rounding of the growth of a step
-NONLINEAR = 0.03  # of the nutation that a method adds of its own may pass for growth: 8e-6 at 4e-4 rad
-BESIDE = 1e-2  # rad
+EXPECTED = 1e-2  # rad: a larger forecast gives a warning; also the axis error from which a verdict calls a run wrong
+AIM = 1e-3  # rad: the error that the proposed step or tolerance should have
+SMALL_TURN = 0.3  # h omega up to which every method is stable for small nutations
+GROWS = 1e-3  # a method is unstable if a step multiplies small nutations by more than 1 + GROWS
+NO_GROWTH = 3e-8  # rounding error of the growth of a step
+NONLINEAR = 0.03  # times the nutation that a method adds: less growth may be a nonlinear effect (8e-6 at 4e-4 rad)
+BESIDE = 1e-2  # rad: nearer to a pole than this, small nutations grow in the tilt of the axis
 NEAR = 0.12  # rad between three or four turns of a step and a whole turn: a resonance
-COARSE = 1.0  # rad of precession in a step
-OWN = 10.0  # times that steps of a probe multiply a change more than the motion does: less is a transient
-PRECESSED = 0.1  # the same, of a step that is tried past a pole
-TRIES, LESS = 8, 0.6  # steps that are tried, each at most so much of the one before
+COARSE = 1.0  # rad of precession in one step at a pole: more is named as the cause
+OWN = 10.0  # times: the steps of a probe multiply a change by this much more than the motion; less is a transient
+PRECESSED = 0.1  # rad of precession at a pole in a proposed step
+TRIES, LESS = 8, 0.6  # steps tried for a remedy; the largest ratio of one to the one before
 MOST_STEPS = 20_000_000_000  # of a run: ten minutes of the fastest kernel
 NO_ORDER = "it has no order, and smaller steps need not help; take another method, such as strang"
 NO_LENGTHS = np.empty(0)
@@ -85,25 +85,25 @@ class Probe(NamedTuple):
     outcome: str
     reached: float  # time of the run, not of the probe
     evaluations: int  # of the force, at the step of the run
-    stray: Array = NO_LENGTHS  # how far the length of the quaternion is from one; empty of a chart without
+    stray: Array = NO_LENGTHS  # ||q| - 1|; empty in a chart without quaternions
 
 
 class Forecast(NamedTuple):
     """The forecast of one run."""
 
-    axis_error: float  # expected largest, rad; inf if the probe did not get through, 0 if there is nothing to probe
-    rounding: float  # what rounding alone will make of it, rad: large on a separatrix, whatever the method
-    outcome: str  # of the probe
+    axis_error: float  # expected largest, rad; inf if the probe failed, 0 for a method without a step or tolerance
+    rounding: float  # error by rounding alone, rad: large on a separatrix, whatever the method
+    outcome: str  # of the probe, or expected of the run
     reached: float
     marks: Landmarks
-    unstable: float = 0.0  # what the motion makes of an error of the tolerance, rad; 0 where a probe shows it
+    unstable: float = 0.0  # an error of the tolerance as the motion amplifies it, rad; 0 where a probe shows it
     whole: bool = False  # the probe was as long as the run
-    growth: float = 1.0  # how many times more than the motion the steps of a probe multiply a small change
+    growth: float = 1.0  # factor by which steps of the probe multiply a small change more than the motion does
 
 
 @functools.cache
 def _places(points: int) -> Array:
-    """Where a probe of so long is sampled: not commensurate with the nutation."""
+    """Positions of the samples of a probe, from about 1 to `points`, not commensurate with the nutation."""
     place = np.arange(1.0, points + 1.0)
     place[:-1] += np.mod(GOLDEN * place[:-1], 1.0) - 0.5
     return place
@@ -111,7 +111,7 @@ def _places(points: int) -> Array:
 
 @functools.lru_cache(maxsize=256)
 def _marks(steps: int, points: int) -> Any:
-    """The same in whole steps of a probe; there are few such numbers of steps (`STEPS`)."""
+    """`_places` for a probe of `steps` steps, rounded to whole steps; few values of `steps` occur (`STEPS`)."""
     return np.unique(np.maximum(np.rint(_places(points) * (steps / points)).astype(np.int64), 1))
 
 
@@ -126,7 +126,7 @@ def _probe(
         piece = Plan.until(duration * (_places(motion.points) / motion.points), plan.tolerance, most)
     run = solve(method, chart, motion.scene.top, motion.start(since), piece)
     outcome, times, states = run.outcome, piece.times, run.states
-    bound = outcome == "out_of_budget" and run.force_evaluations < plan.most(math.inf)  # the run itself may go on
+    bound = outcome == "out_of_budget" and run.force_evaluations < plan.most(math.inf)  # at the limit of a probe only
     if method.fixed_step and bound and run.reached >= motion.marks.period:
         known = times <= run.reached
         outcome, times, states = "ok", times[known], states[known]
@@ -140,7 +140,7 @@ def _probe(
 
 
 def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
-    """The largest error of a probe, grown to the horizon; `straight` if the method's error grows linearly."""
+    """The largest error of a probe, extrapolated to the horizon; `straight` if the method's error grows linearly."""
     half = 0.5 * float(probe.times[-1])
     whole = float(probe.error.max())
     n = horizon / half
@@ -155,20 +155,20 @@ def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
 
 
 def _amplifies(motion: Integrated, change: float, horizon: float, times: float = UNSTABLE) -> bool:
-    """Whether the motion multiplies a change of its start by so much more than the shear of a stable one does."""
+    """Does the motion amplify a change of its start more than `times` as much as the shear of a stable motion?"""
     return motion.displacement(change, horizon) > change * times * (1.0 + horizon / motion.marks.period)
 
 
 def _amplified(motion: Integrated, probe: Probe, horizon: float) -> float:
-    """What the motion makes of the largest error of a probe, if it is not known to add errors up by the law."""
+    """The largest error of a probe as the motion amplifies it by the horizon; 0 if `grown` covers it (`Exact`)."""
     return motion.amplified(float(probe.error.max()), float(probe.times[-1]), horizon)
 
 
 def _fixed(motion: Integrated, method: Integrator, probe: Probe, horizon: float) -> float:
-    """The largest error of a probe of steps, grown to the horizon by its law and by what the motion makes of it.
+    """The largest error of a fixed-step probe at the horizon: by the law of `grown` or by amplification, the larger.
 
-    What rounding, or the end of an iteration, leaves is not symmetric, and an unstable motion makes it grow in every
-    nutation: there a symmetric method is no better than others.
+    Errors of rounding and of truncated iterations are not symmetric, and an unstable motion amplifies them in every
+    nutation: there the error of a symmetric method may grow quadratically, too.
     """
     straight = bool(method.symplectic or method.symmetric)
     expected = max(grown(probe, horizon, straight=straight), _amplified(motion, probe, horizon))
@@ -179,11 +179,11 @@ def _fixed(motion: Integrated, method: Integrator, probe: Probe, horizon: float)
 
 
 def _grown_tolerance(motion: Integrated, method: Integrator, plan: Plan) -> float:
-    """What becomes of the errors of an adaptive method by the horizon, rad; 0 if the motion is stable.
+    """The error of an adaptive method at the horizon, rad, if an unstable motion amplifies it; 0 for a stable motion.
 
-    A method in Python is probed for less than the run, and an unstable motion amplifies what it does elsewhere: in 44
-    wrong runs of SciPy's methods, up to 3600 times the displacement by one tolerance, and up to 1.6e6 times for LSODA,
-    which takes long steps of a high order while the top stands almost still.
+    A probe of a method in Python is shorter than the run and does not show errors made elsewhere: in 44 wrong runs of
+    SciPy's methods they were up to 3600 times the displacement by one tolerance, and up to 1.6e6 times for LSODA, which
+    takes long steps of a high order while the top stands almost still.
     """
     if not _amplifies(motion, plan.tolerance, plan.horizon):
         return 0.0
@@ -194,10 +194,10 @@ def _grown_tolerance(motion: Integrated, method: Integrator, plan: Plan) -> floa
 def _adaptive_forecast(
     motion: Integrated, method: Integrator, chart: str, plan: Plan, period: float, share: float, twice: float, far: bool
 ) -> tuple[float, Probe]:
-    """The same of an adaptive method, whose work is known when a first piece has been probed.
+    """`_expected` for an adaptive method, whose work per time is known after a first probe.
 
-    Where `AFFORDED` work reaches further, a longer probe is taken, up to the whole run. Elsewhere an error below the
-    tolerance is luck.
+    If `AFFORDED` evaluations allow a longer probe, that is made, up to the whole run. The forecast from a probe shorter
+    than the run is at least the tolerance.
     """
     cheap = method if method.same_steps_as is None else integrator(method.same_steps_as)  # a hundredth of the time
     least = twice if cheap.implementation == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0
@@ -221,7 +221,7 @@ def _adaptive_forecast(
 
 
 def _expected(motion: Integrated, method: Integrator, chart: str, plan: Plan) -> tuple[float, Probe]:
-    """The largest axis error to expect, and the probe that says so."""
+    """The expected largest axis error of a run, and the probe from which it follows."""
     straight, marks = bool(method.symplectic or method.symmetric), motion.marks
     grows = motion.scene.of_body and motion.scene.top.free and _amplifies(motion, SMALL, plan.horizon, SHEARED)
     period = marks.period if math.isfinite(marks.period) else plan.horizon
@@ -255,8 +255,8 @@ def _expected(motion: Integrated, method: Integrator, chart: str, plan: Plan) ->
 def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: Integrated | None = None) -> Forecast:
     """Forecast the error of a run from a short run (a probe) of the same method; the run itself is not changed.
 
-    A method without a step or a tolerance, such as the closed form, is not probed. By default the motion of a top is
-    its closed form, and that of a body integrated.
+    A method without a step or a tolerance, such as the closed form, is not probed. The default `motion` is the closed
+    form for a top and an integration for a body.
     """
     motion = motion or (Integrated if scene.of_body else Exact)(scene)
     marks = motion.marks
@@ -284,7 +284,7 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: I
 
 
 def _length_lost(probe: Probe, horizon: float) -> tuple[str, float] | None:
-    """How and when the length of the quaternion, which drifts as it does over the halves of the probe, ends the run."""
+    """Outcome and time of the run's end if the drift of |q| continues as in the probe; None if |q| stays in bounds."""
     half, most = 0.5 * float(probe.times[-1]), float(probe.stray.max())
     drift = (most - float(probe.stray[probe.times <= half].max(initial=0.0))) / half
     if most + drift * (horizon - 2.0 * half) <= LENGTH:
@@ -293,7 +293,10 @@ def _length_lost(probe: Probe, horizon: float) -> tuple[str, float] | None:
 
 
 def _own_growth(motion: Integrated, method: Integrator, chart: str, plan: Plan, piece: float) -> float:
-    """How many times more than the motion itself a method's steps multiply a small change in a piece; 1 if no more."""
+    """The factor by which a method multiplies a small change in a piece of the run more than the motion does; or 1.
+
+    It is a lower bound, as it divides by the square of the motion's own factor.
+    """
     steps = max(1, round(min(piece, STEPS[method.implementation] * plan.step_size) / plan.step_size))
     top, marks = motion.scene.top, Plan.steps(plan.step_size, _marks(steps, motion.points))
     pair = [solve(method, chart, top, start, marks).states for start in (motion.scene.start, motion.moved())]
@@ -305,18 +308,18 @@ def _own_growth(motion: Integrated, method: Integrator, chart: str, plan: Plan, 
 
 
 class Trouble(NamedTuple):
-    """Why a run will go wrong, and what to try instead."""
+    """Why a run is expected to be wrong, and what to try instead."""
 
-    reason: str  # with what to do, if that is not a step
-    step: float = math.nan  # a first try
-    otherwise: str = ""  # what may be done instead of it
+    reason: str  # with the remedy, unless that is a smaller step
+    step: float = math.nan  # the first step to try
+    otherwise: str = ""  # an alternative to a smaller step
 
 
 def warning(scene: Scene, method: Integrator, chart: str, plan: Plan, *, series: bool = False) -> str:
-    """Warn before the run if a large error is expected: one sentence with a remedy, else an empty one.
+    """A warning before the run if a large error is expected, one sentence with a remedy; else an empty string.
 
-    A step is advised if the guard would be silent about it, and otherwise named as one to try. With `series` a top's
-    motion is integrated, too, as that of a body is.
+    It says "take" a step for which the guard gives no warning, and "try" a step if none was found. With `series` a
+    top's motion is integrated like that of a body.
     """
     if method.control is None:
         return ""
@@ -330,7 +333,7 @@ def warning(scene: Scene, method: Integrator, chart: str, plan: Plan, *, series:
 
 
 def _remedy(motion: Integrated, method: Integrator, chart: str, plan: Plan, first: Trouble) -> str:
-    """A step of two digits of which nothing is expected to go wrong: the first try, or the next smaller ones."""
+    """The advice to use a step, of two digits, for which there is no warning: the first try or a smaller one."""
     step, word, others = first.step, "try", f", or {first.otherwise}" if first.otherwise else ""
     for _ in range(TRIES):
         if not plan.horizon / step <= MOST_STEPS:
@@ -346,26 +349,26 @@ def _remedy(motion: Integrated, method: Integrator, chart: str, plan: Plan, firs
 
 
 def trouble(motion: Integrated, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
-    """Why a run will go wrong; None if it will not."""
+    """Why a run is expected to be wrong; None if it is not."""
     known = isinstance(motion, Exact) and _instability(motion.scene, method, chart, plan, expected)
     return known or _cause(motion, method, chart, plan, expected)
 
 
 def _growth(scene: Scene, method: Integrator, chart: str, step: float, frequency: float) -> Growth:
-    """What a step does to small nutations; a symmetric method neither adds to them nor makes fine steps unstable."""
+    """The growth of small nutations in a step. A symmetric method adds no nutation and is stable for small steps."""
     if not method.symmetric:
         return nutation_growth(method, scene, step, chart, frequency)
     return Growth(trace(method, scene, step, chart).growth if step * frequency > SMALL_TURN else 1.0, EPSILON)
 
 
 def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
-    """Small nutations that grow until they show; None if they do not, or if a probe has shown that they do not."""
+    """The trouble that small nutations grow to a visible size; None if not, or if a probe of the whole run was good."""
     marks, step, frequency = expected.marks, plan.step_size, expected.marks.frequency
     good_run = expected.whole and expected.outcome == "ok" and expected.axis_error <= EXPECTED
     if method.adaptive or good_run:
         return None
     growth, steps = _growth(scene, method, chart, step, frequency), plan.horizon / step
-    beside = marks.gap if marks.gap < BESIDE else 0.0  # of a pole, what grows is the tilt
+    beside = marks.gap if marks.gap < BESIDE else 0.0  # of a pole, the tilt grows
     size, folds = marks.width + beside + growth.size, steps * math.log(max(growth.factor, 1.0))
     grows = growth.factor > 1.0 + max(NO_GROWTH, NONLINEAR * growth.size, growth.doubt)
     if not grows or not size * math.expm1(min(folds, MOST_FOLDS)) > EXPECTED:
@@ -389,7 +392,7 @@ def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expec
 
 
 def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
-    """The first of the other causes."""
+    """The first cause that applies, except instability; None if no large error is expected."""
     marks = expected.marks
     if expected.rounding > EXPECTED and not isinstance(motion, Exact):
         return Trouble(
@@ -406,7 +409,7 @@ def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expec
     second, period = motion.scene.second, motion.period_word
     reached = min(expected.axis_error, math.pi)
     size = f"expect an {motion.watches} error of {reached:.1g} rad by t = {plan.horizon:.4g}{second}"
-    limited = expected.outcome == "out_of_budget"  # no error is the cause, and no length of step
+    limited = expected.outcome == "out_of_budget"  # then the step is not the cause
     if not limited and (coarse := _coarse(motion, method, chart, plan, expected, size)) is not None:
         return coarse
     if expected.outcome != "ok":
@@ -428,11 +431,11 @@ def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expec
 def _coarse(
     motion: Integrated, method: Integrator, chart: str, plan: Plan, expected: Forecast, size: str
 ) -> Trouble | None:
-    """A step that is too long for a pole or for the nutation, or in resonance with it."""
+    """The trouble of a step that is too long for a pole or for the nutation, or in resonance with it; else None."""
     marks, step, frequency = expected.marks, plan.step_size, expected.marks.frequency
     if expected.growth > 1.0:
-        words = f"steps of {step:.4g} multiply a small change {expected.growth:.1g} times as much as the motion does"
-        return Trouble(f"{size}: {words} in a short run", SMALL_TURN / frequency)
+        times = f"at least {expected.growth:.1g} times as much as the motion does"
+        return Trouble(f"{size}: steps of {step:.4g} multiply a small change {times}", SMALL_TURN / frequency)
     if chart == "angles" and marks.rate * step > COARSE:
         return Trouble(
             f"{size}: the axis passes the {marks.pole} pole at {marks.gap:.2g} rad and precesses there by "

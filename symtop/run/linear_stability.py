@@ -1,16 +1,16 @@
-"""Linear stability of a method, from a few of its own steps next to a motion at rest in theta.
+"""Linear stability of a method, from a few of its own steps next to a steady precession.
 
 Near a steady precession the method's reduced map has a fixed point, and the inclination obeys a recurrence
 
     theta_{k+1} - t theta_k + d theta_{k-1} = c,       fixed point c/(1 - t + d),     d = 1 for a symmetric method
 
-t is the trace of the linearised map. |t| <= 2: the discrete nutation turns by acos(t/2) a step; beyond, it grows.
-|t| = 2 is the linear limit, t = -1 a third of a turn a step, the resonance that leaves no neighbourhood of the fixed
-point (Moser; Verlet is there at h omega = sqrt 3 and the midpoint rule at 2 sqrt 3). So t(h), which four steps of any
-method show, has the limit and the resonances in it, for any method.
+t is the trace of the linearised map. If |t| <= 2, the discrete nutation turns by acos(t/2) per step; beyond, it grows.
+|t| = 2 is the linear stability limit; t = -1 is a third of a turn per step, the resonance with no stable neighbourhood
+of the fixed point (Moser; for Verlet h omega = sqrt 3, for the midpoint rule 2 sqrt 3). Four steps of any method give
+t(h), and so its stability limit and its resonances.
 
-A method that keeps the energy and both momenta has |t| <= 2 at every step that it can solve: the reduced energy is
-least at the steady precession, and small nutations stay on its level lines. Gauss methods are of this kind. As the
+A method that keeps the energy and both momenta has |t| <= 2 at every step whose equations it can solve: the reduced
+energy has a minimum at the steady precession, and small nutations stay on its level lines. So do Gauss methods. As the
 precession becomes slow beside the nutation, their t tends to 2 Re R(i h omega), R the diagonal Pade approximant of exp.
 
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration,
@@ -30,29 +30,29 @@ from symtop.model.charts import View, axis_of
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
 
-NUDGE = 1e-6  # rad: nonlinear terms are 1e-12 of the linear ones, rounding 1e-10
-BESIDE = 1e-3  # rad from a pole: closer, the motion is that at the pole to 1e-6, but in Euler's angles
-STABLE = 1e-2  # of p_psi^2: a rotation at the pole that is so far from its threshold is stable
-NEAR, LEAST = 1e-3, 1e-9  # of the way to a pole, a nudge beside one: nonlinear terms are 1e-6; rad
-SINGLE_NUDGE, SINGLE_EPSILON = 1e-3, 2.0**-23  # rad, of a method in single precision; the spacing of its numbers at 1
-WARM_UP = 4  # strides before those that are compared: a multistep method has its start behind it by then
+NUDGE = 1e-6  # rad, displacement from the fixed point: nonlinear terms are 1e-12 of the linear ones, rounding 1e-10
+BESIDE = 1e-3  # rad: nearer to a pole than this, the motion is that at the pole to 1e-6, except in Euler's angles
+STABLE = 1e-2  # least relative distance of p_psi^2 above the threshold of a stable rotation at the pole
+NEAR, LEAST = 1e-3, 1e-9  # a nudge near a pole: part of the distance (nonlinear terms are 1e-6), and at least, rad
+SINGLE_NUDGE, SINGLE_EPSILON = 1e-3, 2.0**-23  # for methods in single precision: rad; machine epsilon
+WARM_UP = 4  # strides before those that are compared: more than the starting steps of a multistep method
 ROUNDING = 32.0 * EPSILON  # of an inclination after some steps, rad
-RESIDUAL, RESIDUAL_WITHOUT_ORDER = 2e-3, 5e-4  # of the recurrence, relative; less of a method that leaves out a term
-STRIDE = 0.5  # rad of nutation between two places of a recurrence of `nutation_growth`
-SLOWEST = 1e-6  # growth of a step below which rounding adds up for a million of them
-LONG = 120  # strides that a difference is followed which obeys no recurrence of two terms
+RESIDUAL, RESIDUAL_WITHOUT_ORDER = 2e-3, 5e-4  # largest relative residual of the recurrence; if a method has no order
+STRIDE = 0.5  # rad of nutation between two terms of the recurrence of `nutation_growth`
+SLOWEST = 1e-6  # least growth per step in the estimate of accumulated rounding
+LONG = 120  # strides over which a difference is followed that obeys no two-term recurrence
 MOST_STRIDE = {"compiled": 50, "python": 5}  # steps
-STEPS = 4
-ROUNDS = 6  # of the search for a fixed point
+STEPS = 4  # of a run
+ROUNDS = 6  # iterations for the fixed point
 
 
 def few_steps(method: Integrator, chart: str, top: SymmetricTop, start: Angles, h: float, steps: int = STEPS) -> Run:
-    """The states after 0, 1, ... `steps` steps, as the chart has them."""
+    """A run of `steps` steps, sampled after each of them and at the start, in the variables of the chart."""
     return solve(method, chart, top, start, Plan.steps(h, np.arange(steps + 1)))
 
 
 def with_momenta(top: SymmetricTop, theta: float, momenta: Momenta) -> Angles:
-    """The state at rest in theta with these momenta; exact next to a pole, where p_phi - p_psi cos(theta) cancels."""
+    """The start with these momenta and theta' = 0; exact next to a pole, where p_phi - p_psi cos(theta) cancels."""
     x = 0.5 * theta
     rate = (momenta.north / math.sin(x) ** 2 + momenta.south / math.cos(x) ** 2) / (4.0 * top.I1)
     return Angles(theta=theta, phi_dot=rate, psi_dot=momenta.p_psi / top.I3 - rate * math.cos(theta))
@@ -64,7 +64,7 @@ class Trace(NamedTuple):
     trace: float  # NaN if the method has no fixed point near the steady precession
     determinant: float
     theta: float  # the fixed point
-    doubt: float = 0.0  # of the trace: rounding over the way that theta goes, which is short where a step turns it back
+    doubt: float = 0.0  # uncertainty of the trace: rounding over the range of theta in the run
 
     @property
     def growth(self) -> float:
@@ -85,7 +85,7 @@ NO_TRACE = Trace(math.nan, math.nan, math.nan)
 def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None) -> Trace:
     """The trace of the map of one step h at the method's fixed point next to the steady precession of these momenta.
 
-    In the chart that shows the axis unless another is given.
+    `chart` is by default the smallest that determines the axis.
     """
     top, momenta = scene.top, scene.top.momenta(scene.start)
     chart = chart or method.chart_for("axis")
@@ -100,7 +100,7 @@ def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None) 
             return NO_TRACE
         t, d, c = _recurrence(y, symmetric=bool(method.symmetric))
         denominator, doubt = 1.0 - t + d, ROUNDING / max(float(np.ptp(y)), TINY)
-        if abs(denominator) <= doubt and abs(c) <= doubt * NUDGE:  # every inclination stays where it is
+        if abs(denominator) <= doubt and abs(c) <= doubt * NUDGE:  # every inclination is a fixed point
             return Trace(t, d, theta, doubt)
         if denominator == 0.0:
             return NO_TRACE
@@ -124,31 +124,31 @@ def _recurrence(y: np.ndarray, *, symmetric: bool) -> tuple[float, float, float]
 
 
 class Growth(NamedTuple):
-    """What a method does to small nutations in every step."""
+    """The growth of small nutations per step of a method."""
 
-    factor: float  # of their size; NaN if it is not known
-    size: float  # rad, of what the method adds to them: its own offset from the steady precession, and its rounding
-    doubt: float = 0.0  # of the factor: its rounding
+    factor: float  # by which their size is multiplied; NaN if it is not known
+    size: float  # rad, of the nutation that the method adds: its offset from the steady precession, and rounding
+    doubt: float = 0.0  # rounding error of the factor
 
 
 def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, frequency: float) -> Growth:
-    """By what a method multiplies small nutations about the steady precession of these momenta in a step.
+    """The growth of small nutations about the steady precession of the scene's momenta, per step of a method.
 
-    It need not be symmetric. Two starts on both sides of the steady precession are stepped, and their difference
-    obeys delta_{k+1} = t delta_k - d delta_{k-1}: what both drift by in a step, which `trace` takes for growth, and
-    what is even in the distance cancels. Beside a pole the difference is that of e_x + i e_y, and t and d are
-    complex. Some steps of a fine h are one of the recurrence, so that it turns by a good part of a radian;
-    `frequency` is that of small nutations. Where the difference does not obey it (a method with more roots than two,
-    or one in single precision, whose rounding hides it), its size is followed for longer. Rounding of each step adds
-    up, as a random walk, until that of the first has grown by e. Where so many steps of a fine h turn it by a small
-    angle a, the two terms are nearly one, and rounding e of the difference leaves a doubt of e/a^2 in their roots.
+    It need not be symmetric. Two starts on both sides of the steady precession are stepped, and their difference obeys
+    delta_{k+1} = t delta_k - d delta_{k-1}: a common drift, which `trace` mistakes for growth, and even terms in the
+    distance cancel. Beside a pole the difference is that of e_x + i e_y, and t and d are complex. For small h several
+    steps, a stride, are one index of the recurrence, which then turns by about `STRIDE`; `frequency` is that of small
+    nutations. If the difference does not obey it (a method with more than two roots, or in single precision, where
+    rounding hides it), its size is followed for longer. Rounding errors of the steps add up as a random walk, until the
+    first has grown by e. If a stride turns by a small angle a, the two terms are almost linearly dependent, and a
+    rounding error e of the difference leaves an uncertainty of e/a^2 in the roots.
     """
     stride = max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))  # steps
     gap = min(theta := scene.top.steady_theta(scene.top.momenta(scene.start)), math.pi - theta)
     nudge, rounding = NUDGE if _beside(scene, chart) else min(NUDGE, max(NEAR * gap, LEAST)), EPSILON
     runs, delta, off = _apart(method, scene, h, chart, nudge, stride)
     places = runs[0].states[1:, :3]
-    with np.errstate(over="ignore"):  # of a run that has blown up
+    with np.errstate(over="ignore"):  # a run may have blown up
         single = chart != "angles" and bool((places.astype(np.float32) == places).all())
     if single:
         nudge, rounding = SINGLE_NUDGE, SINGLE_EPSILON
@@ -167,7 +167,7 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
 
 
 def _beside(scene: Scene, chart: str) -> bool:
-    """Is the steady precession so close to a pole, where the top would turn stably, that it is followed as there?"""
+    """Is the steady precession so near a pole with a stable rotation that nutations are followed in e_x, e_y?"""
     top, momenta = scene.top, scene.top.momenta(scene.start)
     theta, square = top.steady_theta(momenta), momenta.p_psi**2
     weight = 4.0 * top.I1 * (top.mgl if theta < 1.0 else -top.mgl)  # p_psi^2 at the threshold
@@ -177,7 +177,7 @@ def _beside(scene: Scene, chart: str) -> bool:
 def _apart(
     method: Integrator, scene: Scene, h: float, chart: str, nudge: float, stride: int, count: int = STEPS
 ) -> tuple[list[Run], np.ndarray, float]:
-    """Two runs at a distance of two nudges, half their difference every `stride` steps, how far off their middle is."""
+    """Two runs two nudges apart, half their difference every `stride` steps, the largest offset of their mean (rad)."""
     top, momenta = scene.top, scene.top.momenta(scene.start)
     theta, beside = top.steady_theta(momenta), _beside(scene, chart)
     if beside:
@@ -196,7 +196,7 @@ def _apart(
 
 
 def _root(delta: np.ndarray, left_over: float) -> float:
-    """The largest root of the recurrence of two terms that a difference obeys, in size; NaN if it does not."""
+    """The largest |root| of the two-term recurrence of `delta`; NaN if its relative residual exceeds `left_over`."""
     if not np.isfinite(delta).all() or not delta.any():
         return math.nan
     known = np.stack([delta[1:-1], delta[:-2]], axis=1)

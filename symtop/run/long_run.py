@@ -1,12 +1,12 @@
-"""Long runs: a billion steps in the memory of a thousand, watched while they run, resumable to the same bits.
+"""Long runs, of a billion steps and more: stored as statistics of windows, and resumable from a checkpoint.
 
-A run is cut into windows: logarithmic in time, `PER_DECADE` a decade, until they would be longer than `LONGEST`
+A run is cut into windows: logarithmic in time, `PER_DECADE` per decade, until they would be longer than `LONGEST`
 steps. In each, `SAMPLES` samples are taken at whole steps that the golden ratio scatters, so that no stride is
-commensurate with the nutation; of every quantity the least, the largest and the mean remain.
+commensurate with the nutation. Of every quantity only the least, the largest and the mean value are stored.
 
-After a window the position of the run, all that its next step depends on, can be written to a checkpoint: whole or not
-at all, at most every `SAVE` seconds, and on an interrupt. Where windows end is fixed by the number of steps alone, so
-that a run that goes on from its checkpoint has the bits of one that was never stopped.
+After a window the state of the run, all that its next step depends on, can be written to a checkpoint: atomically, at
+most every `SAVE` seconds, and on an interrupt. Where windows end depends only on the number of steps, so that a resumed
+run has the same bits as one that was never interrupted.
 """
 
 import contextlib
@@ -41,18 +41,18 @@ from symtop.run.simulation import chart_of as smallest_chart
 
 Gauge = Callable[..., dict[str, Array]]  # states and momenta of samples -> quantities
 
-PER_NUTATION = 1000.37  # steps, where nobody says otherwise: not commensurate with the nutation
+PER_NUTATION = 1000.37  # default steps per nutation: not commensurate with the nutation
 FIRST = 10_000  # steps of the first window
-PER_DECADE = 12
-LONGEST = 20_000_000  # steps: a window of this length takes a second or two, and no more than one is lost by a kill
-SAMPLES = 512
-SAVE = 2.0  # seconds
+PER_DECADE = 12  # windows
+LONGEST = 20_000_000  # steps of a window: it takes a second or two, and is lost if the process is killed
+SAMPLES = 512  # in a window
+SAVE = 2.0  # seconds between two writings of the checkpoint, at least
 QUANTITIES = ("energy", "modified_energy", "p_phi", "p_psi", "theta")
-OF_BODY = ("energy", "p_phi", "momentum", "theta")  # of the momentum its length, a constant without a weight
+OF_BODY = ("energy", "p_phi", "momentum", "theta")  # momentum: |L|, constant if the body has no weight
 
 
 def windows(steps: int) -> list[int]:
-    """Where windows end: logarithmic from `FIRST`, then every `LONGEST` steps, the last at `steps`."""
+    """The steps at which windows end: logarithmic from `FIRST`, then every `LONGEST`, the last at `steps`."""
     ends = [min(FIRST, steps)]
     while ends[-1] < steps:
         grown = round(FIRST * 10.0 ** (len(ends) / PER_DECADE))
@@ -69,7 +69,7 @@ def scattered(begin: int, end: int, samples: int = SAMPLES) -> Whole:
 
 
 def chart_of(method: Integrator, *, of_body: bool = False) -> tuple[str, FixedStep]:
-    """The smallest chart in which a method has a compiled loop of fixed steps, or that of a body, and the loop."""
+    """The smallest chart in which a method has a compiled loop of fixed steps (for a body "body"), and the loop."""
     loops = {chart: loop for chart, solver in method.solvers.items() if (loop := inside(solver)) is not None}
     if not loops:
         raise SymtopError(f"{method.name} has no compiled loop of fixed steps, so that it cannot be run in stretches")
@@ -80,16 +80,16 @@ def chart_of(method: Integrator, *, of_body: bool = False) -> tuple[str, FixedSt
 
 
 def presented(solver: FixedStep, par: Any, states: Array) -> Array:
-    """States of a loop as its chart has them."""
+    """The internal states of a solver's loop, converted to the variables of its chart."""
     return states if solver.present is None else solver.present(par, np.zeros(len(states)), states)
 
 
 def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
-    """Relative changes of energy, modified energy and momenta since the start, and theta, of any samples of a run.
+    """A function from samples of a run to relative changes of energy, modified energy and momenta, and theta.
 
-    The oscillation that the modified energy leaves is fitted on the first `FIRST` steps, which are run here. States are
-    the loop's own, or, where `shown`, those of the chart. The energy is that of the momenta that the run shows unless
-    the method conserves them: then those of the start have more digits. Of a body, `OF_BODY`.
+    The remaining oscillation of the modified energy is fitted on the first `FIRST` steps, which are run here. States
+    are the loop's own, or those of the chart if `shown`. The energy is computed from the momenta of the run, or, if the
+    method conserves them, from those of the start, which have more digits. A body has the quantities `OF_BODY`.
     """
     if scene.of_body:
         return _watch_body(scene, method)
@@ -128,7 +128,7 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
 
 
 def _watch_body(scene: Scene, method: Integrator) -> Gauge:
-    """Relative changes of energy, p_phi and |L| since the start, and theta."""
+    """`watch` for a body: relative changes of energy, p_phi and |L| since the start, and theta."""
     body, size = scene.top, scene.momentum_scale
     solver, start = chart_of(method, of_body=True)[1], body.momenta(scene.start)
     par, _ = solver.prepare(body, scene.start)
@@ -153,14 +153,14 @@ def long_run(
     checkpoint: "str | Path | bool" = False, compensated: bool = True, quiet: bool = False,
     output: "str | Path | None" = None,
 ) -> xr.Dataset:  # fmt: skip
-    """Run a fixed-step method for any number of steps and return what it did, window by window.
+    """Run a fixed-step method for any number of steps and return statistics of each window of the run.
 
-    Dimension ``window``; ``steps`` is chosen each ends. For each of energy, modified_energy, p_phi, p_psi (relative
-    changes since the start) and theta (rad): ``NAME_least``, ``NAME_largest``, ``NAME_mean``; of a body without
-    symmetry for energy, p_phi, momentum (its length, constant without a weight) and theta. `checkpoint` is a file
-    that is written as the run goes on and removed at its end, or True for one in symtop's cache: an interrupted run
-    resumes from it. `output` is a netCDF file for what is returned: the checkpoint is removed once that is written.
-    ``compensated=False`` sums increments plainly, to compare.
+    Dimension ``window``; ``steps`` is the step at which each ends. For each of energy, modified_energy, p_phi, p_psi
+    (relative changes since the start) and theta (rad): ``NAME_least``, ``NAME_largest``, ``NAME_mean``; for a body
+    without symmetry of energy, p_phi, momentum (|L|, constant without a weight) and theta. `checkpoint` is a file
+    that is written during the run and removed at its end, or True for one in symtop's cache: an interrupted run
+    resumes from it. `output` is a netCDF file for the result: the checkpoint is removed once that is written.
+    ``compensated=False`` adds increments without compensated summation, for comparison.
 
     Raises SymtopError for a method without a compiled loop, for a checkpoint of another run and for an output that
     cannot be written.
@@ -212,12 +212,12 @@ def long_run(
 
 
 def summary(values: dict[str, Array]) -> list[float]:
-    """Least, largest and mean of each quantity, in their order."""
+    """Least, largest and mean value of each quantity, in one list."""
     return [float(part) for value in values.values() for part in (value.min(), value.max(), value.mean())]
 
 
 def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:
-    """A hash of all that decides the bits of a run; code counts as it is compiled: a checkpoint outlives a comment."""
+    """A hash of all that determines the bits of a run. It uses compiled code, so that comments do not change it."""
     numbers = [[getattr(record, name) for name in record.__slots__] for record in (scene.top, scene.start)]
     settings = [numbers, h, steps, compensated, FIRST, PER_DECADE, LONGEST, SAMPLES]
     made = by_file(code_of((method, watch, windows, scattered, summary)))
@@ -225,14 +225,14 @@ def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensate
 
 
 def leaves(carry: Any) -> list[float]:
-    """The floats in a kernel's carry: tuples of tuples, or one array."""
+    """The floats in the carry that a kernel passes from step to step, nested tuples or one array, as a flat list."""
     if isinstance(carry, tuple):
         return [value for part in carry for value in leaves(part)]
     return [float(value) for value in np.ravel(carry)]
 
 
 def regrown(carry: Any, values: Iterator[float]) -> Any:
-    """A carry of the same form with other values in it."""
+    """A carry of the same structure as `carry`, filled with `values`: the inverse of `leaves`."""
     if isinstance(carry, np.ndarray):
         return np.array([next(values) for _ in range(carry.size)]).reshape(carry.shape)
     if isinstance(carry, tuple):
@@ -241,7 +241,7 @@ def regrown(carry: Any, values: Iterator[float]) -> Any:
 
 
 class _Checkpoint(contextlib.AbstractContextManager["_Checkpoint"]):
-    """The windows of one run so far, on disk from time to time, and where a run is ended early; removed at its end."""
+    """The checkpoint file of one run: written from time to time and if the run is interrupted, removed at its end."""
 
     def __init__(self, file: "str | Path | bool", identity: str) -> None:
         self.own, self.identity, self.saved = file is True, identity, time.monotonic()
@@ -253,7 +253,7 @@ class _Checkpoint(contextlib.AbstractContextManager["_Checkpoint"]):
         self.latest: tuple[Position, list[list[float]]] | None = None
 
     def resumed(self, start: Position) -> tuple[Position, list[list[float]]]:
-        """The position and the windows to go on from: those on disk, or the start."""
+        """The position and the rows of windows to continue from: those in the file, else `start` and none."""
         data = self._read(self.file) if self.file is not None and self.file.is_file() else None
         if data is None:
             return start, []
@@ -264,10 +264,10 @@ class _Checkpoint(contextlib.AbstractContextManager["_Checkpoint"]):
         return Position(state, low, carry, int(data["steps_done"])), data["rows"].values.tolist()
 
     def _read(self, file: Path) -> xr.Dataset | None:
-        """What is in the file; None of a damaged one of the cache, from which nothing can go on."""
+        """The data in the file. If damaged: SymtopError for a user's file, None with a warning for one in the cache."""
         try:
             data = netcdf.read(file)
-            known = not self.own or data.attrs.get("identity") == self.identity  # its name says whose it is
+            known = not self.own or data.attrs.get("identity") == self.identity  # a file in the cache is named by it
             if known and data.attrs.get("content") == netcdf.content_hash(data):
                 return data
             raise SymtopError("its numbers are not those that were written")  # noqa: TRY301
@@ -279,7 +279,7 @@ class _Checkpoint(contextlib.AbstractContextManager["_Checkpoint"]):
             return None
 
     def note(self, at: Position, rows: list[list[float]]) -> None:
-        """After a window: write it down if the last time was a while ago."""
+        """Record the position after a window, and write the file if the last writing was over `SAVE` seconds ago."""
         self.latest = (at, list(rows))  # a copy: an interrupt may fall between a window and its note
         if time.monotonic() - self.saved > SAVE:
             self.save()
@@ -303,7 +303,7 @@ class _Checkpoint(contextlib.AbstractContextManager["_Checkpoint"]):
             self.file.unlink(missing_ok=True)
 
     def checked(self, output: Path) -> Path:
-        """The file for the result, refused if it is a folder or the checkpoint, which is removed at the end."""
+        """The output file; SymtopError if it is a folder, not writable, or the checkpoint, which the end removes."""
         if output.is_dir():
             raise SymtopError(f"output must be a file, not the folder {str(output)!r}", "output")
         if self.file is not None and output.resolve() == self.file.resolve():
@@ -313,7 +313,7 @@ class _Checkpoint(contextlib.AbstractContextManager["_Checkpoint"]):
         return output
 
     def write(self, data: xr.Dataset, output: Path) -> None:
-        """Write the result; if that fails, the checkpoint is what is left of the run, and the sentence says so."""
+        """Write the result; if that fails, SymtopError says that the run can be resumed from its checkpoint."""
         try:
             netcdf.write(data, output)
         except SymtopError as error:

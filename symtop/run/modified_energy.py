@@ -1,7 +1,7 @@
-"""Modified energies: what a symplectic method conserves in place of the energy, so that rounding can be seen.
+"""Modified energies, which symplectic methods conserve instead of the energy: they make errors of rounding visible.
 
-The energy of a method of order 2 oscillates by C h^2 as long as it runs; a drift of 1e-15 drowns in that. Two layers of
-it come off. The first is known in closed form, for kick-drift-kick splittings H = T + V and for the midpoint rule:
+The energy of a method of order 2 oscillates by C h^2, which hides a drift of 1e-15. The oscillation is removed in two
+steps. The first part is known in closed form, for kick-drift-kick splittings H = T + V and for the midpoint rule:
 
     kick-drift-kick       H + h^2 (V_tt / 12 - |grad V|^2 / 24),  V_tt the second derivative of V along free motion
       stormer-verlet      V_tt = p^2 V''/I1^2,                       |grad V|^2 = V'^2 / I1
@@ -9,12 +9,12 @@ it come off. The first is known in closed form, for kick-drift-kick splittings H
     midpoint              H - h^2 (p^2 V''/I1^2 + V'^2 / I1) / 24
     cayley                exactly conserved: `splitting.space.cayley_energy` / I1
 
-and leaves C h^4 (nothing for cayley); each form is the field `Integrator.modified_energy`. The second is whatever
-remains: the motion has one degree of freedom, a symplectic map stays on a closed curve of its (theta, p_theta), or of
-(u, u') with u = cos(theta), and any function of the state is on that curve a periodic function of the angle about its
-middle. A Fourier series in that angle, fitted to the first nutations of a run, takes it off to 5e-17, which is the
-rounding of one sample; only what moves the curve remains, and the mean of 512 samples shows 2e-18 of it.
-Source of the first layer: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
+and leaves C h^4 (nothing for cayley); each form is the field `Integrator.modified_energy`. The second part is the rest:
+the motion has one degree of freedom, a symplectic map stays on a closed curve of its (theta, p_theta), or of (u, u')
+with u = cos(theta), and any function of the state is on that curve a periodic function of the angle about its middle.
+A Fourier series in that angle, fitted to the first nutations of a run, removes it to 5e-17, the rounding of one sample.
+Only a drift of the curve remains; the mean of 512 samples shows one of 2e-18.
+Source of the first part: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
 """
 
 from collections.abc import Callable
@@ -29,10 +29,10 @@ HARMONICS = 40
 
 
 def energy(scene: Scene, chart: str, states: Array, momenta: Array | None = None) -> Array:
-    """The energy of kernel states (n, dimension), less a constant.
+    """The energy (n,) of kernel states (n, dimension), up to a constant.
 
-    With the momenta that the run showed, (n, 2) of p_phi and p_psi; or, without them, with those of the start and less
-    its constant parts, which has more digits and is the energy only where both momenta are constants of the method.
+    `momenta` (n, 2) are p_phi and p_psi of the run. Without them those of the start are used and its constant parts
+    are subtracted: this has more digits, but is the energy only if the method conserves both momenta.
     """
     if momenta is None:
         return np.asarray(View(chart, scene.top, states).nutation_energy(scene.top.momenta(scene.start)))
@@ -42,7 +42,7 @@ def energy(scene: Scene, chart: str, states: Array, momenta: Array | None = None
 def modified_energy(
     scene: Scene, method: "str | Integrator", chart: str, states: Array, h: float, momenta: Array | None = None
 ) -> Array:
-    """The modified energy of kernel states (n, dimension) up to O(h^4), less constants; H where none is known."""
+    """The modified energy (n,) of kernel states (n, dimension) to O(h^4), up to a constant; H if none is known."""
     plain, correction = energy(scene, chart, states, momenta), integrator(method).modified_energy
     if correction is None:
         return plain
@@ -61,11 +61,10 @@ def section(chart: str, states: Array) -> tuple[Array, Array]:
 
 
 def oscillation(x: Array, y: Array, values: Array, harmonics: int = HARMONICS) -> Callable[..., Array]:
-    """What is left of values at points (x, y, values) of a closed curve, once a level and a Fourier series are off.
+    """A function (x, y, values) that subtracts a level and a Fourier series from values at points of a closed curve.
 
-    Both are fitted to the values given here; too few points give a level and no series. The level comes in two parts, a
-    large number and what is missing from it: rounded to one double it would be wrong by up to half a unit in its last
-    place in every window of a run.
+    Both are fitted to the arguments given here; with too few points there is no series. The level is a sum of two
+    doubles: rounded to one it would be wrong by up to half a unit in its last place in every window of a run.
     """
     level = float(values[0])
     if x.size < 4 * harmonics or np.ptp(x) == 0.0 or not np.any(y):

@@ -1,14 +1,14 @@
-"""The true motion beside a probe of the guard: by the closed form, or integrated where there is none.
+"""The true motion that the guard compares a probe with: the closed form, or an integration where there is none.
 
-`Exact` knows a top's motion for ever. `Integrated` needs the equations alone, and so takes bodies too: a Taylor series
-at rounding, for a body of order 19, or 15 where errors do not grow much. Its own error is its distance from a series
-of a looser tolerance, for a body of order 16 or 13, at the beginning or, where the motion multiplies errors, all the
-way. What the motion makes of an error is
+`Exact` evaluates a top's motion at any time. `Integrated` needs only the equations, and so works for bodies too: a
+Taylor series with a tolerance near rounding, for a body of order 19, or 15 where errors do not grow much. Its error is
+estimated by the distance from a series of a looser tolerance, for a body of order 16 or 13, at the beginning or, where
+the motion amplifies errors, all the way. The amplification of an error by the motion is
 
     A(t) = max over s <= t of |y~(s) - y(s)|/delta,      |y~(0) - y(0)| = delta,
 
-of two integrations over the whole run: shear makes A grow with t, chaos and unstable motions by exponentials. A piece
-of the run does not show it, because a chaotic motion looks regular on many a piece.
+from two integrations over the whole run: A grows linearly by shear, exponentially in chaos and unstable motions. A
+piece of the run does not show it, because a chaotic motion looks regular on many pieces.
 """
 
 import contextlib
@@ -32,27 +32,27 @@ from symtop.model.top import Angles, flat
 from symtop.run.reference.sensitivity import displacement
 
 SERIES = {BODY: "series-general-adaptive", "axis": "series-adaptive"}
-FINE, CHECK = 1e-15, 1e-13  # tolerances: of the true motion, and of its check at one of so many times, the last first
-CHECKED, MULTIPLIED = 10, 1e5  # or at the first ones where A is less, which makes little of what they differ by
-CALM = 1e3  # times these tolerances where A and the law of the guard make less than that of an error by the horizon
-PAIR_STEPS = 7  # of two motions side by side, in a period of the fastest turn: with 5.3 chaos is damped away
-SWINGS = 8.0  # of the pull of a weight: twice what one swing adds to 2T
-MOVED, FINELY_MOVED = 1e-10, 1e-13  # of the natural frequency: shows the shear beside a separatrix; in closed form
-SATURATED = 0.01  # rad; two motions that are farther apart no longer show how fast they part
-WATCHED = {BODY: 200.0, "axis": 20.0}  # natural periods of a run: the motion of a top is integrable
-MOST_WATCHED = 6000  # steps
-POINTS = 100  # of A
-MOST_POWER = 20.0  # of the time by which A grows beyond what is watched
-UNSTABLE, SHEARED = 50.0, 10.0  # times that a stable motion, and most, may amplify a change more than time goes on
-LATER = 30.0  # of the errors of a piece: those that a method commits later in an unstable motion
-MOST_FOLDS = 100.0  # e times that anything grows: any is too much
+FINE, CHECK = 1e-15, 1e-13  # tolerances: of the true motion, and of the integration that checks it
+CHECKED, MULTIPLIED = 10, 1e5  # the check compares each tenth time, or only the first tenth if A is less than 1e5
+CALM = 1e3  # factor on these tolerances if A and the growth law of the guard stay below `MULTIPLIED` to the horizon
+PAIR_STEPS = 7  # steps of two motions side by side, per period of the fastest turn: with 5.3, chaos is damped
+SWINGS = 8.0  # times the pull of a weight: twice what one swing adds to 2T
+MOVED, FINELY_MOVED = 1e-10, 1e-13  # change of the start, in natural frequencies, integrated and in closed form
+SATURATED = 0.01  # rad: motions farther apart than this no longer separate at the same rate
+WATCHED = {BODY: 200.0, "axis": 20.0}  # natural periods over which A is computed; less for a top, which is integrable
+MOST_WATCHED = 6000  # steps over which A is computed
+POINTS = 100  # times at which A is computed
+MOST_POWER = 20.0  # largest power of the time with which A is extrapolated
+UNSTABLE, SHEARED = 50.0, 10.0  # ratio of A to linear growth: more than any stable motion has, more than most have
+LATER = 30.0  # ratio assumed of later errors of a method to those of the probe, in an unstable motion
+MOST_FOLDS = 100.0  # largest exponent x of a growth by e^x, against overflow
 MOST_WORK = 1e6  # steps of an integration
 
 
 class Landmarks(NamedTuple):
-    """What is known about a motion before it is computed."""
+    """Constants of a motion that are known before it is computed."""
 
-    period: float  # of the nutation; of a motion that is integrated the natural one
+    period: float  # of the nutation; in `Integrated` the natural period
     frequency: float  # of small nutations about the steady precession with the same momenta
     width: float  # of the nutation, rad
     gap: float  # closest approach to a pole, rad; infinite where it is not known
@@ -63,7 +63,7 @@ class Landmarks(NamedTuple):
 
 @functools.lru_cache(maxsize=256)
 def landmarks(scene: Scene) -> Landmarks:
-    """The landmarks of a scene's motion, by its closed form; made once and kept."""
+    """The landmarks of a top's motion, by its closed form; cached."""
     top, at, form = scene.top, scene.start, closed_form(scene)
     momenta = top.momenta(at)
     highest, lowest = form.theta_range
@@ -81,14 +81,14 @@ def landmarks(scene: Scene) -> Landmarks:
 
 
 class Growth(NamedTuple):
-    """A, at `times` (n,)."""
+    """The amplification A at `times` (n,)."""
 
     times: Array
     size: Array
 
     @classmethod
     def of(cls, times: Array, apart: Array, most: float) -> Self:
-        """From a distance in units of the first one at `times`, after 0 and not empty; beyond `most` it grows on."""
+        """A from the relative distance `apart` (n,) of two motions at times > 0; exponential growth beyond `most`."""
         size = np.maximum.accumulate(np.maximum(np.where(np.isnan(apart), math.inf, apart), 1.0))
         last = int(np.searchsorted(size, most))
         if last < size.size:
@@ -96,7 +96,7 @@ class Growth(NamedTuple):
         return cls(times, size)
 
     def at(self, until: float) -> float:
-        """A at any time; later than the last one by the power of the time that it grew with in the second half."""
+        """A at any time; beyond the last of `times` it is extrapolated by its power law in their second half."""
         last, count = float(self.times[-1]), self.size.size
         if until <= last:
             return float(self.size[min(int(np.searchsorted(self.times, until)), count - 1)])
@@ -107,7 +107,7 @@ class Growth(NamedTuple):
 
 @register_jitable
 def _apart(near: Any, far: Any, units: Any) -> Any:
-    """How far two states are apart, in place or in momentum; NaN of what is lost, as a quaternion not of length one."""
+    """The larger of the distances of two states in place and in momentum; NaN if not finite or |q| is far from 1."""
     first = len(near) - 3  # of the momentum
     place, momentum, one, other = 0.0, 0.0, 0.0, 0.0
     for m in range(first):
@@ -120,11 +120,11 @@ def _apart(near: Any, far: Any, units: Any) -> Any:
 
 
 class Integrated:
-    """The motion of a body, or of a top as if it had no closed form, by Taylor series; what the guard asks of any."""
+    """The motion of a body, or of a top as if it had no closed form, by Taylor series, with the guard's interface."""
 
-    longest, reach = 20.0, 40.0  # natural periods of a piece that is a share of the run, and of any other
-    points = 100  # of a piece that are compared
-    period_word = "natural period"  # what `marks.period` is
+    longest, reach = 20.0, 40.0  # natural periods: most of a probe that is a share of the run, and of a minimal one
+    points = 100  # of a probe that are compared
+    period_word = "natural period"  # the name of `marks.period` in sentences
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.growths = scene, dict[float, Growth]()
@@ -133,18 +133,18 @@ class Integrated:
         self.marks = Landmarks(2.0 * math.pi / slow, slow, math.nan, math.inf, "upper", 0.0, 0.0)
 
     def states(self, times: Array, tolerance: float) -> Array:
-        """States (n, dimension) at `times` (n,), NaN from where the work is too much."""
-        solver = integrator(SERIES[self.chart]).solvers[self.chart]  # called as it is: checks take as long as it does
+        """States (n, dimension) at `times` (n,), NaN after `MOST_WORK` steps."""
+        solver = integrator(SERIES[self.chart]).solvers[self.chart]  # called directly: checks would double its time
         return solver(self.scene.top, self.scene.start, Plan.until(times, tolerance, MOST_WORK)).states
 
     def apart(self, first: tuple[str, Array], second: tuple[str, Array]) -> Array:
-        """Rad (n,) between states (n, dimension) of two charts."""
+        """The angle (n,), rad, between two runs, each a chart and its states (n, dimension)."""
         if self.chart == BODY:
             return attitude_distance(first[1][:, :4], second[1][:, :4])
         return axis_distance(axes(*first), axes(*second))
 
     def error(self, times: Array, chart: str, states: Array, _: float, horizon: float, /) -> Array:
-        """Rad (n,) by which states (n, dimension) are off at `times` (n,) of a run, with what two orders differ by."""
+        """The error (n,), rad, of states (n, dimension) at `times` (n,), plus the estimated error of the reference."""
         end = float(times[-1])
         steady = self.amplification(end, horizon) < MULTIPLIED
         some = slice(max(times.size // CHECKED, 1)) if steady else slice((times.size - 1) % CHECKED, None, CHECKED)
@@ -155,15 +155,15 @@ class Integrated:
         return np.asarray(self.apart((chart, states), (self.chart, true)) + gap)
 
     def start(self, _: float, /) -> Any:
-        """The state at a time, as a start: the start itself, a piece begins nowhere else."""
+        """The state at a time, as a start. Here it is always the scene's start: probes begin nowhere else."""
         return self.scene.start
 
     def closest(self) -> float:
-        """A time at which a method may have the most to do: when the axis first comes closest to a pole; 0 here."""
+        """When the axis first comes closest to a pole, where a step's error is largest; here not known, and 0."""
         return 0.0
 
     def moved(self, by: float = MOVED) -> Any:
-        """A start that differs by so much of the natural frequency."""
+        """The scene's start with its rates changed by `by` times the natural frequency."""
         at, rate = self.scene.start, by * self.marks.frequency
         if self.chart == BODY:
             x, y, z = at.omega_body
@@ -171,9 +171,10 @@ class Integrated:
         return replace(at, theta_dot=at.theta_dot + 0.6 * rate, phi_dot=at.phi_dot + 0.8 * rate)
 
     def growth(self, horizon: float) -> Growth:
-        """A up to the horizon, or as far as it is watched; made once.
+        """A up to the horizon, or as far as `WATCHED` and `MOST_WATCHED` allow; cached.
 
-        Both motions take the same steps, so that their errors do not hide it; those of a free body that part are exact.
+        Both motions take the same steps, so that integration errors cancel in their distance. If two motions of a free
+        body separate far, A is computed again with the closed form and a smaller change.
         """
         step = 2.0 * math.pi / self.fast / PAIR_STEPS
         until = min(horizon, WATCHED[self.chart] * self.marks.period, MOST_WATCHED * step)
@@ -186,7 +187,7 @@ class Integrated:
             times, moved, top = np.multiply(marks, h, dtype=float), MOVED, self.scene.top
             if self.chart == BODY and top.free and not apart.max() < SATURATED / MOVED:
                 starts = self.scene.start, self.moved(FINELY_MOVED)
-                with contextlib.suppress(SymtopError):  # of momenta that the closed form does not take
+                with contextlib.suppress(SymtopError):  # the closed form refuses some momenta
                     forms = (FreeBody(top.moments, a.quaternion, top.momentum(a), top.momentum_lo(a)) for a in starts)
                     apart = attitude_distance(*(form.samples(times).quaternion for form in forms)) / FINELY_MOVED
                     moved = FINELY_MOVED
@@ -194,34 +195,34 @@ class Integrated:
         return self.growths[until]
 
     def amplification(self, until: float, horizon: float) -> float:
-        """A at a time of a run to the horizon."""
+        """A at the time `until`, of a run to `horizon`."""
         return self.growth(horizon).at(until)
 
     def displacement(self, change: float, horizon: float) -> float:
-        """How far the run is off by the horizon, rad, if the start is changed by so little."""
+        """The distance, rad, at the horizon from the motion whose start is changed by `change`."""
         return min(change * self.amplification(horizon, horizon), math.pi)
 
     def amplified(self, error: float, since: float, horizon: float, /) -> float:
-        """What the motion makes by the horizon of an error at the time `since`, rad; 0 if its law is known."""
+        """An error at the time `since` as the motion amplifies it by the horizon, rad."""
         if since >= horizon:
             return error
         times = self.amplification(horizon, horizon) / self.amplification(since, horizon)
         return error * times * (LATER if times > UNSTABLE * horizon / since else 1.0)
 
     def rounding(self, horizon: float, *, whole: bool) -> float:
-        """What rounding makes of a run, rad, whatever the method; 0 if a piece was the `whole` run, which shows it."""
+        """The error by rounding at the horizon, rad, whatever the method; 0 if a probe of the `whole` run shows it."""
         return 0.0 if whole else self.displacement(EPSILON, horizon)
 
 
 def _frequencies(scene: Scene) -> tuple[float, float, float]:
-    """That of the natural period (`symtop.model.body`), one that no turn exceeds by much, and the inertia of both.
+    """The natural frequency (`symtop.model.body`), an approximate upper bound of |omega|, and a moment of inertia.
 
-    With I1 the least and I3 the largest moment, and T and M at any time,
+    With I1 the least and I3 the largest moment, and kinetic energy T and momentum M at any time,
 
         |omega|^2 = 2T/I3 + sum_i omega_i^2 (1 - I_i/I3) <= 2T/I3 + F/I1,    F = 2T - |M|^2/I3 <= 2T (1 - I1/I3)
 
-    T is at most what is left of the energy where the weight lies lowest. F changes by what the weight does across each
-    axis, which is estimated by a few swings: of 640 random bodies one turned more than a tenth faster.
+    T is at most the energy less the least potential. F changes by the work of the weight across each axis, which is
+    estimated by a few swings: of 640 random bodies one turned more than a tenth faster than the bound.
     """
     top, at, slowest = scene.top, scene.start, 2.0 * math.pi / scene.horizon
     if not scene.of_body:
@@ -240,7 +241,7 @@ def _frequencies(scene: Scene) -> tuple[float, float, float]:
 
 
 class Exact(Integrated):
-    """The same of a top by its closed form, which knows it for ever."""
+    """The motion of a top by its closed form, at any time."""
 
     watches, longest, reach, points, period_word = "axis", 20.0, math.inf, 300, "nutation"
 
@@ -248,7 +249,7 @@ class Exact(Integrated):
         self.scene, self.marks, self.form = scene, landmarks(scene), closed_form(scene)
 
     def error(self, times: Array, chart: str, states: Array, since: float, _: float, /) -> Array:
-        """See `Integrated`; of the axis."""
+        """See `Integrated`; the error is that of the axis."""
         return self.form.axis_distance(since + times, axes(chart, states))
 
     def start(self, since: float, /) -> Any:
@@ -269,10 +270,10 @@ class Exact(Integrated):
         return displacement(self.scene, change, horizon)
 
     def amplified(self, _: float, __: float, ___: float, /) -> float:
-        """0: errors of an integrable motion shear, which the law of the guard has."""
+        """0: errors of an integrable motion grow by shear, which the growth law of the guard covers."""
         return 0.0
 
     def rounding(self, horizon: float, *, whole: bool) -> float:  # noqa: ARG002
-        """See `Integrated`; of the whole run, too."""
+        """See `Integrated`; not 0 for a `whole` run."""
         marks, turns = self.marks, horizon / self.marks.period
         return marks.shear * 2.0 * math.pi * turns * min(marks.width, 1.0) if turns > 0.5 else 0.0

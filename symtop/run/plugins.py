@@ -1,6 +1,6 @@
-"""Python files of a user: those that a command runs, and plug-ins, which register integrators and scenes.
+"""Load Python files of a user: those that a command runs, and plug-ins, which register integrators and scenes.
 
-What a plug-in registers counts in a fingerprint by its values and by the code that it reaches, wherever that stands.
+The fingerprint of a case covers the values that a plug-in registers and all code that it calls, in whatever file.
 """
 
 import contextlib
@@ -18,7 +18,7 @@ _loaded: dict[Path, list[str]] = {}  # files of plug-ins in use, and the names t
 
 
 def python_file(path: str | Path, name: str, kind: str) -> Path:
-    """A file by its path; SymtopError that argument `name` must be of that `kind` if it is not there."""
+    """The file at a path; without one, SymtopError that the argument `name` must be `kind`, such as "a Python file"."""
     with contextlib.suppress(OSError, ValueError):  # a name that is too long, or holds a null character
         if (file := at_home(path).resolve()).is_file():
             return file
@@ -26,12 +26,12 @@ def python_file(path: str | Path, name: str, kind: str) -> Path:
 
 
 def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
-    """A module of that name from a file, which may import what stands beside it, or a package at `places`."""
+    """Import a file as the module `name`, which may import files beside it, or as a package with the paths `places`."""
     for stale in [known for known in sys.modules if known.startswith(f"{name}.")]:
-        del sys.modules[stale]  # of another folder with the same name
+        del sys.modules[stale]  # submodules of another folder with the same name
     if file.suffix != ".py":
         raise SymtopError(f"{str(file)!r} cannot be loaded: its name must end in .py")
-    if places is None and str(file.parent) not in sys.path:  # as Python has it for a script, also when its code runs
+    if places is None and str(file.parent) not in sys.path:  # as for a script, and still when its functions run
         sys.path.insert(0, str(file.parent))
     spec = importlib.util.spec_from_file_location(name, file, submodule_search_locations=places)
     assert spec is not None and spec.loader is not None  # noqa: PT018, S101  (its suffix has one)
@@ -49,7 +49,7 @@ def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleTyp
 
 
 def load(path: str | Path) -> list[str]:
-    """Run a plug-in file once; what it registers, whose names are returned, is then known to studies and commands."""
+    """Run a plug-in file, once per process, and return the names of the integrators and scenes that it registers."""
     file = python_file(path, "plugin", "a Python file")
     if file in _loaded:
         return _loaded[file]
@@ -57,7 +57,7 @@ def load(path: str | Path) -> list[str]:
     with foreign_code(f"plugin {file.name}"):
         try:
             execute(f"symtop_plugin_{file.stem}_{hashed(str(file))[:8]}", file)
-        except SymtopError as error:  # the names in it are the file's, and no options of a command
+        except SymtopError as error:  # without the argument names of the error, which are no options of a command
             raise SymtopError(f"plugin {file.name}: {error}") from error
     entries = (*integrators().items(), *scenes().items(), *body_scenes().items())
     _loaded[file] = [name for name, entry in entries if not any(entry is known for known in before)]
@@ -70,7 +70,7 @@ def loaded() -> tuple[str, ...]:
 
 
 def is_local(name: str) -> bool:
-    """Was this integrator or scene registered by hand in this process, so that no other process can know it?"""
+    """Was this integrator or scene registered in this process and not by a plug-in, so that others do not have it?"""
     name = split_name(name)[0]
     registered = name in added_scenes() or (name in integrators() and not is_built_in(name))
     return registered and not any(name in names for names in _loaded.values())

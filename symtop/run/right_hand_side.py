@@ -1,15 +1,15 @@
-"""The guard for anybody's equations y' = f(t, y): what error to expect of a method, and why, before a long run.
+"""The guard for a user's equations y' = f(t, y): forecasts the error of a method and its cause before a long run.
 
 The method makes a piece of the run, which is compared with DOP853 at a tight tolerance, since only f is known. Its
-error grows by the law of `symtop.run.guard`, linear to quadratic, or by what the motion makes of a small change, A(t)
-of `symtop.run.motion`, whichever is more; two motions are watched as far as `WATCHED` steps of DOP853 lead. An error
-that fades within the piece, as in a transient, is the largest one and does not grow; a run that leaves the motion for
-good goes on as it does in the second half of the piece; any other error is at most twice the extent of a motion that is
-known whole or goes back and forth. Causes:
+error is extrapolated by the law of `symtop.run.guard`, linear to quadratic, or by the amplification A(t) of a small
+change (`symtop.run.motion`), whichever is more; A is computed as far as `WATCHED` steps of DOP853 lead. An error that
+fades within the piece, as in a transient, is not extrapolated. The error of a run that departs from the motion grows on
+as in the second half of the piece. Any other error is at most twice the extent of the motion, if all of the motion is
+known or it goes back and forth. Causes:
 
     stiffness      f has rates far above that of the motion, and they limit an explicit step
     instability    steps multiply a small change more than the motion does, or the motion itself is unstable
-    rounding       the piece is as close as DOP853 can tell
+    rounding       the error of the piece is below that of DOP853
     step           errors of the step or of the tolerance add up
 
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, sections II.4 and II.10; II, section IV.2.
@@ -31,21 +31,21 @@ from symtop.run.guard import OWN, Probe, grown
 from symtop.run.motion import MOST_FOLDS, Growth
 
 SCIPY = {"rk45": ("RK45", 6), "dop853": ("DOP853", 12), "radau": ("Radau", 0), "bdf": ("BDF", 0), "lsoda": ("LSODA", 0)}
-FINE, WATCHED, PROBED = 1e-13, 4000, 5000  # tolerance of the truth; steps of DOP853, and of the method on a piece
-PERIODS, SHARE, POINTS = 10.0, 0.2, 400  # of the motion and of the run in a piece, at least; times that are compared
-TIGHTEST, LOOSEST = 2.3e-14, 0.1  # tolerances: the least of SciPy's solvers, the largest that is advised
-MOVED, SATURATED = (1e-7, 1e-10), 1e-2  # of the extent of the motion: how far two motions are apart, and the most
-UNSTABLE, STIFF = 10.0, 20.0  # times that A grows in the second half; times the rate of the motion
-FIRST, FADED = 1e-7, 0.1  # of a piece, the earliest time that is compared; of the largest error, one that has faded
+FINE, WATCHED, PROBED = 1e-13, 4000, 5000  # tolerance of DOP853; most steps of it, and of the method on a piece
+PERIODS, SHARE, POINTS = 10.0, 0.2, 400  # least length of a piece, in periods or as part of the run; compared times
+TIGHTEST, LOOSEST = 2.3e-14, 0.1  # tolerances: the least of SciPy's solvers, the largest that is proposed
+MOVED, SATURATED = (1e-7, 1e-10), 1e-2  # of the extent of the motion: first distances of two motions, and the largest
+UNSTABLE, STIFF = 10.0, 20.0  # growth of A in the second half of an unstable run; ratio of rates of a stiff f
+FIRST, FADED = 1e-7, 0.1  # part of a piece where comparison begins; part of the largest error that has faded
 
 
 class Outlook(NamedTuple):
-    """What to expect of a run; printed, it is one sentence."""
+    """The forecast of a run; as a string, one sentence."""
 
     error: float  # the largest distance from the truth up to the horizon, Euclidean, in units of y
     setting: float  # a step or tolerance that should keep the accuracy; nan if none does
     cause: str  # of an error beyond the accuracy, see above; "" if there is none
-    amplification: float  # of a small change of y0 by the horizon
+    amplification: float  # of a small change of y0, at the horizon
     sentence: str
 
     def __str__(self) -> str:
@@ -60,7 +60,7 @@ def guard(
 
     `method` is an explicit Runge-Kutta method of symtop with a `step_size`, or rk45, dop853, radau, bdf or lsoda of
     SciPy with a `tolerance`, relative and absolute. `accuracy` is the error that the run may have, in units of y.
-    Raises SymtopError for arguments that make no sense, for an f that fails and for a motion that ends before.
+    Raises SymtopError for invalid arguments, for an f that fails and for a motion that diverges before the horizon.
     """
     rules = {name: getattr(next(iter(one.solvers.values())), "rule", None) for name, one in integrators().items()}
     tables = {name: rule for name, rule in rules.items() if isinstance(rule, Tableau)}
@@ -80,7 +80,7 @@ def guard(
         raise SymtopError(f"step_size must be at most the horizon {end!r}, not {setting!r}", "step_size")
 
     def rate(t: float, y: Array) -> Array:
-        value = real_numbers("what f returns", f(t, y.copy())).copy()  # f may write to y and return one array again
+        value = real_numbers("what f returns", f(t, y.copy())).copy()  # f may change y or reuse its result
         if value.shape != start.shape:
             raise SymtopError(f"f must return {start.size} numbers, not an array of shape {value.shape}")
         return value
@@ -90,7 +90,7 @@ def guard(
 
 
 def _stepped(f: Any, rule: Tableau, t: float, y: Array, h: float, marks: Any) -> Array:
-    """States after so many steps, (marks, n)."""
+    """States (marks, n) of an explicit Runge-Kutta method after the numbers of steps `marks`."""
     b = np.array(rule.b)
     a, slopes, states, done = np.zeros((b.size, b.size)), np.zeros((b.size, y.size)), [], 0
     a[np.tril_indices(b.size, -1)] = np.array(rule.a)[: b.size * (b.size - 1) // 2]
@@ -105,7 +105,7 @@ def _stepped(f: Any, rule: Tableau, t: float, y: Array, h: float, marks: Any) ->
 
 
 def _finite(f: Any) -> Any:
-    """f, refused where it is not finite: SciPy's solvers would shrink their steps for ever."""
+    """f, with SymtopError where it is not finite: SciPy's solvers would reduce their steps without end."""
 
     def rate(t: float, y: Array) -> Array:
         value: Array = f(t, y)
@@ -117,10 +117,10 @@ def _finite(f: Any) -> Any:
 
 
 def _motion(f: Any, t: float, y: Array, end: float) -> tuple[Any, float]:
-    """The solution by DOP853, a function of the time, or None if not one step of it can be made, and how long it is."""
+    """The solution by DOP853 as a function of time, or None if its first step fails, and the time that it covers."""
     from scipy.integrate import DOP853, OdeSolution  # 0.2 s
 
-    # a start at zero has no size, and is given one that is lost in what the motion leads to
+    # a start at zero gives no scale for the tolerance; take a negligible part of the expected size of y
     size = float(np.abs(y).max()) or EPSILON * (end * float(np.abs(f(t, y)).max()) or 1.0)
     solver = DOP853(_finite(f), t, y, t + end, rtol=FINE, atol=FINE * size)
     times, parts = [t], list[Any]()
@@ -131,7 +131,7 @@ def _motion(f: Any, t: float, y: Array, end: float) -> tuple[Any, float]:
 
 
 def _growth(f: Any, near: Any, t: float, y: Array, elapsed: Array, extent: float) -> Growth:
-    """How far two motions are apart, in units of their first distance; of closer ones where these part too far."""
+    """The amplification A of a small change of the start; with a smaller change if the two motions separate too far."""
     for moved in MOVED:
         far, reached = _motion(f, t, y + moved * extent / math.sqrt(y.size), float(elapsed[-1]))
         times, most = elapsed[elapsed <= reached * (1.0 + EPSILON)], SATURATED / moved
@@ -144,9 +144,9 @@ def _growth(f: Any, near: Any, t: float, y: Array, elapsed: Array, extent: float
 
 
 def _expected(times: Array, error: Array, end: float, amplified: float, extent: float) -> float:
-    """The largest error by the end, from that of a piece; the extent of the motion is infinite if it is not known."""
+    """The largest error of a run to `end`, from that of a piece; `extent` of the motion is inf if it is not known."""
     largest, middle = float(error.max()), int(np.searchsorted(times, 0.5 * times[-1]))
-    if largest > 2.0 * extent and 0 < middle < times.size - 1:  # the run leaves the motion for good
+    if largest > 2.0 * extent and 0 < middle < times.size - 1:  # the run departs from the motion
         folds = math.log(max(float(error[-1] / error[middle]), 1.0)) / (times[-1] - times[middle])
         return largest * math.exp(min(folds * (end - times[-1]), MOST_FOLDS))
     late = float(error[middle:].max())
@@ -166,20 +166,20 @@ def _outlook(
         raise SymtopError(f"horizon must be {words}", "horizon")
     elapsed = watched * np.arange(1.0, POINTS + 1.0) / POINTS
     true = near(t + elapsed)
-    path = np.column_stack([y, true])  # from the start, which a transient has left by the first of these times
+    path = np.column_stack([y, true])  # with the start, which a transient may leave before the first of these times
     spread, extent = np.std(true, axis=1), float(np.linalg.norm(np.ptp(path, axis=1))) or 1.0
-    turns = 0.5 * float(np.linalg.norm(np.diff(path, axis=1), axis=0).sum()) / extent  # as often there and back
+    turns = 0.5 * float(np.linalg.norm(np.diff(path, axis=1), axis=0).sum()) / extent  # oscillations, from path length
     rates = np.std([f(t + time, state) for time, state in zip(elapsed, true.T, strict=True)], axis=0)
     frequency = float(np.linalg.norm(rates)) / max(float(np.linalg.norm(spread)), TINY)
-    whole = watched >= end or turns >= 1.0  # all that the motion does
+    whole = watched >= end or turns >= 1.0  # the extent of the motion is known
     slow = min(frequency, 2.0 * math.pi * turns / watched)
     moved, kind = y + MOVED[0] * extent / math.sqrt(y.size), "step" if rule else "tolerance"
     growth = _growth(f, near, t, y, elapsed, extent)
     piece = min(end, watched, max(SHARE * end, PERIODS * 2.0 * math.pi / max(frequency, TINY)))
-    places = np.union1d(np.geomspace(FIRST, 1.0, POINTS // 4), elapsed / watched)  # of the piece
+    places = np.union1d(np.geomspace(FIRST, 1.0, POINTS // 4), elapsed / watched)  # compared times, in pieces
 
     def run_piece(start: Array) -> tuple[Array, Array, float]:
-        """Times and states of the piece, and the mean step of an explicit method."""
+        """Times and states of the piece, and the mean step (0 for an implicit method)."""
         if rule:
             marks = np.unique(np.rint(min(int(piece / setting * (1.0 + 1e-9)), PROBED) * places).clip(1.0))
             return marks * setting, _stepped(f, rule, t, start, setting, marks), setting
@@ -189,7 +189,7 @@ def _outlook(
 
     times, states, mean = run_piece(y)
     error = np.linalg.norm(states - near(t + times).T, axis=1)
-    short = setting > watched if rule else times[-1] < 0.99 * piece  # of what is known, or of what SciPy had to reach
+    short = setting > watched if rule else times[-1] < 0.99 * piece  # the piece has no step, or SciPy ended early
     ended = bool(short) or not np.isfinite(error).all()
     total, since = growth.at(end), growth.at(float(times[-1]))
     expected = math.inf if ended else _expected(times, error, end, total / since, extent if whole else math.inf)
@@ -200,13 +200,13 @@ def _outlook(
     slopes = [(f(t, y + change * unit) - rate) / change for unit in np.eye(y.size)]
     modes, cause = np.linalg.eigvals(np.array(slopes)), "step"
     fastest = float(np.abs(modes).max())
-    if rule and fastest > STIFF * slow:  # no longer than is stable
+    if rule and fastest > STIFF * slow:  # limit the step by stability
         better = min(better, max(setting, 1.0 / fastest))
     better = float(Context(prec=2, rounding=ROUND_DOWN).create_decimal(better))
     why = f"errors add up over {end * slow / (2.0 * math.pi):.3g} periods; take a {kind} of about {better:.2g}"
     if not expected > accuracy:
         cause, why = "", f"a {kind} of {better:.2g} would do for {accuracy:.1g}"
-    elif mean * fastest > 1.0 and fastest > max(STIFF * slow, 2.0 * float(modes.real.max())):  # none of them grows
+    elif mean * fastest > 1.0 and fastest > max(STIFF * slow, 2.0 * float(modes.real.max())):  # no fast mode grows
         cause, better = "stiffness", math.nan
         why = f"f has rates of {fastest:.1g}, the motion of {slow:.1g}; take an implicit method, such as radau"
     elif ended or np.linalg.norm(run_piece(moved)[1] - states, axis=1).max() > OWN * since**2 * MOVED[0] * extent:

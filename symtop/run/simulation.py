@@ -1,14 +1,14 @@
 """simulate(): one scene, one integrator, one step or tolerance -> one dataset.
 
-Samples never bend the step: a fixed-step run has h = T/N exactly and is sampled at whole steps, t = k h. Samples are
-uniform, or at the steps nearest to uniform times, unless they would fall on the same few phases of the nutation again
-and again (where an energy error may read 1e5 times too small); then they are dithered by the golden ratio. The
+Samples do not change the step: a fixed-step run has h = T/N exactly and is sampled at whole steps, t = k h. Samples are
+uniform, or at the steps nearest to uniform times, unless they would repeatedly fall on the same few phases of the
+nutation (where an energy error may read 1e5 times too small); then they are dithered by the golden ratio. The
 attribute ``sampling`` says which.
 
-A time that is asked for inside a fixed step is the end of one shorter step of the same method from where the step
-before has ended: what a step keeps is kept, to every order. That begins at a start, where |e| and |q| are one; if a
-method has let them become r, the weight is multiplied by r, or r^2 for q, and the equations are the same. A method that
-carries more than it shows makes its first step once more, whose error is of the same size.
+A requested time inside a fixed step is the end of one shorter step of the same method from the end of the step before,
+so that constants which the method keeps are kept there too. The shorter step begins at a new start, with |e| and |q| of
+one; if a method has changed these to r, the weight is multiplied by r, or by r^2 for q, which leaves the equations the
+same. A method with internal data beyond the state makes its first step anew, with an error of the same size.
 """
 
 import functools
@@ -36,22 +36,22 @@ from symtop.run.guard import MOST_STEPS, warning
 from symtop.run.trajectory import Trajectory, dataset
 
 MOST_SAMPLES = 10_000_000
-MOST_SWINGS = 1e8  # of an adaptive run: several minutes of the fastest, taylor
-WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider stretch of phases unseen are dithered
-USUAL = 1e-3  # rad, the accuracy of a step that is proposed where none was given
-SAME = 8.0 * EPSILON  # of a time: products and quotients of decimals differ by less
-BRIEF = 0.01  # of a nutation: what an adaptive method is run for where its start alone is shown
-STRETCHES = 17  # of a nutation: two of them are less than `WIDEST_GAP`
+MOST_SWINGS = 1e8  # periods in an adaptive run: several minutes with the fastest method, taylor
+WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider range of phases empty are dithered
+USUAL = 1e-3  # rad: the error at which an error message proposes a step if none was given
+SAME = 8.0 * EPSILON  # relative: times that differ by less are the same, because products are rounded
+BRIEF = 0.01  # nutations: the length of the run of an adaptive method that is sampled at its start only
+STRETCHES = 17  # equal ranges of phase; two of them are less than `WIDEST_GAP`
 
 
 def unseen(times: Array, period: Any) -> Array:
-    """The widest stretch of nutation phases, as a fraction of a period, in which no sample falls, or a bound of it.
+    """The widest range of nutation phases without a sample, as a fraction of a period, or an upper bound of it; (n,).
 
-    Of each row of times (n, samples), in periods (n, 1), or of one row. Where each of 17 equal stretches has a sample,
-    none of 2/17 is without one, and nothing is sorted.
+    For each row of times (n, samples) with periods (n, 1), or for one row. If each of 17 equal ranges has a sample, the
+    widest empty range is at most 2/17, which is returned without sorting.
     """
     turns = np.atleast_2d(times / period)
-    phases = turns - np.floor(turns)  # as `np.mod` has it, in a third of the time
+    phases = turns - np.floor(turns)  # the same as `np.mod`, in a third of the time
     bits = np.bitwise_or.reduce(1 << (STRETCHES * phases).astype(np.int64), axis=1)
     widest, sparse = np.full(len(phases), 2.0 / STRETCHES), bits != (1 << STRETCHES) - 1
     if sparse.any():
@@ -61,7 +61,7 @@ def unseen(times: Array, period: Any) -> Array:
 
 
 def places(samples: int, *, dithered: bool) -> Array:
-    """Where samples are in a run, from 0 to 1."""
+    """Positions of the samples in a run, from 0 to 1: equidistant, or `dithered` by the golden ratio."""
     place = np.arange(samples, dtype=float)
     if dithered:
         place[1:-1] += np.mod(GOLDEN * place[1:-1], 1.0) - 0.5
@@ -73,13 +73,13 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
 
     With `steps`, times are whole multiples of horizon/steps; the first sample is 0 and the last the horizon.
     """
-    if steps is not None and steps < samples:  # every step is shown
+    if steps is not None and steps < samples:  # every step is a sample
         marks: Any = np.arange(steps + 1)
         return marks * (horizon / steps), marks, False
     long_enough = math.isfinite(period) and horizon > 2.0 * period
     for dithered in (False, True):
         if long_enough and not dithered and samples * WIDEST_GAP <= 1.0:
-            continue  # so few leave a wider stretch unseen, wherever they fall
+            continue  # so few samples leave a wider gap, wherever they fall
         place = places(samples, dithered=dithered)
         if steps is None:
             marks, times = np.empty(0, dtype=np.int64), horizon * place
@@ -93,9 +93,9 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
 
 
 def chart_of(method: Integrator, watched: str, observe: str | None = None) -> str:
-    """The chart of a run: the smallest that shows what is asked; of a body without symmetry there is one.
+    """The chart of a run: the smallest of the method that determines `observe`; a body without symmetry has one chart.
 
-    Where nothing is asked, it is what the scenes are `watched` for, or the axis if the method does not show that.
+    Without `observe` it is the scene's default, `watched`, or "axis" if the method does not determine that.
     """
     if watched == BODY:
         one_of("observe", observe or "attitude", ("axis", "attitude"))
@@ -113,12 +113,12 @@ def chart_of(method: Integrator, watched: str, observe: str | None = None) -> st
 
 
 def likely_step(scene: Scene, method: Integrator, horizon: float, accuracy: float) -> float:
-    """A step whose error may be about `accuracy`: that of a fifth of a nutation, cut by the method's order."""
+    """A step whose error may be about `accuracy`: a fifth of a nutation times accuracy^(1/order), at most `horizon`."""
     return min(0.2 * scene.time_scale(horizon) * math.pow(accuracy, 1.0 / (method.order or 2)), horizon)
 
 
 def check_control(method: Integrator, step: object, tolerance: object, name: str = "step_size") -> None:
-    """Refuse a step, which the caller calls `name`, or a tolerance that the method does not take."""
+    """SymtopError for a step (the argument `name`) or a tolerance that the method does not take."""
     if method.fixed_step and tolerance is not None:
         words = f"has a fixed step: give step_size, not tolerance = {shown(tolerance)}"
         raise SymtopError(f"{method.name} {words}", "step_size", "tolerance")
@@ -135,7 +135,7 @@ def make_plan(
     scene: Scene, method: Integrator, step_size: object = None, tolerance: object = None, *, horizon: float,
     samples: int, budget: float | None = None,
 ) -> tuple[Plan, bool]:  # fmt: skip
-    """Check the step or tolerance against the integrator and the budget, and lay out steps and samples."""
+    """Check the step or tolerance, and return the plan of steps and samples, and whether samples are dithered."""
     period = scene.nutation_period
     check_control(method, step_size, tolerance)
     if method.fixed_step:
@@ -167,30 +167,29 @@ def simulate(
     tolerance: float | None = None, horizon: float | None = None, samples: int = 501, observe: str | None = None,
     guard: bool | str | Callable[[str], object] = True, budget: float | None = None, times: ArrayLike | None = None,
 ) -> xr.Dataset:  # fmt: skip
-    """Run one integrator on one scene and return what it did.
+    """Run one integrator on one scene and return the trajectory.
 
     Dimension ``time`` (elapsed) and ``component`` (x, y, z). Variables ``theta``, ``phi``, ``psi`` (unwrapped; absent
-    where the chart does not show them), ``axis(time, component)``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, and
+    where the chart does not have them), ``axis(time, component)``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, and
     ``quaternion`` where the chart has one (its sign may change between samples). Samples after a failure are NaN;
-    ``outcome``, ``outcome_message`` and ``reached_time`` say what happened, ``guard`` what was expected to. `observe`
-    ("nutation", "axis", "attitude"; default: what the scene is watched for) picks the smallest chart of the integrator
-    that shows it; a variant, such as ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` shows
-    every step. A whole number of steps fills the horizon, the one nearest to horizon/step_size: the attribute
-    ``step_size`` is the step made. ``sampling`` is "uniform", "nearest steps" (to uniform times), or "dithered", so
-    that all of a nutation is seen.
+    ``outcome``, ``outcome_message`` and ``reached_time`` say how the run ended, ``guard`` what was expected. `observe`
+    ("nutation", "axis", "attitude"; default: that of the scene) picks the smallest chart of the integrator that
+    determines it; a variant, such as ``rk4[axis]``, works in its own chart. A run of fewer steps than `samples` is
+    sampled at every step. The number of steps is horizon/step_size, rounded; the attribute ``step_size`` is the step
+    made. ``sampling`` is "uniform", "nearest steps" (to uniform times), or "dithered", to cover all nutation phases.
 
-    With `times`, an increasing row (n,) of numbers of at least 0 in the place of `horizon` and `samples`, the run is
-    shown at these and ends at the last; ``sampling`` is "at times". Adaptive methods are sampled at any time. Fixed
-    steps are of exactly `step_size` from 0: a time at the end of one, to rounding, shows it, and one inside a step is
-    the end of one shorter step of the same method. ``steps`` and ``force_evaluations`` count whole steps alone.
+    With `times`, an increasing row (n,) of numbers of at least 0 instead of `horizon` and `samples`, the run is sampled
+    at these and ends at the last; ``sampling`` is "at times". Adaptive methods are sampled at any time. Fixed steps are
+    of exactly `step_size` from 0: a time that equals the end of a step, to rounding, has its state, and one inside a
+    step is the end of one shorter step of the same method. ``steps`` and ``force_evaluations`` count whole steps only.
 
     Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a large
-    error is expected; the run is the same either way. It compares a piece of the run with the closed form ("exact", of
-    tops) or with an accurate integration ("series", as of bodies). Give a function to be handed the sentence instead,
-    or False for no warning. `budget` is the most steps of a fixed-step run (`MOST_STEPS` by default; more are refused)
-    and the most force evaluations, or Taylor steps, of one with steps of several lengths, which ends `out_of_budget`.
+    error is expected; it does not change the run. It compares a piece of the run with the closed form ("exact", tops
+    only) or with an accurate integration ("series", always for bodies). A function as `guard` is called with the
+    sentence instead; False turns it off. `budget` is the most steps of a fixed-step run (`MOST_STEPS` by default; more
+    are refused) and the most force evaluations, or Taylor steps, of any other, which ends `out_of_budget`.
 
-    Raises SymtopError for arguments that make no sense; a run that fails is data, not an exception.
+    Raises SymtopError for invalid arguments. A run that fails raises no exception: see ``outcome``.
     """
     warn = functools.partial(warnings.warn, category=SymtopWarning, stacklevel=3)  # where `simulate` was called
     report = guard if callable(guard) else warn if isinstance(guard, str) or boolean("guard", guard) else None
@@ -200,7 +199,7 @@ def simulate(
         raise SymtopError(f"guard must be series on {chosen.name}, a body without symmetry, not 'exact'", "guard")
     options = {"series": guard == "series", "at_times": times is not None}
     trajectory, caution = _guarded(chosen, method, chart, plan, report, **options)
-    uneven = times is None and plan.marks.size and plan.marks[-1] % (plan.marks.size - 1)  # no whole steps to a sample
+    uneven = times is None and plan.marks.size and plan.marks[-1] % (plan.marks.size - 1)  # unequal numbers of steps
     sampling = "dithered" if dithered else "nearest steps" if uneven else "uniform"
     data = dataset(trajectory.time, trajectory.columns, chosen.units)
     data.attrs = netcdf.attributes_of(
@@ -219,7 +218,7 @@ def integrate(
     scene: "str | Scene", integrator: "str | Integrator", *, guard: Callable[[str], object] | None = None,
     **settings: Any,
 ) -> Trajectory:  # fmt: skip
-    """The run of `simulate` as plain arrays; without a function for the sentence there is no guard."""
+    """The run of `simulate` as plain arrays; `guard` is called with the guard's sentence, and None turns it off."""
     chosen, method, chart, plan, _ = _prepared(scene, integrator, **settings)
     return _guarded(chosen, method, chart, plan, guard)[0]
 
@@ -228,7 +227,7 @@ def _prepared(
     scene: "str | Scene", integrator: "str | Integrator", step_size: object = None, tolerance: object = None,
     horizon: object = None, samples: int = 501, observe: str | None = None, budget: object = None,
 ) -> tuple[Scene, Integrator, str, Plan, bool]:  # fmt: skip
-    """Check the arguments of `simulate`, choose the chart, and lay out steps and samples, which may be dithered."""
+    """Check the arguments of `simulate`; return scene, integrator, chart, plan, and whether samples are dithered."""
     chosen, method = find_scene(scene, bodies=True), find_integrator(integrator)
     end = chosen.horizon if horizon is None else horizon_of(horizon)
     count = whole("samples", samples, 2, MOST_SAMPLES)
@@ -242,7 +241,7 @@ def _guarded(
     scene: Scene, method: Integrator, chart: str, plan: Plan, guard: Callable[[str], object] | None, *,
     series: bool = False, at_times: bool = False,
 ) -> tuple[Trajectory, str]:  # fmt: skip
-    """Make a run, after the guard's sentence if there is one; "off" is the sentence of no guard."""
+    """Call `guard` with the guard's sentence, if any, and make the run; the sentence is "off" without a guard."""
     caution = "off" if guard is None else ""
     forecast = plan._replace(step_size=plan.horizon) if plan.step_size > plan.horizon else plan
     if guard is not None and plan.horizon > 0.0 and (caution := warning(scene, method, chart, forecast, series=series)):
@@ -259,7 +258,7 @@ def _at_times(
     times: ArrayLike, scene: Any, integrator: Any, step_size: object, tolerance: object, horizon: object,
     samples: object, observe: str | None, budget: Any,
 ) -> tuple[Scene, Integrator, str, Plan, bool]:  # fmt: skip
-    """What `_prepared` returns, of a run to the last of `times`; marks are the whole steps before each of them."""
+    """`_prepared` for a run to the last of `times`; marks of the plan are the whole steps before each of them."""
     for name, given, usual in (("horizon", horizon, None), ("samples", samples, 501)):
         if type(given) is not type(usual) or given != usual:
             raise SymtopError(f"{name} must be left out where times are given, not {shown(given)}", name, "times")
@@ -282,7 +281,7 @@ def _at_times(
 
 
 def _stepped(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Run:
-    """Fixed steps, and a shorter one to each time inside them. The first that fails ends the run, and all it shows."""
+    """A run of fixed steps, with a shorter step to each time inside one; NaN from the first step that fails."""
     begun = scene.top, scene.start, 1.0
     times, since, words = plan.times, plan.marks * plan.step_size, f" on {scene.name}"
     marks, place = np.unique(plan.marks, return_inverse=True)
@@ -294,10 +293,10 @@ def _stepped(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Run:
     for i in np.flatnonzero(np.abs(times - since) > SAME * times):
         lost[i:] = True
         if not np.isfinite(states[i]).all() or (steps.outcome != "ok" and plan.marks[i] >= steps.steps):
-            break  # with the whole step around it
+            break  # the whole step that contains this time failed
         try:
             top, start, r = _start(scene, chart, states[i], p_phi[i], p_psi[i]) if plan.marks[i] else begun
-        except SymtopError:  # finite, and of no direction or beyond what a start can be
+        except SymtopError:  # the state is finite, but has no direction or is too large for a start
             outcome, reached = "not_finite", float(since[i])
             break
         one = solve(method, chart, top, start, Plan.steps(float(times[i] - since[i]), [1]), words)
@@ -316,12 +315,12 @@ def _stepped(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Run:
 
 
 def _start(scene: Scene, chart: str, state: Array, p_phi: float, p_psi: float) -> tuple[Any, Any, float]:
-    """The top and the start that a state of a run stands for, and its |e| or |q|; SymtopError if there is no such."""
+    """The top and start from which a run continues at a state, and the |e| or |q| of that; SymtopError without one."""
     top: Any = scene.top
     with np.errstate(all="ignore"):
         if chart == "angles":
             theta, p_theta, phi, psi = state.tolist()
-            held = top.momenta(scene.start)  # whose north and south have no cancellation
+            held = top.momenta(scene.start)  # its `north` and `south` are free of cancellation
             more, other = p_phi - held.p_phi, p_psi - held.p_psi
             north, south = held.north + more - other, held.south + more + other
             _, phi_dot, cosine = effective_force(theta, north, south, top.I1, top.mgl)
@@ -335,11 +334,11 @@ def _start(scene: Scene, chart: str, state: Array, p_phi: float, p_psi: float) -
             return heavy, Attitude(place, tuple((momentum / top.moments).tolist())), r
         along = axis_from_quaternion(unit)
         omega = momentum / top.I1 + (1.0 / top.I3 - 1.0 / top.I1) * (momentum @ along) * along
-        return top, Angles.from_quaternion(place, omega_space=omega.tolist()), r  # f does not hang on |q|
+        return top, Angles.from_quaternion(place, omega_space=omega.tolist()), r  # f does not depend on |q|
 
 
 @functools.lru_cache(maxsize=256)
 def _json(record: Any) -> str:
-    """Its numbers as the JSON of an attribute; `json.dumps` takes three times as long."""
+    """The numbers of a top or a start as JSON for an attribute; `json.dumps` takes three times as long."""
     numbers = ((name, getattr(record, name)) for name in sorted(record.__slots__))
     return "{" + ", ".join(f'"{name}": {list(v) if isinstance(v, tuple) else v!r}' for name, v in numbers) + "}"

@@ -1,6 +1,6 @@
 """A run as plain arrays, a `Trajectory`, and columns over time as a labelled dataset.
 
-Functions inside symtop pass trajectories; a dataset is made where one is returned to the user.
+Functions inside symtop pass trajectories; functions for users return datasets.
 """
 
 import functools
@@ -21,7 +21,7 @@ _DIMS = {(): ("time",)} | {(len(labels),): ("time", name) for name, labels in LA
 
 
 class Trajectory(NamedTuple):
-    """One motion at n times, as a run shows it or as somebody gives it; None for what is not shown."""
+    """One motion at n times, of a run or from other data; None for quantities that it does not have."""
 
     time: Array  # (n,) elapsed
     theta: Any = None  # (n,) rad
@@ -47,13 +47,13 @@ class Trajectory(NamedTuple):
     def of_run(cls, scene: Scene, chart: str, plan: Plan, run: Run) -> Self:
         """The observables of a run, whatever chart it was computed in; phi and psi are made continuous.
 
-        A run that ends well, and whose states are so large that one of these is not finite, ends where that begins; so
-        does one whose axis becomes zero.
+        If the outcome is "ok" but an observable is not finite, because states are too large, or the axis is zero, the
+        outcome becomes "not_finite" from there.
         """
         with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up, and that is a result
             view = View(chart, scene.top, run.states, run.p_phi, run.p_psi)
             phi = psi = p_theta = momentum = None
-            if chart == BODY:  # no angles but theta, and the momentum in space
+            if chart == BODY:  # of the angles only theta; the momentum in space
                 axis, energy, momentum = view.axis, view.energy, view.momentum
             else:
                 phi, psi = view.phi, view.psi
@@ -63,7 +63,7 @@ class Trajectory(NamedTuple):
                     phi, psi = (*continuous(np.array(angles), guides), None)[:2]
                 axis, energy, p_theta = readings(view)
             outcome, reached = run.outcome, run.reached
-            whole = np.isfinite(energy + run.p_phi) & axis.any(axis=1)  # squares overflow, or nothing has a direction
+            whole = np.isfinite(energy + run.p_phi) & axis.any(axis=1)  # an overflow, or an axis of zero
             if outcome == "ok" and not whole.all():
                 outcome, reached = "not_finite", plan.last_of(whole)
             return cls(
@@ -81,12 +81,12 @@ class Trajectory(NamedTuple):
 
     @property
     def columns(self) -> dict[str, Array]:
-        """What is shown, by name, without ``time``."""
+        """The quantities that the trajectory has, by name, without ``time``."""
         return {name: values for name in COLUMNS if (values := getattr(self, name)) is not None}
 
 
 def column(data: xr.Dataset | Mapping[str, Any], name: str) -> Any:
-    """What data hold under that name, over time first; named components are in the order of `LABELS`."""
+    """The variable `name` of data, with time as first dimension and labelled components in the order of `LABELS`."""
     values = data[name]
     if isinstance(values, xr.DataArray) and values.dims != ("time",):
         for dim, labels in LABELS.items():
@@ -104,10 +104,10 @@ COLUMNS, FACTS = Trajectory._fields[1:11], Trajectory._fields[11:]
 def dataset(time: Array, columns: Mapping[str, Array], units: str = "") -> xr.Dataset:
     """Columns (n,) or (n, 3 or 4) of doubles over ``time`` and ``component`` (x, y, z) or ``part`` (w, x, y, z).
 
-    Variables that symtop knows have their long names and units: "SI", or empty for a problem without units. One run has
-    one clock, so that nothing is left to align, and ``xr.Dataset(...)`` would take as long as all the rest of a short
-    run. So the dataset is put together as xarray does it after its checks, which is private: where the two differ in a
-    small example, the public constructor is used.
+    Variables that symtop knows get long names and units: `units` is "SI", or empty for a problem without units. All
+    columns have the same times, so that nothing needs aligning, and ``xr.Dataset(...)`` would take as long as the rest
+    of a short run. The dataset is therefore built with a private constructor of xarray, unless its result differs from
+    that of the public one in a small example.
     """
     return (_direct if _direct_works() else _public)(time, columns, units)
 
@@ -146,14 +146,14 @@ def _direct(time: Array, columns: Mapping[str, Array], units: str) -> xr.Dataset
 
 @functools.cache
 def _labels(name: str) -> tuple[Any, Any]:
-    """The index of a second dimension, and what its variable holds; nobody can write to them."""
+    """The index of a second dimension and the data of its variable; both are immutable and can be shared."""
     data = xr.Dataset(coords={name: list(LABELS[name])})
     return data.xindexes[name], data.variables[name]._data
 
 
 @functools.cache
 def _direct_works() -> bool:
-    """Does this version of xarray hold a dataset as `_direct` builds it?"""
+    """Does `_direct` build the same dataset as the public constructor, in this version of xarray?"""
     example = np.array([0.0, 0.5]), {"theta": np.ones(2), "axis": np.ones((2, 3)), "quaternion": np.ones((2, 4))}
     try:
         direct, public = _direct(*example, ""), _public(*example, "")

@@ -1,1 +1,1 @@
-"""Studies: a question, a grid of cases, figures and a verdict; and the one runner for all of them."""
+"""The runner of studies. A study is a question with a grid of cases, facts, tables and figures."""

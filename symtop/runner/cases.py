@@ -1,13 +1,13 @@
-"""The cases of a study: which are stored, failed, stale or missing; computing those; computing stored ones again.
+"""The cases of a study: their states, computing those that are missing, and checking stored ones.
 
-    done       a file holds what this version computes
+    done       a file holds the result of the present version
     failed     it failed, and is tried again by the next run
     stale      it was computed, and something that its numbers depend on has changed since
     missing    it was never computed with these settings
 
-Why a case is stale follows from the reasons that are stored in its file, compared with the present ones label by label.
-A stored case that is computed again (`check`) must agree to the last bit but for measured times: nothing here is random
-and no file holds a date.
+To say why a case is stale, the hashes of its dependencies are stored in its file and compared with the present ones by
+label. A stored case that is computed again (`check`) must agree to the last bit except for measured times: nothing here
+is random and no file holds a date.
 """
 
 import json
@@ -29,13 +29,13 @@ from symtop.runner.scripts import file_of
 from symtop.runner.study import Case, Study, StudyError, failing
 
 DONE, FAILED, STALE, MISSING = STATES = ("done", "failed", "stale", "missing")
-LONGEST = 1e9  # seconds of a case: the timers of a process count no more than ten times as many
+LONGEST = 1e9  # seconds: largest limit of a case; the timers of a process take up to ten times as many
 SAMPLE = 5  # cases of each study that are checked
 
 
 @dataclass
 class StudyCases:
-    """Cases of a study by their files, the datasets of those that are stored, the failures, how many were computed."""
+    """Cases of a study by their files, the datasets of stored ones, messages of failed ones, the number computed."""
 
     study: Study
     results: Path
@@ -46,7 +46,7 @@ class StudyCases:
 
     @classmethod
     def stored(cls, study: Study, results: Path, *, quick: bool, full: bool) -> Self:
-        """The cases of a study with what is stored of them; of the second round only if the first one is done."""
+        """The cases of a study with their stored datasets; the second round only if the first one is complete."""
         cases = cls(study, results.resolve())
         for new in cases.rounds(quick=quick, full=full):
             if cases.missing(new):
@@ -54,13 +54,13 @@ class StudyCases:
         return cases
 
     def rounds(self, *, quick: bool, full: bool) -> Iterator[dict[Path, Case]]:
-        """The cases of the first round by their files, then those that follow from what it found."""
+        """The cases of the first round by their files, then those of the second round, if there is one."""
         yield self.add(self.study.grid(quick=quick, full=full))
         if self.study.follow_up is not None:
             yield self.add(self.study.later(self.combined()))
 
     def add(self, cases: Iterable[Case]) -> dict[Path, Case]:
-        """Take cases in; returns them by their files."""
+        """Add cases; returns them by their files."""
         new = {store.case_path(self.results, self.study, case): case for case in cases}
         self.cases |= new
         return new
@@ -72,13 +72,13 @@ class StudyCases:
         return {path: case for path, case in cases.items() if path not in self.data}
 
     def read(self, paths: Iterable[Path]) -> None:
-        """Read the files that are there and whole."""
+        """Read the files that exist and are not damaged."""
         for path in paths:
             if path not in self.data and (data := store.load_case(path)) is not None:
                 self.data[path] = data
 
     def read_all(self) -> None:
-        """Read what was not read; what was computed and is gone has failed, for the study would be drawn without it."""
+        """Read all other files; a case without a file and without a recorded failure counts as failed."""
         self.read(self.cases)
         for path in self.cases.keys() - self.data.keys():
             if not store.failure_path(path).is_file():
@@ -86,14 +86,14 @@ class StudyCases:
                 self.failures.append(f"{case.integrator} on {case.scene} failed: its file {path.name} is gone")
 
     def compute(self, missing: dict[Path, Case], pool: Pool, limit: float, *, fresh: bool, quiet: bool) -> None:
-        """Have cases computed, with a progress bar where somebody is watching."""
+        """Compute cases in a pool, with a progress bar on a terminal."""
         script, files, most = str(file_of(self.study.name)), plugins.loaded(), min(limit, LONGEST)
         tasks = [Task(script, case, path, files, most, fresh) for path, case in missing.items()]
         before = self.computed + len(self.failures)
         with progress_bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case") as bar:
 
             def on_result(task: Task, result: Result) -> None:
-                if self.study.follow_up is not None:  # read while others are computed
+                if self.study.follow_up is not None:  # the second round needs the data; read while others run
                     self.read([task.path])
                 if result.state == "failed":
                     self.failures.append(result.message)
@@ -119,7 +119,7 @@ class StudyCases:
 def status(
     study: Study, results: Path, *, quick: bool = False, full: bool = False, why: bool = False
 ) -> list[dict[str, Any]]:
-    """Scene, integrator, state and message of every case; with `why` also what has changed since it was computed."""
+    """Scene, integrator, state and message of every case; with `why` also the changes for stale and missing ones."""
     cases = StudyCases.stored(study, results, quick=quick, full=full)
     stored = store.stored(cases.results, study)
     older: dict[str, list[Path]] = {}
@@ -145,7 +145,7 @@ def status(
 
 
 def other_settings(study: Study, case: Case, stored: list[Path]) -> list[str]:
-    """How the settings of a case, and what it is made of, differ from the nearest of its scene and integrator."""
+    """The settings and dependencies in which a case differs from the most similar stored one of its label."""
     alike = [path for path in stored if store.identity_of(path).rpartition("--")[0] == case.label]
     settings, made = json.loads(json.dumps(dict(case.settings))), fingerprint.reasons(study, case)
     differing = [
@@ -157,7 +157,7 @@ def other_settings(study: Study, case: Case, stored: list[Path]) -> list[str]:
 
 
 def _attribute(path: Path, name: str) -> dict[str, Any]:
-    """A mapping that a case's file holds; empty if the file is damaged or another program's."""
+    """A mapping in the attributes of a case's file; empty if the file is damaged or of another program."""
     content = getattr(store.load_case(path), "attrs", {}).get(name)
     return content if isinstance(content, dict) else {}
 
@@ -166,12 +166,12 @@ def check(
     study: Study, results: Path, pool: Pool, *, quick: bool = False, full: bool = False, everything: bool = False,
     limit: float | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Compute `SAMPLE` stored cases again, or every one, and compare; likewise the dataset that they make together.
+    """Compute `SAMPLE` stored cases again, or every one, and compare; also combine them and compare the dataset.
 
-    Returns how many are ``stored`` and up to date, how many were ``compared``, and the ``differences`` in words.
+    Returns the numbers of cases ``stored`` and up to date and of those ``compared``, and the ``differences`` in words.
     """
     cases = StudyCases.stored(study, results, quick=quick, full=full)
-    # in the order of their digests, so that a sample is one of all parts of the grid
+    # in the order of their digests, so that the sample is spread over the grid
     stored = sorted(cases.data.items(), key=lambda item: store.digest_of(item[0]))
     sample = {path.name: data for path, data in stored[: None if everything else SAMPLE]}
     with tempfile.TemporaryDirectory(prefix="symtop-check-") as folder:

@@ -1,8 +1,8 @@
-"""What a case's numbers are made of, found without running them (`core.code_hash`).
+"""The fingerprint of a case: a hash of all that its numbers depend on, found without running it (`core.code_hash`).
 
-The measure of a study, a scene and the integrators that the case runs (`Study.uses`) count by the code that they reach
-and by their values, so that an edit of one method's coefficients makes the cases of that method stale and no other.
-Settings and versions of packages count besides, and for timed cases the processor.
+It covers the measure function of the study, the scene and the integrators that the case runs (`Study.uses`), each by
+the code that it calls and by its values. An edit of one method's coefficients thus makes only the cases of that method
+stale. It also covers settings and versions of packages, and for timed cases the processor.
 """
 
 import functools
@@ -16,12 +16,13 @@ from symtop.model.scenes import all_scenes, scenes
 from symtop.runner.study import REFERENCE, Case, Study, failing
 
 EVERY = "*"  # in place of an integrator's or a scene's name: all of them
-_known: dict[tuple[str, int], tuple[object, Reasons]] = {}  # by label and id of a thing, which is held for its id
-reached = functools.cache(code)  # what every fingerprint of the process looks for code with
+# cache of `made_of` by label and id of an object; holding the object keeps its id valid
+_known: dict[tuple[str, int], tuple[object, Reasons]] = {}
+reached = functools.cache(code)  # the search for code, shared by all fingerprints of the process
 
 
 def made_of(label: str, thing: object) -> Reasons:
-    """What a thing leads to, as it was when it was first asked for."""
+    """The hashes of all code and values that an object leads to, at the first call for it."""
     key = label, id(thing)
     if key not in _known:
         _known[key] = thing, reached().reasons(label, thing)
@@ -29,7 +30,7 @@ def made_of(label: str, thing: object) -> Reasons:
 
 
 def uses(study: Study, case: Case) -> list[str]:
-    """Names of the integrators that a case runs, the closed form among them, which others are measured by."""
+    """Names of the integrators that a case runs, and of the closed form, which is the reference."""
     with failing(study.name, "uses"):
         names = {*(case.integrators if study.uses is None else study.uses(case)), REFERENCE}
     registry = integrators().keys()
@@ -37,7 +38,7 @@ def uses(study: Study, case: Case) -> list[str]:
 
 
 def settings_key(study: Study, case: Case) -> str:
-    """Hash of what a case was asked to do, which an edit of the code does not change."""
+    """Hash of the declaration of a case, which does not depend on code."""
     question = [study.name, case.scene, case.integrator, case.group, dict(case.settings)]
     return code_hash.hashed(json.dumps(question, sort_keys=True))
 

@@ -1,10 +1,10 @@
-"""Computes cases: in this process, in worker processes, or on a dask cluster, and in which order.
+"""Compute the cases of a study in this process, in worker processes, or on a dask cluster.
 
-The workers are Pebble's: a limit ends compiled code, too, and a worker that dies fails its own case alone. They stay
-for the next study. Few cases, and those of integrators that only this process knows, are computed here. On a dask
-cluster, for untimed cases, workers need this version of symtop, the studies, and the results folder at the same path.
+Worker processes are Pebble's: a time limit also ends compiled code, and if a worker dies, only its own case fails. They
+are kept for the next study. Few cases, and those of integrators registered in this process only, are computed here. On
+a dask cluster, for untimed cases, workers need this version of symtop, the studies, and results at the same path.
 
-A failure that a case causes is recorded and the others go on; one of the machine's (a full disk) is raised.
+If a case fails, the failure is recorded and the others go on; an error of the machine (a full disk) is raised.
 """
 
 import contextlib
@@ -37,10 +37,10 @@ from symtop.run import cluster, plugins
 from symtop.runner import fingerprint, scripts, store
 from symtop.runner.study import Case, Study
 
-WORTH_WORKERS = 8  # cases; starting a worker takes two seconds
-MOST_FRUITLESS = 3  # times that all workers may end without having computed anything
-AHEAD = 3  # cases with the pool for each worker: enough that nobody waits, few enough to stop soon
-BUSY = 0.05  # seconds until a case that another command computes is looked for again
+WORTH_WORKERS = 8  # least cases for which workers are started, which takes two seconds each
+MOST_FRUITLESS = 3  # times in a row that the pool may break without a result
+AHEAD = 3  # cases submitted per worker: enough to keep all busy, few enough to stop soon
+BUSY = 0.05  # seconds between two checks of a case that another command computes
 GRACE = 5.0  # seconds between asking a case to end and ending its process
 ENDED = "its process was ended, by the system (memory) or by the method itself"
 
@@ -48,19 +48,19 @@ _loading = threading.Lock()
 
 
 class Task(NamedTuple):
-    """A case to compute, and everything that another process must know for it."""
+    """A case to compute, with everything that a worker process needs for it."""
 
     study: str  # its script
     case: Case
-    path: Path  # absolute: a worker has a folder of its own
+    path: Path  # of the result; absolute, because a worker may have another working directory
     plugins: tuple[str, ...]
     limit: float  # seconds
-    fresh: bool = False
-    timed: tuple[int, float] | None = None  # how many ran at once, and how many times longer a run took than alone
+    fresh: bool = False  # compute it even if a result is stored
+    timed: tuple[int, float] | None = None  # of timed cases: how many run at once, and the slowdown by that
 
 
 class Result(NamedTuple):
-    """How a task ended: computed, found, failed, died (its process), or busy (another command is computing it)."""
+    """How a task ended: computed, found (already stored), failed, died (its process), or busy (in another command)."""
 
     state: str
     message: str = ""
@@ -70,15 +70,15 @@ OnResult = Callable[[Task, Result], None]
 
 
 def prepare(script: str, files_of_plugins: tuple[str, ...]) -> Study:
-    """The study of a script, with the plug-ins that its cases may need."""
-    with _loading:  # a file that two threads load at once would be executed twice
+    """Load plug-ins, and then the study of a script."""
+    with _loading:  # otherwise two threads might execute a file twice
         for file in files_of_plugins:
             plugins.load(file)
         return scripts.load(script)
 
 
 def execute_case(task: Task, study: Study | None = None) -> Result:
-    """Compute a case and store it, or record how it failed; SymtopError where the machine is the cause."""
+    """Compute a case and store the result, or record the failure; SymtopError if the machine is the cause."""
     study = study or prepare(task.study, task.plugins)
     path, case = task.path, task.case
     if fingerprint.digest(study, case) != store.digest_of(path):
@@ -90,9 +90,9 @@ def execute_case(task: Task, study: Study | None = None) -> Result:
             return Result("busy")
         if not task.fresh and store.load_case(path) is not None:
             return Result("found")
-        files.sweep(path)  # of a worker that was killed
+        files.sweep(path)  # remove partial files of a killed worker
         try:
-            with at_most(task.limit, processor=False), _traced(task):  # compiled code hears no limit: see `GRACE`
+            with at_most(task.limit, processor=False), _traced(task):  # does not end compiled code: see `GRACE`
                 data = study.measure(case)
             if not isinstance(data, xr.Dataset):
                 raise SymtopError(f"the measure of a study must return a Dataset, not {type(data).__name__}")  # noqa: TRY301
@@ -108,7 +108,7 @@ def execute_case(task: Task, study: Study | None = None) -> Result:
 
 @contextlib.contextmanager
 def _traced(task: Task) -> Iterator[None]:
-    """Leave a traceback in a file before the process is ended that takes too long; a thread is in no such process."""
+    """Write a traceback to a file before the process is killed by the time limit; in the main thread only."""
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -122,7 +122,7 @@ def _traced(task: Task) -> Iterator[None]:
 
 
 def failed(task: Task, why: object, trace: str = "") -> Result:
-    """Record how a case failed; a file that an earlier run may have left is no longer its result."""
+    """Record the failure of a case, and remove a result of an earlier run."""
     message = f"{task.case.integrator} on {task.case.scene} failed: {' '.join(str(why).split())}"
     question = {"scene": task.case.scene, "integrator": task.case.integrator, "settings": dict(task.case.settings)}
     record = question | {"message": message, "traceback": trace.splitlines()}
@@ -132,36 +132,36 @@ def failed(task: Task, why: object, trace: str = "") -> Result:
 
 
 class Pool(contextlib.AbstractContextManager["Pool"]):
-    """Worker processes, as many as `jobs`, and the cluster at the address `scheduler` if there is one."""
+    """At most `jobs` worker processes (by default one per core), and the dask cluster at `scheduler`, if given."""
 
     def __init__(self, jobs: int | None = None, scheduler: str | None = None) -> None:
         self.jobs = jobs or parallel.cores()
         self.client: Any = cluster.connect(scheduler) if scheduler else None
-        self.size = 0  # workers that are open
+        self.size = 0  # number of workers
         self._workers: ProcessPool | None = None
         self._analyses: list[Future[Any]] = []
-        self._trials: dict[int, float] = {}  # by how many ran at once: how many times longer a run took
+        self._trials: dict[int, float] = {}  # slowdown of a run by the number that run at once
 
     def open(self, size: int) -> None:
-        """Have at least so many workers."""
+        """Make sure that there are at least `size` workers, up to `jobs`."""
         if self._workers is None or size > self.size:
             wait(self._analyses)
             self.close_workers()
             self.size = min(size, self.jobs)
             if hasattr(os, "fork") and threading.current_thread() is threading.main_thread():
-                # the process that counts semaphores, but on Windows, is deaf to SIGHUP; to SIGTERM Python makes it so
+                # start the resource tracker, except on Windows, so that it ignores SIGHUP, as it does SIGTERM
                 before = signal.signal(HANGUP, signal.SIG_IGN)
                 resource_tracker.ensure_running()
                 signal.signal(HANGUP, before)
             self._workers = ProcessPool(self.size, initializer=begin_worker, context=parallel.OneThreadEach())
 
     def submit(self, function: Callable[..., Any], *args: Any, limit: float | None = None) -> "Future[Any]":
-        """Call a function in a worker; after `limit` seconds the worker is ended, and the result is TimeoutError."""
+        """Call a function in a worker; after `limit` seconds the worker is killed, and the future has TimeoutError."""
         assert self._workers is not None  # noqa: S101
         return self._workers.schedule(function, args=args, timeout=limit)
 
     def analyse(self, function: Callable[..., Any], *args: Any) -> "Future[Any]":
-        """Call a function in a worker beside the cases of the next study; timed ones wait until it is done."""
+        """Call a function in a worker while cases of the next study run; timed cases wait until it is done."""
         self.open(self.jobs)
         self._analyses = [other for other in self._analyses if not other.done()]
         self._analyses.append(self.submit(function, *args))
@@ -188,7 +188,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
                 self._in_workers(part, on_result, timed=timed)
 
     def _in_workers(self, tasks: list[Task], on_result: OnResult, *, timed: bool) -> None:
-        """Compute tasks in workers; one whose worker dies is computed once more, with nobody beside it."""
+        """Compute tasks in workers; a case whose worker dies is retried once, with no other case running."""
         remaining, died = {task.path: task for task in tasks}, dict[Path, Task]()
         fruitless = 0
 
@@ -218,9 +218,9 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             remaining.update(died)
 
     def at_once(self, width: int) -> tuple[int, float]:
-        """How many timed cases may run at once, one for each worker if a trial shows no disturbance, or half, ...
+        """How many timed cases may run at once, and the slowdown of a run by that.
 
-        Beside it stands how many times longer a run took beside so many, or beside the fewest that were tried.
+        It is `width` if a trial shows a slowdown of at most `DISTURBED`, otherwise half of that, and so on, down to 1.
         """
         ratio = math.nan  # without a trial
         while width > 1:
@@ -233,7 +233,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
         return width, ratio
 
     def close_workers(self) -> None:
-        """End all workers at once, with what they are computing; what was computed is on disk."""
+        """End all workers at once; results that are complete are on disk."""
         if self._workers is not None:
             self._workers.stop()
             self._workers.join()
@@ -250,14 +250,14 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
 
 
 def begin_worker() -> None:
-    """Initialise a worker: SIGTERM ends it in compiled code as well, and it exits when the parent process has ended."""
+    """Initialise a worker: SIGTERM also ends compiled code, and the worker exits when its parent process has ended."""
     signal.signal(signal.SIGTERM, signal.SIG_DFL)
-    gc.set_threshold(50_000, 10, 10)  # at 700, looking for garbage takes 4 % of a quick run
-    scripts.install()  # settings of a case may hold records of a study's own
-    tqdm.set_lock(threading.RLock())  # its own would be a semaphore of the system, left behind when a worker is ended
+    gc.set_threshold(50_000, 10, 10)  # with the default of 700, garbage collection takes 4 % of a quick run
+    scripts.install()  # to unpickle records that settings of a case may hold
+    tqdm.set_lock(threading.RLock())  # the default is a system semaphore, which would leak if a worker is killed
 
     def watch() -> None:
-        if (parent := parent_process()) is not None:  # whose number Windows leaves to its children
+        if (parent := parent_process()) is not None:
             parent.join()
             os._exit(1)
 
@@ -265,7 +265,7 @@ def begin_worker() -> None:
 
 
 def in_order(tasks: Sequence[Task]) -> list[Task]:
-    """The first case of every family of methods, then the second, ...: methods of a family share kernels to compile."""
+    """Order tasks: the first case of every family of methods, then the second, ...; a family shares kernels."""
     methods, count = integrators(), Counter[str]()
 
     def rank(task: Task) -> int:
@@ -278,7 +278,7 @@ def in_order(tasks: Sequence[Task]) -> list[Task]:
 
 
 def _drain(tasks: Sequence[Task], submit: Callable[[Task], "Future[Result]"], width: int, settle: OnResult) -> None:
-    """Hand over all tasks, so many at a time; one that another command computes is looked for until that has ended."""
+    """Submit all tasks, `width` at a time, and settle each; one that is busy in another command is submitted again."""
     ahead, futures = deque(tasks), dict[Future[Result], Task]()
     while ahead or futures:
         while ahead and len(futures) < width:
@@ -295,7 +295,7 @@ def _drain(tasks: Sequence[Task], submit: Callable[[Task], "Future[Result]"], wi
 
 
 def _result(future: "Future[Result]", task: Task) -> Result:
-    """The result of a case; one that took too long, whose process ended or that the cluster gave up has failed."""
+    """The result of a future: failed after a timeout or an error of the cluster, died if the process ended."""
     try:
         return future.result()
     except (SymtopError, BrokenExecutor):

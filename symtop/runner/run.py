@@ -1,8 +1,8 @@
-"""Runs a study: computes the cases that are missing, combines them, draws, and writes the findings.
+"""Run a study: compute the cases that are missing, combine them, draw, and write the findings.
 
-A case is computed only if no file holds its digest: an interrupted study resumes, an unchanged one ends in seconds. Two
-commands may share one folder: each case is computed by one of them. How a picture is written is the caller's choice.
-The findings, NAME.json, hold the facts of a study and the names of its tables, figures and charts, for the report.
+A case is computed only if no file has its fingerprint in its name: an interrupted study resumes, an unchanged one ends
+in seconds. Two commands may share one folder: each case is computed by one of them. The caller passes the function that
+writes figures. The findings, NAME.json, hold facts and the names of tables, figures and charts, for the report.
 """
 
 import contextlib
@@ -32,11 +32,11 @@ from symtop.runner.study import LONGEST, Case, Chart, Picture, Save, Study, Stud
 __all__ = ["file_beside", "findings_of", "folder", "load", "names", "run", "start"]
 
 Findings = dict[str, Any]
-QUICK = "quick pass: coarse grid"  # beside a figure of one
+QUICK = "quick pass: coarse grid"  # text at the edge of figures of a quick pass
 
 
 class Started(NamedTuple):
-    """A study whose cases are computed, but for `failures`: `result` waits for its findings; are they `done`?"""
+    """A study whose cases are computed, except `failures`: `result` waits for its findings, `done` is True if ready."""
 
     result: Callable[[], Findings]
     done: Callable[[], bool] = lambda: True
@@ -46,8 +46,8 @@ class Started(NamedTuple):
 def run(study: Study, results: Path, *, jobs: int | None = None, pool: Pool | None = None, **options: Any) -> Findings:
     """Bring a study's dataset, figures and findings up to date; returns the findings. The options are those of `start`.
 
-    Cases that fail are named in ``failures``, recorded beside the others with their traceback, and tried again the next
-    time. Raises SymtopError if the results cannot be written or nothing could be measured.
+    Failed cases are named in ``failures``, recorded beside the others with their traceback, and tried again by the next
+    run. Raises SymtopError if the results cannot be written or nothing could be measured.
     """
     with Pool(jobs) if pool is None else contextlib.nullcontext(pool) as own:
         return start(study, results, own, **options).result()
@@ -56,11 +56,11 @@ def run(study: Study, results: Path, *, jobs: int | None = None, pool: Pool | No
 def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full: bool = False,
           fresh: bool = False, quiet: bool = False, limit: float | None = None, save: Save | None = None,
           beside: bool = False) -> Started:  # fmt: skip
-    """Compute the cases of a study that are missing; what is returned waits for its findings.
+    """Compute the missing cases of a study; the findings are made by `Started.result`.
 
     `quick` is the coarse grid, `full` the longest one of a study that has it; `limit` is the time a case may take, in
-    seconds (the study's own by default); `save` writes figures to files, and without it none are drawn. The findings
-    are made when they are asked for, or `beside` the cases of the next study, in a worker.
+    seconds (the study's own by default); `save` writes figures to files, and without it none are drawn. With `beside`
+    the findings are made in a worker, while cases of the next study run.
     """
     began = time.monotonic()
     results = results.resolve()
@@ -79,7 +79,7 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
         for new in chain([first], rounds):
             cases.compute(cases.missing(new, fresh=fresh), pool, seconds, fresh=fresh, quiet=quiet)
     except BaseException:
-        pool.close()  # before what its processes have left is removed
+        pool.close()  # before its partial files are removed
         store.tidy(results, study)
         raise
     local = any(plugins.is_local(name) for case in cases.cases.values() for name in (case.scene, *case.integrators))
@@ -87,7 +87,7 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
     future = None
     if beside and pool.jobs > 1 and not local and study is load(script):
         work = script, plugins.loaded(), results, cases.cases, cases.failures, made_of, drawing, save, quick
-        cases.data.clear()  # the worker reads the files
+        cases.data.clear()  # the worker reads the files itself
         future = pool.analyse(analyse_stored, *work)
     computing = time.monotonic() - began
 
@@ -95,7 +95,7 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
         begin = time.monotonic()
         with progress_bar(f"{study.name}: combining and drawing", quiet=quiet):
             findings = None
-            with contextlib.suppress(BrokenExecutor, CancelledError, ProcessExpired):  # its process was ended
+            with contextlib.suppress(BrokenExecutor, CancelledError, ProcessExpired):  # if the worker was killed
                 findings = None if future is None else future.result()
             if findings is None:
                 cases.read_all()
@@ -109,16 +109,16 @@ def analyse_stored(
     script: str, files_of_plugins: tuple[str, ...], results: Path, stored: dict[Path, Case], failures: list[str],
     made_of: str, drawing: str, save: Save | None, quick: bool,
 ) -> Findings:  # fmt: skip
-    """The findings of a study from the files of its cases; `drawing` is the part of `made_of` that is code."""
+    """The findings of a study from the files of its cases; `drawing` is the `drawing_digest` at the start."""
     study = prepare(script, files_of_plugins)
     cases = StudyCases(study, results, cases=stored, failures=failures)
     cases.read_all()
-    edited = drawing_digest(study, save) != drawing  # since the cases were computed: drawn again next time
+    edited = drawing_digest(study, save) != drawing  # then the next run must draw again
     return analyse(cases, "" if edited else made_of, save, quick)
 
 
 def drawing_digest(study: Study, save: Save | None) -> str:
-    """Hash of what combines, draws and judges, and of the files beside a study that they fill."""
+    """Hash of the code that combines and draws, and of the template and the table of columns beside a study."""
     answers = study.facts, study.pictures, study.tables, study.charts, study.title, study.question
     drawing = combine, columns.described, findings_of, save
     files_beside = (file_beside(study.name, name) for name in ("page.md", "columns.tsv"))
@@ -128,7 +128,7 @@ def drawing_digest(study: Study, save: Save | None) -> str:
 
 
 def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> Findings:
-    """Combine, draw, judge and write; `made_of` is noted in the manifest."""
+    """Combine the cases, and write dataset, figures, tables and findings; `made_of` goes into the manifest."""
     study, results, catalogue = cases.study, cases.results, all_scenes()
     dataset, words = results / f"{study.name}.nc", results / f"{study.name}.json"
     with files.locked(dataset, wait=True):
@@ -157,7 +157,7 @@ def findings_of(
     study: Study, data: Combined, results: Path, save: Save | None, *, failures: list[str], cases: int,
     quick: bool = False, page: Path | None = None,
 ) -> Findings:  # fmt: skip
-    """Draw a dataset, write its tables, and say what it shows; `page` is the template of its page."""
+    """Draw the figures of a dataset, write its tables, and return the findings; `page` is the template of its page."""
     charts = each(study.name, "charts", lambda: study.charts(data), Chart, "a list of Chart")
     return {
         "study": study.name, "title": study.title, "question": study.question,
@@ -180,11 +180,11 @@ def _answers(study: Study, function: str, data: Combined, form: str) -> Iterator
 
 
 def _facts(study: Study, data: Combined) -> Iterator[tuple[str, float | str | bool | None]]:
-    """Facts as JSON holds them: numbers, names, and None for what was not measured."""
+    """The facts as values for JSON: numbers, text, and None for NaN."""
     for name, raw in () if study.facts is None else _answers(study, "facts", data, "numbers"):
         if not (isinstance(name, str) and name.isidentifier()):
             raise StudyError(f"study {study.name}: a fact's name must be a word of letters, digits and _, not {name!r}")
-        value = raw.item() if getattr(raw, "ndim", None) == 0 else raw  # of NumPy
+        value = raw.item() if getattr(raw, "ndim", None) == 0 else raw  # a scalar of NumPy
         if value is not None and not isinstance(value, (bool, int, float, str)):
             must = f"fact {name} must be a number, text or None, not {shown(value)[:LONGEST]}"
             raise StudyError(f"study {study.name}: {must}")
@@ -215,7 +215,7 @@ def _saved(study: Study, data: Combined, results: Path, save: Save, *, quick: bo
         if picture.name in names:
             raise StudyError(f"study {study.name}: pictures must have a name each, and two are called {picture.name}")
         names.add(picture.name)
-        file = f"{study.name}-{picture.name}.{getattr(picture.figure, 'suffix', 'png')}"  # a film is a GIF
+        file = f"{study.name}-{picture.name}.{getattr(picture.figure, 'suffix', 'png')}"  # an animation is a GIF
         if quick and hasattr(picture.figure, "text"):
             look = {"ha": "right", "va": "bottom", "fontsize": 6.0, "color": "#AD4A00"}
             picture.figure.text(0.998, 0.01, QUICK, rotation=90.0, **look)

@@ -1,8 +1,8 @@
-"""The scripts of the studies: where they are, their names, and how a Python file is loaded.
+"""Find and load the scripts of the studies.
 
 A study that ships with symtop is a package, ``symtop_studies.NAME``, whose module ``study`` defines ``STUDY``. They lie
 beside symtop, in `studies` in a checkout and in `symtop_studies` in an installed wheel. Any other study is a Python
-file that the user names, alone or in a package, so that it may import what stands beside it.
+file of the user, alone or in a package, so that it may import files beside it.
 """
 
 import importlib
@@ -15,9 +15,9 @@ from symtop.core.errors import SymtopError, foreign_code, one_of
 from symtop.run.plugins import execute, python_file
 from symtop.runner.study import Study
 
-STUDIES = "symtop_studies"  # the package that every shipped study belongs to
+STUDIES = "symtop_studies"  # the package of all shipped studies
 
-_own_scripts: dict[str, Path] = {}  # scripts of the user's own, by the name of their study
+_own_scripts: dict[str, Path] = {}  # the user's scripts that are loaded, by the name of their study
 
 
 def folder() -> Path:
@@ -40,18 +40,18 @@ def _package(name: str, place: Path) -> ModuleType:
 
 
 def install() -> ModuleType:
-    """Make ``import symtop_studies`` work, wherever the studies lie."""
+    """Import the package ``symtop_studies`` from the folder of the studies, so that later imports of it work."""
     return _package(STUDIES, folder())
 
 
 def names() -> list[str]:
-    """Names of the studies that ship with symtop, in the order of the report, which their package says."""
+    """Names of the studies that ship with symtop, in the order of the report, ``ORDER`` of their package."""
     shipped = sorted(path.parent.name for path in folder().glob("*/study.py"))
     return sorted(shipped, key=lambda name: [*install().ORDER, name].index(name))
 
 
 def file_of(name: str) -> Path:
-    """The script of a study: a shipped one by its name, or any by its path, which ends in .py."""
+    """The script of a study by its name, or by its path, which ends in .py."""
     if name.endswith(".py"):
         return python_file(name, "study", "a name or a Python file that is there")
     if (new := install().FORMER.get(name)) is not None:

@@ -1,20 +1,20 @@
-"""Where a study's results live: one file a case, one dataset a study, written whole or not at all.
+"""The files of a study's results: one per case, one dataset per study, all written atomically.
 
-results/cases/STUDY/SCENE--INTEGRATOR--SETTINGS--DIGEST.npz            what one case measured
+results/cases/STUDY/SCENE--INTEGRATOR--SETTINGS--DIGEST.npz            the dataset of one case
 results/cases/STUDY/SCENE--INTEGRATOR--SETTINGS--DIGEST.failed.json    or how it failed, with its traceback
 results/cases/STUDY/.SCENE--INTEGRATOR--SETTINGS--DIGEST.lock          while it is being computed
-results/STUDY.nc                                                       all of them, with labelled dimensions
+results/STUDY.nc                                                       all cases, with labelled dimensions
 results/STUDY.json                                                     facts, and names of figures and tables
 results/figures/STUDY-NAME.png, results/tables/STUDY-NAME.csv
-results/cases/manifest.json                                            what these were made of
+results/cases/manifest.json                                            hashes from which these were made
 
-SETTINGS is a hash of what the case was asked to do, DIGEST one of everything that its numbers depend on; its file holds
-both in full, and a hash of all its content: a truncated, damaged or foreign file counts as none. It is removed when a
-case with the same SETTINGS and another DIGEST takes its place. The operating system ends a lock with its process.
+SETTINGS is a hash of the declaration of the case, DIGEST one of everything that its numbers depend on; its file holds
+both in full, and a hash of all its content: a truncated, damaged or foreign file is ignored. It is removed when a
+case with the same SETTINGS and another DIGEST replaces it. The operating system releases the lock of a dead process.
 
-The entry of a study in the manifest holds a hash of what its files were made of, and size and time of the last change
-of each. A disk that loses bits by itself is found by ``symtop study --check``. Without the manifest everything is read
-and drawn again, and nothing is computed again.
+The entry of a study in the manifest holds a hash of all that its files depend on, and size and modification time of
+each file. Corruption of the disk is found by ``symtop study --check``. Without the manifest everything is read and
+drawn again, and nothing is computed again.
 """
 
 import contextlib
@@ -35,7 +35,7 @@ from symtop.measure.datasets import as_text
 from symtop.runner import fingerprint
 from symtop.runner.study import Case, Study
 
-SEED = 0  # of the order in which batches are timed; nothing else here is random
+SEED = 0  # of the random order of timed batches, as stored with a case; nothing else is random
 
 
 def case_path(results: Path, study: Study, case: Case) -> Path:
@@ -50,12 +50,12 @@ def digest_of(path: Path) -> str:
 
 
 def identity_of(path: Path) -> str:
-    """The scene, integrator and settings in the name of a case's file: what was asked, whatever it was made of."""
+    """The scene, integrator and settings in the name of a case's file, without the digest."""
     return path.name.rpartition("--")[0]
 
 
 def prepare(results: Path, study: Study) -> None:
-    """Make the folders of a study and see that they can be written to, before hours are spent on computing."""
+    """Make the folders of a study; SymtopError if they cannot be written to."""
     for folder in (results / "cases" / study.name, results / "figures"):
         try:
             folder.mkdir(parents=True, exist_ok=True)
@@ -68,7 +68,7 @@ def prepare(results: Path, study: Study) -> None:
 
 
 def save_case(data: xr.Dataset, path: Path, study: Study, case: Case) -> None:
-    """Store what a case measured, with what it was made from: arrays, and all that is said of them as JSON."""
+    """Write the dataset of a case with its provenance: arrays, and names, dimensions and attributes as JSON."""
     attributes = data.attrs | netcdf.provenance() | {
         "study": study.name, "settings": dict(case.settings), "sources": digest_of(path),
         "made_of": fingerprint.reasons(study, case), "seed": SEED,
@@ -107,28 +107,28 @@ def _content(about: str, arrays: dict[str, Any]) -> str:
 
 
 def failure_path(path: Path) -> Path:
-    """Where the failure of a case is recorded."""
+    """The file with the failure of a case."""
     return path.with_name(f"{path.stem}.failed.json")
 
 
 def trace_path(path: Path) -> Path:
-    """Where the traceback of a case that took too long waits to be recorded."""
+    """The temporary file with the traceback of a case that exceeds its time limit."""
     return path.with_name(f".{path.stem}.trace")
 
 
 def stored(results: Path, study: Study) -> list[Path]:
-    """The files of all cases of a study that were ever computed and not replaced."""
+    """The files of all stored cases of a study, up to date or not."""
     return sorted((results / "cases" / study.name).glob("[!.]*.npz"))
 
 
 def superseded(paths: Iterable[Path], present: Collection[Path]) -> list[Path]:
-    """Those files that an edit made stale: present ones have their scene, integrator and settings, none the digest."""
+    """Those of `paths` that are stale: a present case has the same scene, integrator and settings, none the digest."""
     digests, identities = {digest_of(path) for path in present}, {identity_of(path) for path in present}
     return [path for path in paths if digest_of(path) not in digests and identity_of(path) in identities]
 
 
 def forget(results: Path, study: Study, present: Collection[Path]) -> None:
-    """Remove what newer files replace, and what killed writers left."""
+    """Remove files that newer ones replace, and files left by killed processes."""
     failures = (results / "cases" / study.name).glob("[!.]*.failed.json")
     for path in superseded([*stored(results, study), *failures], present):
         path.unlink(missing_ok=True)
@@ -136,7 +136,7 @@ def forget(results: Path, study: Study, present: Collection[Path]) -> None:
 
 
 def tidy(results: Path, study: Study) -> None:
-    """Remove what processes that were killed have left of a study's files, and nobody holds any more."""
+    """Remove partial files of a study that killed processes have left, unless another process holds the lock."""
     for lock in (results / "cases" / study.name).glob(".*.lock"):
         path = lock.with_name(f"{lock.stem[1:]}.npz")
         with locked(path, wait=False) as ours:
@@ -162,7 +162,7 @@ def _entries(results: Path) -> dict[str, Any]:
 
 
 def _marks(results: Path, paths: Iterable[Path]) -> dict[str, list[int] | None]:
-    """Size and time of the last change (ns) of files by their place in the folder; None for one that is missing."""
+    """Size and modification time (ns) of files by relative path; None for one that is missing."""
     marks: dict[str, list[int] | None] = {path.relative_to(results).as_posix(): None for path in paths}
     for name in marks:
         with contextlib.suppress(OSError):
@@ -172,7 +172,7 @@ def _marks(results: Path, paths: Iterable[Path]) -> dict[str, list[int] | None]:
 
 
 def is_current(results: Path, name: str, made_of: str) -> bool:
-    """Was an entry of the manifest made of that, and is every file of it there and unchanged?"""
+    """Has the entry `name` of the manifest the hash `made_of`, and are all its files unchanged?"""
     entry = _entries(results).get(name)
     if not isinstance(entry, dict) or entry.get("made_of") != made_of or not isinstance(entry.get("files"), dict):
         return False
@@ -181,7 +181,7 @@ def is_current(results: Path, name: str, made_of: str) -> bool:
 
 
 def note(results: Path, name: str, made_of: str, paths: Iterable[Path]) -> None:
-    """Write that the files of an entry are up to date; another process may be writing another entry."""
+    """Write an entry of the manifest; a lock protects it from other processes."""
     with locked(manifest(results), wait=True):
         sweep(manifest(results))
         entry = {"made_of": made_of, "files": _marks(results, paths)}

@@ -1,5 +1,5 @@
 """The declaration of a study: a question, a grid of cases, a function that measures one case, and functions that turn
-the combined dataset into facts, figures and tables. The runner does the rest; what is said of them is in a template.
+the combined dataset into facts, figures and tables. The runner does the rest; the text of its page is in a template.
 """
 
 import json
@@ -21,21 +21,21 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 REFERENCE = "exact"  # the integrator that is the closed form
-Save = Callable[["Figure", Path], object]  # writes a picture's figure to a file
-LONGEST = 120  # characters of a value that are shown
+Save = Callable[["Figure", Path], object]  # writes a figure to a file
+LONGEST = 120  # characters of a value in a message
 
 
 class StudyError(SymtopError):
-    """A function of a study failed or returned what it must not; the names in the sentence are the study's own."""
+    """A function of a study raised an exception or returned an invalid value; the message names study and function."""
 
 
 def failing(study: str, function: str) -> AbstractContextManager[None]:
-    """Within it, whatever a function of a study raises becomes a StudyError that names both."""
+    """A context in which an exception of a study's function becomes a StudyError that names study and function."""
     return foreign_code(f"study {study}: {function}", StudyError)
 
 
 def each(study: str, function: str, make: Callable[[], Any], kind: type, form: str) -> Iterator[Any]:
-    """What a function of a study returns or yields, one by one, each of which must be of that kind."""
+    """The entries that a function of a study returns or yields; StudyError unless each is of that `kind`."""
     with failing(study, function):
         answer = make()
     if isinstance(answer, (str, bytes, Mapping, kind)) or not isinstance(answer, Iterable):
@@ -52,26 +52,26 @@ def each(study: str, function: str, make: Callable[[], Any], kind: type, form: s
 
 
 class Picture(NamedTuple):
-    """A figure of the report and its file name; its title, caption and text for the blind stand in the template."""
+    """A figure of the report and its file name; its title, caption and alternative text are in the template."""
 
     name: str
     figure: "Figure"
 
 
 class Series(NamedTuple):
-    """One line of a chart: an integrator's points (x, y or more numbers, words shown at the pointer)."""
+    """One line of a chart: an integrator's points, each (x, y or more numbers, text shown at the pointer)."""
 
     integrator: str
     points: Sequence[tuple[Any, ...]]
 
 
 class Chart(NamedTuple):
-    """A log-log chart the reader can point at and filter; the page draws it, beside the figure it repeats.
+    """An interactive log-log chart, which the page draws below the figure with the same data.
 
-    ``panels`` holds the series of each choice (a scene, a quantity), the first one shown at first; `choices` says what
-    each part between ``" | "`` of their names chooses. `x` and `y` name the axes, or each is a choice of columns: of
-    places in a point, by their names. `marks` are, by panel, the x of a vertical line, the exact motion without an
-    integrator, and the y below which the truth cannot judge, both for the first columns.
+    `panels` holds the series of each choice (a scene, a quantity), the first one shown at first; `choices` labels the
+    parts of their names, which ``" | "`` separates. `x` and `y` name the axes, or map names to indices of columns in a
+    point, to choose from. `marks` has, by panel, the x of a vertical line (the exact motion) and the y below which the
+    reference cannot judge errors, both for the first columns.
     """
 
     name: str
@@ -95,7 +95,7 @@ class Case:
     scene: str
     integrator: str
     settings: Mapping[str, Any] = field(default_factory=dict)
-    timed: bool = False  # untimed cases must not run beside it, nor timed ones that disturb it
+    timed: bool = False  # does it measure times? then no untimed case runs at the same time
     group: str = ""
 
     def __post_init__(self) -> None:
@@ -115,7 +115,7 @@ class Case:
 
     @property
     def integrators(self) -> tuple[str, ...]:
-        """The integrators that it measures: its own, or those that its settings list."""
+        """The integrators that it measures: its own, and those that its settings list."""
         return self.integrator, *self.settings.get("integrators", ())
 
     @property
@@ -127,12 +127,11 @@ class Case:
 
 @dataclass(frozen=True)
 class Study:
-    """A question and how it is answered.
+    """The declaration of a study.
 
-    `facts`, `tables`, `pictures`, `charts` and `follow_up` get everything that was measured. Facts are numbers or
-    names by name, None for what was not measured. Tables are stored as CSV. Each picture is saved and closed before the
-    next one is drawn, if `pictures` draws them one by one. A template beside the study says what they show
-    (`symtop.report.template`).
+    `facts`, `tables`, `pictures`, `charts` and `follow_up` are called with the combined dataset. Facts are numbers or
+    text by name, None if not measured. Tables are stored as CSV. If `pictures` is a generator, each picture is saved
+    and closed before the next one is drawn. A template beside the study has the text (`symtop.report.template`).
     """
 
     name: str
@@ -145,35 +144,35 @@ class Study:
     tables: Callable[[Any], Mapping[str, "pd.DataFrame"]] = lambda _: {}
     charts: Callable[[Any], list[Chart]] = lambda _: []
     full: Callable[[], list[Case]] | None = None  # a grid that takes much longer, for `--full`
-    timed: bool = False  # all cases are
-    follow_up: Callable[[Any], list[Case]] | None = None  # a second round, made from what the first one found
+    timed: bool = False  # are all cases timed?
+    follow_up: Callable[[Any], list[Case]] | None = None  # cases of a second round, from the dataset of the first
     uses: Callable[[Case], Sequence[str]] | None = None  # integrators a case runs; "*": all; None: `integrators`
-    limit: float = 3600.0  # seconds after which a case counts as hanging
+    limit: float = 3600.0  # seconds after which a case is ended
 
     def __post_init__(self) -> None:
         label("name of a study", self.name)  # its files are named after it
 
     def grid(self, *, quick: bool = False, full: bool = False) -> list[Case]:
-        """The cases of the first round: the coarse grid, the ordinary one, or the longest there is."""
+        """The cases of the first round: of the coarse grid, of the usual one, or of the `full` one if there is one."""
         longest = self.full if full else None
         return self._listed("cases", lambda: self.cases(quick)) if longest is None else self._listed("full", longest)
 
     def later(self, data: Combined) -> list[Case]:
-        """The cases of the second round, which a study with a `follow_up` has."""
+        """The cases of the second round; a study has one if it has a `follow_up`."""
         return self._listed("follow_up", lambda: self.follow_up and self.follow_up(data))
 
     def _listed(self, function: str, make: Callable[[], Any]) -> list[Case]:
         return list(each(self.name, function, make, Case, "a list of Case"))
 
     def is_timed(self, case: Case) -> bool:
-        """Are times measured in the case, so that nothing may run beside it that disturbs them?"""
+        """Does the case measure times, so that nothing may run beside it that disturbs them?"""
         return self.timed or case.timed
 
     def only(self, names: Collection[str]) -> "Study":
-        """The same study with the cases of some methods, or variants, alone; SymtopError if it has none of them.
+        """The study with only the cases of some methods or variants; StudyError if it has none of them.
 
-        A case that measures several integrators against each other stays whole if one of them is named, and one of
-        the closed form, which others are measured by, stays in any case.
+        A case that measures several integrators against each other stays if one of them is named; cases of the closed
+        form, the reference of others, always stay.
         """
         methods = {*names, REFERENCE}
 

@@ -1,11 +1,12 @@
 """The benchmarks measure what they say: twins are twins, and what was measured stays in the report with its date."""
 
+import math
 import os
 
 import numpy as np
 import pytest
 
-from benchmarks import adaptive, candidates, ensemble, kernels, lanes, truth, twin
+from benchmarks import adaptive, candidates, ensemble, kernels, lanes, machines, truth, twin
 from symtop.measure.timing import timings
 from symtop.methods.framework import loop as loops
 from symtop.methods.framework.lanes import Many
@@ -118,3 +119,18 @@ def test_a_wrong_call_of_the_table_of_candidates_is_one_sentence(arguments, word
     with pytest.raises(SystemExit, match="2"):
         candidates.main()
     assert words in capsys.readouterr().err
+
+
+def test_what_one_processor_chooses_is_priced_on_another():
+    def row(called=True, **seconds):
+        return [{"needs": "derivative", "keeping": False, "target": 1e-3, "called": called, "seconds": seconds}]
+
+    there = row(b=1.0, a=1.5, called=False)
+    pairs = [machines.compare(row(**one), there) for one in ({"a": 2.0, "b": 3.2}, {"b": 2.0}, {"c": 1.0})]
+    assert [tuple(pair[:5]) for pair in pairs[:2]] == [
+        (1, 0, 1, 0, 1.6),
+        (1, 1, 1, 1, pytest.approx(math.nan, nan_ok=True)),
+    ]
+    assert pairs[0].differing == [["f(t, y), to 10\N{SUPERSCRIPT MINUS}³ rad", "a", "b", "1.5", "1.6"]]
+    assert pairs[2].differing[0][3:] == ["over 10", "not kept"]
+    assert machines.compare([], there).cells == 0

@@ -53,6 +53,7 @@ def test_json_has_outcomes_and_errors_finer_steps_smaller_ones_and_failures_are_
     assert json.loads(result.output)["largest_errors"]["axis"] == dict.fromkeys(("0.01", "0.1", "0.5", "0.9", "0.99"))
 
 
+@pytest.mark.quick
 def test_bodies_are_run_compared_and_written(tmp_path):
     """Without epsilon they are other bodies, and a finer step has smaller errors."""
     path = tmp_path / "runs.nc"

@@ -12,6 +12,7 @@ BOOKS = sorted((Path(__file__).resolve().parents[2] / "docs" / "notebooks").glob
 LARGEST = 200_000  # characters
 
 
+@pytest.mark.quick
 @pytest.mark.parametrize("book", BOOKS, ids=lambda book: book.stem)
 def test_a_notebook_runs_and_prints_what_it_shows(book, tmp_path, monkeypatch):
     """Text that is shown is printed again, to the letter; pictures are drawn and are not compared."""

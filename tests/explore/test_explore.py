@@ -43,7 +43,7 @@ def unpacked(text):
     return np.frombuffer(base64.b64decode(text), dtype="<f4")
 
 
-@pytest.mark.parametrize("method", ["midpoint", "gauss-4", "rk45", "exact"])
+@pytest.mark.parametrize("method", ["midpoint", "gauss-4", pytest.param("rk45", marks=pytest.mark.quick), "exact"])
 def test_an_answer_is_the_run_beside_the_truth(method):
     chosen = answers.setup(fields(integrator=method))
     answer, run = answers.answer(chosen), answers.dataset(chosen, str)
@@ -126,7 +126,7 @@ def test_the_page_says_in_which_chart_a_method_runs_and_a_row_runs_in_its_own():
 
 @pytest.mark.parametrize(("method", "scene", "changes"), [
     *((method, "goldstein", {"theta": 0.7123456789}) for method in ("trapezoidal", "rk45", "exact")),
-    ("strang", "tennis-racket", {"w1": 0.0123456789, "horizon": 70.0}),
+    pytest.param("strang", "tennis-racket", {"w1": 0.0123456789, "horizon": 70.0}, marks=pytest.mark.quick),
 ])  # fmt: skip
 def test_the_script_makes_the_same_dataset_to_the_bit(method, scene, changes, tmp_path, monkeypatch, capsys):
     monkeypatch.chdir(tmp_path)
@@ -393,6 +393,7 @@ def test_the_chart_of_a_body_has_the_methods_that_step_it():
     assert all(min(line["error"]) < 1e-3 and not line["message"] for line in lines.values())
 
 
+@pytest.mark.quick
 def test_the_run_of_the_page_is_a_point_on_the_line_of_its_method():
     """The least of some times, as others work beside; a run that fails has no time."""
     line = next(line for line in costs(integrator="strang")["lines"] if line["name"] == "strang")
@@ -452,6 +453,7 @@ def top_with(friction, name="spheroid", **changes):
     return answer, {name: unpacked(text) for name, text in answer["arrays"].items()}
 
 
+@pytest.mark.quick
 def test_the_damped_top_of_the_page_is_the_studys():
     """Order two; the exact motion is the study's; it ends where the bearings meet."""
     coarse, fine = (top_with(0.1, step_size=step, horizon=3.0)[0]["largest"]["midpoint"] for step in (0.01, 0.005))

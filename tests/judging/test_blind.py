@@ -71,7 +71,8 @@ def test_what_is_claimed_of_a_correct_method_is_confirmed_in_short_runs(name, on
     confirmed(ledger, *(claim for claim in claims if claim in SHOWN))
 
 
-@pytest.mark.parametrize("name", [pytest.param("BDF", marks=pytest.mark.quick), "LSODA", "DOP853"])
+@pytest.mark.quick
+@pytest.mark.parametrize("name", ["BDF", "LSODA", "DOP853"])
 def test_classes_of_variable_order_are_judged_at_a_tolerance(name, only):
     """They claim no order; that their error falls with the tolerance is confirmed, and refuted of `WrongSum`."""
     only("calls", "order", "pole")
@@ -219,6 +220,7 @@ def test_what_knows_every_state_again_is_caught_by_its_last_bit(only, monkeypatc
     assert symtop.judge(remembers, quick=True, order=2).refuted == ["calls"]
 
 
+@pytest.mark.quick
 def test_a_seed_draws_the_same_and_without_a_claim_the_order_is_said_and_not_the_slope(only):
     only("order")
     ledger = symtop.judge(wrong.rounded_triple, quick=True)
@@ -232,6 +234,7 @@ def test_a_seed_draws_the_same_and_without_a_claim_the_order_is_said_and_not_the
     assert (first.refuted, first.about.seed) == (["order"], 7)
 
 
+@pytest.mark.quick
 def test_no_order_is_below_zero(only):
     only("order")
     shifted = lambda f, t, y, h: right.rk4(f, t, y, h) + 1e-6

@@ -78,6 +78,7 @@ def test_the_brackets_of_every_chart_are_those_of_its_variables_and_see_growth_b
     assert (1e-8 < defect.size < 1e-5, defect.noise < 1e-10) == (True, True)
 
 
+@pytest.mark.quick
 def test_only_a_real_defect_stays_and_a_step_is_one_map_unless_it_looks_at_the_start():
     """As the differences are refined."""
     for name, conserves in (("strang", True), ("gauss-4", False)):
@@ -136,6 +137,7 @@ def test_jumps_short_runs_and_noise_are_told_from_growth():
     assert set(kinds) == {"bounded"}
 
 
+@pytest.mark.quick
 def test_an_energy_that_leaves_its_scale_is_said_to_blow_up_and_the_rest_judged_until_then(only):
     """Euler's method gains energy, and keeps p_phi; the implicit one loses all that it can, which is no blow-up."""
     only("energy", "p_phi")
@@ -172,6 +174,7 @@ def test_a_claim_about_several_charts_is_judged_in_the_worst_of_them():
     assert finding.why.endswith("in the angles chart")
 
 
+@pytest.mark.quick
 def test_the_limit_of_an_honest_method_is_the_true_motion_and_of_one_whose_step_is_wrong_by_a_billionth_it_is_not():
     for name in ("midpoint", "strang", "gauss-4", "rk4"):
         method = symtop.integrator(name)
@@ -243,6 +246,7 @@ def test_honest_claims_are_confirmed(name):
     assert {ledger[claim].verdict for claim in ("order", "symplectic", "symmetric", "explicit")} == {"confirmed"}
 
 
+@pytest.mark.quick
 def test_an_order_that_is_claimed_too_low_is_refuted_and_a_right_one_of_which_little_is_known_is_not():
     method = dataclasses.replace(symtop.integrator("dop853-compiled-fixed"), order=7)
     for name in ("goldstein", "wave"):
@@ -309,6 +313,7 @@ def test_what_cannot_be_judged_says_why():
     assert "no formula for cayley_energy" in judge(odd, SPHEROID, quick=True)["invariant"].why
 
 
+@pytest.mark.quick
 def test_a_method_whose_every_step_is_exact_is_judged_by_its_errors():
     finding = one_finding(order, symtop.integrator("exact-discrete"), "order")
     assert (finding.declared, finding.verdict, finding.value < 1e-12) == ("exact", "confirmed", True)
@@ -393,6 +398,7 @@ def test_the_series_of_a_step_beside_a_pole_is_taken_on_another_top():
     assert [series and series.order for series in map(order.series_of, subjects)] == [2, 2]
 
 
+@pytest.mark.quick
 def test_no_right_method_is_refuted_beside_a_pole():
     """Slopes in angles are 5e5 there, and cancel to 3e-9 of their square; errors of some fall with a higher power."""
     names = ("trapezoidal-unreduced", "tsit5-fixed", "yade", "stormer-verlet")

@@ -32,10 +32,10 @@ ENDS = {  # how members end that step too far: numbers overflow, theta passes a 
     ("left_chart", "not_converged"): ("midpoint[angles]", "trapezoidal[angles]", "simpson-linear[angles]",
                                       "galerkin-simpson[angles]", "galerkin-gauss-6[angles]"),
 }  # fmt: skip
-FEW = {  # a method of each family, for the others compile for 20 s
-    "strang[axis]", "rk4[attitude]", "vern9-fixed[axis]", "series[axis]", "rkmk-se3-2[axis]", "gauss-4[axis]",
-    "exact-discrete[attitude]", *("stormer-verlet[angles]", "midpoint[angles]", "galerkin-simpson[angles]"),
-    "lie-variational[axis]",
+FEW = {  # a method of each family with its mark, for the others compile for 20 s
+    **dict.fromkeys(("strang[axis]", "rk4[attitude]", "series[axis]", "rkmk-se3-2[axis]", "gauss-4[axis]",
+                     "stormer-verlet[angles]", "midpoint[angles]", "galerkin-simpson[angles]"), ()),
+    **dict.fromkeys(("vern9-fixed[axis]", "exact-discrete[attitude]", "lie-variational[axis]"), pytest.mark.quick),
 }  # fmt: skip
 ALONE = ("midpoint-unreduced[angles]", "gauss-12[axis]", "collective-gauss-4[axis]")  # one after another
 EXPLICIT = ("rkmk-se3-2", "rkmk-se3-4", "rkmk-se3-5", "rkmk-se3-8", "crouch-grossman-3", "commutator-free-4")
@@ -78,7 +78,7 @@ def left_alone(solver, numbers, h, marks):
 
 
 @pytest.mark.parametrize(("name", "ends"), [
-    pytest.param(name, ends, marks=() if name in FEW else pytest.mark.slow)
+    pytest.param(name, ends, marks=FEW.get(name, pytest.mark.slow))
     for ends, names in ENDS.items() for name in names
 ])  # fmt: skip
 def test_members_have_the_bits_of_runs_alone(name, ends):
@@ -317,8 +317,9 @@ def test_tables_and_compositions_of_ones_own_have_the_bits_of_runs_alone(solver)
 
 
 @pytest.mark.parametrize("name", [
-    "commutator-free-4", pytest.param("generalised-alpha", marks=pytest.mark.quick),
-    "lie-variational", "euler-poincare", "simo-wong"])  # fmt: skip
+    "commutator-free-4", "euler-poincare",
+    *(pytest.param(name, marks=pytest.mark.quick) for name in ("generalised-alpha", "lie-variational", "simo-wong")),
+])  # fmt: skip
 def test_lanes_whose_exponential_turns_too_far_for_its_series_run_alone_and_cayleys_turns_as_far_as_it_likes(name):
     """Of Cayley's only members whose equation cannot be solved, or takes half of the passes or more, are left."""
     solver, given, far = SOLVERS[f"{name}[axis]"], members(400, seed=11), set(range(400)[FAR])

@@ -210,6 +210,7 @@ def test_a_budget_is_passed_by_less_than_a_step(name):
     assert (reached[ended] < times[ended, -1]).all()
 
 
+@pytest.mark.quick
 def test_a_run_in_pieces_has_the_bits_of_a_run_in_one():
     assert (len(OWN), len(SOLVERS)) == (9, 23)  # none is left out
     numbers, tolerance, times, counts = members(12)

@@ -364,6 +364,7 @@ def test_errors_are_those_of_each_member_against_its_own_truth():
         assert symtop.errors(data.drop_vars("scene"), some[::-1]).attitude.max() > 1.0
 
 
+@pytest.mark.quick
 def test_methods_that_choose_their_steps_run_as_well_and_one_without_the_chart_is_refused():
     data = symtop.ensemble(scenes()[:8], "vern9", tolerance=1e-8, samples=6, quiet=True)
     assert_alone(scenes()[:8], "vern9", data, 6, tolerance=1e-8)

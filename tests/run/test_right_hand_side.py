@@ -61,7 +61,9 @@ def decay(rate):
 @pytest.mark.parametrize(("f", "y0", "horizon", "name", "control", "causes"), [
     (kepler, at_pericentre(0.3), 40.0 * math.pi, "dop853", {"tolerance": 1e-8}, ("", "step")),
     (kepler, at_pericentre(0.6), 20.0 * math.pi, "rk4", {"step_size": 0.03}, ("", "step")),
-    *((kepler, at_pericentre(0.9), n * math.pi, "dop853", {"tolerance": 1e-7}, ("step",)) for n in (20.0, 40.0)),
+    (kepler, at_pericentre(0.9), 20.0 * math.pi, "dop853", {"tolerance": 1e-7}, ("step",)),
+    pytest.param(kepler, at_pericentre(0.9), 40.0 * math.pi, "dop853", {"tolerance": 1e-7}, ("step",),
+                 marks=pytest.mark.quick),
     (henon_heiles, of_energy(1.0 / 12.0, -0.1), 40.0 * math.pi, "rk45", {"tolerance": 1e-7}, ("", "step")),
     (henon_heiles, of_energy(1.0 / 12.0, -0.1), 5.3102, "rk4", {"step_size": 0.02}, ("",)),  # half a step is left over
     *((decay(rate), [1.0], horizon, "rk4", {"step_size": step}, None)
@@ -89,7 +91,7 @@ def test_an_error_that_has_halved_goes_on_as_it_was_and_one_that_has_faded_as_it
 
 @pytest.mark.parametrize(("f", "y0", "step"), [
     (decay(1000.0), 1.0, 0.1), (decay(1e6), 1.0, 0.1), (lambda _, y: [-200.0 * (y[0] - 1.0)], 0.0, 0.05),
-    (prothero_robinson(1e6), 1.0, 0.1),
+    pytest.param(prothero_robinson(1e6), 1.0, 0.1, marks=pytest.mark.quick),
 ], ids=["decay", "fast decay", "relaxation", "Prothero and Robinson"])  # fmt: skip
 def test_steps_that_are_too_long_for_a_stiff_f_are_no_small_error(f, y0, step):
     expected = symtop.guard(f, 0.0, [y0], 10.0, "rk4", step_size=step)
@@ -98,6 +100,7 @@ def test_steps_that_are_too_long_for_a_stiff_f_are_no_small_error(f, y0, step):
     assert math.isnan(expected.setting)
 
 
+@pytest.mark.quick
 def test_chaos_is_told_from_order_and_what_was_not_watched_says_so():
     said = str(symtop.guard(prothero_robinson(1e6), 0.0, [1.0], 10.0, "radau", tolerance=1e-6))
     assert "; the motion was watched to t = 0.0" in said

@@ -41,8 +41,10 @@ def refused(words, path, name="strang[axis]", **changed):
 
 
 @pytest.mark.parametrize(("name", "settings"), [
-    ("strang[attitude]", {}), ("stormer-verlet", {}), ("strang[axis]", {"variables": ["energy", "p_phi"]}),
-    ("midpoint", {"nutations": None, "horizon": 0.7, "per_nutation": None, "step_size": 0.01}),
+    ("stormer-verlet", {}), ("strang[axis]", {"variables": ["energy", "p_phi"]}),
+    pytest.param("strang[attitude]", {}, marks=pytest.mark.quick),
+    pytest.param("midpoint", {"nutations": None, "horizon": 0.7, "per_nutation": None, "step_size": 0.01},
+                 marks=pytest.mark.quick),
     ("exact", {"per_nutation": None, "nutations": None, "horizon": 2.0}),
 ])  # fmt: skip
 def test_the_file_holds_the_ensemble_in_memory(tmp_path, small_pieces, name, settings):

@@ -87,6 +87,7 @@ def test_a_cell_is_named_once_and_taylor_in_angles_solves_the_same_equations():
     assert 0.0 < float(np.ptp(run["p_phi"].values)) < 1e-12  # free to drift, by rounding
 
 
+@pytest.mark.quick
 def test_the_search_ends_closer_if_asked_and_languages_of_one_method_have_the_same_setting_and_work(measured):
     horizon = 10.0 * SCENE.nutation_period
     for name in ("rk4[axis]", "rk4[attitude]", "strang[axis]"):

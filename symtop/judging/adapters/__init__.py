@@ -1,1 +1,1 @@
-"""What integrators from elsewhere are plugged into: one file for each kind of thing that steps."""
+"""Adapters that make foreign integrators callable as solvers."""

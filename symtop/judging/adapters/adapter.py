@@ -1,7 +1,7 @@
-"""What every adapter gives: something that steps a state of one formulation, and its record for the battery.
+"""The base of all adapters: a `Stepper`, which steps a state of one formulation, and its record for the battery.
 
-The momenta of the runs of a `Stepper` are read off its states here and never asked from it, so that it cannot report
-others than it has. Each call of it stands in the context of `heartbeat`, which the process that waits for it can see.
+The momenta of the runs of a `Stepper` are computed from its states, so that it cannot report false ones. Each call of
+foreign code is in the context of `heartbeat`, which the waiting process can read.
 """
 
 import ctypes
@@ -25,34 +25,34 @@ from symtop.model.top import Angles, SymmetricTop
 
 Marks = NDArray[np.int64]
 A_STEP: Marks = np.array([1])
-LOOK = 64  # steps from one look at whether the state is finite to the next
+LOOK = 64  # steps between two checks whether the state is finite
 PATIENCE, QUICK_PATIENCE = 10.0, 3.0  # seconds for one call
 
 
 class Stepper:
-    """Something that steps, and the solver of its record, which can also go on from any of its states."""
+    """A foreign step as a solver that can also continue from any of its states."""
 
     name: str
-    chart: str  # of its states; "nutation" for (theta, p_theta), which no solver of the registry shows
+    chart: str  # of its states; "nutation" for (theta, p_theta), which no registered solver has
     form: Formulation
-    implementation = "python"  # or compiled: how much it is run
-    adaptive: Solver | None = None  # its solver at a tolerance, where it chooses its steps
-    own_loop = False  # is a run of many steps a loop of its own?
-    takes_field = False  # is it given a right-hand side (`along`)?
+    implementation = "python"  # or compiled; it determines the length of runs
+    adaptive: Solver | None = None  # a solver at a tolerance, if it chooses its steps
+    own_loop = False  # is the loop over steps foreign code, too?
+    takes_field = False  # is it called with a right-hand side (`along`)?
     since = 0.0  # the time at which runs begin
     wrote = False  # has it changed its input?
     evaluations = 0  # of the force, in the last march; 0 if unknown
-    clock: Callable[[], float] = staticmethod(time.perf_counter)  # by which its steps are timed
+    clock: Callable[[], float] = staticmethod(time.perf_counter)  # seconds, to time its steps
 
     def renew(self) -> None:
-        """Forget whatever it may keep, where that is possible."""
+        """Remove data that the step may keep between calls, if possible."""
 
     def march(self, top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> Array:
         """The state after marks[0], marks[1], ... steps of h from y, (marks, dimension), NaN after a failure."""
         raise NotImplementedError  # each kind of foreign code has its own
 
     def from_start(self, top: SymmetricTop, start: Angles, h: float) -> tuple[Array, Callable[..., Array]]:
-        """The state of a start, and a function (state, *marks) -> the states after so many steps of h."""
+        """The state of a start, and a function (state, *marks) -> the states after these numbers of steps of h."""
         par, state = self.form.prepare(top, start)
 
         def run(y: Array, *marks: int) -> Array:
@@ -61,7 +61,7 @@ class Stepper:
         return np.array(state, dtype=float), run
 
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        """Start to horizon, as the registry calls a solver."""
+        """A run from start to horizon, with the interface of a registered solver."""
         par, state = self.form.prepare(top, start)
         states = self.march(top, par, np.array(state, dtype=float), plan.step_size, plan.marks)
         outcome, reached, steps = OK, plan.horizon, int(plan.marks[-1])
@@ -74,7 +74,7 @@ class Stepper:
         return as_run(self.form, par, plan.times, states, steps, self.evaluations, outcome, reached)
 
     def onward(self, top: SymmetricTop, start: Angles, steps: Sequence[float]) -> Run:
-        """The end of steps of these lengths, each a run of its own from the state where the last one ended."""
+        """The end of a sequence of steps of these lengths, each a separate run from the end of the one before."""
         par, state = self.form.prepare(top, start)
         y = np.array(state, dtype=float)
         for h in steps:
@@ -82,7 +82,7 @@ class Stepper:
         return as_run(self.form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
 
     def there_and_back(self, top: SymmetricTop, start: Angles, h: float) -> Run:
-        """The end of a step of h and one from there with all rates reversed: for what makes no step of -h."""
+        """The end of a step of h and one from there with all rates reversed, for methods without steps of -h."""
         par, state = self.form.prepare(top, start)
         turned = np.ones(len(state))
         turned[-3 if turned.size > 2 else -1 :] = -1.0  # L, w, the rates or p_theta
@@ -94,7 +94,7 @@ class Stepper:
 def in_runs(
     run: Callable[[int, int, Any], Any], y: Any, marks: Marks, most: int, show: Callable[[Any], Array] = np.asarray
 ) -> Array:
-    """The states at the marks as `show` has them, of y = run(done, steps, y); NaN once a state is not finite."""
+    """The arrays show(y) at the marks, with y = run(done, steps, y) for at most `most` steps; NaN after a failure."""
     states, done = np.full((marks.size, show(y).size), np.nan), 0
     for place, mark in enumerate(map(int, marks)):
         while done < mark:
@@ -107,7 +107,7 @@ def in_runs(
 
 
 def repeat(once: Callable[[int, Any], Any], y: Any, marks: Marks, show: Callable[[Any], Array] = np.asarray) -> Array:
-    """The same of single steps y = once(k, y)."""
+    """`in_runs` for a function of single steps, y = once(k, y)."""
 
     def run(done: int, steps: int, y: Any) -> Any:
         for k in range(done, done + steps):
@@ -118,19 +118,19 @@ def repeat(once: Callable[[int, Any], Any], y: Any, marks: Marks, show: Callable
 
 
 def relative_gap(first: Any, second: Any) -> float:
-    """Largest difference, relative to the largest number; infinite where it is none."""
+    """The largest difference of two arrays, relative to the largest number of the first; infinite if not finite."""
     gap = float(np.max(np.abs(first - second))) / max(float(np.max(np.abs(first))), 1e-300)
     return gap if np.isfinite(gap) else math.inf
 
 
 def label_of(thing: Any) -> str:
-    """A name of an integrator made of any text, or of what a function or the class of something callable is called."""
+    """A valid name of an integrator from any text, or from the name of a function or of an object's class."""
     text = thing if isinstance(thing, str) else getattr(thing, "__name__", type(thing).__name__)
     return re.sub(r"[^A-Za-z0-9._+-]+", "-", text).strip("-._+")[:64] or "step"
 
 
 def integrator(stepper: Stepper, **claims: Any) -> Integrator:
-    """The record of a stepper with the claims that are made for it; ``own-rk4`` of one that is called as ours is."""
+    """The record of a stepper with its claims; the name gets a prefix, ``own-rk4``, if a registered method has it."""
     chart = "angles" if stepper.chart == "nutation" else stepper.chart
     name = f"own-{stepper.name}"[:64] if stepper.name in integrators() else stepper.name
     solvers = {chart: stepper.adaptive or stepper}
@@ -139,21 +139,21 @@ def integrator(stepper: Stepper, **claims: Any) -> Integrator:
 
 
 class Heartbeat(ctypes.Structure):
-    """Counts calls of a step, in memory that a forked process shares: ``with heartbeat.call(h): step(...)``.
+    """Counts calls of a step, in memory shared with a forked process: ``with heartbeat.call(h): step(...)``.
 
-    `calls` have begun; `step` is the h of the last one, which is under way if `inside` and may take `allowed` seconds.
-    What it raises becomes a SymtopError. Once a step backwards has not returned, `forward_only` refuses such steps.
+    `calls` is the number of calls begun; `step` is the h of the last one, which is running if `inside` and may take
+    `allowed` seconds. Exceptions become SymtopError. `forward_only`: refuse steps backwards, for one did not return.
     """
 
     _fields_ = (("calls", c_long), ("step", c_double), ("inside", c_bool), ("allowed", c_double))
     forward_only, patience = False, PATIENCE
 
     def reset(self, *, quick: bool) -> None:
-        """Something else is judged from now on."""
+        """Reset for another step to judge, with the limit of seconds for `quick` or not."""
         self.forward_only, self.patience = False, QUICK_PATIENCE if quick else PATIENCE
 
     def call(self, h: float, seconds: float = 0.0) -> Self:
-        """The context of a call that steps by h, which may take so many seconds beyond the usual."""
+        """The context of a call that steps by h, which may take `seconds` more than usual."""
         if self.forward_only and h < 0.0:
             raise SymtopError("it makes no step backwards: a step of -h did not return")
         self.step, self.allowed = h, self.patience + seconds

@@ -1,4 +1,4 @@
-"""What is not NumPy's: functions of shared objects, programs, batches of torch and JAX, and solvers of diffrax.
+"""Adapters of steps outside NumPy: shared objects, programs, batches of torch and JAX, and solvers of diffrax.
 
 *shared*, ``void step(double *y, double h, const double *par, long n)`` replaces y by the state n steps of h later; par
 holds I1, I3 and mgl:
@@ -10,19 +10,18 @@ holds I1, I3 and mgl:
     in      I1 I3 mgl h n stride y1 y2 ...           numbers, separated by blanks
     out     the state after 0, stride, 2 stride, ... n steps, as text (any blanks or commas) or as raw doubles
 
-n is a multiple of stride. It is started for every run, so that nothing is left from one to the next. For both, y is
-(e, L) on the axis, (q, L) on the attitude, (theta, phi, psi and their rates) in angles, and h may be negative.
+n is a multiple of stride. It is started for every run, so that it keeps no data between runs. For both, y is (e, L) on
+the axis, (q, L) on the attitude, (theta, phi, psi and their rates) in angles, and h may be negative.
 
 *torch*, *jax*: a function ``step(f, t, y, h) -> y``; y has the shape (batch, 6), a row (e, L) on the axis, or
-(batch, 7), (q, L) on the attitude, and f(t, y) has the same. What is torch is called as it stands, without gradients;
-what is JAX is compiled by `jax.jit`. The batch has two rows, the state that is judged and another, on which it must not
-depend: that is tried once, before all else.
+(batch, 7), (q, L) on the attitude, and f(t, y) has the same. A torch function is called without gradients; a JAX
+function is compiled by `jax.jit`. The batch has two rows, the judged state and another, on which its step must not
+depend: this is tested once at the beginning.
 
-*diffrax*: a solver such as ``diffrax.Tsit5()``, its formula with fixed steps, asked for one step after another in a
-compiled loop, as by `diffrax.diffeqsolve` with a constant step; its own memory (a last slope, a second state) goes with
-it through a run. The stages of an implicit solver are solved by Newton's iteration to `SAME`, whatever its root finder:
-there is no step control to take tolerances from. A library is imported when something of it is judged, and computes in
-double precision.
+*diffrax*: a solver such as ``diffrax.Tsit5()``, run with fixed steps in a compiled loop, as by `diffrax.diffeqsolve`
+with a constant step; its internal data (a last slope, a second state) are kept during a run. The stages of an implicit
+solver are solved by Newton's iteration to `SAME`, whatever its root finder, because there is no step control to take
+tolerances from. A library is imported when a step of it is judged, and computes in double precision.
 """
 
 import contextlib
@@ -47,15 +46,15 @@ from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import QUATERNIONS, Array
 from symtop.model.top import SymmetricTop
 
-MOST = 20_000  # steps of one call, so that a call that hangs is told from a long run
-GUARD, MARK = 8, -1.2345e-67  # doubles behind the state that must stay as they are
-TEXT = b"0123456789+-.eEinfaINFA, \t\r\n"  # the letters of numbers
-SHORT = 1e-3  # relative: digits that a program may leave out
-SLACK = 5.0  # times the seconds that earlier runs make one expect
-COMPILING = 60.0  # seconds that the first call may take besides
-OTHER = 0.7  # momentum of the other row of a batch, of the first
-SAME = 1e-12  # relative: a row alone and in a batch
-CHARTS = ("axis", "attitude")  # whose equations are arithmetic alone; the angles have sines, of each library its own
+MOST = 20_000  # steps of one call, so that a call that hangs can be distinguished from a long run
+GUARD, MARK = 8, -1.2345e-67  # number and value of doubles behind the state that must not be overwritten
+TEXT = b"0123456789+-.eEinfaINFA, \t\r\n"  # characters of numbers as text
+SHORT = 1e-3  # relative: largest rounding of the numbers that a program writes
+SLACK = 5.0  # limit of the time of a run, in times expected from earlier runs
+COMPILING = 60.0  # additional seconds for the first call, which compiles
+OTHER = 0.7  # ratio of momenta of the second row of a batch to the first
+SAME = 1e-12  # relative: difference of a row alone and in a batch; tolerance of Newton's iteration
+CHARTS = ("axis", "attitude")  # their equations need only arithmetic; those in angles need each library's own sine
 
 Doubles = ctypes.POINTER(ctypes.c_double)
 
@@ -120,7 +119,7 @@ class Program(Stepper):
         numbers = [top.I1, top.I3, top.mgl, h, last, stride, *y.tolist()]
         answer = self._answer(" ".join(map(repr, numbers)) + "\n", h, last)
         states = _states(answer, last // stride + 1, y.size, self.name)
-        off = states[0] - y  # the start, but for rounding, the sign of a quaternion and whole turns of an angle
+        off = states[0] - y  # zero except for rounding, the sign of a quaternion and multiples of 2 pi
         if self.chart in QUATERNIONS and states[0, :4] @ y[:4] < 0.0:
             off[:4] = states[0, :4] + y[:4]
         if self.chart == "angles":
@@ -144,7 +143,7 @@ class Program(Stepper):
         if result.returncode != 0:
             words = last_words(result.stderr) or "it said nothing"
             raise SymtopError(f"{self.name} ended with code {result.returncode}: {words}")
-        if steps > 50:  # in fewer its start is most of the time
+        if steps > 50:  # with fewer, starting takes most of the time
             self.seconds_a_step = max(self.seconds_a_step, (time.monotonic() - began) / steps)
         return result.stdout
 
@@ -192,7 +191,7 @@ class BatchStep(Stepper):
         return self.function(field_of(self.chart, par, lambda rows: stack(rows, **{last: -1})), t, y, h)
 
     def _try(self, step: Callable[..., Any], y: Array, batch: Any, h: float) -> None:
-        """A step of the first row alone, and in the batch."""
+        """Compare a step of the first row alone with one in the batch; SymtopError if they differ."""
         pair = (_once(step, 0.0, rows, h, COMPILING)[0] for rows in (self._array(y[None]), batch + 0.0))
         one, two = (state_like(y, np.asarray(row)) for row in pair)
         if (gap := relative_gap(one, two)) > SAME:
@@ -212,7 +211,7 @@ def _once(step: Callable[..., Any], t: float, batch: Any, h: float, seconds: flo
 
 
 def library(form: str, name: str, chart: str) -> Any:
-    """The package `name`; SymtopError if it is not there, or for a chart whose equations are not arithmetic alone."""
+    """Import the package `name`; SymtopError if it is not installed, or for a chart that is not in `CHARTS`."""
     try:
         package = importlib.import_module(name)
     except ImportError:
@@ -229,7 +228,7 @@ def field_of(chart: str, par: Any, stack: Any) -> Any:
     def f(_t: Any, y: Any) -> Any:
         """The time derivative of y, of the shape of y."""
         columns = tuple(y[..., k] for k in range(y.shape[-1]))
-        nothing = 0.0 * columns[0]  # a derivative that is zero is a number
+        nothing = 0.0 * columns[0]  # added to a constant derivative, which is a float and no array
         return stack([value + nothing if isinstance(value, float) else value for value in field(par, columns)])
 
     return f
@@ -237,7 +236,7 @@ def field_of(chart: str, par: Any, stack: Any) -> Any:
 
 @contextlib.contextmanager
 def double_precision(jax: Any) -> Iterator[None]:
-    """JAX computes in double precision within, and as before after."""
+    """A context in which JAX computes in double precision."""
     before = jax.config.jax_enable_x64
     jax.config.update("jax_enable_x64", True)
     try:
@@ -291,7 +290,7 @@ class DiffraxSolver(Stepper):
             return in_runs(run, (start, memory), marks, MOST, lambda at: np.asarray(at[0]))
 
     def _compiled(self) -> tuple[Any, Any]:
-        """The start of a run, and so many steps of it; the numbers of the top are `args`, so that both compile once."""
+        """Two compiled functions: the start of a run, and `count` steps. The top is an argument: no recompilation."""
         jax, diffrax, solver, stack = self.jax, self.diffrax, self.solver, self.jax.numpy.stack
         term = diffrax.ODETerm(lambda t, y, par: field_of(self.chart, par, lambda rows: stack(rows, axis=-1))(t, y))
 

@@ -1,4 +1,4 @@
-"""Steps in Python: functions of a state in a chart, of a rigid body or of the nutation, and classes of SciPy's kind.
+"""Adapters of steps in Python: functions in a chart, of a rigid body or of the nutation, and classes like SciPy's.
 
 *ode*, ``step(f, t, y, h) -> y`` for y' = f(t, y): y and what f returns are NumPy arrays of shape (6,), (e, L) on the
 axis or (theta, phi, psi and their rates) in angles, or (7,), (q, L) on the attitude, and on a body without symmetry
@@ -11,9 +11,8 @@ input in place, and returns it, works.
 
 q = (w, x, y, z) turns body vectors into space vectors, w is the angular velocity, inertia holds the three principal
 moments about the pivot, (I1, I1, I3) of a top, and torque(q) is that of gravity. L in space is R(q) inertia w, R(q)
-with q at length one; a q that loses its length shows it as an axis that is not a unit vector. A step that returns a
-matrix of shape (3, 3) in place of q is given R, body to space, and torque(R); one that ceases to be a rotation shows it
-likewise.
+with q scaled to length one; a q of another length shows as an axis that is not a unit vector. A step that returns a
+matrix of shape (3, 3) instead of q is given R, body to space, and torque(R); an R that is no rotation shows likewise.
 
 *separable*, ``step(state, h, dT, dV) -> state`` for the nutation alone, whose Hamiltonian separates:
 
@@ -24,9 +23,10 @@ and dV the slope of V, both of one number. The chart ends at theta = 0 and pi.
 
 *scipy*, a class derived from ``scipy.integrate.OdeSolver``: max_step = first_step = h with tolerances that accept any
 error make steps of h, so that the formula is judged and not its step control; the end of the interval lies beyond the
-last step, which is never cut short. The stages of an implicit class are solved nevertheless: the tolerances of Newton's
-iteration, which SciPy's classes and others like them keep in `newton_tol`, `kappa` and `tiny_err`, are set to `SOLVED`,
-and it may take `MOST_NEWTON` rounds. With a tolerance, rtol = atol, the class chooses its steps, as for ``solve_ivp``.
+last step, which is never shortened. The stages of an implicit class are still solved accurately: the tolerances of
+Newton's iteration, which SciPy's classes and similar ones have in `newton_tol`, `kappa` and `tiny_err`, are set to
+`SOLVED`, with at most `MOST_NEWTON` iterations. With a tolerance, rtol = atol, the class chooses its steps, as in
+``solve_ivp``.
 """
 
 import contextlib
@@ -54,19 +54,19 @@ from symtop.model.top import Angles, SymmetricTop, effective_force
 Field = Callable[[float, Array], Array]
 PROBE = 1e-3  # step of the call that shows whether a rotation is a matrix
 CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
-ANY = 1e300  # a tolerance that every step meets; infinity times a component of zero would be no number
-LOOSE = 1e8  # one that every step meets, and beside which an update of Newton's iteration can be seen
-SOLVED, MOST_NEWTON, NEWTON = 1e-14, 50, "NEWTON_MAXITER"  # of a stage, absolute; rounds, and what modules call them
-SAME = 1e-9  # of a step: one that is this near to h has its length
+ANY = 1e300  # a tolerance that every step meets; with infinity, a component of zero would give NaN
+LOOSE = 1e8  # the same for implicit classes, small enough that updates of Newton's iteration do not underflow
+SOLVED, MOST_NEWTON, NEWTON = 1e-14, 50, "NEWTON_MAXITER"  # absolute error of a stage, iterations, their name in SciPy
+SAME = 1e-9  # relative: a step length that differs less from h is h
 _patching = threading.RLock()  # `compare` runs variants in threads
 
 
 def state_like(before: Array, after: Any, what: str = "step") -> Array:
-    """What a step returned as an array of floats; SymtopError if it is no state."""
+    """The result of a step as an array of floats; SymtopError if it is not of the shape of `before`."""
     if type(after) is np.ndarray and after.shape == before.shape and after.dtype == np.float64:
         return after
     array = None
-    with contextlib.suppress(ValueError):  # of a pair of an array and a number, which is no array
+    with contextlib.suppress(ValueError):  # a pair of an array and a number is no array
         array = np.asarray(after) if after is not None else None
     if array is None or array.shape != before.shape or array.dtype.kind not in "fiu":
         kind = type(after).__name__ if after is not None else "None"
@@ -76,7 +76,7 @@ def state_like(before: Array, after: Any, what: str = "step") -> Array:
 
 
 class Equations:
-    """y' = f(t, y) of a chart on arrays, and how often it was called."""
+    """The right-hand side f(t, y) of a chart for arrays, with a count of its calls."""
 
     def __init__(self, chart: str, par: Any) -> None:
         self.field, self.par, self.calls = FORMS[chart].field, par, 0
@@ -93,13 +93,13 @@ class Equations:
 
 
 class FunctionStep(Stepper):
-    """A stepper around somebody's function, whose results are checked as they come."""
+    """A stepper around a foreign function, whose results are checked."""
 
     def __init__(self, function: Callable[..., Any], name: str = "") -> None:
         self.function, self.name = function, label_of(name or function)
 
     def steps(self, once: Callable[[float, Array], Any], t: float, y: Array, h: float, marks: Marks) -> Array:
-        """The states at the marks, from a time t on; `once(t, y)` asks the function for one step of h."""
+        """The states at the marks, from time t on; `once(t, y)` calls the function for one step of h."""
 
         def checked(k: int, y: Array) -> Array:
             before = y.copy() if k == 0 else y
@@ -133,14 +133,14 @@ class PythonStep(FunctionStep):
         return states
 
     def along(self, f: Field, t: float, y: Array, h: float, marks: Marks) -> Array:
-        """The states at the marks for any right-hand side, from a time t on."""
+        """The states at the marks for any right-hand side, from time t on."""
         return self.steps(lambda at, state: self.function(f, at, state, h), t, y, h, marks)
 
 
 class ScipySolver(PythonStep):
-    """A stepper around a class of SciPy's kind; with `adaptive`, it chooses its steps by a tolerance."""
+    """A stepper around a class like SciPy's solvers; with `adaptive`, it chooses its steps by a tolerance."""
 
-    own_loop = True  # it may remember what it likes in a run
+    own_loop = True  # an object may keep data during a run
 
     def __init__(self, kind: type, chart: str, *, adaptive: bool = False) -> None:
         from scipy.integrate import OdeSolver  # 0.6 s to import
@@ -152,7 +152,7 @@ class ScipySolver(PythonStep):
         self.adaptive = solver_of(kind, chart) if adaptive else None
 
     def along(self, f: Field, t: float, y: Array, h: float, marks: Marks) -> Array:
-        """The states at the marks for any right-hand side, from a time t on; SymtopError for steps that are not h."""
+        """The states at the marks for any right-hand side, from time t on; SymtopError for steps that are not h."""
         end, size = t + (int(marks[-1]) + 2) * h, abs(h)
         with heartbeat.call(h):
             options = {"max_step": size, "first_step": size}
@@ -172,7 +172,7 @@ class ScipySolver(PythonStep):
                 raise SymtopError(f"{self.name} must make {must}, and made one of {solver.t - t - k * h:.3g}")
             return state_like(y, solver.y, "a solver")
 
-        with contextlib.ExitStack() as undo:  # Newton's iteration goes on until it is solved
+        with contextlib.ExitStack() as undo:  # allow Newton's iteration `MOST_NEWTON` iterations
             modules = {sys.modules.get(one.__module__) for one in self.function.__mro__}  # type: ignore[attr-defined]
             for module in [one for one in modules if hasattr(one, NEWTON)]:
                 undo.enter_context(_patching)
@@ -182,7 +182,7 @@ class ScipySolver(PythonStep):
 
 
 class Body(NamedTuple):
-    """What a rigid body on a pivot is: its principal moments (3,), and its weight times where its centre is."""
+    """A rigid body on a pivot: its principal moments (3,), and its weight times the position of its centre of mass."""
 
     inertia: Array
     c1: float
@@ -204,7 +204,7 @@ def _body_of(top: Any, at: Any) -> tuple[Body, tuple[float, ...]]:
 
 
 def _body_shown(body: Body, _times: Array, states: Array) -> Array:
-    """States (q, L) of states (q, w); (q, M) with the momentum in body axes of a body without symmetry."""
+    """States (q, L) from states (q, w); for a body without symmetry (q, M), with the momentum in body axes."""
     momentum, lengths = body.inertia * states[:, 4:], np.linalg.norm(states[:, :4], axis=1, keepdims=True)
     with np.errstate(all="ignore"):
         momentum = rotated(states[:, :4] / lengths, momentum) if body.of_top else momentum
@@ -227,7 +227,7 @@ def _matrix_of(top: Any, at: Any) -> tuple[Body, tuple[float, ...]]:
 
 
 def _with_quaternions(states: Array) -> Array:
-    """States (q, w) of states (R, w): q of the nearest rotation, |q|^2 the length of R's third column; NaN if none."""
+    """States (q, w) from states (R, w): q of the nearest rotation, |q|^2 the length of R's third column; or NaN."""
     rows = np.full((len(states), 7), np.nan)
     matrices = states[:, :9].reshape(-1, 3, 3)
     with np.errstate(all="ignore"):
@@ -253,7 +253,7 @@ class RotationStep(FunctionStep):
     def __init__(self, function: Callable[..., Any], name: str = "", chart: str = "attitude") -> None:
         super().__init__(function, name)
         self.chart = chart  # or `BODY`, of a body without symmetry
-        self.of_matrix = ""  # what it raises if it is given one, until it has made a step
+        self.of_matrix = ""  # its error message for a matrix, until it has made a step
         probe = np.eye(3), np.array([0.1, 0.2, 0.3]), PROBE, np.array([1.0, 1.0, 0.5]), lambda _: np.zeros(3)
         try:
             with heartbeat.call(PROBE):
@@ -303,7 +303,7 @@ def _plane_of(top: SymmetricTop, at: Angles) -> tuple[Any, tuple[float, ...]]:
 
 REDUCED = Formulation(
     _no_field, lambda y: chart_outcome(y[0]), _no_field, _plane_of,
-    lambda _, __, states: np.pad(states, ((0, 0), (0, 2))),  # in angles, whose phi and psi stand still
+    lambda _, __, states: np.pad(states, ((0, 0), (0, 2))),  # in angles, with phi = psi = 0
     lambda par, states: (np.full(len(states), 0.5 * (par.north + par.south)), np.full(len(states), par.p_psi)),
 )  # fmt: skip
 

@@ -1,1 +1,1 @@
-"""What an integrator can claim of itself: a module for each subject, measurement and verdict."""
+"""The claims about an integrator: each module has the measurements and verdicts of one subject."""

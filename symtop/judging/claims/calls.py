@@ -1,11 +1,10 @@
-"""What a step from elsewhere is like to call: the same twice, from any start, in double precision, backwards.
+"""The claim that a foreign step is a function of its arguments: same results, from any start, double, backwards.
 
-A one-step method is a function of its arguments. A call is repeated, then repeated after a step somewhere else: one
-that differs keeps something, such as the last force, and its runs depend on the runs before. Where the loop over steps
-is somebody else's, a run of n + m steps is compared with a run of n and one of m: a loop that sums its time and stops
-too late or too soon is a step away, a method of several steps less. So are runs of many steps, n and m drawn at random,
-whosever the loop is, once in a new process. The m steps begin at a state whose last bit is changed: what a step
-remembers of a state, or of the steps that it has made, is not there. Then the first call is repeated.
+A call is repeated, then repeated after a step somewhere else: if the result differs, the step keeps data, such as the
+last force, and its runs depend on earlier runs. If the loop over steps is foreign, a run of n + m steps is compared
+with runs of n and of m steps: a loop that sums its time and stops too late or too soon is off by a step, a multistep
+method by less. The same is done with long runs, n and m random, whatever the loop, once in a new process. The m steps
+begin at a state with its last bit changed, so that nothing kept for it can be used. Then the first call is repeated.
 """
 
 import contextlib
@@ -25,25 +24,25 @@ from symtop.measure.step_map import generic_start, one_step
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles
 
-SHARE = 0.0137  # of a nutation: the step that is called
-SAME = 1e-13  # relative: what threads may leave between two calls
-AGAIN, NOISY = 16, 0.1  # calls that tell noise from what is kept, by how much of a difference they scatter
-REPEATS, SECONDS = 250, 0.3  # calls with the same arguments, or as many as there is time for
-NOTHING, STANDS = 1e-8, 1e-6  # a step of so little moves a state by less than this, relative
-FAR = 200.0  # times the step: one that most methods do not survive
-PARTS = [(20, 20), (64, 64), (100, 157), (311, 500), (1000, 1000)]  # steps of runs that are cut in two
-REMEMBERED = 1e-9  # of a step: a last slope that is kept, and not computed anew, makes 1e-10 in 2000 steps
-MISSED = 0.2  # of a step: a method of several steps starts anew with less
-LATE = {False: (100_000, 3.0), True: (20_000, 0.5)}  # quick: steps before a late one, or as many as there are seconds
-# late runs, steps after each, and what may be missed where our loop remembers nothing
+SHARE = 0.0137  # nutations: the step of a call
+SAME = 1e-13  # relative difference of two calls that threads may cause
+AGAIN, NOISY = 16, 0.1  # calls to distinguish noise from kept data; scatter, relative to a difference, that is noise
+REPEATS, SECONDS = 250, 0.3  # calls with the same arguments, up to this time
+NOTHING, STANDS = 1e-8, 1e-6  # ratio of a tiny step to the usual one; largest relative move of a state by it
+FAR = 200.0  # ratio to the usual step of one with which most methods fail
+PARTS = [(20, 20), (64, 64), (100, 157), (311, 500), (1000, 1000)]  # steps (n, m) of runs in two parts
+REMEMBERED = 1e-9  # of a step: a larger gap shows kept data; a slope kept from the last step causes 1e-10 in 2000 steps
+MISSED = 0.2  # of a step: a larger gap is a miscounted step; the new start of a multistep method causes less
+LATE = {False: (100_000, 3.0), True: (20_000, 0.5)}  # by quick: n of the longest late run, or its seconds
+# number of late runs; largest m; largest gap, in steps, if the loop is symtop's
 LATER, AFTER, RECALLED = 4, 64, 1e-6
-BLOWN_UP = 1e6  # times the start
-GROWN = 10.0  # times what the motion makes of the last bit, as beside a separatrix, is nothing that was kept
-ELSEWHERE = 0.3  # rad and units of the rates, from the start that is called
+BLOWN_UP = 1e6  # times the start: a state that has blown up
+GROWN = 10.0  # gaps up to this times the effect of the last bit, as beside a separatrix, do not count
+ELSEWHERE = 0.3  # relative change of the start for a step somewhere else
 
 
 def measure(subject: Subject) -> list[Finding]:
-    """The finding on the calls; refuted if a step is not a function of its arguments."""
+    """The finding on the claim "calls"; refuted if a step is not a function of its arguments."""
     return [_calls(subject) if subject.method.fixed_step else inapplicable("calls", "it has no step of a given length")]
 
 
@@ -53,14 +52,14 @@ def _refuted(kind: str, why: str, value: float = math.nan, resolution: float = S
 
 def _calls(subject: Subject) -> Finding:
     stepper, scene = subject.stepper, subject.scene
-    flat = {"phi": 0.0, "psi": 0.0}  # as a map of (theta, p_theta) shows them
+    flat = {"phi": 0.0, "psi": 0.0}  # a map of (theta, p_theta) has no others
     h, start = SHARE * scene.time_scale(), replace(generic_start(scene), **(flat if subject.in_plane else {}))
 
     def once(at: Angles, step: float) -> Any:
         state, run = stepper.from_start(scene.top, at, step)
         return run(state, 1)[0]
 
-    stepper.renew()  # the step has been timed
+    stepper.renew()  # timing has called the step before
     other = Angles(**{name: getattr(start, name) * (1.0 - ELSEWHERE) for name in Angles.__slots__} | flat)
     first = once(start, h)
     if not np.isfinite(first).all():
@@ -69,7 +68,7 @@ def _calls(subject: Subject) -> Finding:
     if refuted := _repeated(stepper, lambda: relative_gap(first, once(start, h)), lambda step: once(other, step), h):
         return refuted
     step = one_step(subject.method, subject.method.charts()[0], scene, NOTHING * h)
-    after = step.shown(step.run(start, step.h)), step.image(step.point(other))  # the second is at no pole, or refused
+    after = step.shown(step.run(start, step.h)), step.image(step.point(other))  # SymtopError if the second is at a pole
     own, gap = (step.gap(shown, step.at(at)) for shown, at in zip(after, (start, other), strict=True))
     if own > STANDS:
         why = f"a step of {step.h:.0e} moves by {own:.1e}: what it returns is no state, or no next one"
@@ -77,7 +76,7 @@ def _calls(subject: Subject) -> Finding:
     if gap > STANDS:
         why = f"it keeps something of its first start: from another one, a step of {step.h:.0e} moves by {gap:.1e}"
         return _refuted("keeps state", why, gap, STANDS)
-    traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # in two words, and in a clause
+    traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # short names, with clauses
     traits |= {"single precision": "its numbers are those of single precision"} if subject.single else {}
     miss, why = _cut(stepper, scene, h / 10.0, PARTS) if stepper.own_loop else (0.0, "")
     if miss > MISSED:
@@ -101,7 +100,7 @@ def _calls(subject: Subject) -> Finding:
 def _repeated(
     stepper: Stepper, again: Callable[[], float], elsewhere: Callable[[float], Any], h: float
 ) -> Finding | None:
-    """The finding if the first call differs from the same one later, by `again`: it kept some, or calls are noisy."""
+    """A refuting finding if `again`, the relative gap of a repeated first call, is too large; None if it is not."""
     began, most, count, gap = time.monotonic(), 2 if stepper.own_loop else REPEATS, 1, 0.0
     while count <= most and gap <= SAME and time.monotonic() - began < SECONDS:
         count, gap = count + 1, again()
@@ -109,7 +108,7 @@ def _repeated(
     if gap <= SAME:
         elsewhere(h)
         with contextlib.suppress(SymtopError):
-            elsewhere(FAR * h)  # which may fail, and must not be remembered either
+            elsewhere(FAR * h)  # it may fail, which must not change later calls either
         how, gap = "after a step elsewhere the same call", again()
     if gap <= SAME:
         return None
@@ -120,18 +119,18 @@ def _repeated(
 
 
 def _cut(stepper: Stepper, scene: Scene, h: float, parts: Sequence[tuple[int, int]]) -> tuple[float, str]:
-    """How far the last m steps of a run of n + m are from those asked again, in steps, and a clause; the largest."""
+    """The largest gap, in steps, between the end of a run of n + m steps and m steps made anew, and a clause on it."""
     start, run = stepper.from_start(scene.top, generic_start(scene), h)
     a_step, worst, words = _gap(run(start, 1)[0], start), 0.0, "after few steps"
-    a_step = a_step if a_step > SAME * (size := np.abs(start).max()) else size  # it stays where it is
+    a_step = a_step if a_step > SAME * (size := np.abs(start).max()) else size  # the step does not move
     for k, (n, m) in enumerate(parts):
         middle, end = run(start, n, n + m)
         if stepper.own_loop:
             end = run(start, n + m)[0]
         elif k == 0:
             stepper.renew()
-        if not np.abs(middle).max() <= BLOWN_UP * np.abs(start).max():  # NaN too, which SciPy's classes refuse
-            continue  # there the last bit alone moves a step further than any memory
+        if not np.abs(middle).max() <= BLOWN_UP * np.abs(start).max():  # or NaN, which SciPy's classes refuse
+            continue  # there the change of the last bit has more effect than kept data
         above, below = (run(np.nextafter(middle, side), m)[0] for side in (np.inf, -np.inf))
         gap = max(_gap(end, above) - GROWN * _gap(above, below), 0.0) / a_step
         words = words if np.isfinite(gap) or worst else "after a run that fails"
@@ -141,7 +140,7 @@ def _cut(stepper: Stepper, scene: Scene, h: float, parts: Sequence[tuple[int, in
 
 
 def _late(subject: Subject) -> list[tuple[int, int]]:
-    """Lengths of such runs, drawn; the last is the longest, so that a call after it comes after many steps."""
+    """Random lengths (n, m) of late runs; the last is the longest, so that the next call comes after many steps."""
     draw, (most, seconds) = np.random.default_rng(subject.seed), LATE[subject.quick]
     longest = max(min(most, seconds / max(subject.seconds_a_step, 1e-9)), AFTER)
     shares = *np.sort(draw.uniform(0.2, 1.0, LATER - 1)).tolist(), 1.0
@@ -149,5 +148,5 @@ def _late(subject: Subject) -> list[tuple[int, int]]:
 
 
 def _gap(first: Any, second: Any) -> float:
-    with np.errstate(invalid="ignore"):  # both infinite, of runs that blow up
+    with np.errstate(invalid="ignore"):  # both may be infinite, if runs blow up
         return float(np.max(np.abs(first - second)))

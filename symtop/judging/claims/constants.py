@@ -1,24 +1,24 @@
-"""What a million steps do to the constants of the motion, and what a step costs; the worst chart of a method decides.
+"""Claims about the constants of the motion over a million steps, and the cost of a step; the worst chart decides.
 
 A constant is kept, bounded, a random walk, a drift or just growing by the rule of every study,
-`symtop.measure.conservation.behaviour`. Somebody else's sums may be plain. So a change that grows is rounding, too,
-while it is no more than `KEPT`, relative, or than the random walk that the rounding seen in one step makes, n^1/2 times
-as much, or than a bias of a unit of rounding a step, as of products of quaternions that nothing brings back to length
-one. A drift that hides below a bounded oscillation shows in the means of 24 equal stretches, and counts if the line
-through them exceeds `SURE` of its own intervals. A random walk passes a plain test of the slope in one case in three,
-and not this one; at the size of rounding only the size is judged. While it has changed little, no constant changes from
-one sample to the next by `SUDDEN` times what as many of the largest steps at the beginning add up to: else the step is
-another one somewhere, whatever is claimed of it.
+`symtop.measure.conservation.behaviour`. Foreign code may sum without compensation. So a growing change also counts as
+rounding if it is at most `KEPT`, relative, or at most the random walk of the rounding seen in one step, n^1/2 times as
+much, or at most a bias of one epsilon per step, as from products of quaternions that are never normalised. A drift
+below a bounded oscillation shows in the means of 24 equal stretches, and counts if its slope exceeds `SURE` half-widths
+of its interval; a random walk passes a plain test of the slope in one case in three, but not this one. At the size of
+rounding only the size is judged. As long as a constant has changed little, its change from one sample to the next must
+not exceed `SUDDEN` times the sum of as many of the largest changes in one step at the beginning: otherwise the step
+works differently somewhere, and the claim is refuted.
 
-A run blows up when its energy has risen by more than that of the nutation and all that the weight can give, 2 |mgl|: no
-friction does that, and nothing after it is of the top. The constants are judged over the run until then, made again.
+A run blows up when its energy has risen by more than that of the nutation and all that the weight can give, 2 |mgl|,
+which no friction causes. The constants are then judged over a new run until that time.
 
-A Cayley map keeps |L|^2/2 + c e_z - (h mgl)^2 (1 - e_z^2)/8 with c = h mgl/2 tau, whatever its tau: c is fitted, and it
-is the rest of the fit that must vanish. Source: Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147.
+A Cayley map keeps |L|^2/2 + c e_z - (h mgl)^2 (1 - e_z^2)/8 with c = h mgl/2 tau for any tau: c is fitted, and the
+residual of the fit must vanish. Source: Bobenko, Suris, Commun. Math. Phys. 204 (1999) 147.
 
-In the space frame p_phi = L_z and p_psi = L.e are those of the states, whatever the run reports; in angles, where they
-are parameters of a state, those of the increments are set beside the reported ones (`symtop.measure.conservation`). The
-one constant of a map of (theta, p_theta) is the energy at the p_phi and p_psi of the start, which are parameters.
+In the space frame p_phi = L_z and p_psi = L.e are computed from the states, whatever the run reports; in angles, where
+they are parameters of a state, the reported ones are compared with those that the rates imply (`measure.conservation`).
+The only constant of a map of (theta, p_theta) is the energy with the p_phi and p_psi of the start.
 """
 
 import math
@@ -43,42 +43,42 @@ from symtop.model.top import SymmetricTop
 from symtop.run.simulation import chart_of, make_plan
 from symtop.run.trajectory import Trajectory
 
-STEPS, QUICK_STEPS = 1_000_000, 50_000
-FINER = (1.0, 3.17, 10.03)  # times more, if a run does not reach its end
-STEPS_A_TURN = 8.0  # at least, of a body by L about the axis of its least moment
-SAMPLES = 4001
+STEPS, QUICK_STEPS = 1_000_000, 50_000  # of a long run; the second if `quick`
+FINER = (1.0, 3.17, 10.03)  # factors on the steps per nutation, tried in turn if a run does not reach its end
+STEPS_A_TURN = 8.0  # least steps per turn of a body by L about the axis of its least moment
+SAMPLES = 4001  # of a long run
 PILOT = 400  # steps of the run that is sampled at every step
-EVALUATIONS = {"compiled": 2e8, "python": 4e4}
-LEAST_SHARE = 0.25  # of the most steps with --quick: what a run gets after one that used them and failed
-QUICK_SHARE = 0.25  # of these; no verdict on a method of the package changes
+EVALUATIONS = {"compiled": 2e8, "python": 4e4}  # most force evaluations of a long run
+LEAST_SHARE = 0.25  # least part of the most steps for a run that is repeated with finer steps, if `quick`
+QUICK_SHARE = 0.25  # of `EVALUATIONS`, if `quick`; no verdict on a method of the package changes
 TOLERANCE = 1e-6  # of an adaptive method without a default of its own
-KEPT = 1e-11
-REPORTED = 1e-9  # relative, of a reported momentum from that of the states: plain sums leave 1e-11 in a million steps
-OTHER = 0.77  # of a run: the length at which a drift of such a difference is asked for again
-ROUNDING_OF_A_STEP = 2e-13  # a change in one step that may be rounding, where |p| is small beside what makes it up
-BOUNDED = 0.25  # an exponent that exceeds it with its whole interval is growth
-SURE = 8.0
-VISIBLE = 1e-3  # of the largest residual: a smaller trend does not matter
-SUDDEN, LITTLE, FROM = 100.0, 1e-2, "changes as it begins"
-OF_A_RUN = (*CONSTANTS, "reported", "invariant", "explicit", "work")  # reported: momenta beside those of the states
-OF_MOTION = (*CONSTANTS, "momentum")  # the last of a body: L in space, of a heavy one L_z
+KEPT = 1e-11  # relative: a smaller change is rounding
+REPORTED = 1e-9  # relative difference of reported momenta from those of the states; plain sums in 1e6 steps cause 1e-11
+OTHER = 0.77  # length, as a part of the run, of a second run in which a drift of such a difference must appear again
+ROUNDING_OF_A_STEP = 2e-13  # largest change in one step that may be rounding, if |p| is small beside its terms
+BOUNDED = 0.25  # growth is certain if the exponent less its interval is larger
+SURE = 8.0  # half-widths of its interval that the slope of a drift exceeds
+VISIBLE = 1e-3  # of the largest residual: a smaller trend is ignored
+SUDDEN, LITTLE, FROM = 100.0, 1e-2, "changes as it begins"  # factor of a sudden change; change of a constant before it
+OF_A_RUN = (*CONSTANTS, "reported", "invariant", "explicit", "work")  # reported: reported momenta against the states'
+OF_MOTION = (*CONSTANTS, "momentum")  # momentum, of a body: L in space, or L_z of a heavy body
 KINDS = ("kept", "bounded", "random walk", "growing", "drift", "blows up")  # from best to worst
-OWN = "its states'"  # what every run says of the momenta that it reports
-BADNESS = ("inapplicable", "measured", "confirmed", "undecided", "refuted")
-CUTS, SAME_RUN, OF_RUN = 8, 1e-9, "state"  # runs that are compared with parts of longer ones, and within what
-WINDOWS = 160  # of a long run, evenly spaced in the logarithm of time: what a figure shows of it
+OWN = "its states'"  # the implied claim that a run reports the momenta of its states
+BADNESS = ("inapplicable", "measured", "confirmed", "undecided", "refuted")  # verdicts from best to worst
+CUTS, SAME_RUN, OF_RUN = 8, 1e-9, "state"  # short runs compared with longer ones; largest difference; its name
+WINDOWS = 160  # of a long run in a figure, evenly spaced in the logarithm of time
 
 Rows = dict[str, Array]  # by the names of constants
 
 
 class Constant(NamedTuple):
-    """What became of one constant of the motion."""
+    """The change of one constant of the motion over a long run."""
 
     changed: Changed  # relative change, its trend and its growth
     a_step: float  # largest change in one step
     floor: float  # a smaller change is rounding
-    grain: float = 1.0  # rounding of the constant, in units of the machine's
-    sudden: str = ""  # from when on it changes so much more than by its first steps
+    grain: float = 1.0  # rounding error of the constant, in machine epsilons
+    sudden: str = ""  # a clause on a sudden change, if there is one
 
     @property
     def kind(self) -> str:
@@ -94,21 +94,21 @@ class Constant(NamedTuple):
 
     @property
     def grows(self) -> bool | None:
-        """Is it beyond doubt that it grows? None if the exponent leaves that open."""
+        """Does it grow? None if the interval of the exponent leaves that open."""
         if self.kind in ("kept", "bounded", "unknown"):
             return None if self.kind == "unknown" else False
         least = self.changed.exponent - self.changed.exponent_interval
         return True if self.kind == "drift" or least > BOUNDED else None
 
     def words(self, place: str) -> str:
-        """Its largest change, the place of it, and how it grows."""
+        """A clause with its largest change, `place`, and the exponent of growth."""
         words, change = f"largest relative change {self.changed.largest:.1e} {place}", self.changed
         if self.kind in ("kept", "unknown"):
             return words
         return f"{words}, growth exponent {change.exponent:.2f} +- {change.exponent_interval:.2f}"
 
     def verdict(self, claimed: str) -> str:
-        """Of the claim that it is kept or bounded; "measured" where neither is claimed."""
+        """The verdict on the claim that it is kept or bounded; "measured" if neither is claimed."""
         if self.kind == "unknown" or (claimed == "bounded" and self.grows is None):
             return "undecided"
         within = self.kind == "kept" or (self.kind == "bounded" and self.changed.largest <= self.floor)
@@ -137,7 +137,7 @@ class LongRun(NamedTuple):
     evaluations: float  # of the force, a step
     iterations: float  # of a solver, a step
     steady_cost: bool  # every run of the same number of steps cost the same, at two step sizes
-    reported: Difference | None  # of the momenta from those of the states; None where the states show none
+    reported: Difference | None  # of reported momenta from those of the states; None if these are not known
     energy: Array  # times, in nutations, and the largest relative change around each, shape (2, WINDOWS)
     blown_up: float = math.nan  # the time at which it blew up; the run is that until then
 
@@ -148,14 +148,14 @@ class LongRun(NamedTuple):
 
     @property
     def period(self) -> str:
-        """What its length is counted in."""
+        """The name of the period in which its length is given."""
         return "natural period" if self.chart == BODY else "nutation"
 
 
 def _run(
     method: Integrator, scene: Scene, chart: str, steps: float, step: float, samples: int
 ) -> tuple[Trajectory, Run, Plan]:
-    """A run for `steps` times `step`: with the momenta of its states, as the solver returned it, and its plan."""
+    """A run of `steps` steps: as a trajectory with the momenta of its states, as the solver returned it, its plan."""
     horizon = (round(steps) if method.fixed_step else steps) * step
     control = {"step_size": step} if method.fixed_step else {}
     if method.adaptive and method.default_tolerance is None:
@@ -172,14 +172,14 @@ def _run(
 def long_run(
     method: Integrator, scene: Scene, chart: str, *, quick: bool = False, most: float | None = None, seed: int = 0
 ) -> LongRun:
-    """A million steps of a compiled method in one of its charts, or `most`; fewer where that would take minutes."""
+    """A run of a million steps of a compiled method in a chart, or of `most`; fewer if that would take minutes."""
     inside, unit = "angles" if chart == PLANE else chart, scene.time_scale()
     for finer in FINER:  # a motion that passes close to a pole needs shorter steps
         step = unit / (STEPS_A_NUTATION * finer)
         if scene.of_body:  # L turns a needle about its own axis many times in a natural period
             step = min(step, math.tau * min(scene.top.moments) / (STEPS_A_TURN * scene.momentum_scale))
         pilot, first, _ = _run(method, scene, inside, PILOT, step, PILOT + 1)
-        steps = float(PILOT)  # of a formula, which has no steps: nothing adds up
+        steps = float(PILOT)  # for a closed form, which has no steps that accumulate errors
         if method.control is not None:
             cost = max(first.force_evaluations / PILOT, 1.0)
             share = QUICK_SHARE if quick else 1.0
@@ -219,12 +219,12 @@ def long_run(
 
 
 def blows_up(scene: Scene, change: Array) -> NDArray[np.int64]:
-    """The samples at which the energy has risen by more than that of the nutation and all that the weight can give."""
+    """The indices of samples whose energy has risen by more than that of the nutation plus 2 |mgl|."""
     return np.flatnonzero(change > 1.0 + 2.0 * abs(scene.top.mgl) / scene.energy_scale)
 
 
 def blow_up_finding(finding: Finding, time: float, of_body: bool, steps: str = "") -> Finding:
-    """The finding on such an energy."""
+    """The finding on the energy of a run that blows up at `time`."""
     measured, when = Measured("blows up", finding.value, f"blows up at t = {time:.3g}{steps}"), f"by t = {time:.3g}"
     most = "the kinetic one of the start and 3 |mgl|" if of_body else "that of the nutation and 2 |mgl|"
     why = f"{when} it rises by more than {most}; before: {finding.why}"
@@ -234,7 +234,7 @@ def blow_up_finding(finding: Finding, time: float, of_body: bool, steps: str = "
 def _contradiction(
     method: Integrator, scene: Scene, chart: str, long: tuple[Run, Plan], pilot: Run, h: float, seed: int
 ) -> Difference | None:
-    """How far a run of n steps, n drawn at random, is from the first n of a longer one: a step knows nothing of it."""
+    """A difference between a run of n steps, n random, and the first n of a longer run; None if all runs agree."""
     draw, step = np.random.default_rng(seed), one_step(method, chart, scene, h)
     for k in range(CUTS):
         run, marks = (long[0], long[1].marks) if k % 2 else (pilot, np.arange(pilot.states.shape[0]))
@@ -254,7 +254,7 @@ def _reported(
     run, plan = long
     if chart == "angles":
         found = from_increments(method, scene, plan) if method.fixed_step else None
-        if found is not None and found.size > found.floor:  # places that beat with the nutation drift at one length
+        if found is not None and found.size > found.floor:  # aliasing may give a drift at one length only
             fewer = Plan.steps(plan.step_size, [0, round(OTHER * int(plan.marks[-1]))])
             found = min(found, from_increments(method, scene, fewer) or found, key=lambda one: one.size)
         return found
@@ -297,12 +297,12 @@ def change_of(
     time: Array, values: Array, every_step: Array, steps: int, grain: float = 1.0, *, plain: bool = False,
     even: bool = True,
 ) -> Constant:  # fmt: skip
-    """Size, growth and trend of a residual over so many steps; `every_step` holds it at consecutive ones.
+    """Size, growth and trend of a residual over `steps` steps; `every_step` holds it at consecutive ones.
 
-    Of `plain` sums half of what rounding makes in one step may be a bias, and add up, but no more than a unit of
-    rounding a step. A motion that is not `even` may begin calmly and turn over later, and so may its residuals.
+    With `plain` sums half of the rounding error of one step may be a bias that adds up, but at most an epsilon per
+    step. A motion that is not `even` may be calm at first and turn over later: sudden changes are not judged.
     """
-    with np.errstate(invalid="ignore"):  # of a run that blows up
+    with np.errstate(invalid="ignore"):  # a run may blow up
         jumps = np.abs(np.diff(every_step))
     a_step = float(np.max(jumps[np.isfinite(jumps)])) if np.isfinite(jumps).any() else math.nan
     rounding = a_step * math.sqrt(steps) if a_step <= ROUNDING_OF_A_STEP * grain else 0.0
@@ -318,7 +318,7 @@ def change_of(
 
 
 def measure(subject: Subject) -> list[Finding]:
-    """Everything that one long run in each chart shows; the worst chart decides, and the finding names it."""
+    """The findings from one long run in each chart; the worst chart decides, and the finding names it."""
     method, scene, runs, by_chart = subject.method, subject.scene, [], []
     charts = (chart_of(method, BODY),) if scene.of_body else (PLANE,) if subject.in_plane else method.charts()
     options: dict[str, Any] = {"quick": subject.quick, "most": subject.long_steps, "seed": subject.seed}
@@ -328,7 +328,7 @@ def measure(subject: Subject) -> list[Finding]:
             findings = of_run(method, runs[-1])
         except SymtopError as error:
             findings = [undecided(claim, declared(method, claim), str(error)) for claim in (*OF_A_RUN, "momentum")]
-        for k, one in enumerate(findings):  # the chart, where the reason does not speak of it already
+        for k, one in enumerate(findings):  # name the chart in the reason
             if one.verdict != "inapplicable" and not one.why.endswith(" chart"):
                 findings[k] = one._replace(why=f"{one.why}, in the {chart} chart")
         by_chart.append(findings)
@@ -340,7 +340,7 @@ def measure(subject: Subject) -> list[Finding]:
 
 
 def of_run(method: Integrator, run: LongRun) -> list[Finding]:
-    """What one long run shows of each claim of `OF_A_RUN`."""
+    """The findings from one long run on each claim of `OF_A_RUN`, and on the momentum of a body."""
     motion = [_constant(method, one, declared(method, one), run, run.constants.get(one)) for one in OF_MOTION]
     return [*motion, _of_states(run), _invariant(method, run), *_costs(method, run)]
 
@@ -359,7 +359,7 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
     why += f", drifting by {changed.rise / max(run.steps, 1):.1e} a step" if kind == "drift" else ""
     finding = constant.finding(claim, claimed, why)
     finding = finding if run.steps and not (ended and run.nutations < 1.0) else finding._replace(measured=NOTHING)
-    # an error that returns with the nutation cannot exceed the largest change of a step, all one way
+    # an error that is periodic with the nutation cannot exceed the largest change of a step times the steps of one
     most = constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
     if claim == "energy" and run.blown_up > 0.0:
         steps = f", after {run.steps} steps, {run.steps / run.nutations:.0f} a {run.period}"
@@ -370,7 +370,7 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
         return finding._replace(verdict="refuted", declared=claimed or FROM, why=f"{constant.sudden}; {why}")
     if kind == "unknown" and ended:
         return finding._replace(why=f"the run {run.message}")
-    returns = ("kept", "unknown", *["bounded"] * (run.chart == BODY))  # that of a body with slower parts, later
+    returns = ("kept", "unknown", *["bounded"] * (run.chart == BODY))  # a body may have slower periods, too
     if claimed == "bounded" and kind not in returns and changed.largest > max(most, constant.floor):
         why += f", more than the steps of a {run.period} can add up to: it does not come back"
         return finding._replace(verdict="refuted", why=why)
@@ -378,7 +378,7 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
 
 
 def _of_states(run: LongRun) -> Finding:
-    """Are the momenta that the run reports those that its states have, and is it a part of longer ones?"""
+    """The finding on whether reported momenta are those of the states, and a short run is part of a longer one."""
     other = run.reported
     if other is None:
         return inapplicable("reported", f"the {run.chart} chart shows no momenta beside the reported")
@@ -394,7 +394,7 @@ def _of_states(run: LongRun) -> Finding:
 
 
 def _invariant(method: Integrator, run: LongRun) -> Finding:
-    """What a method claims to conserve that is not a constant of the true motion."""
+    """The finding on invariants that a method claims but that are not constants of the true motion."""
     claimed = declared(method, "invariant")
     if not claimed:
         return inapplicable("invariant", "it claims no invariant of its own")

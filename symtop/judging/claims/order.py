@@ -1,34 +1,33 @@
-"""The order claim: what a table, the power series of a step, the slopes of runs and their limit show of it.
+"""The claim of order: measured by the method's table, by the power series of a step, by slopes and limits of runs.
 
-The four see different defects, and a declared order is refuted if any of them refutes it. It is confirmed if the slope
-confirms it, by `symtop.measure.order.order_verdict` as in every study, or the series where no slope can be judged.
+The four detect different defects, and a declared order is refuted if any of them refutes it. It is confirmed by the
+slope (`symtop.measure.order.order_verdict`, as in every study), or by the series if no slope can be judged.
 
-*Slopes* see what becomes of a run. They are extrapolated to h = 0 by `symtop.measure.order` from a ladder of steps,
-then again with more steps put into the decades of error above rounding where a method of high order is asymptotic; if
-the scene does not show it, on `FALLBACK` over longer runs, the first that decides. An adaptive method is fitted against
-its mean step.
+*Slopes* of the errors of runs are extrapolated to h = 0 by `symtop.measure.order` from a ladder of steps, then again
+with added steps in the decades of error above rounding where a method of high order is asymptotic. If that does not
+decide, longer runs on `FALLBACK` are used, the first that decides. An adaptive method is fitted against its mean step.
 
-*The limit.* A method whose coefficients miss their sum by 1e-9 has the right slope down to an error of 1e-9 and stays
-there. So the error at the end of a short run of many steps, with its sign, is extrapolated to h = 0 (Richardson's,
-eliminating h^p and h^(p+1)); what is left beyond rounding is a wrong limit.
+*The limit.* A method whose coefficients have a sum that is off by 1e-9 has the right slope down to an error of 1e-9,
+which then stays. So the signed error at the end of a short run of many steps is extrapolated to h = 0 (Richardson's,
+eliminating h^p and h^(p+1)); a rest beyond rounding is a wrong limit.
 
-*The power series of one step* (`claims.step_series`) sees an order condition that is off by 1e-10, which no
-slope does, but not what a run carries from step to step.
+*The power series of one step* (`claims.step_series`) shows an order condition that is off by 1e-10, which no slope
+does, but not errors from data that a run carries from step to step.
 
 *The table*, Butcher's or a splitting's, needs no run. A condition of order k that is off by d adds an error of
-d (w h)^k to a step, w = 2 pi/nutation, beside d' (w h)^(p+1), which a method of order p has anyway: a slope shows it
-below w h = (d/d')^(1/(p + 1 - k)), often a step that is so small that rounding is larger.
+d (w h)^k to a step, w = 2 pi/nutation, besides the error d' (w h)^(p+1) of a method of order p: a slope shows it only
+below w h = (d/d')^(1/(p + 1 - k)), often a step so small that rounding is larger.
 
-A map of (theta, p_theta) is judged by its error of theta. A step that chooses its order and its steps, and claims no
-order, is to come as near to the motion as its tolerance asks: its error is rounding at the least tolerance, or falls.
+A map of (theta, p_theta) is judged by its error of theta. An adaptive step that claims no order must converge: at the
+least tolerance its error is rounding, or it falls with the tolerance.
 
-*Time.* The top's equations are autonomous: a method whose f is called at wrong times, the nodes c of its tableau, is
-right on them. By a clock g that runs fast and slow the motion z(t) = y(g(t)) solves
+*Time.* The top's equations are autonomous, so that a method that calls f at wrong times (wrong nodes c of its tableau)
+is right on them. With a clock g of varying speed the motion z(t) = y(g(t)) solves
 
     z' = g'(t) f(z),        g = t + a (sin(w (t - t0) + 1) - sin 1)/w,
 
-which depends on t. The series of one step from t0 is set beside that of y(g(t)). An order that is lower than with an
-even clock, a = 0, is one of wrong times. A step that asks f at t0 alone was written for f(y), which refutes nothing.
+which depends on t. The series of one step from t0 is compared with that of y(g(t)). If its order is lower than with an
+even clock, a = 0, the times are wrong. A step that calls f at t0 alone was written for f(y), which is no fault.
 """
 
 import contextlib
@@ -63,30 +62,30 @@ from symtop.model.top import Angles
 from symtop.run.reference.sensitivity import conditioning
 
 NUTATIONS = 1.37  # length of the runs that the slope is fitted to
-FALLBACK, LONGER = "goldstein", (8.37, 40.0)
-QUICK_SHARE = 0.25  # of these; no verdict on a method of the package changes
-LARGEST_EXACT = 2.37  # steps a nutation that a method with exact steps is tried at, beside the ladder
-SHARE = 0.37  # of a nutation: length of the runs that are extrapolated to h = 0
+FALLBACK, LONGER = "goldstein", (8.37, 40.0)  # scene and lengths, in nutations, if the first runs do not decide
+QUICK_SHARE = 0.25  # of the steps in `FINEST`, if `quick`; no verdict on a method of the package changes
+LARGEST_EXACT = 2.37  # steps per nutation at which a method with exact steps is run, besides the ladder
+SHARE = 0.37  # nutations: length of the runs that are extrapolated to h = 0
 STEPS = {1: 40_000, 2: 20_000, 3: 6_000, 4: 2_000, 5: 1_000, 6: 500}  # of the coarsest of them; 200 beyond order 6
 TRUE_LIMIT = 1e-11  # a limit as close as this is the true motion
-SHOWN = 24  # settings of the order that are kept
-DRAWS, DRAWING = (96, 32), (10.0, 3.0)  # starts at which the order of one step is looked at, and seconds for them
-HALVINGS, SHORT = 10, 80.0  # steps that are tried from each, and how many of a short one make a nutation
-LOWER, JUMP = 0.6, 3.0  # an order is lower by so much, or jumps by so much
-LARGE, SEEN = 1e-3, 1e-11  # a miss beyond the first is of no power, below the second rounding
-UNITS = 100.0  # of single precision: a miss below so many is rounding there
-UNEVEN, WAVES = 0.6, 0.7  # a, and waves of the clock in a nutation
-BEGIN = 0.23  # of a nutation: t0
-UNSTABLE = 1e4  # times that the motion of the scene grows a change: errors of runs are no power of the step there
-CLEAR = 1e-9  # noise of the h^1 term: a step that is rounded to single precision leaves 1e-8
-CONVERGES, ROUNDED, FALLS = "converges", 1e-10, (1e4, 10.0)  # an error that falls to a tenth over four decades
-STAYS, FEWEST = 0.5, 3  # an error that falls by less over the last decade of steps, of so many runs, does not fall
-SHARPLY, BESIDE_NEXT = 1e-5, 1e-3  # of a term, or of the next one: a wrong one that is as small is in no slope
-ABOVE, FINEST_RUNS, SPREAD = 10.0, 5, 10.0  # errors beyond so many bounds, of so many runs, fall as h^p to this factor
+SHOWN = 24  # settings in the traces of the order
+DRAWS, DRAWING = (96, 32), (10.0, 3.0)  # random starts where the order of one step is measured, and seconds for them
+HALVINGS, SHORT = 10, 80.0  # steps from each start, each half of the one before; a short step is 1/80 of a nutation
+LOWER, JUMP = 0.6, 3.0  # differences by which a measured order is lower than, or jumps above, the declared one
+LARGE, SEEN = 1e-3, 1e-11  # errors of a step above the first follow no power, below the second they are rounding
+UNITS = 100.0  # single-precision epsilons: smaller errors of a step in single precision are rounding
+UNEVEN, WAVES = 0.6, 0.7  # a, and periods of the clock's speed in a nutation
+BEGIN = 0.23  # nutations: t0
+UNSTABLE = 1e4  # amplification by the motion above which errors of runs follow no power of the step
+CLEAR = 1e-9  # noise of the h^1 term in double precision; rounding of a step to single precision causes 1e-8
+CONVERGES, ROUNDED, FALLS = "converges", 1e-10, (1e4, 10.0)  # converges: an error falls to a tenth over four decades
+STAYS, FEWEST = 0.5, 3  # errors of the last decade of steps, 3 or more, do not fall if their ratio is above 0.5
+SHARPLY, BESIDE_NEXT = 1e-5, 1e-3  # a wrong term with a defect below this, or this part of the next, shows in no slope
+ABOVE, FINEST_RUNS, SPREAD = 10.0, 5, 10.0  # finest errors beyond 10 bounds, and the factor by which they fit h^p
 
 
 def measure(subject: Subject) -> list[Finding]:
-    """The finding on the order; that of a method with a table begins with the conditions of the table."""
+    """The finding on the order; for a method with a table, its reason begins with the conditions of the table."""
     method = subject.method
     if method.control is None:
         return [inapplicable("order", "it has no step and no tolerance", yes_no(method.order))]
@@ -105,10 +104,10 @@ def measure(subject: Subject) -> list[Finding]:
 
 
 def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
-    """The order of one step, and a sentence, where it is lower than `power`; starts, tops, times and steps are drawn.
+    """An order of one step below `power` at a random start, top, time and step, with a sentence; None if there is none.
 
-    Steps of h, h/2, h/4 ... err by d(h) ~ h^(order + 1). Steps that are too long do neither of two things: have a lower
-    order at the finest pairs, which are short, or jump, with an order far above `power` below one that is lower.
+    Steps of h, h/2, h/4 ... have errors d(h) ~ h^(order + 1). To exclude steps that are only too long, the order must
+    be lower at the finest pairs, which are short, or lower at one pair and far above `power` at the next finer one.
     """
     if subject.in_plane or not subject.method.fixed_step or subject.method.exact_steps:
         return None
@@ -129,7 +128,7 @@ def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
 
 
 def _misses(step: StepMap, start: Angles, sizes: Array) -> Array:
-    """How far steps of these sizes end from the motion; NaN where a step fails."""
+    """The errors of single steps of these sizes; NaN where a step fails."""
     motion, z, misses = step.motion(start), step.point(start), np.full(sizes.size, math.nan)
     for k, h in enumerate(sizes.tolist()):
         with contextlib.suppress(SymtopError):
@@ -138,7 +137,7 @@ def _misses(step: StepMap, start: Angles, sizes: Array) -> Array:
 
 
 def _lower(sizes: Array, misses: Array, power: int, short: float, seen: float) -> tuple[float, float]:
-    """The order where it is lower than `power`, and the step; infinity where it is not. Below `seen` is rounding."""
+    """An order lower than `power`, or infinity, and its step; errors below `seen` are rounding."""
     with np.errstate(all="ignore"):
         orders = np.log2(misses[:-1] / misses[1:]) - 1.0
     clear = (misses[:-1] < LARGE) & (misses[1:] > seen)
@@ -150,7 +149,7 @@ def _lower(sizes: Array, misses: Array, power: int, short: float, seen: float) -
 
 
 def on_body(subject: Subject) -> list[Finding]:
-    """The finding on a body without symmetry: the slope of attitude errors, or that they stay as the step falls."""
+    """The finding on a body without symmetry: from the slope of attitude errors, or from errors that do not fall."""
     claim, scene = subject.method.order, subject.scene
     fitted = measured_order(subject.method, scene, quick=subject.quick, finest=subject.finest, main="attitude")
     subject.traces.update(fitted.traces())
@@ -159,7 +158,7 @@ def on_body(subject: Subject) -> list[Finding]:
         return [_converges(fitted, why)]
     if not fitted.measured:
         error = fitted.error[fitted.step_size <= 10.0 * np.min(fitted.step_size)]
-        wrong = float(np.min(error))  # NaN, which is above nothing, where a run ended early
+        wrong = float(np.min(error))  # NaN if a run ended early; then the comparison below is false
         least = max(ABOVE * np.max(fitted.bound), TRUE_LIMIT, subject.rounding(subject.finest or 0.0))
         if error.size >= FEWEST and wrong > max(STAYS * np.max(error), least):
             why = f"however small its step, it goes to a motion that is wrong by {wrong:.1e} rad on {scene.name}"
@@ -194,24 +193,24 @@ def series_of(subject: Subject) -> Series | None:
 
 
 class Order(NamedTuple):
-    """What the errors of a method say about its order."""
+    """Errors of runs and the orders fitted to them."""
 
     scene: str
     tolerance: Array
-    step_size: Array  # mean ones of an adaptive method
-    error: Array  # of the attitude (or axis, where the chart has no attitude)
-    bound: Array  # of it
-    main: Fit  # of it, which decides
-    fits: dict[str, Fit]  # of it, theta and energy
+    step_size: Array  # mean step of an adaptive method
+    error: Array  # of the main quantity: attitude, or axis if the chart has no attitude
+    bound: Array  # of the reference for it
+    main: Fit  # for the main quantity; it decides
+    fits: dict[str, Fit]  # for the main quantity, theta and energy
 
     @property
     def measured(self) -> Measured:
-        """Its slope, if it can be judged."""
+        """The slope of the main quantity, or `NOTHING` if there is none."""
         fit = self.main
         return Measured("slope", fit.slope, text=str(fit)) if math.isfinite(fit.slope) else NOTHING
 
     def traces(self) -> dict[str, Array]:
-        """Steps, errors and which of them the slope is fitted to, (SHOWN,) from the finest on, padded with NaN."""
+        """Steps, errors and flags of those used in the fit, (SHOWN,) from the finest on, padded with NaN."""
         rank = np.argsort(self.step_size)[:SHOWN]
         columns = {"step_size": self.step_size, "error": self.error, "fitted": self.main.used.astype(float)}
         padded = np.full(SHOWN - rank.size, math.nan)
@@ -229,7 +228,7 @@ def measured_order(
     has_order = method.fixed_step and method.order is not None and not scene.of_body
     if has_order and not quick and method.implementation == "compiled":
         runs += [(find_scene(FALLBACK), nutations) for nutations in LONGER]
-    count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # steps that are chosen scatter
+    count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # errors of adaptive methods scatter
     most = FINEST[method.implementation] * (QUICK_SHARE if quick else 1.0) if finest is None else finest
     orders: list[Order] = []
     for problem, nutations in runs:
@@ -252,8 +251,8 @@ def _by_steps(subject: Subject) -> Finding:
     options: dict[str, Any] = {"quick": subject.quick, "finest": finest, "main": "theta" if subject.in_plane else ""}
     fitted = measured_order(method, scene, **options)
     if series and not fitted.measured and series.is_exact and series.order < (claim or 0):
-        # a method of high order is tried at long steps, whose errors fall as no power where the order is low, and the
-        # limit of its runs is extrapolated by a power that they do not have: it looks wrong
+        # for a high declared order the ladder has long steps, whose errors follow no power if the true order is low,
+        # and the limit is extrapolated by a power that errors do not have, and looks wrong
         method = replace(method, order=max(series.order, 1))
         fitted = measured_order(method, scene, **options)
     main, measured = fitted.main, fitted.measured
@@ -261,11 +260,11 @@ def _by_steps(subject: Subject) -> Finding:
     slopes = ", ".join(f"{name} {fit}" for name, fit in fitted.fits.items() if math.isfinite(fit.slope))
     slopes = f"slopes {slopes} on {fitted.scene}" if slopes else "no slope"
     power = method.order or 1
-    # runs of a step that has the motion's terms up to h^power, beyond doubt, go to the motion
+    # if a step certainly has the motion's terms up to h^power, its runs converge to the motion
     follows = series and series.order >= max(power, 1) and float(series.noise[1]) < CLEAR
     settled = measured or conditioning(scene, SHARE * scene.time_scale()) > UNSTABLE
     height = math.sin(generic_start(scene).theta)
-    pole = height if height <= APART else 1.0  # beside one angles know a state to 2e-16 over the square
+    pole = height if height <= APART else 1.0  # near a pole, a state in angles has an error of 2e-16 over the square
     if method.fixed_step and not (subject.in_plane or (settled and follows)):
         power = max(1, min(method.order or 99, round(main.slope))) if measured else power
         wrong, doubt = limit(method, scene, power, finest)
@@ -296,13 +295,13 @@ def _by_steps(subject: Subject) -> Finding:
 
 
 def _hidden(subject: Subject, why: str) -> str:
-    """Why an order could not be judged; that single precision hides errors is said first."""
+    """The reason why an order could not be judged, after that of single precision if it applies."""
     least = subject.rounding(subject.finest or 0.0)
     return hidden_by_single(least, why) if least else why
 
 
 def _converges(fitted: Order, slopes: str) -> Finding:
-    """Does the error fall with the tolerance, down to rounding?"""
+    """The finding on whether the error falls with the tolerance, down to rounding."""
     tolerances, errors = fitted.tolerance, fitted.error
     good, (decades, less) = np.isfinite(errors), FALLS
     if not good.any():
@@ -320,12 +319,11 @@ def _converges(fitted: Order, slopes: str) -> Finding:
 
 
 def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | None, slopes: str) -> Finding:
-    """The verdict on a declared order; the steps of an adaptive method, which has no `fits`, do not all scale alike.
+    """The finding on a declared order; `fits` is empty for an adaptive method, whose steps do not all scale alike.
 
-    Where the series shows the first wrong term, its order is that of the runs as h -> 0, so that a larger slope is one
-    of steps that are too long. A slope that is lower beyond its interval stands, as a run may meet what one step from
-    one point does not, and refutes the order if it is clearly another. One that is larger and no whole number is of no
-    order at all, and refutes none.
+    If the series has a first wrong term, its order is that of runs as h -> 0, and a larger slope comes from steps that
+    are too long. A lower slope, beyond its interval, counts, because a run may pass points with larger errors, and
+    refutes the order if it is clearly another. A larger slope that is no whole number is no order, and refutes none.
     """
     main, measured, verdict = fitted.main, fitted.measured, order_verdict(power, fitted.main, fits)
     value, resolution = main.slope, BESIDE + main.interval
@@ -360,12 +358,12 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
 
 
 def _below(fit: Fit, power: int, by: float) -> bool:
-    """Is a slope lower than the order by so much, beyond its interval?"""
+    """Is a slope with its interval lower than the order `power` by more than `by`?"""
     return fit.slope + fit.interval < power - by
 
 
 def _agree(fitted: Order, power: int) -> bool:
-    """Do the errors of the finest runs fall about as h^power, as far as they can be judged?"""
+    """Do the errors of the finest judgeable runs fall as h^power, within a factor `SPREAD`?"""
     h, error, bound = fitted.step_size, fitted.error, fitted.bound
     good = np.isfinite(error) & (error > ABOVE * bound) & (error < LARGEST_ERROR)
     finest = np.argsort(h[good])[:FINEST_RUNS]
@@ -374,9 +372,10 @@ def _agree(fitted: Order, power: int) -> bool:
 
 
 def limit(method: Integrator, scene: Scene, power: int, finest: float | None = None) -> tuple[float, float]:
-    """How far from the true motion runs of a method of order `power`, of `finest` steps at most, end as h -> 0.
+    """The distance from the true motion of the ends of runs as h -> 0, and its uncertainty by the extrapolation.
 
-    The larger of angle and momentum over the larger one, and what the extrapolation leaves in doubt.
+    The method has order `power`; runs have at most `finest` steps. The distance is the largest difference of the
+    chart's variables, momenta relative to the larger one.
     """
     fewest = STEPS.get(power, 200) // (1 if method.implementation == "compiled" else 20)
     fewest = fewest if finest is None else min(fewest, int(finest) // 4)
@@ -388,7 +387,7 @@ def limit(method: Integrator, scene: Scene, power: int, finest: float | None = N
         return aligned(step.chart, end, true) - true
 
     first, second, third = (signed_error(fewest * 2**k) for k in range(3))
-    # errors at h and h/2 without their term in h^power, then without that in h^(power + 1)
+    # eliminate the term in h^power, then that in h^(power + 1)
     coarse, fine = (b + (b - a) / (2.0**power - 1.0) for a, b in ((first, second), (second, third)))
     last = fine + (fine - coarse) / (2.0 ** (power + 1) - 1.0)
     size = [float(np.max(np.abs(value))) for value in (third, fine, last)]
@@ -396,7 +395,7 @@ def limit(method: Integrator, scene: Scene, power: int, finest: float | None = N
 
 
 def _exactness(subject: Subject) -> Finding:
-    """The errors of a method whose every step is said to be the motion itself, at steps of all sizes."""
+    """The finding on a method with exact steps, from the errors at steps of all sizes."""
     method, scene = subject.method, subject.scene
     horizon, main = NUTATIONS * scene.time_scale(), observable(method)
     finer = ladder(method, scene, horizon, 7 if subject.quick else 13, FINEST[method.implementation])
@@ -416,13 +415,13 @@ def table_of(method: Integrator) -> Conditions | None:
         rule = rule.rule if isinstance(rule, Scaled) else rule
         if isinstance(rule, Tableau):
             return conditions(triangle(rule.a, len(rule.b)), rule.b)
-        if isinstance(rule, Composition) and rule.turn == EXACT:  # a Cayley map is no flow
+        if isinstance(rule, Composition) and rule.turn == EXACT:  # a Cayley map is no exact flow
             return splitting_conditions(rule.drift, rule.kick, rule.gradient, rule.processor)
     return None
 
 
 def time_order(subject: Subject) -> list[Finding]:
-    """The finding on the order where f depends on the time."""
+    """The finding on the claim "time": the order for a right-hand side that depends on time."""
     if subject.autonomous or not (subject.method.fixed_step and subject.stepper.takes_field):
         why = "it was written for f(y)" if subject.autonomous else "it takes no right-hand side"
         return [inapplicable("time", why)]
@@ -443,7 +442,7 @@ def time_order(subject: Subject) -> list[Finding]:
         why = f"where f depends on t, {series.words(power)}"
     elif subject.knows_top:
         return [inapplicable("time", "it knows equations of the top beside f, which depend on no time")]
-    elif calls == {BEGIN * subject.scene.time_scale()}:  # a step for f(y): no fault on a top
+    elif calls == {BEGIN * subject.scene.time_scale()}:  # a step for f(y), which is no fault
         declared, measured = "", Measured("f(y) only", lower, text=f"f(y) only, {lower}")
         why = "f is asked at the start of a step alone, which is right for f(y); where f depends on t, "
         why += series.wrong_term()
@@ -456,7 +455,7 @@ def time_order(subject: Subject) -> list[Finding]:
 
 
 class Hastened:
-    """y' = g'(t) f(y) on the axis, by a clock with a and w; it keeps the times it sees."""
+    """The right-hand side g'(t) f(y) in the axis chart, for a clock with a, w and t0; `times` collects its calls."""
 
     def __init__(self, par: Any, uneven: float, rate: float, begin: float) -> None:
         self.par, self.uneven, self.rate, self.begin = par, uneven, rate, begin
@@ -471,7 +470,7 @@ class Hastened:
 
 
 def series_by_clock(subject: Subject, uneven: float) -> tuple[Series, set[float]]:
-    """The series of a step by a clock that is so `uneven`, of several if the first is a start, and when f is asked."""
+    """The series of a step (or several, if a multistep method) with a clock of a = `uneven`; the times of f's calls."""
     scene, start, scale = subject.scene, generic_start(subject.scene), subject.scene.time_scale()
     begin, rate, unit = BEGIN * scale, 2.0 * math.pi * WAVES / scale, np.repeat([1.0, unit_of(scene)], 3)
     par, state = FORMULATIONS["axis"].prepare(scene.top, start)

@@ -1,4 +1,4 @@
-"""The order conditions of a Butcher table and of a splitting: the order of a method without a run.
+"""The order conditions of a Butcher table and of a splitting, which give the order of a method without a run.
 
 *Rooted trees.* A Runge-Kutta method with the table (A, b) has order p if and only if, for every rooted tree t of at
 most p vertices,
@@ -6,8 +6,8 @@ most p vertices,
     sum_i b_i Phi_i(t) = 1/gamma(t),        Phi_i([t1 .. tm]) = prod_k sum_j a_ij Phi_j(tk),        Phi_i(.) = 1,
 
 with the density gamma([t1 .. tm]) = |t| gamma(t1) .. gamma(tm). There are 1, 1, 2, 4, 9, 20 trees of 1 .. 6 vertices.
-A tree is the sorted tuple of the trees at its root. The conditions are those of order for every equation: one that has
-a higher order on the top alone (whose f is quadratic in the space frame) is not seen here.
+A tree is the sorted tuple of the trees at its root. The conditions are those for all equations; a method may have a
+higher order on the top (whose f is quadratic in the space frame).
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, theorem II.2.13.
 
 *Splitting.* A step exp(b_0 h V) exp(a_1 h T) exp(b_1 h V) ... exp(b_n h V) is the exponential of one element of the
@@ -15,8 +15,8 @@ free Lie algebra of T and V (Baker, Campbell, Hausdorff), and of order p if and 
 
     log(step) = h (T + V) + O(h^(p + 1)).
 
-Here every kick V commutes with W = [V, [V, T]], which depends on position alone: what holds in the free algebra needs
-to hold only beside what vanishes with [V, W]. There are 2, 1, 2, 2, 4, 5, 10, 14, 25, 39 conditions of the orders 1 to
+Here every kick V commutes with W = [V, [V, T]], which depends on position alone: the condition needs to hold only
+modulo the ideal that [V, W] generates. There are 2, 1, 2, 2, 4, 5, 10, 14, 25, 39 conditions of the orders 1 to
 10, against 2, 1, 2, 3, 6, 9, 18, 30, 56, 99 in the free algebra. A kick with a gradient is exp(b h V + c h^3 W), a
 processor k is exp(k h^2 [T, V]) before the step and its inverse after it. The series are kept as coefficients of the
 words in T and V, 2^k of length k.
@@ -33,14 +33,14 @@ from numpy.typing import ArrayLike
 
 from symtop.model.charts import Array
 
-MET = 1e-12  # a condition that is off by less is met: coefficients come with 15 digits or more
-MOST = 6  # vertices of the trees that are tried
+MET = 1e-12  # a condition is met if its defect is smaller: coefficients have 15 digits or more
+MOST = 6  # vertices of the largest trees
 
 Tree = tuple[Any, ...]
 
 
 class Conditions(NamedTuple):
-    """What the conditions of a table are off by: the largest of each number of vertices, from 1 on."""
+    """The largest defect of the conditions of each order, from 1 on."""
 
     defect: tuple[float, ...]
 
@@ -50,7 +50,7 @@ class Conditions(NamedTuple):
         return next((k for k, value in enumerate(self.defect) if not value <= MET), len(self.defect))
 
     def words(self, power: int) -> str:
-        """What they say of the order `power`."""
+        """A clause on whether the conditions up to order `power` are met."""
         if self.order < min(power, len(self.defect)):
             return f"its table misses a condition of order {self.order + 1} by {self.defect[self.order]:.1e}"
         shown = min(power, len(self.defect))
@@ -59,12 +59,12 @@ class Conditions(NamedTuple):
 
 @functools.cache
 def trees(vertices: int) -> tuple[Tree, ...]:
-    """All rooted trees of so many vertices."""
+    """All rooted trees with that number of vertices."""
     return tuple(dict.fromkeys(tuple(sorted(forest)) for forest in _forests(vertices - 1, vertices - 1)))
 
 
 def _forests(vertices: int, largest: int) -> Iterator[tuple[Tree, ...]]:
-    """Trees of at most `largest` vertices each, so many together."""
+    """Forests with `vertices` vertices in all, of trees of at most `largest` vertices."""
     if vertices == 0:
         yield ()
     for first in range(min(vertices, largest), 0, -1):
@@ -107,8 +107,8 @@ def triangle(entries: ArrayLike, stages: int) -> np.ndarray:
     return matrix
 
 
-LONGEST_WORD = 10  # the highest order that is tried
-RANK = 1e-9  # of a direction: shorter is none
+LONGEST_WORD = 10  # the highest order of the conditions
+RANK = 1e-9  # singular values below this are zero
 
 Words = list[Array]  # coefficients of the words of length 0, 1, 2 ..., shapes (1,), (2,), (4,) ...; T is 0 and V is 1
 
@@ -151,17 +151,17 @@ def logarithm(words: Words) -> Words:
 
 @functools.cache
 def vanishing(length: int) -> Array:
-    """An orthonormal basis of the words' combinations of a length that are zero here, shape (2^length, rank).
+    """An orthonormal basis of the combinations of words of a length that vanish here, shape (2^length, rank).
 
-    They are the brackets with more than one V beyond the number of T: by degrees in the momenta, a bracket takes one
-    away, T has two of them and V none.
+    They are spanned by brackets whose number of V exceeds that of T by more than one: T is of degree two in the
+    momenta, V of degree zero, and each bracket lowers the degree by one.
     """
     return np.concatenate([_vanishing(length, letters) for letters in range(length + 1)], axis=1)
 
 
 @functools.cache
 def _vanishing(length: int, letters: int) -> Array:
-    """The same with so many V."""
+    """The same basis for words with `letters` letters V."""
     columns: list[Array] = []
     if length >= 4 and 0 <= letters <= length:
         columns += [_spread(column, 0) for column in _vanishing(length - 1, letters).T]
@@ -185,7 +185,7 @@ def _spread(column: Array, letter: int) -> Array:
 def splitting_conditions(
     drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] = (), processor: float = 0.0
 ) -> Conditions:
-    """What the conditions of a table are off by: the largest coefficient of each length that must vanish and does not.
+    """The defects of the conditions of a splitting: the largest coefficient of each length that must vanish.
 
     `drift`, `kick` (kick[0] comes first), `gradient` and `processor` are those of `symtop.composition`.
     """

@@ -1,16 +1,16 @@
-"""The power series of a step beside that of the motion: the order of a method without a run.
+"""The power series of a step compared with that of the motion, which gives the order of a method from one step.
 
 One step of h from a generic point z of the true motion ends at Y(h), the motion at y(h). Both are analytic in h, and
 
     Y(h) - y(h) = sum_k c_k h^k,        order p  <=>  c_0 = ... = c_p = 0  <=>  the order conditions up to p hold.
 
-Y - y is sampled at Chebyshev points of [-H, H] and fitted by the polynomial that leaves only noise. The points are of
-[0, H] where a solver makes no step backwards, or one of another function, which no polynomial fits together with the
-steps forwards. The defect of a term is |c_k| / |y_k|, y_k the same term of the motion: what an order condition is off
-by, relative to itself. Slopes do not see a small defect: a coefficient of a fourth-order method that is off by 3e-8 has
+Y - y is sampled at Chebyshev points of [-H, H] and fitted by the polynomial of least degree that leaves only noise. The
+interval is [0, H] if a solver makes no step backwards, or if its steps backwards are another function of h, so that no
+polynomial fits both. The defect of a term is |c_k| / |y_k|, y_k the same term of the motion: the relative defect of an
+order condition. Slopes do not show a small defect: with a coefficient that is off by 3e-8 a fourth-order method has
 slope 4.03 in double precision, and here the h^3 term is off by 1e-8 with a noise of 1e-13.
 
-What a run carries from step to step is not seen in one step from a start; `step_map.restart_gap` tells such methods.
+Data carried from step to step in a run are not seen in one step; `step_map.restart_gap` detects such methods.
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, III.1 (the elementary differentials of a step).
 """
 
@@ -28,44 +28,44 @@ from symtop.measure.step_map import StepMap, aligned
 from symtop.model.charts import Array
 from symtop.model.top import Angles
 
-NODES = 40  # an even number: no step of length zero
-WIDEST = 0.16  # of a nutation: the largest H that is tried
-NARROWER, TRIES = 0.6, 7
-DEGREES = range(4, 25)
-LEAST_POWER = 6  # of the powers of h that are shown
-FURTHER = 2  # degrees more: by what they change a term is in doubt, as by the scatter
-NOISE = 1.25  # times the least: the polynomial of least degree whose residual is as small as this is taken
-CLEAN = 3e-14  # of a residual: nothing is gained with a smaller H
-ROUGH, SMOOTH = 1e-12, 0.01  # of a residual: beyond the one, and so much smaller forwards, -h is another function
-SAMPLE_ROUNDING = 2e-16  # of a sample
-SURE = 10.0  # times its noise: a term is there
-AGREES = 1e-10  # a smaller defect is none: difference quotients in a step leave 1e-11, coefficients 1e-12
-SHARP = 1e-3  # of a term of the motion: a noise beyond it says nothing about the term
+NODES = 40  # an even number, so that no step has length zero
+WIDEST = 0.16  # nutations: the largest H that is tried
+NARROWER, TRIES = 0.6, 7  # ratio of one H to the one before; number of them
+DEGREES = range(4, 25)  # of the polynomials that are tried
+LEAST_POWER = 6  # least degree of the series
+FURTHER = 2  # higher degrees of a second fit: its difference is an uncertainty of a term, as is the scatter
+NOISE = 1.25  # times the least residual: the polynomial of least degree with a residual below this is taken
+CLEAN = 3e-14  # a residual below this does not improve with a smaller H
+ROUGH, SMOOTH = 1e-12, 0.01  # residual above which [0, H] is tried; used if its residual is less by this factor
+SAMPLE_ROUNDING = 2e-16  # rounding error of a sample
+SURE = 10.0  # times the noise: a larger defect of a term counts
+AGREES = 1e-10  # a smaller defect does not: difference quotients in a step leave 1e-11, coefficients 1e-12
+SHARP = 1e-3  # relative: a term with more noise is not resolved
 
 
 class Series(NamedTuple):
-    """The terms of a step beside those of the motion."""
+    """The terms of the series of a step compared with those of the motion."""
 
     width: float  # H
     defect: Array  # |c_k| / |y_k|, k = 0 ...
-    noise: Array  # what the samples leave in doubt of each
+    noise: Array  # uncertainty of each defect
     backward: bool  # were steps of -h taken?
     chart: str
 
     @property
     def resolved(self) -> int:
-        """The highest power up to which every term can be told from none."""
+        """The highest power up to which every term is known to better than `SHARP`."""
         return int(np.argmin([*(self.noise < SHARP), False])) - 1
 
     @property
     def order(self) -> int:
-        """The power up to which the terms are those of the motion, at most `resolved`."""
+        """The power up to which the terms agree with those of the motion, at most `resolved`."""
         wrong = self.defect > np.maximum(AGREES, SURE * self.noise)
         return min(int(np.argmax([*wrong, True])) - 1, self.resolved)
 
     @property
     def is_exact(self) -> bool:
-        """Is the order known, by a first term that is not the motion's? Else it may be higher."""
+        """Is there a first wrong term, which fixes the order? Otherwise the order may be higher."""
         return self.order < self.resolved
 
     def worst(self, power: int) -> float:
@@ -73,24 +73,24 @@ class Series(NamedTuple):
         return float(np.max(self.defect[: min(power, self.resolved) + 1], initial=0.0))
 
     def least(self, power: int) -> float:
-        """The least defect of the h^power term, or of the last one that is there, that is told from none."""
+        """The least defect of the h^power term, or of the last term, that counts."""
         return max(AGREES, SURE * float(self.noise[min(power, self.noise.size - 1)]))
 
     def words(self, power: int) -> str:
-        """What it says of the order `power`."""
+        """A clause on whether the series has the order `power`."""
         agreed, ahead = min(power, self.order), "" if self.backward else " (a step of -h is not taken)"
         if agreed < min(power, self.resolved):
             return f"{self.wrong_term()}, in the {self.chart} chart{ahead}"
         return f"a step has the motion's terms up to h^{agreed} to {max(self.worst(agreed), 1e-16):.0e}{ahead}"
 
     def wrong_term(self) -> str:
-        """The first term that is not the motion's, if there is one."""
+        """A clause on the first term that differs from that of the motion; there must be one."""
         term = self.order + 1
         return f"the h^{term} term of a step is off by {self.defect[term]:.1e} of itself (noise {self.noise[term]:.0e})"
 
 
 def step_series(step: StepMap, start: Angles, period: float) -> Series:
-    """The series of a step from a point of a motion with that nutation period; SymtopError if no step succeeds."""
+    """The series of a step from `start`, a point of a motion of that nutation period; SymtopError if all steps fail."""
     z, before = step.point(start), step.at(start)
     return compared(lambda h: aligned(step.chart, step.image(z, h), before), step.motion(start), period, step.chart)
 
@@ -98,7 +98,7 @@ def step_series(step: StepMap, start: Angles, period: float) -> Series:
 def compared(
     image: Callable[[float], Array], motion: Callable[[float], Array], period: float, chart: str = ""
 ) -> Series:
-    """The series of one function of h beside that of another, both (n,) of one chart and of order one."""
+    """The series of the function `image` of h compared with that of `motion`, both (n,) in one chart, of size one."""
     ahead = functools.partial(_narrowed, image, motion, period, chart, backward=False)
     try:
         scatter, series = ahead(backward=True)
@@ -111,7 +111,7 @@ def compared(
 
 
 def _narrowed(image: Any, motion: Any, period: float, chart: str, *, backward: bool) -> tuple[float, Series]:
-    """The fit of the least noise that narrower intervals give, and its noise."""
+    """The scatter and the series of the fit with least scatter among narrower and narrower intervals."""
     width, best = WIDEST * period, None
     refusal = SymtopError("no step succeeds")
     for _ in range(TRIES):
@@ -133,13 +133,13 @@ def _narrowed(image: Any, motion: Any, period: float, chart: str, *, backward: b
 def _fitted(
     image: Callable[[float], Array], motion: Callable[[float], Array], width: float, chart: str, *, backward: bool
 ) -> tuple[float, Series]:
-    """The noise of a fit over [-width, width], or [0, width], and the series that it finds."""
+    """The scatter and the series of a fit over [-width, width], or over [0, width]."""
     nodes = np.cos(math.pi * (np.arange(NODES) + 0.5) / NODES)
     places = nodes if backward else 0.5 * (nodes + 1.0)
     exact = np.stack([motion(width * float(place)) for place in places])
     error = np.stack([image(width * float(place)) for place in places]) - exact
     with np.errstate(over="ignore"):
-        squares = error * error  # as the fits need them
+        squares = error * error  # the fits need finite squares
     if not np.isfinite(squares).all():
         raise SymtopError("a step is not finite")
     scatter, degree = _degree(nodes, error)
@@ -153,13 +153,13 @@ def _fitted(
     moved = np.max(np.abs(finer[: power + 1] - terms), axis=1)
     weights = np.full(power + 1, 2.0 / NODES)
     weights[0] = 1.0 / NODES
-    grown = np.sqrt((_to_powers(power, backward=backward) ** 2) @ weights)  # what a scatter of one makes of each power
+    grown = np.sqrt((_to_powers(power, backward=backward) ** 2) @ weights)  # of each power, by a scatter of one
     doubt = np.maximum(scatter * grown, moved)
     return scatter, Series(width, np.max(np.abs(terms), axis=1) / size, doubt / size, backward, chart)
 
 
 def _degree(nodes: Array, values: Array) -> tuple[float, int]:
-    """The residual (root mean square of the worst component) and the least degree of a polynomial that leaves it."""
+    """The least residual of a fit (root mean square of the worst component), and the least degree that reaches it."""
     rows = []
     for degree in DEGREES:
         rest = values - chebyshev.chebval(nodes, chebyshev.chebfit(nodes, values, degree)).T

@@ -1,12 +1,13 @@
-"""The symplectic, the symmetric and the pole claim: one step, and a run through theta = 0.
+"""The claims of symplecticity, symmetry and the pole, measured on one step and on a run through theta = 0.
 
-What a step does to the bracket, and whether it retraces itself, is measured by `symtop.measure.step_map` in every chart
-of a method. A chart says no if the defect stands out of what the differencing leaves in doubt, yes if it is none, and
-nothing between. The answer is no if any chart says no, yes if one says yes and none no. A no is asked again at half the
-step, where it is smaller by a power of two: one that has all but gone was of an iteration that did not converge.
+Whether a step preserves the Poisson bracket, and whether it is symmetric, is measured by `symtop.measure.step_map` in
+every chart of a method. The answer of a chart is no if the defect is clearly above the error of the differencing, yes
+if it is negligible, and undecided between. A method fails if one chart fails, and passes if one passes and none fails.
+A failure is measured again at half the step, where a true defect is smaller by a power of two; a defect that almost
+vanishes there came from an iteration that had not converged.
 
-At the pole the axis passes theta = 0 exactly, and must come out right on the other side. A method in the space frame
-claims to pass, one in angles claims nothing; both are run, with a step and with half of it.
+For the pole, a run goes through theta = 0 exactly, and must continue correctly on the other side. A method in the space
+frame claims to pass, one in angles claims nothing; both are run, with a step and with half of it.
 
 A map of (theta, p_theta) is symplectic if it keeps the area, {theta, p_theta} = 1; p_theta is in units of the larger
 momentum.
@@ -31,18 +32,18 @@ from symtop.model.scenes import Scene
 from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.run.simulation import simulate
 
-SYMPLECTIC = 1e-9  # a smaller defect of the bracket is none
-MET = 1e-8  # a larger one is one, if it stands out of its noise
-STANDS = 0.2  # the raw defect of a symplectic map falls to 1/256 over the widths
-LOST = 1e-3  # of the noise: beside a pole in angles large slopes cancel, and leave such a defect at any width
-RETURNED = 1e-10  # a return as close as this is exact
-MISSED = 1e-8
-GONE = 4096.0  # times smaller at half the step, as of order 12
-BRACKET_UNITS, RETURN_UNITS = 8.0, 64.0  # of single precision: in a difference of two steps, in a step forth and back
+SYMPLECTIC = 1e-9  # a smaller defect of the bracket is zero
+MET = 1e-8  # a larger defect counts, if it is above its noise
+STANDS = 0.2  # ratio of raw defects, finest to widest, above which one counts; that of a symplectic map is 1/256
+LOST = 1e-3  # of the noise: a smaller raw defect does not count; near a pole, large slopes in angles leave one
+RETURNED = 1e-10  # a step forth and back that ends nearer to its start is symmetric
+MISSED = 1e-8  # one that ends farther away is not
+GONE = 4096.0  # a defect vanishes if it is so many times smaller at half the step: 2^12, as of order 12
+BRACKET_UNITS, RETURN_UNITS = 8.0, 64.0  # single-precision epsilons in a difference of two steps, and forth and back
 ONE_MAP = 1e-9  # two steps are twice one step within this
-DRAWS, DRAWING = (8, 4), (10.0, 2.0)  # starts that are drawn, and seconds for them; the second with --quick
+DRAWS, DRAWING = (8, 4), (10.0, 2.0)  # random starts, and seconds for them; the second if `quick`
 POLE_STEPS = 400
-POLE_RIGHT = 1e-7  # rad: right, whatever the step
+POLE_RIGHT = 1e-7  # rad: a smaller error is right, whether or not it falls with the step
 # the axis passes theta = 0 exactly: I1 = I3 = mgl = 1, w3 = 1, p_phi = p_psi, theta' = -1.2 at theta = 1
 _POLE_RATE = 0.5 / math.cos(0.5) ** 2
 _POLE_START = Angles(theta=1.0, theta_dot=-1.2, phi_dot=_POLE_RATE, psi_dot=1.0 - _POLE_RATE * math.cos(1.0))
@@ -52,7 +53,7 @@ Answer = tuple[bool | None, float, float, str]  # of a chart: yes, no or neither
 
 
 def measure(subject: Subject) -> list[Finding]:
-    """The findings on symplectic and symmetric."""
+    """The findings on the claims "symplectic" and "symmetric"."""
     by_claim: dict[str, list[Finding]] = {"symplectic": [], "symmetric": []}
     for chart in subject.charts:
         answers: list[Answer] = []
@@ -78,7 +79,7 @@ def measure(subject: Subject) -> list[Finding]:
 
 @dataclass(frozen=True)
 class Plane(maps.StepMap):
-    """The map of a step in the plane, of which the angles chart shows theta and p_theta: these are z and Y alike."""
+    """The map of a step in the plane (theta, p_theta), run in the angles chart; both z and Y are (theta, p_theta)."""
 
     momenta: Momenta
 
@@ -87,7 +88,7 @@ class Plane(maps.StepMap):
         return np.asarray(state[:2] / np.array([1.0, self.unit]))
 
     def angles(self, z: Array) -> Angles:
-        """The start that a point stands for, phi and psi zero."""
+        """The start at a point z, with phi = psi = 0."""
         whole = [float(z[0]), 0.0, 0.0, self.unit * float(z[1]), self.momenta.p_phi, self.momenta.p_psi]
         return maps.angles_at(self.top, np.array(whole))
 
@@ -101,7 +102,7 @@ class Plane(maps.StepMap):
 
 
 def map_of(subject: Subject, chart: str) -> tuple[maps.StepMap, Angles]:
-    """The map at a step so large that its structure shows, and the point to judge it at; it may refuse to be made."""
+    """The map of a step large enough to show a defect, and the start to judge it at; SymtopError if there is none."""
     if not subject.in_plane:
         return maps.step_map(subject.method, chart, subject.scene)
     scene, start = subject.scene, maps.generic_start(subject.scene)
@@ -115,9 +116,9 @@ def _badness(one: Finding) -> tuple[int, float]:
 
 
 def _answer_at(ask: Callable[..., Answer], step: maps.StepMap, start: Angles, *traces: dict[str, Any]) -> Answer:
-    """What `ask` answers at a step; at half of it where a no all but goes: its own iteration has not converged."""
+    """The answer of `ask` at a step, or that at half the step if a defect vanishes there (iteration not converged)."""
     answer = ask(step, start, *traces)
-    falls = step.method.explicit and 2.0 ** (step.method.order or 0) >= GONE  # as fast without an iteration
+    falls = step.method.explicit and 2.0 ** (step.method.order or 0) >= GONE  # a true defect falls as fast
     if answer[0] is False and step.method.fixed_step and not falls:
         with contextlib.suppress(SymtopError):
             finer = ask(replace(step, h=0.5 * step.h), start)
@@ -131,7 +132,7 @@ def _bracket(step: maps.StepMap, start: Angles, traces: dict[str, Any] | None = 
         traces.update(defect_width=defect.widths, bracket_defect=defect.raw)
     floor = max(3.0 * defect.noise, 1e-12)
     shrinks = f"from {defect.raw[0]:.0e} to {defect.raw[-1]:.0e} at a 16th of the width; noise {defect.noise:.0e}"
-    foreign = step.own("onward") is not None  # of several steps, perhaps: then the first is not its own
+    foreign = step.own("onward") is not None  # perhaps a multistep method, whose first step is another method's
     if defect.size <= min(SYMPLECTIC, floor) and defect.noise <= SYMPLECTIC and not (foreign and gap > ONE_MAP):
         return True, defect.size, floor, f"defect of the bracket {defect.size:.0e} (it falls {shrinks})"
     if gap > ONE_MAP:
@@ -153,7 +154,7 @@ def _returned(step: maps.StepMap, start: Angles) -> Answer:
 
 
 def _elsewhere(subject: Subject, step: maps.StepMap, answers: list[Answer]) -> list[Answer]:
-    """The answers, or a no that a step gives at a start, on a top, that is drawn at random, where they are yes."""
+    """The answers, with each yes replaced by a no that is measured at a random start."""
     for name, scene in subject.elsewhere(DRAWS, DRAWING) if answers[0][0] or answers[1][0] else ():
         with contextlib.suppress(SymtopError):
             trial = maps.one_step(step.method, step.chart, scene, maps.SHARE * scene.time_scale())
@@ -165,7 +166,7 @@ def _elsewhere(subject: Subject, step: maps.StepMap, answers: list[Answer]) -> l
 
 
 class Passage(NamedTuple):
-    """What a method did in one chart when the axis passed a pole."""
+    """The run of a method in one chart in which the axis passes a pole."""
 
     chart: str
     outcome: str
@@ -175,12 +176,12 @@ class Passage(NamedTuple):
 
     @property
     def passes(self) -> bool:
-        """Did it come out on the other side, with an error that falls with the step?"""
+        """Did it reach the end, with a small error or one that falls with the step?"""
         return self.outcome == "ok" and (self.finer < 0.7 * self.error or self.finer < self.right)
 
     @property
     def word(self) -> str:
-        """The same in a word."""
+        """The result in a word: "passes", "wrong" or "ends there"."""
         return "passes" if self.passes else "wrong" if self.outcome == "ok" else "ends there"
 
     def __str__(self) -> str:
@@ -189,7 +190,7 @@ class Passage(NamedTuple):
 
 
 def passages(method: Integrator, right: float = POLE_RIGHT) -> list[Passage]:
-    """What happens at a pole, in every chart of the method; an error below `right` (rad) is none."""
+    """Run a method through a pole in each of its charts; an error below `right` (rad) is negligible."""
     rows = []
     for chart in method.charts():
         settings = [max(tolerance, method.least_tolerance) for tolerance in (1e-6, 1e-7)]
@@ -205,7 +206,7 @@ def passages(method: Integrator, right: float = POLE_RIGHT) -> list[Passage]:
 
 
 def pole(subject: Subject) -> list[Finding]:
-    """The finding on the pole; of a bare step it is measured alone, for its chart may be the simplest and no claim."""
+    """The finding on the pole; for a bare step it is measured without a claim, because its chart implies none."""
     right = max(POLE_RIGHT, subject.rounding(2.0 * POLE_STEPS))
     claim, rows = "" if subject.stepper else declared(subject.method, "pole"), passages(subject.method, right)
     relevant = [one for one in rows if one.chart != "angles"] or rows

@@ -1,10 +1,9 @@
-"""What is judged: a registered integrator or a bare step, with the scene, its claims and how far its runs may go.
+"""The subject of a judgement: a registered integrator or a bare step, with the scene, its claims and limits of runs.
 
-How much a bare step may run follows from the seconds that it takes, so that a method in Python is judged in a minute
-and a compiled one in seconds; the findings name the steps that were run. A registered integrator runs as far as its
-implementation is given by default.
+The length of runs follows from the time of one step, so that a bare step in Python is judged in a minute and a compiled
+one in seconds; the findings name the numbers of steps. For a registered integrator its implementation decides.
 
-A bare step is given as a function, a class, a solver, a file or a command; its adapter is chosen by what it is.
+A bare step is given as a function, a class, a solver, a file or a command, which selects its adapter.
 """
 
 import functools
@@ -32,44 +31,44 @@ from symtop.run.plugins import execute, python_file
 
 ON_BODY = ("ode", "rotation", "scipy")  # the forms of a step that are judged on a body without symmetry
 ARGUMENTS = {"ode": "(f, t, y, h)", "separable": "(state, h, dT, dV)", "rotation": "(q, w, h, inertia, torque)"}
-OWN_CHART = {"separable": "", "rotation": "attitude"}  # of forms that have no other
+OWN_CHART = {"separable": "", "rotation": "attitude"}  # the only chart of a form
 LIBRARIES = (".so", ".dylib", ".dll")
 CONSTANTS = (*MOTION, "axis_length")
 KEEPING = ("splitting", "discrete-lagrangian", "lie-group")  # families that keep the momentum of a body
 PLANE = "nutation"  # the chart of a map of (theta, p_theta)
-LONG, SLOPES = (10.0, 2.5), (6.0, 1.5)  # seconds of a long run and of the runs of the order; the second with --quick
+LONG, SLOPES = (10.0, 2.5), (6.0, 1.5)  # seconds of a long run and of the runs for the order; the second if `quick`
 STEPS = 1_000_000  # most steps of a long run
-SAMPLES = 4000  # intervals of a long run: a program that writes every so many steps needs a multiple
-FINEST = {"compiled": 2e5, "python": 1e4}  # most steps of a run of the order
-FEWEST = 300  # steps of the longest run of the order, however slow
-SINGLE = 1000  # most of them in single precision, whose rounding hides what more would show
-LADDER = 2.5  # times the steps of the longest run: what all of them take
-ENOUGH_STEPS, AT_REST = 50.0, 1e-9  # steps a nutation with a right-hand side of zero, and how far they may go
-STEPS_A_NUTATION = 118.02  # of a long run, and of the steps that are timed: an implicit one costs more if it is long
-ENOUGH, LEAST = 0.03, 1e-9  # seconds after which the time of a step is known, and the least that it is
+SAMPLES = 4000  # intervals of a long run; its steps are a multiple, for a program writes every `stride` steps
+FINEST = {"compiled": 2e5, "python": 1e4}  # most steps of a run for the order
+FEWEST = 300  # steps of the longest run for the order, however slow a step is
+SINGLE = 1000  # most steps of it in single precision, whose rounding hides smaller errors
+LADDER = 2.5  # ratio of the steps of all runs for the order to those of the longest
+ENOUGH_STEPS, AT_REST = 50.0, 1e-9  # steps per nutation with a zero right-hand side; the largest relative move
+STEPS_A_NUTATION = 118.02  # of a long run, and of timed steps, because the cost of an implicit step depends on its size
+ENOUGH, LEAST = 0.03, 1e-9  # seconds of a run that suffice to time a step; the least time assumed of a step
 
 
 def rest(_: float, y: Any) -> Any:
-    """y' = 0, as a right-hand side."""
+    """The right-hand side of y' = 0."""
     return np.zeros(np.shape(y))
 
 
 @dataclass(frozen=True)
 class Subject:
-    """An integrator with its claims; what a figure shows of its measurements goes into `traces`."""
+    """An integrator with its claims; measurements add data for figures to `traces`."""
 
     method: Integrator
     scene: Scene
     quick: bool = False
-    stepper: Any = None  # a `Stepper`, of a bare step
+    stepper: Any = None  # the `Stepper` of a bare step
     seconds_a_step: float = 0.0
-    seed: int = 0  # of the starts, times and steps that are drawn
-    autonomous: bool = False  # was a step written for f(y)?
+    seed: int = 0  # of the random starts, times and steps
+    autonomous: bool = False  # was the step written for y' = f(y)?
     traces: dict[str, Any] = field(default_factory=dict)
 
     @property
     def kind(self) -> str:
-        """Whatever steps a "body" without symmetry; on a top a bare "step" or a registered "integrator"."""
+        """The kind of subject: "body" if the scene is one; else "step" for a bare step, or "integrator"."""
         return "body" if self.scene.of_body else "step" if self.stepper else "integrator"
 
     @property
@@ -79,7 +78,7 @@ class Subject:
 
     @functools.cached_property
     def knows_top(self) -> bool:
-        """Does it move a state where f is zero? A method for y' = f(t, y) alone does not: this one knows the top."""
+        """Does the step move a state although f is zero? Then it uses equations of the top besides f."""
         if self.stepper is None or not self.stepper.takes_field or self.method.adaptive:
             return False
         h = self.scene.time_scale() / ENOUGH_STEPS
@@ -91,7 +90,7 @@ class Subject:
         return not np.max(np.abs(end - y)) <= AT_REST * np.max(np.abs(y))
 
     def elsewhere(self, draws: tuple[int, int], seconds: tuple[float, float]) -> Iterator[tuple[str, Scene]]:
-        """Starts that are drawn, named, every other one late, while draws and seconds last; the second with --quick."""
+        """Random starts as (description, scene), up to a number and seconds (usual, quick); every other one is late."""
         began, draw, stepper = time.monotonic(), np.random.default_rng(self.seed), self.stepper or Stepper()
         scenes = drawn(self.scene, draws[self.quick], self.seed, same_top=self.knows_top)
         try:
@@ -105,12 +104,12 @@ class Subject:
 
     @property
     def charts(self) -> tuple[str, ...]:
-        """The charts in which a step is looked at."""
+        """The charts in which one step is measured; the last only if `quick`."""
         return (PLANE,) if self.in_plane else self.method.charts()[-1 if self.quick else 0 :]
 
     @property
     def long_steps(self) -> float | None:
-        """The most steps of a long run; None for what an implementation is given."""
+        """The most steps of a long run; None for the default of the implementation."""
         if not self.seconds_a_step:
             return None
         steps = min(LONG[self.quick] / self.seconds_a_step, STEPS)
@@ -118,7 +117,7 @@ class Subject:
 
     @property
     def finest(self) -> float | None:
-        """The most steps of a run of the order; None for what an implementation is given."""
+        """The most steps of a run for the order; None for the default of the implementation."""
         if not self.seconds_a_step:
             return None
         steps = min(SLOPES[self.quick] / self.seconds_a_step / LADDER, FINEST[self.method.implementation])
@@ -126,29 +125,29 @@ class Subject:
 
     @functools.cached_property
     def single(self) -> bool:
-        """Are the numbers of a bare step those of single precision?"""
+        """Does a bare step compute in single precision?"""
         if self.stepper is None or not self.method.fixed_step:
             return False
         scene = self.scene
         state, run = self.stepper.from_start(scene.top, generic_start(scene), scene.time_scale() / STEPS_A_NUTATION)
         end = run(state, 1)[0]
-        with np.errstate(over="ignore"):  # of a step that blows up, whose numbers single precision does not hold
+        with np.errstate(over="ignore"):  # a step may blow up beyond the range of float32
             return bool((end == end.astype(np.float32)).all() and not (state == state.astype(np.float32)).all())
 
     def rounding(self, steps: float) -> float:
-        """What rounding to single precision, if it is that, may leave of so many steps, relative: a unit each."""
+        """The relative rounding error of `steps` steps in single precision, one epsilon each; 0 in double precision."""
         return steps * float(np.finfo(np.float32).eps) * self.single
 
 
 def hidden_by_single(size: float, why: str) -> str:
-    """Why a claim is undecided, with the size below which single precision hides an error."""
+    """The reason of an undecided claim, with the size of errors that single precision hides."""
     return f"single precision hides errors below about {size:.0e}: {why}"
 
 
 def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
-    """Seconds a step, from runs of more and more steps without what a run costs at its start; SymtopError without one.
+    """Seconds per step, from runs of growing length less the time of a start; SymtopError if no step can be made.
 
-    A run that blows up is no longer than its last finite state: then the longest run before it is timed, start and all.
+    If a run blows up, the longest one before it is timed, with its start.
     """
     start, run = stepper.from_start(scene.top, generic_start(scene), scene.time_scale() / STEPS_A_NUTATION)
 
@@ -161,22 +160,22 @@ def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
     while True:
         cost, finite = seconds(4 * steps)
         steps *= 4 if finite else 1
-        if not finite or cost - first > max(ENOUGH, first) or steps > 1e7:  # a start's cost scatters as much as it is
-            # others may have been at work, and a clock that leaves waiting out may hear of what is past
+        if not finite or cost - first > max(ENOUGH, first) or steps > 1e7:  # a start's time scatters by its own size
+            # the median, because other processes disturb, and the count of waiting time may lag behind
             cost = sorted(seconds(steps)[0] for _ in range(3))[1]
-            # the start alone may have been disturbed
+            # at least half, because the run that timed the start may have been disturbed
             return max(cost - first * finite, 0.5 * cost, LEAST * steps) / steps
 
 
 def declared(method: Integrator, claim: str) -> str:
-    """What a method says of a claim, in a word; empty if nothing.
+    """The value that a method declares for a claim, as a word; empty if it declares nothing.
 
-    Nothing claimed of the energy means what the other claims imply: kept if it is among the conserved quantities,
+    If nothing is declared about the energy, the other claims imply it: kept if it is among the conserved quantities,
     bounded if the method is symplectic and its step fixed (Benettin, Giorgilli, J. Stat. Phys. 74 (1994) 1117).
 
     On a body L_z, and all of L without a weight, is kept by methods that turn q and M by the same rotation and kick by
-    the torque: splittings, variational and Lie-group methods, and maps of engines that carry L in space. M.Gamma is a
-    cubic of the state, so that p_phi, which a Runge-Kutta method keeps on the axis of a top, is no claim of it there.
+    the torque: splittings, variational and Lie-group methods, and maps of engines that carry L in space. A Runge-Kutta
+    method keeps p_phi in the axis chart of a top but does not claim it on a body, where M.Gamma is cubic in the state.
     """
     conserves = method.conserves or frozenset()
     if claim == "energy" and method.energy_error is not None:
@@ -198,7 +197,7 @@ def open_target(
     target: Any, form: str | None, chart: str, *, on: Scene | None = None, adaptive: bool = False
 ) -> Stepper:  # fmt: skip
     """The stepper of a function, a class, ``FILE.py:NAME``, ``FILE.so:NAME`` or a command; SymtopError for all else."""
-    chart = BODY if on is not None and on.of_body else one_of("chart", chart, CHARTS)  # a body has no other
+    chart = BODY if on is not None and on.of_body else one_of("chart", chart, CHARTS)  # a body has one chart
     path, _, symbol = str(target).partition(":")
     shared = isinstance(target, (str, Path)) and path.endswith(LIBRARIES)
     kind = one_of("form", ("shared" if shared else "ode") if form is None else form, FORMS)
@@ -239,7 +238,7 @@ def _python_step(thing: Any, name: str, chart: str, kind: str, *, adaptive: bool
 
 
 def _thing(target: Any, *, free: bool) -> tuple[Any, str]:
-    """What is given, or FILE.py:NAME names, and its name; without a name the function ``step``. Is its form `free`?"""
+    """The object `target`, or that of FILE.py:NAME (by default ``step``), and its name; `free`: no form was given."""
     if callable(target) or is_solver(target):
         return target, ""
     path, _, name = str(target).partition(":")

@@ -1,9 +1,9 @@
 """The integrators that physics engines ship, as methods of the registry: family ``engine``.
 
-People choose an engine and get its integrator. Each of these is the map that an engine takes a free body with a torque
-through, written down again from its source and run against it (`make engines`); the top is a body whose centre is
-fixed, in a torque mgl k x e. An engine that works in single precision has its map in both, as ``jolt`` and
-``jolt-float32``: the first shows the method, the second what rounding makes of it; it claims no limit h -> 0.
+Each of these is the map by which an engine steps a free body with a torque, written anew from its source and run
+against it (`make engines`); the top is a body whose centre is fixed, in a torque mgl k x e. An engine that works in
+single precision has its map in both precisions, as ``jolt`` and ``jolt-float32``: the first shows the method, the
+second the effect of rounding; the second claims no order, as its error has no limit for h -> 0.
 
 *A body in space axes.* An engine steps an orientation and the angular velocity w in space, some the angular momentum L.
 With I_s = I1 + (I3 - I1) e e^T, the inertia in space,
@@ -16,8 +16,8 @@ in space beside the new v, which is what the engine carries, w or L:
 
     step(par, e, v, carry, h) -> (p, v, carry),      e <- p e p*,  q <- p q/|p q|.
 
-A *body without symmetry* has I_s = q I q*, and the attitude itself stands where the axis does: the same functions, but
-for what has I_s or the lever in it (`by_length`), and two equations solved in closed form, which are three there.
+A *body without symmetry* has I_s = q I q*, and the attitude takes the place of the axis: the same functions, except for
+those that contain I_s or the lever (`by_length`), and for two equations solved in closed form, which are three there.
 
 Two rotations are in use. With u = h w/2,
 
@@ -27,9 +27,9 @@ Two rotations are in use. With u = h w/2,
 Every function works in the precision of its arguments: 0, 1/2 and 1 are fields of `EngineTop`, for a literal of Python
 would make it double. The loop's compensated sum gives a rounded state exactly; samples are shown at multiples of h.
 
-*Kicks.* The angular velocity changes first, then the body turns by it: the semi-implicit family. They differ in what
-becomes of the gyroscopic term w x I_s w, which is why two engines disagree on a top and agree on a ball. All take tau
-at the start of the step, and one evaluation of it. With L = I_s w and [v] x = v x x:
+*Kicks.* The angular velocity changes first, then the body turns by it: the semi-implicit family. They differ in their
+treatment of the gyroscopic term w x I_s w, so that two engines differ on a top and agree on a ball. All evaluate tau
+once, at the start of the step. With L = I_s w and [v] x = v x x:
 
     none        w += h I_s^-1 tau
     explicit    w += h I_s^-1 (tau - w x L)
@@ -53,7 +53,7 @@ not the exact one of a free body (`strang` takes that). With w(q, L) = R(q) I^-1
 The leapfrog is of order 2 with A = R(q_h), as Fincham published it; with A = R(q), as one code has it, of order 1. Each
 turn of the last is the flow of one term of the kinetic energy, so that the step is symplectic on (q, L), symmetric and
 of order 2; L.e is the momentum of one of the three turns only and wobbles. s3 is the axis of the smallest moment, as
-LAMMPS sorts them: the result hangs on where the transverse axes of a symmetric body are put, here psi.
+LAMMPS sorts them: the result depends on the choice of the transverse axes of a symmetric body, here by psi.
 
 *SPIRAL* in its leapfrog version, with velocities at whole steps: rates in body axes by half a step of Shu and Osher's
 method of three stages, the torque as it stands, q <- q exp(h b/2), and rates by the other half with the new torque. Its
@@ -99,7 +99,7 @@ class EngineTop(NamedTuple):
 
 
 class EngineBody(NamedTuple):
-    """Those of a body without symmetry."""
+    """The numbers of a body without symmetry in the precision of a map."""
 
     I1: float
     I2: float
@@ -138,7 +138,7 @@ def _top_prepared(place_at: Callable[..., Any], size: int, *, rates: bool) -> Pr
 
 
 def _body_prepared(*, rates: bool) -> Preparation:
-    """The same of a body without symmetry."""
+    """`_top_prepared` of a body without symmetry: a start as (q, L), or with `rates` w for L."""
 
     def prepare(body, at):  # type: ignore[no-untyped-def]
         q, v = (at.w, at.x, at.y, at.z), (at.M1, at.M2, at.M3)
@@ -160,7 +160,7 @@ def _body_velocity(par: Any, q: Any, L: Any) -> Any:
     return rotated(par, q, (M[0] / par.I1, M[1] / par.I2, M[2] / par.I3))
 
 
-# of the orientation of a top, its axis, or of a body, its attitude
+# functions of the orientation: of a top its axis, of a body its attitude
 momentum = by_length(  # I_s w
     (3, lambda par, e, w: plus(scaled(par.I1, w), (par.I3 - par.I1) * dot(e, w), e)), (4, _body_momentum)
 )
@@ -227,7 +227,7 @@ def _nothing(par: Any, e: Any, v: Any) -> Any:
     return 0.0
 
 
-ORIENTATION: dict[str, Callable[..., Any]] = {  # of a state, what a map takes for it
+ORIENTATION: dict[str, Callable[..., Any]] = {  # from a state, the orientation that a map takes
     "axis": lambda y: y[:3], "attitude": axis, BODY: lambda y: y[:4],
 }  # fmt: skip
 pointing = by_length((3, lambda _par, e: e), (4, lambda _par, q: axis(q)))  # the axis of it
@@ -246,7 +246,7 @@ def _observing(chart: str) -> Callable[..., Any]:
 
 
 def _presenting(chart: str) -> Callable[..., Any]:
-    """Momenta in the place of rates."""
+    """`present` of a map that carries rates: the state with L in their place."""
     orientation = register_jitable(ORIENTATION[chart])
 
     def present(par, rule, state, k, h):  # type: ignore[no-untyped-def]
@@ -257,7 +257,7 @@ def _presenting(chart: str) -> Callable[..., Any]:
 
 @register_jitable
 def _in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """A momentum in the axes of the body."""
+    """`present` of a body: the state with L in the axes of the body."""
     return (*state[:4], *rotated(par, conjugate(state[:4]), state[4:]))
 
 
@@ -267,7 +267,7 @@ def _momentum_in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
 
 
 class Carried(NamedTuple):
-    """What a map carries in a chart: how it starts, is observed and is shown."""
+    """The functions of a map's state in a chart: its start, its momenta and its samples."""
 
     prepare: Preparation
     observe: Callable[..., Any]
@@ -286,13 +286,13 @@ ANGULAR_MOMENTUM = {
 }
 
 
-NONE = (0.0,)  # a map has no numbers but the top's, and an empty tuple has no type of entry
-PARTS = 4  # that Rapier cuts a step into
+NONE = (0.0,)  # the rule of a map, which has no numbers; numba cannot type the entries of an empty tuple
+PARTS = 4  # substeps of a step of Rapier
 
 
 @register_jitable
 def _gap(after: Any, before: Any) -> Any:
-    """How far numbers of any precision have come from those of a state, in double."""
+    """after - before, numbers of any precision and of a state in double, in double."""
     gap = before
     for i in range(len(before)):
         gap = set_item(gap, i, np.float64(after[i]) - before[i])
@@ -314,9 +314,9 @@ def engine_loop(
     step: Callable[..., Any], chart: str, carried: Carried, reused: Callable[..., Any] = _nothing,
     number: Any = np.float64,
 ) -> Loop:  # fmt: skip
-    """The loop around a map in a chart; `reused` is what its first step takes for the one before.
+    """The loop around a map in a chart; `reused` gives the carry of its first step.
 
-    `number` is a precision, single in charts with a quaternion alone.
+    `number` is the type of its arithmetic, single precision only in charts with a quaternion.
     """
     orientation, step = register_jitable(ORIENTATION[chart]), register_jitable(step)
     kind: Any = EngineBody if chart == BODY else EngineTop
@@ -535,7 +535,7 @@ def _three_stages(par: Any, e: Any, b: Any, h: Any) -> Any:
 
 
 def spiral(par: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
-    """Rates to the half step, a turn by them, which leaves them as they are in both axes, rates to the whole step."""
+    """Half a step of the rates, a turn by them, which does not change them in body or space axes, the other half."""
     w = _three_stages(par, e, w, 0.5 * h)
     p = exponential(par, w, h)
     return p, _three_stages(par, oriented(par, e, p), w, 0.5 * h), carry
@@ -607,7 +607,7 @@ def _engine(
     carried: Mapping[str, Carried] = VELOCITY, reused: Callable[..., Any] = _nothing, forces: int = 1,
     energy_error: str | None = None, number: Any = np.float64,
 ) -> Integrator:  # fmt: skip
-    """A map in every chart, in single precision on quaternions alone; `keeps` names the momenta that it conserves."""
+    """A map in every chart (in single precision, those with a quaternion); `keeps` names the momenta it conserves."""
     charts = [chart for chart in carried if chart != "axis" or number is np.float64]
     loops = {chart: engine_loop(step, chart, carried[chart], reused, number) for chart in charts}
     return Integrator(
@@ -628,7 +628,7 @@ def _both(*given: Any, **more: Any) -> list[Integrator]:
 
 
 def built_in() -> list[Integrator]:
-    """The maps in double, and those of engines in single precision in that, too."""
+    """The maps in double precision, and those of engines in single precision also in single."""
     return [
         *_both("no-gyro", _kicked(_pulled), None, "Havok, PhysX and Jolt by default: no gyroscopic term",
                "havok physx jolt", "p_psi", energy_error="bounded"),

@@ -1,11 +1,11 @@
-"""From a compiled loop that chooses its steps to a solver of the registry, for one run and for many.
+"""Makes a solver of the registry from a compiled loop that chooses its steps, for one run and for many.
 
     loop(numbers, tolerance, times, budget, seen, place, states, momenta) -> (seen, steps, effort, outcome)
 
-goes on from `place`, all that its next step depends on, or begins at the start in `numbers` (`symtop.model.top.flat`)
-if `seen` is negative. It fills `states` and `momenta` (p_phi, p_psi) at `times` until the last of them, a failure or
-`budget` units of effort, which one step may pass, and returns the samples filled since the start, and the steps and the
-effort of this call. A run in several calls has the bits of one call.
+continues from `place`, an array of all that the next step depends on, or begins at the start in `numbers`
+(`symtop.model.top.flat`) if `seen` is negative. It fills `states` and `momenta` (p_phi, p_psi) at `times`, and ends at
+the last of them, at a failure, or at the first step with which the effort reaches `budget`. It returns the number of
+samples filled since the start, and the steps and the effort of this call. Several calls give the bits of one call.
 """
 
 from collections.abc import Callable
@@ -25,17 +25,17 @@ Loop = Callable[..., tuple[int, int, int, int]]
 class Adaptive:
     """A solver around compiled loops with a tolerance; a run is one call where it ends within `block`."""
 
-    loop: Callable[[float], Loop]  # of a tolerance
-    size: int  # of a sample
-    room: int  # numbers of a place
-    time: int  # which of them is the time that was reached
-    most: float  # units of effort of a run without a budget
+    loop: Callable[[float], Loop]  # (tolerance): the loop
+    size: int  # numbers in a sample
+    room: int  # numbers in `place`
+    time: int  # index in `place` of the time that was reached
+    most: float  # limit on the units of effort of a run without a budget
     block: int  # units between returns to Python, so that an interrupt is heard within a second
-    unit: Callable[[float], int] = lambda _: 1  # force evaluations of a unit of effort, of a tolerance
+    unit: Callable[[float], int] = lambda _: 1  # (tolerance): force evaluations in a unit of effort
     check: Callable[[Angles], None] | None = None  # as `Preparation` has it
 
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        """Start to horizon."""
+        """Run from the start to the last sample of the plan."""
         if self.check is not None:
             self.check(start)
         times = np.ascontiguousarray(plan.times)

@@ -1,7 +1,7 @@
-"""The two charts in angles for kernels. Both end at theta = 0 and pi.
+"""The two charts in angles for kernels. Both are singular at theta = 0 and pi.
 
 *Reduced*: state (theta, p_theta, phi, psi). p_phi and p_psi enter as parameters, so every kernel of this chart must
-show them again from the increments that it produced (`observe` in `loop`).
+recompute them from the increments that it produced (`observe` in `loop`).
 
 *Unreduced*: state (theta, phi, psi, theta', phi', psi'), nothing eliminated; the Euler-Lagrange equations, solved for
 the accelerations:
@@ -38,7 +38,7 @@ class ReducedTop(NamedTuple):
 
 @register_jitable
 def chart_outcome(theta: float) -> int:
-    """Is theta still a point of the chart?"""
+    """OK if theta lies inside (0, pi), otherwise LEFT_CHART or NOT_FINITE."""
     if 0.0 < theta < np.pi:
         return OK
     if np.isfinite(theta):
@@ -47,7 +47,7 @@ def chart_outcome(theta: float) -> int:
 
 
 def in_chart(theta: Any) -> Any:
-    """Is theta, a number or an array, no pole, where phi and psi have no meaning of their own?"""
+    """Does theta, a number or an array, lie inside (0, pi)? At the poles only phi + psi or phi - psi is defined."""
     return (theta > 0.0) & (theta < np.pi)
 
 
@@ -74,21 +74,21 @@ def momenta_of_turns(par: Any, a: Any, d: Any, h: float, dstate: Any) -> Any:
 
 
 def _on_angles(top: Any, at: Any) -> Any:
-    """p_theta0 = dL/dtheta' is the discrete Legendre transform's start."""
+    """The discrete Legendre transform starts from p_theta = dL/dtheta'."""
     momenta = conserved(top, at)
     par = ReducedTop(top.I1, top.I3, top.mgl, momenta.p_psi, momenta.north, momenta.south)
     return par, (at.theta, top.I1 * at.theta_dot, at.phi, at.psi)
 
 
 on_angles = Preparation(_on_angles, 4, require_chart)
-LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, where SciPy draws the line
+LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, SciPy's limit
 
 
 @register_jitable
 def accelerations(I1: Any, I3: Any, mgl: Any, theta: Any, theta_dot: Any, phi_dot: Any, psi_dot: Any) -> Any:
-    """theta'', phi'' and psi'' on floats; NaN exactly at a pole. Plain Python as it stands, and compiles."""
+    """theta'', phi'' and psi'' of floats; NaN exactly at a pole. Runs in Python and compiles unchanged."""
     s, c = sincos(theta)
-    if s == 0.0:  # the interpreter would raise where it divides, and lose the run
+    if s == 0.0:  # the interpreter would raise at the division and end the run
         s = math.nan
     spin = I3 * (psi_dot + phi_dot * c)
     theta_ddot = s * (phi_dot * (I1 * phi_dot * c - spin) + mgl) / I1
@@ -126,8 +126,8 @@ def observe_angles(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> A
 
 @register_jitable
 def ended_angles(y: Any) -> int:
-    """Is the state finite and theta a point of the chart?"""
-    # zero, or NaN where any of them is not finite: theta then answers for all six, without a branch
+    """OK if the state is finite and theta inside (0, pi), otherwise NOT_FINITE or LEFT_CHART."""
+    # zero, or NaN where one of them is not finite: added to theta, one test covers all six without a branch
     nothing = 0.0 * (y[1] + y[2] + y[3] + y[4] + y[5])
     return chart_outcome(y[0] + nothing)
 

@@ -10,7 +10,7 @@ Seen from the body, space turns by q*, and Gamma takes the place of a top's axis
     Gamma' = w x Gamma,     M' = w x M + f x Gamma,     w = -omega,   f = -c,     (q*)' = w q*/2
 
 are the equations of (e, L) with another element (w, f) of se(3). So a kernel on (q, L) of a top that makes its step of
-e and L alone steps (q*, M) of a body (`turned`), and what it keeps of L.e it keeps of p_phi.
+e and L alone also steps (q*, M) of a body (`turned`); if it keeps L.e of a top, it keeps p_phi of a body.
 """
 
 from typing import Any, NamedTuple
@@ -23,7 +23,7 @@ from symtop.model.body import vertical
 
 
 class General(NamedTuple):
-    """The numbers of a body: one over its moments, the moments, and c = mgl chi."""
+    """The numbers of a body: the reciprocals of its moments, the moments, and c = mgl chi."""
 
     a1: float
     a2: float
@@ -50,7 +50,7 @@ class Pose(NamedTuple):
 
 @register_jitable
 def opened(plain: Any) -> Any:
-    """A body and a start, of their 14 numbers."""
+    """A body and a start, from their 14 numbers."""
     I1, I2, I3, mgl, x, y, z = plain[:7]
     body = General(1.0 / I1, 1.0 / I2, 1.0 / I3, I1, I2, I3, mgl * x, mgl * y, mgl * z)
     w, x, y, z, w1, w2, w3 = plain[7:]
@@ -80,7 +80,7 @@ of_top, in_space = Preparation(_of_top, 7), Shown(_in_space, 7)  # a top as (q, 
 
 
 def prepared(numbers: Any) -> Preparation:
-    """What a kernel of seven numbers steps, by ``numbers(body, start)`` of a `General` and a `Pose`."""
+    """The preparation of a kernel with seven numbers in its state: ``numbers(body, start)``, `General` and `Pose`."""
     return Preparation(numbers, 7, opened=opened, momenta=_momenta, given=14)
 
 
@@ -117,6 +117,6 @@ def observe_body(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any
 
 
 def observe_turned(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
-    """The same of (q*, M): M3 stands where L_z does, and M.Gamma where L.e does."""
+    """L_z and M3 after a step of (q*, M), where M3 stands in the place of L_z, and M.Gamma in that of L.e."""
     M3, L_z = observe_attitude(par, rule, before, dstate, h)
     return L_z, M3

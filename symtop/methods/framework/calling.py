@@ -1,7 +1,7 @@
-"""The one call of a solver: what it is given it cannot spoil, and what it returns is checked.
+"""`solve`, the only function that calls a solver: it protects the arguments and checks the result.
 
-A solver may be anybody's. Whatever it raises is a `SymtopError` (`symtop.core.errors`), and so is anything but a `Run`
-that fits its plan. A run whose states cease to be finite without its saying so ends there.
+A solver may come from a plug-in. Whatever it raises becomes a `SymtopError` (`symtop.core.errors`), and a result that
+is no `Run` or does not fit the plan raises one. A run with outcome "ok" ends before its first state that is not finite.
 """
 
 import contextlib
@@ -18,15 +18,15 @@ from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import DIMENSIONS
 
 PATIENCE = 10.0  # seconds of processor time for the few steps backwards that probes of reversibility ask for
-OWN = "symtop.methods."  # solvers of these modules spoil nothing, and are given no copies
+OWN = "symtop.methods."  # solvers of these modules do not change their arguments and are given no copies
 COUNTS = ("steps", "force_evaluations", "newton_iterations", "reached")
 
 
 def solve(method: Integrator, chart: str, top: Any, start: Any, plan: Plan, context: str = "") -> Run:
-    """Run a method in one of its charts, `context` such as " on spheroid".
+    """Run a method in one of its charts; messages have `context`, such as " on spheroid", after the method's name.
 
-    A run that blows up is data: NumPy says nothing of overflow or NaN. Raises SymtopError if the solver raises, changes
-    the top or the start, or returns anything but a Run that fits.
+    A run that blows up is a result: NumPy's warnings of overflow and NaN are off. Raises SymtopError if the solver
+    raises, changes the top or the start, or returns anything but a Run that fits the plan.
     """
     solver = method.solvers[chart]
     with foreign_code(f"integrator {method.name}{context}"):
@@ -34,11 +34,11 @@ def solve(method: Integrator, chart: str, top: Any, start: Any, plan: Plan, cont
         if not own:
             plain = plan._replace(times=plan.times.copy(), marks=plan.marks.copy())
             given = copy.copy(top), copy.copy(start), plain
-        backwards = not own and plan.step_size < 0.0  # a loop that counts on a step forwards never ends
+        backwards = not own and plan.step_size < 0.0  # a loop that assumes a positive step may never end
         try:
             with np.errstate(all="ignore"), at_most(PATIENCE) if backwards else contextlib.nullcontext():
                 run = solver(*given)
-        finally:  # also where it raises: a change is the likelier cause
+        finally:  # also after an error, of which a change is the likelier cause
             if not own and given[:2] != (top, start):
                 raise SymtopError(f"integrator {method.name} must not change the top or the start that it is given")
         checked = _checked(method, (plan.times.size, DIMENSIONS[chart]), plan, run, copy=not own)
@@ -70,7 +70,7 @@ def _checked(method: Integrator, shape: tuple[int, int], plan: Plan, run: Any, *
 
 
 def _of_length_one(plan: Plan, run: Run, chart: str) -> Run:
-    """The run, which ends where its quaternion has left length one."""
+    """The run, ended where the length of its quaternion differs from one by more than `LENGTH`."""
     quaternions = run.states[:, :4]
     squares = np.einsum("ij,ij->i", quaternions, quaternions)  # six times as fast as the search that follows
     if np.abs(squares - 1.0).max(initial=0.0) <= LENGTH:
@@ -85,7 +85,7 @@ def _of_length_one(plan: Plan, run: Run, chart: str) -> Run:
 def _real(values: object, *, copy: bool) -> Array | None:
     """An array of doubles; None of anything that is not made of real numbers."""
     if not copy and type(values) is np.ndarray and values.dtype == np.float64:
-        return values  # sooner than by what follows
+        return values  # faster than what follows
     try:
         array = np.asarray(values)
     except (ValueError, TypeError):  # ragged

@@ -1,14 +1,14 @@
-"""The top's equations as a library for differential equations wants them: one right-hand side y' = f(y) a chart.
+"""The top's equations of motion for solvers of ordinary differential equations: a right-hand side y' = f(y) per chart.
 
     chart      y                                       multiplications, divisions   sines, cosines   ends
     angles     (theta, phi, psi, theta', phi', psi')                           16                2   theta = 0 and pi
     axis       (e, L)                                                          12                0   nowhere
     attitude   (q, L)                                                          41                0   nowhere
 
-(see `angles` and `space`). In each of the three, energy and momenta are functions of the state, so that whatever a
-method does to them shows. Every Runge-Kutta method, compiled or a library's, takes f from here, so that method and
-chart can be varied one at a time; `field` gives it to anybody's solver. A Runge-Kutta method keeps what is linear in
-its state, and no explicit one keeps more: p_phi = L_z in the space frame, nothing in angles.
+(see `angles` and `space`). In each of the three, energy and momenta are functions of the state, so that a method's
+errors in them are visible. Every Runge-Kutta method, compiled or a library's, takes f from here, so that method and
+chart can be varied one at a time; `field` gives f to a user's solver. A Runge-Kutta method keeps what is linear in its
+state, and no explicit one keeps more: p_phi = L_z in the space frame, nothing in angles.
 """
 
 import functools
@@ -38,7 +38,7 @@ class Formulation(NamedTuple):
     ended: Callable[[Any], int]  # outcome of a state: OK, or how the chart was left
     observe: Callable[..., Any]  # (par, rule, before, dstate, h) -> p_phi and p_psi after a step
     prepare: Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]  # parameters and state of a start
-    present: Callable[[Any, Array, Array], Array] | None  # (par, times, states) -> states as shown, if others
+    present: Callable[[Any, Array, Array], Array] | None  # (par, times, states) -> states as shown, if they differ
     momenta: Callable[[Any, Array], tuple[Array, Array]]  # (par, states) -> p_phi and p_psi of samples
 
 
@@ -64,7 +64,7 @@ def _body_momenta(_: Any, states: Array) -> tuple[Array, Array]:
 
 FORMS = FORMULATIONS | {
     BODY: Formulation(body.field_body, space.ended_space, body.observe_body, body.on_body, None, _body_momenta)
-}  # with the body that has no symmetry
+}  # and for a body without symmetry
 
 
 def as_run(
@@ -76,7 +76,7 @@ def as_run(
     return Run(shown, p_phi, p_psi, steps, evaluations, 0, OUTCOMES[outcome], reached)
 
 
-_RIGHT: dict[str, tuple[Callable[..., Any], tuple[int]]] = {  # of the numbers of a top and y; the shape of y
+_RIGHT: dict[str, tuple[Callable[..., Any], tuple[int]]] = {  # by chart: f(I1, I3, mgl, y), the shape of y
     "angles": (lambda I1, I3, mgl, y: field_angles(BareTop(I1, I3, mgl), y), (6,)),
     "axis": (lambda I1, _I3, mgl, y: field_axis(SpaceTop(I1, mgl, 0.0), y), (6,)),
     "attitude": (lambda I1, I3, mgl, y: field_attitude(AttitudeTop(I1, mgl, 1.0 / I3 - 1.0 / I1), y), (7,)),
@@ -106,7 +106,7 @@ class Field:
         """y' at any time: an array like y. Raises SymtopError for a y that is no state of the chart."""
         if not isinstance(y, np.ndarray):
             y = real_numbers("y", y)
-        if y.shape != self._shape:  # compiled code would read what lies behind the array
+        if y.shape != self._shape:  # compiled code would read beyond the end of the array
             raise SymtopError(f"y must have the shape {self._shape} in the chart {self.chart}, not {y.shape}")
         if self.compiled:
             return np.asarray(self.kernel(*self.parameters, y))
@@ -118,7 +118,7 @@ class Field:
         return _kernel(self.chart)
 
     def state(self, start: Angles) -> Array:
-        """A start as y."""
+        """The state y of a start."""
         return np.array(FORMULATIONS[self.chart].prepare(self.top, start)[1], dtype=float)
 
 

@@ -7,18 +7,19 @@ as they stand: a member has the bits of `simulate`.
 What a block steps is one array, `block`; number r of lane j is ``block[r W + j]``. With d numbers in a state:
 
     0 .. d-1        state
-    d .. 2d-1       what the sums of the state have rounded off so far
+    d .. 2d-1       accumulated rounding errors of the sums in the state
     2d .. 3d-1      increment of the last step
     3d              0, or 1 once a lane has to be run alone, or minus the outcome with which it has ended
     3d + 1          work that a step counts itself, such as iterations
-    3d + 2 ..       carry, then working space; the last number is that of steps that were made, if lanes can end
+    3d + 2 ..       carry, then working space; the last number counts the steps made, if lanes can end
 
-What its members are made of is a second array, `table`, that a step only reads: the numbers of the top (p of them),
+The constants of the members are a second array, `table`, that a step only reads: the numbers of the top (p of them),
 then those of the rule that the family's `lay` writes.
 
 A lane is given up when its step does what lanes cannot: an outcome that is not OK, or a branch that only the kernel for
-one has. It is then run alone from its start; its neighbours do not notice. With 100 steps a nutation a fifth of random
-tops leaves the chart of the angles, mostly early: a step of Newton's iteration says itself how it ends (`newton`).
+one member has. It is then run alone from its start; the other lanes are unaffected. With 100 steps a nutation a fifth
+of random tops leaves the chart of the angles, mostly early: so a step of Newton's iteration, in its lane, records the
+outcome with which a run ends (`newton`), and such runs are not repeated.
 
 How a family joins: its `loop.Loop` has a function `lanes`. Its `step` makes one step of all lanes, as one loop or
 several over ``range(W)``; in each, `column` makes the tuple that a kernel takes and `put` writes what it returns. LLVM
@@ -31,11 +32,10 @@ and it uses vectors of full width only if `step` begins with a call of `wide_vec
 calls and that has a loop of its own, which is made into vectors before it is inlined. Whether it does is seen in
 ``kernel.inspect_asm()`` (zmm).
 
-*Who stands beside whom.* A block takes as long as its longest member and about as long as `LEAST` members alone.
-Members enter in the order of their numbers of steps, the longest first, and `W` neighbours in it that together make
-fewer steps than `LEAST` times the longest are left to the loop for one, a call of `loop.whole_run` without Python's
-lock. A step that iterates takes as many passes as its slowest lane: there, members whose steps are alike in number
-enter in the order of
+*Order of members.* A block makes as many steps as its longest member; a step takes about as long as `LEAST` members
+alone. Members enter in the order of their numbers of steps, the longest first; `W` successive ones that together make
+fewer steps than `LEAST` times the longest run alone instead (`loop.whole_run`, without Python's lock). A step that
+iterates takes as many passes as its slowest lane: there, members with similar numbers of steps enter in the order of
 
     h sqrt(|L|^2 / I1^2 + |mgl| / I1),    how far the top turns and the pendulum swings in a step, in radians,
 
@@ -83,7 +83,7 @@ def put(array: Any, first: int, j: int, values: Any) -> None:
 
 @register_jitable
 def none_left(block: Any, live: int) -> bool:
-    """Has number `live` of every lane become 0, so that an iteration over the block has ended?"""
+    """Is number `live` of every lane 0? Then an iteration over the block has ended in all lanes."""
     wide_vectors()
     left = 0
     for j in range(W):
@@ -93,7 +93,7 @@ def none_left(block: Any, live: int) -> bool:
 
 @dataclass(frozen=True)
 class Lanes:
-    """What a family needs to run in lanes. All compiles but what takes a `method`, a rule before it is scaled."""
+    """What a family needs to run in lanes. All functions compile, but for those of `method`, an unscaled rule."""
 
     step: Callable[[Any, Any], None]  # (block, table): one step of W members, compensated sums included
     lay: Callable[..., None]  # (par, rule, h, numbers): the numbers of a member's rule that a step reads, into an array
@@ -116,7 +116,7 @@ class Lanes:
 def preparing(
     lanes: Lanes, begin: Any, enter: Any, kind: Any, numbers: Any, scale: Any, opened: Any, momenta_at: Any, width: int
 ) -> Any:
-    """The compiled preparation of many members: what their columns in `block` and `table` begin with, a row each."""
+    """The compiled preparation of many members: the initial numbers of `block` and `table`, one row a member."""
     lay, begin = lanes.lay, lanes.begin or begin
 
     def prepare(chosen, given, coefficients, h, marks, prepared, momenta):  # type: ignore[no-untyped-def]
@@ -231,11 +231,11 @@ def marching(lanes: Lanes, observe: Any, present: Any, write: Any) -> Any:  # no
     return compile_kernel(march)
 
 
-AT_ONCE = 8  # numbers of a tuple that LLVM still reads without a loop, which would stand in the way
+AT_ONCE = 8  # the longest tuple that LLVM reads without an inner loop, which would prevent vector instructions
 
 
 def reading(count: int) -> Callable[..., Any]:
-    """``(array, first, j)`` to so many numbers of lane j."""
+    """A function (array, first, j) that returns numbers `first`, `first` + 1, ... of lane j, `count` of them."""
     like, after = (0.0,) * min(count, AT_ONCE), count - AT_ONCE
     if after <= 0:
 
@@ -254,7 +254,7 @@ def one_loop(
     advance: Callable[..., Any], rule: Any, *, top: Any, dimension: int, carry: int,
     add: Callable[..., Any] = accumulate,
 ) -> Lanes:  # fmt: skip
-    """``advance(par, rule, state, carry)`` is the increment, the next carry and an outcome; `add` sums."""
+    """Lanes whose step is one loop over ``advance(par, rule, state, carry)`` -> (increment, next carry, outcome)."""
     tops, fields = len(top._fields), len(rule._fields)
     zeros, given = (0.0,) * dimension, (0.0,) * fields
     step_at, flag, carry_at = 2 * dimension, 3 * dimension, 3 * dimension + 2
@@ -328,7 +328,7 @@ def groups(chosen: Whole, steps: Whole, most: int) -> list[Whole]:
     return np.split(chosen, np.flatnonzero(np.diff(ends)) + 1) if chosen.size else []
 
 
-LEAST = 5  # members alone take as long as a block: 32 lanes, each at about a seventh of the time
+LEAST = 5  # members alone take as long as a block: 32 lanes, each in about a seventh of the time of a member alone
 ALIKE = 1.1  # numbers of steps within this factor of each other are alike, where the step iterates
 BATCH = 128 * W  # members that are prepared at a time: 4 MB for the longest table
 
@@ -344,7 +344,7 @@ class Blocks:
     def run(self, members: Whole, numbers: Array, rule: Any, h: Array, marks: Whole, done: Many, most: int) -> Whole:
         """Run the chosen members, about `most` steps between returns to Python; return those to be run alone.
 
-        `rule` is a pair: as the method has it, and as it travels into compiled code.
+        `rule` is a pair: as the method has it, and as it is passed to compiled code.
         """
         (rule, coefficients), lanes, steps = rule, self.lanes, marks[:, -1]
         counts_itself = lanes.effort(rule) == 0  # the step iterates
@@ -369,14 +369,14 @@ class Blocks:
 
 
 def aligned(count: int) -> Array:
-    """Room for so many numbers, from a multiple of 64 bytes on: no vector of eight lies in two lines of the cache."""
+    """An array of `count` numbers at a multiple of 64 bytes: no vector of eight lies in two lines of the cache."""
     room = np.empty(count + 7)
     first = -(room.ctypes.data // 8) % 8
     return room[first : first + count]
 
 
 def turns(numbers: Array, h: Array) -> Array:
-    """About how far each member, a row, moves in its step, in radians; not finite if it overflows."""
+    """About the angle by which each member (row) moves in one of its steps, in radians; not finite if it overflows."""
     if of_bodies(numbers):
         moments = numbers[:, :3]
         with np.errstate(all="ignore"):

@@ -2,22 +2,22 @@
 
 A kernel family is three plain functions on flat tuples of floats:
 
-    begin(par, rule, state, h) -> carry                    what the first step may reuse
+    begin(par, rule, state, h) -> carry                    numbers that the first step may reuse
     increment(par, rule, state, carry, h) -> (dstate, carry, work, outcome)
-    observe(par, rule, before, dstate, h) -> (p_phi, p_psi)  the momenta that this step really carried
+    observe(par, rule, before, dstate, h) -> (p_phi, p_psi)  recomputed from the increment of this step
 
-and two more where what is stepped is not what is shown (a processed method, a motion that is known exactly):
+and two more where the kernel's state differs from the one shown (a processed method, a motion that is known exactly):
 
     enter(par, rule, state, h) -> state                    the start as the kernel steps it, once a run
     present(par, rule, state, k, h) -> state               a sample as the user sees it, once a sample
 
 `par` are the numbers of the top, `rule` those of the method, `work` force evaluations or solver iterations. A kernel
 returns the *increment* of the state; the loop adds it with Knuth's two-sum and carries the rounding error to the next
-step. That costs nothing, for the loop is bound by the latency of the kernel. Time is k h, never accumulated.
+step. That costs no time, as the latency of the kernel limits the loop. Time is k h, never accumulated.
 
-A run that nobody interrupts is one compiled call from plain numbers to samples (`whole_run`), the preparation of the
-kernel included. A loop can stop after any step and go on, in another process too, to the same bits: a `Position` is all
-that the next step depends on (`symtop.run.long_run`).
+A run of at most `BLOCK` steps is one compiled call from plain numbers to samples (`whole_run`), preparation included. A
+loop can stop after any step and go on, in another process too, to the same bits: a `Position` is all that the next step
+depends on (`symtop.run.long_run`).
 Source: Hairer, McLachlan, Razakarivony, BIT 48 (2008) 231 (Brouwer's law).
 """
 
@@ -44,10 +44,10 @@ BLOCK = 5_000_000  # steps between returns to Python, so that an interrupt is he
 
 
 class Position(NamedTuple):
-    """Where a run stands: all that its next step depends on."""
+    """All that the next step of a run depends on."""
 
     state: tuple[float, ...]
-    low: tuple[float, ...]  # what the sums of the state have rounded off so far
+    low: tuple[float, ...]  # accumulated rounding errors of the sums in `state`
     carry: Any  # floats in tuples or arrays, as the kernel's `begin` makes them
     k: int  # steps done
 
@@ -64,7 +64,7 @@ class March(NamedTuple):
 
 @register_jitable
 def no_carry(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """`begin` of a kernel whose step depends on its start alone; an empty tuple has no type of entry."""
+    """`begin` of a kernel that reuses nothing; one number, as numba cannot type the entries of an empty tuple."""
     return (0.0,)
 
 
@@ -85,8 +85,8 @@ class Loop:
     """The loop around one kernel family, compiled when it is first used: ``loop(par, rule, state, h, marks)``.
 
     A run records the state after ``marks[j]`` steps for each j (increasing; 0 is the start). `start` and `advance` do
-    the same in stretches, and the bits do not depend on where a stretch ends. `add` is how increments are summed, and
-    `lanes` what the family has for a rule to run many members in lanes, or None.
+    the same in stretches, and the bits do not depend on where a stretch ends. `add` adds an increment to the state.
+    `lanes(rule)` is what the family needs to run many members in lanes (`framework.lanes`), or None.
     """
 
     begin: Callable[..., Any]
@@ -111,7 +111,7 @@ class Loop:
 
     @cached_property  # few processes need it, and each would hash the parts of a hundred loops
     def prepare(self) -> Callable[..., Any]:
-        """The state as the kernel steps it and its carry, of (par, rule, state, h)."""
+        """The compiled function (par, rule, state, h) -> (the kernel's state, the first carry)."""
         begin, enter = self.begin, self.enter
 
         def prepare(par, rule, state, h):  # type: ignore[no-untyped-def]
@@ -122,7 +122,7 @@ class Loop:
 
     @cached_property
     def march(self) -> Callable[..., Any]:
-        """A stretch of the run."""
+        """The compiled loop over a stretch of a run."""
         return compile_kernel(self.marching(as_it_steps))  # type: ignore[no-any-return]
 
     def marching(self, sample: Callable[..., Any]) -> Callable[..., Any]:
@@ -165,7 +165,7 @@ class Loop:
         return Position(state, (0.0,) * len(state), carry, 0)
 
     def advance(self, par: Any, rule: Any, at: Position, h: float, marks: Whole) -> tuple[March, Position]:
-        """On to the last mark; the marks lie beyond `at`, or begin with 0 at the start."""
+        """Continue a run from `at` to the last mark; all marks lie beyond `at`, but for a mark 0 at the start."""
         state, low, carry, k = at
         if isinstance(carry, np.ndarray):  # a kernel's working space: `at` stays what it is
             carry = carry.copy()
@@ -226,19 +226,19 @@ Present = Callable[[Any, Array, Array], Array]
 class _Whole(NamedTuple):
     """The parts of a run in one compiled call."""
 
-    alone: tuple[Any, ...]  # what a run of one takes, for a plain tuple comes apart quicker than a NamedTuple
-    blocks: Callable[[], Blocks] | None  # many members in lanes
-    rule: tuple[Any, Any]  # as the method has it, and as it travels into compiled code
+    alone: tuple[Any, ...]  # the parts of a single run; a plain tuple unpacks faster than a NamedTuple
+    blocks: Callable[[], Blocks] | None  # the kernels for many members in lanes
+    rule: tuple[Any, Any]  # as the method has it, and as it is passed to compiled code
 
 
 @dataclass(frozen=True)
 class FixedStep:
     """A solver around a loop: `prepare` gives a kernel its parameters and state, `rule` the method's numbers.
 
-    A rule whose numbers depend on the run is a function of the top, the start and the step. `evaluations` is how many
-    force evaluations a unit of the kernel's counted work takes (of an implicit method, an iteration), and `each_step`
-    come on top of every step. `present(par, times, states)` makes states of the chart from the kernel's, where they
-    differ. A run is one compiled call where `prepare` is a `Preparation` and `present`, if there is one, is `Shown`.
+    A rule whose numbers depend on the run is a function of the top, the start and the step. A unit of the kernel's
+    counted work (of an implicit method, an iteration) takes `evaluations` force evaluations, and each step `each_step`
+    more. `present(par, times, states)` makes states of the chart from the kernel's, where they differ. A run is one
+    compiled call where `prepare` is a `Preparation` and `present`, if there is one, is `Shown`.
     """
 
     loop: Loop | Callable[..., March]
@@ -261,7 +261,7 @@ class FixedStep:
             done = self._in_stretches(top, start, plan)
             counts = done.steps, *self.counts(done.steps, done.work), ending(done.outcome), done.steps * h
             return Run(done.states, done.momenta[:, 0], done.momenta[:, 1], *counts)
-        # a run of few steps takes as long as what follows: no fields one at a time, no `counts`, no constructor
+        # what follows takes as long as a run of few steps: hence no fields one at a time, no `counts`, no constructor
         run, rule, check, size, evaluations, each_step, counted = whole.alone
         if check is not None:
             check(start)
@@ -273,7 +273,7 @@ class FixedStep:
         return tuple.__new__(Run, fields)
 
     def _in_stretches(self, top: SymmetricTop, start: Angles, plan: Plan) -> March:
-        """The same with the preparation in Python, and a return to Python after every `BLOCK` steps."""
+        """A run with the preparation in Python, and a return to Python after every `BLOCK` steps."""
         par, rule, state = self.setup(top, start, plan.step_size)
         done = self.loop(par, rule, state, plan.step_size, plan.marks)
         if plan.marks[0] == 0:

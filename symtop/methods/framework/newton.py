@@ -4,20 +4,20 @@
 
 A kernel supplies three functions of `problem`, a tuple of whatever they need; x is a float or a tuple of floats:
 
-    evaluate(problem, x) -> trial             what the equations are made of at x: sums, forces and their slopes
+    evaluate(problem, x) -> trial             the terms of the equations at x: sums, forces and their slopes
     correct(problem, trial, x) -> Correction
     restart(problem) -> x                     another first guess, taken once, after half of the evaluations
 
-The iteration ends where ``size <= enough``, or where a correction of at most `grain` did not even halve: that is
-rounding. The last correction is *not* applied: the caller has the trial at x and may follow it to first order, which
-saves one evaluation a step. A predicted x may lie outside the basin of the root in a large step; hence `restart`. All
-is inlined.
+The iteration ends where ``size <= enough``, or where a correction of at most `grain` is more than half of the last one:
+that is rounding. The last correction is *not* applied: the caller has the trial at x and may follow it to first order,
+which saves one evaluation a step. In a large step a predicted x may lie outside the basin of attraction of the root;
+hence `restart`. All functions are inlined.
 
-`newton_loop` makes the loop of a method of such functions, for one run and in lanes.
+`newton_loop` makes the loop of a method from such functions, for one run and in lanes.
 
-In lanes the iteration runs over a block until no lane is live. A lane that has ended keeps its x and evaluates the same
-numbers again, so that all that follows from them may be written at every pass, and only x is chosen. A lane that is
-live after half of the evaluations is given up (`lanes`): there `newton` begins again with another guess.
+In lanes the iteration runs over a block until it has ended in every lane. A lane in which it has ended keeps its x and
+evaluates the same numbers again, so that every pass can write all results without a branch. A lane that has not ended
+after half of the evaluations is run alone from its start (`lanes`), where `newton` takes another guess at that point.
 """
 
 import functools
@@ -33,12 +33,12 @@ from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 
-NEGLIGIBLE_ANGLE = 1e-18  # radians: no correction below this can matter to an angle
-ANGLE_GRAIN = 1e-12  # radians: a smaller correction that does not halve is rounding (a steady precession has no other)
+NEGLIGIBLE_ANGLE = 1e-18  # radians: a correction below this does not change an angle
+ANGLE_GRAIN = 1e-12  # radians: a smaller correction that does not halve is rounding (as all are in steady precession)
 
 
 class Correction(NamedTuple):
-    """What Newton proposes at x."""
+    """A Newton correction at x, with the limits that decide about convergence."""
 
     change: Any  # like x
     after: Any  # x + change
@@ -56,9 +56,9 @@ def settled(correction: Any, last: float) -> Any:
 
 @register_jitable
 def newton(evaluate: Any, correct: Any, restart: Any, problem: Any, guess: Any, most: int) -> Any:
-    """Solve from a first guess with at most so many evaluations: x, the trial at x, the correction that x lacks.
+    """Solve from a first guess with at most `most` evaluations.
 
-    The evaluations that it took, and whether it converged, follow.
+    Returns x, the trial at x, the correction that is not applied to x, the number of evaluations, and convergence.
     """
     x, trial = guess, evaluate(problem, guess)
     evaluations, size = 1, np.inf
@@ -80,18 +80,18 @@ def newton_loop(  # noqa: C901  (the loops of one step, read in one piece)
     restart: Callable[..., Any], keep: Callable[..., Any], close: Callable[..., Any],
     top: Any, dimension: int, steady: int, opened: int, unknowns: int, ends: int, newest: int, carry: int,
 ) -> Loop:  # fmt: skip
-    """The loop of an implicit method on states that begin with theta; its work are the evaluations.
+    """The loop of an implicit method on states that begin with theta; it counts evaluations as work.
 
         constants(par, h) -> steady                  `steady` numbers that no step changes
         start(par, rule, theta) -> opened            `opened` numbers that no iteration changes
         equation(par, rule, state, steady, opened)   the problem of `newton`
         predict(problem, carry) -> x                 the first guess, `unknowns` numbers
         evaluate, correct, restart                   as `newton` takes them
-        keep(trial, correction) -> end               what the increment is made of, `ends` numbers
+        keep(trial, correction) -> end               `ends` numbers from which the increment is computed
         close(problem, end) -> (dstate, newest, outcome)
 
-    The next carry is `newest`, so many numbers, before the rest of this one. In lanes `rule` is a constant of the
-    kernel: a branch that hangs on it alone is none.
+    The next carry is the `newest` numbers of `close`, followed by this carry without as many last ones. In lanes `rule`
+    is a compile-time constant of the kernel, so that a branch on it alone does not stop vectorisation.
     """
     rest = carry - newest
 
@@ -112,7 +112,7 @@ def newton_loop(  # noqa: C901  (the loops of one step, read in one piece)
     size_at, live_at, steps_at = (end_at + ends + i for i in range(3))
     room = steps_at + 1 - opened_at
 
-    @register_jitable  # at once: what a method is made of must not hang on what has run
+    @register_jitable  # now, as the hash of a method's code must not depend on what has run
     def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
         values = constants(par, h)
         for i in range(len(values)):

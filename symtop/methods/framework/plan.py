@@ -1,4 +1,4 @@
-"""What a solver is asked for, a `Plan`, what it returns, a `Run`, and how a run can end."""
+"""`Plan`, the request to a solver; `Run`, its result; and the outcomes of a run."""
 
 import math
 from typing import Any, NamedTuple, Self
@@ -12,7 +12,7 @@ Array = NDArray[np.float64]
 
 
 class Plan(NamedTuple):
-    """What a solver is asked for: the sample times, and the step or the tolerance to reach them with.
+    """The request to a solver: the sample times, and the step or the tolerance to reach them with.
 
     A fixed-step solver makes marks[-1] steps of `step_size` and keeps the states after marks[0], marks[1], ... of them,
     at `times`. An adaptive solver has no marks, and `times` need not be ends of its steps. The first sample may be the
@@ -45,11 +45,11 @@ class Plan(NamedTuple):
         return cls(samples, float(samples[-1]), math.nan, np.empty(0, dtype=np.int64), tolerance, budget)
 
     def last_of(self, whole: Any) -> float:
-        """The time of the last sample before the first one that is not `whole`, (samples,)."""
+        """The time of the last sample before the first at which `whole`, (samples,), is false; 0 if there is none."""
         return float(self.times[int(np.argmin(whole)) - 1]) if whole[0] else 0.0
 
     def most(self, limit: float) -> float:
-        """The budget, or a method's own limit where nobody gave one."""
+        """The budget, or if none was given, the method's own limit."""
         return limit if self.budget is None else self.budget
 
 
@@ -63,7 +63,7 @@ class Run(NamedTuple):
         body       w, x, y, z of q, and M_1, M_2, M_3         the same q; M = q* L q in body axes, and p_psi is M_3
 
     p_phi and p_psi are recomputed from the trajectory (by the discrete Legendre transform, or as L_z and L.e) and never
-    copied from the start, so that a method that loses them shows it.
+    copied from the start, so that a method's errors in them are visible.
     """
 
     states: Array  # (samples, 4, 6 or 7)
@@ -103,9 +103,9 @@ QUATERNIONS = ("attitude", "body")  # charts that begin with one
 
 
 def off_length(chart: str, states: Array) -> NDArray[np.bool_]:
-    """At which samples, states (..., samples, dimension), has the quaternion left length one? From the first on.
+    """True from the first sample on at which | |q| - 1 | > `LENGTH`; states (..., samples, dimension).
 
-    A state that is not finite says nothing.
+    States that are not finite are passed over.
     """
     if chart not in QUATERNIONS:
         return np.zeros(states.shape[:-1], dtype=bool)

@@ -1,12 +1,12 @@
-"""From a top and a start to the numbers that a kernel steps, by functions that are Python and compile as they stand.
+"""From a top and a start to the parameters and the state of a kernel, by plain Python functions that numba compiles.
 
     prepare(top, at) -> (par, state)         the numbers of the top, and the start as the kernel steps it
     scale(rule, top, at, h) -> rule          the coefficients of a method times the step
     sample(par, t, state) -> state           a sample at the time t, in the chart that a user sees
 
 A `Preparation`, a `Scaled` rule and a `Shown` chart each hold one such function and can be called like it. A run takes
-the function itself and compiles it into the loop (`loop.whole_run`): what surrounds a kernel costs more than a few
-steps of it, above all a NamedTuple that is handed to compiled code.
+the function itself and compiles it into the loop (`loop.whole_run`): calls from Python cost more than a few steps of a
+kernel, above all if they pass a NamedTuple to compiled code.
 """
 
 import functools
@@ -22,7 +22,7 @@ from symtop.model import top as model
 from symtop.model.top import Angles, SymmetricTop, flat
 
 Numbers = tuple[float, ...]  # I1, I3, mgl, theta, phi, psi, theta', phi', psi'
-Pack = Callable[[Any], tuple[Callable[[Any], Any], Any]]  # of a rule: what compiled code makes it with, and from what
+Pack = Callable[[Any], tuple[Callable[[Any], Any], Any]]  # (rule): a compiled function that makes it, and its argument
 
 conserved = register_jitable(model.conserved)
 
@@ -48,7 +48,7 @@ class Start(NamedTuple):
 
 @register_jitable
 def opened(plain: Any) -> Any:
-    """A top and a start, of their nine numbers."""
+    """A top and a start, from their nine numbers."""
     return BareTop(*plain[:3]), Start(*plain[3:])
 
 
@@ -61,17 +61,17 @@ def momenta_at(top: Any, at: Any) -> Any:
 
 @dataclass(frozen=True)
 class Preparation:
-    """What a kernel steps, of a top and a start."""
+    """Computes the parameters and the state of a kernel from a top and a start."""
 
     numbers: Callable[..., tuple[Any, Numbers]]  # (top, at): the parameters and the state; compiles
     size: int  # of the state
     check: Callable[[Any], None] | None = None  # refuses a start that the kernel cannot step: raises SymtopError
     opened: Callable[..., Any] = opened  # (plain): the records that `numbers` takes
-    momenta: Callable[..., Any] = momenta_at  # (top, at): what these conserve
-    given: int = 9  # how many plain numbers a run has
+    momenta: Callable[..., Any] = momenta_at  # (top, at): p_phi and p_psi
+    given: int = 9  # how many plain numbers a top and a start have
 
     def __post_init__(self) -> None:
-        register_jitable(self.numbers)  # at once: what a kernel is made of must not hang on what has run
+        register_jitable(self.numbers)  # now, as the hash of a kernel's code must not depend on what has run
 
     def __call__(self, top: Any, at: Any) -> tuple[Any, Numbers]:
         """Kernel parameters and state of a start."""
@@ -82,7 +82,7 @@ class Preparation:
 
 @register_jitable
 def plain(values: Any) -> Any:
-    """A rule that is no NamedTuple, as it is."""
+    """Makes a rule that is a plain tuple: the tuple itself."""
     return values
 
 
@@ -95,7 +95,7 @@ def _made_of_fields(kind: Any) -> Callable[[Any], Any]:
 
 
 def as_fields(rule: Any) -> tuple[Callable[[Any], Any], Any]:
-    """A rule as its fields, which a call takes sooner than a NamedTuple."""
+    """The function that makes a rule from its fields, and the fields: a plain tuple is a faster argument."""
     kind: Any = type(rule)
     return plain if kind is tuple else _made_of_fields(kind), tuple(rule)
 
@@ -113,7 +113,7 @@ def _on_numbers(scale: Callable[..., Any], table: Callable[[Any], Any], opened: 
 
 @dataclass(frozen=True)
 class Scaled:
-    """A rule whose numbers hang on the run, ``scale(rule, top, start, h)``, compiled."""
+    """A rule whose numbers depend on the run: ``scale(rule, top, start, h)``, compiled."""
 
     rule: Any  # a NamedTuple
     scale: Callable[..., Any]
@@ -131,7 +131,7 @@ class Scaled:
 
 @dataclass(frozen=True)
 class Later:
-    """A rule that hangs on nothing, made when it is first used."""
+    """A rule that is the same for all runs, made when it is first used."""
 
     make: Callable[[], Any]
     pack: Pack = as_fields
@@ -155,7 +155,7 @@ def _on_samples(sample: Callable[..., Any], kind: Any) -> Any:
 
 @dataclass(frozen=True)
 class Shown:
-    """What a user sees of a kernel's states: `sample(par, t, state)` compiles and returns `size` numbers."""
+    """From a kernel's states to those of the user's chart: `sample(par, t, state)` compiles, returns `size` numbers."""
 
     sample: Callable[..., Any]
     size: int
@@ -173,11 +173,11 @@ class Shown:
 
 @register_jitable
 def as_it_is(rule: Any, top: Any, at: Any, h: float) -> Any:
-    """The numbers of a method that hang on nothing of the run."""
+    """`scale` of a method whose numbers do not depend on the run."""
     return rule
 
 
 @register_jitable
 def as_it_steps(par: Any, t: float, state: Any) -> Any:
-    """A sample that shows the state of the kernel."""
+    """`sample` of a kernel whose state is that of the user's chart."""
     return state

@@ -4,9 +4,9 @@ Traits are *claims* until measured; `None` means that nobody has claimed anythin
 (`discrete_lagrangian`, `composition`, ...) from a table of numbers, or by hand around any function
 ``solve(top, start, plan) -> Run``. Nothing is decided by an integrator's name.
 
-A method in one of its charts is a *variant*, ``rk4[axis]``. `variants` lists them; `integrator` knows them by name. The
-maps of physics engines, family ``engine``, are run and judged by name as every integrator is; they are what people are
-given, not what one would choose: `methods`, and so `variants` and every comparison, leaves them out.
+A method in one of its charts is a *variant*, ``rk4[axis]``. `variants` lists them; `integrator` finds them by name. The
+maps of physics engines, family ``engine``, are run and judged by name as every integrator is. Users get them with an
+engine and do not choose them: `methods`, and so `variants` and every comparison, leaves them out.
 """
 
 import copyreg
@@ -42,7 +42,7 @@ FAMILIES = (
 )  # fmt: skip
 IMPLEMENTATIONS = ("compiled", "python")
 ENERGY_ERRORS = ("kept", "bounded", None)
-NEEDS = {  # the weakest thing that suffices for a method, whatever its kernel makes use of, and what a user says of it
+NEEDS = {  # the least that a method needs of a problem, even if its kernel uses more, and the words for it
     "derivative": "f(t, y)", "constants": "f(t, y) and constants", "expression": "f as a formula",
     "lagrangian": "a Lagrangian", "kicks": "torque, free motion", "group": "torque, inertia",
     "this-top": "this top's equations", "solution": "the motion itself",
@@ -59,7 +59,7 @@ KINDS: dict[str, tuple[Any, str]] = {
     **dict.fromkeys(("modified_energy", "sleeps_from"), (Callable | None, "a function or None")),
 }  # fmt: skip
 CONSERVED = ("energy", "p_phi", "p_psi", "axis_length", "cayley_energy")  # what a method may claim to conserve
-SMALLEST_FIRST = {  # the charts that show it, in order of preference
+SMALLEST_FIRST = {  # what is observed: the charts that show it, in order of preference
     "nutation": ("angles", "axis", "attitude"), "axis": ("axis", "angles", "attitude"),
     "attitude": ("angles", "attitude"),
 }  # fmt: skip
@@ -77,11 +77,11 @@ def split_name(name: str) -> tuple[str, str]:
 class Integrator:
     """One integrator: its name, its claims, and how to run it.
 
-    `solvers` maps a chart (angles, axis, attitude, body) to a function. `control` is what a user turns: ``step_size``,
-    ``tolerance`` or nothing. `implementation` says what executes the inner loop, so that languages are never ranked
-    against each other unsaid, and `inner_loop` how. `needs` is one of `NEEDS`; `general` says whether the method exists
-    for a body without symmetry; None where nobody has said so. `summary` is a line about it, `about` a paragraph; the
-    built-in ones have theirs from `about.md`. Raises SymtopError for a field that makes no sense.
+    `solvers` maps a chart (angles, axis, attitude, body) to a function. `control` is what a user sets: ``step_size``,
+    ``tolerance`` or nothing. `implementation` says what executes the inner loop, so that a ranking across languages is
+    always labelled, and `inner_loop` how. `needs` is one of `NEEDS`; `general` says whether the method exists for a
+    body without symmetry; both are None if unknown. `summary` is a line about it, `about` a paragraph, which the
+    built-in ones have from `about.md`. Raises SymtopError for an invalid field.
     """
 
     name: str
@@ -98,13 +98,13 @@ class Integrator:
     least_tolerance: float = 0.0
     default_tolerance: float | None = None
     reference: str = field(default="", metadata={"words": True})
-    energy_error: str | None = None  # "kept" or "bounded"; None says what follows from the other claims
-    modified_energy: ModifiedEnergy | None = None  # what it conserves to O(h^4) less the energy, in closed form
-    sleeps_from: Callable[[float], float] | None = None  # spin of the sleeping top (I1 = I3 = mgl = 1) at a step h
+    energy_error: str | None = None  # "kept" or "bounded"; with None it follows from the other claims
+    modified_energy: ModifiedEnergy | None = None  # what it conserves to O(h^4) minus the energy, in closed form
+    sleeps_from: Callable[[float], float] | None = None  # (h): least spin of a sleeping top (I1 = I3 = mgl = 1)
     exact_steps: bool = False  # a step of any size is the motion itself but for rounding: there is no order
     same_steps_as: str | None = None  # a compiled integrator that takes the same steps
     precision: str = "double"  # of its arithmetic: "single", "double", "longdouble" (80 bits) or "quad" (128)
-    speed: float = 1.0  # of a step, in units of others of its implementation: 0.002 for arithmetic in software
+    speed: float = 1.0  # of a step, relative to others of its implementation: 0.002 for arithmetic in software
     needs: str | None = field(default=None, metadata={"words": True})
     general: bool | None = field(default=None, metadata={"words": True})
     inner_loop: str | None = field(default=None, metadata={"words": True})
@@ -152,7 +152,7 @@ class Integrator:
         return Catalogue({self.name: self})._repr_html_()
 
     def check_tolerance(self, tolerance: object) -> float:
-        """The tolerance to use, refused where the arithmetic cannot reach it."""
+        """The tolerance to use, the default for None; SymtopError if the arithmetic cannot reach it."""
         value = self.default_tolerance if tolerance is None else errors.positive("tolerance", tolerance)
         if value is None:
             raise SymtopError(f"{self.name} is adaptive and needs a tolerance, for example 1e-6")
@@ -165,16 +165,16 @@ class Integrator:
 
     @property
     def fixed_step(self) -> bool:
-        """Is a step what a user sets?"""
+        """Does a user set a step size?"""
         return self.control == "step_size"
 
     @property
     def adaptive(self) -> bool:
-        """Is a tolerance what a user sets?"""
+        """Does a user set a tolerance?"""
         return self.control == "tolerance"
 
     def given(self, value: float) -> dict[str, float]:
-        """The argument of `simulate` that sets a step or a tolerance; none where there is nothing to set."""
+        """The argument of `simulate` that sets the step or tolerance to `value`; none if there is nothing to set."""
         return {} if self.control is None else {self.control: value}
 
     def charts(self) -> tuple[str, ...]:
@@ -235,7 +235,7 @@ _loaded: list[str] = []
 _announced: list[str] = []
 _missing: dict[str, str] = {}  # names that cannot be had on this machine, with the reason
 _variants: dict[str, tuple[Integrator, Integrator]] = {}  # by name: the integrator, and its variant
-_shipped: set[str] = set()  # by symtop or an installed package: every process has them
+_shipped: set[str] = set()  # names from symtop and installed packages: every process has them
 _loading = threading.RLock()  # the first call of one thread loads; a package that is being loaded may register
 
 
@@ -262,7 +262,7 @@ def _load_packages() -> None:
             announced = point.load()
             for entry in [announced] if isinstance(announced, Integrator) else announced():
                 _shipped.add(register(entry).name)
-        except BaseException as error:  # (a stranger's package must not take the registry down)
+        except BaseException as error:  # (an error of a package must not disable the registry)
             if is_of_user(error):
                 raise
             sentence = f"the integrators of {point.value} are left out: {words_of(error)}"
@@ -283,7 +283,7 @@ def register(entry: Integrator, *, replace: bool = False) -> Integrator:
 
 
 def is_built_in(name: str) -> bool:
-    """Does every process know this integrator without being told?"""
+    """Does every process have this integrator, from symtop or an installed package?"""
     _load()
     return split_name(name)[0] in _shipped
 
@@ -300,7 +300,7 @@ class _Integrators(Catalogue):
 
 
 def _method_and_chart(name: str, registered: Collection[str]) -> tuple[str, str]:
-    """`split_name`, and the same of ``series-axis``, which stands for ``series[axis]`` where a shell reads brackets."""
+    """`split_name`, also of ``series-axis``, which stands for ``series[axis]`` in shells that expand brackets."""
     method, chart = split_name(name)
     head, _, tail = name.rpartition("-") if isinstance(name, str) else ("", "", "")
     if head in registered and not chart and name not in registered and tail in DIMENSIONS:
@@ -349,7 +349,7 @@ def integrator(name: "str | Integrator") -> Integrator:
 
 
 def _reduced(method: Integrator) -> Any:
-    """A registered one is pickled by its name, as solvers are of their process; any other is copied field by field."""
+    """Pickles a registered integrator by its name, as solvers exist in one process only; others field by field."""
     registered = split_name(method.name)[0] in integrators() and integrator(method.name) == method
     return (integrator, (method.name,)) if registered else object.__reduce_ex__(method, 2)
 
@@ -367,7 +367,7 @@ def variants(observe: str | None = None) -> list[Integrator]:
 
 @functools.cache
 def bibliography() -> dict[str, str]:
-    """The text of every entry, by its key. An entry begins with @ in the first column and ends with } there."""
+    """The BibTeX of every entry, by its key. An entry begins with @ in the first column and ends with } there."""
     text = resources.files("symtop.methods").joinpath("citations.bib").read_text(encoding="utf-8")
     return {
         match["key"]: match[0]
@@ -393,7 +393,7 @@ def citation(name: "str | Integrator") -> str:
 
 @functools.cache
 def paragraphs() -> dict[str, str]:
-    """The text under each heading ``## NAME``, on one line."""
+    """The text under each heading ``## NAME`` of about.md, on one line."""
     text = resources.files("symtop.methods").joinpath("about.md").read_text(encoding="utf-8")
     _, *sections = re.split(r"^## (.+)$", text, flags=re.MULTILINE)
     return {name: " ".join(body.split()) for name, body in zip(sections[::2], sections[1::2], strict=True)}

@@ -2,15 +2,15 @@
 
     e' = L x e / I1,    q' = (L q / I1 + twist q k) / 2,    L' = mgl k x e,    twist = p_psi (1/I3 - 1/I1)
 
-f of (q, L) has p_psi = L.e of the state, with the axis of q/|q| (`on_state`): of a length that a method does not keep
-the rates would be those of another spin. What keeps p_psi exactly or to rounding, as splittings, maps on the group and
-Taylor series do, may take the twist of the start for the whole run (`on_attitude`). The attitude has a third form, the
-frame (e, L, a). A unit vector a across the axis is carried by a' = L x a / I1; the body turns past it about e at the
+The right-hand side f(q, L) takes p_psi = L.e from the state, with the axis of q/|q| (`on_state`): otherwise an error in
+|q| would change the spin. Methods that keep p_psi exactly or to rounding (splittings, maps on the group, Taylor series)
+may take the twist of the start for the whole run (`on_attitude`). The attitude has a third form, the frame (e, L, a).
+A unit vector a normal to the axis is carried by a' = L x a / I1; the body turns relative to it about e at the
 constant rate `twist`, which is applied exactly when a sample is taken. Every equation and every constant of this form
-is linear or quadratic, whereas p_psi = L.e(q) is cubic in (q, L), where no Runge-Kutta method keeps it; and what is
-integrated turns with the axis, not with the spin.
+is linear or quadratic, whereas p_psi = L.e(q) is cubic in (q, L), and no Runge-Kutta method keeps it; and the vectors
+that are integrated turn as slowly as the axis, not with the spin.
 
-p_phi = L_z and p_psi = L.e are read off the state, and whatever a kernel does to them shows.
+p_phi = L_z and p_psi = L.e are computed from the state, so that a kernel's errors in them are visible.
 """
 
 import math
@@ -122,7 +122,7 @@ frame_to_attitude = Shown(_frame_to_attitude, 7)
 @register_jitable
 def field_axis(par: Any, y: Any) -> Any:
     """Time derivative of (e, L)."""
-    inverse = 1.0 / par.I1  # leaves the loop, as three divisions would not
+    inverse = 1.0 / par.I1  # the compiler moves it out of the loop, unlike three divisions
     wx, wy, wz = inverse * y[3], inverse * y[4], inverse * y[5]
     turn = wy * y[2] - wz * y[1], wz * y[0] - wx * y[2], wx * y[1] - wy * y[0]
     return (*turn, -par.mgl * y[1], par.mgl * y[0], 0.0)
@@ -154,7 +154,7 @@ def _turning(par: Any, twist: float, right: float, back: float, y: Any) -> Any:
 
 @register_jitable
 def field_attitude(par: Any, y: Any) -> Any:
-    """Time derivative of (q, L); |q| stays one only as far as a method keeps it, and nothing else hangs on it."""
+    """Time derivative of (q, L); |q| stays one only as far as a method keeps it, and nothing else depends on it."""
     w, x, y1, z = y[0], y[1], y[2], y[3]
     one = 1.0 / (w * w + x * x + y1 * y1 + z * z)
     right, back, up = axis_of(w, x, y1, z)
@@ -164,7 +164,7 @@ def field_attitude(par: Any, y: Any) -> Any:
 
 @register_jitable
 def field_twisted(par: Any, y: Any) -> Any:
-    """The same with the twist of the start and of unit quaternions."""
+    """Time derivative of (q, L) for unit quaternions, with the twist of the start."""
     right, back, _ = axis_of(y[0], y[1], y[2], y[3])
     return _turning(par, par.twist, right, back, y)
 
@@ -200,7 +200,7 @@ def axis_of(w: float, x: float, y: float, z: float) -> Any:
 
 @register_jitable
 def with_spin(par: Any, state: Any, t: float) -> Any:
-    """An attitude state (q, L) that was stepped without the body's own spin, with the spin of a time t."""
+    """An attitude state (q, L) that was stepped without the turn about the axis at rate `twist`, turned by twist t."""
     w, x, y, z, Lx, Ly, Lz = state
     half = 0.5 * par.twist * t
     c, s = np.cos(half), np.sin(half)

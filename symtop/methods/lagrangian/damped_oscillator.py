@@ -144,7 +144,7 @@ def discrete_path(
 
 
 def notebook_positions(damping: float, h: float, first: float, second: float, steps: int) -> tuple[Array, Array]:
-    """The notebook's update and its guess at the forces, for m = k = 1: positions, each of shape (steps + 1,).
+    """The notebook's update and its guess at the forces, for m = k = 1: positions of both, shape (steps + 1,).
 
     update    x[k+2] = ((-4 + 2 b h - h^2) x[k] + 2 (4 - h^2) x[k+1]) / (4 + 2 b h + h^2), the midpoint rule above
     guess     (x[k+2] - 2 x[k+1] + x[k])/h^2 = -(V'(x[k+1/2]) + V'(x[k+3/2]) + 2 dF/dx')/2 with dF/dx' = -b

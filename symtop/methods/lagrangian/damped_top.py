@@ -11,8 +11,8 @@ and psi likewise, so that the momenta are not conserved but balanced, p_phi1 - p
 the motion itself has the same invariants p_phi + c_phi phi and p_psi + c_psi psi, and the discrete one keeps them to
 rounding. Order 2. The kernel is that of `unreduced`. Not in the registry, whose methods step the free top.
 
-The motion has no closed form; its truth is integrated by DOP853 at tolerance 1e-13, in the four equations that remain
-when both momenta are eliminated by their balance.
+The motion has no closed form; its reference is computed by DOP853 at tolerance 1e-13, from the four equations that
+remain when both momenta are eliminated by their balance.
 Source: Marsden and West, Acta Numerica 10 (2001) 357, part three.
 """
 
@@ -30,7 +30,7 @@ from symtop.methods.library.scipy_ivp import integrated
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 
-NEAR = 0.01  # rad from a pole, where the friction of precession, c_phi/(I1 sin^2 theta) a unit of time, is stiff
+NEAR = 0.01  # rad from a pole, nearer to which the friction of precession, rate c_phi/(I1 sin^2 theta), is stiff
 Rates = Callable[[float, Any], tuple[float, ...]]
 
 
@@ -68,7 +68,7 @@ def four_equations(scene: Scene, friction: Friction) -> tuple[Rates, tuple[float
 
 
 def _near_pole(_: float, y: Any) -> float:
-    """Falls through zero where the axis comes within `NEAR` of a pole."""
+    """An event function for `solve_ivp`: becomes negative where the axis comes within `NEAR` of a pole."""
     return math.sin(y[0]) - math.sin(NEAR)
 
 

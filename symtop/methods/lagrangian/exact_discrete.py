@@ -1,4 +1,4 @@
-"""The exact discrete top: an explicit, integrable, variational step that is the motion itself at any step h.
+"""The exact discrete top: an explicit, integrable, variational step that gives the true motion at any step h.
 
 In the chart of `oscillators`, with Z_n = exp(-i n delta) chi(n h) and s = |Z|^2,
 
@@ -19,8 +19,8 @@ reversible for all A and B. It is central: Im(conj(Z) p) = J by Noether's theore
 
     chi' = p + B Re(conj(Z) p) Z,        |chi_1|^2 + |chi_2|^2 = 1  <->  sum_k Re(conj(Z_k) p_k)/D_k = 0
 
-What is exact is the orbit. Marsden and West's exact discrete Lagrangian is the action of the true motion between two
-positions, which no closed form is known for; L_d has the energy E' (in A, B, r) and delta for parameters, as an action
+Exact is the orbit. Marsden and West's exact discrete Lagrangian is the action of the true motion between two positions,
+for which no closed form is known; L_d has the energy E' (in A, B, r) and delta for parameters, as an action
 at fixed energy has, and its discrete Euler-Lagrange equations hold on the orbits of that energy without an error. A
 start names them. As a map of starts a step is the flow: symplectic, and reversible with a step of -h.
 
@@ -73,7 +73,7 @@ from symtop.methods.lagrangian import oscillators
 from symtop.methods.lagrangian.oscillators import Map, OscillatorTop, momentum, on_oscillators
 from symtop.methods.vectors import accumulate_plainly, summed
 
-IDLE = 2e-15  # |chi|^2 may be off by as much: below that, what is seen of it is the rounding of |Z|^2
+IDLE = 2e-15  # errors of |chi|^2 below this are not corrected, as they are the rounding of |Z|^2
 
 
 @register_jitable
@@ -112,7 +112,7 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 @register_jitable
 def _sum(high: float, low: float, more: float, late: float) -> Any:
-    """(high + low) + more: what to add to `high`, what it becomes, and what is left, with `late`."""
+    """(high + low) + more: the increment of `high`, the new `high`, and the remainder plus `late`."""
     addend = more + low
     total = high + addend
     virtual = total - high
@@ -121,7 +121,7 @@ def _sum(high: float, low: float, more: float, late: float) -> Any:
 
 @register_jitable
 def _kick(high: float, low: float, f: float, x: float, under: float) -> Any:
-    """The same for (high + low) + f (x + under)."""
+    """(high + low) + f (x + under): the increment of `high`, the new `high`, and the remainder."""
     small = f * under + low
     addend = fused(f, x, small)
     total = high + addend
@@ -133,19 +133,19 @@ def _kick(high: float, low: float, f: float, x: float, under: float) -> Any:
 
 @register_jitable
 def _step(rule: Any, state: Any, carry: Any) -> Any:
-    """Increment of one application of the map, what it leads to, and the carry at its end."""
+    """Increment of one application of the map, the state after it, and the carry."""
     x1, y1, x2, y2, u1, v1, u2, v2 = state
     s1, s2, f1, f2, lx1, ly1, lx2, ly2, lu1, lv1, lu2, lv2 = carry
     longer = s1 >= s2
-    # the longer one gets the length that it must have, and p the inverse of that factor, so that J remains
+    # the longer one is scaled to its right length, and p by the inverse of that factor, so that J stays the same
     lack, other = (1.0 - s1) - s2, (1.0 - s2) - s1
     lack = lack if longer else other
     half = 0.5 * lack
     lack = half if abs(lack) > IDLE else 0.0
-    # and what is wrong with p is taken off it: sum Re(conj(Z) (W - f Z))/r = 0
+    # and p is corrected to fulfil sum Re(conj(Z) (W - f Z))/r = 0
     out1, out2 = x1 * u1 + y1 * v1 - f1 * s1, x2 * u2 + y2 * v2 - f2 * s2
     swell = out1 * rule.q1 + out2 * rule.q2
-    # both are made, and one is chosen: a branch that holds arithmetic is none in lanes
+    # both are computed and one is selected: a branch with arithmetic in it is not vectorised
     i1, i2 = _inverse(s1), _inverse(s2)
     e1, e2, c1, c2 = lack * i1, lack * i2, swell * rule.r1 * i1, swell * rule.r2 * i2
     e1 = e1 if longer else 0.0
@@ -189,7 +189,7 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
 
 @register_jitable
 def _between(state: Any, after: Any, carry: Any) -> Any:
-    """The increment that leads from one state to another, and the carry with what that rounds off."""
+    """The increment from one state to another, and the carry with its rounding error."""
     total = state
     for i in range(8):
         total = set_item(total, i, after[i] - state[i])
@@ -247,7 +247,7 @@ def present_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
 
 
 def _side_by_side(par: Any, rule: Any, state: Any, carry: Any) -> Any:
-    """A step in lanes: one of several parts is left to the kernel for one."""
+    """A step in lanes; a step of several parts is given up, to be run alone."""
     step, _, carry = _step(rule, state, carry)
     return step, carry, finite_outcome(step[0] + step[2] + (0.0 if rule.parts == 1.0 else np.inf))
 

@@ -41,7 +41,7 @@ from symtop.methods.framework.registry import Integrator
 
 
 class Iteration(NamedTuple):
-    """When Newton stops, as `discrete_lagrangian.Quadrature` says."""
+    """When Newton stops, as in `discrete_lagrangian.Quadrature`."""
 
     tolerance: float = 1e-8
     iterations: int = 50
@@ -144,7 +144,7 @@ class _Step(NamedTuple):
     theta: float
     start: _Node
     h: float
-    flight: float  # h p / I1, what d is without any force
+    flight: float  # h p / I1, d without any force
     scale: float  # h^2 / I1
 
 
@@ -155,7 +155,7 @@ def _steady(par: Any, h: float) -> Any:
 
 @register_jitable
 def _open(par: Any, rule: Any, theta: float) -> Any:
-    """What no iteration changes: the trigonometry of the start."""
+    """The numbers that no iteration changes: the trigonometry of the start."""
     return node_at(par, theta)
 
 
@@ -210,7 +210,7 @@ def _predict(step: Any, carry: Any) -> Any:
 
 @register_jitable
 def _keep(trial: Any, correction: Any) -> Any:
-    """What was evaluated before the last correction follows it to first order; the remainder is its square."""
+    """The last trial with the last correction added to first order; the remainder is its square."""
     fix = correction.change
     return (
         _follow(trial.V0, fix), _follow(trial.Vm, fix), _follow(trial.V1, fix),

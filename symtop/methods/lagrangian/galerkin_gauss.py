@@ -67,7 +67,7 @@ class Rule(NamedTuple):
 
 @functools.cache
 def gauss_rule(s: int) -> Rule:
-    """Of the method with s nodes, from the zeros of Legendre's polynomial."""
+    """The rule of the method with s nodes, from the zeros of Legendre's polynomial."""
     x, w = legendre.leggauss(s)
     c, b = 0.5 * (x + 1.0), 0.5 * w
     k = np.arange(s)
@@ -148,9 +148,9 @@ def _evaluate(step: Any, forces: Any) -> Any:
 
 
 def _elimination(s: int) -> Callable[..., Any]:
-    """x of s equations in rows of s + 1 numbers, the last of them the right-hand side: for one after the other.
+    """A function that solves s equations, in rows of s + 1 numbers, the last of them the right-hand side.
 
-    A function for each s, because numbers of tuples at places that vary are slow.
+    A function for each s, because access to a tuple at a variable place is slow.
     """
     if s == 1:
         return register_jitable(lambda rows: (rows[0][1] / rows[0][0],))
@@ -222,7 +222,7 @@ def _free_flight(step: Any) -> Any:
 
 @register_jitable
 def _keep(trial: Any, correction: Any) -> Any:
-    """What was evaluated before the last correction follows it to first order; the remainder is its square."""
+    """The last trial with the last correction added to first order; the remainder is its square."""
     south = north = roll = 0.0
     for i in range(len(trial.rolls)):
         turned = correction.change[i]
@@ -248,7 +248,7 @@ def _close(step: Any, end: Any) -> Any:
 
 
 def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """The force at the start, in the place of those of a last step, and once more: no tuple is empty in lanes."""
+    """The force at the start, for each force of a step before, and once more, so that no tuple is empty in lanes."""
     force, forces = -pull_at(par, node_at(par, state[0]), par.south, par.north).slope, rule.c
     for i in range(len(forces)):
         forces = set_item(forces, i, force)

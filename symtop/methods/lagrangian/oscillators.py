@@ -1,4 +1,4 @@
-"""The attitude as two planar quartic oscillators that do not see each other; a chart for kernels, without poles.
+"""The attitude as two uncoupled planar quartic oscillators; a chart for kernels, without poles.
 
     chi_1 = q_w - i q_z = cos(theta/2) exp(-i (phi + psi)/2)
     chi_2 = q_y - i q_x = -i sin(theta/2) exp(i (phi - psi)/2)
@@ -16,7 +16,7 @@ its complex number under a central force, with the angular momentum J_k; both ha
     e_x + i e_y = 2 conj(chi_1) chi_2,   p_phi = -2 I1 (J_1 - J_2),   p_psi = -2 I1 (J_1 + J_2),   eta = 2 i I1 chi'
     L_x + i L_y = conj(chi_1) eta_2 + chi_2 conj(eta_1),   L_z = Re(conj(chi_1) eta_1 - conj(chi_2) eta_2)
 
-The price is one parameter, E': off the level of energy that it names, or off |chi_1|^2 + |chi_2|^2 = 1, two oscillators
+One parameter of the equations is E': with another energy, or with |chi_1|^2 + |chi_2|^2 other than 1, two oscillators
 are no top. A state is (Re chi_1, Im chi_1, Re chi_2, Im chi_2) and the four velocities. Derived here, and checked
 against the closed form in the tests; that e_z is an elliptic function and the half angles are Lame's is classical.
 Source: Klein and Sommerfeld, Theory of the Top, chapter 6.
@@ -93,10 +93,10 @@ def momentum(par: Any, s: Any) -> Any:
     return k * x, k * y, k * ((b * A - a * B) + (c * D - d * C))
 
 
-SHORTEST = 1e-100  # of a step, and of what is left of one that is a whole number of nutations
-STEEPEST = 16.0  # (P - e3)/(P - e2): what rounding of the constants is amplified by
-APART = 1e-5  # (e1 - e2)^2 (e1 - e3)/(b1^2 + b2^2)^1.5: rounding over it is what e1 - e2 and a nutation are known to
-MOST_PARTS = 10_000
+SHORTEST = 1e-100  # least length of a step, and of the rest of one that is a whole number of nutations
+STEEPEST = 16.0  # limit on (P - e3)/(P - e2), the factor by which rounding of the constants is amplified
+APART = 1e-5  # least (e1 - e2)^2 (e1 - e3)/(b1^2 + b2^2)^1.5; e1 - e2 and a nutation have errors of rounding over it
+MOST_PARTS = 10_000  # limit on the parts of a step
 TINY = 1e-80  # of e1 - e3, in the place of e1 - b where e1 is a zero of chi: J is zero, too
 
 
@@ -151,7 +151,7 @@ def _whole_turn(e: Any, sigma: float, b: float, J: float) -> float:
 
 @register_jitable
 def _turned(e: Any, above: Any, par: Any, sigma: float, b: float, J: float, sign: float, nutations: float) -> Any:
-    """(A - 1) D, D, r, 1/r and delta in turns of one oscillator, for a step of so many nutations and a rest."""
+    """(A - 1) D, D, r, 1/r and delta in turns of one oscillator, for a step of `nutations` whole ones and a rest."""
     aD, D, delta = one_oscillator(above, par.g2, par.g3, sigma, b, J)
     delta *= sign
     if nutations != 0.0:
@@ -161,7 +161,7 @@ def _turned(e: Any, above: Any, par: Any, sigma: float, b: float, J: float, sign
 
 
 def _mapped(rule: Any, top: Any, at: Any, h: float) -> Any:
-    """The numbers of the step h from a start; `rule` says nothing but their type."""
+    """The numbers of the step h from a start; of `rule` only the type is used."""
     par, s = oscillator_numbers(top, at)
     e = roots(par.g2, par.g3)
     # two roots that are neighbours lose digits: e1 and e2 beside a separatrix, both turning points in a steady motion

@@ -11,10 +11,10 @@ the step is p0 = -D1 L_d, solved by Newton with an analytic 3 x 3 Jacobian, and 
     p_theta1 = I1 w + h sum w_i a_i f_i,        p_phi1 = sum w_i l_i,    p_psi1 = sum w_i m_i
 
 All three momenta are variables of the state: p_phi and p_psi are conserved only as far as the equations were solved.
-Order 2, symplectic, symmetric if the rule is. It shows that the reduced kernel assumed nothing: in exact arithmetic
-both are one map. It is not a method to use: its solver iterates more often (the study `reduction` measures both), p1 is
-formed at full size, so that no compensated sum undoes its rounding, and p_phi - p_psi cos(theta) cancels near a pole.
-Friction of the bearings, of which a top of the registry has none, enters as `damped_top` says.
+Order 2, symplectic, symmetric if the rule is. It is there to check the reduced kernel: in exact arithmetic both are one
+map. It is not a method to use: its solver iterates more often (the study `reduction` measures both), p1 is formed at
+full size, so that no compensated sum undoes its rounding, and p_phi - p_psi cos(theta) cancels near a pole. Friction of
+the bearings (`damped_top`) is part of the equations; it is zero for the methods of the registry.
 Source: Marsden and West, Discrete mechanics and variational integrators, Acta Numerica 10 (2001) 357.
 """
 
@@ -132,10 +132,10 @@ def _from_the_start(step: Any) -> Any:
 
 @register_jitable
 def _correct(step: Any, sums: Any, rate: Any) -> Any:
-    """Newton's correction, judged against the rates themselves, to stagnation.
+    """Newton's correction, whose size is compared with the rates, until it no longer falls.
 
-    p1 comes from the very sums whose residual was seen to vanish. Stopped as in the reduced kernel, after a correction
-    of 1e-8, p_phi of `goldstein` walks off linearly, 2e-12 in 1e6 steps at h = 0.01 against 3e-13.
+    p1 comes from the sums whose residual has converged. If the iteration stopped as in the reduced kernel, after a
+    correction of 1e-8, p_phi of `goldstein` would drift linearly, 2e-12 in 1e6 steps at h = 0.01 against 3e-13.
     """
     (par, rule, state, h), (w, v, u) = step, rate
     dw, dv, du = _correction(par, sums, rate, state[3:], h)
@@ -211,5 +211,5 @@ def unreduced(method: Integrator) -> Integrator:
 
 
 def built_in() -> list[Integrator]:
-    """The twins of two reduced methods."""
+    """The unreduced forms of two reduced methods."""
     return [unreduced(method) for method in reduced_methods() if method.name in {"midpoint", "trapezoidal"}]

@@ -1,4 +1,4 @@
-"""The closed form as an integrator: no step, no tolerance, no growth of error. It is what the others are measured by.
+"""The closed form as an integrator: no step, no tolerance, no growth of error; the reference for all others.
 
 Source: Klein and Sommerfeld, Theory of the Top, chapter 6; see `symtop.model.exact.closed_form`.
 """

@@ -65,10 +65,10 @@ def compiled_field(chart: str) -> Any:
 
 
 def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solver:
-    """A solver of the registry around a method of ``scipy.integrate`` or a class like it; `compiled`: the field.
+    """A solver of the registry around a method of ``scipy.integrate`` or a class like it.
 
-    It is the loop of ``solve_ivp`` with ``t_eval``, to the same bits, kept open: a run that fails returns what it had,
-    and one that would never end is stopped.
+    `compiled` is for the right-hand side. The loop is that of ``solve_ivp`` with ``t_eval``, to the same bits, but a
+    run that fails returns the samples before the failure, and one that would never end is stopped.
     """
     form = FORMS[chart]
     most = EVALUATIONS.get(method if isinstance(method, str) else "", EVALUATIONS["Radau"])
@@ -112,9 +112,9 @@ def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solve
 def integrated(
     rates: Callable[..., Any], start: Sequence[float], times: Array, method: str, tolerance: float, events: Any = None
 ) -> Array:
-    """Equations by ``solve_ivp`` (rtol = atol) at times from 0 on: (variables, times). SymtopError if it fails.
+    """Solution by ``solve_ivp`` (rtol = atol) at times from 0 on, shape (variables, times). SymtopError if it fails.
 
-    A terminal event of `events` ends them: the times before it are answered.
+    A terminal event of `events` ends it: the result has the times before the event only.
     """
     from scipy.integrate import solve_ivp  # 0.6 s to import
 

@@ -28,7 +28,7 @@ from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_charts, inertia, iterated_loop
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
-MOST = 30  # iterations of a step; 3 or 4 are the rule
+MOST = 30  # limit on the iterations of a step; 3 or 4 are usual
 ENOUGH = 1e-9  # a correction of u whose square is below rounding, relative to 1 + |u|
 
 

@@ -27,7 +27,7 @@ from symtop.methods.lie_group.loop import SPUN, Parts, gravity, in_charts, inert
 from symtop.methods.splitting.rotor import exact, near
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
-MOST = 50  # iterations of a step; 4 to 6 are the rule
+MOST = 50  # limit on the iterations of a step; 4 to 6 are usual
 ENOUGH = 1e-14  # a correction of W', relative to its parts, that is rounding
 
 
@@ -81,8 +81,8 @@ def _corrected(par: Any, e: Any, w: Any, m: float, v: Any, gain: Any, by: float,
 def _parts(rotation: Callable[..., Any], *, alone: bool) -> Parts:
     """The parts of an iteration in the body's axes of the start, with the rotor of any angle, or of one below 2.
 
-    x is W'_1, the size of its last correction, and alone what the last pass made of W'_1, which registers hold; in
-    lanes W'_1 before that correction, of which it is made again.
+    x is W'_1 and the size of its last correction; then, with `alone`, the results of `made_of` in the last pass, which
+    fit in registers, and in lanes W'_1 before that correction, from which they are computed again.
     """
 
     @register_jitable

@@ -1,6 +1,6 @@
 """The loop around maps that make a step as a rotation in space: Lie-group methods, on the attitude (q, L).
 
-A map sees the axis and the momentum, since nothing of a symmetric top hangs on more, and returns a rotation as a
+A map takes the axis and the momentum, on which alone the motion of a symmetric top depends, and returns a rotation as a
 quaternion less one, (m, v) = p - 1, and the change of L:
 
     turn(par, rule, e, L, carry, h) -> (m, v, dL, carry, work, outcome),    q <- p q,   e <- p e p*,   L <- L + dL
@@ -12,15 +12,15 @@ A map in the frame that turns with L/I1 leaves the spin of the body out (`UNSPUN
 is a constant rate and is added at samples, as in `splitting.space`. A map of the body itself (`SPUN`) turns it in the
 step, with an error that grows with the spin.
 
-p - 1 in place of p keeps increments free of cancellation. What |q| lacks is added to m in every step.
+p - 1 in place of p keeps increments free of cancellation. In every step m is corrected for the error of |q|.
 
 A body without symmetry is stepped as (q*, M), for which a map sees Gamma and M (`framework.body`), alone, not in lanes.
 
-In lanes the shares stand outside and the lanes inside. A family writes what stands between, as one loop over the lanes
-or several (`stepped`), or as the parts of an iteration (`iterated_loop`). The table holds the numbers of the top, those
-of the rule and those of each share: one kernel for compositions of any length, and for both charts. An iteration runs
-until no lane is live. A lane that is live after half of the passes that a run alone may make is given up, and so is one
-whose equation cannot be solved.
+In lanes the outer loop is over shares and the inner one over lanes. A family supplies the inner one, as one loop over
+the lanes or several (`stepped`), or as the parts of an iteration (`iterated_loop`). The table holds the numbers of the
+top, those of the rule and those of each share: one kernel for compositions of any length, and for both charts. An
+iteration runs until it has ended in all lanes. A lane in which it has not ended after half of the passes allowed to a
+run alone is given up, and so is one whose equation cannot be solved.
 """
 
 import functools
@@ -47,7 +47,7 @@ def _on_body(top: Any, at: Any) -> Any:
 
 
 class Carried(NamedTuple):
-    """How the body's spin is stepped: what a kernel starts from, and how the attitude is shown."""
+    """How the body's spin is stepped: the start of a kernel, and how the attitude is shown."""
 
     prepare: Preparation
     present: Shown | None
@@ -83,7 +83,7 @@ def cayley(u: Any) -> Any:
 
 @register_jitable
 def composed(step: Any, q: Any, m: float, v: Any, dL: Any) -> Any:
-    """The increment with one more rotation, of the quaternion q that it has led to."""
+    """The increment with one more rotation, of q, the quaternion after that increment."""
     a, b, c, d, X, Y, Z = step
     w, x, y, z = q
     m += 0.5 * (1.0 + m) * (1.0 - (w * w + x * x + y * y + z * z))
@@ -143,7 +143,7 @@ LOW, STEP, FLAG, WORK, CARRY = SIZE, 2 * SIZE, 3 * SIZE, 3 * SIZE + 1, 3 * SIZE 
 
 @register_jitable
 def entered(block: Any, j: int) -> Any:
-    """The quaternion that lane j has come to, its axis, and the momentum."""
+    """The present quaternion of lane j, within the step, its axis, and the momentum."""
     y = summed(column(block, 0, j, STILL), column(block, STEP, j, STILL))
     return y[:4], axis_of(*y[:4]), y[4:]
 
@@ -156,7 +156,7 @@ def left(block: Any, j: int, q: Any, m: float, v: Any, dL: Any) -> None:
 
 @register_jitable
 def give_up(block: Any, j: int, when: bool) -> None:
-    """Have lane j run alone, by selection."""
+    """Mark lane j to be run alone, if `when`, without a branch."""
     block[FLAG * W + j] = 1.0 if when else block[FLAG * W + j]
 
 
@@ -165,7 +165,7 @@ def stepped(
     carried: Carried, carry: int = 1, begin: Callable[..., Any] = no_carry, room: int = 0,
     effort: Callable[[Any], int] = lambda _: 0,
 ) -> Lanes:  # fmt: skip
-    """A map in lanes: ``part(block, table, row)`` is one share of all lanes, whose own numbers begin with `row`.
+    """A map in lanes: ``part(block, table, row)`` makes one share of all lanes; `row` holds the share's numbers.
 
     ``lay(par, rule, h, numbers)`` writes `fields` numbers of the rule, then `each` for every share.
     """
@@ -207,7 +207,7 @@ def iterated_loop(  # noqa: C901  (the loops of one step, read in one piece)
     numbers: Callable[..., Any] = lambda _: (0.0,), count: int = 1, begin: Callable[..., Any] = no_carry,
     carry: int = 1,
 ) -> Loop:  # fmt: skip
-    """The loop around an iterated map of a body, for one and in lanes, from its parts; its work are the passes.
+    """The loop around an iterated map of a body, for one and in lanes, from its parts; it counts passes as work.
 
         numbers(rule) -> rule                                        in lanes `count` numbers of it, as the parts take
         start(par, rule, e, L, carry, h) -> (opened, x)              what no pass changes, and the first guess

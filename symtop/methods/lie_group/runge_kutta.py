@@ -68,7 +68,7 @@ def near(square: float) -> Any:
 
 @register_jitable
 def any_angle(square: float) -> Any:
-    """The same of any angle."""
+    """`near` for any angle."""
     if square < 1.0:
         return near(square)
     x = math.sqrt(square)
@@ -118,7 +118,7 @@ def _of_top(par: Any, L: Any) -> Any:
 
 @register_jitable
 def _of_body(par: Any, M: Any) -> Any:
-    """That of a body, seen from itself."""
+    """The element of se(3) of a body at M, in body axes (`framework.body`)."""
     return -par.a1 * M[0], -par.a2 * M[1], -par.a3 * M[2], -par.c1, -par.c2, -par.c3
 
 
@@ -127,7 +127,7 @@ TOP: Any = UNSPUN.top
 NUMBERS = (0.0,) * len(TOP._fields)
 
 
-@register_jitable  # at once: what a method is made of must not hang on what has run
+@register_jitable  # now, as the hash of a method's code must not depend on what has run
 def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
     i = 0
     for share in rule.shares:
@@ -137,7 +137,7 @@ def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
 
 
 def _product(count: int, terms: int, first: int, stages: int) -> Part:
-    """``(e, L, slopes, row, j)`` to the product of so many exponentials, the last of them, and whether all are near."""
+    """A function (e, L, slopes, row, j): the product of `count` exponentials, the last one, and 0 if all are near."""
     if count == 0:
 
         def made(e, L, slopes, row, j):  # type: ignore[no-untyped-def]
@@ -156,7 +156,7 @@ def _product(count: int, terms: int, first: int, stages: int) -> Part:
 
 
 def _stages(counts: tuple[int, ...], stages: int, brackets: int) -> Part:
-    """``(par, e, L, row, j)`` to the slopes of the stages, one more than there are counts, and whether all are near."""
+    """A function (par, e, L, row, j): the slopes of the stages, one more than `counts`, and 0 if all are near."""
     if not counts:
 
         def slopes(par, e, L, row, j):  # type: ignore[no-untyped-def]

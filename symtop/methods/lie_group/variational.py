@@ -42,7 +42,7 @@ from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_charts, iter
 from symtop.methods.splitting.coefficients import SUZUKI_4
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
-MOST = 60  # iterations of a step; 2 to 5 are the rule
+MOST = 60  # limit on the iterations of a step; 2 to 5 are usual
 ENOUGH = 1e-10  # a relative correction whose square is below rounding
 MOSER_VESELOV, EULER_POINCARE = 0.0, 1.0
 

@@ -8,7 +8,7 @@ and the modified divided differences phi_1 = f_n, phi_{i+1} = phi_i - phi*_i (on
     error of the step: h |g_k - g_{k+1}| |d|;    with order j and steps of one length: h sigma_j |gamma*_j phi_{j+1}|
 
 It predicts with order k = 1 .. 12 and corrects with order k + 1. The run starts with order 1 and raises order and step
-together until an error says otherwise; then the order is the one with the least error, raised only after k + 1 steps of
+together until an error is too large; then the order is the one with the least error, raised only after k + 1 steps of
 one length. h is kept, doubled if the error allows it, or multiplied by 0.5 to 0.9; doubled steps are what keeps the g_i
 (after k of them they are constants). Two evaluations a step, one for a step that is rejected. A sample is the value of
 the polynomial of degree k + 1 that the corrector integrates; it takes no evaluation.
@@ -33,12 +33,12 @@ from symtop.methods.runge_kutta.explicit import add, row_of, store
 from symtop.methods.runge_kutta.pairs import Method, integrator, nothing_more, rms
 from symtop.methods.vectors import zero
 
-HIGHEST = 12  # of k
-MOST_FAILURES = 2000  # of a step: one that is rounded up to what it was halved from would be tried for ever
+HIGHEST = 12  # the largest k
+MOST_FAILURES = 2000  # of a step: one that is rounded up to its length before halving would be tried for ever
 SUMS, NUMBERS = HIGHEST + 2, 2 * HIGHEST + 2  # rows of the memory: phi, then sums of phi*, then numbers of order i
-PSI, G, ALPHA, BETA, SIGMA, WORK = range(6)  # of which these are the columns
-LAST = NUMBERS + HIGHEST + 2  # the row of what the last step was, with these columns
-ORDER, ORDER_THEN, SAME, LENGTH, SETTLED = range(5)  # k now and of the step, how many had its length, and the start
+PSI, G, ALPHA, BETA, SIGMA, WORK = range(6)  # columns of the rows of numbers
+LAST = NUMBERS + HIGHEST + 2  # the row on the last step, with the columns:
+ORDER, ORDER_THEN, SAME, LENGTH, SETTLED = range(5)  # next k, its k, steps of its length, its length, start is over
 
 gamma = [1.0]  # gamma*_j, whose sizes are the error constants of Adams-Moulton methods with steps of one length
 for j in range(1, HIGHEST + 2):
@@ -78,7 +78,7 @@ def update(memory: Any, last: Any, k: int, h: float) -> None:
 
 
 def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read in one piece)
-    """What `pairs.loop` steps by."""
+    """The `Method` for `pairs.loop`."""
 
     @register_jitable
     def advance(par, state, memory, tolerance, t, step, end):  # type: ignore[no-untyped-def]  # noqa: C901

@@ -1,4 +1,4 @@
-"""Collective Gauss methods: Gauss collocation upstairs, on canonical variables, is Lie-Poisson downstairs.
+"""Collective Gauss methods: Gauss collocation on canonical variables, whose image on (e, L) is a Lie-Poisson map.
 
 The momentum map of SE(3) acting on T*H, the quaternions g with canonical momenta r, takes the canonical bracket to the
 Lie-Poisson bracket of the axis and the momentum,
@@ -13,8 +13,8 @@ a Poisson map. The equations are
 g starts as 1 and r as 2 L. The choice does not matter: turns g -> g c and shifts r -> r + s g are linear symmetries,
 with which a Gauss method commutes, so that the image of a step depends on (e, L) alone. Their momenta, |g|^2 and
 r.(g e_0)/2 = L.e, are quadratic, as is L_z: a Gauss method keeps all three, and with them |e|, p_psi and p_phi. The
-energy is of degree four in (g, r) and stays bounded. So this is `gauss` with what that lacks, the bracket, and without
-what it has, the energy. The spin of the body is a constant rate and is added at samples.
+energy is of degree four in (g, r) and its error stays bounded. In contrast to `gauss`, these methods preserve the
+bracket and not the energy. The spin of the body is a constant rate and is added at samples.
 
 The stages are swept as those of `gauss` are, with the same tables, from the slope at the start of the step and until
 the correction no longer falls. Sweeps that do not converge end the run.
@@ -54,7 +54,7 @@ def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 @register_jitable
 def _swept(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
-    """Fill in the increments of the stages; the sweeps that it took, and the outcome."""
+    """Fill in the increments of the stages; returns the number of sweeps and the outcome."""
     stages, start = len(rule.b), (1.0, 0.0, 0.0, 0.0, 0.0, 2.0 * L[0], 2.0 * L[1], 2.0 * L[2])
     unit = 1.0 / (abs(L[0]) + abs(L[1]) + abs(L[2]) + np.sqrt(par.I1 * abs(par.mgl)) + 1e-300)
     slope = _field(par, e, start)

@@ -41,7 +41,7 @@ from symtop.methods.vectors import accumulate, summed, zero
 from symtop.model.charts import BODY
 
 
-@register_jitable  # at once: what a method is made of must not hang on what has run
+@register_jitable  # now, as the hash of a method's code must not depend on what has run
 def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
     n = len(rule.b)
     weights = n * (n - 1) // 2
@@ -52,9 +52,9 @@ def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
 
 
 def written_out(count: int, stage: Callable[[int], Callable[..., Any]]) -> Callable[..., Any]:
-    """``(par, state, first, at, h)`` to so many slopes, a tuple of tuples.
+    """A function (par, state, first, at, h) that returns `count` slopes, a tuple of tuples.
 
-    Those after the first are ``stage(i)(par, state, made, at, h)``, i = 1, 2, ..., of the slopes that are made.
+    Those after the first are ``stage(i)(par, state, made, at, h)``, i = 1, 2, ..., where `made` are the slopes before.
     """
     if count == 1:
 
@@ -71,7 +71,7 @@ def written_out(count: int, stage: Callable[[int], Callable[..., Any]]) -> Calla
 
 
 def weighted_in_lanes(terms: int, first: int) -> Callable[..., Any]:
-    """``(place, slopes, table, j)`` to place + w_1 k_1 + ... of so many terms, whose weights begin at this number."""
+    """A function (place, slopes, table, j): place + w_1 k_1 + ..., `terms` of them; w_1 is number `first` of a lane."""
     weights = reading(terms)
 
     def added(place, slopes, table, j):  # type: ignore[no-untyped-def]
@@ -138,7 +138,7 @@ def weighted(weights: Any, state: Any, slopes: Any, h: float) -> Any:
 
 
 def in_lanes(form: Any, top: Any, moved: Callable[..., Any], lay: Callable[..., None], size: int, cost: int) -> Lanes:
-    """A step in lanes, ``moved(par, state, table, j)`` long, of so many evaluations; `lay` writes `size` numbers."""
+    """Lanes with increments ``moved(par, state, table, j)`` of `cost` evaluations; `lay` writes `size` numbers."""
     ended, d, moved = form.ended, form.prepare.size, register_jitable(moved)
     zeros, numbers, step_at, flag = (0.0,) * d, (0.0,) * len(top._fields), 2 * d, 3 * d
 
@@ -198,7 +198,7 @@ def _explicit(a: Rows, b: Row) -> tuple[list[list[float]], list[float]]:
     weights = row("b", b)
     try:
         rows = None if isinstance(a, (str, bytes, dict)) else [row("a", values) for values in a]
-    except TypeError:  # nothing to go through, such as an array without dimensions
+    except TypeError:  # not iterable, such as an array without dimensions
         rows = None
     if rows is None:
         raise SymtopError(f"a must be rows of numbers, not {short(a)}")
@@ -235,7 +235,7 @@ def runge_kutta(
         if len(nodes) != len(sums) or any(abs(x - y) > TABLE_ROUNDING for x, y in zip(sums, nodes, strict=True)):
             raise SymtopError(f"c must be the row sums of a, {sums}, not {nodes}")
     triangle = tuple(value for values in lower for value in values)
-    rule = Tableau(triangle or (0.0,), tuple(weights))  # Euler's is empty, and an empty tuple has no type of entry
+    rule = Tableau(triangle or (0.0,), tuple(weights))  # Euler's is empty, which numba cannot type
     return Integrator(
         name=name,
         family="runge-kutta",
@@ -254,7 +254,7 @@ def built_in() -> list[Integrator]:
     words = "explicit Euler method on the unreduced equations"
     euler = runge_kutta("euler", ((),), (1.0,), order=1, summary=words, reference="hairer-norsett-wanner-1993")
     return [
-        replace(euler, solvers={chart: euler.solvers[chart] for chart in ("angles", "axis")}),  # no |q| would last
+        replace(euler, solvers={chart: euler.solvers[chart] for chart in ("angles", "axis")}),  # |q| would not stay one
         runge_kutta(
             "rk4",
             ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)),

@@ -3,8 +3,8 @@
     T_j1:  y_1 = y + g f(y),  y_{i+1} = y_{i-1} + 2 g f(y_i),  T_j1 = y_{n_j},   g = h/n_j,  n_j = 2, 4, 6, ...
     T_j,l+1 = T_jl + (T_jl - T_{j-1,l}) / ((n_j / n_{j-l})^2 - 1),    err_j = |T_jj - T_j,j-1| as in `pairs`
 
-T_jj has order 2 j. A step is tried with k - 1, k and k + 1 lines and ends with the first whose error passes, or as soon
-as the errors leave no hope. With A_j evaluations for j lines and H_j = .94 h (.65/err_j)^(1/(2j-1)), the step that line
+T_jj has order 2 j. A step is tried with k - 1, k and k + 1 lines and ends with the first whose error passes, or when
+the errors are too large to pass. With A_j evaluations for j lines and H_j = .94 h (.65/err_j)^(1/(2j-1)), the step line
 j would allow, the next k is a neighbour whose work A_j/H_j is less by a tenth. Samples inside a step are shorter steps
 with as many lines, which are not counted. Explicit, neither symplectic nor symmetric; nothing is conserved but what is
 linear in the state. No smoothing step: all n_j are even.
@@ -23,13 +23,13 @@ from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import add, row_of, store
 from symtop.methods.runge_kutta.pairs import GROW, Method, integrator, nothing_more, rms
 
-LINES = 10  # at most, so that k is at most 9
-FEWEST = 3  # of k
+LINES = 10  # limit on the lines, so that k is at most 9
+FEWEST = 3  # the least k
 ORDERS, LAST = LINES + 1, LINES + 2  # rows of the memory: k and the number of lines of the last step; f at its end
 
 
 def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read in one piece)
-    """What `pairs.loop` steps by: rows 1 .. `LINES` of the memory are the last line of the table."""
+    """The `Method` for `pairs.loop`: rows 1 .. `LINES` of the memory are the last line of the table."""
 
     @register_jitable
     def line(par, state, table, j, h):  # type: ignore[no-untyped-def]

@@ -35,8 +35,8 @@ states of each of 11 scenes every one is solved, the first way 100 %, 94 % and 7
 path that turns back before the whole step: slow tops that swing widely, at steps of a nutation and more.
 
 *Lanes.* A lane whose sweeps have ended keeps its L_i by selection; one whose corrections do not fall to rounding is
-given up. Each stage is a loop of its own with the numbers of its row as constants, for a place in `block` that hangs on
-a variable is no vector.
+given up. Each stage is a loop of its own with the numbers of its row as constants, because accesses to `block` at a
+variable place are not vectorised.
 
 No step is too large for stability. The methods are A-stable, |R(iy)| = 1; and at a steady precession, where the reduced
 energy is least, small nutations cannot grow at any step, because the energy is kept. What a large step loses is the
@@ -66,9 +66,9 @@ from symtop.model.charts import BODY
 
 ENOUGH = 1e-9  # a correction in units of |e| = 1, whose square is below rounding
 NEAR = 0.1  # a correction after which the solution is followed to a longer step
-DIRECT = 12  # iterations for one length of the step, 2 to 7 where they converge soon
-RUNGS = 28  # steps of growing length up to the whole one, by `LONGER` each: from a tenth
-LONGER = 2.0**0.125  # with sqrt 2 one step in ten of `spheroid` is lost at h omega = 10, with 2^(1/4) one in a hundred
+DIRECT = 12  # limit on the iterations for one length of the step; 2 to 7 where they converge soon
+RUNGS = 28  # lengths from a tenth of the step to the whole, each longer by the factor `LONGER`
+LONGER = 2.0**0.125  # with sqrt 2 one step in ten of `spheroid` fails at h omega = 10, with 2^(1/4) one in a hundred
 
 
 @register_jitable
@@ -84,7 +84,7 @@ def _at_stage(state: Any, work: Any, stages: int, i: int) -> Any:
 
 @register_jitable
 def _linearise(field: Any, par: Any, state: Any, work: Any, stages: int, share: float, first: int, mgl: float) -> None:
-    """The equations for corrections of the three components from `first` on, and what they must make up for."""
+    """Fill in the equations for corrections of the three components from `first` on, with their residuals."""
     base = 4 * stages + 1
     for i in range(stages):
         place = _at_stage(state, work, stages, i)
@@ -131,7 +131,7 @@ def _eliminate(work: Any, base: int, size: int) -> None:
 def _iterate(
     field: Any, par: Any, state: Any, work: Any, stages: int, share: float, first: int, mgl: float, enough: float
 ) -> Any:
-    """Newton from the increments as they are, for a share of the step: iterations, and did they converge."""
+    """Newton from the present increments, for a share of the step; returns iterations, and whether they converged."""
     base, effort, converged = 4 * stages + 1, 0, False
     while True:
         for i in range(stages):  # the increments of L that belong to those of e
@@ -154,7 +154,7 @@ def _iterate(
 
 @register_jitable
 def _twice(work: Any, dimension: int, stages: int) -> None:
-    """nu = mu diag(w) mu, made by each solve: in the preparation, 216 products at s = 6, every run would pay for it."""
+    """nu = mu diag(w) mu, in each solve: in the preparation, every run would compute it, 216 products at s = 6."""
     for i in range(stages):
         for j in range(stages):
             total = 0.0
@@ -165,7 +165,7 @@ def _twice(work: Any, dimension: int, stages: int) -> None:
 
 @register_jitable
 def solve_stages(field: Any, par: Any, state: Any, work: Any, stages: int) -> Any:
-    """Solve a step in the array of `_loop`: iterations, and did they converge. `_iterate` is inlined: once."""
+    """Solve a step in the array of `_loop`; returns iterations and convergence. One call of the inlined `_iterate`."""
     effort, rung, first, mgl, grown = 0, RUNGS, 0, par.mgl, False
     _twice(work, len(state), stages)
     for i in range(stages):
@@ -190,9 +190,9 @@ def solve_stages(field: Any, par: Any, state: Any, work: Any, stages: int) -> An
 
 STAGES = (1, 2, 3, 4, 5, 6)
 DIGITS = 40  # of the multiprecision that coefficients are computed in
-SWEEPS = 100  # most of them in a step; 14 are the most that a step of sensible size takes
+SWEEPS = 100  # limit on the sweeps in a step; a step of usual size takes at most 14
 FARTHEST, PACE = 1e3, 0.68  # correction k that does not fall and is above FARTHEST PACE^k: sweeps will not converge
-IN_LANES = {6: 4, 9: 2}  # most stages, by numbers of a state, that lanes gain from (3.2 times); more stay scalar
+IN_LANES = {6: 4, 9: 2}  # by size of the state: most stages for which lanes are faster (3.2 times); more run alone
 STILL = 5  # L_z has no slope, so its increments stay zero: left out, they save a sixth of the sums on (e, L)
 ROUND_OFF = 1e-14  # a correction that stopped falling above this, in units of |e| = 1 and |L|, has not converged
 
@@ -213,7 +213,7 @@ def _opened(rows: Any) -> GaussRule:
 
 
 def packed(rule: GaussRule) -> tuple[Callable[[Any], GaussRule], Array]:
-    """How a rule travels into compiled code: as one array, which a call takes sooner than three."""
+    """How a rule is passed to compiled code: as one array, a faster argument than three."""
     return _opened, np.vstack([rule.mu, rule.b, rule.predict])
 
 
@@ -265,7 +265,7 @@ def momentum_unit(par: Any, state: Any) -> float:
 
 @register_jitable
 def _unit_of_body(par: Any, state: Any) -> float:
-    """The same of a body without symmetry, from M."""
+    """`momentum_unit` of a body without symmetry, from M."""
     pull = par.I2 * np.sqrt(par.c1**2 + par.c2**2 + par.c3**2)
     momentum = np.sqrt(state[4] ** 2 + state[5] ** 2 + state[6] ** 2) + np.sqrt(pull)
     return 1.0 / momentum if momentum > 0.0 else 1.0
@@ -273,12 +273,12 @@ def _unit_of_body(par: Any, state: Any) -> float:
 
 @register_jitable
 def farthest(sweeps: int) -> float:
-    """A correction beyond this, after so many sweeps, that does not fall will not converge."""
+    """The size of a correction, after so many sweeps, above which one that does not fall will not converge."""
     return FARTHEST * PACE**sweeps
 
 
 def _after(first: Any, then: Any) -> Any:
-    """Both, one after the other."""
+    """A function that applies `first` and then `then` to a block."""
 
     @register_jitable
     def both(block, table):  # type: ignore[no-untyped-def]
@@ -408,16 +408,16 @@ def _loop(  # noqa: C901
 ) -> Loop:  # fmt: skip
     """The loop on states that move by `field`, a momentum from `first` on and, in `still`, a number that has no slope.
 
-    It counts sweeps and iterations of Newton. A step is one function, for an array that is handed to another one is
-    counted once more. The largest correction is kept for the momentum and for the rest, not for each component, for
-    which there are not registers enough.
+    It counts sweeps and iterations of Newton. A step is one function, because numba counts references to an array at
+    each call. The largest correction is kept for the momentum and for the rest, and not for each component, as there
+    are too few registers.
     """
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
         """One array for all that a step reads and writes, because numba counts references to each.
 
         Of its rows 0 .. s-1 hold L_i and then h b_i; s .. 2s-1 are room for the prediction; 2s .. 3s-1 hold mu, and
-        then have room for what Newton makes of it; 3s .. 4s-1 hold the predictor; row 4s begins with 1/|L|, the unit in
+        then have room for Newton's nu; 3s .. 4s-1 hold the predictor; row 4s begins with 1/|L|, the unit in
         which corrections of L are judged; the last 3s are room for Newton's equations. L_i starts as h b_i f(y).
         """
         stages = len(rule.b)
@@ -504,7 +504,7 @@ def _loop(  # noqa: C901
 
 @register_jitable
 def _unsolved(field: Any, par: Any, state: Any, work: Any, stages: int) -> Any:
-    """In the place of Newton's iteration."""
+    """`solve` of a loop without Newton's iteration: no iterations, not converged."""
     return 0, False
 
 

@@ -12,7 +12,7 @@ It is a Runge-Kutta method, y_1 = y_0 + h (2 f((y_0 + y_1)/2) - f(y_0)/2 - f(y_1
 discretisation of Hirota and Kimura, which is integrable for this top. It is symmetric, of order 2, and birational: the
 inverse is the step of -h. p_phi is linear and kept. The energy, |e| and p_psi are not: they wobble by O(h^2) and do
 not drift, because the map keeps functions that differ from them by as much. It preserves no Lie-Poisson bracket. The
-attitude is a frame (e, L, a), a quadratic system too; what it lacks of right angles is made up where it is shown.
+attitude is a frame (e, L, a), a quadratic system too, which is made orthonormal at samples.
 Sources: Kahan, unpublished lecture notes (1993); Petrera, Pfadler, Suris, Regul. Chaotic Dyn. 16 (2011) 245; Celledoni,
 McLachlan, Owren, Quispel, J. Phys. A 46 (2013) 025201.
 """
@@ -92,7 +92,7 @@ march_frame = Loop(no_carry, _increment_frame, _observe_frame)
 
 
 class Onward(FixedStep):
-    """A solver whose steps can be of different lengths: |e| is not kept, and no start stands for where a step ends."""
+    """A solver whose steps can have different lengths: as |e| is not kept, the end of a step is no valid start."""
 
     def onward(self, top: SymmetricTop, start: Angles, lengths: Sequence[float]) -> Run:
         """One step of each length, each from where the last one ended."""

@@ -73,7 +73,7 @@ def kicks(par: Any, theta: Any) -> Any:
 
 
 def _total(weights: Row, velocity: Row) -> Any:
-    """``(par, made, h)`` to what the forces add to (theta, p_theta, phi, psi)."""
+    """A function (par, made, h): the increments of (theta, p_theta, phi, psi) due to the forces."""
     bend, turn = combination(weights), combination(velocity)
 
     def added(par, made, h):  # type: ignore[no-untyped-def]

@@ -11,8 +11,8 @@
     vern9             9       16         e_8                                a shorter step, not counted
 
 `rk45-compiled` and `dop853-compiled` are SciPy's `rk45` and `dop853` on the same equations (see `equations`): they
-accept and reject the same steps and take as many f, so that their times differ only by what Python costs and their
-errors not at all: they keep the language out of a comparison of methods.
+accept and reject the same steps and take as many f, so that their errors are equal and their times differ only by the
+cost of Python: with them a comparison of methods does not depend on the language.
 
 The stages of a step are written out, without the terms whose coefficient is zero, and keep their slopes in registers:
 on the axis a step of order 8 takes a quarter of the time of a loop over the table. In lanes (`explicit.in_lanes`) the
@@ -44,7 +44,7 @@ from symtop.methods.simd import apart, combined, side_by_side
 from symtop.methods.vectors import accumulate, summed, zero
 
 BLOCK = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second
-EVALUATIONS = 1_000_000_000  # a run's limit: about half a minute
+EVALUATIONS = 1_000_000_000  # limit of a run: about half a minute
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
 
@@ -53,7 +53,7 @@ class Method(NamedTuple):
     """A method in one chart, in functions that compile; `memory` (rows, size) begins with f(y), the rest is its own."""
 
     advance: Callable[..., Any]  # (par, state, memory, tolerance, t, step, end) -> state, t, step, evaluations, outcome
-    refine: Callable[..., int]  # (par, state, memory, h) -> evaluations: what samples of a step need beyond that
+    refine: Callable[..., int]  # (par, state, memory, h) -> evaluations: further slopes for samples within a step
     sample: Callable[..., Any]  # (par, state, new, memory, h, x) -> the state at a fraction x of the step
     last: int  # the row of f(y+) after a step
     power: float  # of the error in the choice of the first step
@@ -61,7 +61,7 @@ class Method(NamedTuple):
 
 @register_jitable
 def rms(vector: Any, state: Any, other: Any, tolerance: float) -> float:
-    """Root mean square of a vector in units of what is allowed, tolerance (1 + |y|)."""
+    """Root mean square of a vector in units of the allowed error, tolerance (1 + |y|)."""
     total = 0.0
     for m in range(len(vector)):
         part = vector[m] / (tolerance + max(abs(state[m]), abs(other[m])) * tolerance)
@@ -112,7 +112,7 @@ def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, toleran
 
 @register_jitable
 def copy(rows: Any, to: Any) -> None:
-    """Write rows to others; numba has an assignment of slices format an error: a third of compiling a kernel."""
+    """Copy rows; numba's assignment of slices would take a third of a kernel's compilation, for an error message."""
     for j in range(len(rows)):
         for m in range(rows.shape[1]):
             to[j, m] = rows[j, m]
@@ -120,7 +120,7 @@ def copy(rows: Any, to: Any) -> None:
 
 @functools.cache
 def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
-    """The loop of ``method(field)``, a `Method` whose memory has so many rows, on a `Formulation`, compiled.
+    """The compiled loop of ``method(field)``, a `Method` whose memory has `rows` rows, on a `Formulation`.
 
     It counts force evaluations. The place is (state, memory, time, step). `observe` sees the memory and the step that a
     sample lies in.
@@ -186,7 +186,7 @@ def solver(form: Any, method: Any, rows: int) -> Adaptive:
 
 
 def integrator(name: str, summary: str, reference: str, method: Any, rows: int, **claims: Any) -> Integrator:
-    """The record of a method with a tolerance that needs f and nothing else, in every chart."""
+    """The `Integrator` of a method with a tolerance that needs f and nothing else, in every chart."""
     solvers = {chart: solver(form, method, rows) for chart, form in FORMS.items()}
     return Integrator(
         name=name, family="runge-kutta", summary=summary, solvers=solvers, control="tolerance", explicit=True,
@@ -197,11 +197,11 @@ def integrator(name: str, summary: str, reference: str, method: Any, rows: int, 
 
 @register_jitable
 def _forget(slopes: Any, i: int, slope: Any) -> None:
-    """Slopes that nobody reads again."""
+    """`keep` for slopes that are not used again: does nothing."""
 
 
 def combination(weights: Sequence[float]) -> Any:
-    """``(place, made, h)`` to place + h sum_j w_j k_j, term by term, of a tuple of slopes."""
+    """A function (place, made, h): place + h sum_j w_j k_j, term by term, of the tuple `made` of slopes."""
     used = tuple(float(weight) if weight else None for weight in weights)
 
     def added(place, made, h):  # type: ignore[no-untyped-def]
@@ -211,7 +211,7 @@ def combination(weights: Sequence[float]) -> Any:
 
 
 def _stages(field: Callable[..., Any], rows: Sequence[Row], keep: Callable[..., Any]) -> Any:
-    """``(par, state, first, slopes, h)`` to the slopes of a step, a tuple of tuples; `keep` writes each down."""
+    """A function (par, state, first, slopes, h): the slopes of a step, a tuple of tuples; `keep` stores each."""
 
     def stage(i: int) -> Callable[..., Any]:
         place = combination(rows[i - 1])
@@ -227,7 +227,7 @@ def _stages(field: Callable[..., Any], rows: Sequence[Row], keep: Callable[..., 
 
 
 def stages_of(field: Callable[..., Any], table: Table) -> Any:
-    """``(par, state, first, at, h)`` to the slopes of a step that nobody reads later."""
+    """A function (par, state, first, at, h): the slopes of a step, which are not stored."""
     return _stages(field, table.a[: len(table.b) - 1], _forget)
 
 
@@ -247,7 +247,7 @@ class Pair(NamedTuple):
         return len(self.table.a) + 2 + len(self.table.extra)
 
     def __call__(self, field: Callable[..., Any]) -> Method:
-        """What `loop` steps by: attempts, their error, and samples."""
+        """The `Method` for `loop`: attempts, their error, and samples."""
         table, dense = self.table, self.table.dense
         keep = store if dense else _forget
         stages, total = _stages(field, table.a, keep), combination(table.b)
@@ -295,7 +295,7 @@ class Pair(NamedTuple):
         """The table of the higher order with a step."""
         a, b = self.table.a[: len(self.table.b) - 1], self.table.b
         triangle = [value for i, row in enumerate(a) for value in (*row, *(0.0,) * (i + 1 - len(row)))]
-        arrays: Any = np.array(triangle), np.array(b)  # they travel faster than tuples
+        arrays: Any = np.array(triangle), np.array(b)  # faster arguments than tuples
         rule = Tableau(*arrays)
         solvers = {
             chart: FixedStep(fixed_loop(chart, self), rule, form.prepare, 1, implicit=False, present=form.present)
@@ -342,12 +342,12 @@ def _order_seven(table: Table, field: Callable[..., Any], cost: int) -> dict[str
 
 @functools.cache
 def fixed_loop(chart: str, pair: Pair) -> Loop:
-    """The loop with fixed steps in one chart; the rule is the table as a `Tableau`, for whoever wants to see it."""
+    """The loop with fixed steps in one chart; its rule, the table as a `Tableau`, is not used by the kernel."""
     return loop_of(FORMS[chart], TOPS[chart], pair.table, lambda _par, _state, step: step)
 
 
 def loop_of(form: Any, top: Any, table: Table, finished: Callable[..., Any]) -> Loop:
-    """The loop of a table's steps, for one and in lanes; ``finished(par, state, step)`` is what becomes of a step."""
+    """The loop of a table's steps, for one and in lanes; ``finished(par, state, step)`` changes each increment."""
     field, ended, finished = form.field, form.ended, register_jitable(finished)
     stages, total, cost = stages_of(field, table), combination(table.b), len(table.b)
     zeros, step_at = (0.0,) * form.prepare.size, len(top._fields) * W
@@ -376,7 +376,7 @@ def two_runs(chart: str, pair: Pair, compare: Callable[..., float]) -> Callable[
     """``run(near, far, h, marks, given, seen)``: two starts by the same steps, in the time of one and to the same bits.
 
     `near` and `far` are the plain numbers (`preparation`) of one top or body with each start. After each mark `seen`
-    has ``compare(state, other state, given)``. What overflows goes on without a sign.
+    has ``compare(state, other state, given)``. An overflow is not reported: the run goes on.
     """
     form: Any = FORMS[chart]
     field, numbers, opened = form.field, form.prepare.numbers, form.prepare.opened

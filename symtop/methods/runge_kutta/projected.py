@@ -29,7 +29,7 @@ from symtop.methods.framework.space import L_at, e_at
 from symtop.methods.runge_kutta.pairs import DOP8, NINE, loop_of
 from symtop.methods.vectors import dot, summed
 
-SMALL = 1e-8  # of the square of a gradient: with less of its own it depends on those before it
+SMALL = 1e-8  # a gradient depends on those before it if less than this part of its square is normal to them
 AXIS = FORMS["axis"]
 
 
@@ -68,7 +68,7 @@ def _without(u: Any, part: Any, v: Any) -> Any:
 
 @register_jitable
 def _inverse(own: Any, whole: Any) -> Any:
-    """1/own; 0 where a gradient whose square is `whole` has next to nothing of its own."""
+    """1/own, of the square of a gradient's own part; 0 where that is below `SMALL` times its square, `whole`."""
     return 1.0 / own if own > SMALL * whole else 0.0
 
 

@@ -8,9 +8,9 @@ left of the kinetic energy, (1/I1 - 1/I2) M1^2/2 + (1/I3 - 1/I2) M3^2/2, has two
 body: R1 by the angle (1/I1 - 1/I2) M1 a h, and R3 likewise. R1 is the identity for I1 = I2, and the drift exact.
 
 A drift is symmetric and of order two, so that kick-drift-kick is, too, and a composition of such steps has the order
-that it has elsewhere. Other tables take the free motion for exact and fall to order two with this one. They drift by a
-composition of turns R3 and R1 of the order p that they have themselves, S once at its end (`free_motion`); of the
-(8, 6, 4) of a generalised order the last is left. With tau = Gamma x c the force gradient is that of W = {V, {V, T}}:
+that it has elsewhere. Other tables assume an exact free motion and would fall to order two with this one. They drift by
+a composition of turns R3 and R1 of their own order p, with S once at its end (`free_motion`); of a generalised order
+(8, 6, 4) only the last number remains. With tau = Gamma x c the force gradient is that of W = {V, {V, T}}:
 
     W = tau.(J^-1 tau),     M += Gamma x (b h c + 2 g h^3 c x J^-1 tau)
 
@@ -61,7 +61,7 @@ def _scale(rule: Any, top: Any, at: Any, h: float) -> Any:
 
 
 def scaled(rule: Composition) -> Scaled:
-    """The table of a run."""
+    """The table as a rule that is scaled by the step of a run."""
     return Scaled(rule, _scale, packed, body.opened)
 
 
@@ -99,21 +99,21 @@ def _kicking(gradient: bool | None) -> Callable[..., Any]:
 
 @register_jitable
 def by_library(x: float) -> Any:
-    """sin x, cos x - 1, and that they are right, of any angle by sine and cosine of its half."""
+    """sin x, cos x - 1 and True, of any angle by sine and cosine of its half."""
     q = math.sin(0.5 * x)
     return 2.0 * q * math.cos(0.5 * x), -2.0 * q * q, True
 
 
 @register_jitable
 def by_series(x: float) -> Any:
-    """The same of an angle below 1; whether it was."""
+    """sin x, cos x - 1 by series, and whether |x| < 1, where they are accurate."""
     square = x * x
     return x * series(square, SINE), -square * series(square, COSINE), square < 1.0
 
 
 @register_jitable
 def by_either(x: float) -> Any:
-    """The series where it is right."""
+    """`by_series` for |x| < 1, otherwise `by_library`."""
     return by_series(x) if x * x < 1.0 else by_library(x)
 
 
@@ -123,11 +123,11 @@ _Turns = tuple[Callable[..., Any], ...]
 def _turns(sine: Callable[..., Any], rotor: Callable[..., Any]) -> _Turns:
     """The turns by M_k `turn` about the three axes of the body, and the flow of turn |M|^2/2 by a rotor of `rotor`.
 
-    Each is ``(state, d, turn)``: what d becomes, and whether the series, or the rotor, could be used.
+    Each is a function (state, d, turn) that returns the new increment d, and whether the series was accurate.
     """
 
     def about(k: int) -> Callable[..., Any]:
-        """The turn about axis k and what it does to the two that follow: numbers of q, and of M three further."""
+        """The turn about axis k; a, b, c are the places in q of axis k and of the two that follow, in M three more."""
         a, b, c = 1 + k, 1 + (k + 1) % 3, 1 + (k + 2) % 3
 
         @register_jitable
@@ -210,7 +210,7 @@ def march(free: Table) -> Loop:
 
 
 def _in_lanes(outer: tuple[float, ...], inner: tuple[float, ...]) -> tuple[Any, Any]:
-    """The first turn of that drift, and the others, each in a loop over lanes."""
+    """The drift of `march` in lanes: its first turn, and a function of the others, each in a loop over lanes."""
     first, _, third, momentum = TOGETHER
 
     @register_jitable
@@ -285,7 +285,7 @@ def _five(turns: _Turns) -> Callable[..., Any]:
 
 
 def _five_in_lanes() -> Callable[..., Any]:
-    """The same about the axes as they are given."""
+    """A drift of five rotations in lanes, about the axes in the given order."""
     first, second, third, momentum = TOGETHER
 
     @register_jitable

@@ -30,7 +30,7 @@ class Table(NamedTuple):
 
 
 def palindrome(outer: Sequence[float], *, odd: bool) -> tuple[float, ...]:
-    """`outer`, then the middle one (or two equal ones) that close the sum to 1, then `outer` backwards."""
+    """`outer`, then one middle value (or two equal ones) that make the sum 1, then `outer` backwards."""
     half = math.fsum([0.5, *(-value for value in outer)])  # rounded once
     return (*outer, *((2.0 * half,) if odd else (half, half)), *reversed(outer))
 

@@ -7,8 +7,7 @@ A composition alternates kicks b_0 .. b_n with drifts a_1 .. a_n (`loop`). The c
     body            a free motion of the order of the table, or of order two between Strang's kicks (`body`)
 
 Every method here is explicit and symplectic, all but the symplectic Euler method are symmetric, and all keep p_phi and
-p_psi. `stormer-verlet` and its
-compositions live in the angles chart, all others in the space frame.
+p_psi of a top. `stormer-verlet` and its compositions work in the angles chart, all others in the space frame.
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, chapters II.5 and V.3.
 """
 
@@ -47,14 +46,14 @@ def composition(
 ) -> Integrator:  # fmt: skip
     """A splitting method from its coefficients: kick[0], drift[0], kick[1], ... drift[-1], kick[-1].
 
-    Drifts and kicks must each sum to 1; what is missing by rounding is given to the middle ones, for a sum that is
-    wrong by one rounding is a systematic error that grows with time. A zero kick costs nothing.
+    Drifts and kicks must each sum to 1; the middle ones are corrected for rounding, because a sum that is wrong by one
+    rounding is a systematic error that grows with time. A zero kick costs nothing.
 
     `chart` is "angles", or "space" for a method on the axis and on the attitude. Only there, ``gradient[i]`` adds
     ``h^2 {V, {V, T}}`` times itself to ``kick[i] V``; `rotation` is a drift's: "exact", "cayley", or "cayley-tuned",
     whose tau makes the angle right for the root of the mean of |L|^2 over the run; and `processor` is k of the map
     exp(k h^2 (mgl/I1) L.(e x z)), which is applied to the start and undone at each sample.
-    `order` is your claim, and nothing here checks it.
+    `order` is a claim that this function does not check.
 
     Raises SymtopError for tables that do not fit together or do not sum to 1.
     """

@@ -8,8 +8,8 @@ A force is evaluated only where it is kicked with, and the one at the end of a s
 kick-first table with n drifts costs n forces and a drift-first one n - 1, but n drifts: its last drift and the first of
 the next step are not merged.
 
-The kernels see no h: `stages` multiplies the tables out before a run, each row closed to the product of its sum, or the
-clock would run fast by 1e-16 in every step.
+The kernels do not use h: `stages` multiplies the tables by it before a run and corrects each row for rounding, so that
+its sum is exact: otherwise the time of every step would be wrong by 1e-16.
 
 In lanes, kick, drift and force of a stage are one loop over the lanes; the last kick and the sums are another. A kick
 or a force that a table leaves out is carried out with the coefficient 0, which changes no bit. The coefficients lie in
@@ -30,7 +30,7 @@ from symtop.methods.framework.plan import OK
 from symtop.methods.simd import times, wide_vectors, with_item
 from symtop.methods.vectors import accumulate, zero
 
-SHORT = 2  # drifts
+SHORT = 2  # tables of at most so many drifts are tuples in compiled code
 
 
 class Composition(NamedTuple):
@@ -66,10 +66,10 @@ def _of_any_length(row: Any) -> Composition:
 
 
 def packed(rule: Any) -> tuple[Callable[[Any], Composition], NDArray[np.float64]]:
-    """How a composition travels into compiled code: what opens an array of numbers, and the array.
+    """How a composition is passed to compiled code: a function that opens an array of numbers, and the array.
 
-    A call looks at every number of a tuple, and at an array as a whole. Short tables are tuples inside, longer ones are
-    rows of the array, so that one kernel is compiled for all of them.
+    A call unpacks every number of a tuple, but takes an array as a whole. Short tables are tuples inside, longer ones
+    are rows of the array, so that one kernel is compiled for all of them.
     """
     drift, kick, gradient = rule[:3]
     opened = _opened(len(drift)) if len(drift) <= SHORT else _of_any_length
@@ -77,7 +77,7 @@ def packed(rule: Any) -> tuple[Callable[[Any], Composition], NDArray[np.float64]
 
 
 class Stages(NamedTuple):
-    """What one run of a kernel drifts and kicks by, in tuples, or in arrays where the table is long."""
+    """The drifts and kicks of one run of a kernel, in tuples, or in arrays where the table is long."""
 
     drift: Any
     kick: Any
@@ -105,14 +105,14 @@ def close(values: Any, total: float) -> Any:
 
 @register_jitable
 def stages(rule: Any, drift: float, kick: float, bend: float, boost: float) -> Any:
-    """The coefficients of a `Composition` times what a whole step drifts, kicks, bends and boosts by."""
+    """The coefficients of a `Composition` times the drift, kick and bend of a whole step; `boost` as it is."""
     drifts, kicks = close(times(rule.drift, drift), drift), close(times(rule.kick, kick), kick)
     return Stages(drifts, kicks, times(rule.gradient, bend), rule.forces, rule.turn, boost)
 
 
 @register_jitable
 def compose(force: Any, kick: Any, drift: Any, par: Any, rule: Any, state: Any, at_start: Any) -> Any:
-    """Increment of one step and the force at its end. A force nobody kicks with is not evaluated."""
+    """Increment of one step and the force at its end. A force that no kick uses is not evaluated."""
     step, now, n = zero(state), at_start, len(rule.drift)
     for i in range(n):
         if rule.kick[i] != 0.0:
@@ -122,13 +122,13 @@ def compose(force: Any, kick: Any, drift: Any, par: Any, rule: Any, state: Any, 
             now = force(par, state, step)
     if rule.kick[n] != 0.0:
         step = kick(par, now, step, rule.kick[n], rule.bend[n])
-    elif rule.kick[0] != 0.0:  # what the next step kicks with first
+    elif rule.kick[0] != 0.0:  # for the first kick of the next step
         now = force(par, state, step)
     return step, now
 
 
 def exact_sum(values: Sequence[float], total: float = 1.0) -> tuple[float, ...]:
-    """The same coefficients with what is missing from `total` given to the middle one, or to the middle two equally."""
+    """The coefficients with the middle one, or the middle two equally, corrected so that the sum is `total`."""
     closed, n = list(values), len(values)
     surplus = math.fsum((*closed, -total))
     if n % 2:
@@ -157,7 +157,7 @@ def read(numbers: Any) -> Any:
 
 @register_jitable
 def no_rest(block: Any, row: Any, table: Any) -> None:
-    """Of a drift that is one loop over lanes."""
+    """`rest` of a drift that is one loop over lanes: nothing."""
 
 
 def composed(
@@ -166,10 +166,10 @@ def composed(
 ) -> Lanes:  # fmt: skip
     """A composition in lanes, from the functions that `compose` takes, but for the drift.
 
-    ``drift(par, state, step, a)`` returns the step and whether it can do without a branch. ``ended(state, step)`` is
-    the outcome of a step, `carry` how many numbers a force has. The last `still` components of a state never move: of
-    their sums only the one is made that turns -0 into 0. ``rest(block, row, table)`` is what of a long drift remains,
-    in loops of its own, the force at its end included.
+    ``drift(par, state, step, a)`` returns the step and whether it is accurate, as lanes have no branch. ``ended(state,
+    step)`` is the outcome of a step, `carry` how many numbers a force has. The last `still` components of a state never
+    move: 0 is added once, which turns -0 into 0 as their sums would. ``rest(block, row, table)`` makes the remaining
+    parts of a long drift, in loops of its own, and the force at its end.
     """
     zeros, none, numbers = (0.0,) * dimension, (0.0,) * carry, (0.0,) * len(top._fields)
     moving, unmoved = zeros[: dimension - still], zeros[dimension - still :]

@@ -48,7 +48,7 @@ def growth(par: Any, k: float, state: Any, step: Any) -> Any:
 
 @compile_kernel
 def march(par, k, eps, turn, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]
-    """On from a place on the grid to the last of `times`, a failure or `budget` steps."""
+    """Continue from `place`, a point of the grid, to the last of `times`, a failure or `budget` steps."""
     state, low, force, clock, rest, rho = place
     steps = outcome = 0
     if turn > 0.0:
@@ -77,7 +77,7 @@ def march(par, k, eps, turn, times, budget, seen, place, states, momenta):  # ty
 
 
 def _limit(count: int) -> int:
-    """The steps at which a run without a budget is stopped for so many of a plan."""
+    """The limit on steps of a run without a budget, for a plan of `count` steps."""
     return max(min(BLOCK + SHARE * count, STEPS), 8 * count)
 
 
@@ -113,7 +113,7 @@ class Reversible:
         return plan.most(_limit(int(plan.marks[-1])))
 
     def onward(self, top: SymmetricTop, start: Angles, lengths: Sequence[float]) -> Run:
-        """A step of each length from where the last one stood, with its rho: a negative one retraces what was made."""
+        """A step of each length from the end of the last one, with its rho: a negative length retraces a step."""
         ends = np.cumsum(lengths)
         return _run(top, start, self.k, [(h, ends[i : i + 1]) for i, h in enumerate(lengths)], _limit(len(lengths)))
 

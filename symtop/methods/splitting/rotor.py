@@ -5,8 +5,8 @@ The free top turns about L by the angle 2 x, x = tau |L| with tau = a h/2 I1. It
     exact      s = sin(x)/|L|,                      w = cos(x)
     cayley     s = tau/sqrt(1 + tau^2 |L|^2),       w = 1/sqrt(1 + tau^2 |L|^2)
 
-and m = w - 1 is what an increment is made of. Both are functions of x^2 and tau alone. The exact one has a branch: a
-series where x < 1, sine and cosine beyond. Lanes take the series and say whether it was right to.
+and increments are computed from m = w - 1. Both rotations are functions of x^2 and tau alone. The exact one has a
+branch: a series where x < 1, sine and cosine beyond. Lanes take the series and return whether x < 1.
 """
 
 import math
@@ -72,7 +72,7 @@ def exact(square: float, half: float) -> Any:
 
 
 def without_branch(turned: Callable[..., Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """An exact and a Cayley drift for lanes, as `loop.composed` takes them; right where the step is that of `rotor`."""
+    """An exact and a Cayley drift for lanes, as `loop.composed` takes them, with a flag: is the result accurate?"""
 
     def exact(par, state, step, half):  # type: ignore[no-untyped-def]
         square = half_square(state, step, half)

@@ -55,7 +55,7 @@ def scale(rule: Any, top: Any, at: Any, h: float) -> Any:
 
 
 def tuned(rule: Any, top: Any, at: Any, h: float) -> Any:
-    """The same of a Cayley drift that turns by the right mean angle."""
+    """`scale` of a tuned Cayley drift, which turns by the right mean angle."""
     return _scaled(rule, top, h, tangent_scale(top, at, h))
 
 
@@ -228,5 +228,5 @@ def strang_sleeps_from(h: float) -> float:
 
 
 def cayley_sleeps_from(h: float) -> float:
-    """The same of a Cayley drift: w3^2 = 4 + h^2."""
+    """`strang_sleeps_from` of a Cayley drift: w3^2 = 4 + h^2."""
     return math.sqrt(4.0 + h * h)

@@ -7,10 +7,10 @@
 
 The order follows from the tolerance (about 20 in double), the step from the size of the series' last terms. Asking for
 a hundredth of the rounding unit removes the truncation bias that makes energy drift linearly at tolerance eps.
-`taylor` works in double, `taylor-longdouble` and `taylor-quad` with mantissas of 64 and 113 bits: they show what the
-method does without rounding, and `symtop.reference` is made by the same function. A Taylor step of order n computes n
+`taylor` works in double, `taylor-longdouble` and `taylor-quad` with mantissas of 64 and 113 bits: they show the errors
+of the method without rounding, and `symtop.reference` uses the same function. A Taylor step of order n computes n
 derivatives of the state; `force_evaluations` counts them. The registry has the two charts without poles; the study of
-charts makes a record in angles for itself.
+charts makes an integrator in angles for itself.
 Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, MNRAS 504 (2021) 2614.
 """
 
@@ -134,7 +134,7 @@ class Flight(NamedTuple):
     states: Any  # (times, dimension of the chart), in the working precision
     steps: int
     order: int
-    outcome: str  # heyoka's word
+    outcome: str  # as heyoka names it
     time: float  # of the last completed step
 
 
@@ -167,7 +167,7 @@ class HeyokaSolver:
     precision: str
 
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
-        """Start to horizon, samples by dense output."""
+        """Run from the start to the horizon, samples by dense output."""
         form = FORMS[self.chart]
         most = max(1, int(min(plan.most(MOST_STEPS[self.precision]), sys.maxsize)))  # infinity is a budget, too
         flight = propagate(self.chart, self.precision, plan.tolerance, top, start, plan.times, most)
@@ -187,7 +187,7 @@ class HeyokaSolver:
         return Run(states, p_phi, p_psi, flight.steps, flight.steps * flight.order, 0, word, reached)
 
     def bare(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[Callable[[], Any], int]:
-        """heyoka's own loop to the horizon, without samples, as a call, and the derivatives that it computes."""
+        """A function that runs heyoka's own loop to the horizon, without samples, and the derivatives it computes."""
         state, parameters = start_numbers(self.chart, self.precision, top, start)
         one, kind = stepper(self.chart, self.precision, plan.tolerance), arithmetic(self.precision).kind
         begin, end, parameters = kind("0"), kind(plan.horizon), parameters[: one.pars.size]
@@ -202,7 +202,7 @@ class HeyokaSolver:
 def _padded(values: Any, size: int) -> Array:
     """Values as doubles, and NaN for the times that were not reached."""
     if len(values) == size and values.dtype == np.float64:
-        return values  # type: ignore[no-any-return]  # of a run's own: no copy
+        return values  # type: ignore[no-any-return]  # not shared with another run: no copy
     padded = np.full((size, *values.shape[1:]), np.nan)
     padded[: len(values)] = values
     return padded

@@ -39,9 +39,9 @@ attitude at the end of the step: the tolerance is an error of one step in radian
     e = max(|S_N|, |S_{N-1}|/4),    accepted if e <= 4 tolerance,    h <- h min(4, 0.95 (tolerance/e)^(1/N))
 
 The first neglected term is smaller than e by the ratio of two terms, 0.2 to 0.5. A rejected step costs one series. So
-does a sample, the series of the step with a shorter time: it is the method's dense output and, as that of `taylor`, no
-force evaluation of the run, whose work would otherwise depend on who looks at it. Time and state are sums with
-compensation.
+does a sample, the series of the step with a shorter time: it is the method's dense output and, as that of `taylor`, not
+counted as a force evaluation, so that the work of a run does not depend on its samples. Time and state are compensated
+sums.
 
 The step must resolve the distance of the pole of wp from the real time, 0.44 nutations in `spheroid`, 0.7 in
 `goldstein`, 2.9 in `fast`; a variable step gains at most 1.5, and 4 to 6 near a separatrix. Explicit, no poles; L_z
@@ -119,7 +119,7 @@ def first_terms(v: Vectors, z: Any, u: Any, norm: Any, w: Any, a: Any, p: Any, m
 
 
 def middle_first(n: int) -> list[int]:
-    """0 < j < n, the terms first that are known first."""
+    """The j with 0 < j < n, in the order in which the terms of the product become known."""
     return sorted(range(1, n), key=lambda j: -min(j, n - j))
 
 
@@ -273,7 +273,7 @@ spun = Shown(lambda par, t, state: with_spin(par, state, t), 7)  # with the spin
 
 ORDERS = (8, 12, 16, 20)
 BLOCK = 1_000_000  # series between returns to Python
-SERIES = 200_000_000  # of one run: about half a minute
+SERIES = 200_000_000  # limit on the series of one run: about half a minute
 ACCEPTED, SAFETY, GROW, EARLIER = 4.0, 0.95, 4.0, 0.25
 
 CHARTS: dict[str, tuple[Any, ...]] = {  # preparation, series, sample(par, t, state), axis of a state

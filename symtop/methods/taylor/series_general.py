@@ -5,9 +5,9 @@ follow from each other by Cauchy products:
 
     y(t + tau) = sum_n c_n tau^n,    c_0 = y,    (n + 1) c_{n+1} = sum_{j<=n} Q(c_j, c_{n-j}) + l(c_n)
 
-This is what a Taylor code for anybody's equations does: six products of series on the axis, sixteen on the attitude, in
-loops. No second order, no vector registers, and no constant of the motion but L.e, which is a parameter of (q, L) as in
-`taylor`: `series` beside it shows what those are worth, `taylor` what heyoka makes of the same equations.
+This is what a general Taylor code does: six products of series on the axis, sixteen on the attitude, in loops. It uses
+no second-order form, no vector registers, and no constant of the motion but L.e, a parameter of (q, L) as in `taylor`.
+A comparison with `series` shows the gain by those, one with `taylor` the gain by heyoka on the same equations.
 
 *With a fixed step* the order is 16. *With a tolerance* eps it is N = ceil(1 - log(eps)/2), and the step is
 
@@ -101,7 +101,7 @@ class Quadratic(NamedTuple):
         return fill
 
     def __call__(self, _: Callable[..., Any]) -> Method:
-        """Steps and samples of an order that hangs on the tolerance."""
+        """Steps and samples of an order that depends on the tolerance."""
         fill = self.series()
 
         @register_jitable

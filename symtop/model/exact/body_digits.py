@@ -1,4 +1,4 @@
-"""The motion of any rigid body with a fixed point in many digits, by Taylor's series in whole numbers.
+"""The motion of any rigid body with a fixed point in many digits, by Taylor's series in integer arithmetic.
 
     q' = q omega/2,    M' = M x omega + Gamma x c,    Gamma' = Gamma x omega,    omega = M/I,    c = mgl chi
 
@@ -7,8 +7,8 @@ A number is a whole multiple of 2^-bits and a step a power of two, so that the b
 last terms of the series choose the step. Moments, weight, start and times are the doubles that are given, exactly, and
 the quaternion is scaled to length one.
 
-The bound is the distance of a second run with fewer bits, of a lower order and with a looser goal: it is the error of
-that run, and larger than that of the first by `APART` bits as long as errors grow alike. Slow (ms a step), and for
+The bound is the distance to a second run with fewer bits, a lower order and a looser tolerance: it is the error of the
+second run, and larger than that of the first by `APART` bits as long as both errors grow alike. Slow (ms a step), for
 references that are made once. Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99, for the steps.
 """
 
@@ -22,9 +22,9 @@ from symtop.core.errors import SymtopError
 from symtop.core.numbers import context
 from symtop.model.body import Attitude, RigidBody
 
-BITS, ORDER, GOAL = 190, 56, 120  # of a number, of the series, and of what it leaves out
-APART = 8  # bits that the second run gives away
-LONGEST = 20_000  # steps: a minute
+BITS, ORDER, GOAL = 190, 56, 120  # bits of a number, order of the series, bits of accuracy of the series
+APART = 8  # bits, and orders, by which the second run is less accurate
+LONGEST = 20_000  # limit on the steps: a minute
 
 
 class Digits(NamedTuple):

@@ -61,7 +61,7 @@ FORM_SECONDS, SAMPLE_SECONDS = 5e-4, 1e-5
 
 
 class Provenance(NamedTuple):
-    """How the constants of a closed form were made."""
+    """How the constants of a closed form were computed."""
 
     arithmetic: str  # "double-double", "quad-double", "40 digits", or "double" on the separatrix
     rate_error: float  # bound of the relative error of the rates that a phase grows with
@@ -86,7 +86,7 @@ class _Form:
     precession_rate = _constant(at.PHI_LINE, "Mean of phi' over a nutation, radians per unit time.")
 
     def _view(self, times: ArrayLike, view: int) -> Array:
-        raise NotImplementedError  # one motion and many have their own
+        raise NotImplementedError  # the classes for one motion and for many have their own
 
     def quaternion(self, times: ArrayLike) -> Array:
         """Attitude (w, x, y, z), body to space, shape (..., 4); continuous in time, through poles as well."""
@@ -112,8 +112,8 @@ class ClosedForm(_Form):
     1e-15; axis and quaternion 1e-15. Methods take times of any shape and raise `SymtopError` for any that is not
     finite; so does construction if the axis comes within 1e-145 of a pole that it does not meet.
 
-    The constants are double-double numbers. Where a bound says that this is too little they come from quad-double sums,
-    and where that is too little, too, from 40 digits: see `provenance`.
+    The constants are double-double numbers. Where an error bound is too large, they are computed from quad-double sums,
+    and where it is still too large, with 40 digits: see `provenance`.
 
     `nutation_period` is that of small nutations for a steady precession, and infinite where the axis stands on an
     unstable pole or climbs to it for ever; `phi_per_period`, `psi_per_period` are the mean growth over it (0 if the
@@ -135,7 +135,7 @@ class ClosedForm(_Form):
 
     @property
     def provenance(self) -> Provenance:
-        """The arithmetic that served for the constants, the bound that it left, and why it was not a shorter one."""
+        """The arithmetic of the constants, the bound of their error, and why a shorter arithmetic was not enough."""
         kind = int(self._constants[at.ARITHMETIC])
         error = DIGITS_ERROR if kind == at.DIGITS else float(self._constants[at.RATE_ERROR])
         return Provenance(ARITHMETIC[kind], error, REASONS[int(self._constants[at.STATUS])])
@@ -172,19 +172,19 @@ class ClosedForm(_Form):
 
 
 def compile_now() -> None:
-    """Load the compiled functions, or compile them: for whoever is about to time a closed form or to make many."""
+    """Load the compiled functions, or compile them: call it before timing a closed form or making many."""
     for kernel in (_build, _fill, _compare):
         kernel.compile()
 
 
 def load() -> bool:
-    """Load the compiled functions that are in the cache; whether closed forms are made by compiled code now."""
+    """Load the compiled functions that are in the cache; returns whether all are loaded now."""
     loaded = [kernel.load() for kernel in (_build, _fill, _compare)]
     return all(loaded)
 
 
 def short_constants(rows: Array) -> tuple[Array, int]:
-    """Constants of tops and starts (n, 9) in the short arithmetic, (n, SIZE), and how many it does not serve."""
+    """Constants (n, SIZE) of tops and starts (n, 9) without 40 digits, and for how many rows they are too inexact."""
     if _build.ready(FORM_SECONDS * len(rows)):
         out = np.empty((len(rows), at.SIZE))
         return out, _build.compiled(rows, out)
@@ -194,7 +194,7 @@ def short_constants(rows: Array) -> tuple[Array, int]:
 
 
 def take_digits(constants: Array, top: SymmetricTop, start: Angles) -> None:
-    """Put the constants from 40 digits in the place of short ones that are not to be relied on."""
+    """Replace constants that are too inexact by those from 40 digits; their status stays."""
     status = constants[at.STATUS]
     constants[:] = precise_constants(top, start)
     constants[at.STATUS] = status
@@ -219,7 +219,7 @@ def distances(constants: Array, times: Array, axes: Array) -> Array:
 
 
 def _put(kernel: LazyKernel, seconds: float, constants: Array, times: Array, *others: Any) -> None:
-    """Let a kernel fill in the last argument, in so many seconds if interpreted; refuse the time that it names."""
+    """Let a kernel fill in the last argument (`seconds` if interpreted); SymtopError for a time out of range."""
     if kernel.ready(seconds):
         bad = kernel.compiled(constants, times, *others)
     else:
@@ -263,7 +263,7 @@ class ClosedForms(_Form):
 
     @cached_property
     def arithmetic(self) -> list[str]:
-        """The arithmetic that served for the constants of each member; empty if it was refused."""
+        """The arithmetic of the constants of each member; empty if the member was refused."""
         return [ARITHMETIC[int(kind)] if kind >= 0.0 else "" for kind in self.constants[:, at.ARITHMETIC].tolist()]
 
     @property
@@ -298,7 +298,7 @@ class ClosedForms(_Form):
 
 
 def checked_numbers(numbers: ArrayLike, names: Any = None) -> Array:
-    """The rows as compiled code takes them; SymtopError for the first that is no top or no start, by its name."""
+    """The rows as compiled code takes them; SymtopError names the first member that is no top or no start."""
     rows = real_numbers("numbers", numbers)
     rows = rows if rows.flags.writeable else rows.copy()  # compiled code takes no other
     if rows.ndim != 2 or rows.shape[1] != len(NUMBERS):

@@ -62,8 +62,8 @@ from symtop.model.exact.elliptic import (
 from symtop.model.exact.samples import halves
 from symtop.model.exact.turning_points import GRAIN, RATE, VALUE, Data, Exact, Sums, TurningPoints, choose, exact_zeros
 
-LEAST_GAP, LEAST_SWING = 1e-280, 1e-130  # of distances from a pole, of u2 - u1
-DONE, OUT_OF_RANGE, UNRESOLVED, UNMET = range(4)  # what became of the constants
+LEAST_GAP, LEAST_SWING = 1e-280, 1e-130  # limits on distances from a pole, and on u2 - u1
+DONE, OUT_OF_RANGE, UNRESOLVED, UNMET = range(4)  # statuses of the constants
 
 
 @shared
@@ -73,7 +73,7 @@ def _put(out: Any, place: int, poly: Cubic, unit: DoubleDouble) -> None:
 
 
 class Mean(NamedTuple):
-    """What the angles do on average: the nutation period, growth at both poles, lags of both halves at the start."""
+    """Mean motion of the angles: the nutation period, growth at both poles, lags of both halves at the start."""
 
     period: DoubleDouble
     growth_down: DoubleDouble
@@ -240,8 +240,8 @@ def move(data: Data, sums: Sums, exact: Exact, points: TurningPoints, out: Any) 
 
 
 SERIES = 1e-30  # what nome, period and mean rates add to the relative error of a rate (measured 3e-31)
-SMALLEST, LARGEST = 1e-60, 1e40  # of any number given that is not zero
-LEAST_ANGLE, LARGEST_ANGLE = 1e-142, 1e12  # of theta, and of phi and psi
+SMALLEST, LARGEST = 1e-60, 1e40  # range of the data that are not zero
+LEAST_ANGLE, LARGEST_ANGLE = 1e-142, 1e12  # rad: the least theta that is not zero, the largest phi and psi
 
 
 @shared
@@ -293,7 +293,7 @@ def _conserved(data: Data, sums: Sums) -> tuple[float, float]:
 
 @shared
 def _meets(data: Data, phi: float, psi: float, speed: float, c: Any) -> bool:
-    """Does the form begin where it should, to rounding, in attitude, theta' and phi' sin theta?"""
+    """Does the form at time 0 agree with the start to rounding, in attitude, theta' and phi' sin theta?"""
     cosine, ax, ay, sine, bx, by, nod, rate = halves(c, 0.0)
     ahead, behind, x, y = 0.5 * (phi + psi), 0.5 * (phi - psi), math.cos(0.5 * data.theta), math.sin(0.5 * data.theta)
     sum_gap = max(abs(cosine * ax - x * math.cos(ahead)), abs(cosine * ay - x * math.sin(ahead)))
@@ -333,7 +333,7 @@ def _lines(data: Data, phi: float, psi: float, a: DoubleDouble, mean: Mean, out:
 
 @shared
 def motion_constants(numbers: Any, out: Any) -> int:
-    """Fill in the constants of a row of `symtop.model.top.NUMBERS`; a status, `DONE` if they can be relied on."""
+    """Fill in the constants of a row of `symtop.model.top.NUMBERS`; returns a status, `DONE` if they are accurate."""
     data = Data(numbers[0], numbers[1], numbers[2], numbers[3], numbers[6], numbers[7], numbers[8])
     phi, psi = numbers[4], numbers[5]
     if not _in_range(data, phi, psi):
@@ -365,7 +365,7 @@ def motion_constants(numbers: Any, out: Any) -> int:
 
 
 def all_constants(rows: Any, out: Any) -> int:
-    """The constants of n tops, of rows (n, 9) of their numbers, with statuses; how many are not to be relied on."""
+    """Fill in the constants of n tops from rows (n, 9), with statuses; returns how many are not `DONE`."""
     failed = 0
     for i in range(len(rows)):
         out[i][at.STATUS] = motion_constants(rows[i], out[i])

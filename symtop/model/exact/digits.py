@@ -114,7 +114,7 @@ class Motion(NamedTuple, Generic[Number]):
 
 
 class Pole(NamedTuple):
-    """A pole as the axis sees it: twist b +- a, and distances 1 +- u at the turning points u1 (low) and u2 (high)."""
+    """Numbers of a pole: its twist b +- a, and distances 1 +- u at the turning points u1 (low) and u2 (high)."""
 
     twist: Any
     low: Any
@@ -295,7 +295,7 @@ class PreciseForm:
     def _state(self, time: Any) -> tuple[Any, Any, Any, Any, Any]:
         """sqrt((1 + u)/2) and sqrt((1 - u)/2), signed, phi + psi, phi - psi and theta', all in the upright picture."""
         exact, last = rational("time", time), self._last
-        if last is None or last[0] != exact:  # angles, axis and attitude of one time are asked for one after the other
+        if last is None or last[0] != exact:  # else a call for another quantity at the same time
             self._last = last = exact, self._after(self._real(exact))
         return last[1]
 
@@ -378,9 +378,9 @@ _EVEN_SINES = ((0, 0, 0, 0), (2, 0, 0, 0), (0, 4, 0, 0), (-2, 0, 8, 0))
 
 
 def precise_constants(top: SymmetricTop, start: Angles, form: PreciseForm | None = None) -> Array:
-    """The array of constants, from a form that there is or from one of `DIGITS` digits.
+    """The array of constants, from `form` or, without one, from a form of `DIGITS` digits.
 
-    Raises `SymtopError` if the axis comes within 1e-145 of a pole that it does not meet, or stays there.
+    Raises `SymtopError` if the axis comes within 1e-145 of a pole that it does not meet, or never leaves that range.
     """
     form, out = form or PreciseForm(top, start, digits=DIGITS), np.zeros(at.SIZE)
     ctx, curve = form.ctx, form.curve

@@ -42,7 +42,7 @@ PI = (3.141592653589793, 1.2246467991473532e-16)
 HALF_PI = (1.5707963267948966, 6.123233995736766e-17)
 PER_PI = (0.3183098861837907, -1.9678676675182486e-17)  # 1/pi
 PER_TURN = (0.15915494309189535, -9.839338337591243e-18)  # 1/(2 pi)
-TO_WHOLE = 6755399441055744.0  # 1.5 * 2^52: a double of less than 2^51 that is added to it and taken off is whole
+TO_WHOLE = 6755399441055744.0  # 1.5 * 2^52: adding and subtracting it rounds a double below 2^51 to an integer
 
 
 @inlined
@@ -55,7 +55,7 @@ def two_sum(a: float, b: float) -> DoubleDouble:
 
 @inlined
 def ordered_sum(a: float, b: float) -> DoubleDouble:
-    """The same with half the operations if abs(a) >= abs(b), or a = 0."""
+    """`two_sum` with half the operations, for abs(a) >= abs(b) or a = 0."""
     total = a + b
     return total, b - (total - a)
 
@@ -150,8 +150,8 @@ def rounded(a: DoubleDouble) -> float:
     return a[0] + a[1]
 
 
-NODES = 64.0  # per radian, and per unit of an exponent
-BITS = 400  # of the integers in fixed point
+NODES = 64.0  # nodes of the tables per radian, and per unit of an exponent
+BITS = 400  # fractional bits of the integers in fixed point
 LAST_EXPONENT = 23  # the nodes of exp run from -23/64 to 23/64: half of ln 2 and more
 LN2 = (0.6931471805599453, 2.3190468138462996e-17, 5.7077084384162121e-34)
 HALF_PI_REST = 1.4973849048591698e-33  # pi/2 less its first two doubles, with the sign that subtracting them has
@@ -213,7 +213,7 @@ def _near_zero(r: float) -> tuple[DoubleDouble, DoubleDouble]:
 @shared
 def _by_node(high: float, low: float) -> tuple[DoubleDouble, DoubleDouble]:
     """sin and cos of high + low, 0 <= high < 0.8."""
-    k = int(high * NODES + 0.5) if high < 1.5 else 0  # not a number has a node, too
+    k = int(high * NODES + 0.5) if high < 1.5 else 0  # NaN needs a node, too
     s, c = _near_zero(high - k / NODES)
     node_s, node_c = (float(ARCS[k, 0]), float(ARCS[k, 1])), (float(ARCS[k, 4]), float(ARCS[k, 5]))
     sine = add(add(mul(node_s, c), mul(node_c, s)), node_s)
@@ -364,7 +364,7 @@ def quad_neg(a: QuadDouble) -> QuadDouble:
 
 @inlined
 def widened(a: DoubleDouble) -> QuadDouble:
-    """The same number."""
+    """The number `a` as a quad-double."""
     return a[0], a[1], 0.0, 0.0
 
 

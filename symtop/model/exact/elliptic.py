@@ -74,7 +74,7 @@ from symtop.model.exact.double_double import (
 
 
 class Nome(NamedTuple):
-    """The nome q of a parameter of at most 1/2, and what comes with it."""
+    """The nome q of a parameter of at most 1/2, its powers, and theta constants."""
 
     q: DoubleDouble
     q2: DoubleDouble  # q^2, and so on
@@ -324,7 +324,7 @@ def hyperbolic_half(y: DoubleDouble, s: DoubleDouble, c: DoubleDouble, nome: Nom
 
 
 SMALL = 1e-9  # an argument w h below which sn, cn and dn are w h, 1 and 1
-CONVERGED = 1e-9  # of the mean: its error is the square of this
+CONVERGED = 1e-9  # relative gap at which the arithmetic-geometric mean ends; its error is the square of this
 MOST_MEANS = 12
 NEAR = 0.003  # R_J is a polynomial of order 5 where its arguments differ by less, to 1e-16
 MOST_HALVINGS = 60

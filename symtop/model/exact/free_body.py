@@ -78,10 +78,10 @@ SINE, COSINE, THETA_3, THETA_4, REAL, IMAG = 19, 23, 27, 31, 35, 39  # cubics; t
 FRAME, START, TIME_UNIT, UNIT = 43, 52, 56, 57  # canonical to body axes, c above, powers of two
 SIZE = 58
 GIVEN = 13  # numbers of a body: moments, quaternion, momentum and its low half
-LEAST, LEAST_MOMENT = 1e-100, 1e-30  # components of the momentum that are not 0, moments, in units of the largest one
-FAR = 300.0  # of w: sech 2w is nothing beyond
+LEAST, LEAST_MOMENT = 1e-100, 1e-30  # least nonzero component of the momentum, least moment, relative to the largest
+FAR = 300.0  # limit on w: sech 2w is negligible beyond
 ROUNDING, RATE = 32.0 * 2.0**-53, 2.0**-97  # rad of a sample, twice the largest error; relative, of the rates
-PASSES = 6  # of the distillation
+PASSES = 6  # of the error-free summation in `_gap`
 
 Constants = Any  # an array, or a list when interpreted
 Vector = tuple[float, float, float]
@@ -394,14 +394,14 @@ class BodyMotion(NamedTuple):
     """Samples of a body's motion; the rows of `quaternion` and `quaternion_lo` add up."""
 
     quaternion: Array  # (n, 4), body to space, scalar first; continuous in time
-    quaternion_lo: Array  # (n, 4), what the doubles lack
+    quaternion_lo: Array  # (n, 4), the low halves of pairs of doubles
     momentum: Array  # (n, 3), in the body's axes
     bound: Array  # (n,) of the error of the attitude, rad
-    known: float = 0.0  # a time up to which the values are known, which does not hang on the samples; 0 if it is close
-    too_long: bool = False  # lost since it takes too many steps?
+    known: float = 0.0  # a time up to which the values are known, whatever the samples; 0 if none was found
+    too_long: bool = False  # lost because it takes too many steps?
 
     def lost(self, times: Array) -> float | None:
-        """Of the times of the samples that have no value the one nearest to 0; None if all have one."""
+        """The time nearest to 0 of the samples that have no value; None if all have one."""
         beyond = np.asarray(times)[~np.isfinite(self.bound)]
         return float(beyond[np.argmin(np.abs(beyond))]) if beyond.size else None
 
@@ -409,10 +409,10 @@ class BodyMotion(NamedTuple):
 class FreeBody:
     """Exact motion of a free body with principal moments (3,), from an attitude (4,) and a momentum in body axes (3,).
 
-    The numbers are read as exact doubles, `momentum_lo` (3,) is added to the momentum: that of a rotation whose rates
-    are doubles is not one. The quaternion may have any length but 0. Raises `SymtopError` for numbers that are not
-    finite, moments that are not positive or below 1e-30 of the largest, and components of the momentum that are neither
-    0 nor at least 1e-100 of the largest, because a rotation about the middle axis hangs on them.
+    The numbers are read as exact doubles; `momentum_lo` (3,) is added to the momentum, as a product of a moment and a
+    rate is no double. The quaternion may have any length but 0. Raises `SymtopError` for numbers that are not finite,
+    moments that are not positive or below 1e-30 of the largest, and components of the momentum that are neither 0 nor
+    at least 1e-100 of the largest, because a rotation about the middle axis depends on them.
 
     Errors, measured against 50 digits: 1.8e-15 rad and of the momentum 7e-16 of its length, at times up to 1e6 periods.
     """
@@ -437,8 +437,8 @@ class FreeBody:
     def samples(self, times: ArrayLike) -> BodyMotion:
         """The motion at a row of times (n,), before 0 as well; `quaternion_lo` is 0.
 
-        The bound is twice the largest error of some 5,000 samples, and the error of the rates, counted and not proved,
-        times t: 1e-29 of the angle turned. Raises `SymtopError` for times beyond 1e100 or not finite.
+        The bound is twice the largest error measured in some 5,000 samples, plus |t| times the error of the rates,
+        estimated and not proved: 1e-29 of the angle turned. Raises `SymtopError` for times beyond 1e100 or not finite.
         """
         row = checked_times(times)
         out = np.empty((row.size, 7))

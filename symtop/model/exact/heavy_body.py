@@ -5,13 +5,13 @@
 in body axes, c the weight times the centre of mass. Three different moments, or a centre off the axis, have no closed
 form: this is an integration and is never called exact.
 
-heyoka integrates in long double (64 bits), tolerances 1e-2 and, what is returned, 1e-5 of the rounding unit. The
-first is done twice, with steps of at most `SHORTER` of the mean step, because steps of one length share most of their
-rounding, and with the start and 1/I off by one unit, up and down in two patterns, because these are rounded, too. The
-bound is `SAFETY` times the largest distance from these two up to that time, at the samples and at `CHECKS` others. In
-quadruple precision (113 bits), which takes 5 times as long, all three are compared with one run, whose error is smaller
-by the ratio of the units, 2^-49, as long as the distance is small (`LINEAR`). Where the bound exceeds what is asked
-the motion is lost (chaos). The runs go on side by side, `STRETCH` steps of the second one at a time, until it is.
+heyoka integrates in long double (64 bits): one run with a tolerance of 1e-5 of the rounding unit, which is returned,
+and two with 1e-2. These two have steps of at most `SHORTER` of the mean step, because runs with equal steps share most
+of their rounding, and the start and 1/I off by one unit, up and down in two patterns, because these are rounded, too.
+The bound is `SAFETY` times the largest distance from these two up to that time, at the samples and at `CHECKS` others.
+With `precise`, all three are compared with a run in quadruple precision (113 bits, 5 times as long), whose error is
+smaller by the ratio of the units, 2^-49, as long as the distance is small (`LINEAR`). Where the bound exceeds the given
+accuracy the motion is lost (chaos). All runs advance together, by `STRETCH` steps of the returned one, until then.
 Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, MNRAS 504 (2021) 2614.
 """
 
@@ -31,8 +31,8 @@ from symtop.model.exact.free_body import BodyMotion, checked_body, checked_times
 LONG, QUAD = 2.0**-63, 2.0**-112  # rounding units
 TOLERANCES = (1e-2 * LONG, 1e-2 * LONG, 1e-5 * LONG, 1e-2 * QUAD)  # of the runs, the last one in quadruple precision
 SAFETY, LINEAR, CHECKS, SHORTER = 256.0, 1e-4, 32, 0.4
-ACCURACY, PAIR = 1e-9, 2.0**-104  # rad: asked by default, what a pair of doubles holds
-MOST_STEPS = 1_000_000  # of all runs, one in quadruple precision counts as `QUAD_STEP`: half a minute, or three
+ACCURACY, PAIR = 1e-9, 2.0**-104  # rad: the default accuracy, the rounding error of a pair of doubles
+MOST_STEPS = 1_000_000  # of all runs, half a minute or three; a step in quadruple precision counts as `QUAD_STEP`
 STRETCH, QUAD_STEP = 10_000, 10
 START_DIGITS = 60
 
@@ -113,7 +113,7 @@ class HeavyBody:
         return BodyMotion(high[:, :4], low[:, :4], high[:, 4:], bound, known, too_long)
 
     def _one_way(self, times: Array, accuracy: float, precise: bool) -> tuple[Array, Array, Array, float, bool]:
-        """Values, their low halves and bounds at times of one sign; up to which time they are known, and too long?"""
+        """Values, low halves and bounds at times of one sign; until when they are known; were there too many steps?"""
         last = times[np.argmax(np.abs(times))]
         sizes = np.unique(np.abs(np.concatenate([[0.0], times, last * (np.arange(1, CHECKS + 1) / CHECKS)])))
         grid = [np.longdouble(t) for t in np.copysign(sizes, last).tolist()]
@@ -163,7 +163,7 @@ def _to(stepper: Any, points: list[Any], most: int, longest: float = math.inf) -
     """States (n, 7) of an integrator at points from its time on, fewer if it takes more than `most` steps."""
     kind = stepper.state.dtype.type
     row = np.array([kind(point) for point in points])
-    heard = {"callback": lambda _: True}  # Python hears Ctrl-C in it
+    heard = {"callback": lambda _: True}  # in which Python handles Ctrl-C
     _, _, _, steps, *_, states = stepper.propagate_grid(row, max_steps=most, max_delta_t=kind(longest), **heard)
     return states, int(steps)
 

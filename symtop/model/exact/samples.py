@@ -18,9 +18,9 @@ from symtop.core.jit_functions import inlined, shared, two_product
 from symtop.model.exact import layout as at
 from symtop.model.exact.double_double import two_sum, whole_part
 
-MOTION, QUATERNION, AXIS, MOMENTUM, STATE, TURNS, RUN = range(7)  # what `samples` fills in
-WIDTHS = (6, 4, 3, 3, 7, 2, 9)  # `RUN`: a state, and p_phi and p_psi read off it
-ROWS = (MOTION, TURNS)  # views of which each number is a row (width, n) and not a column
+MOTION, QUATERNION, AXIS, MOMENTUM, STATE, TURNS, RUN = range(7)  # views: what `samples` fills in
+WIDTHS = (6, 4, 3, 3, 7, 2, 9)  # numbers in a view; `RUN`: a state, and p_phi and p_psi computed from it
+ROWS = (MOTION, TURNS)  # views that are stored as (width, n), the others as (n, width)
 LONGEST_TIME = 1e100
 TURN = 2.0 * math.pi
 
@@ -79,7 +79,7 @@ def _phase(c: Constants, t: float) -> tuple[float, float]:
 
 @inlined
 def _precession(c: Constants, down: float, up: float, lean: float, size: float) -> float:
-    """phi' as the sum of its two fractions, or as lean/sin^2 theta where these cancel more than lean did."""
+    """phi' as the sum of its two fractions, or as lean/sin^2 theta where these cancel more than the terms of lean."""
     rate = fractions = 0.0
     if c[at.SIGN_DOWN] != 0.0:
         fraction = (c[at.TWIST_DOWN] / down) * (c[at.TWIST_DOWN] / down)
@@ -96,7 +96,7 @@ def _precession(c: Constants, down: float, up: float, lean: float, size: float) 
 
 @inlined
 def wave(c: Constants, t: float) -> Wave:
-    """The bounded part of the motion, upright.
+    """The motion without the angles that are linear in time, in the upright picture.
 
     For the halves down = sqrt((1 + u)/2) and up = sqrt((1 - u)/2), signed through a pole: modulus, cosine and sine of
     the argument, its mean growth since the turning point. Then theta' and phi'.
@@ -163,7 +163,7 @@ def _unit(c: Constants, place: int, t: float, x: float, y: float, lag: float) ->
 
 @shared
 def halves(c: Constants, t: float) -> tuple[float, float, float, float, float, float, float, float]:
-    """cos(theta/2) with its unit vector, sin(theta/2) with its own, theta' and phi', for the top as it stands."""
+    """cos(theta/2) with its unit vector, sin(theta/2) with its own, theta' and phi', for the given top."""
     down, dx, dy, down_lag, up, ux, uy, up_lag, nod, rate = wave(c, t)
     dx, dy = _unit(c, at.DOWN_TURNS, t, dx, dy, down_lag)
     ux, uy = _unit(c, at.UP_TURNS, t, ux, uy, up_lag)
@@ -250,7 +250,7 @@ def samples(c: Constants, times: Sequence[float], view: int, out: Any) -> int:
 
 
 def all_samples(constants: Any, times: Any, view: int, out: Any) -> int:
-    """The same for many tops, with one row of times for all of them or a row for each; the place counts all times."""
+    """`samples` of many tops, with one row of times for all of them or a row for each; the place counts all times."""
     for i in range(len(constants)):
         row = min(i, len(times) - 1)
         bad = samples(constants[i], times[row], view, out[i])

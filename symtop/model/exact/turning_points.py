@@ -64,11 +64,11 @@ from symtop.model.exact.double_double import (
 
 GRAIN = 1e-31  # relative error of a few operations in double-double
 GRAIN4 = 1e-61  # in quad-double, with three digits to spare
-RATE, VALUE = 1e-28, 1e-18  # of relative errors, beyond which a longer arithmetic is taken
+RATE, VALUE = 1e-28, 1e-18  # limits on relative errors of rates and of values; above them a longer arithmetic is used
 
 
 class Data(NamedTuple):
-    """What a top and its start are, without phi and psi."""
+    """A top and its start, without phi and psi."""
 
     I1: float
     I3: float
@@ -212,7 +212,7 @@ def _is_zero(a: float, b: float, c: float, d: float) -> bool:
 
 @shared
 def exact_zeros(data: Data) -> Exact:
-    """What is known to vanish: cos theta is transcendental unless theta = 0, a root of no rational polynomial.
+    """Which quantities vanish exactly: cos theta is transcendental unless theta = 0, a root of no rational polynomial.
 
     The only separatrix is that of `symtop.model.exact.digits`.
     """
@@ -226,12 +226,12 @@ def exact_zeros(data: Data) -> Exact:
     return Exact(north if mgl >= 0.0 else south, south if mgl >= 0.0 else north, rests, top)
 
 
-LEAST_SQUARE = 1e-150  # of u2 - u1, whose square must be a double
-LEAST_TERM = 1e-270  # of the largest term of the cubic: its rounding errors must be doubles, too
+LEAST_SQUARE = 1e-150  # lower limit on u2 - u1, whose square must not underflow
+LEAST_TERM = 1e-270  # lower limit on the largest term of the cubic, whose rounding errors must not underflow
 
 
 class TurningPoints(NamedTuple):
-    """What the module's docstring names; x1, x2 relative to the start, bend = lead g3."""
+    """The quantities of the module's docstring; x1, x2 relative to the start, bend = lead g3."""
 
     d1: DoubleDouble
     d2: DoubleDouble
@@ -250,7 +250,7 @@ class TurningPoints(NamedTuple):
 
 @inlined
 def unknown_points() -> TurningPoints:
-    """The answer where the arithmetic does not tell a distance from zero."""
+    """The result where the arithmetic does not tell a distance from zero."""
     return TurningPoints(ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, False, math.inf, math.inf)
 
 
@@ -311,7 +311,7 @@ class _Roots(NamedTuple):
 
 @shared
 def _roots(sums: Sums, exact: Exact, theta_dot: float) -> tuple[bool, _Roots]:
-    """The roots, and whether they are there."""
+    """Whether the roots could be computed, and the roots."""
     lead, passes_up = sums.lead, exact.through_up and not (sums.lead[0] > 0.0 and sums.k1[0] >= 0.0)
     third, full = ZERO, add(sums.kinetic, square(sums.a))
     bend = full
@@ -360,7 +360,7 @@ def _upper(sums: Sums, exact: Exact, roots: _Roots, e1: DoubleDouble) -> DoubleD
 
 @shared
 def turning_points(sums: Sums, exact: Exact, theta_dot: float) -> TurningPoints:
-    """The curve of a moving axis, and how well it is known."""
+    """The turning points of a moving axis, with bounds of their errors."""
     twisted = (exact.through_up or sums.twist_up[0] != 0.0) and (exact.through_down or sums.twist_down[0] != 0.0)
     there, roots = _roots(sums, exact, theta_dot)
     e1, d2 = sub(sums.up, roots.x1), add(sums.down, roots.x2)
@@ -414,7 +414,7 @@ def _bounds(sums: Sums, exact: Exact, roots: _Roots, distances: tuple[float, ...
 
 @shared
 def choose(data: Data, exact: Exact) -> tuple[float, Sums, TurningPoints]:
-    """The arithmetic that the data ask for, the sums in it and the turning points."""
+    """The arithmetic that the data need, the sums in it and the turning points."""
     sums = short_sums(data)
     if exact.separatrix:
         return at.EXACTLY, sums, unknown_points()

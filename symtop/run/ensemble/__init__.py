@@ -1,1 +1,1 @@
-"""Many tops at once."""
+"""Run many tops with one integrator."""

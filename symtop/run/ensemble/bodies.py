@@ -1,24 +1,24 @@
 """Random bodies without symmetry: a population in strata, and its members as scenes.
 
-Free bodies have the least and the largest moment of a triangle of ratios, and a momentum at a small or larger angle
-from an axis; |L| is 1 and times are counted in natural periods. Heavy ones lie at a distance epsilon from a Lagrange
-top with I1 = mgl = 1: I2 = 1 + epsilon u, u from 1/2 to 1, I3 from 0.2 to 1.8, as far as a body can have it, the centre
-epsilon v off the third axis, |v| up to 1, rates across it up to 3/2. Attitudes are even over all turns.
+Free bodies have random ratios of moments and a momentum at a small or larger angle from an axis; |L| is 1 and times are
+in natural periods. Heavy ones lie at a distance epsilon from a Lagrange top with I1 = mgl = 1: I2 = 1 + epsilon u, u
+from 1/2 to 1, I3 from 0.2 to 1.8 within the triangle inequality, the centre epsilon v off the third axis, |v| up to 1,
+rates across it up to 3/2. Attitudes are uniform over all rotations.
 
     short-axis       a rotation about the axis of the largest moment, up to 0.5 rad off
-    long-axis        about that of the smallest moment
-    near-separatrix  where 2 E I2 = L^2, but for the momentum along the largest moment, off by 2^-16 .. 2^-4 of itself
+    long-axis        a rotation about the axis of the smallest moment, up to 0.5 rad off
+    near-separatrix  2 E I2 = L^2, except that the momentum along the largest moment is off by 2^-16 .. 2^-4 of itself
     near-symmetric   two moments equal to 2^-20 .. 2^-6, the momentum in any direction
-    needle           the smallest moment is 2^-12 .. 2^-5 of the others, which spins fast
+    needle           the smallest moment is 2^-12 .. 2^-5 of the others, and the spin about its axis is fast
     heavy            epsilon from 2^-7 to 1/2, spins from 1/16 to 4 of the sleeping threshold
     regular          those of heavy whose disturbances grow less than `CHAOS` times in `PERIODS` natural periods
-    chaotic          and those whose grow more: by an exponent of 0.69 a natural period
+    chaotic          those of heavy whose disturbances grow more: an exponent above 0.69 per natural period
     lagrange         heavy with epsilon = 0: a symmetric top as a body
 
-The growth is that of the largest of two disturbances of `SMALL`, by the series `series-general-adaptive`; of a rotation
-that is not unstable it grows with the time, and not by as much. Drawn numbers have nine digits, so that sines of
-another machine change nothing; directions are then brought to length one. The first n members of more are those of
-fewer, and member i of `heavy` is drawn from the same numbers for each epsilon.
+The growth is the larger one of two disturbances of size `SMALL`, computed by `series-general-adaptive`; in a stable
+motion it is linear in time and smaller. Drawn numbers are rounded to nine digits, so that sines of another machine
+change nothing; directions are then scaled to length one. Member i is the same for any n, and member i of `heavy` is
+drawn from the same numbers for each epsilon.
 """
 
 import math
@@ -45,7 +45,7 @@ KINDS = (*STRATA, "heavy", "all", "free")
 DRAWS, MOST = 16, 1_000_000
 PERIODS, CHAOS, SMALL = 10.0, 1000.0, 1e-8
 ACCURATE = 1e-13  # tolerance of the series
-FARTHEST, NEAREST = 0.5, 0.02  # epsilon at most; and at least where chaos is asked for, which nothing below has
+FARTHEST, NEAREST = 0.5, 0.02  # largest epsilon; least of the chaotic kind, as no motion below it is chaotic
 VECTORS = {"centre": "component", "quaternion": "part", "omega_body": "component"}
 PRINCIPAL = {name: {"long_name": "principal moment of inertia", "units": "1"} for name in ("I1", "I3")}
 SPLIT = np.cumsum([*PARTS.values()])[:-1]  # of the 14 numbers of a member
@@ -57,11 +57,9 @@ def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float 
     Variables ``I1``, ``I2``, ``I3``, ``mgl``, ``centre`` and ``omega_body`` (member, 3; principal axes),
     ``quaternion`` (member, 4; w, x, y, z, body to space), in any consistent units, and ``stratum``, its name. `kind` is
     a stratum (free: short-axis, long-axis, near-separatrix, near-symmetric, needle; heavy: regular, chaotic,
-    lagrange), "heavy" without asking for chaos, or "free" or "all" for such strata in turn. `epsilon` is how
-    far heavy bodies are from a Lagrange top, from 0, or with chaotic ones from 0.02, to 1/2; without one it is drawn.
-    Member i depends on the seed, not on n.
-
-    Raises SymtopError for arguments that make no sense.
+    lagrange), "heavy" for regular and chaotic ones as drawn, or "free" or "all" for those strata in turn. `epsilon` is
+    the distance of heavy bodies from a Lagrange top, from 0 (with chaotic ones from 0.02) to 1/2; by default it is
+    drawn. Member i depends on the seed, not on n. Raises SymtopError for invalid arguments.
     """
     count, chosen, first = whole("n", n, 1, MOST), one_of("kind", kind, KINDS), whole("seed", seed, 0)
     check_memory("n", count)
@@ -117,21 +115,21 @@ def _members(kind: str, seed: int, count: int, epsilon: float | None) -> Array:
 
 
 def _direction(first: Array, second: Array) -> Array:
-    """Directions (3, n), evenly over the sphere."""
+    """Directions (3, n), uniform over the sphere."""
     z, angle = 2.0 * first - 1.0, 2.0 * math.pi * second
     across = np.sqrt(np.maximum(1.0 - z * z, 0.0))
     return np.stack([across * np.cos(angle), across * np.sin(angle), z])
 
 
 def _turn(u: Array) -> Array:
-    """Quaternions (4, n), evenly over all turns."""
+    """Quaternions (4, n), uniform over all rotations."""
     out, back = np.sqrt(u[0]), np.sqrt(1.0 - u[0])
     first, second = 2.0 * math.pi * u[1], 2.0 * math.pi * u[2]
     return np.stack([out * np.cos(first), out * np.sin(first), back * np.cos(second), back * np.sin(second)])
 
 
 def _rows(moments: Array, mgl: float, centre: Array, turns: Array, rates: Array) -> Array:
-    """Members (n, 14) of parts (parts, n)."""
+    """Members (n, 14) from columns of their parts, each (components, n), rounded to nine digits."""
     n = moments.shape[1]
     rows = np.concatenate([moments, np.full((1, n), mgl), centre, turns, rates]).T
     rows = np.array([float(f"{value:.9g}") + 0.0 for value in rows.ravel().tolist()]).reshape(n, 14)
@@ -141,7 +139,7 @@ def _rows(moments: Array, mgl: float, centre: Array, turns: Array, rates: Array)
 
 
 def _free(kind: str, u: Array) -> Array:
-    """Free bodies with |L| = 1, their axes in an order that is drawn."""
+    """Free bodies with |L| = 1, their principal axes in random order."""
     low, one, high = between(0.3, 0.9, u[0]), np.ones(u.shape[1]), between(1.1, 1.25, u[1])
     moments = np.stack([low, one, np.minimum(high, 0.99 * (1.0 + low))])
     tilt, turn, small = 0.5 * u[2], 2.0 * math.pi * u[3], octaves(-16.0, -4.0, u[4])
@@ -168,7 +166,7 @@ def _free(kind: str, u: Array) -> Array:
 
 
 def _heavy(u: Array, epsilon: float | None) -> Array:
-    """Heavy bodies with I1 = mgl = 1, epsilon from a Lagrange top, or a distance that is drawn."""
+    """Heavy bodies with I1 = mgl = 1, at the distance `epsilon` from a Lagrange top, or at a random one for None."""
     off, one = octaves(-7.0, -1.0, u[0]) if epsilon is None else np.full(u.shape[1], epsilon), np.ones(u.shape[1])
     third = between(0.2, 1.8, u[2])
     second = np.minimum(1.0 + off * between(0.5, 1.0, u[1]), 0.99 * (1.0 + third))
@@ -181,7 +179,7 @@ def _heavy(u: Array, epsilon: float | None) -> Array:
 
 
 def growth(scene: Scene) -> float:
-    """How many times the attitude's disturbance of the start has grown at most over `PERIODS` natural periods."""
+    """The largest factor by which two disturbances of the start grow in the attitude over `PERIODS` natural periods."""
     solver, start = integrator("series-general-adaptive").solvers[BODY], scene.start
     times = scene.nutation_period * np.linspace(0.0, PERIODS, 4 * round(PERIODS) + 1)[1:]
     plan = Plan.until(times, ACCURATE)

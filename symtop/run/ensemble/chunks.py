@@ -1,11 +1,11 @@
-"""A chunk of an ensemble: plans, runs and observables of some members, each step made for all of them at once.
+"""A chunk of an ensemble: plans, runs and observables of some members, computed together.
 
-A member has the bits of `simulate` alone: the same steps, samples and observables. Steps are made in one compiled call
-(`FixedStep.many`, or the closed form's) where the method has one, or in one for each member (`Adaptive.many`); any
-other method runs its members one after another by `calling.solve`, as anybody's solver is called.
+A member has the same bits as in `simulate`: the same steps, samples and observables. All steps are made in one compiled
+call (`FixedStep.many`, or the closed form's) where the method has one, or in one per member (`Adaptive.many`); any
+other method, such as a plug-in, runs its members one after another by `calling.solve`.
 
-Whether samples have to be dithered, `simulation.sample_times` decides for one run by the widest stretch of nutation
-phases that none of them shows; `schedule` decides it for all rows by the same operations on the same nutation periods.
+`simulation.sample_times` decides for one run whether its samples are dithered, by the widest range of nutation phases
+without a sample; `schedule` decides it for all rows by the same operations on the same nutation periods.
 """
 
 import contextlib
@@ -42,18 +42,18 @@ from symtop.run.simulation import WIDEST_GAP, places, unseen
 from symtop.run.trajectory import LABELS
 
 CHUNK = 65_536  # values of one column in a chunk: half a megabyte, which stays in a core's cache
-CHUNK_STEPS = 5_000_000  # in a chunk: a hundredth of a second in lanes, to a second
-SHARES, LEAST_STEPS = 16, 200_000  # threads share even a small ensemble, in chunks of a millisecond or more
+CHUNK_STEPS = 5_000_000  # most steps in a chunk: 0.01 s in lanes, to 1 s
+SHARES, LEAST_STEPS = 16, 200_000  # an ensemble has at least 16 chunks, unless these had fewer steps (1 ms) than this
 HARMLESS = 1e100  # states and momenta below it have a finite energy: no inertia is below 1e-40
-UNKNOWN_STEPS = 1000  # what a member counts for that chooses its steps, or makes none
-READ_TOGETHER = 4096  # members of which a thread makes angles continuous
+UNKNOWN_STEPS = 1000  # the steps assumed of a member of an adaptive method or of a closed form
+READ_TOGETHER = 4096  # members whose angles a thread makes continuous at a time
 RAISED = "raised"  # outcome of a member on which a solver raised an exception
 ENDS = (*OUTCOMES, RAISED)
 IN_LANES = "lanes"
 IN_TURN = "compiled, one after another"
 IN_PYTHON = "one call of Python for each"
 
-SHOWN = {  # by each chart
+SHOWN = {  # the variables of each chart
     "angles": ("theta", "phi", "psi", "axis", "energy", "p_theta", "p_phi", "p_psi"),
     "axis": ("theta", "phi", "axis", "energy", "p_theta", "p_phi", "p_psi"),
     "attitude": ("theta", "phi", "psi", "axis", "quaternion", "energy", "p_theta", "p_phi", "p_psi"),
@@ -62,17 +62,17 @@ SHOWN = {  # by each chart
 
 
 class Schedule(NamedTuple):
-    """When n runs are sampled. A run of fewer steps than samples shows every step; the rest of its row is padded."""
+    """Sample times of n runs. A run of fewer steps than samples is sampled at every step; its row is padded."""
 
-    step_size: Array  # (n,), NaN where a method chooses its steps
-    marks: Whole  # (n, samples) whole steps; the last one again beyond `counts`, zeros without a step
+    step_size: Array  # (n,), NaN for adaptive methods
+    marks: Whole  # (n, samples) whole steps; the last one repeated beyond `counts`; zeros for adaptive methods
     times: Array  # (n, samples), NaN beyond `counts`
     counts: Whole  # (n,) samples of each
     dithered: NDArray[np.bool_]  # (n,)
 
 
 def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -> Schedule:
-    """The samples of `simulation.sample_times` for n runs with so many steps each, or without steps of their own."""
+    """The samples of `simulation.sample_times` for n runs with `steps` (n,) steps, or with None for adaptive runs."""
     n = len(horizon)
     h = np.full(n, np.nan) if steps is None else horizon / steps
     marks, times = np.zeros((n, samples), np.int64), np.empty((n, samples))
@@ -87,13 +87,13 @@ def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -
         each = np.rint(steps[rows, None] * place).astype(np.int64)
         new = np.diff(each, axis=1, prepend=-1) > 0
         plan.counts[rows] = new.sum(axis=1)
-        few = plan.counts[rows] < samples  # each mark once, and the last again in the rest of the row
+        few = plan.counts[rows] < samples  # remove repeated marks, and fill the row with the last
         each[few] = np.sort(np.where(new[few], each[few], each[few, -1:]), axis=1)
         marks[rows], times[rows] = each, each * h[rows, None]
 
     lay_out(np.arange(n), dithered=False)
     long_enough = np.isfinite(period) & (horizon > 2.0 * period)
-    rows = np.flatnonzero(long_enough if steps is None else long_enough & (steps >= samples))  # others show every step
+    rows = np.flatnonzero(long_enough if steps is None else long_enough & (steps >= samples))  # others have every step
     lay_out(rows[unseen(times[rows], period[rows, None]) >= WIDEST_GAP], dithered=True)
     times[np.arange(samples) >= plan.counts[:, None]] = np.nan
     return plan
@@ -110,7 +110,7 @@ def nutation_periods(numbers: Array) -> Array:
 
 @functools.cache
 def _all_periods() -> Any:
-    """The compiled loop over members, whose bisections run in lanes: a third of the time."""
+    """The compiled loop of `nutation_periods` over tops; its bisections run in lanes, in a third of the time."""
     period_between, cubic_of, bisected, none = model.period_between, model.nutation_cubic, model.bisected, (0.0,) * 9
     width = len(none)
 
@@ -139,17 +139,17 @@ class _Runs(NamedTuple):
 
     states: Array  # (n, samples, dimension)
     momenta: Array  # (n, samples, 2)
-    steps: Any  # (n,), as all that follow
+    steps: Any  # (n,), as the following arrays
     force_evaluations: Any
     newton_iterations: Any
     outcome: Any
     reached: Array
-    raised: str = ""  # what the first solver said that raised an exception
+    raised: str = ""  # the message of the first exception of a solver
 
 
 @dataclass(frozen=True)
 class Job:
-    """What is asked of an integrator, checked; arrays over members."""
+    """The checked arguments of an ensemble; arrays are over members."""
 
     method: Integrator
     chart: str
@@ -160,13 +160,13 @@ class Job:
     samples: int
     budget: float | None
     observables: tuple[str, ...]  # of `SHOWN`
-    period: Array | None = None  # of nutation, where it is known
-    names: Any = None  # what members are called (n,), where they have labels
-    continuous: bool = True  # are angles; otherwise modulo a turn where that takes the closed form (`Turns`)
+    period: Array | None = None  # of nutation, if it has been computed
+    names: Any = None  # labels of the members (n,), or None
+    continuous: bool = True  # make angles continuous; else they are left modulo 2 pi where that needs `Turns`
     first: int = 0  # number of the first member
 
     def __getstate__(self) -> dict[str, Any]:
-        """For workers elsewhere, which know integrators by their names; one that they do not know goes as it is."""
+        """Pickle a registered integrator by its name, because worker processes have it; any other as an object."""
         with contextlib.suppress(SymtopError):
             if find_integrator(self.method.name) == self.method:
                 return vars(self) | {"method": self.method.name}
@@ -184,9 +184,9 @@ class Job:
         return IN_TURN if solver is exact.solve or isinstance(solver, Adaptive) else IN_PYTHON
 
     def chunks(self) -> Iterator[slice]:
-        """Members in stretches that neither hold more than `CHUNK` values a column nor make too many steps.
+        """Slices of the members with at most `CHUNK` values per column and about `CHUNK_STEPS` steps.
 
-        They do not depend on who computes them, and have whole blocks of lanes where they are longer than some.
+        They do not depend on the number of workers; one of more than 4 W members has whole blocks of W lanes.
         """
         n, begin, size = len(self.numbers), 0, max(1, CHUNK // self.samples)
         ends = np.cumsum(np.full(n, UNKNOWN_STEPS) if self.steps is None else self.steps)
@@ -200,13 +200,13 @@ class Job:
             begin = end
 
     def of(self, members: Any) -> "Job":
-        """The same for some members; those of a slice know their numbers."""
+        """The job of some members; for a slice the numbers of members in messages stay right."""
         arrays = ("numbers", "horizon", "steps", "tolerance", "period", "names")
         cut = {name: values[members] for name in arrays if (values := getattr(self, name)) is not None}
         return replace(self, **cut, first=self.first + (members.start if isinstance(members, slice) else 0))
 
     def order(self) -> Any:
-        """Members in lanes by the work of a step, as neighbours end together, the most first; None if it is all one."""
+        """The order of members, longest first, in which neighbouring lanes end together; None if any order will do."""
         solver = self.method.solvers[self.chart]
         if self.execution != IN_LANES or not (solver.implicit or np.ptp(self.steps)):  # type: ignore[attr-defined]
             return None
@@ -214,7 +214,7 @@ class Job:
         return np.concatenate(divided(np.arange(len(each)), self.steps, each))[::-1]
 
     def columns(self) -> dict[str, Any]:
-        """The runs: what they show, how each was made and ended, and the message of the first exception, if any."""
+        """Make the runs: columns of observables, settings and outcomes, and the message of the first exception."""
         period = nutation_periods(self.numbers) if self.period is None else self.period
         plan = schedule(period, self.horizon, self.samples, self.steps)
         with np.errstate(all="ignore"):  # a run may blow up, and that is a result
@@ -230,10 +230,10 @@ class Job:
         return columns
 
     def _runs(self, plan: Schedule) -> _Runs:
-        """The states of the members, by the quickest way there is."""
+        """The runs of the members, by the fastest way that the method has."""
         solver = self.method.solvers[self.chart]
-        if isinstance(solver, FixedStep) and not solver.in_python:  # whose marks may stand still at the end of a row
-            with foreign_code(f"integrator {self.method.name}"):  # a kernel that does not compile
+        if isinstance(solver, FixedStep) and not solver.in_python:  # it takes marks that repeat at the end of a row
+            with foreign_code(f"integrator {self.method.name}"):  # its kernel may not compile
                 done = solver.many(self.numbers, plan.step_size, plan.marks)
             padding = np.isnan(plan.times)
             done.states[padding], done.momenta[padding] = np.nan, np.nan
@@ -256,7 +256,7 @@ class Job:
         return self._in_turn(plan)
 
     def _in_turn(self, plan: Schedule) -> _Runs:
-        """The same by one call of a solver for each member; one fails alone whatever its solver raises."""
+        """The runs of the members by one call of the solver each; an exception ends only that member."""
         n = len(plan.counts)
         states = np.full((n, self.samples, DIMENSIONS[self.chart]), np.nan)
         momenta, (steps, work, iterations, outcome) = np.full((n, self.samples, 2), np.nan), np.zeros((4, n), int)
@@ -283,7 +283,7 @@ class Job:
         return runs
 
     def _plan(self, i: int, plan: Schedule) -> Plan:
-        """What `simulate` would ask a solver for."""
+        """The plan of member i, as `simulate` would make it."""
         count, horizon = plan.counts[i], float(self.horizon[i])
         if self.steps is not None:
             return Plan.steps(float(plan.step_size[i]), plan.marks[i, :count], horizon, self.budget)
@@ -291,20 +291,20 @@ class Job:
         return Plan.until(plan.times[i, :count], tolerance, self.budget)
 
     def _observables(self, view: View, times: Array) -> dict[str, Any]:
-        """Of what a `Trajectory` shows of one run, what is asked for, of all."""
+        """The columns of `observables` of all members, as a `Trajectory` has them for one run."""
         columns = {name: getattr(view, name) for name in self.observables}
         turned = self.turned if self.continuous else ()
         return columns | Turns(self.numbers, times, {name: columns[name] for name in turned}).of(slice(None))
 
     @property
     def turned(self) -> tuple[str, ...]:
-        """The angles that are shown and that the chart knows modulo a turn."""
+        """The observables among phi and psi that the chart determines modulo 2 pi only."""
         return tuple(name for name in ("phi", "psi") if name in self.observables and self.chart in ("axis", "attitude"))
 
 
 @dataclass(frozen=True, eq=False)
 class Turns:
-    """phi and psi of members, (n, samples), modulo a turn, and the closed forms that make them continuous."""
+    """phi and psi of members, (n, samples), modulo 2 pi, which are made continuous by closed forms on request."""
 
     numbers: Array
     times: Array
@@ -320,14 +320,14 @@ class Turns:
 
     @functools.cached_property
     def all(self) -> dict[str, Array]:
-        """Those of all, on all cores."""
+        """Continuous angles of all members, computed on all cores and cached."""
         firsts = range(0, len(self.numbers), READ_TOGETHER)
         parts = list(in_threads(self.of, [slice(first, first + READ_TOGETHER) for first in firsts], cores()))
         return {name: np.concatenate([part[name] for part in parts]) for name in self.angles}
 
 
 class Later(BackendArray):
-    """One of the angles of `Turns`, made when it is looked at: the constants of a closed form take 4 us."""
+    """One of the angles of `Turns` as a lazy array: the constants of a closed form take 4 us a member."""
 
     def __init__(self, turns: Turns, name: str) -> None:
         self.turns, self.name = turns, name
@@ -343,14 +343,14 @@ class Later(BackendArray):
         return values.reshape(*chosen.shape, -1)[..., key[1]]
 
     def variable(self) -> xr.Variable:
-        """A variable that keeps what it has read."""
-        layers: Any = indexing  # whose types know no array but NumPy's
+        """An xarray variable that computes its values when first read and keeps them."""
+        layers: Any = indexing  # its type annotations allow NumPy arrays only
         data = layers.MemoryCachedArray(layers.CopyOnWriteArray(layers.LazilyIndexedArray(self)))
         return xr.Variable(("member", "time"), data)
 
 
 def together(numbers: Array) -> Any:
-    """All tops at once, or all bodies, as a `View` takes one."""
+    """An object with the attributes of one top, or body, that holds those of all, for a `View` of all."""
     if of_bodies(numbers):
         torque = (numbers[:, 3:4] * numbers[:, 4:7]).T[..., None]
         return SimpleNamespace(moments=numbers[:, None, :3], torque=torque)
@@ -360,7 +360,7 @@ def together(numbers: Array) -> Any:
 
 
 def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
-    """A run whose states or energy are not finite, and that reports nothing of it, ends there, as in `simulate`."""
+    """End runs with outcome "ok" before the first sample with a state or energy that is not finite, as `simulate`."""
     if all(values.min() > -HARMLESS and values.max() < HARMLESS for values in runs[:2]):  # a tenth of the time
         return runs
     finite = np.isfinite(runs.states).all(axis=2) & np.isfinite(view.energy + view.p_phi) | np.isnan(plan.times)
@@ -368,7 +368,7 @@ def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
 
 
 def _of_length_one(runs: _Runs, plan: Schedule, chart: str) -> _Runs:
-    """Runs end where their quaternions have left length one, as in `simulate`."""
+    """End runs where |q| is too far from one, as in `simulate`."""
     lost = off_length(chart, runs.states)
     if not lost.any():
         return runs
@@ -377,14 +377,14 @@ def _of_length_one(runs: _Runs, plan: Schedule, chart: str) -> _Runs:
 
 
 def _ended(runs: _Runs, plan: Schedule, lost: NDArray[np.bool_], outcome: int) -> _Runs:
-    """Runs with that outcome end before their first sample that is `lost`, (n, samples)."""
+    """End runs with `outcome` before their first sample that is `lost`, (n, samples)."""
     bad = lost.any(axis=1)
     reached = plan.times[np.arange(len(lost)), np.maximum(lost.argmax(axis=1) - 1, 0)]
     return runs._replace(outcome=np.where(bad, outcome, runs.outcome), reached=np.where(bad, reached, runs.reached))
 
 
 def same_times(times: Any, row: Any) -> bool:
-    """Are these times of members (n, samples) all that row? NaN is what both have beyond runs of few steps."""
+    """Are the times (n, samples) of all members equal to `row`? NaN, the padding of short runs, equals NaN."""
     if (times == row).all():
         return True
     return bool(np.isnan(row).any() and np.array_equal(times, np.broadcast_to(row, times.shape), equal_nan=True))
@@ -393,10 +393,10 @@ def same_times(times: Any, row: Any) -> bool:
 def as_dataset(
     columns: dict[str, Any], labels: dict[str, Any], *, shared: bool | None = None, of: Job | None = None
 ) -> xr.Dataset:
-    """Columns (n, ...) and labels (n,) as a dataset; times that all members share are one row.
+    """Columns (n, ...) and labels (n,) as a dataset; if all members have the same times, these are one row.
 
-    `shared` says so where the columns are not those of all members. Angles `of` a job that leaves them modulo a turn
-    are made continuous when they are read.
+    `shared` says whether they do, if the columns are not those of all members. Angles of the job `of` are modulo 2 pi
+    and are made continuous when they are read.
     """
     columns, vectors = columns | labels, {"axis": "component", "momentum": "component", "quaternion": "part"}
     times = columns.pop("time")

@@ -1,7 +1,7 @@
 """ensemble(): many tops or bodies, one integrator, each with a step and a horizon of its own -> one dataset.
 
-Members are computed in chunks (`symtop.run.ensemble.chunks`), on threads or on a cluster, and a member has the bits of
-`simulate` alone. What does not fit into memory goes to a file as it is computed (`Stream`), and is resumed from there.
+Members are computed in chunks (`symtop.run.ensemble.chunks`), on threads or on a cluster, and a member has the same
+bits as in `simulate`. An ensemble too large for memory is written to a file (`Stream`), and resumed from there.
 """
 
 import contextlib
@@ -38,8 +38,8 @@ from symtop.run.guard import MOST_STEPS
 from symtop.run.simulation import MOST_SAMPLES, MOST_SWINGS, chart_of, check_control
 
 SAMPLES = 101
-IDENTITY = "identity"  # the file that says which ensemble a folder belongs to
-MOST_VALUES = 250_000_000  # of all members, samples and variables, 2 GB: more goes to a file
+IDENTITY = "identity"  # the name of the file with the hash of the ensemble that a folder belongs to
+MOST_VALUES = 250_000_000  # numbers in memory, 2 GB: a larger dataset needs a file
 
 
 def ensemble(
@@ -50,42 +50,42 @@ def ensemble(
     scheduler: str | None = None, quiet: bool = False,
     added: Callable[[xr.Dataset], xr.Dataset] = lambda _: xr.Dataset(),
 ) -> xr.Dataset:  # fmt: skip
-    """Run one integrator on many tops, or on many bodies; each member has the bits of `simulate` alone.
+    """Run one integrator on many tops, or on many bodies; each member has the same bits as in `simulate`.
 
     `members` is a list of scenes or their names, or a dataset over ``member`` with ``I1``, ``I3``, ``mgl``, ``theta``
     and, where they are not zero, ``phi``, ``psi``, ``theta_dot``, ``phi_dot``, ``psi_dot`` (`symtop.population` makes
-    one; a scalar counts for all members). A dataset with ``I2`` is of bodies without symmetry, as
-    `symtop.body_population` makes them. What follows may be one number or one for each member:
+    one; a scalar applies to all members). A dataset with ``I2`` is of bodies without symmetry, as
+    `symtop.body_population` makes them. These arguments may be one number or one for each member:
 
-        step_size or per_nutation    the step, or how many steps a nutation period of the member has
+        step_size or per_nutation    the step, or the number of steps per nutation period of the member
         tolerance                    of an adaptive method
         horizon or nutations         the time, or the number of nutation periods, to run to; scenes have their own
 
-    Dimensions ``member``, ``time``, ``component`` (x, y, z). Variables as `simulate` has them: ``theta``, ``phi``,
-    ``psi``, ``axis``, ``quaternion``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, of bodies ``momentum``, or those
-    that `variables` names (``phi`` and ``psi`` of the space frame take the closed form, 4 us a member, and are made
-    when they are first read); for each member ``outcome``, ``steps``,
-    ``force_evaluations``, ``newton_iterations``, ``reached_time``, ``step_size``, ``horizon``, ``dithered``. ``time``
-    is a row where all members are sampled at the same times, and otherwise an array over ``member`` and ``time``;
-    ``data.isel(member=i)`` has a row either way. A member of fewer steps than `samples` shows every step, and the rest
-    of its row is NaN. Labels of members, a coordinate ``member``, are kept, and what is given for each as a DataArray
-    with such labels is taken by label.
+    Dimensions ``member``, ``time``, ``component`` (x, y, z). Variables as in `simulate`: ``theta``, ``phi``, ``psi``,
+    ``axis``, ``quaternion``, ``energy``, ``p_phi``, ``p_psi``, ``p_theta``, for bodies ``momentum``, or only those in
+    `variables`; for each member ``outcome``, ``steps``, ``force_evaluations``, ``newton_iterations``, ``reached_time``,
+    ``step_size``, ``horizon``, ``dithered``. In space-frame charts continuous ``phi`` and ``psi`` need the closed form,
+    4 us a member, and are computed when first read. ``time`` is a row if all members are sampled at the same times, and
+    otherwise an array over ``member`` and ``time``; ``data.isel(member=i)`` has a row either way. A member with fewer
+    steps than `samples` is sampled at every step, and the rest of its row is NaN. Labels of members, a coordinate
+    ``member``, are kept, and an argument given as a DataArray with such labels is matched by label.
 
-    A member that fails fails alone: its samples are NaN from there, ``outcome`` says why, and one `SymtopWarning` how
-    many have (not if `quiet`, which shows no progress either). One that starts on a pole has left the angles chart at
-    once, and one on which somebody's solver raises an exception has "raised": a warning, and the attribute ``raised``
-    of a dataset in memory, tells the first such exception. If all members raise, SymtopError does. `observe` picks the
-    chart as in `simulate` (default: what the scenes are watched for, the axis of a dataset). `budget` is that of one
-    member. There is no guard.
+    If a member fails, its samples are NaN from there, ``outcome`` says why, and the others go on; one `SymtopWarning`
+    says how many failed (not if `quiet`, which also hides progress). In the angles chart a start on a pole fails at
+    once. If a foreign solver raises an exception, ``outcome`` is "raised", and a warning, and the attribute ``raised``
+    of a dataset in memory, contain the first such exception; SymtopError if all members raise. `observe` picks the
+    chart as in `simulate` (default: that of the scenes, "axis" for a dataset). `budget` is that of one member. There is
+    no guard.
 
-    Work is done on as many `threads` as there are cores, or by the workers of the dask cluster at the address
-    `scheduler`. The attribute ``execution`` says how members were run: in "lanes", 32 side by side, where the method
-    can. With a `path`, members go to that netCDF file as they are computed, in memory that does not grow with
-    `samples` (0.4 kB a member). The same call resumes one that was killed, to the same file, and the dataset is lazy.
-    What `added` makes of it is added to it, and attributes to a file, before this is in its place.
+    Work is done on `threads` threads, by default one per core, or by the workers of the dask cluster at the address
+    `scheduler`. The attribute ``execution`` says how members were run: in "lanes", 32 side by side, if the method
+    allows. With a `path`, members are written to that netCDF file as they are computed, in memory that does not grow
+    with `samples` (0.4 kB a member). The same call resumes an interrupted one to the same file; the dataset is lazy.
+    `added` is called with the dataset; the variables (and in a file the attributes) that it returns are added, to a
+    file before it is moved to `path`.
 
-    Raises SymtopError for arguments that make no sense, for members that are no top or no start, by number, and for a
-    path to which another process is writing.
+    Raises SymtopError for invalid arguments, for members that are no top or no start, by number, and for a path to
+    which another process is writing.
     """
     read, method = read_members(members), find_integrator(integrator)
     count, silent = whole("samples", samples, 2, MOST_SAMPLES), boolean("quiet", quiet)
@@ -110,7 +110,7 @@ def ensemble(
     }  # fmt: skip
 
     def compute(rest: list[slice], keep: Callable[[slice, dict[str, Any]], object]) -> tuple[int, str]:
-        """On how many members a solver raised an exception, and the first one's message."""
+        """Compute the chunks `rest`; returns the number of members whose solver raised, and the first message."""
         raised, first, left = 0, "", sum(chunk.stop - chunk.start for chunk in rest)
         drawn = progress_bar(words["title"], quiet=silent, total=n, initial=n - left, unit="run")
         with drawn as bar, contextlib.closing(_computed(ordered, rest, workers, scheduler)) as parts:
@@ -151,7 +151,7 @@ def ensemble(
 
 
 def _computed(job: Job, chunks: list[slice], threads: int, scheduler: str | None) -> Generator[Any, None, None]:
-    """The columns of each chunk, in their order."""
+    """The columns of each chunk, in the order of the chunks, from threads or from a cluster."""
     parts = map(job.of, chunks)
     if scheduler is None:
         yield from in_threads(Job.columns, parts, threads)
@@ -164,7 +164,7 @@ def _computed(job: Job, chunks: list[slice], threads: int, scheduler: str | None
 
 
 def _fill(columns: dict[str, Any], part: dict[str, Any], chunk: Any, n: int) -> None:
-    """Put the members of a chunk into columns of n members, which the first one makes."""
+    """Copy the members of a chunk into the columns of n members, which are allocated at the first chunk."""
     for name, values in part.items():
         if name not in columns:
             kind = f"U{max(map(len, OUTCOMES))}" if name == "outcome" else values.dtype
@@ -173,7 +173,7 @@ def _fill(columns: dict[str, Any], part: dict[str, Any], chunk: Any, n: int) -> 
 
 
 def _observables(variables: Iterable[str] | None, chart: str) -> tuple[str, ...]:
-    """Which variables a dataset has, in their usual order."""
+    """The variables of the dataset, checked against the chart and in its order; None for all."""
     if variables is None:
         return SHOWN[chart]
     if isinstance(variables, str) or not isinstance(variables, Iterable):
@@ -197,7 +197,7 @@ def _job(
     members: Members, method: Integrator, chart: str, settings: dict[str, Any], tolerance: object, samples: int,
     budget: float | None, observables: tuple[str, ...],
 ) -> Job:  # fmt: skip
-    """The job of an integrator, from settings that are checked here."""
+    """Check the settings and return the `Job` of the members."""
     for one, other in (("step_size", "per_nutation"), ("horizon", "nutations")):
         if one in settings and other in settings:
             raise SymtopError(f"give {one} or {other}, not both", one, other)
@@ -224,7 +224,7 @@ def _job(
 
 
 def _horizons(members: Members, settings: dict[str, Any], period: Array | None) -> Array:
-    """The horizon of each member: given, so many periods, or its own."""
+    """The horizon of each member (n,): from `horizon`, from `nutations` times its period, or its scene's."""
     horizon, names, n = members.horizon, members.names, len(members.numbers)
     if "horizon" in settings:
         horizon = for_each("horizon", settings["horizon"], n, names)
@@ -245,8 +245,8 @@ def _horizons(members: Members, settings: dict[str, Any], period: Array | None) 
 
 
 def _parts(period: Array, counted: Array, horizon: Array, names: Any) -> Array:
-    """A step of each member, of which its nutation period has so many."""
-    with np.errstate(over="ignore"):  # a step that is infinite is longer than the horizon, too
+    """The step of each member, its nutation period divided by `counted`; SymtopError above its horizon."""
+    with np.errstate(over="ignore"):  # an infinite step is also longer than the horizon
         step: Array = period / counted
     for i in np.flatnonzero(step > horizon)[:1]:
         least = f"{period[i] / horizon[i]:.4g}, a step within the horizon"
@@ -256,7 +256,7 @@ def _parts(period: Array, counted: Array, horizon: Array, names: Any) -> Array:
 
 
 def _steps(step: Array, horizon: Array, most: float, names: Any) -> Whole:
-    """Whole steps of each member, as `simulation.make_plan` counts and refuses them."""
+    """The number of steps of each member, computed and checked as in `simulation.make_plan`."""
     with np.errstate(over="ignore"):
         ratio = horizon / step
     for i in np.flatnonzero(step > horizon)[:1]:
@@ -269,7 +269,7 @@ def _steps(step: Array, horizon: Array, most: float, names: Any) -> Whole:
 
 
 def _tolerances(method: Integrator, tolerance: object, members: Members, horizon: Array, period: Array) -> Array:
-    """Tolerance of each member; a horizon that `simulation.make_plan` would refuse is refused."""
+    """The tolerance of each member; tolerance and horizon are checked as in `simulation.make_plan`."""
     numbers, names = members.numbers, members.names
     mgl = numbers[:, 3 if of_bodies(numbers) else 2]
     swings = horizon * np.maximum(1.0 / period, np.sqrt(np.abs(mgl) / numbers[:, 0]) / (2.0 * np.pi))
@@ -287,11 +287,11 @@ def _tolerances(method: Integrator, tolerance: object, members: Members, horizon
 class Stream:
     """The netCDF file of an ensemble, and its chunks on disk.
 
-    Each chunk is in a file of its own, whole or absent, in the folder ``PATH.parts``, beside the file `IDENTITY`. When
-    all are there they are put together, one after another, into the netCDF file, which replaces `PATH` in one move;
-    then they are removed, `IDENTITY` last. The bytes of the file do not depend on how often the work was interrupted.
-    While it is put together it takes its size twice. One process at a time may do so: it holds the lock ``.PATH.lock``.
-    Nothing is removed or replaced that symtop did not write.
+    Each chunk is written atomically to a file of its own in the folder ``PATH.parts``, beside the file `IDENTITY`. When
+    all exist they are copied, one after another, into a netCDF file, which is then moved to `PATH`; then the chunks are
+    removed, `IDENTITY` last. The bytes of the file do not depend on how often the work was interrupted. Copying needs
+    twice the size of the file on disk. Only one process at a time does this: it holds the lock ``.PATH.lock``. Files
+    that symtop did not write are never removed or replaced.
     """
 
     def __init__(self, path: Path, folder: Path, job: Job, labels: dict[str, Any], attributes: dict[str, Any]) -> None:
@@ -313,12 +313,12 @@ class Stream:
         return [chunk for chunk in chunks if not self._part(chunk).is_file()]
 
     def keep(self, chunk: slice, columns: dict[str, Any]) -> None:
-        """Put a chunk on disk."""
+        """Write a chunk to its file."""
         with ending_on_sigterm(), replacing(self._part(chunk), ".npz") as partial:
             np.savez(partial, **columns)
 
     def finish(self, chunks: list[slice], added: Callable[[xr.Dataset], xr.Dataset]) -> xr.Dataset:
-        """Put the chunks together; the dataset reads from the file what it is asked for."""
+        """Copy the chunks into the netCDF file, remove them, and open it as a lazy dataset."""
         with netcdf.one_thread, replacing(self.path) as partial:
             first = self._columns(chunks[0])
             shared = all(same_times(self._columns(chunk, "time")["time"], first["time"][0]) for chunk in chunks)
@@ -337,17 +337,17 @@ class Stream:
                     more = added(data)
                 if more:
                     more.to_netcdf(partial, mode="a")
-            except RuntimeError as error:  # the netCDF library's own word for a disk that is full
+            except RuntimeError as error:  # raised by the netCDF library if the disk is full
                 words = f"What was computed is in {self.folder}, and the same call goes on from there"
                 raise SymtopError(f"cannot write {self.path}: {error}; is the disk full? {words}") from error
         self.forget(chunks)
         return xr.open_dataset(self.path, engine="netcdf4")
 
     def forget(self, chunks: list[slice]) -> None:
-        """Remove the chunks, and at last the file that says whose they are."""
+        """Remove the chunks, and last the file `IDENTITY`."""
         for file in (*map(self._part, chunks), self.folder / IDENTITY):
             file.unlink(missing_ok=True)
-        with contextlib.suppress(OSError):  # something of somebody else's is in it
+        with contextlib.suppress(OSError):  # the folder holds other files
             self.folder.rmdir()
 
     def _part(self, chunk: slice) -> Path:
@@ -366,7 +366,7 @@ class Stream:
 
 
 def _lay_out(file: Any, pattern: xr.Dataset, n: int) -> None:
-    """Dimensions, variables, attributes and coordinates of the file, from a dataset of its first members."""
+    """Create the dimensions, variables, attributes and coordinates of a file like those of `pattern`, for n members."""
     file.set_fill_off()
     for name, size in pattern.sizes.items():
         file.createDimension(name, n if name == "member" else size)
@@ -382,7 +382,7 @@ def _lay_out(file: Any, pattern: xr.Dataset, n: int) -> None:
 
 
 def _identity(job: Job, labels: dict[str, Any]) -> str:
-    """A hash of all that decides the bytes of the file: code, and what it is given."""
+    """A hash of all that determines the bytes of the file: code, libraries and inputs."""
     arrays = job.numbers, job.horizon, job.steps, job.tolerance
     limits = job.chart, job.samples, job.budget, job.observables, CHUNK, CHUNK_STEPS
     return digest({

@@ -1,4 +1,4 @@
-"""Who takes part in an ensemble: tops or bodies as rows of numbers, from a dataset or scenes, refused by number."""
+"""Read and check the members of an ensemble, tops or bodies, from a dataset or scenes, as rows of numbers."""
 
 import difflib
 import re
@@ -20,35 +20,35 @@ from symtop.model.scenes import OBSERVABLES, Scene, scene
 from symtop.model.top import NUMBERS, flat
 
 TOP = dict.fromkeys(NUMBERS, 1)
-NEEDED = {"nine": NUMBERS[:4], "14": ("I1", "I2", "I3", "omega_body")}  # the others are as in `Angles`, or
+NEEDED = {"nine": NUMBERS[:4], "14": ("I1", "I2", "I3", "omega_body")}  # required variables; others default to 0 or to
 USUAL = {"centre": (0.0, 0.0, 1.0), "quaternion": (1.0, 0.0, 0.0, 0.0)}
-WRITTEN = {*netcdf.VARIABLES, "scene", "member", "period"}  # names that symtop gives, which no one misspells
-NEAR = 0.8  # likeness of a name that is taken for a misspelled one: thetadot and theta0, not p_phi and theta_max
+WRITTEN = {*netcdf.VARIABLES, "scene", "member", "period"}  # names that symtop writes, never taken for misspelled ones
+NEAR = 0.8  # similarity of a name that is taken for a misspelled one: thetadot and theta0, not p_phi and theta_max
 RATE = re.compile(r"(d|v|w|omega)_?(theta|phi|psi)(_?d?t)?|(theta|phi|psi)_?(d|dt|t|prime|rate|speed|vel|velocity)")
-UNNAMED = "dim_0"  # what xarray calls a dimension that nobody has named
+UNNAMED = "dim_0"  # xarray's name for an unnamed dimension
 
 
 class Members(NamedTuple):
-    """Tops or bodies and their starts, and what else is known of them."""
+    """Tops or bodies and their starts, with the horizons, labels and units that come with them."""
 
-    numbers: Array  # (n, 9), columns as `NUMBERS`, or (n, 14) as `RigidBody.flat` has them
-    horizon: Array | None  # (n,) of scenes; None where nobody has said it
-    observes: str  # the smallest observable that shows what every scene is watched for
+    numbers: Array  # (n, 9) with the columns `NUMBERS`, or (n, 14) with those of `RigidBody.flat`
+    horizon: Array | None  # (n,) of scenes; None for a dataset
+    observes: str  # the smallest observable that covers the default one of every scene
     units: str  # "SI", or empty
     labels: dict[str, NDArray[Any]]  # names of scenes, or strata, and the coordinate ``member`` if there is one: (n,)
 
     @property
     def names(self) -> NDArray[Any] | None:
-        """What members are called, where they have labels."""
+        """The labels of the members, or None."""
         return self.labels.get("member")
 
 
 def read_members(members: "xr.Dataset | Iterable[str | Scene]") -> Members:
-    """Members from a dataset over ``member`` (scalars count for all) or from scenes or their names.
+    """Members from a dataset over ``member`` (scalars apply to all) or from scenes or their names.
 
-    A dataset with ``I2`` is of bodies, as `symtop.body_population` has them. Raises SymtopError for a variable that is
-    missing or has another dimension, for one that looks like a misspelled one of theirs, for tops beside bodies, and
-    for members that are no top, no body or no start: by label or number, and reason.
+    A dataset with ``I2`` is of bodies, as `symtop.body_population` makes them. Raises SymtopError for a variable that
+    is missing, has another dimension or seems misspelled, for tops together with bodies, and for invalid members, with
+    their label or number.
     """
     if isinstance(members, xr.Dataset):
         return _from_dataset(members)
@@ -56,7 +56,7 @@ def read_members(members: "xr.Dataset | Iterable[str | Scene]") -> Members:
     if isinstance(members, (str, bytes, Scene)) or not several:
         raise SymtopError(f"members must be a dataset or a list of scenes, not {shown(members)}")
     tables = type(members).__module__.startswith("pandas")
-    if tables or isinstance(members, (dict, xr.DataArray)):  # which go through their names or numbers
+    if tables or isinstance(members, (dict, xr.DataArray)):  # iterating over these gives names or numbers
         raise SymtopError(f"members must be an xarray.Dataset or a list of scenes, not a {type(members).__name__}")
     scenes = [scene(entry, bodies=True) for entry in members]
     if not scenes:
@@ -107,18 +107,18 @@ def _from_dataset(data: xr.Dataset) -> Members:
 
 
 def _checked_bodies(numbers: Array, names: NDArray[Any] | None) -> Array:
-    """The rows of bodies and starts as their records have them, directions of length one."""
+    """The rows of bodies and starts, checked, with directions scaled to length one."""
     for i, row in enumerate(numbers.tolist()):
         try:
             top, start = from_flat(row)
-            numbers[i] = replace(top).flat(replace(start))  # which checks what they hold
+            numbers[i] = replace(top).flat(replace(start))  # `replace` checks their values
         except SymtopError as error:
             raise SymtopError(f"{member_name(names, i)}: {error}") from None
     return numbers
 
 
 def _check_names(data: xr.Dataset, parts: dict[str, int]) -> None:
-    """Refuse a variable that looks like one of theirs, in case, letters, underscores or another word for a rate."""
+    """SymtopError for a variable whose name seems a misspelling of one in `parts`, or another word for a rate."""
     usual = {name.lower(): name for name in parts}
     for name in (name for name in map(str, data.variables) if name not in parts and name not in WRITTEN):
         near = [usual[like] for like in difflib.get_close_matches(name.lower(), usual, n=1, cutoff=NEAR)]
@@ -129,7 +129,7 @@ def _check_names(data: xr.Dataset, parts: dict[str, int]) -> None:
 
 
 def refuse_others(members: Members, runs: xr.Dataset) -> None:
-    """Refuse members that are not those of an ensemble, by their number or their labels."""
+    """SymtopError for members that are not those of the ensemble `runs`, by their number or their labels."""
     if len(members.numbers) != (n := runs.sizes["member"]):
         raise SymtopError(f"members must be the {n} of the ensemble, not {len(members.numbers)}")
     known = {name: row.to_numpy() for name, row in runs.variables.items() if row.dims == ("member",)}
@@ -146,12 +146,12 @@ def _plain(index: Any) -> NDArray[Any]:
 
 
 def member_name(names: NDArray[Any] | None, i: int) -> str:
-    """A member in a sentence: by its label where it has one, otherwise by its number."""
+    """The name of a member in messages: "member" and its label, or its number if there are no labels."""
     return f"member {i if names is None else names[i]}"
 
 
 def _aligned(name: str, value: xr.DataArray, n: int, names: NDArray[Any] | None) -> xr.DataArray:
-    """A row in the order of the members, by label where both have labels."""
+    """`value` in the order of the members, by label where both have labels; SymtopError if it does not fit them."""
     if value.dims not in ((), ("member",), (UNNAMED,)):
         raise SymtopError(f"{name} must be one number or a row over member, not over {', '.join(map(str, value.dims))}")
     if names is None or value.dims != ("member",) or "member" not in value.indexes:
@@ -165,7 +165,7 @@ def _aligned(name: str, value: xr.DataArray, n: int, names: NDArray[Any] | None)
 
 
 def for_each(name: str, value: object, n: int, names: NDArray[Any] | None = None) -> Array:
-    """A number above zero for each of n members, of one for all (then read-only) or of a row of them, by `names`."""
+    """A positive number for each of n members (n,), from one for all (then read-only) or a row, ordered by `names`."""
     if np.ma.is_masked(value):
         raise SymtopError(f"{name} must be numbers without a mask, not a masked array: what is masked has no value")
     if isinstance(value, xr.DataArray):

@@ -1,6 +1,6 @@
-"""Random tops: a population from a distribution without units, in six strata.
+"""Random tops: a population drawn from a distribution of dimensionless numbers, in six strata.
 
-A top and its start are drawn in numbers that have no unit, and then scaled. In units where I1 = abs(mgl) = 1, time is
+A top and its start are drawn in dimensionless numbers and then scaled. In units where I1 = abs(mgl) = 1, time is
 counted in 1/g, g = sqrt(abs(mgl)/I1), x = theta/2, and the spin enters as the ratio to the sleeping threshold,
 
     sigma = I3 w3 / (2 sqrt(I1 abs(mgl))),    a = p_psi = 2 sigma,    b = p_phi.
@@ -10,22 +10,22 @@ counted in 1/g, g = sqrt(abs(mgl)/I1), x = theta/2, and the spin enters as the r
                                                             kinetic energy across the axis from 0 to 8
     fast               25 %   sigma from 2 to 64            theta 0.2 to 2.9; phi' from -2 to 4 slow precessions 1/a,
                                                             theta' from -2 to 2 of them
-    grazing            15 %   as large as the energy lets   passes the upper or the lower pole, one as often as the
-                                                            other, at 2^-14 to 2^-5 rad, with a speed from 1/2 to 2
-                                                            (more if it has to climb from the lower pole to its start)
+    grazing            15 %   up to what the energy allows  passes the upper or the lower pole, with equal probability,
+                                                            at 2^-14 to 2^-5 rad, with a speed from 1/2 to 2 (more if
+                                                            it has to climb from the lower pole to its start)
     near-separatrix    10 %   sigma from 0.01 to 0.9        climbs to 2^-16 to 2^-6 rad of the upper pole and hovers
                                                             there: its energy at the pole has the size of gap^2
     hanging            10 %   sigma from 1/64 to 2          mgl < 0, theta 0.05 to 1.2; the energy across the axis does
                                                             not lift the axis to the horizontal
-    sleeping           15 %   sigma from 1 + 2^-5 to 5      let go 2^-12 to 2^-4 rad from upright, with rates that let
-                                                            the axis stray to sqrt(3) times that
+    sleeping           15 %   sigma from 1 + 2^-5 to 5      starts 2^-12 to 2^-4 rad from upright, with rates that take
+                                                            the axis to at most sqrt(3) times that
 
 In all of them, I3/I1 is uniform in (0.02, 1.98), phi and psi in (-pi, pi), every sign is drawn; I1 lies between 2^-10
 and 2^10, g between 2^-6 and 2^6. Quantities that range over octaves are drawn by octave and uniformly within one.
 
-The first n members of a larger population are those of the smaller one, with the same bits on every machine: the draws
-are the raw integers of a Philox generator, a stream that NumPy promises to keep, 16 a member, and everything else is
-made of sums, products, quotients and square roots, sine and cosine of theta included.
+Member i is the same in populations of any size, with the same bits on every machine: the draws are the raw integers of
+a Philox generator, a stream that NumPy promises to keep, 16 per member, and everything else, including sine and cosine
+of theta, is computed by sums, products, quotients and square roots.
 """
 
 import math
@@ -42,11 +42,11 @@ from symtop.model.charts import Array
 from symtop.model.top import NUMBERS
 
 MOST = 1e9  # members
-BYTES = 400  # of memory that a member takes
-DRAWS = 16  # uniform numbers a member: a new quantity must not move those that are there
+BYTES = 400  # of memory per member
+DRAWS = 16  # uniform numbers per member, some unused: a new quantity must not change the existing ones
 BLOCK = 1 << 16  # members drawn at a time
 
-# without units: theta, the tilt from the pole that gravity pulls from, theta' and phi' in units of g, and a; each (n,)
+# dimensionless: theta, measured from the pole of unstable equilibrium, theta' and phi' in units of g, and a; each (n,)
 Start = tuple[Array, Array, Array, Array]
 
 
@@ -82,7 +82,7 @@ def sine_cosine(angle: Array) -> tuple[Array, Array]:
 
 
 def direction(uniform: Array) -> tuple[Array, Array]:
-    """A unit vector of any direction, not quite evenly: a half circle by its slope, and a sign."""
+    """A unit vector (two columns) of random direction, not quite uniform: a half circle by its slope, and a sign."""
     t = 4.0 * np.mod(uniform, 0.5) - 1.0
     square = 1.0 + t * t
     return signs(uniform) * (1.0 - t * t) / square, signs(uniform) * 2.0 * t / square
@@ -100,7 +100,7 @@ def _fast(draw: Array) -> Start:
 
 
 def _grazing(draw: Array) -> Start:
-    """Tilts `away` from the pole that is passed. With x = away/2, u the speed at the pole and delta = b -+ a = u gap,
+    """Starts at the tilt `away` from the pole to pass. With x = away/2, u the speed there and delta = b -+ a = u gap,
 
         away'^2 = u^2 +- 4 sin^2 x - a^2 tan^2 x    (upper, lower pole), up to terms of the size of delta,
 
@@ -139,7 +139,7 @@ def _near_separatrix(draw: Array) -> Start:
 
 
 def _hanging(draw: Array) -> Start:
-    """Here the tilt is from the pole that gravity pulls to; cos(tilt) is the energy that lifts the axis level."""
+    """Here theta is measured from the stable pole; cos(theta) is the energy that lifts the axis to the horizontal."""
     theta, a = between(0.05, 1.2, draw[0]), 2.0 * signs(draw[1]) * octaves(-6.0, 1.0, draw[2])
     sine, cosine = sine_cosine(theta)
     speed, (along, across) = np.sqrt(2.0 * between(0.0, 0.95, draw[3]) * cosine), direction(draw[4])
@@ -191,13 +191,13 @@ def _fill(columns: dict[str, Any], draw: Array, kind: str) -> None:
 
 
 def memory() -> float:
-    """Bytes of memory of this machine; infinite where the system does not say."""
+    """Bytes of memory of this machine; infinite if the system does not report it."""
     known = hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names
     return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")) if known else math.inf
 
 
 def check_memory(name: str, members: int) -> None:
-    """Refuse more members than the memory holds; `name` is that of their number."""
+    """SymtopError for more members than the memory holds; `name` is the argument with their number."""
     if members * BYTES > memory():
         limit = f"{memory() / BYTES:.2g} in the {memory() / 2**30:.3g} GiB of this machine ({BYTES} bytes a member)"
         raise SymtopError(f"{name} must be at most {limit}, not {members}", name)
@@ -208,9 +208,9 @@ def population(n: int, *, seed: int = 0, kind: str = "all") -> xr.Dataset:
 
     Variables ``I1``, ``I3``, ``mgl``, ``theta``, ``phi``, ``psi``, ``theta_dot``, ``phi_dot``, ``psi_dot`` (rad and
     any consistent units) and ``stratum``, its name. `kind` is a stratum (slow, fast, grazing, near-separatrix, hanging,
-    sleeping), or "all" for their mixture. Member i depends on the seed alone, and not on n or the machine.
+    sleeping), or "all" for their mixture. Member i depends only on the seed, not on n or the machine.
 
-    Raises SymtopError for arguments that make no sense.
+    Raises SymtopError for invalid arguments.
     """
     count = whole("n", n, 1, MOST)
     check_memory("n", count)

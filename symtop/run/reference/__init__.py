@@ -1,1 +1,1 @@
-"""The truth: the closed form with bounds on every error, and independent checks of it."""
+"""The reference motion: the closed form with bounds on every error, and independent checks of it."""

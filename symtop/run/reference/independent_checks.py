@@ -1,12 +1,12 @@
-"""Independent checks of the truth: integrations, the discrete map iterated, and the closed form in 40 digits.
+"""Independent checks of the closed form: integrations, the iterated discrete map, and the closed form in 40 digits.
 
 heyoka integrates the space-frame equations in double, long double or quadruple precision (never in angles, which lose
-digits near a pole), at a tolerance of a hundredth of the rounding unit, from a start that is built in 60 digits. The
-closed form in `DIGITS` digits at `CHECKS` times shows the error of that run. It grows, so that the bound at a time t is
-`SAFETY` times the largest error at any check up to the next one after t.
+digits near a pole), at a tolerance of a hundredth of the rounding unit, from a start that is built in 60 digits. Its
+error is measured against the closed form in `DIGITS` digits at `CHECKS` times. It grows, so that the bound at a time t
+is `SAFETY` times the largest error at any check up to the next one after t.
 
-`exact-discrete` iterated shares with the others nothing but the start: no series in time, no theta function, no
-integral over the motion. Its own error is what becomes of a last place of mgl at another step size.
+The iterated map `exact-discrete` shares only the start with the others: it has no series in time, no theta function, no
+integral over the motion. Its error is estimated by changing mgl by one unit in the last place, and the step size.
 """
 
 import functools
@@ -29,11 +29,11 @@ from symtop.model.exact.digits import PreciseForm
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 
-CHECKS = 16
+CHECKS = 16  # times, besides those of fastest nutation
 DIGITS = 40
-SAFETY = 8.0
-MAP_STEPS = (4.37, 7.13)  # of the discrete map, a nutation: no two of its constants agree
-MOST_NUTATIONS = 1e4  # that it is iterated over
+SAFETY = 8.0  # factor from the largest error seen to a bound
+MAP_STEPS = (4.37, 7.13)  # steps of the discrete map per nutation, of two runs that have no constant in common
+MOST_NUTATIONS = 1e4  # over which the map is iterated
 CHECKED = ("attitude", "axis", "phi", "psi")
 
 Checks = dict[str, Array]  # largest errors up to each check time (running maxima), by quantity, and the ``times``
@@ -55,10 +55,10 @@ def integrate(scene: Scene, times: Array, precision: str, chart: str = "attitude
 
 
 def iterate_map(scene: Scene, times: Array, per_nutation: float = MAP_STEPS[0]) -> tuple[Any, int]:
-    """Attitudes (w, x, y, z) of the discrete map at times above zero, each a whole number of steps; and all steps."""
+    """Attitudes (n, 4) of the discrete map at times (n,) > 0, each reached in whole steps, and the number of steps."""
     solve = integrator("exact-discrete").solvers["attitude"]
     nutation, attitudes, made = min(scene.nutation_period, scene.horizon), [], 0
-    nutation = max(nutation, float(np.max(times)) / MOST_NUTATIONS)  # of a horizon that is no part of a nutation
+    nutation = max(nutation, float(np.max(times)) / MOST_NUTATIONS)  # if the horizon is far below a nutation
     for t in map(float, times):
         steps = math.ceil(t / nutation * per_nutation)
         attitudes.append(solve(scene.top, scene.start, Plan.steps(t / steps, [steps])).states[0, :4])
@@ -67,9 +67,9 @@ def iterate_map(scene: Scene, times: Array, per_nutation: float = MAP_STEPS[0]) 
 
 
 def iterate_map_with_error(scene: Scene, times: Array) -> tuple[Any, Array]:
-    """Attitudes of the discrete map, and their own error so far: `SAFETY` times what two neighbours differ by.
+    """Attitudes of the discrete map, and their estimated error: `SAFETY` times the distance from two other runs so far.
 
-    A neighbour has another step, and mgl a last place up or down: next to a separatrix that is another motion.
+    These have another step size, and mgl one unit in the last place up or down, which matters next to a separatrix.
     """
     attitudes, apart = iterate_map(scene, times)[0], np.zeros(len(times))
     for way in (-math.inf, math.inf):
@@ -80,15 +80,15 @@ def iterate_map_with_error(scene: Scene, times: Array) -> tuple[Any, Array]:
 
 
 def have_heyoka() -> bool:
-    """heyoka has wheels for Linux only."""
+    """Is heyoka installed? It has wheels for Linux only."""
     return importlib.util.find_spec("heyoka") is not None
 
 
 def check_times(scene: Scene, horizon: float) -> Array:
     """Times of the checks: denser towards the start, the last one at the horizon.
 
-    Beside each stands the moment of fastest nutation in the period before it: an error of phase shows there most, and
-    may be thousands of times smaller elsewhere (near a separatrix the top hovers where all errors look small).
+    For each, the moment of fastest nutation in the period before it is added: there an error of phase has the largest
+    effect; elsewhere it may be thousands of times smaller (near a separatrix the top hovers, with small errors).
     """
     even = horizon * (np.arange(1, CHECKS + 1) / CHECKS) ** 2
     period = min(scene.nutation_period, horizon)
@@ -100,13 +100,13 @@ def check_times(scene: Scene, horizon: float) -> Array:
 
 @functools.lru_cache(maxsize=8)
 def precise_form(top: SymmetricTop, start: Angles, digits: int) -> PreciseForm:
-    """The closed form in so many digits."""
+    """The closed form in `digits` digits."""
     return PreciseForm(top, start, digits)
 
 
 @functools.lru_cache(maxsize=2048)  # integrations in three precisions have the same checks
 def precise_attitude(top: SymmetricTop, start: Angles, digits: int, t: float) -> tuple[Any, ...]:
-    """Its attitude at one time."""
+    """The attitude at time t by `precise_form`, as w, x, y, z."""
     return tuple(precise_form(top, start, digits).quaternion(t))
 
 
@@ -138,7 +138,7 @@ def envelope(checks: Checks, name: str, times: Array) -> Array:
 
 
 def _unwrapped(angle: Any, near: Array) -> Any:
-    """`angle` on the branch nearest `near`, without rounding 2 pi to double."""
+    """`angle` plus the multiple of 2 pi that brings it nearest to `near`, without rounding 2 pi to double."""
     turns = np.rint((near - angle.astype(np.float64)) / (2.0 * math.pi))
     return angle + turns.astype(angle.dtype) * angle.dtype.type("6.283185307179586476925286766559005768394")
 
@@ -147,8 +147,8 @@ class Integration(NamedTuple):
     """heyoka's run through the given times and those of the checks."""
 
     grid: Array  # all of them, increasing
-    chosen: Any  # places of the given times in the grid
-    checked: Any  # and of those of the checks
+    chosen: Any  # indices of the given times in the grid
+    checked: Any  # indices of the times of the checks
     states: Any  # of the attitude, in the working precision
     seconds: float  # of the integration alone
 
@@ -159,7 +159,7 @@ class Integration(NamedTuple):
 
 
 def integrate_with_checks(scene: Scene, times: Array, precision: str) -> Integration:
-    """The integration behind `integration_values`, and nothing of what judges it."""
+    """The integration for `integration_values`, through the given times and those of the checks."""
     check = check_times(scene, float(times[-1]))
     grid, place = np.unique(np.concatenate([times, check]), return_inverse=True)
     start = time.perf_counter()

@@ -1,9 +1,9 @@
-"""The sensitivity of a motion to its start: what no arithmetic and no method can undo.
+"""The sensitivity of a motion to its start, a property of the motion that no method or arithmetic can avoid.
 
-A motion that is unstable somewhere on its way (beside a separatrix, or almost upright below the spin at which the top
-would sleep) multiplies a change of its start. The closed form answers for the start as it is given, nine exact doubles,
-and its bounds are of that motion. Whoever gives the start in other variables rounds it differently: at theta = 1e-6 a
-unit vector along the axis holds 1 - theta^2/2 to four digits. Between such starts lies `conditioning` times a rounding.
+A motion that is unstable somewhere (beside a separatrix, or almost upright below the spin at which the top would sleep)
+amplifies a change of its start. The closed form and its bounds are for the start as given, taken as nine exact doubles.
+The same start in other variables is rounded differently: at theta = 1e-6 a unit vector along the axis holds
+1 - theta^2/2 to four digits. The motions from two such starts differ by `conditioning` times a rounding error.
 """
 
 import math
@@ -18,16 +18,16 @@ from symtop.model.scenes import Scene
 from symtop.model.top import flat
 
 POINTS = 100  # of the motion that are compared
-SMALL = 64.0 * EPSILON  # a change whose effect the closed form shows: rounding is a tenth of it
-LEAST = 2.0 * EPSILON  # the least change that any theta in [0, pi] and every rate can take
-FAR = 0.1  # rad: beyond it a displacement no longer grows with the change, and it ends at pi
+SMALL = 64.0 * EPSILON  # a change of the start whose effect is ten times the rounding error of the closed form
+LEAST = 2.0 * EPSILON  # the least change that does not vanish by rounding, of any theta in [0, pi] and any rate
+FAR = 0.1  # rad: a larger displacement is no longer proportional to the change; it is at most pi
 
 
 def displacement(scene: Scene, change: float, horizon: float) -> float:
-    """How far the axis will be, rad, from where it would be if the start were changed by so little: the most.
+    """The largest distance of the axis, rad, up to the horizon from motions with starts changed by `change`.
 
-    Three starts are tried: theta moved by `change` rad, theta' by that part of the fastest rate, and all rates by that
-    part of themselves. NaN if one of them is no start.
+    Three starts are tried: theta changed by `change` rad, theta' by `change` times the fastest rate, and all rates by
+    the relative `change`. NaN if one of them is no valid start.
     """
     row = np.array(flat(scene.top, scene.start))
     I1, I3, mgl, theta, _, _, theta_dot, phi_dot, psi_dot = row.tolist()
@@ -44,10 +44,10 @@ def displacement(scene: Scene, change: float, horizon: float) -> float:
 
 
 def conditioning(scene: Scene, horizon: float) -> float:
-    """Rad by which the axis moves up to the horizon for each of the start, or relative; 1 at least, or NaN.
+    """The ratio of the displacement of the axis up to the horizon to a change of the start; at least 1, or NaN.
 
-    Where a change displaces the axis by `FAR`, a smaller one is tried, which the start takes less exactly: `LEAST` to a
-    third. What the smallest change moves by `FAR` is displaced by `FAR` even so, and moves by that much at least.
+    If a change displaces the axis by more than `FAR`, a smaller one is tried, which rounding changes more: `LEAST` by
+    up to a third. If `LEAST` still displaces it by more, the ratio is a lower bound.
     """
     for change in (SMALL, 8.0 * EPSILON, LEAST):
         apart = displacement(scene, change, horizon)

@@ -7,33 +7,32 @@ By default the values are the closed form in double. Three errors add up at a ti
                  (`benchmarks/accuracy.py`), and of phi and psi 4.8e-16 beyond their last digit
     rates        of two doubles: their relative bound (`ClosedForm.provenance`, below 1e-28) times t moves the motion
                  along its path, an angle of that times the angular velocity
-    formulas     whatever else may be wrong: none is known
+    formulas     any other error: none is known
 
-The third is looked for at every time that is given. The angles, the axis and the quaternion are evaluated apart and
-must name one attitude; theta' and phi' must give back the energy and p_phi. Where they do not, to `SUSPICIOUS`, nothing
-is claimed: the bound is pi.
+The third kind is checked for at every requested time: the angles, the axis and the quaternion are evaluated separately
+and must agree on the attitude, and theta' and phi' must reproduce the energy and p_phi. If these differ by more than
+`SUSPICIOUS`, the bound is pi.
 
-A *certificate* holds the closed form of a scene against independent checks, once; each kind holds the one before it:
+A *certificate* is one comparison of a scene's closed form with independent checks; each kind includes the one before:
 
     digits        its angles, axis and attitude at `CHECKS` times and at the fastest moment before each, up to
-                  `REACH` nutations, against the same formulas in 40 digits: shows every error of rounding
-    discrete-map  its attitude over `OVERLAP` nutations against the discrete map iterated: an error of the formulas
-    integration   the same attitude against heyoka's long double integration of the equations of motion: an error that
-                  the formulas of the map would have, too
+                  `REACH` nutations, against the same formulas in 40 digits: finds errors of rounding
+    discrete-map  its attitude over `OVERLAP` nutations against the iterated discrete map: finds errors of the formulas
+    integration   the same attitude against heyoka's long double integration of the equations of motion: finds errors
+                  that the formulas of the map share
 
-It takes up to half a second and is kept on disk under a hash of the top, the start, the sources and the libraries; each
-later reference of the scene names it. It lowers no bound: one that contradicts the bounds raises them.
+It takes up to half a second and is stored on disk under a hash of the top, the start, the sources and the libraries;
+later references of the scene name it. A certificate never lowers a bound; one that contradicts the bounds raises them.
 
 A *body* without symmetry has no such closed form. Free, its motion is exact (`symtop.model.exact.free_body`); with a
 weight it is an integration in long double, bounded by a second one (`symtop.model.exact.heavy_body`), or with
 precision="quad" by one in quadruple precision. Beyond the time at which the bound passes 1e-9 rad, as it does in chaos,
 or that takes more than a million steps, there is no reference.
 
-With a `precision` the values are heyoka's integration of the equations of motion in that arithmetic, judged by the
-closed form in 40 digits at some thirty times (`symtop.run.reference.independent_checks`): a check, and digits beyond
-double, stored as pairs, ``theta + theta_lo``. An integration that visibly differs from the closed form has that
-distance as its bound. Such a result is kept on disk likewise, in a file that holds a hash of its values, so that a
-damaged one is noticed and computed again.
+With a `precision` the values are heyoka's integration of the equations of motion in that arithmetic, compared with the
+closed form in 40 digits at some thirty times (`symtop.run.reference.independent_checks`). This is an independent check
+and has digits beyond double, stored as pairs, ``theta + theta_lo``. Where an integration visibly differs from the
+closed form, that distance is its bound. Results are cached on disk with a hash, by which damaged ones are recognised.
 """
 
 import functools
@@ -88,11 +87,11 @@ KINDS = ("digits", "discrete-map", "integration")  # of certificates
 REACH, OVERLAP = 1e6, 100.0  # nutations
 ROUNDING = {"theta": 2e-15, "axis": 2e-15, "attitude": 4e-15, "phi": 2e-15, "psi": 2e-15}  # rad
 SUSPICIOUS = 1e-12  # a disagreement beyond this is an error, not rounding
-ILL = 1e4  # times: beyond it the words say what a rounding of the start costs
+ILL = 1e4  # amplification beyond which ``conditioning`` states the effect of rounding the start
 UNCERTIFIED = "none; certify='digits', 'discrete-map' or 'integration' makes one"
-MOST_CACHED = 200_000  # times; larger results are not kept on disk
+MOST_CACHED = 200_000  # times; larger results are not cached on disk
 MOST_BYTES = 500_000_000  # of the folder on disk; a reference at 1000 times takes 200 kB
-OFTEN = 50  # files that a process writes between two looks at the size of the folder
+OFTEN = 50  # files that a process writes between two checks of the size of the folder
 COMPILED = tuple(code_hash.PACKAGE / "core" / name for name in ("jit.py", "sines.py"))  # without importing numba
 
 _written = itertools.count()
@@ -103,23 +102,22 @@ def reference(
 ) -> xr.Dataset:
     """The true motion at the given times, each value with a bound on its error.
 
-    Variables as `simulate` (``theta``, ``phi``, ``psi``, ``axis``, ``quaternion``, ``energy``, ``p_phi``, ...), of an
-    integration their low halves ``theta_lo`` ..., and ``axis_error_bound``, ``attitude_error_bound``,
-    ``theta_error_bound``, ``phi_error_bound``, ``psi_error_bound`` in radians, for the sum of both halves. All have the
+    Variables as in `simulate` (``theta``, ``phi``, ``psi``, ``axis``, ``quaternion``, ``energy``, ``p_phi``, ...), for
+    an integration their low parts ``theta_lo`` ..., and ``axis_error_bound``, ``attitude_error_bound``,
+    ``theta_error_bound``, ``phi_error_bound``, ``psi_error_bound`` in radians, for the sum of both parts. All have the
     dimension ``time``, in the order of `times`; axis and quaternion have a second one. `precision` is "closed-form", or
     "double", "longdouble" or "quad" for heyoka's integration in that arithmetic.
 
-    `certify`, for the closed form: "digits" holds it against 40 digits, "discrete-map" also against `exact-discrete`
-    iterated, "integration" moreover against heyoka in long double; each once a scene, and kept on disk.
-    Attributes say what was done: ``bound`` what the bounds follow from, ``certificate`` what the closed form of this
-    scene has been held against, and how it fared, ``arithmetic`` in which its constants were computed,
-    ``conditioning`` how much the motion amplifies a change of its start (`symtop.run.reference.sensitivity`): bounds
-    are of the motion from the very doubles that are given.
+    `certify`, for the closed form: "digits" compares it with 40 digits, "discrete-map" also with `exact-discrete`
+    iterated, "integration" also with heyoka in long double; each once per scene, and stored on disk.
+    Attributes: ``bound`` from what the bounds are derived, ``certificate`` with what the closed form of this scene has
+    been compared, and the result, ``arithmetic`` in which its constants were computed, ``conditioning`` how much the
+    motion amplifies a change of its start (`symtop.run.reference.sensitivity`): bounds are for exactly these doubles.
 
-    Of a body without symmetry: ``quaternion``, ``axis`` (its third), ``theta``, ``momentum`` (L in the space frame),
+    For a body without symmetry: ``quaternion``, ``axis`` (its third), ``theta``, ``momentum`` (L in the space frame),
     ``energy``, ``p_phi``, ``quaternion_lo``, and the bounds of axis, attitude and theta.
 
-    Raises SymtopError for times that are negative, not finite or none, and for a body's that is not known, see above.
+    Raises SymtopError for times that are negative, not finite or none, and for those beyond a body's reference.
     """
     chosen = find_scene(scene, bodies=True)
     moments = real_numbers("times", times)
@@ -152,10 +150,10 @@ def _motion(body: RigidBody, start: Attitude) -> FreeBody | HeavyBody:
 
 @functools.lru_cache(maxsize=16)
 def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> BodyMotion:
-    """The motion of a body of that name at times, kept for a while; SymtopError if it is lost before."""
+    """The motion of a body at the times with the bytes `plain`, cached; SymtopError if its reference ends before."""
     motion, times = _motion(body, start), np.frombuffer(plain).copy()
     sampled = motion.samples if body.free else functools.partial(motion.samples, precise=precise)  # type: ignore[call-arg]
-    if (lost := (shown := sampled(times)).lost(times)) is not None:  # the answer does not hang on the times
+    if (lost := (shown := sampled(times)).lost(times)) is not None:  # `lost` does not depend on `times`
         if shown.known > 0.0:
             known = float(f"{0.999 * shown.known:.4g}")
         else:
@@ -164,7 +162,7 @@ def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, prec
                 end *= 2.0
             finer = np.linspace(0.0, min(end, lost), 201)
             known = float(f"{0.999 * finer[np.isfinite(sampled(finer).bound)].max():.4g}")
-            while not sampled(np.array([known])).bound[0] < 5e-10:  # what is printed is known, too
+            while not sampled(np.array([known])).bound[0] < 5e-10:  # the printed time must be known, too
                 known = float(f"{0.99 * known:.4g}")
         why = "its motion is not known to 1e-9 rad for longer"
         if shown.too_long:
@@ -197,7 +195,7 @@ def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) ->
 
 
 def _by_closed_form(scene: Scene, times: Array, certify: str | None) -> tuple[xr.Dataset, dict[str, str]]:
-    """Values and bounds in double, and words on both."""
+    """The dataset of values and bounds in double, and its attributes."""
     values, known = closed_values(scene, times), certificate(scene, certify)
     bounds = closed_bounds(scene, times, values)
     if known is not None:
@@ -212,7 +210,7 @@ def _by_closed_form(scene: Scene, times: Array, certify: str | None) -> tuple[xr
 
 
 def _by_integration(scene: Scene, times: Array, precision: str) -> tuple[xr.Dataset, dict[str, str]]:
-    """The same of an integration, from the cache if it is there."""
+    """The dataset of an integration, from the cache if it is there, and its attributes."""
     distinct, order = np.unique(times, return_inverse=True)
     if distinct.size > MOST_CACHED:
         data = _integration(scene, distinct, precision)
@@ -229,14 +227,14 @@ def _by_integration(scene: Scene, times: Array, precision: str) -> tuple[xr.Data
 
 
 def conditioned(scene: Scene, horizon: float) -> str:
-    """How well the start determines the motion, in words: bounds are of the motion from the doubles that are given."""
+    """The attribute ``conditioning``: in words, how much the motion amplifies a change of its start."""
     if not horizon > 0.0:
         return "1: these are times of the start"
     factor = conditioning(scene, horizon)
     if math.isnan(factor):  # a changed start that comes too close to a pole
         return "unknown"
     change, anew = f"{factor:.2g} times a change of the start", "rounding the start anew moves the axis by"
-    if factor * LEAST > FAR:  # the factor is only a lower bound: the smallest change of the start moves the axis so far
+    if factor * LEAST > FAR:  # the smallest change already moves the axis by `FAR`, so the factor is a lower bound
         known = "nothing is known of the axis but from these very doubles"
         return f"at least {change}; {anew} {factor * EPSILON:.2g} rad or more: {known}"
     return f"{change}; {anew} {factor * EPSILON:.1g} rad" if factor > ILL else change
@@ -253,9 +251,9 @@ def _integration(scene: Scene, times: Array, precision: str) -> xr.Dataset:
 
 
 def judged_integration(scene: Scene, times: Array, precision: str, run: Integration) -> xr.Dataset:
-    """Values, low halves and bounds at the times of a run, increasing and distinct, as `reference` has them."""
+    """The dataset of `reference` from an integration: values, low parts and bounds at increasing, distinct times."""
     values, checks = integration_values(scene, run)
-    grain = 8.0 * max(heyoka.arithmetic(precision).epsilon, 2.0 * EPSILON**2)  # what a pair of doubles can hold
+    grain = 8.0 * max(heyoka.arithmetic(precision).epsilon, 2.0 * EPSILON**2)  # the latter: rounding of a double pair
     columns: dict[str, Array] = {}
     for name, value in values.items():
         columns[name] = value.astype(np.float64)
@@ -269,14 +267,14 @@ def _bounds(times: Array, shown: dict[str, Any], checks: Checks, grain: float) -
     sine = np.maximum(np.sin(shown["theta"]), TINY)
     axis = envelope(checks, "axis", times) + grain
     attitude = envelope(checks, "attitude", times) + grain
-    # an error of the axis turns phi by 1/sin(theta) of it, and psi by the rest of the attitude's error
+    # an error of the axis changes phi by 1/sin(theta) times it, and psi by that and the attitude's error
     turn = np.maximum(envelope(checks, "phi", times), axis / sine) + grain * np.abs(shown["phi"])
     spin = np.maximum(envelope(checks, "psi", times), attitude + axis / sine) + grain * np.abs(shown["psi"])
     return {"axis": axis, "attitude": attitude, "theta": axis, "phi": turn, "psi": spin}
 
 
 def _raise_to_distance(bounds: dict[str, Array], shown: dict[str, Any], closed: dict[str, Any]) -> None:
-    """Where an integration visibly differs from the closed form in double, that distance is its error at that time."""
+    """Raise bounds where an integration visibly differs from the closed form in double, to that distance."""
     distances = {name: np.abs(shown[name] - closed[name]) for name in ("theta", "phi", "psi")}
     distances["axis"] = charts.axis_distance(shown["axis"], closed["axis"])
     distances["attitude"] = charts.attitude_distance(shown["quaternion"], closed["quaternion"])
@@ -310,7 +308,10 @@ def closed_bounds(scene: Scene, times: Array, values: dict[str, Any]) -> dict[st
 
 
 def disagreement(form: ClosedForm, times: Array, values: dict[str, Any]) -> Array:
-    """How far the views are apart at each time, rad, or the integrals from the start's, relative to their terms."""
+    """The largest inconsistency of the closed form at each time (n,): between attitudes, rad, or of an integral.
+
+    Angles, axis and quaternion are compared; energy and p_phi with those of the start, relative to their terms.
+    """
     axis, (x, y, z) = charts.axis_from_quaternion(values["quaternion"]), values["axis"].T
     apart = np.sqrt(((axis - values["axis"]) ** 2).sum(axis=1))
     named = charts.quaternion_from_angles(values["theta"], values["phi"], values["psi"])
@@ -327,23 +328,23 @@ def disagreement(form: ClosedForm, times: Array, values: dict[str, Any]) -> Arra
 
 
 class Certificate(NamedTuple):
-    """What the closed form of a scene has been held against."""
+    """The result of comparing the closed form of a scene with independent checks."""
 
     reach: float  # time of the last comparison with 40 digits
-    times: int  # how many there were
-    share: float  # largest error there, as a share of its bound
+    times: int  # the number of these comparisons
+    share: float  # largest ratio of an error to its bound in them
     overlap: float  # time of the two comparisons below; nan without them
-    map_apart: float  # rad, how far the map and the closed form are apart beyond its own error; nan without one
-    apart: float  # rad, the same of the integration
+    map_apart: float  # rad: distance of closed form and discrete map beyond the map's own error; nan without a map
+    apart: float  # rad: the same for the integration
 
     @property
     def doubt(self) -> float:
-        """Rad by which the formulas may be wrong: a distance from an independent check that exceeds rounding."""
+        """The possible error of the formulas, rad: a distance from an independent check that exceeds rounding."""
         return max((gap for gap in (self.map_apart, self.apart) if gap > SUSPICIOUS), default=0.0)
 
     @property
     def factor(self) -> float:
-        """What the bounds are raised by: 1 if they hold."""
+        """The factor by which the bounds are raised: 1 if they hold."""
         return SAFETY * self.share if self.share > 1.0 else 1.0
 
     def __str__(self) -> str:
@@ -357,7 +358,7 @@ class Certificate(NamedTuple):
 
 
 def certificate(scene: Scene, kind: str | None = None) -> Certificate | None:
-    """The certificate of a scene, made if there is none of this kind; without a kind the best on disk, or None.
+    """The certificate of a scene of this kind, made if it is not stored; without a kind the best on disk, or None.
 
     Without heyoka there is no integration, and the certificate is one of the discrete map.
     """
@@ -399,7 +400,7 @@ def _times(scene: Scene, nutations: float) -> Array:
 
 
 def _against_map(scene: Scene) -> tuple[float, float]:
-    """The time of the last comparison with the map, and how far it and the closed form are apart beyond its error."""
+    """The last time compared with the discrete map, and the distance from the closed form beyond the map's error."""
     times = _times(scene, OVERLAP)
     attitudes, own = iterate_map_with_error(scene, times)
     gap = charts.attitude_distance(closed_form(scene).quaternion(times), attitudes)
@@ -407,7 +408,7 @@ def _against_map(scene: Scene) -> tuple[float, float]:
 
 
 def _against_integration(scene: Scene) -> tuple[float, float]:
-    """The time of the integration, and how far it and the closed form are apart beyond its own error."""
+    """The last time compared with the integration, and the distance from the closed form beyond its rounding error."""
     times = _times(scene, OVERLAP)
     states, _ = integrate(scene, times, "longdouble")
     gap = charts.attitude_distance(closed_form(scene).quaternion(times), states[:, :4].astype(float))
@@ -424,7 +425,7 @@ def _sources(maker: Callable[..., Any]) -> str:
 
 
 def place(maker: Callable[..., Any], *key: object, data: bytes = b"") -> Path:
-    """The file of a result, of the function that makes it and of what it is made from."""
+    """The cache file of a result, named by a hash of the code of `maker` and of its arguments."""
     name = hashlib.sha256(repr([_sources(maker), *key]).encode() + data).hexdigest()[:32]
     return cache_root() / "reference" / f"{name}.nc"
 
@@ -432,10 +433,10 @@ def place(maker: Callable[..., Any], *key: object, data: bytes = b"") -> Path:
 def cached(path: Path, compute: Callable[[], xr.Dataset], depth: int | None) -> xr.Dataset:
     """The dataset in a file, or the one that `compute` returns, which is then written to it.
 
-    Warnings point `depth` calls up, 1 being this function; with None there are none, because nobody asked for a file.
-    Files that nobody used for 30 days are removed, and those used longest ago beyond `MOST_BYTES` of the folder.
+    Warnings point `depth` calls up, 1 being this function; with None there are no warnings. Files unused for 30 days
+    are removed, and beyond `MOST_BYTES` of the folder those used longest ago.
     """
-    if os.access(path, os.R_OK):  # false, too, in a folder that is another user's
+    if os.access(path, os.R_OK):  # also false in a folder of another user
         try:
             data = netcdf.read(path)
             if data.attrs.pop("content", "") == netcdf.content_hash(data):
