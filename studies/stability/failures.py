@@ -120,7 +120,8 @@ def separatrix_horizon(method: Integrator, scene: Scene, setting: float) -> Hori
         plan = Plan.until(np.linspace(0.0, LONGEST, 1601) / rate, setting)
     times = plan.times
     outcome, seen = _run(method, scene, scene.start, plan)
-    error = charts.axis_distance(seen.axis, closed_form(scene).axis(times))
+    with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
+        error = charts.axis_distance(seen.axis, closed_form(scene).axis(times))
     early = float(error[np.searchsorted(times, SEEN / rate * (1.0 - 1e-12))])
     past = np.flatnonzero(error > LOST)
     reached = float(times[past[0]]) if past.size else math.nan
