@@ -357,7 +357,7 @@ def test_energy_and_momenta_may_both_be_asked_to_be_kept():
 
 
 def test_a_step_that_takes_too_long_stays_named_when_another_does_later(monkeypatch):
-    question = advise._Question(symtop.scene("spheroid"), 1e-3, "axis", 2.0, (), 0.002, pace=1e-6)
+    question = advise._Question(symtop.scene("spheroid"), 1e-3, "axis", 2.0, (), 0.002, time_a_step=1e-6)
     mets = [settings.Met(symtop.integrator(name), 0.002, 1e-4, 0.0, 2.0, 1e3) for name in ("rk4", "strang", "cayley")]
     trials, fails = [advise._Trial(one, 1e-4, math.nan, "checked", 2.0) for one in mets], {}
     for seconds in ([1e-2, 1e-4, 1e-4], [1e-2, 1e-4]):  # 1e-5, and 1e-7 s a step
