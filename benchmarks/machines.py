@@ -126,7 +126,8 @@ def main() -> int:
     sentence = (
         f"{pair.same} of {pair.cells} choices of the front page's first table are the same on {names[0]} and on "
         f"{names[1]}: {pair.clear_same} of {pair.clear} where either shows a lead beyond the error of measurement. "
-        f"Where they differ, the other's choice costs at most {_times(pair.most)} times the best."
+        f"Where they differ, the choice of one takes on the other at most {_times(pair.most)} times as long as "
+        "the best."
     )
     print(f"{table.text}\n{sentence}")
     page = pages.findings(

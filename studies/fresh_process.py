@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import Any
 
 START = (
-    "from symtop.runner import scripts; scripts.install(); from symtop_studies import fresh_process as it; it.answer()"
+    "from symtop.runner import scripts; scripts.install(); from symtop_studies import fresh_process as f; f.run_call()"
 )
 
 
@@ -19,7 +19,7 @@ def call(function: Callable[..., Any], *arguments: Any) -> Any:
     return json.loads(done.stdout.splitlines()[-1])
 
 
-def answer() -> None:
+def run_call() -> None:
     """The new process: reads the pickled function and arguments on standard input, prints the result as last line."""
     function, arguments = pickle.load(sys.stdin.buffer)  # noqa: S301  (of the process that started this one)
     print(json.dumps(function(*arguments)))  # noqa: T201

@@ -118,7 +118,7 @@ class _Question(NamedTuple):
     max_step: float = math.inf
     general: bool = False
     keeps: Collection[str] = ()
-    pace: float = math.inf  # most seconds of a step
+    time_a_step: float = math.inf  # most seconds of a step
 
     @property
     def goal(self) -> str:
@@ -138,7 +138,7 @@ class _Question(NamedTuple):
         """Does a method meet the user's conditions, apart from its error?"""
         claims = [claim for kept in self.keeps for claim in KEPT[kept]]
         conserving = all(declared(method, claim) in ("kept", "bounded") for claim in claims)
-        fixed = self.step is None and self.max_step == self.pace == math.inf
+        fixed = self.step is None and self.max_step == self.time_a_step == math.inf
         suits = not self.general or BODY in integrator(method.method).solvers  # in any chart
         return conserving and (fixed or method.fixed_step) and suits
 
@@ -209,9 +209,9 @@ def recommend(
     longest = math.inf if max_step is None else positive("max_step", max_step)
     if step is not None and step > longest:
         raise SymtopError(f"step_size must be at most max_step {longest:g}, not {step:g}", "step_size", "max_step")
-    pace = math.inf if time_a_step is None else positive("time_a_step", time_a_step)
+    time_a_step = math.inf if time_a_step is None else positive("time_a_step", time_a_step)
     constants = tuple(one_of("keeps", one, [*KEPT][: 1 if scene.of_body else None]) for one in _words(keeps))
-    limits = step, longest, boolean("general", general), constants, pace
+    limits = step, longest, boolean("general", general), constants, time_a_step
     question = _Question(scene, accuracy, quantity, horizon, allowed, *limits)
     if accuracy < limit:
         source = f"no run was made, as that is below {limit:.2g}, the least error that the reference can judge"
@@ -289,7 +289,7 @@ class _Search:
 
     def _try(self, names: Collection[str]) -> None:
         """Try methods, high orders first: these are the cheapest at most accuracies, and limit the other searches."""
-        files.expected[0] = math.ceil(KERNELS * len(names))
+        files.kernels_to_compile[0] = math.ceil(KERNELS * len(names))
         for number, method in enumerate(sorted(map(integrator, names), key=lambda method: -(method.order or 0)), 1):
             post(f"trying method {number} of {len(names)}")
             rivals = [one.run.evaluations for one in self.trials if one.run.integrator.needs not in THIS_TOP]
@@ -348,7 +348,7 @@ def _menu(question: _Question) -> list[str]:
     table does not apply.
     """
     scene, accuracy, quantity, horizon = question[:4]
-    if question.step is not None or question.max_step < math.inf or question.pace < math.inf:
+    if question.step is not None or question.max_step < math.inf or question.time_a_step < math.inf:
         return []
     if question.keeps and scene.of_body:
         return []
@@ -406,10 +406,10 @@ def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]
     times = settings.seconds(question.scene, runs, question.quantity, question.horizon, rounds)
     pairs = zip(trials, times, strict=True)
     timed = sorted((one._replace(seconds=time) for one, time in pairs), key=lambda one: one.seconds)
-    slow = [one.run.integrator.name for one in timed if one.a_step > question.pace]
+    slow = [one.run.integrator.name for one in timed if one.a_step > question.time_a_step]
     if slow:
-        fails.setdefault(f"A step takes over {question.pace:g} s", []).extend(slow)
-    return [one for one in timed if one.a_step <= question.pace]
+        fails.setdefault(f"A step takes over {question.time_a_step:g} s", []).extend(slow)
+    return [one for one in timed if one.a_step <= question.time_a_step]
 
 
 def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":

@@ -209,7 +209,8 @@ def test_the_table_names_methods_for_every_class_and_none_where_a_user_limits_st
     assert {symtop.integrator(name).needs for name in both[:2]} == {"derivative", "kicks"}
     assert len(both) == 6  # all that are tried before all methods are: none is left out then
     assert all(symtop.integrator(name).general for name in advise._menu(ask((), general=True)))
-    assert not any(advise._menu(ask((), **limit)) for limit in ({"step": 0.01}, {"max_step": 0.1}, {"pace": 1e-3}))
+    limits = {"step": 0.01, "max_step": 0.1, "time_a_step": 1e-3}
+    assert not any(advise._menu(ask((), **{name: value})) for name, value in limits.items())
     run = settings.Met(symtop.integrator("rk4"), 0.1, 1e-9, 0.0, scene.horizon, 1.0)  # no longer step makes it cheaper
     trial = advise._Trial(run, run.error, 1.0, "checked", scene.horizon)
     assert trial.cost(ask((), max_step=0.1)) == 1.0 > trial.cost(ask(()))
@@ -357,7 +358,7 @@ def test_energy_and_momenta_may_both_be_asked_to_be_kept():
 
 
 def test_a_step_that_takes_too_long_stays_named_when_another_does_later(monkeypatch):
-    question = advise._Question(symtop.scene("spheroid"), 1e-3, "axis", 2.0, (), 0.002, pace=1e-6)
+    question = advise._Question(symtop.scene("spheroid"), 1e-3, "axis", 2.0, (), 0.002, time_a_step=1e-6)
     mets = [settings.Met(symtop.integrator(name), 0.002, 1e-4, 0.0, 2.0, 1e3) for name in ("rk4", "strang", "cayley")]
     trials, fails = [advise._Trial(one, 1e-4, math.nan, "checked", 2.0) for one in mets], {}
     for seconds in ([1e-2, 1e-4, 1e-4], [1e-2, 1e-4]):  # 1e-5, and 1e-7 s a step

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.measure.conservation import tops
+from symtop.measure.conservation import maxima
 from symtop.model.scenes import scene
 from symtop.report.figures import SMALLEST, error_band, rows
 from symtop.report.formats import number
@@ -80,7 +80,7 @@ def _history(cell: xr.Dataset) -> tuple[Any, Any]:
     if not good.any():
         return np.empty(0), np.empty(0)
     decades = np.log10(time[good][-1] / max(time[good][0], 1.0))
-    x, y = map(np.array, tops(time[good], np.maximum(change[good], SMALLEST), decades, WINDOWS))
+    x, y = map(np.array, maxima(time[good], np.maximum(change[good], SMALLEST), decades, WINDOWS))
     return x, np.where(y > SMALLEST, y, np.nan)
 
 

@@ -84,7 +84,7 @@ def factors(errors: Array, draws: int = DRAWS) -> Array:
 
 
 @functools.cache
-def drawn(n: int) -> NDArray[np.int64]:
+def bootstrap_counts(n: int) -> NDArray[np.int64]:
     """How often each of n tops is drawn, and, in the last place, the unknown one, (`DRAWS`, n + 1)."""
     return np.random.default_rng(2).multinomial(n + 1, np.full(n + 1, 1.0 / (n + 1)), size=DRAWS)
 
@@ -127,7 +127,7 @@ def hindsight(names: Sequence[str], costs: Array, errors: Array, marked: Sequenc
     ratio = slowdowns(costs[:, solved])
     won, level = wins(ratio)
     near = np.flatnonzero((ratio < CLOSE).any(axis=1))
-    weights, total = drawn(int(solved.sum())), solved.sum() + 1
+    weights, total = bootstrap_counts(int(solved.sum())), solved.sum() + 1
     lucky = np.random.default_rng(3).integers(len(names), size=DRAWS)
     shares = np.zeros((DRAWS, len(names)))
     for draw, factor in enumerate(factors(errors)):
@@ -179,7 +179,7 @@ def safe(ladders: Sequence[Ladder], marked: Sequence[str] = ()) -> tuple[list[Sa
         fine = np.log(np.where(one.met_at > 0.0, one.met_at, np.inf)) * (1.0 if one.fixed else -1.0)
         fine = np.where(np.isfinite(one.met_at) & (one.met_at > 0.0), fine, np.inf)
         by_setting, n = np.argsort(fine), fine.size
-        many = drawn(n)[:, np.append(by_setting, n)].cumsum(axis=1) >= _rank(n + 1)
+        many = bootstrap_counts(n)[:, np.append(by_setting, n)].cumsum(axis=1) >= _rank(n + 1)
         fine = np.append(fine[by_setting], np.inf)
         chosen = np.append(fine[max(_rank(n), 1) - 1], fine[many.argmax(axis=1)])
         there = np.isfinite(one.seconds) & np.isfinite(one.settings)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.measure.conservation import CONSTANTS, tops
+from symtop.measure.conservation import CONSTANTS, maxima
 from symtop.report.figures import SMALLEST, chosen
 from symtop.report.formats import number
 from symtop.report.style import BLACK, GREY, LEAST_TEXT, few_ticks, legend_below, line, look, panels, slope_guide
@@ -31,7 +31,7 @@ def pictures(data: xr.DataTree) -> list[Picture]:
 
 def envelope(t: np.ndarray, r: np.ndarray) -> tuple[list[float], list[float]]:
     """The largest value in each of 18 logarithmic windows of time, which start a little before the first sample."""
-    return tops(t, r, math.log10(t[-1] / (0.999 * t[0])), 18)
+    return maxima(t, r, math.log10(t[-1] / (0.999 * t[0])), 18)
 
 
 def _residuals(histories: xr.Dataset) -> Picture:

@@ -46,7 +46,7 @@ def compare(
     with ticking("loading"):
         from symtop.core import netcdf
         from symtop.judging import comparison
-        from symtop.judging.findings import pace
+        from symtop.judging.findings import as_time
         from symtop.measure.sweep import failed_setting, period_word, titled
         from symtop.measure.timing import NOISY
 
@@ -82,7 +82,7 @@ def compare(
         if any(words):
             say(f"{cell['variant'].item()}: {'; '.join(filter(None, words))}")
     if timed:
-        motion = f"The exact motion takes {pace(exact)}. " if math.isfinite(exact) else ""
+        motion = f"The exact motion takes {as_time(exact)}. " if math.isfinite(exact) else ""
         say(f"{motion}A time is that of one call of the solver, with nothing around it.")
         if float((data["seconds_spread"] > NOISY).sum() / data["seconds_spread"].notnull().sum()) > 0.5:
             warn("the machine is busy: times are the least of some, and most others took a quarter longer")
@@ -100,10 +100,10 @@ def _record(cell: "xr.Dataset", target: float, place: int) -> dict[str, Any]:
 def _cell(record: dict[str, Any], timed: bool) -> str:
     if not record["reached"]:
         return f"not: {record['reason']}"
-    from symtop.judging.findings import pace
+    from symtop.judging.findings import as_time
 
     steps, tolerance = record["steps_per_nutation"], record["tolerance"]
     fixed, formula = not math.isnan(record["step_size"]), math.isnan(tolerance)
     many = f"{steps:.3g}" if steps < 999.5 else f"{steps:.0f}"
     setting = f"{many} steps" if fixed else "-" if formula else f"tol {tolerance:.0e}"
-    return f"{setting:>10} {pace(record['seconds']) if timed else format(record['force_evaluations'], '.1e'):>7}"
+    return f"{setting:>10} {as_time(record['seconds']) if timed else format(record['force_evaluations'], '.1e'):>7}"

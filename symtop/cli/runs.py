@@ -283,7 +283,7 @@ def ensemble(
         own.update({name: largest(values) for name, values in wrong.items()})
         return _columns(sample, own, words)
 
-    files.expected[0] = KERNELS
+    files.kernels_to_compile[0] = KERNELS
     post(f"running {so_many(members, noun)}")
     try:
         data = runs.ensemble(sample, integrator, variables=variables, path=output, added=added, **settings)

@@ -11,10 +11,9 @@ number is stale. Cases of studies, cached kernels and references, checkpoints an
 that it names (attributes of modules included) and to what it imports when it runs; from a class to its methods and
 bases; from an instance to its class and attributes. Comments, line numbers and docstrings (but those of functions
 inside functions) do not count. By name alone count functions that look something up (`by_name`), the files of
-`PLUMBING`, which store and pass on numbers but compute none, and libraries, with their version (`packages`). Lists,
-dicts and sets under a module's lower-case names are state of a process and do not count (in a user's file its
-statements outside of functions count instead); nor do fields of a dataclass with the metadata ``words``. A file of a
-known package whose path is a constant counts as a whole.
+`PLUMBING`, which pass on numbers but compute none, and libraries, with their version (`packages`). Lists, dicts, sets
+under a module's lower-case names are state of a process and do not count (in a user's file its statements outside of
+functions count instead); nor do dataclass fields with the metadata ``words``. A file whose path is a constant counts.
 """
 
 import ast

@@ -24,7 +24,7 @@ DAY = 86_400.0  # seconds
 UNUSED = 30  # days
 
 A_KERNEL, CLOSED_FORM = 3.0, 7  # seconds to compile a kernel on one core; the closed form takes this many times as long
-expected = [1]  # how many kernels the running command may have to compile
+kernels_to_compile = [1]  # how many kernels the running command may have to compile
 
 
 def is_terminal(stream: TextIO | None) -> bool:
@@ -34,8 +34,8 @@ def is_terminal(stream: TextIO | None) -> bool:
 
 def compiling() -> str:
     """The message before a compilation: how many kernels there are to compile, and how long that may take."""
-    count = f"up to {expected[0]} kernels" if expected[0] > 1 else "a kernel"
-    return f"compiling {count}, about {A_KERNEL * expected[0]:.0f} s on one core, once"
+    count = f"up to {kernels_to_compile[0]} kernels" if kernels_to_compile[0] > 1 else "a kernel"
+    return f"compiling {count}, about {A_KERNEL * kernels_to_compile[0]:.0f} s on one core, once"
 
 
 def _tell() -> None:

@@ -173,7 +173,7 @@ SAYS = {  # phrases for measured values: {0} is the number, {1} the text
 }  # fmt: skip
 
 
-def pace(seconds: float) -> str:
+def as_time(seconds: float) -> str:
     """A short time as text with a suitable unit: 5.4 us, 4.8 ms."""
     size, unit = next(one for one in UNITS if not float(f"{seconds:.3g}") < one[0])
     return f"{seconds / (size or 1e-9):.3g} {unit}"
@@ -181,7 +181,7 @@ def pace(seconds: float) -> str:
 
 def heading(about: About, scene: str) -> str:
     """The first line of a report: name, chart, scene, time of a step and seed."""
-    cost = f", {pace(about.seconds_a_step)} a step" if about.seconds_a_step else ""
+    cost = f", {as_time(about.seconds_a_step)} a step" if about.seconds_a_step else ""
     chart = f" in the {about.chart} chart" if about.chart else ""
     seed = f", seed {about.seed}" if about.seed else ""
     return f"{about.name}{chart} on {scene}{cost}{seed}\n"

@@ -41,7 +41,7 @@ from symtop.judging.claims.subject import Subject, open_target, seconds_a_step
 from symtop.judging.findings import About, Finding, Ledger, Measured, error_units, undecided
 from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
 from symtop.measure.conservation import CONSTANTS, constant_of
-from symtop.measure.errors import checked, completed, doubles, errors, refuse_other_order, refuse_other_scene, sampled
+from symtop.measure.errors import checked, completed, doubles, errors, refuse_other_order, refuse_other_scene, unpadded
 from symtop.methods.framework.registry import ENERGY_ERRORS, Integrator
 from symtop.model.body import rotated
 from symtop.model.charts import CHARTS, axis_distance, axis_from_quaternion, body_energy, space_energy
@@ -207,7 +207,7 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
         target = netcdf.read(target)
     if isinstance(target, xr.Dataset):
         refuse_other_scene(target, scene)
-        target = sampled(target)
+        target = unpadded(target)
     columns = read(target)
     rates, states = columns.pop("omega_body", None), completed(checked(columns))
     if rates is not None:

@@ -27,7 +27,7 @@ import numpy as np
 from symtop.core.errors import SymtopError, last_words, words_of
 from symtop.judging.adapters.adapter import Marks, Stepper, heartbeat
 from symtop.judging.adapters.python_step import MATRIX, REDUCED, ROTATION
-from symtop.judging.findings import pace
+from symtop.judging.findings import as_time
 from symtop.methods.framework import equations
 from symtop.methods.framework.calling import OWN, solve
 from symtop.methods.framework.plan import Array, Plan, Run
@@ -119,7 +119,7 @@ class Process(contextlib.AbstractContextManager["Process"]):
                 raise SymtopError(f"a step of h = {heartbeat.step:.3g} had not returned after {now - since:.0f} s")
             if now - self.began > self.limit:
                 self.late = self.limit / max(heartbeat.calls - self.calls, 1)
-                raise SymtopError(f"it was not judged within {self.limit:.0f} s, at {pace(self.late)} a call")
+                raise SymtopError(f"it was not judged within {self.limit:.0f} s, at {as_time(self.late)} a call")
         try:
             return json.loads(self.pipe.recv_bytes())
         except (EOFError, OSError, ValueError):

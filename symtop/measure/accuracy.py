@@ -25,7 +25,7 @@ from symtop.run.simulation import integrate
 SAMPLES = 1001
 DENSE = 5.0  # samples per nutation above which the phase of the samples does not matter
 GOLDEN_CLOSE = 0.01  # nutations: largest distance of an accepted stride from the golden section
-ENOUGH = {"compiled": 1e9, "python": 2e4}  # after a run with more force evaluations no finer setting is run
+NO_FINER_AFTER = {"compiled": 1e9, "python": 2e4}  # after a run with more force evaluations no finer setting is run
 COUNTS = ("step_size", "tolerance", "steps", "force_evaluations", "newton_iterations", "outcome", "reached_time")
 
 
@@ -52,7 +52,7 @@ def error_table(
     enough = False
     for setting in settings:
         rows.append(blank_row(method) if enough else error_row(scene, method, setting, horizon, observe))
-        enough = enough or float(rows[-1]["force_evaluations"]) > ENOUGH[method.implementation]
+        enough = enough or float(rows[-1]["force_evaluations"]) > NO_FINER_AFTER[method.implementation]
     return as_table(rows)
 
 

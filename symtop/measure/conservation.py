@@ -86,10 +86,10 @@ def residuals(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
 
 def growth(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> Fit:
     """The exponent of |residual| ~ t^exponent, from the largest values in logarithmic windows of the last `decades`."""
-    return power_law(*tops(time, residual, decades))  # within the first nutations an oscillation only switches on
+    return power_law(*maxima(time, residual, decades))  # within the first nutations an oscillation only switches on
 
 
-def tops(
+def maxima(
     time: ArrayLike, residual: ArrayLike, decades: float = 2.0, count: int = 12
 ) -> tuple[list[float], list[float]]:
     """Middles of `count` logarithmic windows over the last `decades` of time, and the largest |residual| in each."""

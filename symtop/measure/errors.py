@@ -124,7 +124,7 @@ def errors(
 def _of_run(run: Any, scene: Any, precision: str, warn: Callable[[str], object]) -> xr.Dataset:
     """The errors of one run or trajectory; calls `warn` with each warning."""
     foreign = scene is not None and "integrator" not in getattr(run, "attrs", {})
-    run = sampled(run) if isinstance(run, xr.Dataset) else run
+    run = unpadded(run) if isinstance(run, xr.Dataset) else run
     chosen = scene_of(run) if scene is None else find_scene(scene, bodies=True)
     refuse_other_scene(run, chosen)
     data = checked(run) if foreign else Trajectory.of_data(run)
@@ -137,12 +137,12 @@ def _of_run(run: Any, scene: Any, precision: str, warn: Callable[[str], object])
         data = data._replace(psi=None)
     columns = errors_against(chosen, data, truth)
     sure = scene is None or _stored(run, "start") is not None
-    doubtful = [] if sure else elsewhere(data.time, columns)
+    doubtful = [] if sure else start_warnings(data.time, columns)
     if doubtful and data.axis is not None:
         x, up, z = data.axis[0]
         if np.min(charts.axis_distance(np.array([[x, -z, up], [x, z, up]]), truth["axis"].values[0])) < NEAR:
             doubtful[0] += " It is the true one if y is read as up, where here z is up."
-    for sentence in [*doubtful, *(doubts(data.time, columns, chosen.horizon) if foreign else ())]:
+    for sentence in [*doubtful, *(trajectory_warnings(data.time, columns, chosen.horizon) if foreign else ())]:
         warn(f"on {chosen.name}: {sentence}")
     bounds = {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns}
     for name in UNIT_VECTORS if foreign else ():
@@ -231,7 +231,7 @@ UNIT_VECTORS = ("axis", "quaternion")
 FAR, NEAR = 0.1, 0.01  # rad from the true attitude: farther is a wrong convention of a quaternion, nearer the right one
 BEYOND = 100.0  # horizons: a longer run probably has another unit of time (milliseconds for seconds: a factor 1000)
 SHAPES = {"axis": (3,), "quaternion": (4,), "momentum": (3,), **dict.fromkeys(("theta", "phi", "psi", *CONSTANTS), ())}
-ENOUGH = ("axis", "quaternion", "theta")  # a trajectory needs one of them
+SUFFICIENT_COLUMNS = ("axis", "quaternion", "theta")  # a trajectory needs one of them
 
 
 def scene_of(run: xr.Dataset | Mapping[str, Any]) -> Scene:
@@ -264,7 +264,7 @@ def _stored(run: xr.Dataset | Mapping[str, Any], name: str) -> Any:
     return None
 
 
-def sampled(run: xr.Dataset) -> xr.Dataset:
+def unpadded(run: xr.Dataset) -> xr.Dataset:
     """A run without samples whose time is NaN, which pad the shorter members of an ensemble."""
     # in other data a time of NaN is an error, raised in `checked`
     if "integrator" not in run.attrs or "time" not in run or run["time"].dims != ("time",):
@@ -290,7 +290,7 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
         raise SymtopError(f"time must be finite, at least 0 and increase, but sample {k} is at {time[k]:g}{after}")
     columns: dict[str, Any] = {name: doubles(name, column(data, name)) for name in SHAPES if name in data}
     check_shapes(columns, time.size)
-    places = [columns[name].reshape(time.size, -1) for name in ENOUGH if name in columns]
+    places = [columns[name].reshape(time.size, -1) for name in SUFFICIENT_COLUMNS if name in columns]
     if all(np.isnan(place).any(axis=1).all() for place in places):
         words = "numbers, but every sample of where the top is has a NaN" if places else (
             "one of axis, quaternion, theta beside time, to show where the top is")  # fmt: skip
@@ -362,7 +362,7 @@ def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:
             raise SymtopError(f"{must}, but its {place} is the true one if it is read as {other}")
 
 
-def elsewhere(time: charts.Array, errors: Mapping[str, charts.Array]) -> list[str]:
+def start_warnings(time: charts.Array, errors: Mapping[str, charts.Array]) -> list[str]:
     """A warning if the first sample of a trajectory is far from the true motion, as a list of at most one sentence."""
     for name in ("attitude", "axis", "theta"):
         if name in errors and errors[name][0] > FAR:
@@ -371,7 +371,7 @@ def elsewhere(time: charts.Array, errors: Mapping[str, charts.Array]) -> list[st
     return []
 
 
-def doubts(time: charts.Array, errors: Mapping[str, charts.Array], horizon: float) -> list[str]:
+def trajectory_warnings(time: charts.Array, errors: Mapping[str, charts.Array], horizon: float) -> list[str]:
     """Warnings about a foreign trajectory: times far beyond the scene's horizon, samples that are NaN."""
     sentences = []
     if time[-1] > BEYOND * horizon:

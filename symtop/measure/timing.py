@@ -24,7 +24,7 @@ from symtop.run.simulation import make_plan
 BATCH = 0.02  # seconds
 CLEAR = 1e-3  # seconds: from a trial at least that long the number of calls in a batch is estimated
 STRIDE = 16  # largest factor by which the number of calls grows from one trial to the next
-ENOUGH = 5  # samples needed before the three least are compared with each other
+LEAST_SAMPLES = 5  # samples needed before the three least are compared with each other
 NOISY = 0.25  # relative spread beyond which a timing is not called reliable
 
 
@@ -108,12 +108,12 @@ def timings(
 
 
 def agree(samples: Sequence[float], close: float) -> bool:
-    """Do the three least of at least `ENOUGH` samples differ by less than `close`, relative to the least?
+    """Do the three least of at least `LEAST_SAMPLES` samples differ by less than `close`, relative to the least?
 
     Fewer samples may agree on a wrong time: on a busy machine an interrupted batch takes one time slice longer.
     """
     least = sorted(samples)[:3]
-    return len(samples) >= ENOUGH and least[2] < (1.0 + close) * least[0]
+    return len(samples) >= LEAST_SAMPLES and least[2] < (1.0 + close) * least[0]
 
 
 def bare_run(

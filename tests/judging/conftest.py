@@ -15,7 +15,7 @@ def one_seed(monkeypatch):
 def shorten(monkeypatch):
     """A quick judging takes an eighth of the time: shorter runs, fewer starts that are drawn."""
     for module, name, numbers in (
-        (subject, "LONG", (10.0, 0.5)), (subject, "SLOPES", (6.0, 0.2)), (subject, "ENOUGH", 0.005),
+        (subject, "LONG", (10.0, 0.5)), (subject, "SLOPES", (6.0, 0.2)), (subject, "TIMED", 0.005),
         (calls, "LATE", calls.LATE | {True: (20_000, 0.15)}), (order, "DRAWS", (96, 4)), (structure, "DRAWS", (8, 1)),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, numbers)

@@ -20,7 +20,7 @@ from symtop.judging.claims import constants, constants as long, order, structure
 from symtop.judging.claims.constants import long_run
 from symtop.judging.claims.step_series import Series
 from symtop.judging.claims.subject import Subject, seconds_a_step
-from symtop.judging.findings import VERDICTS, About, Finding, Ledger, Measured, description, pace
+from symtop.judging.findings import VERDICTS, About, Finding, Ledger, Measured, as_time, description
 from symtop.judging.remote import Process, separated, solvers_of
 from symtop.measure.conservation import Changed, behaviour
 from symtop.measure.order import Fit
@@ -411,7 +411,7 @@ def test_no_right_method_is_refuted_beside_a_pole():
 
 
 def test_a_time_has_the_unit_that_suits_what_is_printed_and_a_least_order_is_said_to_be_one():
-    assert [pace(seconds) for seconds in (5.4321e-6, 999.4e-6, 999.7e-6, 0.0)] == ["5.43 us", "999 us", "1 ms", "0 ns"]
+    assert [*map(as_time, (5.4321e-6, 999.4e-6, 999.7e-6, 0.0))] == ["5.43 us", "999 us", "1 ms", "0 ns"]
     for text, words in (("2 or more", "order 2 or more"), ("2: the h^3 term is off", "order 2"), ("", "order 2.4")):
         assert description([Finding("order", "", Measured("", 2 if text else 2.4, text), "measured", "")]) == words
     walks = Finding("p_psi", "", Measured("random walk", 1e-11), "measured", "", math.inf)

@@ -32,7 +32,7 @@ from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import Stepper
 from symtop.judging.claims.subject import CONSTANTS, PLANE, STEPS_A_NUTATION, Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided, yes_no
-from symtop.measure.conservation import Changed, Difference, behaviour, constant_of, from_increments, residuals, tops
+from symtop.measure.conservation import Changed, Difference, behaviour, constant_of, from_increments, maxima, residuals
 from symtop.measure.step_map import one_step
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Array, Plan, Run, sentence
@@ -213,7 +213,7 @@ def long_run(
     shown = min(run.steps, round(run.reached / step)) if method.fixed_step else run.steps  # of those that were made
     costs = run.force_evaluations / count, run.newton_iterations / count, steady
     times = plan.times / unit
-    rows = tops(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS)  # fewer, where no sample is
+    rows = maxima(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS)  # fewer, where no sample is
     energy = np.array([np.pad(row, (0, WINDOWS - len(row)), constant_values=math.nan) for row in rows])
     return LongRun(by_name, run.outcome, message, chart, shown, nutations, *costs, reported, energy, blown_up)
 

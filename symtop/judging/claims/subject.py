@@ -45,7 +45,7 @@ SINGLE = 1000  # most steps of it in single precision, whose rounding hides smal
 LADDER = 2.5  # ratio of the steps of all runs for the order to those of the longest
 ENOUGH_STEPS, AT_REST = 50.0, 1e-9  # steps per nutation with a zero right-hand side; the largest relative move
 STEPS_A_NUTATION = 118.02  # of a long run, and of timed steps, because the cost of an implicit step depends on its size
-ENOUGH, LEAST = 0.03, 1e-9  # seconds of a run that suffice to time a step; the least time assumed of a step
+TIMED, LEAST = 0.03, 1e-9  # seconds of a run that suffice to time a step; the least time assumed of a step
 
 
 def rest(_: float, y: Any) -> Any:
@@ -160,7 +160,7 @@ def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
     while True:
         cost, finite = seconds(4 * steps)
         steps *= 4 if finite else 1
-        if not finite or cost - first > max(ENOUGH, first) or steps > 1e7:  # a start's time scatters by its own size
+        if not finite or cost - first > max(TIMED, first) or steps > 1e7:  # a start's time scatters by its own size
             # the median, because other processes disturb, and the count of waiting time may lag behind
             cost = sorted(seconds(steps)[0] for _ in range(3))[1]
             # at least half, because the run that timed the start may have been disturbed

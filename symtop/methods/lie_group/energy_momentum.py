@@ -29,7 +29,7 @@ from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_charts, iner
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
 MOST = 30  # limit on the iterations of a step; 3 or 4 are usual
-ENOUGH = 1e-9  # a correction of u whose square is below rounding, relative to 1 + |u|
+CONVERGED = 1e-9  # a correction of u whose square is below rounding, relative to 1 + |u|
 
 
 class Midpoint(NamedTuple):
@@ -75,7 +75,7 @@ def _again(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> An
     change = solve3(first, second, third, rest)
     u = plus(u, 1.0, change)
     size = abs(change[0]) + abs(change[1]) + abs(change[2])
-    return u, size <= ENOUGH * (1.0 + abs(u[0]) + abs(u[1]) + abs(u[2])), False
+    return u, size <= CONVERGED * (1.0 + abs(u[0]) + abs(u[1]) + abs(u[2])), False
 
 
 def _close(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:

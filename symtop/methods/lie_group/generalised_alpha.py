@@ -28,7 +28,7 @@ from symtop.methods.splitting.rotor import exact, near
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
 MOST = 50  # limit on the iterations of a step; 4 to 6 are usual
-ENOUGH = 1e-14  # a correction of W', relative to its parts, that is rounding
+CONVERGED = 1e-14  # a correction of W', relative to its parts, that is rounding
 
 
 class Alpha(NamedTuple):
@@ -74,7 +74,7 @@ def _corrected(par: Any, e: Any, w: Any, m: float, v: Any, gain: Any, by: float,
     )
     size = abs(change[0]) + abs(change[1]) + abs(change[2])
     scale = abs(par.mgl) / par.I1 + rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2]
-    ended = size <= ENOUGH * scale or (size >= last and size <= 1e-10 * scale)
+    ended = size <= CONVERGED * scale or (size >= last and size <= 1e-10 * scale)
     return plus(slope, 1.0, change), size, ended
 
 

@@ -43,7 +43,7 @@ from symtop.methods.splitting.coefficients import SUZUKI_4
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
 MOST = 60  # limit on the iterations of a step; 2 to 5 are usual
-ENOUGH = 1e-10  # a relative correction whose square is below rounding
+CONVERGED = 1e-10  # a relative correction whose square is below rounding
 MOSER_VESELOV, EULER_POINCARE = 0.0, 1.0
 
 
@@ -62,7 +62,7 @@ def _next_n(par: Any, A: float, square: float, x: Any) -> Any:
     gap = 1.0 + along + square * n * n / D - n
     slope = 1.0 - 2.0 * along / n - 2.0 * square * n * par.I1 * par.I1 / (D * D)
     n += gap / slope
-    return (n,), gap <= ENOUGH * slope * n, not slope > 0.0
+    return (n,), gap <= CONVERGED * slope * n, not slope > 0.0
 
 
 def _next_k(par: Any, A: float, square: float, x: Any) -> Any:
@@ -77,7 +77,7 @@ def _next_k(par: Any, A: float, square: float, x: Any) -> Any:
     low, high = (k, high) if gap > 0.0 else (low, k)
     after = k + gap / slope
     after = after if low <= after <= high else 0.5 * (low + high)
-    return (after, low, high), abs(after - k) <= ENOUGH * j, False
+    return (after, low, high), abs(after - k) <= CONVERGED * j, False
 
 
 # The equation for one number, in functions of what a holds along the axis and of the square of what lies across:
@@ -147,7 +147,8 @@ def turn_body(par: Any, rule: Any, g: Any, M: Any, carry: Any, h: float) -> Any:
         third = _image(par, kind, a, u, Ju, (0.0, 0.0, 1.0))
         change = solve3(first, second, third, rest)
         u = plus(u, 1.0, change)
-        ended, lost = dot(change, change) <= ENOUGH * ENOUGH * dot(u, u), not dot(first, cross(second, third)) > 0.0
+        ended = dot(change, change) <= CONVERGED * CONVERGED * dot(u, u)
+        lost = not dot(first, cross(second, third)) > 0.0
         work += 1
     m, v = cayley(scaled(-1.0, u))  # space turns the other way
     kick = plus(torque(par, *g), 1.0, torque(par, *plus(g, 1.0, moved(m, v, g))))

@@ -64,7 +64,7 @@ from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate, zero
 from symtop.model.charts import BODY
 
-ENOUGH = 1e-9  # a correction in units of |e| = 1, whose square is below rounding
+CONVERGED = 1e-9  # a correction in units of |e| = 1, whose square is below rounding
 NEAR = 0.1  # a correction after which the solution is followed to a longer step
 DIRECT = 12  # limit on the iterations for one length of the step; 2 to 7 where they converge soon
 RUNGS = 28  # lengths from a tenth of the step to the whole, each longer by the factor `LONGER`
@@ -172,7 +172,7 @@ def solve_stages(field: Any, par: Any, state: Any, work: Any, stages: int) -> An
         for m in range(len(state)):
             work[i, m] = 0.0
     while True:
-        enough = ENOUGH if rung == RUNGS else NEAR
+        enough = CONVERGED if rung == RUNGS else NEAR
         more, converged = _iterate(field, par, state, work, stages, LONGER ** (rung - RUNGS), first, mgl, enough)
         effort += more
         if converged and rung < RUNGS:
