@@ -12,6 +12,7 @@ import argparse
 import itertools
 import json
 import math
+import re
 import sys
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -103,13 +104,15 @@ def main() -> int:
     parser.add_argument("name", nargs="?")
     parser.add_argument("--results", type=Path, default=RESULTS)
     options = parser.parse_args()
+    if options.name is not None and not re.fullmatch(r"[\w-]+", options.name):
+        parser.error(f"NAME must be of letters, digits and hyphens, as it names a file, not {options.name!r}")
     if options.name is not None:
         try:
             data = netcdf.read_any(options.results / "cost.nc")
         except SymtopError as error:
             sys.exit(f"machines: {error}; run symtop study cost first")
-        about = measured.circumstances()
-        netcdf.write_json(KEPT / f"{options.name}.json", {"processor": about["processor"], "choices": choices(data)})
+        content = {"processor": str(data.attrs["processor"]), "choices": choices(data)}
+        netcdf.write_json(KEPT / f"{options.name}.json", content)
     kept = [json.loads(file.read_text(encoding="utf-8")) for file in sorted(KEPT.glob("*.json"))]
     pairs = [(one, other, compare(one["choices"], other["choices"]))
              for one, other in itertools.combinations(kept, 2)]  # fmt: skip
