@@ -34,7 +34,6 @@ from symtop_studies.cost.tops import NATURAL  # noqa: E402
 
 RESULTS = Path("results")
 KEPT = RESULTS / "machines"
-ROWS = [*((needs, False) for needs in cells.CLASSES[:-1]), (cells.CLASSES[0], True)]  # and those that keep constants
 UNKNOWN = "not kept"  # a cost on a machine of which the first choice alone is kept
 NEAR = 10.0  # times the best: safe choices that are kept
 
@@ -42,7 +41,7 @@ NEAR = 10.0  # times the best: safe choices that are kept
 def choices(data: xr.DataTree) -> list[dict[str, Any]]:
     """Of each cell the seconds of its safe choices, the fastest first, and whether its lead is called."""
     table = []
-    for (needs, keeping), target in itertools.product(ROWS, cells.targets(data)):
+    for (needs, keeping), target in itertools.product(cells.ROWS, cells.targets(data)):
         each, called = cells.safest(data, Cell("short", "axis", target, NATURAL, needs), keeping)
         seconds = {one.name: one.seconds for one in each if one.seconds <= NEAR * each[0].seconds < math.inf}
         if seconds:

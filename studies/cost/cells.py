@@ -35,6 +35,8 @@ HORIZONS = ("short", "long")
 POPULATIONS = {"strata": tuple(STRATA), NATURAL: (NATURAL,)}  # kinds of tops in each
 GENERAL = "any body"  # whatever a method needs, if it exists for a body without symmetry
 CLASSES = (*(name for name in NEEDS if name != "solution"), GENERAL)
+# of the front page's table: a class, and whether only methods count that keep energy and momenta
+ROWS = ((CLASSES[0], False), (CLASSES[0], True), *((needs, False) for needs in CLASSES[1:-1]))
 SECONDS, EVALUATIONS = "seconds", "evaluations"
 WITHIN = 2.5  # variants up to this many times the least cost of their class over ten nutations run over a thousand
 CLOSER = 1.25  # the same for attitude charts, which take part in contests of the attitude only

@@ -200,9 +200,8 @@ def use(data: xr.DataTree) -> pd.DataFrame:
     The second row is for a slower f, the third for the methods of the first row that keep energy and momenta.
     """
     rows = list[dict[str, str]]()
-    lines = [(NEEDS[needs], needs, False) for needs in CLASSES[:-1]]
-    for supplied, needs, keeping in [lines[0], (f"{lines[0][0]}, all constants kept", lines[0][1], True), *lines[1:]]:
-        line, kept = {"you can supply": supplied}, ""
+    for needs, keeping in cells.ROWS:
+        line, kept = {"you can supply": f"{NEEDS[needs]}{', all constants kept' * keeping}"}, ""
         for target in cells.targets(data):
             cell = Cell("short", "axis", target, NATURAL, needs)
             choices, called = cells.safest(data, cell, keeping)
