@@ -27,7 +27,7 @@ SHOWN = re.compile(
 )
 
 
-class Shown(NamedTuple):
+class Figure(NamedTuple):
     """A figure as the report shows it."""
 
     file: str
@@ -36,13 +36,13 @@ class Shown(NamedTuple):
     caption: str
 
 
-def sections(report: str) -> dict[str, tuple[str, list[Shown]]]:
+def sections(report: str) -> dict[str, tuple[str, list[Figure]]]:
     """Of each section of the report that has figures: its text, and its figures in order."""
-    with_figures: dict[str, tuple[str, list[Shown]]] = {}
+    with_figures: dict[str, tuple[str, list[Figure]]] = {}
     first, *others = re.split(r"^## ", report, flags=re.MULTILINE)
     for title, _, text in [(FRONT, "", first), *(part.partition("\n") for part in others)]:
         shown = SHOWN.finditer(text)
-        if figures := [Shown(one["file"], one["title"] or "", one["alt"], one["caption"]) for one in shown]:
+        if figures := [Figure(one["file"], one["title"] or "", one["alt"], one["caption"]) for one in shown]:
             with_figures[title.strip()] = (text, figures)
     return with_figures
 

@@ -69,7 +69,7 @@ def drifts_of(variant: Integrator) -> bool:
     return not variant.symplectic and "energy" not in (variant.conserves or ())
 
 
-class Shown(NamedTuple):
+class Samples(NamedTuple):
     """Samples of n runs, (n, samples, ...), and their force evaluations (n,)."""
 
     states: Array
@@ -122,7 +122,7 @@ class Asked(NamedTuple):
     budget: float  # force evaluations
 
 
-def run(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Shown, Array]]:
+def run(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Samples, Array]]:
     """The runs of all tops with each setting, and the times (n, samples) of their samples.
 
     Those of a fixed step go side by side, the settings too, in one call.
@@ -133,11 +133,11 @@ def run(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[
     for setting, ends, budget in wanted:
         times = places(ends).ravel() * tops.period[:, np.newaxis]
         done = in_turn(variant, tops.numbers, [Plan.until(one, setting, budget) for one in times])
-        made.append((Shown(done.states, done.momenta, done.work, done.outcome == 0), times))
+        made.append((Samples(done.states, done.momenta, done.work, done.outcome == 0), times))
     return made
 
 
-def together(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Shown, Array]]:
+def together(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Samples, Array]]:
     """The runs of a fixed step, in one call, which needs equally many samples of all; extra samples are dropped."""
     marks = []
     for setting, ends, _ in wanted:
@@ -155,7 +155,8 @@ def together(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[t
     made = []
     for k, (one, seen) in enumerate(zip(marks, shown, strict=True)):
         rows, columns = slice(k * n, (k + 1) * n), np.searchsorted(seen, one)
-        parts = Shown(done.states[rows, columns], done.momenta[rows, columns], done.work[rows], done.outcome[rows] == 0)
+        states, momenta = done.states[rows, columns], done.momenta[rows, columns]
+        parts = Samples(states, momenta, done.work[rows], done.outcome[rows] == 0)
         made.append((parts, one * h[k][:, np.newaxis]))
     return made
 
@@ -166,7 +167,7 @@ def filled(marks: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     return np.union1d(marks, free)
 
 
-def errors(chart: str, tops: Tops, shown: Shown, times: Array) -> dict[str, Array]:
+def errors(chart: str, tops: Tops, shown: Samples, times: Array) -> dict[str, Array]:
     """Each quantity at each sample, (n, samples); inf where a run has failed."""
     view = View(chart, chunks.together(tops.numbers), shown.states, shown.momenta[..., 0], shown.momenta[..., 1])
     with np.errstate(all="ignore"):

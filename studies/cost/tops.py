@@ -65,7 +65,7 @@ def sample_marks(steps: int, samples: int = SAMPLES) -> NDArray[np.int64]:
     return np.unique(np.maximum(np.rint(places * steps / samples).astype(np.int64), 1))
 
 
-class Shown(Protocol):
+class Samples(Protocol):
     """Samples of n runs, such as `symtop.methods.framework.lanes.Many`."""
 
     @property
@@ -170,7 +170,7 @@ class Tops:
                 self._members[k] = member
             yield member
 
-    def errors(self, chart: str, shown: Shown, chosen: NDArray[np.int64]) -> dict[str, Array]:
+    def errors(self, chart: str, shown: Samples, chosen: NDArray[np.int64]) -> dict[str, Array]:
         """Largest error of each quantity of the chosen members' runs, (chosen,); inf after a failure.
 
         `attitude` is left out where the chart does not show it.

@@ -28,10 +28,10 @@ from symtop.run.long_run import (
     QUANTITIES,
     Gauge,
     chart_of,
+    gauge_of,
     long_run,
     scattered,
     summary,
-    watch,
     windows as windows_until,
 )
 
@@ -57,7 +57,7 @@ def members(scene: Scene, count: int) -> list[Scene]:
 
 def gauges_of(scenes: Sequence[Scene], method: Integrator, per_nutation: float) -> list[Gauge]:
     """The gauge of each long run, fitted to its beginning; the same for compensated and for plain sums."""
-    return [watch(one, method, one.nutation_period / per_nutation) for one in scenes]
+    return [gauge_of(one, method, one.nutation_period / per_nutation) for one in scenes]
 
 
 def side_by_side(

@@ -20,7 +20,7 @@ import click
 
 from symtop.core import errors, files
 from symtop.core.errors import SymtopError, SymtopWarning, UnknownNameError, at_home, file_path, positive, words_of
-from symtop.core.progress import telling
+from symtop.core.progress import showing_work
 from symtop.core.signals import INTERRUPTED, UNREAD, told_apart
 
 if TYPE_CHECKING:
@@ -190,7 +190,7 @@ class Group(click.Group):
         """The command of a command line; from here on messages say that it is still working."""
         name, command, rest = super().resolve_command(ctx, args)
         if not ctx.resilient_parsing and name not in SILENT:
-            ctx.with_resource(telling(str(name)))
+            ctx.with_resource(showing_work(str(name)))
         return name, command, rest
 
     def list_commands(self, ctx: click.Context) -> list[str]:  # noqa: ARG002  (click calls it so)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from symtop.cli.common import File, as_text, check_outputs, completing, say, say_written, scene_options, table, warn
-from symtop.core.progress import ticking
+from symtop.core.progress import showing_seconds
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -43,7 +43,7 @@ def compare(
     symtop compare spheroid my.py:step rk4
     """
     check_outputs(output=output, figure=figure)
-    with ticking("loading"):
+    with showing_seconds("loading"):
         from symtop.core import netcdf
         from symtop.judging import comparison
         from symtop.judging.findings import as_time

@@ -9,7 +9,7 @@ import click
 from symtop.cli import common
 from symtop.cli.common import File, as_text, check_outputs, completing, json_option, plugin_option, say, say_written
 from symtop.core.errors import SymtopError
-from symtop.core.progress import ticking
+from symtop.core.progress import showing_seconds
 from symtop.judging import FORMS
 
 # methods in the figure of a judged step, length of their runs, most evaluations of one
@@ -117,7 +117,7 @@ def _draw_beside(
     """Draw a step's error against force evaluations with those of `BESIDE`, if `file` is given, and print a ranking."""
     if file is None:
         return
-    with ticking("comparing"):
+    with showing_seconds("comparing"):
         from symtop.judging.adapters.adapter import integrator
         from symtop.judging.claims.subject import open_target
         from symtop.judging.comparison import compare, ranked
@@ -157,7 +157,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
     symtop claims midpoint rk4
     symtop claims --plugin my_methods.py
     """
-    with ticking("loading"):
+    with showing_seconds("loading"):
         from symtop.judging.judge_step import judge_separately
         from symtop.methods.framework import registry
         from symtop.model import scenes
@@ -169,7 +169,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
         methods = [registry.integrator(name) for name in names or added or known]
     refuted, entries = False, []
     for method in methods:
-        with ticking(f"measuring {method.name}"):
+        with showing_seconds(f"measuring {method.name}"):
             ledger = judge_separately(method, problem, quick=quick)
         verdicts = {finding.verdict for finding in ledger.findings}
         refuted |= "refuted" in verdicts or not verdicts & {"confirmed", "measured"}
@@ -213,12 +213,12 @@ def recommend(scene: Any, accuracy: float | None, engine: str | None, as_json: b
     symtop recommend tennis-racket --accuracy 1e-6
     symtop recommend goldstein --i-use mujoco --step-size 0.002
     """
-    with ticking("loading"):
+    with showing_seconds("loading"):
         from symtop import advise, engine_settings
     if accuracy is None and engine is None:
         raise SymtopError("recommend needs --accuracy, for example 1e-6, or --i-use")
     options |= {"step_size": common.step_of(scene, options), "needs": options["needs"] or ()}
-    with ticking("trying methods"):
+    with showing_seconds("trying methods"):
         answer: Any
         if engine is not None:
             answer = engine_settings.i_use(engine, scene, accuracy=accuracy, **options)

@@ -13,7 +13,7 @@ from symtop.cli import common
 from symtop.cli.common import File, as_text, check_outputs, completing, say, say_written, separated, table, warn
 from symtop.core import files
 from symtop.core.errors import SymtopError, whole
-from symtop.core.progress import post, ticking
+from symtop.core.progress import post, showing_seconds
 from symtop.report.formats import FIRM, counted, duration
 
 FEWEST, FEW, MANY = 1000, 100_000, 20  # steps of a trial; a run of more than 20 times 100,000 steps is timed before
@@ -64,7 +64,7 @@ def run(
     symtop run body rk4 --body 1,2,3 --rates 0.01,1,0 --step-size 0.01
     """
     check_outputs(output=output, figure=figure)
-    with ticking("loading"):
+    with showing_seconds("loading"):
         from symtop.core import netcdf
         from symtop.measure.errors import OF_BODY, QUANTITIES
         from symtop.model import scenes
@@ -77,7 +77,7 @@ def run(
     if h is not None and h > 0.0:
         few_steps = partial(simulate, scene, integrator, step_size=h, samples=2, guard=False)
         estimate(horizon / h, lambda few: few_steps(horizon=few * h))
-    with ticking("running"):
+    with showing_seconds("running"):
         data = simulate(scene, integrator, guard={"on": True, "off": False}.get(guard, guard), **settings)
         if output is not None:
             netcdf.write(data, output)
@@ -113,7 +113,7 @@ def _is_known(problem: Any, horizon: float, figure: str | None) -> bool:
     from symtop.measure.settings import judgeable
 
     try:
-        with ticking("following the true motion"):
+        with showing_seconds("following the true motion"):
             judgeable(problem, "attitude", horizon)
     except SymtopError as error:
         if figure is not None:
@@ -145,7 +145,7 @@ def estimate(steps: float, run: Callable[[int], object]) -> None:
 
     if not MANY * FEW < steps <= MOST_STEPS:  # more are refused
         return
-    with ticking("timing some steps"):
+    with showing_seconds("timing some steps"):
         run(FEWEST)  # compiles the kernel
         few, fixed, seconds = FEWEST, first_call(partial(run, FEWEST)), 0.0
         while seconds < LONG_ENOUGH and few * MANY < steps:
@@ -180,7 +180,7 @@ def long(
     symtop long spheroid stormer-verlet --steps 1e9 --output long.nc
     """
     check_outputs(output=output, checkpoint=checkpoint)
-    with ticking("loading"):
+    with showing_seconds("loading"):
         import numpy as np
 
         from symtop.measure.order import power_law
@@ -258,7 +258,7 @@ def ensemble(
     if epsilon is not None and not bodies:
         raise SymtopError("--epsilon must come with --bodies: it is how far heavy bodies are from a top")
     noun, most = ("bodies", COMPARED_BODIES) if bodies else ("tops", COMPARED)
-    with ticking(f"drawing {noun}"):
+    with showing_seconds(f"drawing {noun}"):
         import numpy as np
 
         from symtop.report.spread import LEVELS, QUANTITIES, SHOWN_BY, largest, member_errors, so_many, spread
@@ -278,7 +278,7 @@ def ensemble(
 
     def added(data: Any) -> Any:
         few, results = (part.isel(member=slice(0, most)) for part in (sample, data))
-        with ticking("comparing with the true motion"):
+        with showing_seconds("comparing with the true motion"):
             wrong.update({name: member_errors(few, results, name) for name in compared})
         own.update({name: largest(values) for name, values in wrong.items()})
         return _columns(sample, own, words)

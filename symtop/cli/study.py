@@ -12,7 +12,7 @@ import click
 from symtop.cli import common
 from symtop.cli.common import File, as_text, completing, json_option, plugin_option, results_option, separated
 from symtop.core.errors import SymtopError, positive
-from symtop.core.progress import ticking
+from symtop.core.progress import showing_seconds
 from symtop.core.signals import INTERRUPTED, TERMINATED, TerminatedError, ending_on_sigterm
 from symtop.report.formats import abridged, counted
 
@@ -273,7 +273,7 @@ def archive(results: str, output: str | None, *, test_set: bool) -> None:
     if test_set:
         from symtop.report.test_set import write
 
-        with ticking("computing the test set"):
+        with showing_seconds("computing the test set"):
             click.echo(f"test set: {write(output or Path(results) / 'test-set')}")
         return
     from symtop.report.archive import bundle

@@ -295,7 +295,7 @@ def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
 
 
 @functools.cache
-def is_lean() -> Any:
+def lean_probe() -> Any:
     """A test kernel, if numba has the private parts that `_Library` needs; else None, for numba's own way. 0.06 s."""
     part = register_jitable(lambda x: x + 1.0, OPTIONS | WITHIN)
     kernel = njit(**OPTIONS)(lambda x: 2.0 * part(x))
@@ -326,7 +326,7 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
                 with contextlib.suppress(SymtopError, OSError):  # a cache that cannot be written costs time and no run
                     make_private(kernel._cache.cache_path)
                     stack.enter_context(locked(kernel._cache.cache_path / "code", wait=True))
-            lean = is_cached(kernel, signature, bitcode=True) or is_lean()
+            lean = is_cached(kernel, signature, bitcode=True) or lean_probe()
             return _lean(kernel, compiling, signature) if lean else compiling(signature)
 
     return compile_now

@@ -18,7 +18,7 @@ listeners: list[Callable[[str], object]] = []  # functions that `post` calls
 
 
 def post(words: str) -> None:
-    """Pass a description of the present work to all `listeners`, such as the one of `telling`."""
+    """Pass a description of the present work to all `listeners`, such as the one of `showing_work`."""
     for hear in listeners:
         hear(words)
 
@@ -47,14 +47,14 @@ def progress_bar(words: str, *, quiet: bool = False, **options: Any) -> Iterator
                 thread.join()
 
 
-def ticking(words: str) -> contextlib.AbstractContextManager[Any]:
+def showing_seconds(words: str) -> contextlib.AbstractContextManager[Any]:
     """Post `words`, and show them with the elapsed time on a terminal, each second until the block ends."""
     post(words)
     return progress_bar(words) if is_terminal(sys.stderr) else contextlib.nullcontext()  # without importing tqdm
 
 
 @contextlib.contextmanager
-def telling(words: str) -> Iterator[None]:
+def showing_work(words: str) -> Iterator[None]:
     """Print `words`, or those last posted, now and then to a standard error that is no terminal, after two seconds."""
     if sys.__stderr__ is None or is_terminal(sys.stderr):
         yield

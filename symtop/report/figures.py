@@ -38,7 +38,7 @@ def chosen(names: Sequence[str], known: Sequence[str], most: int = MOST_NAMED) -
     return list(names) if len(names) <= most else [name for name in names if name in known] or list(names)[:most]
 
 
-def spread(places: Sequence[float], gap: float) -> list[float]:
+def keep_apart(places: Sequence[float], gap: float) -> list[float]:
     """Positions in [0, 1] at least `gap` apart, in the order of `places` and nearest to these (least squares)."""
     from scipy.optimize import isotonic_regression
 
@@ -59,7 +59,7 @@ def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]]) -> None:
     axis.figure.canvas.figure.draw_without_rendering()  # the top-level figure, also for a subfigure
     height = axis.get_window_extent().height * 72.0 / axis.figure.dpi
     places = axis.transAxes.inverted().transform(axis.transData.transform([end[:2] for end in ends.values()]))
-    heights = spread([float(np.clip(y, 0.0, 1.0)) for _, y in places], 1.2 * LEAST_TEXT / height)
+    heights = keep_apart([float(np.clip(y, 0.0, 1.0)) for _, y in places], 1.2 * LEAST_TEXT / height)
     for (name, (x, y, color)), place in zip(ends.items(), heights, strict=True):
         axis.annotate(
             name, (x, y), (1.04, place), textcoords="axes fraction", va="center", fontsize=LEAST_TEXT, color=ink(color),

@@ -95,7 +95,7 @@ class Forecast(NamedTuple):
     rounding: float  # error by rounding alone, rad: large on a separatrix, whatever the method
     outcome: str  # of the probe, or expected of the run
     reached: float
-    marks: Landmarks
+    landmarks: Landmarks
     unstable: float = 0.0  # an error of the tolerance as the motion amplifies it, rad; 0 where a probe shows it
     whole: bool = False  # the probe was as long as the run
     growth: float = 1.0  # factor by which steps of the probe multiply a small change more than the motion does
@@ -127,7 +127,7 @@ def _probe(
     run = solve(method, chart, motion.scene.top, motion.start(since), piece)
     outcome, times, states = run.outcome, piece.times, run.states
     bound = outcome == "out_of_budget" and run.force_evaluations < plan.most(math.inf)  # at the limit of a probe only
-    if method.fixed_step and bound and run.reached >= motion.marks.period:
+    if method.fixed_step and bound and run.reached >= motion.landmarks.period:
         known = times <= run.reached
         outcome, times, states = "ok", times[known], states[known]
     with np.errstate(all="ignore"):
@@ -156,7 +156,7 @@ def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
 
 def _amplifies(motion: Integrated, change: float, horizon: float, times: float = UNSTABLE) -> bool:
     """Does the motion amplify a change of its start more than `times` as much as the shear of a stable motion?"""
-    return motion.displacement(change, horizon) > change * times * (1.0 + horizon / motion.marks.period)
+    return motion.displacement(change, horizon) > change * times * (1.0 + horizon / motion.landmarks.period)
 
 
 def _amplified(motion: Integrated, probe: Probe, horizon: float) -> float:
@@ -212,7 +212,7 @@ def _adaptive_forecast(
     piece = max(share, least)
     expected, probe = probed(piece)
     afforded = AFFORDED[cheap.implementation] * min(cheap.speed, 1.0)
-    if (far or (chart == "angles" and motion.marks.gap < plan.tolerance)) and cheap.implementation == "compiled":
+    if (far or (chart == "angles" and motion.landmarks.gap < plan.tolerance)) and cheap.implementation == "compiled":
         afforded *= THROUGH
     longer = min(plan.horizon, piece * afforded / max(probe.evaluations, 1))
     if longer > 1.5 * piece:
@@ -222,7 +222,7 @@ def _adaptive_forecast(
 
 def _expected(motion: Integrated, method: Integrator, chart: str, plan: Plan) -> tuple[float, Probe]:
     """The expected largest axis error of a run, and the probe from which it follows."""
-    straight, marks = bool(method.symplectic or method.symmetric), motion.marks
+    straight, marks = bool(method.symplectic or method.symmetric), motion.landmarks
     grows = motion.scene.of_body and motion.scene.top.free and _amplifies(motion, SMALL, plan.horizon, SHEARED)
     period = marks.period if math.isfinite(marks.period) else plan.horizon
     twice = min(2.0 * period, plan.horizon)
@@ -259,7 +259,7 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: I
     form for a top and an integration for a body.
     """
     motion = motion or (Integrated if scene.of_body else Exact)(scene)
-    marks = motion.marks
+    marks = motion.landmarks
     if method.control is None:
         return Forecast(0.0, 0.0, "ok", plan.horizon, marks)
     error, probe = _expected(motion, method, chart, plan)
@@ -363,7 +363,7 @@ def _growth(scene: Scene, method: Integrator, chart: str, step: float, frequency
 
 def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
     """The trouble that small nutations grow to a visible size; None if not, or if a probe of the whole run was good."""
-    marks, step, frequency = expected.marks, plan.step_size, expected.marks.frequency
+    marks, step, frequency = expected.landmarks, plan.step_size, expected.landmarks.frequency
     good_run = expected.whole and expected.outcome == "ok" and expected.axis_error <= EXPECTED
     if method.adaptive or good_run:
         return None
@@ -393,7 +393,7 @@ def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expec
 
 def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
     """The first cause that applies, except instability; None if no large error is expected."""
-    marks = expected.marks
+    marks = expected.landmarks
     if expected.rounding > EXPECTED and not isinstance(motion, Exact):
         return Trouble(
             f"the motion multiplies a change of its start by {expected.rounding / EPSILON:.1g} by t = "
@@ -432,7 +432,7 @@ def _coarse(
     motion: Integrated, method: Integrator, chart: str, plan: Plan, expected: Forecast, size: str
 ) -> Trouble | None:
     """The trouble of a step that is too long for a pole or for the nutation, or in resonance with it; else None."""
-    marks, step, frequency = expected.marks, plan.step_size, expected.marks.frequency
+    marks, step, frequency = expected.landmarks, plan.step_size, expected.landmarks.frequency
     if expected.growth > 1.0:
         times = f"at least {expected.growth:.1g} times as much as the motion does"
         return Trouble(f"{size}: steps of {step:.4g} multiply a small change {times}", SMALL_TURN / frequency)
@@ -459,4 +459,4 @@ def _coarse(
 def _smaller(method: Integrator, plan: Plan, expected: Forecast) -> float:
     """The step at which the forecast would be `AIM`, if the method keeps its order."""
     step = plan.step_size * math.pow(AIM / (min(expected.axis_error, 1.0) or AIM), 1.0 / (method.order or 1))
-    return min(step, expected.marks.period / 20.0) if expected.axis_error > 1.0 else step
+    return min(step, expected.landmarks.period / 20.0) if expected.axis_error > 1.0 else step

@@ -84,7 +84,7 @@ def presented(solver: FixedStep, par: Any, states: Array) -> Array:
     return states if solver.present is None else solver.present(par, np.zeros(len(states)), states)
 
 
-def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
+def gauge_of(scene: Scene, method: Integrator, h: float) -> Gauge:
     """A function from samples of a run to relative changes of energy, modified energy and momenta, and theta.
 
     The remaining oscillation of the modified energy is fitted on the first `FIRST` steps, which are run here. States
@@ -92,7 +92,7 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     method conserves them, from those of the start, which have more digits. A body has the quantities `OF_BODY`.
     """
     if scene.of_body:
-        return _watch_body(scene, method)
+        return _body_gauge(scene, method)
     chart, solver = chart_of(method)
     par, rule, state = solver.setup(scene.top, scene.start, h)
     assert isinstance(solver.loop, Loop)  # noqa: S101
@@ -127,8 +127,8 @@ def watch(scene: Scene, method: Integrator, h: float) -> Gauge:
     return gauge
 
 
-def _watch_body(scene: Scene, method: Integrator) -> Gauge:
-    """`watch` for a body: relative changes of energy, p_phi and |L| since the start, and theta."""
+def _body_gauge(scene: Scene, method: Integrator) -> Gauge:
+    """`gauge_of` for a body: relative changes of energy, p_phi and |L| since the start, and theta."""
     body, size = scene.top, scene.momentum_scale
     solver, start = chart_of(method, of_body=True)[1], body.momenta(scene.start)
     par, _ = solver.prepare(body, scene.start)
@@ -177,7 +177,7 @@ def long_run(
     at, rows = checkpoints.resumed(loop.start(par, rule, state, h))
     ends, outcome, reached, title = windows(count), OK, at.k, f"{method.name} on {chosen.name}"
     quantities = OF_BODY if chosen.of_body else QUANTITIES
-    gauge = watch(chosen, method, h) if len(rows) < len(ends) else None
+    gauge = gauge_of(chosen, method, h) if len(rows) < len(ends) else None
     with ending_on_sigterm(), checkpoints:
         with progress_bar(title, quiet=silent, total=count, initial=at.k, unit="step", unit_scale=True) as bar:
             while gauge is not None and len(rows) < len(ends) and outcome == OK:
@@ -220,7 +220,7 @@ def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensate
     """A hash of all that determines the bits of a run. It uses compiled code, so that comments do not change it."""
     numbers = [[getattr(record, name) for name in record.__slots__] for record in (scene.top, scene.start)]
     settings = [numbers, h, steps, compensated, FIRST, PER_DECADE, LONGEST, SAMPLES]
-    made = by_file(code_of((method, watch, windows, scattered, summary)))
+    made = by_file(code_of((method, gauge_of, windows, scattered, summary)))
     return digest(made | {"numbers": hashed(json.dumps(settings))})
 
 

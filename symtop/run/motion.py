@@ -124,13 +124,13 @@ class Integrated:
 
     longest, reach = 20.0, 40.0  # natural periods: most of a probe that is a share of the run, and of a minimal one
     points = 100  # of a probe that are compared
-    period_word = "natural period"  # the name of `marks.period` in sentences
+    period_word = "natural period"  # the name of `landmarks.period` in sentences
 
     def __init__(self, scene: Scene) -> None:
         self.scene, self.growths = scene, dict[float, Growth]()
         self.chart, self.watches = (BODY, "attitude") if scene.of_body else ("axis", "axis")
         slow, self.fast, self.inertia = _frequencies(scene)
-        self.marks = Landmarks(2.0 * math.pi / slow, slow, math.nan, math.inf, "upper", 0.0, 0.0)
+        self.landmarks = Landmarks(2.0 * math.pi / slow, slow, math.nan, math.inf, "upper", 0.0, 0.0)
 
     def states(self, times: Array, tolerance: float) -> Array:
         """States (n, dimension) at `times` (n,), NaN after `MOST_WORK` steps."""
@@ -164,7 +164,7 @@ class Integrated:
 
     def moved(self, by: float = MOVED) -> Any:
         """The scene's start with its rates changed by `by` times the natural frequency."""
-        at, rate = self.scene.start, by * self.marks.frequency
+        at, rate = self.scene.start, by * self.landmarks.frequency
         if self.chart == BODY:
             x, y, z = at.omega_body
             return replace(at, omega_body=(x + 0.6 * rate, y - 0.48 * rate, z + 0.64 * rate))
@@ -177,12 +177,13 @@ class Integrated:
         body separate far, A is computed again with the closed form and a smaller change.
         """
         step = 2.0 * math.pi / self.fast / PAIR_STEPS
-        until = min(horizon, WATCHED[self.chart] * self.marks.period, MOST_WATCHED * step)
+        until = min(horizon, WATCHED[self.chart] * self.landmarks.period, MOST_WATCHED * step)
         if until not in self.growths:
             steps = max(math.ceil(until / step), POINTS)
             h, marks, apart = until / steps, np.arange(1, POINTS + 1) * steps // POINTS, np.empty(POINTS)
             given = (flat(self.scene.top, start) for start in (self.scene.start, self.moved()))
-            units = (2.0 if self.chart == BODY else 1.0) / MOVED, 1.0 / (MOVED * self.inertia * self.marks.frequency)
+            momentum = self.inertia * self.landmarks.frequency
+            units = (2.0 if self.chart == BODY else 1.0) / MOVED, 1.0 / (MOVED * momentum)
             two_runs(self.chart, DOP8, _apart)(*given, h, marks, units, apart)
             times, moved, top = np.multiply(marks, h, dtype=float), MOVED, self.scene.top
             if self.chart == BODY and top.free and not apart.max() < SATURATED / MOVED:
@@ -246,7 +247,7 @@ class Exact(Integrated):
     watches, longest, reach, points, period_word = "axis", 20.0, math.inf, 300, "nutation"
 
     def __init__(self, scene: Scene) -> None:
-        self.scene, self.marks, self.form = scene, landmarks(scene), closed_form(scene)
+        self.scene, self.landmarks, self.form = scene, landmarks(scene), closed_form(scene)
 
     def error(self, times: Array, chart: str, states: Array, since: float, _: float, /) -> Array:
         """See `Integrated`; the error is that of the axis."""
@@ -258,7 +259,7 @@ class Exact(Integrated):
 
     def closest(self) -> float:
         """See `Integrated`."""
-        width = self.marks.period if math.isfinite(self.marks.period) else self.scene.horizon
+        width = self.landmarks.period if math.isfinite(self.landmarks.period) else self.scene.horizon
         middle = 0.5 * width
         for _ in range(4):
             times = middle + width * np.linspace(-0.5, 0.5, 129)
@@ -275,5 +276,5 @@ class Exact(Integrated):
 
     def rounding(self, horizon: float, *, whole: bool) -> float:  # noqa: ARG002
         """See `Integrated`; not 0 for a `whole` run."""
-        marks, turns = self.marks, horizon / self.marks.period
+        marks, turns = self.landmarks, horizon / self.landmarks.period
         return marks.shear * 2.0 * math.pi * turns * min(marks.width, 1.0) if turns > 0.5 else 0.0

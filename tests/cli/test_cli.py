@@ -280,9 +280,9 @@ SLOW = """\
 import sys, time
 from symtop.core import progress
 progress.FIRST, progress.EVERY = 0.1, 0.15
-with progress.telling("judge"):
+with progress.showing_work("judge"):
     time.sleep(float(sys.argv[1]))
-    with progress.ticking("trying methods"):
+    with progress.showing_seconds("trying methods"):
         time.sleep(float(sys.argv[1]))
 """
 

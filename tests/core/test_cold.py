@@ -151,7 +151,7 @@ def test_inner_functions_get_no_machine_code_and_kernels_the_same_bits(monkeypat
     compiled = compile_kernel(kernel)
     if way in PRIVATE:
         monkeypatch.setattr(PRIVATE[way], way, property(), raising=False)
-        monkeypatch.setattr(jit, "is_lean", functools.cache(jit.is_lean.__wrapped__))
+        monkeypatch.setattr(jit, "lean_probe", functools.cache(jit.lean_probe.__wrapped__))
     if way == "numba alone":
         monkeypatch.setattr(compiled, "compile", compiled.compile.__wrapped__)
     assert compiled(rows) == pytest.approx(expected, rel=1e-15)

@@ -101,7 +101,7 @@ def test_ctrl_c_is_heard_while_llvm_calls_back(monkeypatch):
     engine, once = cpu_target.target_context.codegen()._engine._ee, iter([signal.SIGINT])
     monkeypatch.setattr(engine, "_object_cache_notify", lambda *_: any(map(signal.raise_signal, once)))
     with told_apart(), pytest.raises(InterruptedByUser):
-        jit.is_lean.__wrapped__(), [time.sleep(0.01) for _ in range(500)]
+        jit.lean_probe.__wrapped__(), [time.sleep(0.01) for _ in range(500)]
 
 
 def test_two_requests_are_both_heard_and_a_limit_inside_another_leaves_that_one_running(default_handlers):

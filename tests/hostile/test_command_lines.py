@@ -96,7 +96,7 @@ def test_every_bad_command_line_is_one_sentence(name, folder, monkeypatch):
     """513 of them and more; the same lines without what is bad are right."""
     monkeypatch.chdir(folder)
     monkeypatch.setattr("sys.dont_write_bytecode", False)  # as on most machines
-    monkeypatch.setattr("symtop.cli.common.telling", contextlib.nullcontext)  # a process for each line
+    monkeypatch.setattr("symtop.cli.common.showing_work", contextlib.nullcontext)  # a process for each line
     monkeypatch.setattr("socketserver.BaseServer.serve_forever", lambda *_: pytest.fail("it serves"))
     before = sorted(path.name for path in folder.iterdir())
     above, faults = sorted(path.name for path in folder.parent.iterdir()), []

@@ -61,7 +61,7 @@ import hashlib, sys, symtop
 from symtop.core import jit
 way, count = sys.argv[1], int(sys.argv[2])
 if way == "numba alone":
-    jit.is_lean = lambda: False
+    jit.lean_probe = lambda: False
 if way == "bitcode":
     jit.on_cold[:] = [lambda: sys.exit("compiled")]
 every = [f"{one.name}[{chart}]" for one in symtop.integrators().values() if one.implementation == "compiled"

@@ -99,12 +99,12 @@ def test_letters_have_the_contrast_that_letters_need():
 
 @pytest.mark.parametrize("places", [[0.5] * 10, [0.0, 0.01, 0.99, 1.0, 1.0], [0.2, 0.9, 0.4]])
 def test_labels_keep_their_order_and_their_distance(places):
-    placed = figures.spread(places, 0.05)
+    placed = figures.keep_apart(places, 0.05)
     assert np.all(np.diff(np.sort(placed)) >= 0.05 - 1e-12)
     assert max(placed) <= 1.0 + 1e-12
     for one, other in ((0, 1), (1, 2)):
         assert (places[one] < places[other]) <= (placed[one] < placed[other])
-    assert figures.spread([0.1, 0.5], 0.05) == [0.1, 0.5]
+    assert figures.keep_apart([0.1, 0.5], 0.05) == [0.1, 0.5]
 
 
 @pytest.mark.parametrize(("value", "text"), [

@@ -327,11 +327,11 @@ def test_coarse_runs_end_in_the_ladder_as_they_end_alone(tops, name):
 
 
 def test_a_failed_run_has_an_infinite_error_and_targets_are_asked_where_they_mean_something(tops):
-    class Shown:
+    class Samples:
         states = np.full((1, tops.marks.size, 6), NAN)
         momenta = np.full((1, tops.marks.size, 2), NAN)
 
-    errors = tops.errors("axis", Shown, np.array([4]))
+    errors = tops.errors("axis", Samples, np.array([4]))
     assert set(errors) == {"axis", "energy", MOMENTA}
     assert all(value == INF for values in errors.values() for value in values)
     asked, bounds = tops.asked(TARGETS), tops.bounds()

@@ -21,7 +21,7 @@ from symtop.methods.framework.lanes import LEAST
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import scene
 from symtop.run import modified_energy as shadow
-from symtop.run.long_run import QUANTITIES, chart_of, long_run, scattered, watch
+from symtop.run.long_run import QUANTITIES, chart_of, gauge_of, long_run, scattered
 from tests.templates import checked
 
 
@@ -261,7 +261,7 @@ def test_the_mean_of_a_window_is_known_far_better_than_the_energy_has_digits(nam
         h, solver = one.nutation_period / 1000.37, chart_of(method)[1]
         par, rule, state = solver.setup(one.top, one.start, h)
         done = solver.loop(par, rule, state, h, scattered(0, 5000))
-        level = watch(one, method, h)(done.states, done.momenta)["modified_energy"].mean()
+        level = gauge_of(one, method, h)(done.states, done.momenta)["modified_energy"].mean()
         found.append(level / one.energy_grain)  # relative to |E|, whose rounding it is
     assert np.sqrt(np.mean(np.square(found))) < 1.2e-17
 

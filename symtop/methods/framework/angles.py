@@ -22,7 +22,7 @@ from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, Array
-from symtop.methods.framework.preparation import BareTop, Preparation, Shown, conserved
+from symtop.methods.framework.preparation import BareTop, Preparation, Presentation, conserved
 
 
 class ReducedTop(NamedTuple):
@@ -139,4 +139,4 @@ def sampled_momenta(par: Any, states: Array) -> tuple[Array, Array]:
 
 
 # an unreduced state as (theta, p_theta, phi, psi), the angles chart of `simulate`
-to_angles = Shown(lambda par, _t, y: (y[0], par.I1 * y[3], y[1], y[2]), 4)
+to_angles = Presentation(lambda par, _t, y: (y[0], par.I1 * y[3], y[1], y[2]), 4)

@@ -16,7 +16,7 @@ e and L alone also steps (q*, M) of a body (`turned`); if it keeps L.e of a top,
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.preparation import Preparation, Shown
+from symtop.methods.framework.preparation import Preparation, Presentation
 from symtop.methods.framework.space import L_at, observe_attitude, q_at
 from symtop.methods.vectors import rotated
 from symtop.model.body import vertical
@@ -76,7 +76,7 @@ def _in_space(par: Any, t: float, y: Any) -> Any:
     return (*q, *rotated(q, (y[4], y[5], y[6])))
 
 
-of_top, in_space = Preparation(_of_top, 7), Shown(_in_space, 7)  # a top as (q, M), shown as (q, L)
+of_top, in_space = Preparation(_of_top, 7), Presentation(_in_space, 7)  # a top as (q, M), shown as (q, L)
 
 
 def prepared(numbers: Any) -> Preparation:
@@ -86,7 +86,7 @@ def prepared(numbers: Any) -> Preparation:
 
 on_body = prepared(lambda body, at: (body, (at.w, at.x, at.y, at.z, at.M1, at.M2, at.M3)))
 turned = prepared(lambda body, at: (body, (at.w, -at.x, -at.y, -at.z, at.M1, at.M2, at.M3)))
-turned_back = Shown(lambda _par, _t, y: (y[0], -y[1], -y[2], -y[3], y[4], y[5], y[6]), 7)
+turned_back = Presentation(lambda _par, _t, y: (y[0], -y[1], -y[2], -y[3], y[4], y[5], y[6]), 7)
 
 
 @register_jitable

@@ -35,7 +35,7 @@ from symtop.core.parallel import heed
 from symtop.methods.framework import lanes as many, preparation
 from symtop.methods.framework.lanes import Blocks, Lanes, Many, Whole
 from symtop.methods.framework.plan import LEFT_CHART, OK, Array, Plan, Run, ending
-from symtop.methods.framework.preparation import Preparation, Shown, as_it_steps
+from symtop.methods.framework.preparation import Preparation, Presentation, as_it_steps
 from symtop.methods.framework.registry import Solver
 from symtop.methods.vectors import accumulate, accumulate_plainly, zero
 from symtop.model.top import Angles, SymmetricTop, flat
@@ -238,7 +238,7 @@ class FixedStep:
     A rule whose numbers depend on the run is a function of the top, the start and the step. A unit of the kernel's
     counted work (of an implicit method, an iteration) takes `evaluations` force evaluations, and each step `each_step`
     more. `present(par, times, states)` makes states of the chart from the kernel's, where they differ. A run is one
-    compiled call where `prepare` is a `Preparation` and `present`, if there is one, is `Shown`.
+    compiled call where `prepare` is a `Preparation` and `present`, if there is one, is `Presentation`.
     """
 
     loop: Loop | Callable[..., March]
@@ -332,14 +332,14 @@ class FixedStep:
         loop, prepare, present, rule = self.loop, self.prepare, self.present, self.rule
         if not isinstance(loop, Loop) or not isinstance(prepare, Preparation):
             return None
-        if present is not None and not isinstance(present, Shown):
+        if present is not None and not isinstance(present, Presentation):
             return None
         sample, size = (as_it_steps, prepare.size) if present is None else (present.sample, present.size)
         scale = preparation.as_it_is
         pack = getattr(rule, "pack", preparation.as_fields)
         if isinstance(rule, preparation.Scaled):
             scale, rule = rule.scale, rule.rule
-        elif isinstance(rule, preparation.Later):
+        elif isinstance(rule, preparation.LazyRule):
             rule = rule.make()
         if not isinstance(rule, tuple) or not rule:  # a function of Python, or numbers in an array
             return None

@@ -4,7 +4,7 @@
     scale(rule, top, at, h) -> rule          the coefficients of a method times the step
     sample(par, t, state) -> state           a sample at the time t, in the chart that a user sees
 
-A `Preparation`, a `Scaled` rule and a `Shown` chart each hold one such function and can be called like it. A run takes
+A `Preparation`, a `Scaled` rule and a `Presentation` each hold one such function and can be called like it. A run takes
 the function itself and compiles it into the loop (`loop.whole_run`): calls from Python cost more than a few steps of a
 kernel, above all if they pass a NamedTuple to compiled code.
 """
@@ -130,7 +130,7 @@ class Scaled:
 
 
 @dataclass(frozen=True)
-class Later:
+class LazyRule:
     """A rule that is the same for all runs, made when it is first used."""
 
     make: Callable[[], Any]
@@ -154,7 +154,7 @@ def _on_samples(sample: Callable[..., Any], kind: Any) -> Any:
 
 
 @dataclass(frozen=True)
-class Shown:
+class Presentation:
     """From a kernel's states to those of the user's chart: `sample(par, t, state)` compiles, returns `size` numbers."""
 
     sample: Callable[..., Any]

@@ -20,7 +20,7 @@ import numpy as np
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.plan import NOT_FINITE, OK
-from symtop.methods.framework.preparation import Preparation, Shown
+from symtop.methods.framework.preparation import Preparation, Presentation
 from symtop.model import charts
 
 _axis_parts, _quaternion_parts = register_jitable(charts.axis_parts), register_jitable(charts.quaternion_parts)
@@ -116,7 +116,7 @@ def _frame_to_attitude(par: Any, t: float, y: Any) -> Any:
     return with_spin(par, (*q, y[3], y[4], y[5]), t)
 
 
-frame_to_attitude = Shown(_frame_to_attitude, 7)
+frame_to_attitude = Presentation(_frame_to_attitude, 7)
 
 
 @register_jitable

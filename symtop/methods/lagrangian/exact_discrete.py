@@ -66,7 +66,7 @@ from symtop.core.jit import register_jitable, set_item
 from symtop.core.jit_functions import fused, two_product
 from symtop.methods.framework.lanes import one_loop
 from symtop.methods.framework.loop import FixedStep, Loop
-from symtop.methods.framework.preparation import Shown
+from symtop.methods.framework.preparation import Presentation
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import finite_outcome, with_spin
 from symtop.methods.lagrangian import oscillators
@@ -262,8 +262,8 @@ march_axis, march_attitude = (
 def built_in() -> list[Integrator]:
     """`exact-discrete`."""
     charts = {
-        "axis": (march_axis, Shown(lambda _par, _t, state: state[:6], 6)),
-        "attitude": (march_attitude, Shown(lambda _par, _t, state: state[:7], 7)),
+        "axis": (march_axis, Presentation(lambda _par, _t, state: state[:6], 6)),
+        "attitude": (march_attitude, Presentation(lambda _par, _t, state: state[:7], 7)),
     }
     return [
         Integrator(

@@ -44,7 +44,7 @@ from symtop.methods.framework.angles import ReducedTop, chart_outcome, momenta_o
 from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.newton import ANGLE_GRAIN, NEGLIGIBLE_ANGLE, Correction, newton_loop
 from symtop.methods.framework.plan import Array
-from symtop.methods.framework.preparation import Later, Preparation, Shown
+from symtop.methods.framework.preparation import LazyRule, Preparation, Presentation
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian.galerkin import node_at, pull_at
 
@@ -270,7 +270,7 @@ def _with_sums(top: Any, at: Any) -> Any:
 
 
 with_sums = Preparation(_with_sums, 6, require_chart)
-to_angles = Shown(lambda _par, _t, y: (y[0], y[1], y[2], y[3]), 4)
+to_angles = Presentation(lambda _par, _t, y: (y[0], y[1], y[2], y[3]), 4)
 
 
 @functools.cache
@@ -285,7 +285,7 @@ def loop(s: int) -> Loop:
 
 def built_in() -> list[Integrator]:
     """galerkin-gauss-4, -6, -8 and -12, named after their orders."""
-    rules = {s: Later(functools.partial(gauss_rule, s)) for s in NODES}
+    rules = {s: LazyRule(functools.partial(gauss_rule, s)) for s in NODES}
     return [
         Integrator(
             name=f"galerkin-gauss-{2 * s}", family="discrete-lagrangian",

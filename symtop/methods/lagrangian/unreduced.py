@@ -29,7 +29,7 @@ from symtop.methods.framework.angles import chart_outcome, require_chart
 from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.newton import Correction, newton
 from symtop.methods.framework.plan import NOT_CONVERGED
-from symtop.methods.framework.preparation import Preparation, Shown, conserved
+from symtop.methods.framework.preparation import Preparation, Presentation, conserved
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian.discrete_lagrangian import built_in as reduced_methods, rule_of
 
@@ -192,7 +192,7 @@ def _with_momenta(top: Any, at: Any) -> Any:
 
 with_momenta = Preparation(_with_momenta, 6, require_chart)
 # (theta, p_theta, phi, psi) of the six state variables; p_phi and p_psi are columns of their own
-in_angles = Shown(lambda _par, _t, y: (y[0], y[3], y[1], y[2]), 4)
+in_angles = Presentation(lambda _par, _t, y: (y[0], y[3], y[1], y[2]), 4)
 
 
 def unreduced(method: Integrator) -> Integrator:

@@ -33,7 +33,7 @@ from symtop.methods.framework.body import turned, turned_back
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
 from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
-from symtop.methods.framework.preparation import BareTop, Preparation, Shown, as_it_steps
+from symtop.methods.framework.preparation import BareTop, Preparation, Presentation, as_it_steps
 from symtop.methods.framework.space import SpaceTop, axis_of, ended_space, observe_attitude, on_attitude, with_spin
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate, cross, dot, plus, scaled, summed
@@ -50,13 +50,13 @@ class Carried(NamedTuple):
     """How the body's spin is stepped: the start of a kernel, and how the attitude is shown."""
 
     prepare: Preparation
-    present: Shown | None
+    present: Presentation | None
     top: Any  # the NamedTuple of the numbers of the top
 
 
-UNSPUN = Carried(on_attitude, Shown(lambda par, t, y: with_spin(par, y, t), 7), SpaceTop)
+UNSPUN = Carried(on_attitude, Presentation(lambda par, t, y: with_spin(par, y, t), 7), SpaceTop)
 SPUN = Carried(Preparation(_on_body, 7), None, BareTop)
-_AXIS = Shown(lambda _par, _t, y: (*axis_of(y[0], y[1], y[2], y[3]), y[4], y[5], y[6]), 6)
+_AXIS = Presentation(lambda _par, _t, y: (*axis_of(y[0], y[1], y[2], y[3]), y[4], y[5], y[6]), 6)
 STILL = (0.0,) * 7  # no increment
 
 

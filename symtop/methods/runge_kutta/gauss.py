@@ -57,7 +57,7 @@ from symtop.methods.framework import body, space
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
 from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.plan import NOT_CONVERGED, OK, Array
-from symtop.methods.framework.preparation import Later
+from symtop.methods.framework.preparation import LazyRule
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop, field_axis, field_frame, observe_axis
 from symtop.methods.simd import wide_vectors
@@ -512,7 +512,7 @@ march_axis, march_frame = _loop(field_axis, 6), _loop(field_frame, 9)
 march_body = _loop(body.field_body, 7, 4, -1, _unit_of_body, _unsolved, body.observe_body)
 
 
-RULES = {stages: Later(functools.partial(gauss_rule, stages), packed) for stages in STAGES}
+RULES = {stages: LazyRule(functools.partial(gauss_rule, stages), packed) for stages in STAGES}
 
 
 def built_in() -> list[Integrator]:

@@ -26,7 +26,7 @@ import numpy as np
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import OUTCOMES, Run
-from symtop.methods.framework.preparation import Shown
+from symtop.methods.framework.preparation import Presentation
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import finite_outcome, frame_to_attitude, observe_axis, on_axis, on_frame
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
@@ -89,6 +89,7 @@ def _attitude_shown(par: Any, t: float, y: Any) -> Any:
 
 march_axis = Loop(no_carry, _increment_axis, observe_axis)
 march_frame = Loop(no_carry, _increment_frame, _observe_frame)
+_attitude = Presentation(_attitude_shown, 7)
 
 
 class Onward(FixedStep):
@@ -114,7 +115,7 @@ def built_in() -> list[Integrator]:
             conserves=frozenset({"p_phi"}), energy_error="bounded", needs="expression", general=True,
             solvers={
                 "axis": Onward(march_axis, (1.0,), on_axis, 1, implicit=True),
-                "attitude": Onward(march_frame, (1.0,), on_frame, 1, implicit=True, present=Shown(_attitude_shown, 7)),
+                "attitude": Onward(march_frame, (1.0,), on_frame, 1, implicit=True, present=_attitude),
             },
             reference="petrera-pfadler-suris-2011 celledoni-mclachlan-owren-quispel-2013",
         )

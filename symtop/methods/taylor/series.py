@@ -66,7 +66,7 @@ from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.lanes import Lanes, one_loop
 from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import NOT_FINITE, STEP_TOO_SMALL
-from symtop.methods.framework.preparation import BareTop, Scaled, Shown, Start, as_it_steps
+from symtop.methods.framework.preparation import BareTop, Presentation, Scaled, Start, as_it_steps
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, with_spin
 from symtop.methods.runge_kutta.explicit import row_of, store
@@ -269,7 +269,7 @@ def _loop(series_of: Callable[..., Any], size: int, observe: Callable[..., Any])
 
 march_axis = _loop(axis_sum, 6, space.observe_axis)
 march_attitude = _loop(attitude_sum, 7, space.observe_attitude)
-spun = Shown(lambda par, t, state: with_spin(par, state, t), 7)  # with the spin since the start
+spun = Presentation(lambda par, t, state: with_spin(par, state, t), 7)  # with the spin since the start
 
 ORDERS = (8, 12, 16, 20)
 BLOCK = 1_000_000  # series between returns to Python

@@ -397,7 +397,7 @@ class BodyMotion(NamedTuple):
     quaternion_lo: Array  # (n, 4), the low halves of pairs of doubles
     momentum: Array  # (n, 3), in the body's axes
     bound: Array  # (n,) of the error of the attitude, rad
-    known: float = 0.0  # a time up to which the values are known, whatever the samples; 0 if none was found
+    known: float = 0.0  # of a heavy body: a time up to which the values are known, whatever the samples
     too_long: bool = False  # lost because it takes too many steps?
 
     def lost(self, times: Array) -> float | None:

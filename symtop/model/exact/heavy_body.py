@@ -8,10 +8,12 @@ form: this is an integration and is never called exact.
 heyoka integrates in long double (64 bits): one run with a tolerance of 1e-5 of the rounding unit, which is returned,
 and two with 1e-2. These two have steps of at most `SHORTER` of the mean step, because runs with equal steps share most
 of their rounding, and the start and 1/I off by one unit, up and down in two patterns, because these are rounded, too.
-The bound is `SAFETY` times the largest distance from these two up to that time, at the samples and at `CHECKS` others.
+The bound at a time is `SAFETY` times the largest distance from these two at the checks up to it and at the next one.
 With `precise`, all three are compared with a run in quadruple precision (113 bits, 5 times as long), whose error is
 smaller by the ratio of the units, 2^-49, as long as the distance is small (`LINEAR`). Where the bound exceeds the given
-accuracy the motion is lost (chaos). All runs advance together, by `STRETCH` steps of the returned one, until then.
+accuracy the motion is lost (chaos). All runs advance together by pieces of equal length until then, as far as any call
+has asked for, so that values and bounds at a time do not depend on the other times. The state at the beginning of each
+piece is kept, and the Taylor polynomials of the last `PIECES` of them (0.2 MB each).
 Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, MNRAS 504 (2021) 2614.
 """
 
@@ -30,10 +32,10 @@ from symtop.model.exact.free_body import BodyMotion, checked_body, checked_times
 
 LONG, QUAD = 2.0**-63, 2.0**-112  # rounding units
 TOLERANCES = (1e-2 * LONG, 1e-2 * LONG, 1e-5 * LONG, 1e-2 * QUAD)  # of the runs, the last one in quadruple precision
-SAFETY, LINEAR, CHECKS, SHORTER = 256.0, 1e-4, 32, 0.4
+SAFETY, LINEAR, CHECKS, SHORTER = 256.0, 1e-4, 8, 0.4  # `CHECKS` of them in each piece
 ACCURACY, PAIR = 1e-9, 2.0**-104  # rad: the default accuracy, the rounding error of a pair of doubles
 MOST_STEPS = 1_000_000  # of all runs, half a minute or three; a step in quadruple precision counts as `QUAD_STEP`
-STRETCH, QUAD_STEP = 10_000, 10
+ANGLE, PIECES, QUAD_STEP = 64.0, 256, 10  # a piece takes the time of `ANGLE` rad or half, at the rate of the start
 START_DIGITS = 60
 
 
@@ -93,6 +95,10 @@ class HeavyBody:
         state = [*(value / size for value in start), *(mp.mpf(high) + mp.mpf(low) for high, low in momentum)]
         self._numbers = [*state, *(1 / mp.mpf(value) for value in row[:3]), *map(mp.mpf, heavy.tolist())]
         self._digits = lambda value: mp.nstr(value, 50)
+        turning, falling = np.divide(row[7:10], row[:3]), np.hypot(np.roll(heavy, 1), np.roll(heavy, 2)) / row[:3]
+        rate = float(np.linalg.norm(turning) + np.sqrt(falling.max()))
+        self._length = 2.0 ** math.floor(math.log2(ANGLE / rate)) if rate > 0.0 else 1.0
+        self._ways: dict[tuple[float, bool], _Way] = {}
 
     def samples(self, times: ArrayLike, accuracy: float = ACCURACY, *, precise: bool = False) -> BodyMotion:
         """The motion at a row of times (n,), before 0 as well, as pairs of doubles; `precise` in quadruple precision.
@@ -103,51 +109,19 @@ class HeavyBody:
         row = checked_times(times)
         high, low, bound = np.full((row.size, 7), np.nan), np.full((row.size, 7), np.nan), np.full(row.size, math.inf)
         known, too_long = math.inf, False
-        for way in (row >= 0.0, row < 0.0):
-            if way.any():
-                high[way], low[way], bound[way], end, tired = self._one_way(row[way], accuracy, precise)
-                known, too_long = min(known, end), too_long or tired
-        lost = ~(bound <= accuracy)
-        high[lost] = low[lost] = np.nan
-        bound[lost] = math.inf
+        for sign, chosen in ((1.0, row >= 0.0), (-1.0, row < 0.0)):
+            if chosen.any():
+                # taken out while it advances: another thread makes its own, and a run that was interrupted is dropped
+                way = self._ways.pop((sign, precise), None) or self._way(sign, precise)
+                sizes = np.abs(row[chosen])
+                way.advance(sizes.max(), accuracy)
+                high[chosen], low[chosen], bound[chosen] = way.values(sizes, accuracy)
+                known, too_long = min(known, way.known(accuracy)), too_long or way.too_long(sizes.max(), accuracy)
+                self._ways[sign, precise] = way
         return BodyMotion(high[:, :4], low[:, :4], high[:, 4:], bound, known, too_long)
 
-    def _one_way(self, times: Array, accuracy: float, precise: bool) -> tuple[Array, Array, Array, float, bool]:
-        """Values, low halves and bounds at times of one sign; until when they are known; were there too many steps?"""
-        last = times[np.argmax(np.abs(times))]
-        sizes = np.unique(np.abs(np.concatenate([[0.0], times, last * (np.arange(1, CHECKS + 1) / CHECKS)])))
-        grid = [np.longdouble(t) for t in np.copysign(sizes, last).tolist()]
-        high, bound = np.full((len(grid), 7), np.nan), np.full(len(grid), math.inf)
-        low = high.copy()
-        rough, other, fine = (self._run(run) for run in range(3))
-        exact = [self._run(3)] if precise else []
-        unit = QUAD / LONG if precise else 1.0
-        done, work, known, reached = 0, 0, 0.0, LONG
-        while done < len(grid) and work < MOST_STEPS:
-            began, old = fine.time, min(done, 1)  # a stretch begins with the end of the one before
-            states, steps = _to(fine, [began, *grid[done + 1 - old :]], STRETCH)
-            new = len(states) - old
-            points = [began, *grid[done + 1 - old : done + new]]
-            if fine.time != points[-1]:  # the end of a stretch is compared, too
-                points, states = [*points, fine.time], np.vstack([states, fine.state])
-            longest = SHORTER * abs(float(fine.time - began)) / max(steps, 1) or math.inf
-            runs = [_to(one, points, MOST_STEPS, longest) for one in (rough, other)]
-            runs += [(states, steps), *(_to(one, points, MOST_STEPS) for one in exact)]
-            work += sum(count for _, count in runs[:3]) + QUAD_STEP * sum(count for _, count in runs[3:])
-            *others, (value, rest) = [_halves(states, len(points)) for states, _ in runs]
-            gaps = [((first - value) + (second - rest))[:, :4] for first, second in others]
-            apart = 2.0 * np.sqrt((np.square(gaps)).sum(axis=2).max(axis=0))
-            apart = np.maximum.accumulate(np.where(np.isnan(apart), math.inf, np.maximum(apart, reached)))
-            error = np.where(apart < LINEAR, SAFETY * unit * apart + PAIR, math.inf)
-            here, there = slice(done, done + new), slice(old, old + new)
-            high[here], low[here], bound[here] = value[there], rest[there], error[there]
-            done, reached = done + new, apart[-1]
-            if not error[-1] <= accuracy or steps < STRETCH:
-                break
-            known = abs(float(fine.time)) if error[-1] <= 0.5 * accuracy else known
-        place = np.searchsorted(sizes, np.abs(times))
-        too_long = bool(error[-1] <= accuracy) and done < len(grid) and work >= MOST_STEPS
-        return high[place], low[place], bound[place], abs(float(fine.time)) if too_long else known, too_long
+    def _way(self, sign: float, precise: bool) -> "_Way":
+        return _Way([self._run(run) for run in range(4 if precise else 3)], sign * self._length)
 
     def _run(self, run: int) -> Any:
         """An integrator at the start; of the first two with numbers that are off by one unit."""
@@ -159,18 +133,84 @@ class HeavyBody:
         return stepper
 
 
-def _to(stepper: Any, points: list[Any], most: int, longest: float = math.inf) -> tuple[Array, int]:
-    """States (n, 7) of an integrator at points from its time on, fewer if it takes more than `most` steps."""
+class _Way:
+    """The runs in one direction of time, the last of which is returned, and what is known as far as they went."""
+
+    def __init__(self, runs: list[Any], length: float) -> None:
+        *self._others, self.main = runs
+        self.length, self._unit = length, QUAD / LONG if len(runs) == 4 else 1.0
+        self.states, self._work = [self.main.state.copy()], 0  # at the beginning of each piece
+        self._checks, self._apart = [0.0], [LONG]  # |t|, rad
+
+    def _bounds(self) -> Array:
+        apart = np.array(self._apart)
+        return np.where(apart < LINEAR, SAFETY * self._unit * apart + PAIR, math.inf)
+
+    def known(self, accuracy: float) -> float:
+        """The last check, as |t|, at which the bound is no more than the accuracy."""
+        return self._checks[int(np.searchsorted(self._bounds(), accuracy, "right")) - 1]
+
+    def too_long(self, end: float, accuracy: float) -> bool:
+        """Is |t| = end not known because it takes too many steps?"""
+        return self._checks[-1] < end and bool(self._bounds()[-1] <= accuracy)
+
+    def advance(self, end: float, accuracy: float) -> None:
+        """Advance all runs to |t| = end, or until the motion is lost."""
+        while self._checks[-1] < end and self._bounds()[-1] <= accuracy and self._work < MOST_STEPS:
+            k = len(self._checks) // CHECKS
+            points = np.longdouble(self.length) * (k + np.arange(CHECKS + 1) / np.longdouble(CHECKS))
+            solution, steps = _piece(self, k)
+            longest = SHORTER * abs(self.length) / steps
+            self._work += steps * (QUAD_STEP if len(self._others) == 3 else 1)
+            value, rest = _halves(solution(_row(self.main, points)))
+            gaps = []
+            for run, one in enumerate(self._others):
+                most = {"max_delta_t": np.longdouble(longest)} if run < 2 else {}
+                _, _, _, count, *_, states = one.propagate_grid(points, callback=_heard, **most)
+                self._work += count
+                other, less = _halves(states)
+                gaps.append(((other - value) + (less - rest))[1:, :4])
+            apart = 2.0 * np.sqrt(np.square(gaps).sum(axis=2).max(axis=0))
+            apart = np.where(np.isnan(apart), math.inf, np.maximum(apart, self._apart[-1]))
+            self._checks += np.abs(points[1:]).astype(float).tolist()
+            self._apart += np.maximum.accumulate(apart).tolist()
+
+    def values(self, sizes: Array, accuracy: float) -> tuple[Array, Array, Array]:
+        """Values, low halves and bounds at times as |t|; NaN and infinity where the bound exceeds the accuracy."""
+        bound = np.append(self._bounds(), math.inf)[np.searchsorted(self._checks, sizes)]
+        bound[~(bound <= accuracy)] = math.inf
+        high, low = np.full((sizes.size, 7), np.nan), np.full((sizes.size, 7), np.nan)
+        places = sizes // abs(self.length)
+        for k in np.unique(places[np.isfinite(bound)]).astype(int).tolist():
+            here = np.isfinite(bound) & (places == k)
+            solution, _ = _piece(self, k)
+            high[here], low[here] = _halves(solution(_row(self.main, np.copysign(sizes[here], self.length))))
+        return high, low, bound
+
+
+@functools.lru_cache(maxsize=PIECES)
+def _piece(way: _Way, k: int) -> tuple[Any, int]:
+    """The solution of a way from k to k + 1 lengths, as a function of a row of times, and its steps."""
+    main = way.main
+    main.time, end = _row(main, [k * way.length, (k + 1) * way.length])
+    main.state[:] = way.states[k]
+    _, _, _, steps, solution, _ = main.propagate_until(end, c_output=True, callback=_heard)
+    if len(way.states) == k + 1:
+        way.states.append(main.state.copy())
+    return solution, int(steps)
+
+
+def _heard(_stepper: Any) -> bool:
+    """A call in each step, in which Python handles Ctrl-C."""
+    return True
+
+
+def _row(stepper: Any, times: ArrayLike) -> Any:
     kind = stepper.state.dtype.type
-    row = np.array([kind(point) for point in points])
-    heard = {"callback": lambda _: True}  # in which Python handles Ctrl-C
-    _, _, _, steps, *_, states = stepper.propagate_grid(row, max_steps=most, max_delta_t=kind(longest), **heard)
-    return states, int(steps)
+    return np.array([kind(t) for t in np.asarray(times)])
 
 
-def _halves(states: Array, n: int) -> tuple[Array, Array]:
-    """States as pairs of doubles, (n, 7) each, NaN where there are fewer."""
-    high, low = np.full((n, 7), np.nan), np.full((n, 7), np.nan)
-    high[: len(states)] = states.astype(np.float64)
-    low[: len(states)] = (states - states.astype(np.float64).astype(states.dtype)).astype(np.float64)
-    return high, low
+def _halves(states: Array) -> tuple[Array, Array]:
+    """States as pairs of doubles, (n, 7) each."""
+    high = states.astype(np.float64)
+    return high, (states - high.astype(states.dtype)).astype(np.float64)

@@ -326,7 +326,7 @@ class Turns:
         return {name: np.concatenate([part[name] for part in parts]) for name in self.angles}
 
 
-class Later(BackendArray):
+class LazyAngle(BackendArray):
     """One of the angles of `Turns` as a lazy array: the constants of a closed form take 4 us a member."""
 
     def __init__(self, turns: Turns, name: str) -> None:
@@ -406,7 +406,7 @@ def as_dataset(
     }
     if of is not None:
         turns = Turns(of.numbers, times, {name: columns[name] for name in of.turned})
-        variables |= {name: Later(turns, name).variable() for name in of.turned}
+        variables |= {name: LazyAngle(turns, name).variable() for name in of.turned}
     coordinates = {dim: list(LABELS[dim]) for dim in LABELS if any(vectors.get(name) == dim for name in columns)}
     clock = ("time", times[0]) if shared else (("member", "time"), times)
     return xr.Dataset(variables, {"time": clock, **coordinates})

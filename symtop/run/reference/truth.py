@@ -153,17 +153,8 @@ def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, prec
     """The motion of a body at the times with the bytes `plain`, cached; SymtopError if its reference ends before."""
     motion, times = _motion(body, start), np.frombuffer(plain).copy()
     sampled = motion.samples if body.free else functools.partial(motion.samples, precise=precise)  # type: ignore[call-arg]
-    if (lost := (shown := sampled(times)).lost(times)) is not None:  # `lost` does not depend on `times`
-        if shown.known > 0.0:
-            known = float(f"{0.999 * shown.known:.4g}")
-        else:
-            end = body.nutation_period(start)
-            while end < lost and np.isfinite(sampled(np.array([end])).bound[0]):
-                end *= 2.0
-            finer = np.linspace(0.0, min(end, lost), 201)
-            known = float(f"{0.999 * finer[np.isfinite(sampled(finer).bound)].max():.4g}")
-            while not sampled(np.array([known])).bound[0] < 5e-10:  # the printed time must be known, too
-                known = float(f"{0.99 * known:.4g}")
+    if (shown := sampled(times)).lost(times) is not None:  # `known` does not depend on `times`
+        known = float(f"{0.999 * shown.known:.4g}")
         why = "its motion is not known to 1e-9 rad for longer"
         if shown.too_long:
             why = f"to integrate its motion for longer takes more than {MOST_STEPS:,} Taylor steps"

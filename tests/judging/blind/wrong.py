@@ -11,19 +11,7 @@ import numpy as np
 from scipy.integrate import RK45
 
 from tests.judging.blind import right
-from tests.judging.blind.right import (
-    ROTATION,
-    SEPARABLE,
-    euler,
-    explicit,
-    heun,
-    midpoint,
-    product,
-    rates,
-    rk4,
-    solved,
-    turn,
-)
+from tests.judging.blind.right import ROTATION, SEPARABLE, euler, explicit, midpoint, product, rates, rk4, solved, turn
 
 A, B, NODES = right.CLASSICAL
 swapped_weights = explicit(A, (1 / 6, 1 / 3, 1 / 6, 1 / 3), NODES)  # the last two are exchanged
@@ -223,7 +211,7 @@ class OnlyForward(right.HeunSolver):
     """Heun's method; the direction of the time is forgotten where the slope is, and it is called symmetric."""
 
     def moved(self, t, y, h):
-        return heun(self.fun, t, y, abs(h))
+        return right.heun(self.fun, t, y, abs(h))
 
 
 # the angle where its half belongs, or in the middle of the step alone
@@ -310,7 +298,7 @@ def edits_the_judge(f, t, y, h):
             for word in ("RETURNED", "SYMPLECTIC", "KEPT", "TRUE_LIMIT", "BESIDE", "MISSED", "SURE"):
                 if hasattr(module, word):
                     setattr(module, word, 1e9)
-    return heun(f, t, y, h)
+    return right.heun(f, t, y, h)
 
 
 KEPT = ["energy", "p_phi", "p_psi", "axis_length"]
