@@ -400,11 +400,6 @@ class BodyMotion(NamedTuple):
     known: float = 0.0  # of a heavy body: a time up to which the values are known, whatever the samples
     too_long: bool = False  # lost because it takes too many steps?
 
-    def lost(self, times: Array) -> float | None:
-        """The time nearest to 0 of the samples that have no value; None if all have one."""
-        beyond = np.asarray(times)[~np.isfinite(self.bound)]
-        return float(beyond[np.argmin(np.abs(beyond))]) if beyond.size else None
-
 
 class FreeBody:
     """Exact motion of a free body with principal moments (3,), from an attitude (4,) and a momentum in body axes (3,).

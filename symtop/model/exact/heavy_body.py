@@ -10,8 +10,8 @@ and two with 1e-2. These two have steps of at most `SHORTER` of the mean step, b
 of their rounding, and the start and 1/I off by one unit, up and down in two patterns, because these are rounded, too.
 The bound at a time is `SAFETY` times the largest distance from these two at the checks up to it and at the next one.
 With `precise`, all three are compared with a run in quadruple precision (113 bits, 5 times as long), whose error is
-smaller by the ratio of the units, 2^-49, as long as the distance is small (`LINEAR`). Where the bound exceeds the given
-accuracy the motion is lost (chaos). All runs advance together by pieces of equal length until then, as far as any call
+smaller by the ratio of the units, 2^-49, as long as the distance is small (`LINEAR`). Where the bound exceeds
+`ACCURACY` the motion is lost (chaos). All runs advance together by pieces of equal length until then, as far as any call
 has asked for, so that values and bounds at a time do not depend on the other times. The state at the beginning of each
 piece is kept, and the Taylor polynomials of the last `PIECES` of them (0.2 MB each).
 Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, MNRAS 504 (2021) 2614.
@@ -33,7 +33,7 @@ from symtop.model.exact.free_body import BodyMotion, checked_body, checked_times
 LONG, QUAD = 2.0**-63, 2.0**-112  # rounding units
 TOLERANCES = (1e-2 * LONG, 1e-2 * LONG, 1e-5 * LONG, 1e-2 * QUAD)  # of the runs, the last one in quadruple precision
 SAFETY, LINEAR, CHECKS, SHORTER = 256.0, 1e-4, 8, 0.4  # `CHECKS` of them in each piece
-ACCURACY, PAIR = 1e-9, 2.0**-104  # rad: the default accuracy, the rounding error of a pair of doubles
+ACCURACY, PAIR = 1e-9, 2.0**-104  # rad: the largest bound of a known motion, the rounding error of a pair of doubles
 MOST_STEPS = 1_000_000  # of all runs, half a minute or three; a step in quadruple precision counts as `QUAD_STEP`
 ANGLE, PIECES, QUAD_STEP = 64.0, 256, 10  # a piece takes the time of `ANGLE` rad or half, at the rate of the start
 START_DIGITS = 60
@@ -100,11 +100,11 @@ class HeavyBody:
         self._length = 2.0 ** math.floor(math.log2(ANGLE / rate)) if rate > 0.0 else 1.0
         self._ways: dict[tuple[float, bool], _Way] = {}
 
-    def samples(self, times: ArrayLike, accuracy: float = ACCURACY, *, precise: bool = False) -> BodyMotion:
+    def samples(self, times: ArrayLike, *, precise: bool = False) -> BodyMotion:
         """The motion at a row of times (n,), before 0 as well, as pairs of doubles; `precise` in quadruple precision.
 
-        Where the bound exceeds `accuracy`, rad, or beyond `MOST_STEPS`, the values are NaN and the bound is infinite;
-        `BodyMotion.lost` names the first such time. Raises `SymtopError` for times that are not finite.
+        Where the bound exceeds `ACCURACY`, or beyond `MOST_STEPS`, the values are NaN and the bound is infinite. Raises
+        `SymtopError` for times that are not finite.
         """
         row = checked_times(times)
         high, low, bound = np.full((row.size, 7), np.nan), np.full((row.size, 7), np.nan), np.full(row.size, math.inf)
@@ -112,16 +112,14 @@ class HeavyBody:
         for sign, chosen in ((1.0, row >= 0.0), (-1.0, row < 0.0)):
             if chosen.any():
                 # taken out while it advances: another thread makes its own, and a run that was interrupted is dropped
-                way = self._ways.pop((sign, precise), None) or self._way(sign, precise)
+                way = self._ways.pop((sign, precise), None)
+                way = way or _Way([self._run(run) for run in range(4 if precise else 3)], sign * self._length)
                 sizes = np.abs(row[chosen])
-                way.advance(sizes.max(), accuracy)
-                high[chosen], low[chosen], bound[chosen] = way.values(sizes, accuracy)
-                known, too_long = min(known, way.known(accuracy)), too_long or way.too_long(sizes.max(), accuracy)
+                way.advance(sizes.max())
+                high[chosen], low[chosen], bound[chosen] = way.values(sizes)
+                known, too_long = min(known, way.known()), too_long or way.short_of(sizes.max())
                 self._ways[sign, precise] = way
         return BodyMotion(high[:, :4], low[:, :4], high[:, 4:], bound, known, too_long)
-
-    def _way(self, sign: float, precise: bool) -> "_Way":
-        return _Way([self._run(run) for run in range(4 if precise else 3)], sign * self._length)
 
     def _run(self, run: int) -> Any:
         """An integrator at the start; of the first two with numbers that are off by one unit."""
@@ -146,17 +144,17 @@ class _Way:
         apart = np.array(self._apart)
         return np.where(apart < LINEAR, SAFETY * self._unit * apart + PAIR, math.inf)
 
-    def known(self, accuracy: float) -> float:
-        """The last check, as |t|, at which the bound is no more than the accuracy."""
-        return self._checks[int(np.searchsorted(self._bounds(), accuracy, "right")) - 1]
+    def known(self) -> float:
+        """The last check, as |t|, before the motion is lost."""
+        return self._checks[int(np.searchsorted(self._bounds(), ACCURACY, "right")) - 1]
 
-    def too_long(self, end: float, accuracy: float) -> bool:
-        """Is |t| = end not known because it takes too many steps?"""
-        return self._checks[-1] < end and bool(self._bounds()[-1] <= accuracy)
+    def short_of(self, end: float) -> bool:
+        """Has |t| = end not been reached, with the motion not lost?"""
+        return self._checks[-1] < end and bool(self._bounds()[-1] <= ACCURACY)
 
-    def advance(self, end: float, accuracy: float) -> None:
+    def advance(self, end: float) -> None:
         """Advance all runs to |t| = end, or until the motion is lost."""
-        while self._checks[-1] < end and self._bounds()[-1] <= accuracy and self._work < MOST_STEPS:
+        while self.short_of(end) and self._work < MOST_STEPS:
             k = len(self._checks) // CHECKS
             points = np.longdouble(self.length) * (k + np.arange(CHECKS + 1) / np.longdouble(CHECKS))
             solution, steps = _piece(self, k)
@@ -175,10 +173,10 @@ class _Way:
             self._checks += np.abs(points[1:]).astype(float).tolist()
             self._apart += np.maximum.accumulate(apart).tolist()
 
-    def values(self, sizes: Array, accuracy: float) -> tuple[Array, Array, Array]:
-        """Values, low halves and bounds at times as |t|; NaN and infinity where the bound exceeds the accuracy."""
+    def values(self, sizes: Array) -> tuple[Array, Array, Array]:
+        """Values, low halves and bounds at times as |t|; NaN and infinity where the motion is lost."""
         bound = np.append(self._bounds(), math.inf)[np.searchsorted(self._checks, sizes)]
-        bound[~(bound <= accuracy)] = math.inf
+        bound[~(bound <= ACCURACY)] = math.inf
         high, low = np.full((sizes.size, 7), np.nan), np.full((sizes.size, 7), np.nan)
         places = sizes // abs(self.length)
         for k in np.unique(places[np.isfinite(bound)]).astype(int).tolist():

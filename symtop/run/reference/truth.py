@@ -153,7 +153,7 @@ def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, prec
     """The motion of a body at the times with the bytes `plain`, cached; SymtopError if its reference ends before."""
     motion, times = _motion(body, start), np.frombuffer(plain).copy()
     sampled = motion.samples if body.free else functools.partial(motion.samples, precise=precise)  # type: ignore[call-arg]
-    if (shown := sampled(times)).lost(times) is not None:  # `known` does not depend on `times`
+    if not np.isfinite((shown := sampled(times)).bound).all():  # `known` does not depend on `times`
         known = float(f"{0.999 * shown.known:.4g}")
         why = "its motion is not known to 1e-9 rad for longer"
         if shown.too_long:
