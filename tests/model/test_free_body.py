@@ -225,7 +225,8 @@ def test_what_is_lost_in_chaos_is_not_a_number(monkeypatch):
     assert motion.bound[~after].max() <= heavy_body.ACCURACY
     assert np.isfinite(body.samples(times[:5]).bound).all()
     assert np.isinf(body.samples(-times).bound[[0, -1]]).tolist() == [False, True]
-    assert np.array_equal(body.samples([0.0]).quaternion, [START])
+    assert np.array_equal(HeavyBody(BRICK, WEIGHT, START, MOMENTUM).samples([0.0]).quaternion, [START])
+    assert HeavyBody(BRICK, (0.0, 0.0, -1e9), (1, 0, 0, 0), (0, 0, 0)).samples([1e9]).bound < 1e-15  # in long pieces
     monkeypatch.setattr(heavy_body, "ACCURACY", 1e-13)
     assert times[np.isinf(body.samples(times).bound)].min() < lost
 
@@ -266,6 +267,7 @@ NOWHERE = (0.0, 0.0, 0.0, 0.0)
     (lambda: FreeBody(BRICK, START, (1e-101, 2, 3)), "1e-100"),
     (lambda: FreeBody((1e-31, 2.0, 2.5), START, MOMENTUM), "1e-30"),
     (lambda: HeavyBody(BRICK, (0.0, math.inf, 1.0), START, MOMENTUM), "weight must be 3 finite numbers"),
+    (lambda: HeavyBody(BRICK, (0.0, 1e101, 1.0), START, MOMENTUM), "of at most 1e100"),
     (lambda: HeavyBody(BRICK, WEIGHT, NOWHERE, MOMENTUM), "which names no attitude"),
 ])  # fmt: skip
 def test_numbers_that_are_no_body_are_refused(make, words):

@@ -11,9 +11,9 @@ of their rounding, and the start and 1/I off by one unit, up and down in two pat
 The bound at a time is `SAFETY` times the largest distance from these two at the checks up to it and at the next one.
 With `precise`, all three are compared with a run in quadruple precision (113 bits, 5 times as long), whose error is
 smaller by the ratio of the units, 2^-49, as long as the distance is small (`LINEAR`). Where the bound exceeds
-`ACCURACY` the motion is lost (chaos). All runs advance together by pieces of equal length until then, as far as any call
-has asked for, so that values and bounds at a time do not depend on the other times. The state at the beginning of each
-piece is kept, and the Taylor polynomials of the last `PIECES` of them (0.2 MB each).
+`ACCURACY` the motion is lost (chaos). All runs advance together until then, as far as any call has asked for, by pieces
+whose length depends on the motion alone, so that values and bounds at a time do not depend on the other times. The
+state at the beginning of each piece is kept, and the Taylor polynomials of the last `PIECES` of them (0.2 MB each).
 Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, MNRAS 504 (2021) 2614.
 """
 
@@ -35,7 +35,9 @@ TOLERANCES = (1e-2 * LONG, 1e-2 * LONG, 1e-5 * LONG, 1e-2 * QUAD)  # of the runs
 SAFETY, LINEAR, CHECKS, SHORTER = 256.0, 1e-4, 8, 0.4  # `CHECKS` of them in each piece
 ACCURACY, PAIR = 1e-9, 2.0**-104  # rad: the largest bound of a known motion, the rounding error of a pair of doubles
 MOST_STEPS = 1_000_000  # of all runs, half a minute or three; a step in quadruple precision counts as `QUAD_STEP`
-ANGLE, PIECES, QUAD_STEP = 64.0, 256, 10  # a piece takes the time of `ANGLE` rad or half, at the rate of the start
+PIECES, QUAD_STEP = 256, 10
+ANGLE = 64.0  # rad: the first piece takes the time of it or of half, at the rate of the start
+FEW, MANY = 16, 128  # steps of a piece: after fewer the next one is twice as long, after more half
 START_DIGITS = 60
 
 
@@ -82,8 +84,8 @@ class HeavyBody:
     ) -> None:  # fmt: skip
         row = checked_body(inertia, quaternion, momentum_body, momentum_lo).tolist()
         heavy = real_numbers("weight", weight)
-        if heavy.shape != (3,) or not np.isfinite(heavy).all():
-            raise SymtopError(f"weight must be 3 finite numbers, not {weight!r}")
+        if heavy.shape != (3,) or not (np.abs(heavy) <= 1e100).all():
+            raise SymtopError(f"weight must be 3 finite numbers of at most 1e100, not {weight!r}")
         try:
             import heyoka  # noqa: F401
         except ImportError:
@@ -96,8 +98,8 @@ class HeavyBody:
         self._numbers = [*state, *(1 / mp.mpf(value) for value in row[:3]), *map(mp.mpf, heavy.tolist())]
         self._digits = lambda value: mp.nstr(value, 50)
         turning, falling = np.divide(row[7:10], row[:3]), np.hypot(np.roll(heavy, 1), np.roll(heavy, 2)) / row[:3]
-        rate = float(np.linalg.norm(turning) + np.sqrt(falling.max()))
-        self._length = 2.0 ** math.floor(math.log2(ANGLE / rate)) if rate > 0.0 else 1.0
+        rate = float(np.clip(np.linalg.norm(turning) + np.sqrt(falling.max()), 1e-300, 1e300))  # also of a body at rest
+        self._length = 2.0 ** math.floor(math.log2(ANGLE / rate))
         self._ways: dict[tuple[float, bool], _Way] = {}
 
     def samples(self, times: ArrayLike, *, precise: bool = False) -> BodyMotion:
@@ -136,29 +138,26 @@ class _Way:
 
     def __init__(self, runs: list[Any], length: float) -> None:
         *self._others, self.main = runs
-        self.length, self._unit = length, QUAD / LONG if len(runs) == 4 else 1.0
-        self.states, self._work = [self.main.state.copy()], 0  # at the beginning of each piece
-        self._checks, self._apart = [0.0], [LONG]  # |t|, rad
-
-    def _bounds(self) -> Array:
-        apart = np.array(self._apart)
-        return np.where(apart < LINEAR, SAFETY * self._unit * apart + PAIR, math.inf)
+        self._length, self._unit, self._work = length, QUAD / LONG if len(runs) == 4 else 1.0, 0
+        self.ends, self.states = [0.0], [self.main.state.copy()]  # the times between the pieces, and the states there
+        self._checks, self._bounds = [0.0], [SAFETY * self._unit * LONG + PAIR]  # |t|, rad
 
     def known(self) -> float:
         """The last check, as |t|, before the motion is lost."""
-        return self._checks[int(np.searchsorted(self._bounds(), ACCURACY, "right")) - 1]
+        return self._checks[int(np.searchsorted(self._bounds, ACCURACY, "right")) - 1]
 
     def short_of(self, end: float) -> bool:
         """Has |t| = end not been reached, with the motion not lost?"""
-        return self._checks[-1] < end and bool(self._bounds()[-1] <= ACCURACY)
+        return self._checks[-1] < end and self._bounds[-1] <= ACCURACY
 
     def advance(self, end: float) -> None:
         """Advance all runs to |t| = end, or until the motion is lost."""
-        while self.short_of(end) and self._work < MOST_STEPS:
-            k = len(self._checks) // CHECKS
-            points = np.longdouble(self.length) * (k + np.arange(CHECKS + 1) / np.longdouble(CHECKS))
-            solution, steps = _piece(self, k)
-            longest = SHORTER * abs(self.length) / steps
+        while len(self.ends) == 1 or (self.short_of(end) and self._work < MOST_STEPS):
+            self.ends.append(self.ends[-1] + self._length)
+            began, ended = np.array(self.ends[-2:], np.longdouble)
+            points = np.linspace(began, ended, CHECKS + 1)
+            solution, steps = _piece(self, len(self.ends) - 2)
+            longest = SHORTER * abs(self._length) / steps
             self._work += steps * (QUAD_STEP if len(self._others) == 3 else 1)
             value, rest = _halves(solution(_row(self.main, points)))
             gaps = []
@@ -169,28 +168,29 @@ class _Way:
                 other, less = _halves(states)
                 gaps.append(((other - value) + (less - rest))[1:, :4])
             apart = 2.0 * np.sqrt(np.square(gaps).sum(axis=2).max(axis=0))
-            apart = np.where(np.isnan(apart), math.inf, np.maximum(apart, self._apart[-1]))
+            bounds = np.where(apart < LINEAR, SAFETY * self._unit * apart + PAIR, math.inf)
             self._checks += np.abs(points[1:]).astype(float).tolist()
-            self._apart += np.maximum.accumulate(apart).tolist()
+            self._bounds += np.maximum.accumulate([self._bounds[-1], *bounds])[1:].tolist()
+            self._length *= 2.0 if steps < FEW else 0.5 if steps > MANY else 1.0
 
     def values(self, sizes: Array) -> tuple[Array, Array, Array]:
         """Values, low halves and bounds at times as |t|; NaN and infinity where the motion is lost."""
-        bound = np.append(self._bounds(), math.inf)[np.searchsorted(self._checks, sizes)]
+        bound = np.append(self._bounds, math.inf)[np.searchsorted(self._checks, sizes)]
         bound[~(bound <= ACCURACY)] = math.inf
         high, low = np.full((sizes.size, 7), np.nan), np.full((sizes.size, 7), np.nan)
-        places = sizes // abs(self.length)
-        for k in np.unique(places[np.isfinite(bound)]).astype(int).tolist():
+        places = np.maximum(np.searchsorted(np.abs(self.ends), sizes) - 1, 0)
+        for k in np.unique(places[np.isfinite(bound)]).tolist():
             here = np.isfinite(bound) & (places == k)
             solution, _ = _piece(self, k)
-            high[here], low[here] = _halves(solution(_row(self.main, np.copysign(sizes[here], self.length))))
+            high[here], low[here] = _halves(solution(_row(self.main, np.copysign(sizes[here], self._length))))
         return high, low, bound
 
 
 @functools.lru_cache(maxsize=PIECES)
 def _piece(way: _Way, k: int) -> tuple[Any, int]:
-    """The solution of a way from k to k + 1 lengths, as a function of a row of times, and its steps."""
+    """The solution of a way in its piece k, as a function of a row of times, and its steps."""
     main = way.main
-    main.time, end = _row(main, [k * way.length, (k + 1) * way.length])
+    main.time, end = _row(main, way.ends[k : k + 2])
     main.state[:] = way.states[k]
     _, _, _, steps, solution, _ = main.propagate_until(end, c_output=True, callback=_heard)
     if len(way.states) == k + 1:
