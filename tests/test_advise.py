@@ -413,7 +413,7 @@ def test_a_body_is_answered_with_a_method_of_its_chart():
     assert (symtop.integrator(heavy.integrator).needs, (heavy.step_size, heavy.closed_form)) == ("kicks", (0.02, ""))
     assert symtop.recommend("tennis-racket", accuracy=1e-3, needs="this-top").integrator is None
     for wrong, words in (
-        ({"horizon": 72.0}, "horizon must be at most 46"), ({"quantity": "p_psi"}, "quantity 'p_psi' is unknown"),
+        ({"horizon": 72.0}, "horizon must be at most 47"), ({"quantity": "p_psi"}, "quantity 'p_psi' is unknown"),
         ({"keeps": "momenta"}, "keeps 'momenta' is unknown"), ({"accuracy": 4.0}, "accuracy must be below pi"),
     ):  # fmt: skip
         with pytest.raises(symtop.SymtopError, match=words):
