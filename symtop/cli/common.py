@@ -326,10 +326,8 @@ def check_outputs(**files: str | None) -> None:
             if path.suffix.lower() in TEXT:
                 raise SymtopError(f"{option} is written as netCDF, such as run.nc, not as {file!r}")
             errors.check_replaceable(path)
-        try:
+        with errors.writing(file):
             tempfile.TemporaryFile(dir=path.parent).close()
-        except OSError as error:
-            raise SymtopError(f"cannot write {file}: {error.strerror or error}") from error
         if (other := options.setdefault(path.resolve(), option)) != option:
             raise SymtopError(f"{other} and {option} must be two files, not both {file!r}")
 

@@ -106,17 +106,23 @@ def file_path(name: str, value: object) -> Path:
     raise SymtopError(f"{name} must be the name of a file, not {shown(value)[:SHOWN]}", name)
 
 
+@contextlib.contextmanager
+def writing(path: str | Path) -> Iterator[None]:
+    """Turn an OSError of the block into a SymtopError that `path` cannot be written, with the system's reason."""
+    try:
+        yield
+    except OSError as error:
+        raise SymtopError(f"cannot write {path}: {error.strerror or error}") from error
+
+
 def check_replaceable(path: Path) -> None:
     """Raise SymtopError if `path` exists and is no netCDF file, but a script, a device or a folder."""
     if path.is_dir():
         raise SymtopError(f"cannot write {path}: it is a folder")
     head = b""
     if path.is_file():
-        try:
-            with path.open("rb") as file:
-                head = file.read(4)
-        except OSError as error:
-            raise SymtopError(f"cannot write {path}: {error.strerror or error}") from error
+        with writing(path), path.open("rb") as file:
+            head = file.read(4)
     if path.exists() and not head.startswith(MAGIC):
         raise SymtopError(f"cannot write {path}: it is there, and no netCDF file; remove it or name another path")
 
