@@ -250,19 +250,19 @@ def _runs(ledger: Ledger) -> str:
     """The steps per nutation and the lengths of the runs, and the steps that failed; empty for a trajectory."""
     traces, words, of_body = ledger.traces, [], ledger.about.chart == "body"
     period = "natural period" if of_body else "nutation"
-    if "steps_run" in traces and (steps := float(traces["steps_run"])):
-        periods = float(traces["nutations_run"])
-        length = f"{steps:.0f} steps over {periods:.3g} {period}s ({steps / periods:.0f} a {period})"
-        scales = "kinetic one of the start and |mgl|, of the momentum to |L|"
-        scales = scales if of_body else "nutation's, of momenta to the larger one"
-        words += [f"{length} for the constants", f"changes of the energy are relative to the {scales}"]
     ladder = ledger.about.nutation / np.asarray(traces.get("step_size", []))  # NaN where no run was made
     if np.isfinite(ladder).any():
         failed = ladder[np.isnan(traces["error"]) & np.isfinite(ladder)]
         fails = f" ({failed.max():.0f} and fewer fail)" if failed.size else ""
         one = ledger.about.nutation / traces.get("structure_step", math.nan)
         structure = f", {one:.1f} for the structure" if math.isfinite(one) else ""
-        tries = f"{np.nanmin(ladder):.0f} to {np.nanmax(ladder):.0f} steps a {period} for the order{fails}{structure}"
-        words.insert(0, tries)
+        span = f"{np.nanmin(ladder):.0f} to {np.nanmax(ladder):.0f}"
+        words.append(f"{span} steps a {period} for the order{fails}{structure}")
+    if "steps_run" in traces and (steps := float(traces["steps_run"])):
+        periods = float(traces["nutations_run"])
+        length = f"{steps:.0f} steps over {periods:.3g} {period}s ({steps / periods:.0f} a {period})"
+        scales = "kinetic one of the start and |mgl|, of the momentum to |L|"
+        scales = scales if of_body else "nutation's, of momenta to the larger one"
+        words += [f"{length} for the constants", f"changes of the energy are relative to the {scales}"]
     joined = ";\n    ".join(words)
     return f"Its runs: {joined}.\n" if words else ""

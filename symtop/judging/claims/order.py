@@ -264,7 +264,7 @@ def _by_steps(subject: Subject) -> Finding:
     slopes = f"slopes {slopes} on {fitted.scene}" if slopes else "no slope"
     power = method.order or 1
     # if a step certainly has the motion's terms up to h^power, its runs converge to the motion
-    follows = series and series.order >= max(power, 1) and float(series.noise[1]) < CLEAR
+    follows = series and series.order >= power and float(series.noise[1]) < CLEAR
     settled = measured or conditioning(scene, SHARE * scene.time_scale()) > UNSTABLE
     height = math.sin(generic_start(scene).theta)
     pole = height if height <= APART else 1.0  # near a pole, a state in angles has an error of 2e-16 over the square
