@@ -1,8 +1,4 @@
-"""Errors of the user and errors of other people's code, each as one sentence.
-
-Within `foreign_code`, around a call of a plug-in's solver or a user's study, whatever is raised becomes a SymtopError,
-also what is no `Exception`; the exceptions of Ctrl-C and SIGTERM pass unchanged.
-"""
+"""Errors of the user and errors of other people's code, each as one sentence."""
 
 import contextlib
 import difflib
@@ -18,6 +14,9 @@ LONGEST_PART = 255  # bytes of a name in a folder
 SHOWN = 80  # characters of a name that are shown
 ENTRY = "an entry of "  # stands before the name of a row in messages about one of its entries
 MAGIC = (b"\x89HDF", b"CDF")  # the first bytes of netCDF files
+LONGEST = 300  # characters that are shown of the message of an error or a process
+_COMPILING = "(step: nopython frontend)"  # numba's text before each cause, from the loop inwards; the last is the cause
+_TRACE = r",? (?:defined at |raised from |File \"|During: |There are \d+ candidate)"  # what follows a cause
 
 
 class SymtopError(ValueError):
@@ -164,11 +163,6 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     raise error
 
 
-LONGEST = 300  # characters that are shown of the message of an error or a process
-_COMPILING = "(step: nopython frontend)"  # numba's text before each cause, from the loop inwards; the last is the cause
-_TRACE = r",? (?:defined at |raised from |File \"|During: |There are \d+ candidate)"  # what follows a cause
-
-
 def words_of(error: BaseException) -> str:
     """The type and the message of an error, in one line."""
     try:
@@ -189,7 +183,10 @@ def last_words(output: bytes) -> str:
 
 @contextlib.contextmanager
 def foreign_code(what: str, kind: type[SymtopError] = SymtopError) -> Iterator[None]:
-    """Turn whatever the block raises into an error of that kind, "`what` failed: ..."; one of that kind passes."""
+    """Turn whatever the block raises into an error of that kind, "`what` failed: ..."; one of that kind passes.
+
+    Also what is no `Exception`, but for those of Ctrl-C and SIGTERM, which pass.
+    """
     try:
         yield
     except BaseException as error:
