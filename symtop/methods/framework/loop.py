@@ -62,22 +62,10 @@ class March(NamedTuple):
     outcome: int  # index into OUTCOMES
 
 
-@register_jitable
-def no_carry(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """`begin` of a kernel that reuses nothing; one number, as numba cannot type the entries of an empty tuple."""
-    return (0.0,)
-
-
-@register_jitable
-def as_given(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """`enter` of a kernel that steps the start as it is."""
-    return state
-
-
-@register_jitable
-def as_stepped(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """`present` of a kernel whose state is shown as it is."""
-    return state
+# `begin` of a kernel that reuses nothing: one number, as numba cannot type the entries of an empty tuple
+no_carry = register_jitable(lambda _par, _rule, _state, _h: (0.0,))
+as_given = register_jitable(lambda _par, _rule, state, _h: state)  # `enter` of a kernel that steps the start itself
+as_stepped = register_jitable(lambda _par, _rule, state, _k, _h: state)  # `present` of one that shows its state
 
 
 @dataclass(frozen=True)

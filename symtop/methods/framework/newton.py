@@ -94,6 +94,8 @@ def newton_loop(  # noqa: C901  (the loops of one step, read in one piece)
     is a compile-time constant of the kernel, so that a branch on it alone does not stop vectorisation.
     """
     rest = carry - newest
+    for function in (constants, start, equation, predict, evaluate, correct, restart, keep, close):
+        register_jitable(function)
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
         equations = equation(par, rule, state, constants(par, h), start(par, rule, state[0]))
