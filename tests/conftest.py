@@ -141,7 +141,7 @@ def truth() -> dict:
 
 def late(*sets, mark="quick"):
     """Parameters of a test that take long or compile much: `make test` takes them up after `make quick` alone."""
-    return [pytest.param(*(one if isinstance(one, tuple) else (one,)), marks=mark) for one in sets]
+    return [pytest.param(*(one if isinstance(one, tuple) else [one]), marks=getattr(pytest.mark, mark)) for one in sets]
 
 
 def random_scenes(count: int, seed: int) -> list[Scene]:
