@@ -30,7 +30,7 @@ from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.body import turned, turned_back
-from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
+from symtop.methods.framework.lanes import Lanes, W, column, move, none_left, put, reading, showing
 from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import BareTop, Preparation, Presentation, as_it_steps
@@ -138,7 +138,7 @@ def inertia(par: Any, e: Any, x: Any) -> Any:
 
 
 SIZE = len(STILL)
-LOW, STEP, FLAG, WORK, CARRY = SIZE, 2 * SIZE, 3 * SIZE, 3 * SIZE + 1, 3 * SIZE + 2
+STEP, FLAG, WORK, CARRY = 2 * SIZE, 3 * SIZE, 3 * SIZE + 1, 3 * SIZE + 2
 
 
 @register_jitable
@@ -179,11 +179,9 @@ def stepped(
         for share in range((len(table) // W - shares_at) // each):
             part(block, table, table[(shares_at + share * each) * W :])
         for j in range(W):
-            state, step = column(block, 0, j, STILL), column(block, STEP, j, STILL)
+            step = column(block, STEP, j, STILL)
             give_up(block, j, ended_space(step) != OK)
-            moved, low = accumulate(state, column(block, LOW, j, STILL), step)
-            put(block, 0, j, moved)
-            put(block, LOW, j, low)
+            move(accumulate, block, SIZE, j, step)
 
     def size(rule: Any) -> int:
         return fields + each * len(rule.shares)

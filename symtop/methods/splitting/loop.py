@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.core.jit import register_jitable, to_fixed_tuple
-from symtop.methods.framework.lanes import Lanes, W, column, put
+from symtop.methods.framework.lanes import Lanes, W, column, move, put
 from symtop.methods.framework.plan import OK
 from symtop.methods.simd import times, wide_vectors, with_item
 from symtop.methods.vectors import accumulate, zero
@@ -191,10 +191,7 @@ def composed(
         par = top(*column(table, 0, j, numbers))
         step = kick(par, column(block, force_at, j, none), step, row[j], row[W + j])
         block[flag * W + j] = block[flag * W + j] if ended(state, step) == OK else 1.0
-        moved, low = accumulate(state[:still_at], column(block, dimension, j, moving), step[:still_at])
-        put(block, 0, j, moved)
-        put(block, dimension, j, low)
-        put(block, step_at, j, step[:still_at])
+        move(accumulate, block, dimension, j, step[:still_at])
         for i in range(still):
             block[(still_at + i) * W + j] = state[still_at + i] + 0.0
 
