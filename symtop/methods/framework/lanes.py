@@ -54,6 +54,7 @@ from symtop.core.jit import compile_kernel, register_jitable, set_item, to_fixed
 from symtop.core.parallel import heed
 from symtop.methods.framework.angles import in_chart
 from symtop.methods.framework.plan import OK, Array
+from symtop.methods.framework.preparation import Preparation
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 from symtop.model.body import from_flat
@@ -122,13 +123,12 @@ class Lanes:
                 register_jitable(part)
 
 
-def preparing(
-    lanes: Lanes, begin: Any, enter: Any, kind: Any, numbers: Any, scale: Any, opened: Any, momenta_at: Any, width: int
-) -> Any:
+def preparing(lanes: Lanes, begin: Any, enter: Any, kind: Any, scale: Any, prepare: Preparation) -> Any:
     """The compiled preparation of many members: the initial numbers of `block` and `table`, one row a member."""
-    lay, begin = lanes.lay, lanes.begin or begin
+    lay, begin, width = lanes.lay, lanes.begin or begin, prepare.given
+    numbers, opened, momenta_at = prepare.numbers, prepare.opened, prepare.momenta
 
-    def prepare(chosen, given, coefficients, h, marks, prepared, momenta):  # type: ignore[no-untyped-def]
+    def fill(chosen, given, coefficients, h, marks, prepared, momenta):  # type: ignore[no-untyped-def]
         tops, rules, starts, carries = prepared
         for i in range(len(chosen)):
             m = chosen[i]
@@ -147,7 +147,7 @@ def preparing(
             if marks[m, 0] == 0:
                 momenta[m, 0, 0], momenta[m, 0, 1] = momenta_at(top, start)
 
-    return compile_kernel(prepare)
+    return compile_kernel(fill)
 
 
 @functools.cache

@@ -499,12 +499,8 @@ def _loop(  # noqa: C901
     return Loop(begin, increment, observe, lanes=in_lanes)
 
 
-@register_jitable
-def _unsolved(field: Any, par: Any, state: Any, work: Any, stages: int) -> Any:
-    """`solve` of a loop without Newton's iteration: no iterations, not converged."""
-    return 0, False
-
-
+# `solve` of a loop without Newton's iteration: no iterations, not converged
+_unsolved = register_jitable(lambda _field, _par, _state, _work, _stages: (0, False))
 march_axis, march_frame = _loop(field_axis, 6), _loop(field_frame, 9)
 march_body = _loop(body.field_body, 7, 4, -1, _unit_of_body, _unsolved, body.observe_body)
 

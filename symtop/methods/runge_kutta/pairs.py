@@ -69,10 +69,7 @@ def rms(vector: Any, state: Any, other: Any, tolerance: float) -> float:
     return math.sqrt(total / len(vector))
 
 
-@register_jitable
-def nothing_more(par: Any, state: Any, slopes: Any, h: float) -> int:
-    """Samples need no further evaluations."""
-    return 0
+nothing_more = register_jitable(lambda _par, _state, _slopes, _h: 0)  # `refine` where samples need no evaluations
 
 
 def trying(attempt: Callable[..., Any], cost: int, power: float) -> Any:
@@ -195,9 +192,7 @@ def integrator(name: str, summary: str, reference: str, method: Any, rows: int, 
     )  # fmt: skip
 
 
-@register_jitable
-def _forget(slopes: Any, i: int, slope: Any) -> None:
-    """`keep` for slopes that are not used again: does nothing."""
+_forget = register_jitable(lambda _slopes, _i, _slope: None)  # `keep` for slopes that are not used again
 
 
 def combination(weights: Sequence[float]) -> Any:

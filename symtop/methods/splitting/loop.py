@@ -155,9 +155,7 @@ def read(numbers: Any) -> Any:
     return Stages(numbers[2:last:3], numbers[0:last:3], numbers[1:last:3], 0, 0, numbers[last])
 
 
-@register_jitable
-def no_rest(block: Any, row: Any, table: Any) -> None:
-    """`rest` of a drift that is one loop over lanes: nothing."""
+no_rest = register_jitable(lambda _block, _row, _table: None)  # `rest` of a drift that is one loop over lanes
 
 
 def composed(
@@ -175,6 +173,8 @@ def composed(
     moving, unmoved = zeros[: dimension - still], zeros[dimension - still :]
     coefficients, step_at, flag, still_at = len(numbers), 2 * dimension, 3 * dimension, len(moving)
     force_at = flag + 2
+    for part in (force, kick, drift, ended):
+        register_jitable(part)
 
     @register_jitable
     def stage(block, row, table, step, j):  # type: ignore[no-untyped-def]
