@@ -173,14 +173,14 @@ kernel_loop = Loop  # its public name
 
 @functools.cache
 def whole_run(
-    loop: Loop, sample: Callable[..., Any], kind: Callable[..., Any], numbers: Callable[..., Any],
-    scale: Callable[..., Any], opened: Callable[..., Any], momenta_at: Callable[..., Any],
-) -> Callable[..., tuple[int, int, int]]:  # fmt: skip
+    loop: Loop, sample: Callable[..., Any], kind: Callable[..., Any], scale: Callable[..., Any], prepare: Preparation
+) -> Callable[..., tuple[int, int, int]]:
     """A run in one compiled call, from plain numbers (`preparation`) to filled arrays.
 
     ``run(plain, coefficients, h, marks, states, momenta)``, with momenta (2, samples), returns steps, work and outcome.
     """
     begin, enter, march = loop.begin, loop.enter, register_jitable(loop.marching(sample))
+    numbers, opened, momenta_at = prepare.numbers, prepare.opened, prepare.momenta
 
     def run(plain, coefficients, h, marks, states, momenta):  # type: ignore[no-untyped-def]
         top, at = opened(plain)
@@ -332,13 +332,12 @@ class FixedStep:
         if not isinstance(rule, tuple) or not rule:  # a function of Python, or numbers in an array
             return None
         kind, numbers = pack(rule)
-        parts = prepare.numbers, scale, prepare.opened, prepare.momenta
-        run = whole_run(loop, sample, kind, *parts)
+        run = whole_run(loop, sample, kind, scale, prepare)
         alone = run, numbers, prepare.check, size, self.evaluations, self.each_step, int(self.implicit)
         if (lanes := loop.lanes(rule)) is None:
             return _Whole(alone, None, (rule, numbers))
         show = lanes.show or many.showing(sample)
-        return _Whole(alone, partial(blocks_of, loop, lanes, show, kind, *parts, prepare.given), (rule, numbers))
+        return _Whole(alone, partial(blocks_of, loop, lanes, show, kind, scale, prepare), (rule, numbers))
 
 
 def inside(solver: Solver | None) -> FixedStep | None:

@@ -30,13 +30,13 @@ from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.body import turned, turned_back
-from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
+from symtop.methods.framework.lanes import Lanes, W, column, move, none_left, put, reading, showing
 from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import BareTop, Preparation, Presentation, as_it_steps
 from symtop.methods.framework.space import SpaceTop, axis_of, ended_space, observe_attitude, on_attitude, with_spin
 from symtop.methods.simd import wide_vectors
-from symtop.methods.vectors import accumulate, cross, dot, plus, scaled, summed
+from symtop.methods.vectors import accumulate, displaced, dot, plus, scaled, summed
 from symtop.model.charts import BODY
 
 _attitude_numbers = on_attitude.numbers
@@ -69,8 +69,7 @@ def gravity(par: Any, e: Any) -> Any:
 @register_jitable
 def moved(m: float, v: Any, x: Any) -> Any:
     """How far the rotation p = (1 + m, v) moves a vector: p x p* - x."""
-    c = cross(v, x)
-    return scaled(2.0, plus(cross(v, c), 1.0 + m, c))
+    return displaced((1.0 + m, v[0], v[1], v[2]), x)
 
 
 @register_jitable
@@ -138,7 +137,7 @@ def inertia(par: Any, e: Any, x: Any) -> Any:
 
 
 SIZE = len(STILL)
-LOW, STEP, FLAG, WORK, CARRY = SIZE, 2 * SIZE, 3 * SIZE, 3 * SIZE + 1, 3 * SIZE + 2
+STEP, FLAG, WORK, CARRY = 2 * SIZE, 3 * SIZE, 3 * SIZE + 1, 3 * SIZE + 2
 
 
 @register_jitable
@@ -179,11 +178,9 @@ def stepped(
         for share in range((len(table) // W - shares_at) // each):
             part(block, table, table[(shares_at + share * each) * W :])
         for j in range(W):
-            state, step = column(block, 0, j, STILL), column(block, STEP, j, STILL)
+            step = column(block, STEP, j, STILL)
             give_up(block, j, ended_space(step) != OK)
-            moved, low = accumulate(state, column(block, LOW, j, STILL), step)
-            put(block, 0, j, moved)
-            put(block, LOW, j, low)
+            move(accumulate, block, SIZE, j, step)
 
     def size(rule: Any) -> int:
         return fields + each * len(rule.shares)
