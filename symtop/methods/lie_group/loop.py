@@ -30,7 +30,7 @@ from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.body import turned, turned_back
-from symtop.methods.framework.lanes import Lanes, W, column, move, none_left, put, reading, showing
+from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
 from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.preparation import BareTop, Preparation, Presentation, as_it_steps
@@ -137,7 +137,7 @@ def inertia(par: Any, e: Any, x: Any) -> Any:
 
 
 SIZE = len(STILL)
-STEP, FLAG, WORK, CARRY = 2 * SIZE, 3 * SIZE, 3 * SIZE + 1, 3 * SIZE + 2
+LOW, STEP, FLAG, WORK, CARRY = SIZE, 2 * SIZE, 3 * SIZE, 3 * SIZE + 1, 3 * SIZE + 2
 
 
 @register_jitable
@@ -178,9 +178,11 @@ def stepped(
         for share in range((len(table) // W - shares_at) // each):
             part(block, table, table[(shares_at + share * each) * W :])
         for j in range(W):
-            step = column(block, STEP, j, STILL)
+            state, step = column(block, 0, j, STILL), column(block, STEP, j, STILL)
             give_up(block, j, ended_space(step) != OK)
-            move(accumulate, block, SIZE, j, step)
+            moved, low = accumulate(state, column(block, LOW, j, STILL), step)  # `move` takes a fifth longer here
+            put(block, 0, j, moved)
+            put(block, LOW, j, low)
 
     def size(rule: Any) -> int:
         return fields + each * len(rule.shares)
