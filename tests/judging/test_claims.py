@@ -368,6 +368,13 @@ def test_a_liar_is_caught_for_the_right_reason(liar, clean_registry):
     assert refuted <= {claim} | FOLLOWS.get(liar, set())
 
 
+def test_a_chart_in_which_a_method_raises_hides_no_finding_of_another():
+    axis = symtop.integrator("rk4").solvers["axis"]
+    false = Mock(side_effect=lambda *run: axis(*run)._replace(p_phi=np.arange(len(run[2].times))))
+    method = dataclasses.replace(integrator("rk4"), solvers={"axis": false, "attitude": Mock(side_effect=ValueError)})
+    assert judge(method, SPHEROID, quick=True)["reported"].verdict == "refuted"
+
+
 HONEST = ["midpoint", "stormer-verlet", "strang", "cayley", "rk4", "gauss-4", "takahashi-imada", "yoshida-4", "gauss-2",
           "galerkin-simpson", "trapezoidal", "chin-4a", "srkn-6-4", "suzuki-4", "rk45-compiled", "gauss-6", "srkn-11-6",
           "midpoint-unreduced", "cayley-tuned", "aba-8-6-4", "dop853-compiled-fixed", "tsit5-fixed"]  # fmt: skip

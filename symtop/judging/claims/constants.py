@@ -330,12 +330,12 @@ def measure(subject: Subject) -> list[Finding]:
         for k, one in enumerate(findings):  # name the chart in the reason
             if one.verdict != "inapplicable" and not one.why.endswith(" chart"):
                 findings[k] = one._replace(why=f"{one.why}, in the {chart} chart")
-        by_chart.append(findings)
+        by_chart.append({one.claim: one for one in findings})
     if runs:
         run = min(runs, key=lambda run: run.steps)
         length = {"steps_run": np.array(run.steps), "nutations_run": np.array(run.nutations)}
         subject.traces.update(length, long_nutations=run.energy[0], energy_change=run.energy[1])
-    return [max(findings, key=_badness) for findings in zip(*by_chart, strict=True)]
+    return [max((findings[claim] for findings in by_chart), key=_badness) for claim in by_chart[0]]
 
 
 def of_run(method: Integrator, run: LongRun) -> list[Finding]:
