@@ -73,6 +73,14 @@ def _on_axis(top: Any, at: Any) -> Any:
     return _numbers(top, at), (*e_at(at), *L_at(top, at))
 
 
+def _on_attitude(top: Any, at: Any) -> Any:
+    return _numbers(top, at), (*q_at(at), *L_at(top, at))
+
+
+def _on_state(top: Any, at: Any) -> Any:
+    return AttitudeTop(top.I1, top.mgl, 1.0 / top.I3 - 1.0 / top.I1), (*q_at(at), *L_at(top, at))
+
+
 def _on_frame(top: Any, at: Any) -> Any:
     """a is the body's first axis."""
     w, x, y, z = q_at(at)
@@ -80,11 +88,8 @@ def _on_frame(top: Any, at: Any) -> Any:
     return par, (*state, w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
 
 
-on_axis, on_frame = Preparation(_on_axis, 6), Preparation(_on_frame, 9)
-on_attitude = Preparation(lambda top, at: (_numbers(top, at), (*q_at(at), *L_at(top, at))), 7)
-on_state = Preparation(
-    lambda top, at: (AttitudeTop(top.I1, top.mgl, 1.0 / top.I3 - 1.0 / top.I1), (*q_at(at), *L_at(top, at))), 7
-)
+on_axis, on_attitude, on_frame = Preparation(_on_axis, 6), Preparation(_on_attitude, 7), Preparation(_on_frame, 9)
+on_state = Preparation(_on_state, 7)
 
 
 @register_jitable
