@@ -48,7 +48,6 @@ from symtop.model.scenes import Scene, horizon_of
 from symtop.run.guard import MOST_STEPS
 from symtop.run.plugins import loaded
 
-KNOWN_QUANTITIES = (*QUANTITIES, *FREQUENCIES)
 THIS_TOP = ("this-top", "solution")  # needs of methods that are only named in addition, unless the user asks for them
 OF_ANY = tuple(need for need in NEEDS if need not in THIS_TOP)  # needs of methods that may be recommended by default
 COMMA = re.compile(r",\s*(?![^(]*\))")  # a comma between words of `NEEDS`, not that in f(t, y)
@@ -66,7 +65,6 @@ CONFIDENCE = {
     "at the reference's limit": "measured to the end, as far as the reference can tell",
     "extrapolated": "extrapolated from a short run",
 }
-MISSES_AT_STEP = "Not accurate enough at this step, each with its error"
 LEAD = 1.05  # least ratio of times with which the closed form is called the fastest way
 CLOSE = 0.85  # a search for a finalist ends at an error between this part of the target and the target
 ROUNDS = 15  # of timing, for finalists
@@ -195,7 +193,7 @@ def recommend(
     quantity = ("attitude" if scene.of_body else "axis") if quantity is None else quantity
     allowed = _needs(_words(needs))
     accuracy = positive("accuracy", accuracy)
-    one_of("quantity", quantity, settings.OF_BODY if scene.of_body else KNOWN_QUANTITIES)
+    one_of("quantity", quantity, settings.OF_BODY if scene.of_body else (*QUANTITIES, *FREQUENCIES))
     if quantity in settings.ANGLES and accuracy >= math.pi:
         raise SymtopError(f"accuracy must be below pi, beyond which every angle is right, not {accuracy!r}", "accuracy")
     horizon = scene.horizon if horizon is None else horizon_of(horizon)
@@ -230,7 +228,7 @@ def recommend(
     if own := [one.name for one in every if one.implementation == "python" and not is_built_in(one.name)]:
         fails["Not tried, as only compiled methods are timed"] = own
     errors = [f"{name} {error:.2e}" for name, error in sorted(search.errors_at_step.items(), key=lambda one: one[1])]
-    fails = {MISSES_AT_STEP: errors} | fails if errors else fails
+    fails = ({"Not accurate enough at this step, each with its error": errors} if errors else {}) | fails
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
     return _advice(question, ranked, sentences, source, beside)
 

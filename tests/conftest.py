@@ -139,6 +139,11 @@ def truth() -> dict:
     return {name: entry for name, entry in json.loads(path.read_text()).items() if not name.startswith("_")}
 
 
+def late(*sets, mark="quick"):
+    """Parameters of a test that take long or compile much: `make test` takes them up after `make quick` alone."""
+    return [pytest.param(*(one if isinstance(one, tuple) else [one]), marks=getattr(pytest.mark, mark)) for one in sets]
+
+
 def random_scenes(count: int, seed: int) -> list[Scene]:
     """Ordinary tops in ordinary motion, away from the poles."""
     draw = random.Random(seed)

@@ -168,17 +168,15 @@ plugin_option = click.option(
     help="A Python file that registers integrators or scenes.",
 )  # fmt: skip
 json_option = click.option("--json", "as_json", is_flag=True, help="Print JSON instead of text.")
+results_option = click.option(
+    "--results", type=File(file_okay=False), default="results", show_default=True,
+    help="The folder of the datasets, figures and findings.",
+)  # fmt: skip
 
 
 def scene_options(command: Callable[..., None]) -> Callable[..., None]:
     """Add the options of commands on a scene: a user's body, plug-ins, JSON."""
     return body_options(plugin_option(json_option(command)))
-
-
-results_option = click.option(
-    "--results", type=File(file_okay=False), default="results", show_default=True,
-    help="The folder of the datasets, figures and findings.",
-)  # fmt: skip
 
 
 class Group(click.Group):
@@ -326,10 +324,8 @@ def check_outputs(**files: str | None) -> None:
             if path.suffix.lower() in TEXT:
                 raise SymtopError(f"{option} is written as netCDF, such as run.nc, not as {file!r}")
             errors.check_replaceable(path)
-        try:
+        with errors.writing(file):
             tempfile.TemporaryFile(dir=path.parent).close()
-        except OSError as error:
-            raise SymtopError(f"cannot write {file}: {error.strerror or error}") from error
         if (other := options.setdefault(path.resolve(), option)) != option:
             raise SymtopError(f"{other} and {option} must be two files, not both {file!r}")
 

@@ -1,8 +1,4 @@
-"""``symtop doctor``: checks of the packages, the caches, the folders and a few computed numbers.
-
-With ``--warm`` every kernel is compiled first: every method is run for two steps in each of its charts, alone and in an
-ensemble of two tops, and the reference is computed, in one process per core.
-"""
+"""``symtop doctor``: checks of the packages, the caches, the folders and a few computed numbers."""
 
 import concurrent.futures
 import importlib.metadata
@@ -176,7 +172,7 @@ PERIODS = 0.02  # nutations: the length of a run that compiles a kernel
 
 
 def _run(name: str) -> str:
-    """Compile the kernels of a variant, alone and in an ensemble, or of the reference for name ""; returns an error."""
+    """Compile the kernels of a variant by two steps, alone and in an ensemble, or of the reference for ""; an error."""
     from symtop.methods.framework.registry import integrator
     from symtop.model.lazy_kernel import LAZY
     from symtop.model.scenes import scene

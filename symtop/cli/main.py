@@ -1,7 +1,5 @@
 """The command line: ``symtop integrators | scenes | run | compare | ensemble | study | judge | report | ...``.
 
-Exit codes: 0 success; 1 a case or a check failed; 2 bad input, or a file that cannot be written; 3 a run ended early by
-its outcome (its dataset was written); 130 and 143 interrupted or terminated (results of a study so far are kept).
 A command imports heavy packages inside its function, so that ``symtop --help`` takes a tenth of a second.
 """
 

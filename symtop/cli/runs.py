@@ -307,7 +307,8 @@ def ensemble(
         say(f"{counted(steps, 'step')}, computed {EXECUTION.get(execution, execution)}")
         heading = [f"largest error, {so_many(min(members, most), noun)}", *(f"{100.0 * level:g} %" for level in LEVELS)]
         if worst:
-            click.echo(table(heading, [[words[name], *map("{:.1e}".format, row)] for name, row in worst.items()]))
+            short = {name: one.replace("energy of", "that of") for name, one in words.items()}  # a line of 80 columns
+            click.echo(table(heading, [[short[name], *map("{:.1e}".format, row)] for name, row in worst.items()]))
         say_written(output, figure)
     if lost := sum(np.isnan(own.get("attitude", []))):
         warn(f"the attitudes of {so_many(lost, noun)} are not compared: their motion is not known to 1e-9 rad")

@@ -135,29 +135,23 @@ def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict
     from symtop.runner import run, store
     from symtop.runner.study import StudyError
 
+    ahead, refused = deque(studies), list[SymtopError]()
     waiting: deque[tuple[Any, Any]] = deque()  # (study, `Started`) whose findings have not been yielded
-    refused: list[SymtopError] = []
-
-    def findings() -> Iterator[dict[str, Any]]:
-        """Yield those of the first waiting study; a study without findings, by a StudyError, does not stop others."""
-        try:
-            yield waiting[0][1].result()
-        except StudyError as error:
-            _tell(waiting[0][1].failures, str(error))  # they may be the cause
-            refused.append(error)
-        waiting.popleft()
-
     try:
-        for study in studies:
+        while ahead:
+            study = ahead.popleft()
             try:
                 waiting.append((study, run.start(study, results, pool, **options)))
             except SymtopError as error:
                 refused.append(error)
-                break
-            while len(waiting) > 1 and waiting[0][1].done():
-                yield from findings()
-        while waiting:
-            yield from findings()
+                ahead.clear()
+            while waiting and (not ahead or (len(waiting) > 1 and waiting[0][1].done())):
+                try:
+                    yield waiting[0][1].result()
+                except StudyError as error:  # this study has no findings; the others go on
+                    _tell(waiting[0][1].failures, str(error))  # they may be the cause
+                    refused.append(error)
+                waiting.popleft()
     except BaseException:
         pool.close()
         for study, _ in waiting:

@@ -38,6 +38,11 @@ Reasons = dict[str, str]
 
 LENGTH = 20  # hexadecimal digits of a digest
 COMPUTING = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "mpmath")  # packages that may change a number
+PACKAGE = Path(__file__).resolve().parent.parent
+_PLUMBING = ("code_hash", "errors", "files", "netcdf", "parallel", "progress", "signals")
+PLUMBING = frozenset([PACKAGE / "run" / "cluster.py", *(PACKAGE / "core" / f"{name}.py" for name in _PLUMBING)])
+roots: dict[str, Path] = {PACKAGE.name: PACKAGE}  # name of a known package: its folder
+_path = functools.cache(lambda name: Path(name).resolve())
 
 
 def hashed(*parts: str) -> str:
@@ -96,21 +101,12 @@ def packages(*names: str) -> Reasons:
     return {f"package {name}": version(name) for name in names or COMPUTING} | python
 
 
-PACKAGE = Path(__file__).resolve().parent.parent
-_PLUMBING = ("code_hash", "errors", "files", "netcdf", "parallel", "progress", "signals")
-PLUMBING = frozenset([PACKAGE / "run" / "cluster.py", *(PACKAGE / "core" / f"{name}.py" for name in _PLUMBING)])
-roots: dict[str, Path] = {PACKAGE.name: PACKAGE}  # name of a known package: its folder
-
-
 def add_root(name: str, folder: Path) -> None:
     """Make a package known: its code counts file by file, not by the package's version."""
     if roots.get(name) != folder.resolve():
         roots[name] = folder.resolve()
         for cached in (_path, file_label, is_library):
             cached.cache_clear()
-
-
-_path = functools.cache(lambda name: Path(name).resolve())
 
 
 @functools.cache

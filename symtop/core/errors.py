@@ -1,8 +1,4 @@
-"""Errors of the user and errors of other people's code, each as one sentence.
-
-Within `foreign_code`, around a call of a plug-in's solver or a user's study, whatever is raised becomes a SymtopError,
-also what is no `Exception`; the exceptions of Ctrl-C and SIGTERM pass unchanged.
-"""
+"""Errors of the user and errors of other people's code, each as one sentence."""
 
 import contextlib
 import difflib
@@ -18,6 +14,9 @@ LONGEST_PART = 255  # bytes of a name in a folder
 SHOWN = 80  # characters of a name that are shown
 ENTRY = "an entry of "  # stands before the name of a row in messages about one of its entries
 MAGIC = (b"\x89HDF", b"CDF")  # the first bytes of netCDF files
+LONGEST = 300  # characters that are shown of the message of an error or a process
+_COMPILING = "(step: nopython frontend)"  # numba's text before each cause, from the loop inwards; the last is the cause
+_TRACE = r",? (?:defined at |raised from |File \"|During: |There are \d+ candidate)"  # what follows a cause
 
 
 class SymtopError(ValueError):
@@ -106,17 +105,23 @@ def file_path(name: str, value: object) -> Path:
     raise SymtopError(f"{name} must be the name of a file, not {shown(value)[:SHOWN]}", name)
 
 
+@contextlib.contextmanager
+def writing(path: str | Path) -> Iterator[None]:
+    """Turn an OSError of the block into a SymtopError that `path` cannot be written, with the system's reason."""
+    try:
+        yield
+    except OSError as error:
+        raise SymtopError(f"cannot write {path}: {error.strerror or error}") from error
+
+
 def check_replaceable(path: Path) -> None:
     """Raise SymtopError if `path` exists and is no netCDF file, but a script, a device or a folder."""
     if path.is_dir():
         raise SymtopError(f"cannot write {path}: it is a folder")
     head = b""
     if path.is_file():
-        try:
-            with path.open("rb") as file:
-                head = file.read(4)
-        except OSError as error:
-            raise SymtopError(f"cannot write {path}: {error.strerror or error}") from error
+        with writing(path), path.open("rb") as file:
+            head = file.read(4)
     if path.exists() and not head.startswith(MAGIC):
         raise SymtopError(f"cannot write {path}: it is there, and no netCDF file; remove it or name another path")
 
@@ -158,11 +163,6 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     raise error
 
 
-LONGEST = 300  # characters that are shown of the message of an error or a process
-_COMPILING = "(step: nopython frontend)"  # numba's text before each cause, from the loop inwards; the last is the cause
-_TRACE = r",? (?:defined at |raised from |File \"|During: |There are \d+ candidate)"  # what follows a cause
-
-
 def words_of(error: BaseException) -> str:
     """The type and the message of an error, in one line."""
     try:
@@ -183,7 +183,10 @@ def last_words(output: bytes) -> str:
 
 @contextlib.contextmanager
 def foreign_code(what: str, kind: type[SymtopError] = SymtopError) -> Iterator[None]:
-    """Turn whatever the block raises into an error of that kind, "`what` failed: ..."; one of that kind passes."""
+    """Turn whatever the block raises into an error of that kind, "`what` failed: ..."; one of that kind passes.
+
+    Also what is no `Exception`, but for those of Ctrl-C and SIGTERM, which pass.
+    """
     try:
         yield
     except BaseException as error:

@@ -18,7 +18,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TextIO
 
-from symtop.core.errors import SymtopError, SymtopWarning
+from symtop.core.errors import SymtopError, SymtopWarning, writing
 
 DAY = 86_400.0  # seconds
 UNUSED = 30  # days
@@ -133,19 +133,16 @@ def replacing(path: str | os.PathLike[str], suffix: str = "", mode: int = 0o666)
         raise SymtopError(f"a path must not hold a null character, as {str(path)!r} does")
     target = Path(os.path.realpath(path))
     partial = target.parent / f".{target.name}.{os.urandom(4).hex()}.part{suffix}"
-    try:
+    with writing(target), contextlib.ExitStack() as stack:
         if target.is_dir():
             raise SymtopError(f"cannot write {target}: it is a folder")
         target.parent.mkdir(parents=True, exist_ok=True)
         partial.touch(mode, exist_ok=False)
-        with contextlib.ExitStack() as stack:
-            stack.callback(partial.unlink, missing_ok=True)
-            yield partial
-            with partial.open("rb+") as file:  # Windows flushes no file that is open for reading only
-                os.fsync(file.fileno())
-            partial.replace(target)
-    except OSError as error:
-        raise SymtopError(f"cannot write {target}: {error.strerror or error}") from error
+        stack.callback(partial.unlink, missing_ok=True)
+        yield partial
+        with partial.open("rb+") as file:  # Windows flushes no file that is open for reading only
+            os.fsync(file.fileno())
+        partial.replace(target)
 
 
 def sweep(path: Path) -> None:
@@ -179,11 +176,9 @@ def locked(path: Path, *, wait: bool) -> Iterator[bool]:
         return
     lock = lock_path(path)
     while True:
-        try:
+        with writing(lock):
             lock.parent.mkdir(parents=True, exist_ok=True)
             file = lock.open("a")
-        except OSError as error:
-            raise SymtopError(f"cannot write {lock}: {error.strerror or error}") from error
         with file:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))

@@ -3,8 +3,7 @@
 numba stamps a cached kernel with the file of the function itself and does not see edits in the files it calls, so that
 an old kernel can silently return old numbers; and it recompiles a function that only moved by a line. Here the folder
 of a kernel is named after a hash of everything it is compiled from (`symtop.core.code_hash`): instructions, constants
-and values of its functions, wherever they stand, and the versions of Python and numba. The first time a process saves a
-kernel it removes those that nobody used for 30 days, and the oldest ones beyond `MOST_BYTES`.
+and values of its functions, wherever they stand, and the versions of Python and numba.
 
 The module also compiles `fused`, a b + c with one rounding, which numba lacks. A sum of a number and a correction that
 hardly changes from step to step is rounded the same way every time, a bias of up to half a unit in the last place. The

@@ -22,7 +22,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.core import __version__
-from symtop.core.code_hash import processor, version
+from symtop.core.code_hash import COMPUTING, processor, version
 from symtop.core.errors import SymtopError, words_of
 from symtop.core.files import replacing
 from symtop.core.signals import deferred
@@ -61,7 +61,6 @@ Tree = TypeVar("Tree", bound=xr.Dataset | xr.DataTree)
 
 LITTLE = 1_000_000  # bytes: with less free space a write error is reported as a full disk
 ROOT = Path(__file__).resolve().parents[2]
-_DEPENDENCIES = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "matplotlib", "mpmath")  # in each file
 
 
 def _git(*arguments: str) -> str:
@@ -84,7 +83,7 @@ def provenance(*, changes: bool = False) -> dict[str, str]:
         "symtop_version": __version__,
         "symtop_revision": (_git("rev-parse", "HEAD")[:12] or "unknown") + ("+changes" if edited else ""),
         "python_version": platform.python_version(),
-        "dependencies": json.dumps({package: version(package) for package in _DEPENDENCIES}, sort_keys=True),
+        "dependencies": json.dumps({name: version(name) for name in (*COMPUTING, "matplotlib")}, sort_keys=True),
         "platform": f"{platform.system()} {platform.machine()}",
         "processor": processor(),
     }
@@ -159,10 +158,8 @@ def read_json(path: Path) -> Any:
 
 def _encoding(data: xr.Dataset) -> dict[Any, dict[str, Any]]:
     bare = {name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"}
-    return bare | {
-        name: {"zlib": True} for name, values in data.data_vars.items()
-        if values.dtype.kind == "u" or values.dtype == np.float32
-    }  # fmt: skip
+    rounded = [name for name, one in data.data_vars.items() if one.dtype.kind == "u" or one.dtype == np.float32]
+    return bare | {name: {"zlib": True} for name in rounded}
 
 
 def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:

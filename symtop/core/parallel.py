@@ -18,6 +18,7 @@ Result = TypeVar("Result")
 
 MOST_THREADS = 1024
 AHEAD = 2  # pieces for each thread that are computed before their turn: results that wait take memory
+VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")  # of NumPy's and SciPy's builds
 _stop = threading.local()
 _starting = threading.Lock()  # held while a process starts, as its environment is set meanwhile
 
@@ -64,9 +65,6 @@ def in_order(pool: Executor, work: Callable[[Piece], Result], pieces: Iterable[P
     while submitted:
         yield submitted.popleft().result()
         submitted += [pool.submit(work, piece) for piece in islice(rest, 1)]
-
-
-VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")  # of NumPy's and SciPy's builds
 
 
 class OneThread(SpawnProcess):

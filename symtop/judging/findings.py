@@ -1,7 +1,6 @@
 """The claims table of an integrator, a `Ledger` with one finding per claim, as a dataset, as sentences, as a report.
 
-A verdict is `confirmed`, `refuted`, `measured` (nothing was claimed), `undecided` or `inapplicable` (both with the
-reason). `value` is the number that decides, `resolution` the least value that the battery can tell from a true claim.
+A verdict is `confirmed`, `refuted`, `measured` (nothing was claimed), and with the reason `undecided`, `inapplicable`.
 """
 
 import math
@@ -18,6 +17,22 @@ from symtop.core.errors import SymtopError, shown
 
 VERDICTS = ("confirmed", "refuted", "measured", "undecided", "inapplicable")
 LONGEST, CUT = 240, " [...]"  # characters of a foreign error message, and the end of one that was longer
+WIDTH, AS = 100, "as with "  # characters in a line; the begin of a reason that refers to that of another claim
+UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (0.0, "ns"))
+KEPT = {"energy": "the energy", "p_phi": "p_phi", "p_psi": "p_psi", "axis_length": "|e|", "momentum": "the momentum"}
+SAYS = {  # phrases for measured values: {0} is the number, {1} the text
+    "wrong limit": "as h -> 0 it goes to another motion, {0:.1e} away",
+    "kept": "kept, to {0:.0e}", "bounded": "bounded, within {0:.1e}", "drift": "drifts, by {0:.1e}",
+    "random walk": "wanders as rounding does, by {0:.1e}", "growing": "changes, by {0:.1e}, and may grow",
+    "symplectic yes": "yes, a step keeps the Poisson bracket to {0:.0e}",
+    "symplectic no": "no, a step misses the Poisson bracket by {0:.1e}",
+    "symmetric yes": "yes, a step back returns to the start to {0:.0e}",
+    "symmetric no": "no, a step back misses the start by {0:.1e}",
+    "work work": "{1} force evaluations a step", "time order": "order {1} where f depends on the time",
+    "pole passes": "a run through the upright axis ends {0:.0e} rad off (good: 1e-7 or falling with h)",
+    "pole ends there": "a run ends where the axis is upright (theta = 0)",
+    "pole wrong": "a run through the upright axis comes out {0:.0e} rad off (good: 1e-7 or falling with h)",
+}  # fmt: skip
 
 
 def claim_name(claim: str) -> str:
@@ -70,8 +85,8 @@ class Finding(NamedTuple):
 
 def error_units(name: str) -> str:
     """The unit of an error of a trajectory, to append to a number: rad for angles, empty for lengths."""
-    none = {"axis_length": "", "quaternion_length": ""}
-    return (none | {"momentum": " times |L|", "rates": " rad per unit time"}).get(name, " rad")
+    units = {"momentum": " times |L|", "rates": " rad per unit time"}
+    return "" if name.endswith("_length") else units.get(name, " rad")
 
 
 def yes_no(value: bool | int | None) -> str:
@@ -155,24 +170,6 @@ class Ledger:
         return xr.Dataset(columns, {"claim": list(self)}, attributes)
 
 
-WIDTH, AS = 100, "as with "  # characters in a line; the begin of a reason that refers to that of another claim
-UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (0.0, "ns"))
-KEPT = {"energy": "the energy", "p_phi": "p_phi", "p_psi": "p_psi", "axis_length": "|e|", "momentum": "the momentum"}
-SAYS = {  # phrases for measured values: {0} is the number, {1} the text
-    "wrong limit": "as h -> 0 it goes to another motion, {0:.1e} away",
-    "kept": "kept, to {0:.0e}", "bounded": "bounded, within {0:.1e}", "drift": "drifts, by {0:.1e}",
-    "random walk": "wanders as rounding does, by {0:.1e}", "growing": "changes, by {0:.1e}, and may grow",
-    "symplectic yes": "yes, a step keeps the Poisson bracket to {0:.0e}",
-    "symplectic no": "no, a step misses the Poisson bracket by {0:.1e}",
-    "symmetric yes": "yes, a step back returns to the start to {0:.0e}",
-    "symmetric no": "no, a step back misses the start by {0:.1e}",
-    "work work": "{1} force evaluations a step", "time order": "order {1} where f depends on the time",
-    "pole passes": "a run through the upright axis ends {0:.0e} rad off (good: 1e-7 or falling with h)",
-    "pole ends there": "a run ends where the axis is upright (theta = 0)",
-    "pole wrong": "a run through the upright axis comes out {0:.0e} rad off (good: 1e-7 or falling with h)",
-}  # fmt: skip
-
-
 def as_time(seconds: float) -> str:
     """A short time as text with a suitable unit: 5.4 us, 4.8 ms."""
     size, unit = next(one for one in UNITS if not float(f"{seconds:.3g}") < one[0])
@@ -210,8 +207,7 @@ def description(findings: Sequence[Finding]) -> str:
     """The measured properties of a method in a phrase: "order 2, symplectic, reversible, keeps p_phi; not p_psi"."""
     measured = {one.claim: one.measured for one in findings}
     errors = ((one.claim.removesuffix("_error"), one) for one in findings if one.claim.endswith("_error"))
-    true = {"axis_length": "one", "quaternion_length": "one"}
-    words = [f"{name} within {one.value:.1e}{error_units(name)} of {true.get(name, 'the truth')}"
+    words = [f"{name} within {one.value:.1e}{error_units(name)} of {'one' if name.endswith('_length') else 'the truth'}"
              for name, one in errors if one.measured]  # fmt: skip
     if order := measured.get("order"):
         p, limits = order.number, {"wrong limit": "converges to another motion", "converges": order.text}
@@ -254,19 +250,19 @@ def _runs(ledger: Ledger) -> str:
     """The steps per nutation and the lengths of the runs, and the steps that failed; empty for a trajectory."""
     traces, words, of_body = ledger.traces, [], ledger.about.chart == "body"
     period = "natural period" if of_body else "nutation"
-    if "steps_run" in traces and (steps := float(traces["steps_run"])):
-        periods = float(traces["nutations_run"])
-        length = f"{steps:.0f} steps over {periods:.3g} {period}s ({steps / periods:.0f} a {period})"
-        scales = "kinetic one of the start and |mgl|, of the momentum to |L|"
-        scales = scales if of_body else "nutation's, of momenta to the larger one"
-        words += [f"{length} for the constants", f"changes of the energy are relative to the {scales}"]
     ladder = ledger.about.nutation / np.asarray(traces.get("step_size", []))  # NaN where no run was made
     if np.isfinite(ladder).any():
         failed = ladder[np.isnan(traces["error"]) & np.isfinite(ladder)]
         fails = f" ({failed.max():.0f} and fewer fail)" if failed.size else ""
         one = ledger.about.nutation / traces.get("structure_step", math.nan)
         structure = f", {one:.1f} for the structure" if math.isfinite(one) else ""
-        tries = f"{np.nanmin(ladder):.0f} to {np.nanmax(ladder):.0f} steps a {period} for the order{fails}{structure}"
-        words.insert(0, tries)
+        span = f"{np.nanmin(ladder):.0f} to {np.nanmax(ladder):.0f}"
+        words.append(f"{span} steps a {period} for the order{fails}{structure}")
+    if "steps_run" in traces and (steps := float(traces["steps_run"])):
+        periods = float(traces["nutations_run"])
+        length = f"{steps:.0f} steps over {periods:.3g} {period}s ({steps / periods:.0f} a {period})"
+        scales = "kinetic one of the start and |mgl|, of the momentum to |L|"
+        scales = scales if of_body else "nutation's, of momenta to the larger one"
+        words += [f"{length} for the constants", f"changes of the energy are relative to the {scales}"]
     joined = ";\n    ".join(words)
     return f"Its runs: {joined}.\n" if words else ""

@@ -56,7 +56,6 @@ VECTORS = {
 }  # fmt: skip
 SCALARS = ("time", "theta", "phi", "psi", *CONSTANTS)
 OF_STATES = ("axis", "attitude", "theta", "momentum", "rates")
-LENGTHS = ("axis_length", "quaternion_length")
 SINGLE = 1e-6  # a length that differs less from one, as by single precision, gets no finding
 SHOWN = 3  # most faults of a line of names in a message
 AGREE = 1e-3  # rad: largest angle between the axis and the third axis of the quaternion, above the rounding of a file
@@ -227,7 +226,7 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
         bound = scene.momentum_scale / moments.min() * (truth["attitude_error_bound"].values + 4.0 * EPSILON)
         off = np.linalg.norm(rates - inside / moments, axis=1)
         deviation = deviation.assign(rates=("time", off), rates_bound=("time", bound))
-    strayed = [name for name in LENGTHS if name in deviation and (deviation[name] > SINGLE).any()]
+    strayed = [name for name in map(str, deviation) if name.endswith("_length") and (deviation[name] > SINGLE).any()]
     findings = [_error(name, scene, time, deviation) for name in (*OF_STATES, *strayed) if name in deviation]
     own = _from_states(scene, states)
     for name in (*CONSTANTS, *sorted({*conserves} - {*CONSTANTS})):

@@ -178,9 +178,6 @@ def try_separately(call: Callable[[], Any], what: str) -> None:
             raise SymtopError(f"{what} cannot be loaded: {process.lost}")
 
 
-# ---- a step ----------------------------------------------------------------------------------------------------------
-
-
 def table_of(opened: Callable[[], Stepper]) -> Table:
     """The functions of a stepper that `Remote` calls, by name."""
     stepper: Any = opened()
@@ -228,9 +225,6 @@ class Remote(Stepper):
         states, times = self.process.call("along", f, t, y, h, marks)
         getattr(f, "times", set[float]()).update(map(float, times))
         return np.array(states, dtype=float).reshape(marks.size, y.size)
-
-
-# ---- a registered integrator -----------------------------------------------------------------------------------------
 
 
 def _run(process: Process, name: str, top: SymmetricTop, start: Angles, plan: Plan) -> Run:

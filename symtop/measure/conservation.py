@@ -148,9 +148,8 @@ def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
     t, r = t[good], r[good]
     if t.size < 2 * BLOCKS:
         return Trend(math.nan, math.nan, math.nan)
-    t_mean = np.array([part.mean() for part in np.array_split(t, BLOCKS)])
-    r_mean = np.array([part.mean() for part in np.array_split(r, BLOCKS)])
-    slope, error, _, rest = line(t_mean, r_mean)
+    means = (np.array([part.mean() for part in np.array_split(values, BLOCKS)]) for values in (t, r))
+    slope, error, _, rest = line(*means)
     # with first-order autocorrelation r, a fraction (1-r)/(1+r) of the residuals is independent; r has a bias of -4/n
     power = float(rest @ rest)
     memory = float(rest[1:] @ rest[:-1]) / power + 4.0 / BLOCKS if power > 0.0 else 0.0

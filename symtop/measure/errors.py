@@ -13,9 +13,8 @@ kinetic and |mgl|, and that of p_phi and of the vector L is |L|.
 Explicit methods do not keep |e| or |q| at one. A wrong length does not change the angles, but the energy and momenta.
 
 A trajectory of another program is checked first. A quaternion determines the attitude, the axis and theta; so do theta,
-phi and psi; theta and phi determine the axis; an axis determines theta. Vectors are scaled to length one, and the
-deviation of their length is an error of its own, ``axis_length`` or ``quaternion_length``. It may become large in a
-valid run (SciPy's RK45 at 1e-3 takes |q| to 1.4 on `spheroid`), but is small at first unless a column or unit is wrong.
+phi and psi; theta and phi determine the axis; an axis determines theta. Vectors are scaled to length one. Their length
+may become wrong in a valid run (SciPy's RK45 at 1e-3 takes |q| to 1.4 on `spheroid`), but not at first.
 """
 
 import contextlib
@@ -215,10 +214,7 @@ def errors_against(scene: Scene, run: Trajectory, truth: xr.Dataset) -> dict[str
         for name, unit in units.items():
             if (mine := getattr(run, name)) is not None:
                 columns[name] = np.abs((mine - true[name]) - true.get(f"{name}_lo", 0.0)) / unit
-        if run.quaternion is not None or run.psi is not None:
-            attitude = run.quaternion
-            if attitude is None:
-                attitude = charts.quaternion_from_angles(run.theta, run.phi, run.psi)
+        if (attitude := completed(run).quaternion) is not None:
             low = true.get("quaternion_lo", 0.0)
             columns["attitude"] = charts.attitude_distance(attitude, true["quaternion"], low)
         if run.momentum is not None and "momentum" in true:
@@ -231,7 +227,6 @@ UNIT_VECTORS = ("axis", "quaternion")
 FAR, NEAR = 0.1, 0.01  # rad from the true attitude: farther is a wrong convention of a quaternion, nearer the right one
 BEYOND = 100.0  # horizons: a longer run probably has another unit of time (milliseconds for seconds: a factor 1000)
 SHAPES = {"axis": (3,), "quaternion": (4,), "momentum": (3,), **dict.fromkeys(("theta", "phi", "psi", *CONSTANTS), ())}
-SUFFICIENT_COLUMNS = ("axis", "quaternion", "theta")  # a trajectory needs one of them
 
 
 def scene_of(run: xr.Dataset | Mapping[str, Any]) -> Scene:
@@ -290,7 +285,7 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
         raise SymtopError(f"time must be finite, at least 0 and increase, but sample {k} is at {time[k]:g}{after}")
     columns: dict[str, Any] = {name: doubles(name, column(data, name)) for name in SHAPES if name in data}
     check_shapes(columns, time.size)
-    places = [columns[name].reshape(time.size, -1) for name in SUFFICIENT_COLUMNS if name in columns]
+    places = [columns[name].reshape(time.size, -1) for name in (*UNIT_VECTORS, "theta") if name in columns]
     if all(np.isnan(place).any(axis=1).all() for place in places):
         words = "numbers, but every sample of where the top is has a NaN" if places else (
             "one of axis, quaternion, theta beside time, to show where the top is")  # fmt: skip

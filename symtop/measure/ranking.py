@@ -14,7 +14,6 @@ from pathlib import Path
 
 SHOWN_AS = {"theta": "axis"}  # quantities without rows of their own, and the quantity whose rows are used
 TABLE = Path(__file__).with_name("candidates.tsv")
-KEY_COLUMNS = ("nutations", "quantity", "accuracy", "needs", "general")  # columns of the table, before the variants
 ANY = "any"  # class of needs: every method but those made for the symmetric top only
 MENU = 6  # variants in a row
 

@@ -36,11 +36,19 @@ def conjugate(q: Any) -> Any:
 
 
 @register_jitable
-def rotated(q: Any, v: Any) -> Any:
-    """q v q* of a unit quaternion."""
+def displaced(q: Any, v: Any) -> Any:
+    """q v q* - v of a unit quaternion; doubled by addition, in any precision."""
     u = q[1], q[2], q[3]
     c = cross(u, v)
-    return plus(v, 2.0, plus(cross(u, c), q[0], c))
+    d = plus(cross(u, c), q[0], c)
+    return d[0] + d[0], d[1] + d[1], d[2] + d[2]
+
+
+@register_jitable
+def rotated(q: Any, v: Any) -> Any:
+    """q v q* of a unit quaternion."""
+    x, y, z = displaced(q, v)
+    return v[0] + x, v[1] + y, v[2] + z
 
 
 @register_jitable

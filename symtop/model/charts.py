@@ -129,7 +129,7 @@ def unwrapped(angle: Array, guide: Array) -> Array:
     lag = angle - guide
     step = lag[..., 1:] - lag[..., :-1]
     jumps = np.nonzero(~(np.abs(step) < np.pi))  # NaN is one, too
-    if jumps[0].size:  # the arithmetic of `np.unwrap`, for the few steps that jump: half the time
+    if jumps[0].size:  # the arithmetic of `np.unwrap`, for the few steps that jump: a third of the time
         jump = step[jumps]
         rest = np.mod(jump + np.pi, 2.0 * np.pi) - np.pi
         rest[(rest == -np.pi) & (jump > 0.0)] = np.pi

@@ -172,15 +172,11 @@ def _energy_scale(top: SymmetricTop, start: Angles) -> float:
 
 
 @functools.lru_cache(maxsize=256)
-def _closed_form(top: SymmetricTop, start: Angles) -> "ClosedForm":
-    from symtop.model.exact.closed_form import ClosedForm
-
-    return ClosedForm(top, start)
-
-
 def closed_form(scene: Scene) -> "ClosedForm":
     """The exact motion of a scene; made once and kept."""
-    return _closed_form(scene.top, scene.start)
+    from symtop.model.exact.closed_form import ClosedForm
+
+    return ClosedForm(scene.top, scene.start)
 
 
 def spinning(spin: float, precession: float = 0.0) -> Scene:

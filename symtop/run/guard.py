@@ -24,8 +24,7 @@ rotation, are made as long as allowed, because the errors of a few passages may 
     departure     the unstable motion amplifies errors of the size of an adaptive method's tolerance
     growth        the errors of the nutations add up until the horizon
 
-The guard never changes a run, and does not look at the number of samples: `simulate` dithers samples that would fall on
-the same phases of the nutation. Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, X.3 and XI.3.
+The guard never changes a run. Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, X.3 and XI.3.
 """
 
 import functools

@@ -12,6 +12,7 @@ same. A method with internal data beyond the state makes its first step anew, wi
 """
 
 import functools
+import json
 import math
 import warnings
 from collections.abc import Callable
@@ -339,6 +340,5 @@ def _start(scene: Scene, chart: str, state: Array, p_phi: float, p_psi: float) -
 
 @functools.lru_cache(maxsize=256)
 def _json(record: Any) -> str:
-    """The numbers of a top or a start as JSON for an attribute; `json.dumps` takes three times as long."""
-    numbers = ((name, getattr(record, name)) for name in sorted(record.__slots__))
-    return "{" + ", ".join(f'"{name}": {list(v) if isinstance(v, tuple) else v!r}' for name, v in numbers) + "}"
+    """The numbers of a top or a start as JSON, for an attribute."""
+    return json.dumps({name: getattr(record, name) for name in sorted(record.__slots__)})

@@ -14,8 +14,6 @@ from xarray.backends.locks import HDF5_LOCK
 from symtop.core import jit, netcdf
 from symtop.core.signals import InterruptedByUser, TerminatedError, at_most, deferred, ending_on_sigterm, told_apart
 
-DATA = xr.Dataset({"value": ("x", np.arange(5.0))})
-
 
 def _at_line(number):
     """A tracer that sends SIGTERM at one of the lines that xarray's locks and files are handled by, and the count."""
@@ -39,7 +37,7 @@ def write_with_signal(path, number):
     with ending_on_sigterm():
         sys.settrace(trace)
         try:
-            netcdf.write(DATA, path)
+            netcdf.write(xr.Dataset({"value": ("x", np.arange(5.0))}), path)
         finally:
             sys.settrace(before)
     return count[0]

@@ -25,6 +25,7 @@ from symtop.model import charts
 from symtop.model.scenes import closed_form
 from symtop.run.simulation import integrate
 from tests.commands import call
+from tests.conftest import late
 
 
 def fields(name="spheroid", integrator="midpoint", **changes):
@@ -43,7 +44,7 @@ def unpacked(text):
     return np.frombuffer(base64.b64decode(text), dtype="<f4")
 
 
-@pytest.mark.parametrize("method", ["midpoint", "gauss-4", pytest.param("rk45", marks=pytest.mark.quick), "exact"])
+@pytest.mark.parametrize("method", ["midpoint", "exact", *late("gauss-4", "rk45")])
 def test_an_answer_is_the_run_beside_the_truth(method):
     chosen = answers.setup(fields(integrator=method))
     answer, run = answers.answer(chosen), answers.dataset(chosen, str)

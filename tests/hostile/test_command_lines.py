@@ -24,7 +24,6 @@ NO_NUMBERS = ["", " ", "x", "nano", "None", "\0", "é", "½", "'1'"]
 NOT_NUMBERS = [*NO_NUMBERS, "1,5", "0x10", "1e", "--", "1+2j", "[1]", "1 2", "0.1.2"]
 NOT_FINITE = ["nan", "inf", "-inf", "1e999", "-1e999"]
 NOT_POSITIVE = ["0", "-1", "-0.0", "-1e-300", "1e-400"]
-NOT_WHOLE = ["1.5", "1e3", "-1", "9" * 400]
 ODD_NAMES = ["", " ", "no-such", "Spheroid ", "STRANG!", "é", "a\nb", "../x", "/", "x" * 5000]
 NAMES = [*ODD_NAMES, "None", "-", "*", "%s", "{}", "\x1b[31m"]
 FILES = ["", "/", ".", "/dev/null/x.nc", "/proc/x.nc", "missing/../../x/y.nc", "a" * 300 + ".nc", "no/such/folder/x.nc"]
@@ -35,7 +34,7 @@ NO_FILES = ["", ".", "/", "no-such.py", "/dev/null/x.py", "/etc/hostname", "x" *
 PLUGINS = [*NO_FILES, "own.txt", "broken.py", "leaves.py"]
 ADDRESSES = ["nowhere", "ftp://x", "tcp://[::1:0", "tcp://:", "/", "x" * 300]
 NUMBERS = NOT_NUMBERS + NOT_FINITE + NOT_POSITIVE
-WHOLE = NOT_NUMBERS + NOT_FINITE + NOT_WHOLE
+WHOLE = NOT_NUMBERS + NOT_FINITE + ["1.5", "1e3", "-1", "9" * 400]
 BAD = {
     "--seed": WHOLE, "--members": [*WHOLE, "0"], "--samples": [*WHOLE, "0", "1"], "--threads": [*WHOLE, "0"],
     "--jobs": [*WHOLE, "0"], "--port": [*WHOLE, "70000"], "--order": [*WHOLE, "0"],
@@ -56,7 +55,6 @@ FINE = {
     ("study", "--limit"), ("study", "--jobs"), ("study", "--scheduler"),  # --status has no use for them
     ("long", "--step-size"),  # a step of 1e300 ends the run at once, which is 3
 }  # fmt: skip
-FLAGS = ["=1", "=", "=no"]
 
 
 def lines(name):
@@ -71,7 +69,7 @@ def lines(name):
             place = 1 + [one for one in command.params if not isinstance(one, click.Option)].index(part)
             yield from ([*good[:place], value, *good[place + 1 :]] for value in NAMES if part.nargs == 1)
         elif part.is_flag:
-            yield from ([*good, f"{option}{value}"] for value in FLAGS)
+            yield from ([*good, f"{option}{value}"] for value in ["=1", "=", "=no"])
         else:
             if option != "--guard":  # which has a default
                 yield [*good, option]

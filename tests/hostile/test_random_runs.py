@@ -18,6 +18,7 @@ from symtop.run.linear_stability import nutation_growth, trace
 from symtop.run.motion import landmarks
 from symtop.run.reference.sensitivity import conditioning, displacement
 from symtop.run.simulation import make_plan
+from tests.conftest import late
 from tests.hostile.random_runs import LONGEST, NEWER, draw_run, one, run_all, summary
 from tests.run.test_guard import nutating
 
@@ -30,9 +31,7 @@ SILENT = [
 FALSE = [74, 511, 780, 990, 1929, 2413, 4178, 5013]  # right runs that were warned of growth that was none
 
 
-@pytest.mark.parametrize(("k", "seed"), [
-    *SILENT[::3], *(pytest.param(*one, marks=pytest.mark.quick) for one in SILENT if one not in SILENT[::3])
-])  # fmt: skip
+@pytest.mark.parametrize(("k", "seed"), [*SILENT[::3], *late(*SILENT[1::3], *SILENT[2::3])])
 def test_what_was_wrong_in_silence_is_warned_of(k, seed):
     run = one(k, seed)
     assert run.wrong

@@ -27,6 +27,7 @@ from symtop.judging.claims.subject import open_target
 from symtop.judging.findings import VERDICTS
 from symtop.judging.remote import clock
 from tests.commands import ROOT, answer
+from tests.conftest import late
 from tests.judging.blind.right import midpoint, product, rates, rk4, turn, verlet
 from tests.judging.conftest import shorten
 
@@ -234,9 +235,7 @@ def _keeps_its_slope(f, t, y, h, memory=[np.zeros(6)]):  # noqa: B006, B008  (wh
 PENDULUM = symtop.Scene("pendulum", symtop.SymmetricTop(1.0, 0.5, 1.0), symtop.Angles(theta=2.0), 20.0)
 
 
-@pytest.mark.parametrize("scene", [
-    pytest.param("sleeping", marks=pytest.mark.quick),
-    *(pytest.param(scene, marks=pytest.mark.slow) for scene in ("separatrix", PENDULUM))])  # fmt: skip
+@pytest.mark.parametrize("scene", [*late("sleeping"), *late("separatrix", PENDULUM, mark="slow")])
 def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, only, monkeypatch):
     """Beside a pole angles know a state badly; a pendulum has momenta of zero, which are no unit."""
     only("calls", "order")
@@ -325,9 +324,7 @@ def test_an_axis_that_stays_upright_is_refused_in_a_sentence_and_one_that_hangs_
         symtop.judge(midpoint, scene=upright, quick=True)
 
 
-@pytest.mark.parametrize(
-    "claimed", [pytest.param(2, marks=pytest.mark.slow), pytest.param(12, marks=pytest.mark.quick)]
-)
+@pytest.mark.parametrize("claimed", [*late(2, mark="slow"), *late(12)])
 def test_a_motion_that_is_wrong_is_told_so_whatever_is_claimed(claimed, only):
     only("order")
     for factor, wrong in ((0.999, 2e-3), (0.0, None)):  # the second stands still

@@ -16,7 +16,6 @@ from symtop.methods.framework.equations import FORMULATIONS
 from tests.commands import ROOT, ended, printed_by, symtop as command
 from tests.judging.blind.right import midpoint
 
-EXAMPLES = ROOT / "studies" / "examples"
 SPHEROID = symtop.scene("spheroid")
 
 
@@ -84,7 +83,7 @@ FORMS = [pytest.param(name, marks=needs(name)) for name in ("torch", "jax")]
 ])  # fmt: skip
 def test_a_method_has_its_order_and_no_more(tmp_path, file, options, order):
     (tmp_path / "my.py").write_text(SOLVERS)
-    target = EXAMPLES / file if ":" in file else f"{tmp_path / 'my.py'}:{file}"
+    target = ROOT / "studies" / "examples" / file if ":" in file else f"{tmp_path / 'my.py'}:{file}"
     code, findings = judge(target, *options, "--order", order, "--not-symplectic")
     assert (code, findings["order"]["verdict"], findings["symplectic"]["verdict"]) == (0, "confirmed", "confirmed")
     if ":" in file:

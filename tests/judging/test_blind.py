@@ -16,6 +16,7 @@ from symtop.judging import battery
 from symtop.judging.claims import calls
 from symtop.judging.findings import description
 from symtop.judging.remote import Remote
+from tests.conftest import late
 from tests.judging.blind import right, wrong
 
 BLIND, EXAMPLES = Path(__file__).parent / "blind", Path(__file__).parents[2] / "studies" / "examples"
@@ -24,10 +25,6 @@ needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="there i
 SPLIT = {"symplectic": True, "symmetric": True, "conserves": ["p_phi", "p_psi"], "energy": "bounded"}
 SHOWN = ("order", "symplectic", "symmetric")  # claims that every right step must have confirmed
 PROGRAM = {"form": "program"}
-
-
-def slowly(*values):
-    return pytest.param(*values, marks=pytest.mark.slow)
 
 
 def compiled(folder, source, *options, program=False):
@@ -62,7 +59,7 @@ def test_a_correct_method_is_not_refuted(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["AdamsBashforth", "separable_forest_ruth", "rotation_guarded", slowly("rotation_strang")]
+    "name", ["AdamsBashforth", "separable_forest_ruth", *late("rotation_guarded", "rotation_strang")]
 )
 def test_what_is_claimed_of_a_correct_method_is_confirmed_in_short_runs(name, only):
     only(*(claim for stage in battery.TABLE for claim in stage.claims))
@@ -102,17 +99,18 @@ def test_a_correct_method_is_not_refuted_in_another_chart(name, chart):
 
 @needs_compiler
 @pytest.mark.parametrize(("source", "options", "claims", "refuted"), [
-    ("strang.c", (), {"order": 2, **SPLIT}, ""),
-    slowly(EXAMPLES / "judged.c", (), {"order": 1, "symplectic": True, "conserves": ["p_phi", "p_psi"]}, ""),
-    slowly("strang.c", ("-DYOSHIDA",), {"order": 4, **SPLIT}, ""),
-    slowly("strang.c", ("-DMCLACHLAN",), {"order": 4, **SPLIT}, ""),
-    slowly("tricks.c", ("-DKIND=3",), {"order": 2, "symplectic": False}, ""),
-    slowly("strang.c", (), {"order": 2, **SPLIT, **PROGRAM}, ""), ("wrong.c", ("-DKIND=0",), {"order": 3}, "order"),
-    slowly("wrong.c", ("-DKIND=1",), {"order": 4}, "order"), slowly("wrong.c", ("-DKIND=2",), {"order": 4}, "order"),
-    slowly("wrong.c", ("-DKIND=3",), {"order": 2}, "order"), slowly("tricks.c", ("-DKIND=0",), {"order": 2}, "order"),
-    slowly("tricks.c", ("-DKIND=1",), {"order": 2}, "calls"),
-    slowly("tricks.c", ("-DKIND=2",), {"order": 1, "symplectic": True}, "symplectic"),
-    slowly("wrong.c", ("-DKIND=9",), {"order": 2, **PROGRAM}, "calls"),  # time is summed in single precision
+    ("strang.c", (), {"order": 2, **SPLIT}, ""), ("wrong.c", ("-DKIND=0",), {"order": 3}, "order"), *late(
+        (EXAMPLES / "judged.c", (), {"order": 1, "symplectic": True, "conserves": ["p_phi", "p_psi"]}, ""),
+        ("strang.c", ("-DYOSHIDA",), {"order": 4, **SPLIT}, ""),
+        ("strang.c", ("-DMCLACHLAN",), {"order": 4, **SPLIT}, ""),
+        ("tricks.c", ("-DKIND=3",), {"order": 2, "symplectic": False}, ""),
+        ("strang.c", (), {"order": 2, **SPLIT, **PROGRAM}, ""),
+        ("wrong.c", ("-DKIND=1",), {"order": 4}, "order"), ("wrong.c", ("-DKIND=2",), {"order": 4}, "order"),
+        ("wrong.c", ("-DKIND=3",), {"order": 2}, "order"), ("tricks.c", ("-DKIND=0",), {"order": 2}, "order"),
+        ("tricks.c", ("-DKIND=1",), {"order": 2}, "calls"),
+        ("tricks.c", ("-DKIND=2",), {"order": 1, "symplectic": True}, "symplectic"),
+        ("wrong.c", ("-DKIND=9",), {"order": 2, **PROGRAM}, "calls"),  # time is summed in single precision
+        mark="slow"),
 ])  # fmt: skip
 def test_what_is_written_in_c(tmp_path, source, options, claims, refuted):
     target = compiled(tmp_path, source, *options, program="form" in claims)

@@ -13,9 +13,8 @@ from symtop.measure.accuracy import error_row
 from symtop.measure.timing import Timing
 from symtop.model.top import Angles, SymmetricTop
 
-STEPS = [0.02, 0.01, 0.005]
 METHODS = ["strang", "rk4[axis]", "rk45-compiled", "exact"]
-ARGUMENTS = {"step_size": STEPS, "tolerance": [1e-4, 1e-6], "horizon": 2.0, "quiet": True}
+ARGUMENTS = {"step_size": [0.02, 0.01, 0.005], "tolerance": [1e-4, 1e-6], "horizon": 2.0, "quiet": True}
 
 
 @pytest.fixture(scope="module")

@@ -18,6 +18,7 @@ from symtop.methods.lie_group.variational import EULER_POINCARE, Variational, li
 from symtop.methods.splitting.coefficients import SUZUKI_4
 from symtop.methods.splitting.space import march_axis
 from symtop.model.top import flat
+from tests.conftest import late
 
 SOLVERS = {row.name: solver for row in variants() for solver in filter(None, map(inside, row.solvers.values()))}
 IN_LANES = {name for name, solver in SOLVERS.items() if solver.in_lanes}
@@ -34,8 +35,9 @@ ENDS = {  # how members end that step too far: numbers overflow, theta passes a 
 }  # fmt: skip
 FEW = {  # a method of each family with its mark, for the others compile for 20 s
     **dict.fromkeys(("strang[axis]", "rk4[attitude]", "series[axis]", "rkmk-se3-2[axis]", "gauss-4[axis]",
-                     "stormer-verlet[angles]", "midpoint[angles]", "galerkin-simpson[angles]"), ()),
-    **dict.fromkeys(("vern9-fixed[axis]", "exact-discrete[attitude]", "lie-variational[axis]"), pytest.mark.quick),
+                     "stormer-verlet[angles]", "midpoint[angles]"), ()),
+    **dict.fromkeys(("vern9-fixed[axis]", "exact-discrete[attitude]", "galerkin-simpson[angles]"), pytest.mark.quick),
+    "lie-variational[axis]": pytest.mark.quick,
 }  # fmt: skip
 ALONE = ("midpoint-unreduced[angles]", "gauss-12[axis]", "collective-gauss-4[axis]")  # one after another
 EXPLICIT = ("rkmk-se3-2", "rkmk-se3-4", "rkmk-se3-5", "rkmk-se3-8", "crouch-grossman-3", "commutator-free-4")
@@ -167,8 +169,8 @@ def spread(count, steps):
     return numbers, np.full(count, at.nutation_period / 300), np.tile([0, steps], (count, 1))
 
 
-@pytest.mark.parametrize(("name", "longer"), [("midpoint[angles]", 40.0), *(
-    pytest.param(f"{name}[attitude]", 20.0, marks=pytest.mark.quick) for name in ITERATED)])  # fmt: skip
+@pytest.mark.parametrize(("name", "longer"), [
+    ("midpoint[angles]", 40.0), *late(*((f"{name}[attitude]", 20.0) for name in ITERATED))])  # fmt: skip
 def test_a_lane_that_takes_more_iterations_changes_no_other(name, longer):
     """A step so large that one lane takes more passes; the others keep bits and counts, and that one does not."""
     numbers, h, marks = spread(W, 40)
@@ -316,10 +318,7 @@ def test_tables_and_compositions_of_ones_own_have_the_bits_of_runs_alone(solver)
     assert_runs_alone(solver, *given, solver.many(*given))
 
 
-@pytest.mark.parametrize("name", [
-    "commutator-free-4", "euler-poincare",
-    *(pytest.param(name, marks=pytest.mark.quick) for name in ("generalised-alpha", "lie-variational", "simo-wong")),
-])  # fmt: skip
+@pytest.mark.parametrize("name", ["commutator-free-4", *late(*(name for name in ITERATED if "suzuki" not in name))])
 def test_lanes_whose_exponential_turns_too_far_for_its_series_run_alone_and_cayleys_turns_as_far_as_it_likes(name):
     """Of Cayley's only members whose equation cannot be solved, or takes half of the passes or more, are left."""
     solver, given, far = SOLVERS[f"{name}[axis]"], members(400, seed=11), set(range(400)[FAR])

@@ -19,6 +19,7 @@ from symtop.methods.runge_kutta.adams import ALPHA, BETA, GAMMA, HIGHEST, LAST, 
 from symtop.model.scenes import closed_form
 from symtop.run.ensemble.chunks import nutation_periods
 from symtop.run.ensemble.inputs import read_members
+from tests.conftest import late
 
 
 def prepared(steps, h, k):
@@ -81,7 +82,7 @@ def test_it_needs_no_more_evaluations_than_scipys_adams_codes_and_errs_no_more(n
         assert error < 1.1 * np.linalg.norm(axis - truth, axis=1).max()
 
 
-@pytest.mark.parametrize("chart", list(FORMULATIONS))
+@pytest.mark.parametrize("chart", ["angles", "axis", *late("attitude")])
 @pytest.mark.parametrize(("name", "tolerances"), [
     ("adams", (1e-5, 1e-8, 1e-12)),  # at 1e-4 a quaternion is longer than one by more than 0.1 %, an outcome
     ("extrapolation", (1e-4, 1e-8, 1e-12)),
@@ -220,7 +221,7 @@ def test_a_run_in_pieces_has_the_bits_of_a_run_in_one():
         np.testing.assert_array_equal(whole.work, parts.work)
 
 
-@pytest.mark.parametrize("name", ["rk45", *OWN])
+@pytest.mark.parametrize("name", ["rk45", *OWN[:-2], *late(*OWN[-2:])])  # tsit5, vern9
 def test_a_pole_ends_a_run_in_angles_alone(name):
     """Falling through the pole exactly: without rotation theta' only changes sign in the angles chart."""
     top, start = symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0, theta_dot=-2.0)

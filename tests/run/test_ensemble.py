@@ -13,6 +13,7 @@ from symtop.model.exact.closed_form import NUMBERS, ClosedForms
 from symtop.run.ensemble import chunks
 from symtop.run.ensemble.chunks import nutation_periods, schedule
 from symtop.run.simulation import sample_times
+from tests.conftest import late
 
 SOME = symtop.population(36, seed=5)
 COUNTS = ("steps", "force_evaluations", "newton_iterations", "reached_time")
@@ -50,7 +51,7 @@ def assert_alone(members, name, data, samples, **setting):
     ("strang[axis]", {"step_size": 0.02, "horizon": 2.0}, 60),
     ("midpoint[angles]", {"per_nutation": 12, "nutations": 20}, 45),
     ("cayley-tuned[axis]", {"per_nutation": 12, "nutations": 3}, 20),
-    ("gauss-4[attitude]", {"per_nutation": 12, "nutations": 5.5}, 50),
+    *late(("gauss-4[attitude]", {"per_nutation": 12, "nutations": 5.5}, 50)),
 ])  # fmt: skip
 def test_a_member_is_the_run_of_simulate_to_the_last_bit(name, settings, samples):
     data = symtop.ensemble(SOME, name, samples=samples, quiet=True, **settings)

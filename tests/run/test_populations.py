@@ -10,7 +10,6 @@ from symtop.run.ensemble import population as populations
 from symtop.run.ensemble.bodies import CHAOS, FREE, STRATA as BODY_STRATA, body_population, growth, scenes_of
 from symtop.run.ensemble.population import STRATA, population
 
-COUNT = 3000
 HASH = "8afda6e1ae62a77eabc29ef01ffbbb0c0777d931e63e1ed78ae8aed761d678b2"  # of 1000 members of seed 1
 BODY_HASH = "db868dbc6447cfc999cf348d04fb7e241827773bc77f595a9064c2a658f8b795"  # of 64 members of seed 1
 
@@ -19,7 +18,7 @@ class Motion:
     """What the closed forms say of one stratum, without units."""
 
     def __init__(self, kind, seed=1):
-        self.data = population(COUNT, seed=seed, kind=kind)
+        self.data = population(3000, seed=seed, kind=kind)
         numbers = np.stack([self.data[name].values for name in NUMBERS], axis=1)
         forms = ClosedForms(numbers)
         I1, I3, mgl, self.theta, _, _, theta_dot, phi_dot, psi_dot = numbers.T

@@ -17,6 +17,7 @@ import symtop
 from symtop.core import files
 from symtop.run.ensemble import chunks, ensemble, ensemble as ensembles
 from tests.commands import printed_by
+from tests.conftest import late
 
 SOME = symtop.population(60, seed=5)
 SETTINGS = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
@@ -42,9 +43,8 @@ def refused(words, path, name="strang[axis]", **changed):
 
 @pytest.mark.parametrize(("name", "settings"), [
     ("stormer-verlet", {}), ("strang[axis]", {"variables": ["energy", "p_phi"]}),
-    pytest.param("strang[attitude]", {}, marks=pytest.mark.quick),
-    pytest.param("midpoint", {"nutations": None, "horizon": 0.7, "per_nutation": None, "step_size": 0.01},
-                 marks=pytest.mark.quick),
+    *late(("strang[attitude]", {}),
+          ("midpoint", {"nutations": None, "horizon": 0.7, "per_nutation": None, "step_size": 0.01})),
     ("exact", {"per_nutation": None, "nutations": None, "horizon": 2.0}),
 ])  # fmt: skip
 def test_the_file_holds_the_ensemble_in_memory(tmp_path, small_pieces, name, settings):

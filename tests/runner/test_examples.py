@@ -16,14 +16,11 @@ from symtop.methods.framework import registry
 from symtop.run import plugins
 from tests.commands import ROOT, call, printed_by
 
-EXAMPLE = ROOT / "studies" / "examples" / "my_methods.py"
-
-
 CLAIMS = {"two-point": 2, "mclachlan-2": 2, "ralston-3": 3, "kick-then-drift": 1}
 
 
 def test_its_methods_have_the_orders_they_claim_and_its_kernel_keeps_the_momenta(tmp_path, clean_registry):
-    shutil.copy(EXAMPLE, tmp_path / "my_own_methods.py")
+    shutil.copy(ROOT / "studies" / "examples" / "my_methods.py", tmp_path / "my_own_methods.py")
     plugins.load(tmp_path / "my_own_methods.py")
     scene = symtop.scene("goldstein")
     for name, claim in CLAIMS.items():

@@ -75,15 +75,13 @@ def everyone():
 
 GAUSS_FILE = "symtop/methods/runge_kutta/gauss.py"
 GAUSS = {f"gauss-{order}" for order in (2, 4, 6, 8, 10, 12)}
-SCIPY = {"rk45", "dop853", "lsoda", "radau"}
-STRAIGHT = {"midpoint", "trapezoidal", "simpson-linear"}
 METHODS = "symtop.methods"
 
 
 @pytest.mark.parametrize(("place", "stale"), [
     (f"{METHODS}.runge_kutta.gauss:solve_stages", GAUSS),
-    (f"{METHODS}.lagrangian.discrete_lagrangian:forces", STRAIGHT),
-    (f"{METHODS}.library.scipy_ivp:compiled_field", SCIPY),
+    (f"{METHODS}.lagrangian.discrete_lagrangian:forces", {"midpoint", "trapezoidal", "simpson-linear"}),
+    (f"{METHODS}.library.scipy_ivp:compiled_field", {"rk45", "dop853", "lsoda", "radau"}),
     (f"{METHODS}.runge_kutta.explicit:later_stages", {"euler", "rk4"}),  # the watch of guards reaches what pairs are of
     (f"{METHODS}.lie_group.generalised_alpha:_corrected", {"generalised-alpha"}),
     (f"{METHODS}.taylor.heyoka:propagate", {"taylor", "taylor-longdouble", "taylor-quad"}),

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from symtop.core.errors import SymtopError
 from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import Stepper
-from symtop.judging.claims.subject import CONSTANTS, PLANE, STEPS_A_NUTATION, Subject, declared
+from symtop.judging.claims.subject import CONSTANTS, PLANE, QUICK_SHARE, STEPS_A_NUTATION, Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided, yes_no
 from symtop.measure.conservation import Changed, Difference, behaviour, constant_of, from_increments, maxima, residuals
 from symtop.measure.step_map import one_step
@@ -50,7 +50,6 @@ SAMPLES = 4001  # of a long run
 PILOT = 400  # steps of the run that is sampled at every step
 EVALUATIONS = {"compiled": 2e8, "python": 4e4}  # most force evaluations of a long run
 LEAST_SHARE = 0.25  # least part of the most steps for a run that is repeated with finer steps, if `quick`
-QUICK_SHARE = 0.25  # of `EVALUATIONS`, if `quick`; no verdict on a method of the package changes
 TOLERANCE = 1e-6  # of an adaptive method without a default of its own
 KEPT = 1e-11  # relative: a smaller change is rounding
 REPORTED = 1e-9  # relative difference of reported momenta from those of the states; plain sums in 1e6 steps cause 1e-11
@@ -331,12 +330,12 @@ def measure(subject: Subject) -> list[Finding]:
         for k, one in enumerate(findings):  # name the chart in the reason
             if one.verdict != "inapplicable" and not one.why.endswith(" chart"):
                 findings[k] = one._replace(why=f"{one.why}, in the {chart} chart")
-        by_chart.append(findings)
+        by_chart.append({one.claim: one for one in findings})
     if runs:
         run = min(runs, key=lambda run: run.steps)
         length = {"steps_run": np.array(run.steps), "nutations_run": np.array(run.nutations)}
         subject.traces.update(length, long_nutations=run.energy[0], energy_change=run.energy[1])
-    return [max(findings, key=_badness) for findings in zip(*by_chart, strict=True)]
+    return [max((findings[claim] for findings in by_chart), key=_badness) for claim in by_chart[0]]
 
 
 def of_run(method: Integrator, run: LongRun) -> list[Finding]:

@@ -42,7 +42,7 @@ from symtop.core.errors import SymtopError
 from symtop.judging.claims.order_conditions import Conditions, conditions, splitting_conditions, triangle
 from symtop.judging.claims.step_series import Series, compared, step_series
 from symtop.judging.claims.structure import ONE_MAP, map_of
-from symtop.judging.claims.subject import FINEST, Subject, hidden_by_single
+from symtop.judging.claims.subject import FINEST, QUICK_SHARE, Subject, hidden_by_single
 from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, undecided, yes_no
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import BESIDE, CLEARLY, LARGEST_ERROR, Fit, order_verdict
@@ -63,7 +63,6 @@ from symtop.run.reference.sensitivity import conditioning
 
 NUTATIONS = 1.37  # length of the runs that the slope is fitted to
 FALLBACK, LONGER = "goldstein", (8.37, 40.0)  # scene and lengths, in nutations, if the first runs do not decide
-QUICK_SHARE = 0.25  # of the steps in `FINEST`, if `quick`; no verdict on a method of the package changes
 LARGEST_EXACT = 2.37  # steps per nutation at which a method with exact steps is run, besides the ladder
 SHARE = 0.37  # nutations: length of the runs that are extrapolated to h = 0
 STEPS = {1: 40_000, 2: 20_000, 3: 6_000, 4: 2_000, 5: 1_000, 6: 500}  # of the coarsest of them; 200 beyond order 6
@@ -161,13 +160,17 @@ def on_body(subject: Subject) -> list[Finding]:
         wrong = float(np.min(error))  # NaN if a run ended early; then the comparison below is false
         least = max(ABOVE * np.max(fitted.bound), TRUE_LIMIT, subject.rounding(subject.finest or 0.0))
         if error.size >= FEWEST and wrong > max(STAYS * np.max(error), least):
-            why = f"however small its step, it goes to a motion that is wrong by {wrong:.1e} rad on {scene.name}"
-            verdict = "measured" if claim is None else "refuted"
-            return [Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)]
+            how = f"however small its step, it goes to a motion that is wrong by {wrong:.1e} rad on {scene.name}"
+            return [_wrong_limit(claim, wrong, how)]
         return [undecided("order", yes_no(claim), _hidden(subject, fit.reason))]
     if verdict == "refuted" and fit.slope - fit.interval > (claim or 0) + CLEARLY:  # as Fasso's method on some bodies
         verdict, why = "measured", f"{why}: here the error falls with a higher power"
     return [Finding("order", yes_no(claim), fitted.measured, verdict, why, fit.slope, fit.interval)]
+
+
+def _wrong_limit(claim: int | None, wrong: float, why: str) -> Finding:
+    verdict = "measured" if claim is None else "refuted"
+    return Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)
 
 
 def _terms(series: Series) -> Measured:
@@ -261,7 +264,7 @@ def _by_steps(subject: Subject) -> Finding:
     slopes = f"slopes {slopes} on {fitted.scene}" if slopes else "no slope"
     power = method.order or 1
     # if a step certainly has the motion's terms up to h^power, its runs converge to the motion
-    follows = series and series.order >= max(power, 1) and float(series.noise[1]) < CLEAR
+    follows = series and series.order >= power and float(series.noise[1]) < CLEAR
     settled = measured or conditioning(scene, SHARE * scene.time_scale()) > UNSTABLE
     height = math.sin(generic_start(scene).theta)
     pole = height if height <= APART else 1.0  # near a pole, a state in angles has an error of 2e-16 over the square
@@ -269,9 +272,8 @@ def _by_steps(subject: Subject) -> Finding:
         power = max(1, min(method.order or 99, round(main.slope))) if measured else power
         wrong, doubt = limit(method, scene, power, finest)
         if wrong > max(TRUE_LIMIT / pole**2, 10.0 * doubt, subject.rounding(finest or 0.0)):
-            why = f"as its step goes to zero it goes to a motion that is wrong by {wrong:.1e} ({slopes})"
-            verdict = "measured" if claim is None else "refuted"
-            return Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)
+            how = f"as its step goes to zero it goes to a motion that is wrong by {wrong:.1e} ({slopes})"
+            return _wrong_limit(claim, wrong, how)
     if claim is not None:
         finding = _claimed(claim, fitted, fitted.fits.values() if method.fixed_step else (), series, slopes)
         lowest = min((fit.slope for fit in fitted.fits.values() if math.isfinite(fit.slope)), default=0.0)

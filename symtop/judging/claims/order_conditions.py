@@ -35,8 +35,11 @@ from symtop.model.charts import Array
 
 MET = 1e-12  # a condition is met if its defect is smaller: coefficients have 15 digits or more
 MOST = 6  # vertices of the largest trees
+LONGEST_WORD = 10  # the highest order of the conditions of a splitting
+RANK = 1e-9  # singular values below this are zero
 
 Tree = tuple[Any, ...]
+Words = list[Array]  # coefficients of the words of length 0, 1, 2 ..., shapes (1,), (2,), (4,) ...; T is 0 and V is 1
 
 
 class Conditions(NamedTuple):
@@ -105,12 +108,6 @@ def triangle(entries: ArrayLike, stages: int) -> np.ndarray:
     rows, columns = np.tril_indices(stages, -1)
     matrix[rows, columns] = np.asarray(entries, dtype=float)[: rows.size]
     return matrix
-
-
-LONGEST_WORD = 10  # the highest order of the conditions
-RANK = 1e-9  # singular values below this are zero
-
-Words = list[Array]  # coefficients of the words of length 0, 1, 2 ..., shapes (1,), (2,), (4,) ...; T is 0 and V is 1
 
 
 def product(first: Words, second: Words) -> Words:

@@ -2,8 +2,6 @@
 
 The length of runs follows from the time of one step, so that a bare step in Python is judged in a minute and a compiled
 one in seconds; the findings name the numbers of steps. For a registered integrator its implementation decides.
-
-A bare step is given as a function, a class, a solver, a file or a command, which selects its adapter.
 """
 
 import functools
@@ -44,6 +42,7 @@ FEWEST = 300  # steps of the longest run for the order, however slow a step is
 SINGLE = 1000  # most steps of it in single precision, whose rounding hides smaller errors
 LADDER = 2.5  # ratio of the steps of all runs for the order to those of the longest
 ENOUGH_STEPS, AT_REST = 50.0, 1e-9  # steps per nutation with a zero right-hand side; the largest relative move
+QUICK_SHARE = 0.25  # of the most steps and evaluations of a registered method, if `quick`; no verdict changes
 STEPS_A_NUTATION = 118.02  # of a long run, and of timed steps, because the cost of an implicit step depends on its size
 TIMED, LEAST = 0.03, 1e-9  # seconds of a run that suffice to time a step; the least time assumed of a step
 

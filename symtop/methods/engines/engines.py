@@ -80,9 +80,9 @@ from symtop.methods.framework.body import prepared
 from symtop.methods.framework.loop import FixedStep, Loop, as_stepped, no_carry
 from symtop.methods.framework.preparation import BareTop, Preparation
 from symtop.methods.framework.registry import ENGINE, Integrator
-from symtop.methods.framework.space import L_at, e_at, ended_space, observe_attitude, observe_axis, q_at
+from symtop.methods.framework.space import L_at, axis_of, e_at, ended_space, observe_attitude, observe_axis, q_at
 from symtop.methods.splitting.body import SORTED, five_rotations
-from symtop.methods.vectors import conjugate, cross, dot, plus, scaled, summed
+from symtop.methods.vectors import conjugate, cross, displaced, dot, plus, rotated, scaled, summed
 from symtop.model.body import product
 from symtop.model.charts import BODY
 
@@ -112,21 +112,6 @@ class EngineBody(NamedTuple):
     one: float = 1.0
 
 
-@register_jitable
-def turned(p: Any, v: Any) -> Any:
-    """How far the rotation p moves a vector: p v p* - v."""
-    u = p[1], p[2], p[3]
-    c = cross(u, v)
-    d = plus(cross(u, c), p[0], c)
-    return d[0] + d[0], d[1] + d[1], d[2] + d[2]  # doubled by addition, in any precision
-
-
-@register_jitable
-def rotated(par: Any, p: Any, v: Any) -> Any:
-    """p v p*."""
-    return plus(v, par.one, turned(p, v))
-
-
 def _top_prepared(place_at: Callable[..., Any], size: int, *, rates: bool) -> Preparation:
     """A start as (e, L) or (q, L), or with `rates` w for L: the angular momentum of a body whose moments are one."""
 
@@ -145,19 +130,19 @@ def _body_prepared(*, rates: bool) -> Preparation:
         if rates:
             v = body.a1 * at.M1, body.a2 * at.M2, body.a3 * at.M3
         par = EngineBody(body.I1, body.I2, body.I3, body.c1, body.c2, body.c3, 0.0, 0.5, 1.0)
-        return par, (*q, *rotated(par, q, v))
+        return par, (*q, *rotated(q, v))
 
     return prepared(prepare)
 
 
 def _body_momentum(par: Any, q: Any, w: Any) -> Any:
-    b = rotated(par, conjugate(q), w)
-    return rotated(par, q, (par.I1 * b[0], par.I2 * b[1], par.I3 * b[2]))
+    b = rotated(conjugate(q), w)
+    return rotated(q, (par.I1 * b[0], par.I2 * b[1], par.I3 * b[2]))
 
 
 def _body_velocity(par: Any, q: Any, L: Any) -> Any:
-    M = rotated(par, conjugate(q), L)
-    return rotated(par, q, (M[0] / par.I1, M[1] / par.I2, M[2] / par.I3))
+    M = rotated(conjugate(q), L)
+    return rotated(q, (M[0] / par.I1, M[1] / par.I2, M[2] / par.I3))
 
 
 # functions of the orientation: of a top its axis, of a body its attitude
@@ -170,13 +155,13 @@ velocity = by_length(  # I_s^-1 L
 )
 pulled = by_length(  # gravity about the fixed point where the vertical is `up`
     (3, lambda par, e, up: scaled(par.mgl, cross(up, e))),
-    (4, lambda par, q, up: cross(up, rotated(par, q, (par.c1, par.c2, par.c3)))),
+    (4, lambda par, q, up: cross(up, rotated(q, (par.c1, par.c2, par.c3)))),
 )
 torque = by_length(
     (3, lambda par, e: (-par.mgl * e[1], par.mgl * e[0], par.zero)),
     (4, lambda par, q: pulled(par, q, (par.zero, par.zero, par.one))),
 )
-oriented = by_length((3, lambda par, e, p: rotated(par, p, e)), (4, lambda _par, q, p: product(p, q)))  # after a turn p
+oriented = by_length((3, lambda _par, e, p: rotated(p, e)), (4, lambda _par, q, p: product(p, q)))  # after a turn p
 
 
 @register_jitable
@@ -215,22 +200,13 @@ def normalised(par: Any, q: Any) -> Any:
     return s * q[0], s * q[1], s * q[2], s * q[3]
 
 
-@register_jitable
-def axis(q: Any) -> Any:
-    """The axis of an attitude, the third column of its matrix."""
-    x, y = q[1] * q[3] + q[0] * q[2], q[2] * q[3] - q[0] * q[1]
-    return x + x, y + y, q[0] * q[0] - q[1] * q[1] - q[2] * q[2] + q[3] * q[3]
-
-
-@register_jitable
-def _nothing(par: Any, e: Any, v: Any) -> Any:
-    return 0.0
+_nothing = register_jitable(lambda _par, _e, _v: 0.0)
 
 
 ORIENTATION: dict[str, Callable[..., Any]] = {  # from a state, the orientation that a map takes
-    "axis": lambda y: y[:3], "attitude": axis, BODY: lambda y: y[:4],
+    "axis": lambda y: y[:3], "attitude": lambda y: axis_of(*y[:4]), BODY: lambda y: y[:4],
 }  # fmt: skip
-pointing = by_length((3, lambda _par, e: e), (4, lambda _par, q: axis(q)))  # the axis of it
+pointing = by_length((3, lambda _par, e: e), (4, lambda _par, q: axis_of(*q)))  # the axis of it
 
 
 def _observing(chart: str) -> Callable[..., Any]:
@@ -258,7 +234,7 @@ def _presenting(chart: str) -> Callable[..., Any]:
 @register_jitable
 def _in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     """`present` of a body: the state with L in the axes of the body."""
-    return (*state[:4], *rotated(par, conjugate(state[:4]), state[4:]))
+    return (*state[:4], *rotated(conjugate(state[:4]), state[4:]))
 
 
 def _momentum_in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
@@ -300,7 +276,7 @@ def _gap(after: Any, before: Any) -> Any:
 
 
 def _axis_moved(par: Any, e: Any, p: Any, start: Any) -> Any:
-    x, y, z = turned(p, e)
+    x, y, z = displaced(p, e)
     r, s, t = e[0] + x, e[1] + y, e[2] + z
     lost = 0.5 * (1.0 - (r * r + s * s + t * t))  # |e| = 1 to rounding, as engines keep |q|
     return x + lost * r, y + lost * s, z + lost * t
@@ -365,9 +341,9 @@ def _columns(par: Any, u: Any, v: Any) -> Any:
 
 def _body_implicit(par: Any, q: Any, w: Any, r: Any, h: Any) -> Any:
     back = conjugate(q)
-    b = rotated(par, back, w)
+    b = rotated(back, w)
     columns = _columns(par, b, (-par.I1 * b[0], -par.I2 * b[1], -par.I3 * b[2]))
-    return rotated(par, q, _solved(par, h, columns, rotated(par, back, r)))
+    return rotated(q, _solved(par, h, columns, rotated(back, r)))
 
 
 def _top_implicit(par: Any, e: Any, w: Any, r: Any, h: Any) -> Any:
@@ -418,9 +394,9 @@ def _top_projected(par: Any, e: Any, L: Any, h: Any) -> Any:
 
 
 def _body_projected(par: Any, q: Any, L: Any, h: Any) -> Any:
-    M = rotated(par, conjugate(q), L)
+    M = rotated(conjugate(q), L)
     rest = par.zero, par.zero, par.zero
-    return rotated(par, q, _solved(par, h, _columns(par, rest, scaled(-par.one, M)), M))
+    return rotated(q, _solved(par, h, _columns(par, rest, scaled(-par.one, M)), M))
 
 
 projected = by_length((3, _top_projected), (4, _body_projected))
@@ -479,7 +455,7 @@ def _leapfrog(*, published: bool) -> Callable[..., Any]:
         middle = _advanced(one, velocity(par, e, L), one, 0.5 * h)
         L = plus(L, 0.5 * h, torque(par, e))
         turn = normalised(par, middle)
-        w = velocity(par, oriented(par, e, turn), L) if published else rotated(par, turn, velocity(par, e, L))
+        w = velocity(par, oriented(par, e, turn), L) if published else rotated(turn, velocity(par, e, L))
         p = normalised(par, _advanced(one, w, middle, h))
         return p, plus(L, 0.5 * h, torque(par, oriented(par, e, p))), carry
 
@@ -489,7 +465,7 @@ def _leapfrog(*, published: bool) -> Callable[..., Any]:
 @register_jitable
 def _slope(par: Any, e: Any, p: Any, b: Any) -> Any:
     """b' of rates in the axes of the start, where the body stands p further."""
-    up = rotated(par, conjugate(p), (0.0, 0.0, 1.0))
+    up = rotated(conjugate(p), (0.0, 0.0, 1.0))
     rest = plus(pulled(par, e, up), -1.0, cross(b, momentum(par, e, b)))
     return velocity(par, e, rest)
 
@@ -519,7 +495,7 @@ def _kutta(*, munthe_kaas: bool) -> Callable[..., Any]:
             turns = _straightened(turn, rates) if munthe_kaas else rates
             total, gain = plus(total, weight, turns), plus(gain, weight, slopes)
         p = exponential(par, total, 1.0)
-        return p, rotated(par, p, plus(b, 1.0, gain)), carry
+        return p, rotated(p, plus(b, 1.0, gain)), carry
 
     return step
 
@@ -544,7 +520,7 @@ def spiral(par: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
 def explicit_euler(par: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
     """Attitude and body rates both from the start of the step; a linear rotation."""
     p = linear(par, w, h)
-    return p, rotated(par, p, plus(w, h, acceleration(par, e, w))), carry
+    return p, rotated(p, plus(w, h, acceleration(par, e, w))), carry
 
 
 def adams_bashforth(par: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
@@ -552,7 +528,7 @@ def adams_bashforth(par: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
     now = acceleration(par, e, w)
     p = exponential(par, plus(plus(w, 0.5 * h, now), h * h / 12.0, cross(now, w)), h)
     w = plus(plus(w, 1.5 * h, now), -0.5 * h, carry)
-    return p, rotated(par, p, w), rotated(par, p, now)
+    return p, rotated(p, w), rotated(p, now)
 
 
 def _turn(k: int) -> Callable[..., Any]:
@@ -587,14 +563,14 @@ def _five_turns(outer: Any, inner: Any, par: Any, q: Any, L: Any, h: float) -> A
 def _increment_no_squish(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
     """One step on (q, L); the free rotation leaves L in space as it is."""
     q, half = state[:4], 0.5 * h
-    kick = scaled(half, torque(par, axis(q)))
-    L = rotated(par, conjugate(q), plus(state[4:], 1.0, kick))
+    kick = scaled(half, torque(par, axis_of(*q)))
+    L = rotated(conjugate(q), plus(state[4:], 1.0, kick))
     if par.I3 < par.I1:
         q, L = _five_turns(_first_turn, _third_turn, par, q, L, h)
     else:
         q, L = _five_turns(_third_turn, _first_turn, par, q, L, h)
     q = normalised(par, q)
-    kick = plus(kick, half, torque(par, axis(q)))
+    kick = plus(kick, half, torque(par, axis_of(*q)))
     dstate = (*_gap(q, state[:4]), *kick)
     return dstate, carry, 1, ended_space(dstate)
 

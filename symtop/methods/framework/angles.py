@@ -21,7 +21,7 @@ import numpy as np
 from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
 from symtop.core.sines import sincos
-from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK, Array
+from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, OK
 from symtop.methods.framework.preparation import BareTop, Preparation, Presentation, conserved
 
 
@@ -130,12 +130,6 @@ def ended_angles(y: Any) -> int:
     # zero, or NaN where one of them is not finite: added to theta, one test covers all six without a branch
     nothing = 0.0 * (y[1] + y[2] + y[3] + y[4] + y[5])
     return chart_outcome(y[0] + nothing)
-
-
-def sampled_momenta(par: Any, states: Array) -> tuple[Array, Array]:
-    """p_phi and p_psi of states, shape (samples, 6)."""
-    p_phi, p_psi = momenta(par, states[:, 0], states[:, 4], states[:, 5])
-    return p_phi, p_psi
 
 
 # an unreduced state as (theta, p_theta, phi, psi), the angles chart of `simulate`

@@ -25,8 +25,7 @@ from symtop.methods.framework.angles import field_angles
 from symtop.methods.framework.plan import OUTCOMES, Array, Run
 from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.space import AttitudeTop, SpaceTop, field_attitude, field_axis
-from symtop.model import charts
-from symtop.model.charts import BODY, CHARTS, space_momenta
+from symtop.model.charts import BODY, CHARTS, lifted, space_momenta
 from symtop.model.scenes import Scene, scene
 from symtop.model.top import Angles, SymmetricTop
 
@@ -37,34 +36,33 @@ class Formulation(NamedTuple):
     field: Callable[[Any, Any], Any]  # (par, state) -> time derivative
     ended: Callable[[Any], int]  # outcome of a state: OK, or how the chart was left
     observe: Callable[..., Any]  # (par, rule, before, dstate, h) -> p_phi and p_psi after a step
-    prepare: Callable[[SymmetricTop, Angles], tuple[Any, tuple[float, ...]]]  # parameters and state of a start
+    prepare: Any  # (top, start) -> parameters and state
     present: Callable[[Any, Array, Array], Array] | None  # (par, times, states) -> states as shown, if they differ
     momenta: Callable[[Any, Array], tuple[Array, Array]]  # (par, states) -> p_phi and p_psi of samples
+    top: Any = None  # the NamedTuple of the parameters
 
 
 FORMULATIONS = {
     "angles": Formulation(
         angles.field_angles, angles.ended_angles, angles.observe_angles, angles.with_rates, angles.to_angles,
-        angles.sampled_momenta,
+        lambda par, y: angles.momenta(par, y[:, 0], y[:, 4], y[:, 5]), BareTop,
     ),
     "axis": Formulation(
         space.field_axis, space.ended_space, space.observe_axis, space.on_axis, None,
-        lambda _, states: space_momenta("axis", states),
+        lambda _, states: space_momenta("axis", states), SpaceTop,
     ),
     "attitude": Formulation(
         space.field_attitude, space.ended_space, space.observe_attitude, space.on_state, None,
-        lambda _, states: space_momenta("attitude", states),
+        lambda _, states: space_momenta("attitude", states), AttitudeTop,
     ),
 }  # fmt: skip
 
-
-def _body_momenta(_: Any, states: Array) -> tuple[Array, Array]:
-    return charts.lifted(states)[..., 2], states[..., 6].copy()
-
-
-FORMS = FORMULATIONS | {
-    BODY: Formulation(body.field_body, space.ended_space, body.observe_body, body.on_body, None, _body_momenta)
-}  # and for a body without symmetry
+FORMS = FORMULATIONS | {  # and for a body without symmetry
+    BODY: Formulation(
+        body.field_body, space.ended_space, body.observe_body, body.on_body, None,
+        lambda _, states: (lifted(states)[..., 2], states[..., 6].copy()), body.General,
+    )
+}  # fmt: skip
 
 
 def as_run(
@@ -76,17 +74,17 @@ def as_run(
     return Run(shown, p_phi, p_psi, steps, evaluations, 0, OUTCOMES[outcome], reached)
 
 
-_RIGHT: dict[str, tuple[Callable[..., Any], tuple[int]]] = {  # by chart: f(I1, I3, mgl, y), the shape of y
-    "angles": (lambda I1, I3, mgl, y: field_angles(BareTop(I1, I3, mgl), y), (6,)),
-    "axis": (lambda I1, _I3, mgl, y: field_axis(SpaceTop(I1, mgl, 0.0), y), (6,)),
-    "attitude": (lambda I1, I3, mgl, y: field_attitude(AttitudeTop(I1, mgl, 1.0 / I3 - 1.0 / I1), y), (7,)),
+_RIGHT: dict[str, Callable[..., Any]] = {  # by chart: f(I1, I3, mgl, y)
+    "angles": lambda I1, I3, mgl, y: field_angles(BareTop(I1, I3, mgl), y),
+    "axis": lambda I1, _I3, mgl, y: field_axis(SpaceTop(I1, mgl, 0.0), y),
+    "attitude": lambda I1, I3, mgl, y: field_attitude(AttitudeTop(I1, mgl, 1.0 / I3 - 1.0 / I1), y),
 }
 
 
 @functools.cache
-def _kernel(chart: str) -> Any:
-    """f(I1, I3, mgl, y) -> y' of a chart, compiled."""
-    right = register_jitable(_RIGHT[chart][0])
+def compiled_field(chart: str) -> Any:
+    """f(I1, I3, mgl, y) -> y' of a chart of the top, compiled."""
+    right = register_jitable(_RIGHT[chart])
 
     def kernel(I1, I3, mgl, y):  # type: ignore[no-untyped-def]
         return np.array(right(I1, I3, mgl, y))
@@ -100,7 +98,7 @@ class Field:
     def __init__(self, chart: str, top: SymmetricTop, *, compiled: bool) -> None:
         self.chart, self.top, self.compiled = chart, top, compiled
         self.parameters = top.I1, top.I3, top.mgl
-        self._right, self._shape = _RIGHT[chart]
+        self._right, self._shape = _RIGHT[chart], (FORMULATIONS[chart].prepare.size,)
 
     def __call__(self, _: float, y: Any) -> Array:
         """y' at any time: an array like y. Raises SymtopError for a y that is no state of the chart."""
@@ -115,7 +113,7 @@ class Field:
     @property
     def kernel(self) -> Any:
         """The compiled function (I1, I3, mgl, y) -> y', which other compiled code may call with `parameters`."""
-        return _kernel(self.chart)
+        return compiled_field(self.chart)
 
     def state(self, start: Angles) -> Array:
         """The state y of a start."""

@@ -54,6 +54,7 @@ from symtop.core.jit import compile_kernel, register_jitable, set_item, to_fixed
 from symtop.core.parallel import heed
 from symtop.methods.framework.angles import in_chart
 from symtop.methods.framework.plan import OK, Array
+from symtop.methods.framework.preparation import Preparation
 from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate
 from symtop.model.body import from_flat
@@ -79,6 +80,15 @@ def put(array: Any, first: int, j: int, values: Any) -> None:
     """Write a tuple to numbers `first`, `first` + 1, ... of lane j."""
     for i in range(len(values)):
         array[(first + i) * W + j] = values[i]
+
+
+@register_jitable
+def move(add: Any, block: Any, dimension: int, j: int, dstate: Any) -> None:
+    """Add the increment of a step to the state of lane j by `add`, `accumulate` or like it, and record it."""
+    state, low = add(column(block, 0, j, dstate), column(block, dimension, j, dstate), dstate)
+    put(block, 0, j, state)
+    put(block, dimension, j, low)
+    put(block, 2 * dimension, j, dstate)
 
 
 @register_jitable
@@ -113,13 +123,12 @@ class Lanes:
                 register_jitable(part)
 
 
-def preparing(
-    lanes: Lanes, begin: Any, enter: Any, kind: Any, numbers: Any, scale: Any, opened: Any, momenta_at: Any, width: int
-) -> Any:
+def preparing(lanes: Lanes, begin: Any, enter: Any, kind: Any, scale: Any, prepare: Preparation) -> Any:
     """The compiled preparation of many members: the initial numbers of `block` and `table`, one row a member."""
-    lay, begin = lanes.lay, lanes.begin or begin
+    lay, begin, width = lanes.lay, lanes.begin or begin, prepare.given
+    numbers, opened, momenta_at = prepare.numbers, prepare.opened, prepare.momenta
 
-    def prepare(chosen, given, coefficients, h, marks, prepared, momenta):  # type: ignore[no-untyped-def]
+    def fill(chosen, given, coefficients, h, marks, prepared, momenta):  # type: ignore[no-untyped-def]
         tops, rules, starts, carries = prepared
         for i in range(len(chosen)):
             m = chosen[i]
@@ -138,7 +147,7 @@ def preparing(
             if marks[m, 0] == 0:
                 momenta[m, 0, 0], momenta[m, 0, 1] = momenta_at(top, start)
 
-    return compile_kernel(prepare)
+    return compile_kernel(fill)
 
 
 @functools.cache
@@ -251,40 +260,47 @@ def reading(count: int) -> Callable[..., Any]:
 
 
 def one_loop(
-    advance: Callable[..., Any], rule: Any, *, top: Any, dimension: int, carry: int,
+    advance: Callable[..., Any], lay: Callable[..., None], size: int, *, top: Any, dimension: int, carry: int = 1,
+    begin: Callable[..., Any] | None = None, cost: int = 1, read: Callable[[Any], Any] = lambda _: 0.0,
     add: Callable[..., Any] = accumulate,
 ) -> Lanes:  # fmt: skip
-    """Lanes whose step is one loop over ``advance(par, rule, state, carry)`` -> (increment, next carry, outcome)."""
-    tops, fields = len(top._fields), len(rule._fields)
-    zeros, given = (0.0,) * dimension, (0.0,) * fields
-    step_at, flag, carry_at = 2 * dimension, 3 * dimension, 3 * dimension + 2
+    """Lanes whose step is one loop over ``advance(par, state, carry, table, j)`` -> (increment, next carry, outcome).
+
+    `lay` writes `size` numbers, and a step takes `cost` units of work.
+    """
+    zeros, flag, carry_at = (0.0,) * dimension, 3 * dimension, 3 * dimension + 2
+    top_of, carried = reading(len(top._fields)), reading(carry)
     register_jitable(advance)
-    top_of, rule_of, carried = reading(tops), reading(fields), reading(carry)
+
+    def step(block, table):  # type: ignore[no-untyped-def]
+        wide_vectors()
+        for j in range(W):
+            state, before = column(block, 0, j, zeros), carried(block, carry_at, j)
+            dstate, after, outcome = advance(top(*top_of(table, 0, j)), state, before, table, j)
+            block[flag * W + j] = block[flag * W + j] if outcome == OK else 1.0
+            move(add, block, dimension, j, dstate)
+            put(block, carry_at, j, after)
+
+    return Lanes(step, lay, read, lambda _: size, top, dimension, carry, lambda _: cost, begin=begin)
+
+
+def loop_with_rule(advance: Callable[..., Any], rule: Any, *, top: Any, **more: Any) -> Lanes:
+    """`one_loop` over ``advance(par, rule, state, carry)``, of a rule that is a NamedTuple of numbers."""
+    fields, tops = len(rule._fields), len(top._fields)
+    rule_of = reading(fields)
+    register_jitable(advance)
 
     def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
         for i in range(fields):
             numbers[i] = rule[i]
 
     def read(numbers):  # type: ignore[no-untyped-def]
-        values = given
-        for i in range(fields):
-            values = set_item(values, i, numbers[i])
-        return rule(*values)
+        return rule(*to_fixed_tuple(numbers, fields))
 
-    def step(block, table):  # type: ignore[no-untyped-def]
-        wide_vectors()
-        for j in range(W):
-            par, scaled = top(*top_of(table, 0, j)), rule(*rule_of(table, tops, j))
-            state, lost = column(block, 0, j, zeros), block[flag * W + j]
-            dstate, after, outcome = advance(par, scaled, state, carried(block, carry_at, j))
-            block[flag * W + j] = lost if outcome == OK else 1.0
-            moved, low = add(state, column(block, dimension, j, zeros), dstate)
-            put(block, 0, j, moved)
-            put(block, dimension, j, low)
-            put(block, step_at, j, dstate)
-            put(block, carry_at, j, after)
+    def advance_lane(par, state, carry, table, j):  # type: ignore[no-untyped-def]
+        return advance(par, rule(*rule_of(table, tops, j)), state, carry)
 
-    return Lanes(step, lay, read, lambda _: fields, top, dimension, carry, effort=lambda _: 1)
+    return one_loop(advance_lane, lay, fields, top=top, read=read, **more)
 
 
 GROUP = 200_000  # steps between returns to Python, so that an interrupt is heard: a second of the slowest kernel

@@ -62,22 +62,10 @@ class March(NamedTuple):
     outcome: int  # index into OUTCOMES
 
 
-@register_jitable
-def no_carry(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """`begin` of a kernel that reuses nothing; one number, as numba cannot type the entries of an empty tuple."""
-    return (0.0,)
-
-
-@register_jitable
-def as_given(par: Any, rule: Any, state: Any, h: float) -> Any:
-    """`enter` of a kernel that steps the start as it is."""
-    return state
-
-
-@register_jitable
-def as_stepped(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    """`present` of a kernel whose state is shown as it is."""
-    return state
+# `begin` of a kernel that reuses nothing: one number, as numba cannot type the entries of an empty tuple
+no_carry = register_jitable(lambda _par, _rule, _state, _h: (0.0,))
+as_given = register_jitable(lambda _par, _rule, state, _h: state)  # `enter` of a kernel that steps the start itself
+as_stepped = register_jitable(lambda _par, _rule, state, _k, _h: state)  # `present` of one that shows its state
 
 
 @dataclass(frozen=True)
@@ -185,14 +173,14 @@ kernel_loop = Loop  # its public name
 
 @functools.cache
 def whole_run(
-    loop: Loop, sample: Callable[..., Any], kind: Callable[..., Any], numbers: Callable[..., Any],
-    scale: Callable[..., Any], opened: Callable[..., Any], momenta_at: Callable[..., Any],
-) -> Callable[..., tuple[int, int, int]]:  # fmt: skip
+    loop: Loop, sample: Callable[..., Any], kind: Callable[..., Any], scale: Callable[..., Any], prepare: Preparation
+) -> Callable[..., tuple[int, int, int]]:
     """A run in one compiled call, from plain numbers (`preparation`) to filled arrays.
 
     ``run(plain, coefficients, h, marks, states, momenta)``, with momenta (2, samples), returns steps, work and outcome.
     """
     begin, enter, march = loop.begin, loop.enter, register_jitable(loop.marching(sample))
+    numbers, opened, momenta_at = prepare.numbers, prepare.opened, prepare.momenta
 
     def run(plain, coefficients, h, marks, states, momenta):  # type: ignore[no-untyped-def]
         top, at = opened(plain)
@@ -344,13 +332,12 @@ class FixedStep:
         if not isinstance(rule, tuple) or not rule:  # a function of Python, or numbers in an array
             return None
         kind, numbers = pack(rule)
-        parts = prepare.numbers, scale, prepare.opened, prepare.momenta
-        run = whole_run(loop, sample, kind, *parts)
+        run = whole_run(loop, sample, kind, scale, prepare)
         alone = run, numbers, prepare.check, size, self.evaluations, self.each_step, int(self.implicit)
         if (lanes := loop.lanes(rule)) is None:
             return _Whole(alone, None, (rule, numbers))
         show = lanes.show or many.showing(sample)
-        return _Whole(alone, partial(blocks_of, loop, lanes, show, kind, *parts, prepare.given), (rule, numbers))
+        return _Whole(alone, partial(blocks_of, loop, lanes, show, kind, scale, prepare), (rule, numbers))
 
 
 def inside(solver: Solver | None) -> FixedStep | None:

@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
+from symtop.methods.framework.lanes import Lanes, W, column, move, none_left, put
 from symtop.methods.framework.loop import Loop
 from symtop.methods.framework.plan import NOT_CONVERGED
 from symtop.methods.simd import wide_vectors
@@ -94,6 +94,8 @@ def newton_loop(  # noqa: C901  (the loops of one step, read in one piece)
     is a compile-time constant of the kernel, so that a branch on it alone does not stop vectorisation.
     """
     rest = carry - newest
+    for function in (constants, start, equation, predict, evaluate, correct, restart, keep, close):
+        register_jitable(function)
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
         equations = equation(par, rule, state, constants(par, h), start(par, rule, state[0]))
@@ -149,12 +151,9 @@ def newton_loop(  # noqa: C901  (the loops of one step, read in one piece)
 
         @register_jitable
         def finish(block, table, j):  # type: ignore[no-untyped-def]
-            state, before = column(block, 0, j, states), column(block, carry_at, j, kept)
+            before = column(block, carry_at, j, kept)
             step, newest, outcome = close(problem(block, table, j), column(block, end_at, j, end))
-            moved, low = accumulate(state, column(block, dimension, j, states), step)
-            put(block, 0, j, moved)
-            put(block, dimension, j, low)
-            put(block, 2 * dimension, j, step)
+            move(accumulate, block, dimension, j, step)
             put(block, carry_at, j, newest + before)
             ended = -float(outcome) if block[live_at * W + j] == 0.0 else 1.0
             ended = ended if block[flag * W + j] == 0.0 else block[flag * W + j]

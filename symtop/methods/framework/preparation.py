@@ -80,24 +80,15 @@ class Preparation:
         return self.numbers(*self.opened(flat(top, at)))
 
 
-@register_jitable
-def plain(values: Any) -> Any:
-    """Makes a rule that is a plain tuple: the tuple itself."""
-    return values
-
-
 @functools.cache
 def _made_of_fields(kind: Any) -> Callable[[Any], Any]:
-    def made(fields: Any) -> Any:
-        return kind(*fields)
-
-    return register_jitable(made)
+    return register_jitable((lambda fields: fields) if kind is tuple else (lambda fields: kind(*fields)))
 
 
 def as_fields(rule: Any) -> tuple[Callable[[Any], Any], Any]:
     """The function that makes a rule from its fields, and the fields: a plain tuple is a faster argument."""
     kind: Any = type(rule)
-    return plain if kind is tuple else _made_of_fields(kind), tuple(rule)
+    return _made_of_fields(kind), tuple(rule)
 
 
 @functools.cache
@@ -171,13 +162,5 @@ class Presentation:
         return out
 
 
-@register_jitable
-def as_it_is(rule: Any, top: Any, at: Any, h: float) -> Any:
-    """`scale` of a method whose numbers do not depend on the run."""
-    return rule
-
-
-@register_jitable
-def as_it_steps(par: Any, t: float, state: Any) -> Any:
-    """`sample` of a kernel whose state is that of the user's chart."""
-    return state
+as_it_is = register_jitable(lambda rule, _top, _at, _h: rule)  # `scale` of numbers that no run changes
+as_it_steps = register_jitable(lambda _par, _t, state: state)  # `sample` of a kernel that steps states of the chart

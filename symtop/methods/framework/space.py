@@ -21,6 +21,7 @@ import numpy as np
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.plan import NOT_FINITE, OK
 from symtop.methods.framework.preparation import Preparation, Presentation
+from symtop.methods.vectors import cross
 from symtop.model import charts
 
 _axis_parts, _quaternion_parts = register_jitable(charts.axis_parts), register_jitable(charts.quaternion_parts)
@@ -105,8 +106,7 @@ def _rows(e: Any, a: Any, b: Any) -> Any:
 def _frame_to_attitude(par: Any, t: float, y: Any) -> Any:
     """A frame state as an attitude state (q, L); the sign of q is arbitrary."""
     e, a = (y[0], y[1], y[2]), (y[6], y[7], y[8])
-    b = (e[1] * a[2] - e[2] * a[1], e[2] * a[0] - e[0] * a[2], e[0] * a[1] - e[1] * a[0])
-    rows = _rows(e, a, b)
+    rows = _rows(e, a, cross(e, a))
     best, largest = rows[0], rows[0][0]  # the row with the largest diagonal loses no digits
     for i in range(1, 4):
         if rows[i][i] > largest:
@@ -195,7 +195,8 @@ def observe_axis(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any
 @register_jitable
 def axis_of(w: float, x: float, y: float, z: float) -> Any:
     """The axis of a quaternion."""
-    return 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z
+    right, back = x * z + w * y, y * z - w * x  # doubled by addition, in any precision
+    return right + right, back + back, w * w - x * x - y * y + z * z
 
 
 @register_jitable

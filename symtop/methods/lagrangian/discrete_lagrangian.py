@@ -217,12 +217,6 @@ class _Step(NamedTuple):
     scale: float  # h^2 / I1
 
 
-@register_jitable
-def _steady(par: Any, h: float) -> Any:
-    return h, h / par.I1, par.p_psi / par.I3
-
-
-@register_jitable
 def _equation(par: Any, rule: Any, state: Any, steady: Any, opened: Any) -> Any:
     # h^2/I1 rounded once would bias the energy: increments are computed from h and h/I1 alone
     h, lever, spin = steady
@@ -231,19 +225,16 @@ def _equation(par: Any, rule: Any, state: Any, steady: Any, opened: Any) -> Any:
     return _Step(par, rule, state[0], opened, h, lever, spin, state[1], flight, scale)
 
 
-@register_jitable
 def _predict(step: Any, carry: Any) -> Any:
     """W0 is smooth in time: the cubic through its last four values predicts the next one."""
     return (step.flight - step.scale * (4.0 * (carry[0] + carry[2]) - 6.0 * carry[1] - carry[3]),)
 
 
-@register_jitable
 def _evaluate(step: Any, x: Any) -> Any:
     sums = node_sums(step.rule, step.theta, x[0], step.opened)
     return sums, forces(step.par, sums)
 
 
-@register_jitable
 def _correct(step: Any, trial: Any, x: Any) -> Any:
     """Newton's correction, judged against the step's own increment."""
     (d,), (_, force) = x, trial
@@ -252,12 +243,6 @@ def _correct(step: Any, trial: Any, x: Any) -> Any:
     return Correction(change, (d + change,), abs(change), enough, ANGLE_GRAIN)
 
 
-@register_jitable
-def _free_flight(step: Any) -> Any:
-    return (step.flight,)
-
-
-@register_jitable
 def _keep(trial: Any, correction: Any) -> Any:
     """The forces and two sums of the last trial, and the last correction of d, which is not applied, and d with it."""
     sums, (v, W0, W1, v_slope, W0_slope, W1_slope) = trial
@@ -265,7 +250,6 @@ def _keep(trial: Any, correction: Any) -> Any:
     return v, W0, W1, v_slope, W0_slope, W1_slope, sums.cosine, sums.sine_end, last, after
 
 
-@register_jitable
 def _close(step: Any, end: Any) -> Any:
     v, W0, W1, v_slope, W0_slope, W1_slope, cosine, sine_end, change, after = end
     h = step.h
@@ -293,9 +277,9 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
 
 
 march = newton_loop(
-    begin, observe, constants=_steady, start=opening, equation=_equation, predict=_predict, evaluate=_evaluate,
-    correct=_correct, restart=_free_flight, keep=_keep, close=_close, top=ReducedTop, dimension=4, steady=3, opened=6,
-    unknowns=1, ends=10, newest=1, carry=4,
+    begin, observe, constants=lambda par, h: (h, h / par.I1, par.p_psi / par.I3), start=opening, equation=_equation,
+    predict=_predict, evaluate=_evaluate, correct=_correct, restart=lambda step: (step.flight,), keep=_keep,
+    close=_close, top=ReducedTop, dimension=4, steady=3, opened=6, unknowns=1, ends=10, newest=1, carry=4,
 )  # fmt: skip
 
 

@@ -64,7 +64,7 @@ import numpy as np
 
 from symtop.core.jit import register_jitable, set_item
 from symtop.core.jit_functions import fused, two_product
-from symtop.methods.framework.lanes import one_loop
+from symtop.methods.framework.lanes import loop_with_rule
 from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.preparation import Presentation
 from symtop.methods.framework.registry import Integrator
@@ -252,7 +252,7 @@ def _side_by_side(par: Any, rule: Any, state: Any, carry: Any) -> Any:
     return step, carry, finite_outcome(step[0] + step[2] + (0.0 if rule.parts == 1.0 else np.inf))
 
 
-_LANES = one_loop(_side_by_side, Map, top=OscillatorTop, dimension=8, carry=12, add=accumulate_plainly)
+_LANES = loop_with_rule(_side_by_side, Map, top=OscillatorTop, dimension=8, carry=12, add=accumulate_plainly)
 march_axis, march_attitude = (
     Loop(begin, increment, observe, enter, present, accumulate_plainly, lanes=lambda _: _LANES)
     for present in (present_axis, present_attitude)

@@ -148,31 +148,17 @@ class _Step(NamedTuple):
     scale: float  # h^2 / I1
 
 
-@register_jitable
-def _steady(par: Any, h: float) -> Any:
-    return h, h * h / par.I1
-
-
-@register_jitable
-def _open(par: Any, rule: Any, theta: float) -> Any:
-    """The numbers that no iteration changes: the trigonometry of the start."""
-    return node_at(par, theta)
-
-
-@register_jitable
 def _equations(par: Any, rule: Any, state: Any, steady: Any, opened: Any) -> Any:
     h, scale = steady
     return _Step(par, rule, state[0], _Node(*opened), h, h * state[1] / par.I1, scale)
 
 
-@register_jitable
 def _at(step: Any, unknowns: Any) -> Any:
     """The trial at m = thetam - theta0 and d = theta1 - theta0."""
     m, d = unknowns
     return _evaluate(step.par, step.start, step.theta + m, step.theta + d)
 
 
-@register_jitable
 def _correct(step: Any, trial: Any, unknowns: Any) -> Any:
     """Newton's correction of (m, d) for flight - d - scale (V0 + 2 Vm)/6 = 0 and d/2 - m + scale Vm/8 = 0."""
     m, d = unknowns
@@ -188,18 +174,12 @@ def _correct(step: Any, trial: Any, unknowns: Any) -> Any:
     return Correction((fix_m, fix_d), (m + fix_m, d + fix_d), abs(fix_m) + abs(fix_d), enough, ANGLE_GRAIN)
 
 
-@register_jitable
-def _free_flight(step: Any) -> Any:
-    return 0.5 * step.flight, step.flight
-
-
 def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     """V' at the start, as a history of V0 and Vm for the predictor."""
     V = pull_at(par, node_at(par, state[0]), par.south, par.north).slope
     return (V, V, V, V, V, V, V, V)
 
 
-@register_jitable
 def _predict(step: Any, carry: Any) -> Any:
     """thetam - theta0 and theta1 - theta0, from the cubic through the last four values of V0 and of Vm."""
     V0 = 4.0 * (carry[0] + carry[4]) - 6.0 * carry[2] - carry[6]
@@ -208,7 +188,6 @@ def _predict(step: Any, carry: Any) -> Any:
     return 0.5 * d + step.scale * Vm / 8.0, d
 
 
-@register_jitable
 def _keep(trial: Any, correction: Any) -> Any:
     """The last trial with the last correction added to first order; the remainder is its square."""
     fix = correction.change
@@ -218,7 +197,6 @@ def _keep(trial: Any, correction: Any) -> Any:
     )  # fmt: skip
 
 
-@register_jitable
 def _close(step: Any, end: Any) -> Any:
     V0, Vm, V1, plus, minus, d = end
     h = step.h
@@ -253,8 +231,9 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
 
 
 march = newton_loop(
-    begin, observe, constants=_steady, start=_open, equation=_equations, predict=_predict, evaluate=_at,
-    correct=_correct, restart=_free_flight, keep=_keep, close=_close, top=ReducedTop, dimension=4, steady=2, opened=5,
+    begin, observe, constants=lambda par, h: (h, h * h / par.I1), start=lambda par, _rule, theta: node_at(par, theta),
+    equation=_equations, predict=_predict, evaluate=_at, correct=_correct, keep=_keep, close=_close,
+    restart=lambda step: (0.5 * step.flight, step.flight), top=ReducedTop, dimension=4, steady=2, opened=5,
     unknowns=2, ends=6, newest=2, carry=8,
 )  # fmt: skip
 

@@ -47,6 +47,7 @@ from symtop.methods.framework.plan import Array
 from symtop.methods.framework.preparation import LazyRule, Preparation, Presentation
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian.galerkin import node_at, pull_at
+from symtop.methods.vectors import zero
 
 NODES = (2, 3, 4, 6)
 
@@ -104,17 +105,14 @@ class _Trial(NamedTuple):
     rolls_by: Row
 
 
-@register_jitable
 def _steady(par: Any, h: float) -> Any:
     return h, h / par.I1
 
 
-@register_jitable
 def _open(par: Any, rule: Any, theta: float) -> Any:
     return (theta,)
 
 
-@register_jitable
 def _equations(par: Any, rule: Any, state: Any, steady: Any, opened: Any) -> Any:
     return _Step(par, rule, state[0], state[1], steady[0], steady[1])
 
@@ -128,7 +126,6 @@ def _reached(rule: Any, forces: Any, i: int) -> float:
     return total
 
 
-@register_jitable
 def _evaluate(step: Any, forces: Any) -> Any:
     par, blank = step.par, step.rule.c
     new, stiffness, souths, norths, rolls = blank, blank, blank, blank, blank
@@ -180,7 +177,6 @@ def _correction(s: int) -> Callable[..., Any]:
     solved, blank = _elimination(s), (0.0,) * (s + 1)
     blanks = (blank,) * s
 
-    @register_jitable
     def correct(step, trial, forces):  # type: ignore[no-untyped-def]
         scale, rows = step.lever * step.h, blanks
         for i in range(s):
@@ -201,7 +197,6 @@ def _correction(s: int) -> Callable[..., Any]:
     return correct
 
 
-@register_jitable
 def _predict(step: Any, carry: Any) -> Any:
     forces = step.rule.c
     for i in range(len(forces)):
@@ -212,15 +207,10 @@ def _predict(step: Any, carry: Any) -> Any:
     return forces
 
 
-@register_jitable
 def _free_flight(step: Any) -> Any:
-    forces = step.rule.c
-    for i in range(len(forces)):
-        forces = set_item(forces, i, 0.0)
-    return forces
+    return zero(step.rule.c)
 
 
-@register_jitable
 def _keep(trial: Any, correction: Any) -> Any:
     """The last trial with the last correction added to first order; the remainder is its square."""
     south = north = roll = 0.0
@@ -232,7 +222,6 @@ def _keep(trial: Any, correction: Any) -> Any:
     return (*correction.after, south, north, roll)
 
 
-@register_jitable
 def _close(step: Any, end: Any) -> Any:
     h, par, newest, kick, bend = step.h, step.par, step.rule.c, 0.0, 0.0
     s = len(newest)

@@ -24,13 +24,10 @@ from typing import Any
 import numpy as np
 
 from symtop.core.errors import SymtopError, one_of
-from symtop.core.jit import compile_kernel
 from symtop.methods.framework.angles import LEAST_TOLERANCE
-from symtop.methods.framework.equations import FORMS, FORMULATIONS, as_run
+from symtop.methods.framework.equations import FORMS, FORMULATIONS, as_run, compiled_field
 from symtop.methods.framework.plan import NOT_FINITE, OK, OUT_OF_BUDGET, STEP_TOO_SMALL, Array, Plan, Run
-from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.registry import Integrator, Solver
-from symtop.methods.framework.space import AttitudeTop, SpaceTop
 from symtop.model.top import Angles, SymmetricTop
 
 # a run's limit: about half a minute each; other classes have the last
@@ -42,26 +39,14 @@ class RightHandSide:
 
     __slots__ = ("calls", "compiled", "field", "par")
 
-    def __init__(self, field: Callable[[Any, Any], Any], par: Any, compiled: Callable[..., Any] | None = None) -> None:
+    def __init__(self, field: Callable[[Any, Any], Any], par: Any, compiled: Any = None) -> None:
         self.field, self.par, self.compiled = field, par, compiled
         self.calls = 0
 
     def __call__(self, _: float, y: Any) -> Any:
         """y' at any time."""
         self.calls += 1
-        return self.field(self.par, y.tolist()) if self.compiled is None else self.compiled(*self.par, y)
-
-
-@functools.cache
-def compiled_field(chart: str) -> Any:
-    """f(a, b, c, y) -> y' of a chart of the top, compiled; a, b, c are the three parameters of its equations."""
-    field = FORMS[chart].field
-    parameters: type = {"angles": BareTop, "axis": SpaceTop, "attitude": AttitudeTop}[chart]
-
-    def compiled(a, b, c, y):  # type: ignore[no-untyped-def]
-        return np.array(field(parameters(a, b, c), y))
-
-    return compile_kernel(compiled)
+        return self.field(self.par, y.tolist()) if self.compiled is None else self.compiled(y)
 
 
 def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solver:
@@ -77,7 +62,8 @@ def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solve
         from scipy import integrate  # 0.6 s to import
 
         par, y0 = form.prepare(top, start)
-        rhs = RightHandSide(form.field, par, compiled_field(chart) if compiled else None)
+        kernel = functools.partial(compiled_field(chart), top.I1, top.I3, top.mgl) if compiled else None
+        rhs = RightHandSide(form.field, par, kernel)
         states = np.full((plan.times.size, len(y0)), np.nan)
         steps = row = 0
         outcome = OK

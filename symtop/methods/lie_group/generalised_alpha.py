@@ -120,13 +120,9 @@ def _parts(rotation: Callable[..., Any], *, alone: bool) -> Parts:
     return start, again, close
 
 
-def _numbers(rule: Any) -> Any:
-    return rule.m, rule.f, rule.gamma, rule.beta
-
-
 march = iterated_loop(
     _parts(exact, alone=True), MOST, in_lanes=_parts(near, alone=False), begin=_begin, opened=6, unknowns=7, carry=6,
-    count=4, numbers=_numbers,
+    count=4, numbers=lambda rule: (rule.m, rule.f, rule.gamma, rule.beta),
 )  # fmt: skip
 
 

@@ -28,17 +28,12 @@ from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError, row
 from symtop.core.jit import register_jitable, set_item
-from symtop.methods.framework.body import General
 from symtop.methods.framework.equations import FORMS
-from symtop.methods.framework.lanes import Lanes, W, column, put, reading
+from symtop.methods.framework.lanes import Lanes, one_loop, reading
 from symtop.methods.framework.loop import FixedStep, Loop, no_carry
-from symtop.methods.framework.plan import OK
-from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.framework.space import AttitudeTop, SpaceTop
-from symtop.methods.simd import combined, wide_vectors
-from symtop.methods.vectors import accumulate, summed, zero
-from symtop.model.charts import BODY
+from symtop.methods.simd import combined
+from symtop.methods.vectors import summed, zero
 
 
 @register_jitable  # now, as the hash of a method's code must not depend on what has run
@@ -137,28 +132,20 @@ def weighted(weights: Any, state: Any, slopes: Any, h: float) -> Any:
     return step
 
 
-def in_lanes(form: Any, top: Any, moved: Callable[..., Any], lay: Callable[..., None], size: int, cost: int) -> Lanes:
+def in_lanes(form: Any, moved: Callable[..., Any], lay: Callable[..., None], size: int, cost: int) -> Lanes:
     """Lanes with increments ``moved(par, state, table, j)`` of `cost` evaluations; `lay` writes `size` numbers."""
-    ended, d, moved = form.ended, form.prepare.size, register_jitable(moved)
-    zeros, numbers, step_at, flag = (0.0,) * d, (0.0,) * len(top._fields), 2 * d, 3 * d
+    ended, moved = form.ended, register_jitable(moved)
 
-    def step(block, table):  # type: ignore[no-untyped-def]
-        wide_vectors()
-        for j in range(W):
-            state, par = column(block, 0, j, zeros), top(*column(table, 0, j, numbers))
-            change = moved(par, state, table, j)
-            block[flag * W + j] = block[flag * W + j] if ended(summed(state, change)) == OK else 1.0
-            place, low = accumulate(state, column(block, d, j, zeros), change)
-            put(block, 0, j, place)
-            put(block, d, j, low)
-            put(block, step_at, j, change)
+    def advance(par, state, carry, table, j):  # type: ignore[no-untyped-def]
+        step = moved(par, state, table, j)
+        return step, carry, ended(summed(state, step))
 
-    return Lanes(step, lay, lambda _: 0.0, lambda _: size, top, d, 1, lambda _: cost, begin=no_carry)
+    return one_loop(advance, lay, size, top=form.top, dimension=form.prepare.size, begin=no_carry, cost=cost)
 
 
-def _loop(form: Any, top: Any) -> Loop:
+def _loop(form: Any) -> Loop:
     """The loop in one chart, for one and in lanes; the work counted is the number of force evaluations."""
-    field, ended, zeros, tops = form.field, form.ended, (0.0,) * form.prepare.size, len(top._fields)
+    field, ended, zeros, tops = form.field, form.ended, (0.0,) * form.prepare.size, len(form.top._fields)
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
         return np.empty((len(rule.b), len(state)))
@@ -184,13 +171,12 @@ def _loop(form: Any, top: Any) -> Loop:
         def moved(par, state, table, j):  # type: ignore[no-untyped-def]
             return total(zeros, stages(par, state, field(par, state), table, j), table, j)
 
-        return in_lanes(form, top, moved, _lay, count * (count + 1) // 2, count)
+        return in_lanes(form, moved, _lay, count * (count + 1) // 2, count)
 
     return Loop(begin, increment, form.observe, lanes=lambda rule: lanes(len(rule.b)))
 
 
-TOPS: dict[str, Any] = {"angles": BareTop, "axis": SpaceTop, "attitude": AttitudeTop, BODY: General}
-LOOPS = {chart: _loop(form, TOPS[chart]) for chart, form in FORMS.items()}
+LOOPS = {chart: _loop(form) for chart, form in FORMS.items()}
 
 
 def _explicit(a: Rows, b: Row) -> tuple[list[list[float]], list[float]]:

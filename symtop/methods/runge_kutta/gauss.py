@@ -54,7 +54,7 @@ import numpy as np
 from symtop.core.jit import register_jitable, set_item
 from symtop.core.numbers import context
 from symtop.methods.framework import body, space
-from symtop.methods.framework.lanes import Lanes, W, column, none_left, put
+from symtop.methods.framework.lanes import Lanes, W, column, move, none_left
 from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.plan import NOT_CONVERGED, OK, Array
 from symtop.methods.framework.preparation import LazyRule
@@ -382,10 +382,7 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
                 for m in range(dimension):
                     dstate = set_item(dstate, m, dstate[m] + block[(carry_at + i * dimension + m) * W + j])
             healthy = np.isfinite(dstate[0]) and block[live_at * W + j] == 0.0
-            moved, low = accumulate(column(block, 0, j, zeros), column(block, dimension, j, zeros), dstate)
-            put(block, 0, j, moved)
-            put(block, dimension, j, low)
-            put(block, 2 * dimension, j, dstate)
+            move(accumulate, block, dimension, j, dstate)
             block[flag * W + j] = block[flag * W + j] if healthy else 1.0
 
     def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
@@ -502,12 +499,8 @@ def _loop(  # noqa: C901
     return Loop(begin, increment, observe, lanes=in_lanes)
 
 
-@register_jitable
-def _unsolved(field: Any, par: Any, state: Any, work: Any, stages: int) -> Any:
-    """`solve` of a loop without Newton's iteration: no iterations, not converged."""
-    return 0, False
-
-
+# `solve` of a loop without Newton's iteration: no iterations, not converged
+_unsolved = register_jitable(lambda _field, _par, _state, _work, _stages: (0, False))
 march_axis, march_frame = _loop(field_axis, 6), _loop(field_frame, 9)
 march_body = _loop(body.field_body, 7, 4, -1, _unit_of_body, _unsolved, body.observe_body)
 

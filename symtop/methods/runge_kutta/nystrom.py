@@ -83,19 +83,14 @@ def _total(weights: Row, velocity: Row) -> Any:
 
 
 @register_jitable
-def _observe(par: Any, memory: Any, place: Any, nothing: Any, h: float) -> Any:
-    return memory[2, 0], memory[2, 1]
-
-
-@register_jitable
 def _field(par: Any, state: Any) -> Any:
     slope, precession, turn, _ = kicks(par, state[0])
     return state[1] / par.I1, slope, precession, turn
 
 
 REDUCED = FORMS["angles"]._replace(
-    field=_field, ended=register_jitable(lambda state: chart_outcome(state[0])), observe=_observe, prepare=on_angles,
-    present=None,
+    field=_field, ended=register_jitable(lambda state: chart_outcome(state[0])), prepare=on_angles, present=None,
+    observe=lambda _par, memory, _place, _nothing, _h: (memory[2, 0], memory[2, 1]),
 )  # fmt: skip
 
 

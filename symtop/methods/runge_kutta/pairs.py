@@ -38,7 +38,7 @@ from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import OK, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import as_it_steps
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.runge_kutta.explicit import TOPS, Tableau, add, in_lanes, row_of, store, weighted, written_out
+from symtop.methods.runge_kutta.explicit import Tableau, add, in_lanes, row_of, store, weighted, written_out
 from symtop.methods.runge_kutta.pair_tables import DOP853, DORMAND_PRINCE, TSIT5, VERN9, Row, Table
 from symtop.methods.simd import apart, combined, side_by_side
 from symtop.methods.vectors import accumulate, summed, zero
@@ -69,10 +69,7 @@ def rms(vector: Any, state: Any, other: Any, tolerance: float) -> float:
     return math.sqrt(total / len(vector))
 
 
-@register_jitable
-def nothing_more(par: Any, state: Any, slopes: Any, h: float) -> int:
-    """Samples need no further evaluations."""
-    return 0
+nothing_more = register_jitable(lambda _par, _state, _slopes, _h: 0)  # `refine` where samples need no evaluations
 
 
 def trying(attempt: Callable[..., Any], cost: int, power: float) -> Any:
@@ -195,9 +192,7 @@ def integrator(name: str, summary: str, reference: str, method: Any, rows: int, 
     )  # fmt: skip
 
 
-@register_jitable
-def _forget(slopes: Any, i: int, slope: Any) -> None:
-    """`keep` for slopes that are not used again: does nothing."""
+_forget = register_jitable(lambda _slopes, _i, _slope: None)  # `keep` for slopes that are not used again
 
 
 def combination(weights: Sequence[float]) -> Any:
@@ -343,14 +338,14 @@ def _order_seven(table: Table, field: Callable[..., Any], cost: int) -> dict[str
 @functools.cache
 def fixed_loop(chart: str, pair: Pair) -> Loop:
     """The loop with fixed steps in one chart; its rule, the table as a `Tableau`, is not used by the kernel."""
-    return loop_of(FORMS[chart], TOPS[chart], pair.table, lambda _par, _state, step: step)
+    return loop_of(FORMS[chart], pair.table, lambda _par, _state, step: step)
 
 
-def loop_of(form: Any, top: Any, table: Table, finished: Callable[..., Any]) -> Loop:
+def loop_of(form: Any, table: Table, finished: Callable[..., Any]) -> Loop:
     """The loop of a table's steps, for one and in lanes; ``finished(par, state, step)`` changes each increment."""
     field, ended, finished = form.field, form.ended, register_jitable(finished)
     stages, total, cost = stages_of(field, table), combination(table.b), len(table.b)
-    zeros, step_at = (0.0,) * form.prepare.size, len(top._fields) * W
+    zeros, step_at = (0.0,) * form.prepare.size, len(form.top._fields) * W
 
     @register_jitable
     def stepped(par, state, h):  # type: ignore[no-untyped-def]
@@ -367,7 +362,7 @@ def loop_of(form: Any, top: Any, table: Table, finished: Callable[..., Any]) -> 
     def moved(par, state, table, j):  # type: ignore[no-untyped-def]
         return stepped(par, state, table[step_at + j])
 
-    lanes = in_lanes(form, top, moved, lay, 1, cost)
+    lanes = in_lanes(form, moved, lay, 1, cost)
     return Loop(no_carry, increment, form.observe, lanes=lambda _: lanes)
 
 

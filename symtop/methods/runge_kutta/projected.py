@@ -105,7 +105,7 @@ def built_in() -> list[Integrator]:
     for pair, name in ((DOP8, "dop853-projected"), (NINE, "vern9-projected")):
         plain = pair.fixed()
         solver: Any = plain.solvers["axis"]
-        loop = loop_of(AXIS._replace(prepare=on_levels), Levels, pair.table, projected)
+        loop = loop_of(AXIS._replace(prepare=on_levels, top=Levels), pair.table, projected)
         methods.append(replace(
             plain, name=name, summary=f"{pair.summary} with fixed steps, projected onto the constants of the motion",
             solvers={"axis": FixedStep(loop, solver.rule, on_levels, 1, implicit=False)},

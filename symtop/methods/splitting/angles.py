@@ -77,17 +77,10 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
     return momenta_of_turns(par, a, d, h, dstate)
 
 
-@register_jitable
-def _drift_in_lanes(par: Any, state: Any, step: Any, tau: float) -> Any:
-    return drift_angles(par, None, state, step, tau), True
-
-
-@register_jitable
-def _ended(state: Any, step: Any) -> int:
-    return chart_outcome(state[0] + step[0])
-
-
-_LANES = composed(force_angles, kick_angles, _drift_in_lanes, _ended, top=ReducedTop, dimension=4, carry=3)
+_LANES = composed(
+    force_angles, kick_angles, lambda par, state, step, tau: (drift_angles(par, None, state, step, tau), True),
+    lambda state, step: chart_outcome(state[0] + step[0]), top=ReducedTop, dimension=4, carry=3,
+)  # fmt: skip
 march = Loop(_begin, _increment, observe, lanes=lambda _: _LANES)
 
 

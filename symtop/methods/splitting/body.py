@@ -165,9 +165,7 @@ ALONE, TOGETHER = _turns(by_either, exact), _turns(by_series, near)  # with a br
 PAR, STATE, STEP, FLAG = (0.0,) * 9, (0.0,) * 7, 14, 21  # numbers of a block, as `lanes` has them
 
 
-@register_jitable
-def _ended(state: Any, step: Any) -> int:
-    return ended_space(step)
+_ended = register_jitable(lambda _state, step: ended_space(step))
 
 
 def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:

@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from symtop.core.jit import register_jitable, to_fixed_tuple
-from symtop.methods.framework.lanes import Lanes, W, column, put
+from symtop.methods.framework.lanes import Lanes, W, column, move, put
 from symtop.methods.framework.plan import OK
 from symtop.methods.simd import times, wide_vectors, with_item
 from symtop.methods.vectors import accumulate, zero
@@ -155,9 +155,7 @@ def read(numbers: Any) -> Any:
     return Stages(numbers[2:last:3], numbers[0:last:3], numbers[1:last:3], 0, 0, numbers[last])
 
 
-@register_jitable
-def no_rest(block: Any, row: Any, table: Any) -> None:
-    """`rest` of a drift that is one loop over lanes: nothing."""
+no_rest = register_jitable(lambda _block, _row, _table: None)  # `rest` of a drift that is one loop over lanes
 
 
 def composed(
@@ -175,6 +173,8 @@ def composed(
     moving, unmoved = zeros[: dimension - still], zeros[dimension - still :]
     coefficients, step_at, flag, still_at = len(numbers), 2 * dimension, 3 * dimension, len(moving)
     force_at = flag + 2
+    for part in (force, kick, drift, ended):
+        register_jitable(part)
 
     @register_jitable
     def stage(block, row, table, step, j):  # type: ignore[no-untyped-def]
@@ -191,10 +191,7 @@ def composed(
         par = top(*column(table, 0, j, numbers))
         step = kick(par, column(block, force_at, j, none), step, row[j], row[W + j])
         block[flag * W + j] = block[flag * W + j] if ended(state, step) == OK else 1.0
-        moved, low = accumulate(state[:still_at], column(block, dimension, j, moving), step[:still_at])
-        put(block, 0, j, moved)
-        put(block, dimension, j, low)
-        put(block, step_at, j, step[:still_at])
+        move(accumulate, block, dimension, j, step[:still_at])
         for i in range(still):
             block[(still_at + i) * W + j] = state[still_at + i] + 0.0
 

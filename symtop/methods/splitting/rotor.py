@@ -83,4 +83,4 @@ def without_branch(turned: Callable[..., Any]) -> tuple[Callable[..., Any], Call
         s, m = cayley(half_square(state, step, half), half)
         return turned(state, step, s, m), True
 
-    return register_jitable(exact), register_jitable(by_cayley)
+    return exact, by_cayley

@@ -164,7 +164,6 @@ def _loop(force: Any, turned: Any, process: Any, spun: Any, observe: Any, dimens
     for part in (force, turned, process, spun):
         register_jitable(part)
 
-    @register_jitable
     def ended(state, step):  # type: ignore[no-untyped-def]
         total = step[0] + step[1]
         for i in range(2, dimension - 1):  # all but L_z

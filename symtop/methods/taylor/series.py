@@ -63,7 +63,7 @@ from symtop.core.jit import compile_kernel, register_jitable, set_item
 from symtop.core.numbers import EPSILON
 from symtop.methods.framework import space
 from symtop.methods.framework.adaptive import Adaptive
-from symtop.methods.framework.lanes import Lanes, one_loop
+from symtop.methods.framework.lanes import Lanes, loop_with_rule
 from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import NOT_FINITE, STEP_TOO_SMALL
 from symtop.methods.framework.preparation import BareTop, Presentation, Scaled, Start, as_it_steps
@@ -252,7 +252,7 @@ def _loop(series_of: Callable[..., Any], size: int, observe: Callable[..., Any])
             step, outcome = stepped(rule, state)
             return step, carry, outcome
 
-        return one_loop(advance, Scale, top=SpaceTop, dimension=size, carry=1)
+        return loop_with_rule(advance, Scale, top=SpaceTop, dimension=size)
 
     @functools.cache
     def loop(order: int) -> Loop:

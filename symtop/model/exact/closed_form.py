@@ -27,6 +27,7 @@ Both classes loop over their members with the same compiled functions, so that a
 form; the functions release the interpreter's lock, and threads may share the work.
 """
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -85,8 +86,15 @@ class _Form:
     psi_per_period = _constant(at.PSI_PER_PERIOD, "Mean growth of psi in a nutation period, radians.")
     precession_rate = _constant(at.PHI_LINE, "Mean of phi' over a nutation, radians per unit time.")
 
-    def _view(self, times: ArrayLike, view: int) -> Array:
-        raise NotImplementedError  # the classes for one motion and for many have their own
+    _view: Callable[[ArrayLike, int], Array]  # a view in the shapes of the class, and of `ROWS` with the rows first
+
+    def __call__(self, times: ArrayLike) -> Motion[Array]:
+        """Angles and rates at `times`; every field has their shape, or (n, samples)."""
+        return Motion(*self._view(times, samples.MOTION))
+
+    def turns(self, times: ArrayLike) -> Array:
+        """phi and psi alone, (2, ...), with the bits of a call."""
+        return self._view(times, samples.TURNS)
 
     def quaternion(self, times: ArrayLike) -> Array:
         """Attitude (w, x, y, z), body to space, shape (..., 4); continuous in time, through poles as well."""
@@ -145,22 +153,13 @@ class ClosedForm(_Form):
         """The turning points, radians."""
         return float(self._constants[at.THETA_LOW]), float(self._constants[at.THETA_HIGH])
 
-    def __call__(self, times: ArrayLike) -> Motion[Array]:
-        """Angles and rates at `times`; every field has their shape."""
-        flat_times, shape = _in_a_row(times)
-        return Motion(*(row.reshape(shape) for row in fill(self._all, flat_times, samples.MOTION)[0]))
-
-    def turns(self, times: Array) -> Array:
-        """phi and psi alone (2, n) at a row of times, with the bits of a call."""
-        return np.asarray(fill(self._all, _in_a_row(times)[0], samples.TURNS)[0])
-
     def axis_distance(self, times: Array, axes: Array) -> Array:
         """Angles between axes (n, 3) and the top's at times (n,), rad, shape (n,)."""
         return np.asarray(distances(self._all, _in_a_row(times)[0], axes[None])[0])
 
     def run(self, times: Array) -> tuple[Array, Array, Array]:
         """States (n, 7) at a row of times, with p_phi = L_z and p_psi = L.e read off them."""
-        values = fill(self._all, _in_a_row(times)[0], samples.RUN)[0]
+        values = self._view(times, samples.RUN)
         return values[:, :7], values[:, 7], values[:, 8]
 
     def _constant(self, place: int) -> float:
@@ -168,7 +167,8 @@ class ClosedForm(_Form):
 
     def _view(self, times: ArrayLike, view: int) -> Array:
         flat_times, shape = _in_a_row(times)
-        return fill(self._all, flat_times, view).reshape(*shape, samples.WIDTHS[view])
+        width = (samples.WIDTHS[view],)
+        return fill(self._all, flat_times, view).reshape(width + shape if view in samples.ROWS else shape + width)
 
 
 def compile_now() -> None:
@@ -271,15 +271,6 @@ class ClosedForms(_Form):
         """The turning points, radians, shape (n, 2)."""
         return self.constants[:, [at.THETA_LOW, at.THETA_HIGH]]
 
-    def __call__(self, times: ArrayLike) -> Motion[Array]:
-        """Angles and rates at `times`, each (n, samples)."""
-        return Motion(*self._view(times, samples.MOTION).swapaxes(0, 1))
-
-    def turns(self, times: ArrayLike) -> tuple[Array, Array]:
-        """phi and psi alone, each (n, samples), with the bits of a call."""
-        phi, psi = self._view(times, samples.TURNS).swapaxes(0, 1)
-        return phi, psi
-
     def run(self, times: ArrayLike) -> tuple[Array, Array]:
         """States (n, samples, 7), and p_phi = L_z and p_psi = L.e read off them, (n, samples, 2)."""
         values = self._view(times, samples.RUN)
@@ -294,7 +285,8 @@ class ClosedForms(_Form):
         if rows.ndim != 2 or (len(rows) != len(self) and given.ndim != 1):
             words = f"times must be a row for all members or have the shape ({len(self)}, samples)"
             raise SymtopError(f"{words}, not {given.shape}")
-        return fill(self.constants, rows if rows.flags.writeable else rows.copy(), view)
+        values = fill(self.constants, rows if rows.flags.writeable else rows.copy(), view)
+        return values.swapaxes(0, 1) if view in samples.ROWS else values
 
 
 def checked_numbers(numbers: ArrayLike, names: Any = None) -> Array:

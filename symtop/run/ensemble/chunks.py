@@ -3,9 +3,6 @@
 A member has the same bits as in `simulate`: the same steps, samples and observables. All steps are made in one compiled
 call (`FixedStep.many`, or the closed form's) where the method has one, or in one per member (`Adaptive.many`); any
 other method, such as a plug-in, runs its members one after another by `calling.solve`.
-
-`simulation.sample_times` decides for one run whether its samples are dithered, by the widest range of nutation phases
-without a sample; `schedule` decides it for all rows by the same operations on the same nutation periods.
 """
 
 import contextlib
@@ -72,7 +69,7 @@ class Schedule(NamedTuple):
 
 
 def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -> Schedule:
-    """The samples of `simulation.sample_times` for n runs with `steps` (n,) steps, or with None for adaptive runs."""
+    """The samples of `simulation.sample_times` for n runs of `steps` (n,) steps (None: adaptive), to the same bits."""
     n = len(horizon)
     h = np.full(n, np.nan) if steps is None else horizon / steps
     marks, times = np.zeros((n, samples), np.int64), np.empty((n, samples))
@@ -385,9 +382,7 @@ def _ended(runs: _Runs, plan: Schedule, lost: NDArray[np.bool_], outcome: int) -
 
 def same_times(times: Any, row: Any) -> bool:
     """Are the times (n, samples) of all members equal to `row`? NaN, the padding of short runs, equals NaN."""
-    if (times == row).all():
-        return True
-    return bool(np.isnan(row).any() and np.array_equal(times, np.broadcast_to(row, times.shape), equal_nan=True))
+    return np.array_equal(times, np.broadcast_to(row, times.shape), equal_nan=True)
 
 
 def as_dataset(

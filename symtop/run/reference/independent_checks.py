@@ -105,16 +105,16 @@ def precise_form(top: SymmetricTop, start: Angles, digits: int) -> PreciseForm:
 
 
 @functools.lru_cache(maxsize=2048)  # integrations in three precisions have the same checks
-def precise_attitude(top: SymmetricTop, start: Angles, digits: int, t: float) -> tuple[Any, ...]:
-    """The attitude at time t by `precise_form`, as w, x, y, z."""
-    return tuple(precise_form(top, start, digits).quaternion(t))
+def precise_attitude(top: SymmetricTop, start: Angles, t: float) -> tuple[Any, ...]:
+    """The attitude at time t in `DIGITS` digits, as w, x, y, z."""
+    return precise_form(top, start, DIGITS).quaternion(t)
 
 
 def largest_errors(scene: Scene, times: Array, quaternions: Any, phis: Any, psis: Any) -> Checks:
     """Running maxima of the errors of given attitudes and angles, against the closed form in `DIGITS` digits."""
     mp, rows = context(DIGITS + 10), []
     for t, *numbers in zip(times, *quaternions.T, phis, psis, strict=True):
-        precise = precise_attitude(scene.top, scene.start, DIGITS, float(t))
+        precise = precise_attitude(scene.top, scene.start, float(t))
         w, x, y, z = true = np.array([mp.convert(value) for value in precise])  # all digits, in this arithmetic
         *parts, phi, psi = [mp.mpf(float(one) if isinstance(one, float) else str(one)) for one in numbers]
         attitude = np.array(parts) if true @ parts >= 0 else -np.array(parts)
