@@ -140,7 +140,7 @@ def truth() -> dict:
 
 
 def late(*sets, mark="quick"):
-    """Parameters of a test that take long or compile much: `make test` takes them up after `make quick` alone."""
+    """Parameters of a test with a mark: `quick` waits for `make quick`, as it compiles much; `slow` takes long."""
     return [pytest.param(*(one if isinstance(one, tuple) else [one]), marks=getattr(pytest.mark, mark)) for one in sets]
 
 

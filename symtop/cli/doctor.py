@@ -172,7 +172,7 @@ PERIODS = 0.02  # nutations: the length of a run that compiles a kernel
 
 
 def _run(name: str) -> str:
-    """Compile the kernels of a variant by two steps, alone and in an ensemble, or of the reference for ""; an error."""
+    """Compile the kernels of a variant, alone and in an ensemble, or of the reference for name ""; returns an error."""
     from symtop.methods.framework.registry import integrator
     from symtop.model.lazy_kernel import LAZY
     from symtop.model.scenes import scene

@@ -13,8 +13,9 @@ kinetic and |mgl|, and that of p_phi and of the vector L is |L|.
 Explicit methods do not keep |e| or |q| at one. A wrong length does not change the angles, but the energy and momenta.
 
 A trajectory of another program is checked first. A quaternion determines the attitude, the axis and theta; so do theta,
-phi and psi; theta and phi determine the axis; an axis determines theta. Vectors are scaled to length one. Their length
-may become wrong in a valid run (SciPy's RK45 at 1e-3 takes |q| to 1.4 on `spheroid`), but not at first.
+phi and psi; theta and phi determine the axis; an axis determines theta. Vectors are scaled to length one, and the
+deviation of their length is an error of its own, ``axis_length`` or ``quaternion_length``. It may become large in a
+valid run (SciPy's RK45 at 1e-3 takes |q| to 1.4 on `spheroid`), but is small at first unless a column or unit is wrong.
 """
 
 import contextlib

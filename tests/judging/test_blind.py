@@ -59,7 +59,7 @@ def test_a_correct_method_is_not_refuted(name):
 
 
 @pytest.mark.parametrize(
-    "name", ["AdamsBashforth", "separable_forest_ruth", *late("rotation_guarded", "rotation_strang")]
+    "name", ["AdamsBashforth", "separable_forest_ruth", "rotation_guarded", *late("rotation_strang", mark="slow")]
 )
 def test_what_is_claimed_of_a_correct_method_is_confirmed_in_short_runs(name, only):
     only(*(claim for stage in battery.TABLE for claim in stage.claims))
