@@ -194,8 +194,7 @@ def score(motion: Integrated, method: Integrator, chart: str, plan: Plan) -> tup
 
 def chunk(name: str, first: int) -> list[Run]:
     """Make `CHUNK` runs from number `first` on."""
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore")
+    with warnings.catch_warnings(action="ignore"):
         return [one(name, k) for k in range(first, first + CHUNK)]
 
 

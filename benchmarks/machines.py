@@ -125,11 +125,12 @@ def main() -> int:
     header = ["what can be supplied, and error", *(f"on {name}" for name in names), *(costs[k] for k in known)]
     rows = [[*row[:3], *(row[3 + k] for k in known)] for row in pair.differing]
     table = pages.Table("Where two processors choose differently", header, rows)
+    least = f", of {len(kept)} processors the two that agree least" * (len(kept) > 2)
     sentence = (
         f"{pair.same} of {pair.cells} choices of the front page's first table are the same on {names[0]} and on "
-        f"{names[1]}: {pair.clear_same} of {pair.clear} where either shows a lead beyond the error of measurement. "
-        f"Where they differ, the choice of one takes on the other at most {_times(pair.most)} times as long as "
-        "the best."
+        f"{names[1]}{least}: {pair.clear_same} of {pair.clear} where either shows a lead beyond the error of "
+        f"measurement. Where they differ, the choice of one takes on the other at most {_times(pair.most)} times as "
+        "long as the best."
     )
     print(f"{table.text}\n{sentence}")
     page = pages.findings(

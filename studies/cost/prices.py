@@ -176,8 +176,7 @@ def spread_of(values: Array) -> Array:
 def combined(price: Array, call: Array) -> tuple[Array, Array, Array, Array]:
     """Prices, calls, relative errors and spreads (variants, tolerances), from (processes, variants, tolerances)."""
     good = np.where(price >= FLOOR, price, np.nan)
-    with np.errstate(all="ignore"), warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # variants that a batch has not timed
+    with np.errstate(all="ignore"), warnings.catch_warnings(action="ignore"):  # on variants that a batch has not timed
         middle = np.nanmedian(good, axis=0)
         common = np.nanmedian(good / middle, axis=(1, 2), keepdims=True)  # of a process that is slower at everything
         if np.isfinite(middle).any(axis=1).sum() < COMPANY:

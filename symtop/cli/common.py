@@ -264,8 +264,7 @@ def _in_options(error: SymtopError, command: click.Command | None) -> str:
 
 @contextlib.contextmanager
 def _warnings_as_lines() -> Iterator[None]:
-    with warnings.catch_warnings():
-        warnings.simplefilter("always", SymtopWarning)
+    with warnings.catch_warnings(action="always", category=SymtopWarning):
         warnings.filterwarnings("ignore", r"\d+ of \d+ members ended early: ")  # `symtop ensemble` counts them anyway
         others: Any = warnings.showwarning
         warnings.showwarning = lambda message, category, *rest: (

@@ -42,8 +42,7 @@ def connect(address: str) -> Any:
     try:
         with ThreadPoolExecutor(1) as apart:  # the caller's thread may run an event loop, as in a notebook
             apart.submit(asyncio.run, _query(address)).result()
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")  # on differing versions; the hash of every case is compared anyway
+        with warnings.catch_warnings(action="ignore"):  # on other versions; every case's hash is compared anyway
             client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
             client.wait_for_workers(1, timeout=PATIENCE)
     except (OSError, ValueError, RuntimeError) as error:
