@@ -387,7 +387,6 @@ def test_a_check_that_fails_is_a_finding_and_the_code_is_1(monkeypatch, tmp_path
     assert "OSError: the tools are gone" in result.output
 
 
-@pytest.mark.quick
 def test_all_is_well_here_and_every_compiled_method_is_run_in_each_of_its_charts(tmp_path):
     result = call("doctor", "--results", tmp_path, "--json")
     topics = {entry["topic"]: entry["result"] for entry in json.loads(result.output)}

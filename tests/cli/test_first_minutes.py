@@ -53,7 +53,6 @@ def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(tmp_path):
         assert several.stdout.startswith("convergence: ")
 
 
-@pytest.mark.quick
 def test_a_proposed_step_is_of_use_and_the_guard_warns_of_what_the_verdict_calls_wrong():
     assert EXPECTED == ACCURATE
     wrong = call("run", "spheroid", "midpoint", "--step-size", "0.01")

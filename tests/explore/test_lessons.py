@@ -16,7 +16,6 @@ SOURCE = (STATIC / "stories.js").read_text(encoding="utf-8")
 RANGE = {"step_least": 0.01, "step_most": 0.6, "spin_least": -4.0, "spin_most": 4.0}
 
 
-@pytest.mark.quick
 def test_a_cell_of_the_map_is_the_run_that_a_click_asks_for():
     chosen, steps, spins = answers.grid(fields(**RANGE))
     errors = unpacked(answers.outcome_map(chosen, steps, spins)["error_rad"]).reshape(answers.ROWS, answers.COLUMNS)

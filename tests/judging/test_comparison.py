@@ -90,7 +90,6 @@ def test_failed_settings_stay_with_their_outcome_and_are_drawn(data):
     assert len({text.split(":")[0] for text in labels} & set(data["variant"].values)) == data.sizes["variant"]
 
 
-@pytest.mark.quick
 def test_own_scenes_and_methods_engines_and_scipy_take_part(clean_registry, tmp_path):
     refusing = Mock(side_effect=RuntimeError("no"))
     for name, solver in (("on-the-axis", symtop.integrator("rk4").solvers["axis"]), ("refusing", refusing)):

@@ -173,7 +173,6 @@ def test_energy_and_momentum_of_a_run_are_those_of_its_states():
     assert 1e-6 < abs(run["energy"] - run["energy"][0]).max() < 1e-1
 
 
-@pytest.mark.quick
 def test_a_sweep_and_a_comparison_take_a_body(tmp_path) -> None:  # type: ignore[no-untyped-def]
     setting = {"per_nutation": [32, 64], "quiet": True, "path": tmp_path / "s.nc"}
     data = symtop.sweep("heavy-brick", ["rk4", "tsit5-fixed"], **setting)

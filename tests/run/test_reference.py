@@ -56,7 +56,7 @@ KINDS = ("generic", "fast", "slow", "retrograde", "grazes the top", "grazes the 
 
 
 @pytest.mark.parametrize(("precision", "count", "seed"), [
-    pytest.param("longdouble", 1, 11, marks=pytest.mark.quick), ("double", 1, 11), ("closed-form", 1, 11),
+    ("longdouble", 1, 11), ("double", 1, 11), ("closed-form", 1, 11),
     *(pytest.param(precision, 56, 2026, marks=pytest.mark.slow) for precision in ("longdouble", "closed-form")),
 ])  # fmt: skip
 def test_bounds_hold_on_random_tops_and_are_tight(precision, count, seed):

@@ -355,7 +355,7 @@ def test_a_quaternion_that_keeps_its_length_has_not_failed_and_a_state_whose_squ
     assert good.attrs["outcome"] == "ok"
 
 
-@pytest.mark.parametrize("count", [pytest.param(2, marks=pytest.mark.quick), pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("count", [2, pytest.param(4, marks=pytest.mark.slow)])
 def test_every_variant_shows_finite_numbers_or_says_that_it_does_not(count):
     draw, ended = np.random.default_rng(50), set()
     for row in (method.variant(chart) for method in symtop.integrators().values() for chart in method.charts()):
