@@ -262,6 +262,7 @@ def all_samples(constants: Any, times: Any, view: int, out: Any) -> int:
 def all_gaps(constants: Any, times: Any, axes: Any, out: Any) -> int:
     """Angles between axes (n, samples, 3) and those of n tops, as `charts.axis_distance` takes them, in one pass.
 
+    On processors with AVX-512 NumPy's arc tangent has another last bit for some angles above 0.01 rad, 6 % near 1 rad.
     Returns the place of the first time beyond the range, or -1, as `all_samples` does.
     """
     for i in range(len(constants)):
