@@ -42,6 +42,7 @@ static inline int increment(
         if (rule->kick[i + 1] != 0.0) now = force(par, state[0] + step[0]);
     }
     if (rule->kick[DRIFTS] != 0.0) kick(par, &now, step, rule->kick[DRIFTS]);
+    else if (rule->kick[0] != 0.0) now = force(par, state[0] + step[0]);
     *carry = now;
     *work = (long)rule->forces;
     return chart_outcome(state[0] + step[0]);

@@ -105,6 +105,7 @@ static inline int increment(
         if (rule->kick[i + 1] != 0.0) now = force(state, step);
     }
     if (rule->kick[DRIFTS] != 0.0) kick(&now, step, rule->kick[DRIFTS], rule->bend[DRIFTS]);
+    else if (rule->kick[0] != 0.0) now = force(state, step);
     *carry = now;
     *work = (long)rule->forces;
     return judge(step);

@@ -17,7 +17,8 @@ from symtop.model.exact.closed_form import ClosedForms
 
 KEYS = kernels.keys()
 STEPS = 500
-FEW = [("stormer-verlet", "angles"), ("takahashi-imada", "attitude"), ("rk4", "axis"), ("exact-discrete", "axis")]
+FEW = [("stormer-verlet", "angles"), ("symplectic-euler", "angles"), ("takahashi-imada", "attitude"), ("rk4", "axis"),
+       ("exact-discrete", "axis")]  # fmt: skip
 needs_gcc = pytest.mark.skipif(twin.compiler() is None, reason="the twins are built with gcc")
 
 
