@@ -143,11 +143,6 @@ def test_the_frame_turns_with_the_body():
     assert np.max(charts.attitude_distance(attitude[:, :4], exact)) < 1e-13
 
 
-def jacobian(par, y):
-    """Of the field of (e, L), by central differences, which are exact for a quadratic field but for rounding."""
-    return np.transpose([np.subtract(field_axis(par, y + e), field_axis(par, y - e)) / 2.0 for e in np.eye(6)])
-
-
 def newton_step(par, stages, y, h):
     """One step by Newton on all 6 s increments, from zero increments, and the size of the last correction."""
     mu, b = gauss_rule(stages)[:2]
@@ -156,8 +151,9 @@ def newton_step(par, stages, y, h):
         places = y + mu @ parts
         defect = np.array([h * b[i] * np.array(field_axis(par, places[i])) - parts[i] for i in range(stages)])
         system = np.eye(6 * stages)
-        for i in range(stages):
-            system[6 * i : 6 * i + 6] -= h * b[i] * np.kron(mu[i], jacobian(par, places[i]))
+        for i, y_i in enumerate(places):  # central differences are exact for a quadratic field but for rounding
+            columns = [np.subtract(field_axis(par, y_i + e), field_axis(par, y_i - e)) / 2.0 for e in np.eye(6)]
+            system[6 * i : 6 * i + 6] -= h * b[i] * np.kron(mu[i], np.transpose(columns))
         fix = np.linalg.solve(system, defect.ravel()).reshape(stages, 6)
         parts, change = parts + fix, np.abs(fix).max()
         if change < 1e-13:

@@ -34,11 +34,6 @@ def one_pass(scene_, times, states, momenta, followed=True):
     return VERDICTS[judged.verdict[0, 0]], judged.axis_error[0, 0]
 
 
-def padded(values):
-    """A row of a map: NaN beyond the last sample of a run."""
-    return np.concatenate([values, np.full((SAMPLES - len(values), *values.shape[1:]), math.nan)])
-
-
 @pytest.mark.parametrize(("name", "chart", "step", "word"), [
     ("strang", "axis", 0.03, "accurate"), ("strang", "axis", 0.12, "bounded_but_wrong"),
     ("stormer-verlet", "angles", 0.03, "accurate"), ("stormer-verlet", "angles", 0.1, "bounded_but_wrong"),
@@ -83,7 +78,9 @@ def test_one_pass_says_what_judgement_says_of_runs_of_few_steps(name):
             if run.outcome == "ok":
                 error = axis_distance(seen.axis, closed_form(cusp).axis(times))
                 seen_by_map = times, run.states, np.stack([run.p_phi, run.p_psi], axis=-1)
-                word = one_pass(cusp, *(padded(values) for values in seen_by_map))[0]
+                # a row of a map has NaN beyond the last sample of a run
+                padded = [np.r_[one, np.full((SAMPLES - len(one), *one.shape[1:]), math.nan)] for one in seen_by_map]
+                word = one_pass(cusp, *padded)[0]
                 assert word == judgement(cusp, shown, error).verdict, (count, step)
                 words.add((word, times.size < 16))
     assert ("bounded_but_wrong", True) in words
