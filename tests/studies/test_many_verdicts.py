@@ -77,8 +77,7 @@ def test_one_pass_says_what_judgement_says_of_runs_of_few_steps(name):
             times, run, seen, shown = run_of(cusp, name, "axis", step, count)
             if run.outcome == "ok":
                 error = axis_distance(seen.axis, closed_form(cusp).axis(times))
-                seen_by_map = times, run.states, np.stack([run.p_phi, run.p_psi], axis=-1)
-                # a row of a map has NaN beyond the last sample of a run
+                seen_by_map = times, run.states, np.stack([run.p_phi, run.p_psi], axis=-1)  # its rows end in NaN
                 padded = [np.r_[one, np.full((SAMPLES - len(one), *one.shape[1:]), math.nan)] for one in seen_by_map]
                 word = one_pass(cusp, *padded)[0]
                 assert word == judgement(cusp, shown, error).verdict, (count, step)
