@@ -1,5 +1,6 @@
 """Arithmetic of short tuples in kernels: vectors of three, quaternions (w, x, y, z), and sums with compensation."""
 
+from collections.abc import Callable
 from typing import Any
 
 from symtop.core.jit import register_jitable, set_item
@@ -57,6 +58,33 @@ def solve3(a: Any, b: Any, c: Any, y: Any) -> Any:
     bc, ca, ab = cross(b, c), cross(c, a), cross(a, b)
     inverse = 1.0 / dot(a, bc)
     return inverse * dot(bc, y), inverse * dot(ca, y), inverse * dot(ab, y)
+
+
+def each(make: Callable[[int], Callable[..., Any]], count: int, i: int = 0) -> Callable[..., Any]:
+    """A function that returns the tuple of ``make(i)(...)``, i < count.
+
+    A loop over tuples is unrolled by LLVM if it is short, and by lanes only if it is very short: this one has no loop.
+    """
+    one = register_jitable(make(i))
+    if i + 1 == count:
+        return register_jitable(lambda *given: (one(*given),))
+    rest = each(make, count, i + 1)
+    return register_jitable(lambda *given: (one(*given), *rest(*given)))
+
+
+def total(make: Callable[[int], Callable[..., Any]], count: int) -> Callable[..., Any]:
+    """A function that adds ``make(i)(...)``, i < count, to its first argument in this order."""
+    last = register_jitable(make(count - 1))
+    if count == 1:
+        return register_jitable(lambda first, *given: first + last(*given))
+    before = total(make, count - 1)
+    return register_jitable(lambda first, *given: before(first, *given) + last(*given))
+
+
+def dot_of(count: int) -> Callable[..., Any]:
+    """The scalar product of the first numbers of two tuples, in order."""
+    products = total(lambda i: lambda a, b: a[i] * b[i], count)
+    return register_jitable(lambda a, b: products(0.0, a, b))
 
 
 @register_jitable

@@ -57,9 +57,9 @@ def test_the_comparison_sees_one_wrong_rounding_and_a_twin_that_leaves_the_chart
     ("dop853-compiled-fixed", "axis"), ("gauss-6", "axis"),
     ("gauss-2", "attitude"),  # nine components: the widest state that the loop adds up
 ], ids="-".join)  # fmt: skip
-def test_a_kernel_takes_at_most_a_quarter_more_than_its_twin(key):
+def test_a_kernel_takes_at_most_a_quarter_more_than_the_same_operations_in_c(key):
     kernel, steps = kernels.kernel(key), 8000
-    other = twin.Twin(kernel)
+    other = twin.Twin(kernel, twin.EXACT)  # what fusing gains depends on the processor
     ours, theirs = timings([lambda: twin.ours(kernel, steps), lambda: other(steps)], batches=60, batch=1e-3)
     assert ours.best / theirs.best < kernels.LIMIT
 

@@ -47,7 +47,7 @@ from symtop.methods.framework.plan import Array
 from symtop.methods.framework.preparation import LazyRule, Preparation, Presentation
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian.galerkin import node_at, pull_at
-from symtop.methods.vectors import zero
+from symtop.methods.vectors import dot_of, each, total, zero
 
 NODES = (2, 3, 4, 6)
 
@@ -93,16 +93,16 @@ class _Step(NamedTuple):
 
 
 class _Trial(NamedTuple):
-    """At each node, the last six times its weight."""
+    """At one node; the last six times its weight."""
 
-    forces: Row  # F
-    stiffness: Row  # V''
-    souths: Row  # 1/(4 I1 cos^2 x)
-    norths: Row  # 1/(4 I1 sin^2 x)
-    rolls: Row  # phi' cos(theta)
-    souths_by: Row  # the slopes of the three
-    norths_by: Row
-    rolls_by: Row
+    force: float  # F
+    stiffness: float  # V''
+    south: float  # 1/(4 I1 cos^2 x)
+    north: float  # 1/(4 I1 sin^2 x)
+    roll: float  # phi' cos(theta)
+    south_by: float  # the slopes of the three
+    north_by: float
+    roll_by: float
 
 
 def _steady(par: Any, h: float) -> Any:
@@ -117,123 +117,111 @@ def _equations(par: Any, rule: Any, state: Any, steady: Any, opened: Any) -> Any
     return _Step(par, rule, state[0], state[1], steady[0], steady[1])
 
 
-@register_jitable
-def _reached(rule: Any, forces: Any, i: int) -> float:
-    """(a a F)_i."""
-    total = 0.0
-    for j in range(len(forces)):
-        total += rule.reach[i][j] * forces[j]
-    return total
+def _evaluation(s: int) -> Callable[..., Any]:
+    """The trials at all s nodes."""
+    product = dot_of(s)
 
+    def node(i):  # type: ignore[no-untyped-def]
+        return lambda step, forces: evaluate(step, step.rule.c[i], step.rule.b[i], product(step.rule.reach[i], forces))
 
-def _evaluate(step: Any, forces: Any) -> Any:
-    par, blank = step.par, step.rule.c
-    new, stiffness, souths, norths, rolls = blank, blank, blank, blank, blank
-    souths_by, norths_by, rolls_by = blank, blank, blank
-    for i in range(len(blank)):
-        flown, b = step.rule.c[i] * step.momentum + step.h * _reached(step.rule, forces, i), step.rule.b[i]
+    @register_jitable
+    def evaluate(step, c, b, reached):  # type: ignore[no-untyped-def]
+        par = step.par
+        flown = c * step.momentum + step.h * reached
         node = node_at(par, step.theta + step.lever * flown)
         pull = pull_at(par, node, par.south, par.north)
         precession, bend = node.d * par.south + node.a * par.north, pull.south + pull.north
-        new, stiffness = set_item(new, i, -pull.slope), set_item(stiffness, i, pull.stiffness)
-        souths, norths = set_item(souths, i, b * node.d), set_item(norths, i, b * node.a)
-        rolls = set_item(rolls, i, b * (precession * node.cosine))
-        souths_by = set_item(souths_by, i, b * (node.d * node.tangent))
-        norths_by = set_item(norths_by, i, -b * (node.a / node.tangent))
-        rolls_by = set_item(rolls_by, i, b * (bend * node.cosine - precession * node.sine))
-    return _Trial(new, stiffness, souths, norths, rolls, souths_by, norths_by, rolls_by)
+        return _Trial(
+            -pull.slope, pull.stiffness, b * node.d, b * node.a, b * (precession * node.cosine),
+            b * (node.d * node.tangent), -b * (node.a / node.tangent),
+            b * (bend * node.cosine - precession * node.sine),
+        )  # fmt: skip
+
+    return each(node, s)
 
 
 def _elimination(s: int) -> Callable[..., Any]:
-    """A function that solves s equations, in rows of s + 1 numbers, the last of them the right-hand side.
-
-    A function for each s, because access to a tuple at a variable place is slow.
-    """
+    """A function that solves s equations, in rows of s + 1 numbers, the last of them the right-hand side."""
     if s == 1:
         return register_jitable(lambda rows: (rows[0][1] / rows[0][0],))
-    below, row_below = _elimination(s - 1), (0.0,) * s
-    rows_below = (row_below,) * (s - 1)
+    reduced = each(lambda j: lambda row, factor, first: row[j + 1] - factor * first[j + 1], s)
+    rest = each(lambda i: lambda rows, inverse: reduced(rows[i + 1], rows[i + 1][0] * inverse, rows[0]), s - 1)
+    below, less = _elimination(s - 1), total(lambda j: lambda row, x: -(row[j + 1] * x[j]), s - 1)
 
     @register_jitable
     def solved(rows):  # type: ignore[no-untyped-def]
-        first, rest = rows[0], rows_below
-        inverse = 1.0 / first[0]
-        for i in range(s - 1):
-            row, factor = row_below, rows[i + 1][0] * inverse
-            for j in range(s):
-                row = set_item(row, j, rows[i + 1][j + 1] - factor * first[j + 1])
-            rest = set_item(rest, i, row)
-        x = below(rest)
-        value = first[s]
-        for j in range(s - 1):
-            value -= first[j + 1] * x[j]
-        return (value * inverse, *x)
+        inverse = 1.0 / rows[0][0]
+        x = below(rest(rows, inverse))
+        return (less(rows[0][s], rows[0], x) * inverse, *x)
 
     return solved
 
 
 def _correction(s: int) -> Callable[..., Any]:
     """Newton's correction with s nodes."""
-    solved, blank = _elimination(s), (0.0,) * (s + 1)
-    blanks = (blank,) * s
+    product, solved = dot_of(s), _elimination(s)
+    row = each(lambda j: lambda stiffness, reach: stiffness * reach[j], s)
+
+    def equation(i):  # type: ignore[no-untyped-def]
+        def equation(step, trial, forces, scale):  # type: ignore[no-untyped-def]
+            left = row(scale * trial[i].stiffness, step.rule.reach[i])
+            return (*set_item(left, i, left[i] + 1.0), trial[i].force - forces[i])
+
+        return equation
+
+    rows = each(equation, s)
+    added = each(lambda i: lambda forces, change: forces[i] + change[i], s)
+    size = total(lambda i: lambda turned: abs(turned[i]), s)
+    turning = each(lambda i: lambda step, change, scale: scale * product(step.rule.reach[i], change), s)
 
     def correct(step, trial, forces):  # type: ignore[no-untyped-def]
-        scale, rows = step.lever * step.h, blanks
+        scale = step.lever * step.h
+        change = solved(rows(step, trial, forces, scale))
+        after, turned, largest = added(forces, change), turning(step, change, scale), 0.0
         for i in range(s):
-            row, stiffness = blank, scale * trial.stiffness[i]
-            for j in range(s):
-                row = set_item(row, j, stiffness * step.rule.reach[i][j] + (1.0 if i == j else 0.0))
-            rows = set_item(rows, i, set_item(row, s, trial.forces[i] - forces[i]))
-        change = solved(rows)
-        after, turned, size, largest = change, change, 0.0, 0.0
-        for i in range(s):
-            after = set_item(after, i, forces[i] + change[i])
-            turned = set_item(turned, i, scale * _reached(step.rule, change, i))
             largest = max(largest, abs(after[i]))
-            size += abs(turned[i])
         enough = step.rule.tolerance * (abs(step.lever * step.momentum) + scale * largest) + NEGLIGIBLE_ANGLE
-        return Correction(turned, after, size, enough, ANGLE_GRAIN)
+        return Correction(turned, after, size(0.0, turned), enough, ANGLE_GRAIN)
 
     return correct
 
 
-def _predict(step: Any, carry: Any) -> Any:
-    forces = step.rule.c
-    for i in range(len(forces)):
-        ahead = 0.0
-        for j in range(len(forces)):
-            ahead += step.rule.predict[i][j] * carry[j]
-        forces = set_item(forces, i, ahead)
-    return forces
+def _prediction(s: int) -> Callable[..., Any]:
+    """The last step's forces, continued."""
+    product = dot_of(s)
+    return each(lambda i: lambda step, carry: product(step.rule.predict[i], carry), s)
 
 
 def _free_flight(step: Any) -> Any:
     return zero(step.rule.c)
 
 
-def _keep(trial: Any, correction: Any) -> Any:
+def _keeping(s: int) -> Callable[..., Any]:
     """The last trial with the last correction added to first order; the remainder is its square."""
-    south = north = roll = 0.0
-    for i in range(len(trial.rolls)):
-        turned = correction.change[i]
-        south += trial.souths[i] + trial.souths_by[i] * turned
-        north += trial.norths[i] + trial.norths_by[i] * turned
-        roll += trial.rolls[i] + trial.rolls_by[i] * turned
-    return (*correction.after, south, north, roll)
+    south = total(lambda i: lambda trial, turned: trial[i].south + trial[i].south_by * turned[i], s)
+    north = total(lambda i: lambda trial, turned: trial[i].north + trial[i].north_by * turned[i], s)
+    roll = total(lambda i: lambda trial, turned: trial[i].roll + trial[i].roll_by * turned[i], s)
+
+    def keep(trial, correction):  # type: ignore[no-untyped-def]
+        turned = correction.change
+        return (*correction.after, south(0.0, trial, turned), north(0.0, trial, turned), roll(0.0, trial, turned))
+
+    return keep
 
 
-def _close(step: Any, end: Any) -> Any:
-    h, par, newest, kick, bend = step.h, step.par, step.rule.c, 0.0, 0.0
-    s = len(newest)
-    for j in range(s):
-        newest = set_item(newest, j, end[j])
-        kick += step.rule.b[j] * end[j]
-        bend += step.rule.last[j] * end[j]
-    south, north = h * end[s], h * end[s + 1]
-    d = step.lever * (step.momentum + h * bend)
-    turn = south * par.south + north * par.north
-    dstate = (d, h * kick, turn, h * (par.p_psi / par.I3 - end[s + 2]), south, north)
-    return dstate, newest, chart_outcome(step.theta + d)
+def _closing(s: int) -> Callable[..., Any]:
+    """The increment of a step, and the forces that the next one begins with."""
+    product = dot_of(s)
+
+    def close(step, end):  # type: ignore[no-untyped-def]
+        h, par = step.h, step.par
+        south, north = h * end[s], h * end[s + 1]
+        d = step.lever * (step.momentum + h * product(step.rule.last, end))
+        turn = south * par.south + north * par.north
+        dstate = (d, h * product(step.rule.b, end), turn, h * (par.p_psi / par.I3 - end[s + 2]), south, north)
+        return dstate, end[:s], chart_outcome(step.theta + d)
+
+    return close
 
 
 def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
@@ -266,9 +254,9 @@ to_angles = Presentation(lambda _par, _t, y: (y[0], y[1], y[2], y[3]), 4)
 def loop(s: int) -> Loop:
     """The loop of the method with s nodes, on (theta, p_theta, phi, psi, S, N)."""
     return newton_loop(
-        begin, observe, constants=_steady, start=_open, equation=_equations, predict=_predict, evaluate=_evaluate,
-        correct=_correction(s), restart=_free_flight, keep=_keep, close=_close, top=ReducedTop, dimension=6, steady=2,
-        opened=1, unknowns=s, ends=s + 3, newest=s, carry=s + 1,
+        begin, observe, constants=_steady, start=_open, equation=_equations, predict=_prediction(s),
+        evaluate=_evaluation(s), correct=_correction(s), restart=_free_flight, keep=_keeping(s), close=_closing(s),
+        top=ReducedTop, dimension=6, steady=2, opened=1, unknowns=s, ends=s + 3, newest=s, carry=s + 1,
     )  # fmt: skip
 
 
