@@ -146,7 +146,8 @@ def benchmark(name: str, results: Path) -> str:
     if name == "bench":
         explicit = [row for row in data["lanes"]["rows"] if lanes.kind_of(row["name"]) == "explicit"]
         given |= {
-            "slow": [row for row in data["kernels"] if row["ratio"] > kernels.LIMIT], "limit": kernels.LIMIT,
+            "slow": [row for row in data["kernels"] if row["unfused"] > kernels.LIMIT], "limit": kernels.LIMIT,
+            "fused": sum(row["ratio"] <= kernels.LIMIT for row in data["kernels"]),
             "kernel": {row["name"]: row for row in data["kernels"]},
             "part": {row["name"]: row["seconds"] for row in data["run"]["parts"]},
             "one_step": max(data["run"]["one_step"].values()),
