@@ -63,7 +63,7 @@ def solve3(a: Any, b: Any, c: Any, y: Any) -> Any:
 def each(make: Callable[[int], Callable[..., Any]], count: int, i: int = 0) -> Callable[..., Any]:
     """A function that returns the tuple of ``make(i)(...)``, i < count.
 
-    A loop over tuples is unrolled by LLVM if it is short, and by lanes only if it is very short: this one has no loop.
+    In the place of a loop over tuples: LLVM unrolls those only if they are short, and most of them too late for lanes.
     """
     one = register_jitable(make(i))
     if i + 1 == count:

@@ -27,7 +27,7 @@ turns such a loop into vectors only if
     all that a loop writes lies in `block`, at ``(constant) W + j``, and it reads `table` at ``(same for all j) W + j``;
     nothing in it branches (two values of which one is chosen are no branch) or calls the C library;
     no loop of a length unknown when it is compiled stands inside it: stages go outside, lanes inside;
-    LLVM unrolls each loop inside it first, over tuples of three, not of six: `vectors.each` and `total` write none;
+    a loop over tuples inside it is short, or LLVM does not unroll it in time: `vectors.each` and `total` need none;
     W is a constant of 16 or more: eight lanes are unrolled and then not made into vectors;
 and it uses vectors of full width only if `step` begins with a call of `wide_vectors`, and so does each function that it
 calls and that has a loop of its own, which is made into vectors before it is inlined. Whether it does is seen in
