@@ -103,7 +103,7 @@ def members(count: int = MEMBERS) -> np.ndarray:
 
 
 def kind_of(name: str) -> str:
-    """The kind of a method that a limit of `LEAST` is set for, `WIDE` or `OTHERS`."""
+    """The kind of a method that a limit of `LEAST` is set for, or `WIDE`."""
     if name in UNLIMITED:
         return WIDE
     method = symtop.integrator(name)

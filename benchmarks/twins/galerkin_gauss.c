@@ -49,7 +49,8 @@ static inline void correct(
     double rows[NODES][NODES + 1], inverse[NODES];
     for (int i = 0; i < NODES; i++) {
         double stiffness = scale * found->stiffness[i];
-        for (int j = 0; j < NODES; j++) rows[i][j] = stiffness * rule->reach[i][j] + (i == j ? 1.0 : 0.0);
+        for (int j = 0; j < NODES; j++) rows[i][j] = stiffness * rule->reach[i][j];
+        rows[i][i] = rows[i][i] + 1.0;
         rows[i][NODES] = found->forces[i] - forces[i];
     }
     for (int k = 0; k < NODES - 1; k++) {
