@@ -159,7 +159,5 @@ def test_the_page_of_ensembles_says_how_the_members_of_each_method_are_run():
         for chart in method.solvers:
             in_python, in_turn = ({f"{method.name}[{chart}]", method.name} & named[how] for how in (IN_PYTHON, IN_TURN))
             lanes = method.fixed_step and not in_turn and method.family != "engine"
-            if chart == "body":
-                lanes = method.family == "splitting" or method.name in named[IN_LANES]
             expected = IN_PYTHON if in_python else IN_LANES if lanes else IN_TURN
             assert Job(method, chart, *[None] * 7).execution == expected, (method.name, chart)

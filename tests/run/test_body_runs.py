@@ -327,8 +327,10 @@ def test_a_body_stored_or_of_plain_numbers_is_read_back_to_the_bit(tmp_path):  #
 
 @pytest.mark.quick
 @pytest.mark.parametrize(("name", "execution"), [
-    *((name, chunks.IN_LANES) for name in ("rk4", "strang", "suzuki-4", "chin-4a", "five-rotations", "vern9-fixed")),
-    ("gauss-4", chunks.IN_TURN),
+    *((name, chunks.IN_LANES) for name in (
+        "rk4", "strang", "chin-4a", "five-rotations", "vern9-fixed", "gauss-6", "rkmk-se3-4", "lie-variational")),
+    *late(*((name, chunks.IN_LANES) for name in ("gauss-2", "gauss-12", "rkmk-se3-8", "crouch-grossman-3")), mark="slow"),
+    ("series-general", chunks.IN_TURN),
 ])  # fmt: skip
 @pytest.mark.parametrize("per_nutation", [4, 30])  # a turn of more than a radian leaves its lane
 def test_a_member_is_the_run_of_simulate_to_the_last_bit(name, execution, per_nutation):

@@ -14,7 +14,7 @@ step, with an error that grows with the spin.
 
 p - 1 in place of p keeps increments free of cancellation. In every step m is corrected for the error of |q|.
 
-A body without symmetry is stepped as (q*, M), for which a map sees Gamma and M (`framework.body`), alone, not in lanes.
+A body without symmetry is stepped as (q*, M), for which a map sees Gamma and M (`TURNED`; see `framework.body`).
 
 In lanes the outer loop is over shares and the inner one over lanes. A family supplies the inner one, as one loop over
 the lanes or several (`stepped`), or as the parts of an iteration (`iterated_loop`). The table holds the numbers of the
@@ -29,7 +29,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.body import turned, turned_back
+from symtop.methods.framework.body import General, turned, turned_back
 from symtop.methods.framework.lanes import Lanes, W, column, none_left, put, reading, showing
 from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
@@ -56,6 +56,7 @@ class Carried(NamedTuple):
 
 UNSPUN = Carried(on_attitude, Presentation(lambda par, t, y: with_spin(par, y, t), 7), SpaceTop)
 SPUN = Carried(Preparation(_on_body, 7), None, BareTop)
+TURNED = Carried(turned, turned_back, General)  # a body without symmetry
 _AXIS = Presentation(lambda _par, _t, y: (*axis_of(y[0], y[1], y[2], y[3]), y[4], y[5], y[6]), 6)
 STILL = (0.0,) * 7  # no increment
 
@@ -127,7 +128,7 @@ def in_charts(
     made = functools.partial(FixedStep, rule=rule, evaluations=forces, implicit=implicit)
     shown = {"axis": _AXIS, "attitude": carried.present}
     of_top = {chart: made(loop, prepare=carried.prepare, present=present) for chart, present in shown.items()}
-    return of_top if of_body is None else of_top | {BODY: made(of_body, prepare=turned, present=turned_back)}
+    return of_top if of_body is None else of_top | {BODY: made(of_body, prepare=TURNED.prepare, present=TURNED.present)}
 
 
 @register_jitable
@@ -204,7 +205,7 @@ Parts = tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # sta
 def iterated_loop(  # noqa: C901  (the loops of one step, read in one piece)
     parts: Parts, most: int, *, opened: int, unknowns: int, in_lanes: Parts | None = None,
     numbers: Callable[..., Any] = lambda _: (0.0,), count: int = 1, begin: Callable[..., Any] = no_carry,
-    carry: int = 1,
+    carry: int = 1, carried: Carried = SPUN, observe: Callable[..., Any] = observe_attitude,
 ) -> Loop:  # fmt: skip
     """The loop around an iterated map of a body, for one and in lanes, from its parts; it counts passes as work.
 
@@ -217,16 +218,16 @@ def iterated_loop(  # noqa: C901  (the loops of one step, read in one piece)
     a branch, where there is one.
     """
     (start, again, close), (begin_lane, again_lane, close_lane) = parts, in_lanes or parts
-    body, top_of = SPUN.top, reading(len(SPUN.top._fields))
-    tops, first = len(body._fields), CARRY + carry
+    body, tops, first = carried.top, len(carried.top._fields), CARRY + carry
     x_at, live_at = first + opened, first + opened + unknowns
-    rule_of, carried, opens, unknown = reading(count), reading(carry), reading(opened), reading(unknowns)
+    top_of, rule_of, opens, unknown = reading(tops), reading(count), reading(opened), reading(unknowns)
+    carry_of = reading(carry)
     for function in (*parts, *(in_lanes or ()), numbers):
         register_jitable(function)
 
     @register_jitable
     def given(block, table, row, j):  # type: ignore[no-untyped-def]
-        return body(*top_of(table, 0, j)), rule_of(table, tops, j), carried(block, CARRY, j), row[j]
+        return body(*top_of(table, 0, j)), rule_of(table, tops, j), carry_of(block, CARRY, j), row[j]
 
     def part(block, table, row):  # type: ignore[no-untyped-def]
         wide_vectors()
@@ -273,5 +274,5 @@ def iterated_loop(  # noqa: C901  (the loops of one step, read in one piece)
         m, v, dL, carry = close(par, rule, carry, h, fixed, x)
         return m, v, dL, carry, work, OK if ended and not lost else NOT_CONVERGED
 
-    lanes = stepped(part, lay, count, 1, carried=SPUN, carry=carry, begin=begin, room=live_at + 1 - first)
-    return lie_loop(turn, begin, lambda _: lanes)
+    lanes = stepped(part, lay, count, 1, carried=carried, carry=carry, begin=begin, room=live_at + 1 - first)
+    return lie_loop(turn, begin, lambda _: lanes, observe)

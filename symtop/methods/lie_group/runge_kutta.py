@@ -40,10 +40,23 @@ import numpy as np
 
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.body import observe_turned
-from symtop.methods.framework.lanes import Lanes, W, column
+from symtop.methods.framework.lanes import Lanes, W, reading
+from symtop.methods.framework.loop import Loop
 from symtop.methods.framework.plan import OK
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group.loop import UNSPUN, entered, give_up, in_charts, left, lie_loop, moved, stepped
+from symtop.methods.framework.space import observe_attitude
+from symtop.methods.lie_group.loop import (
+    TURNED,
+    UNSPUN,
+    Carried,
+    entered,
+    give_up,
+    in_charts,
+    left,
+    lie_loop,
+    moved,
+    stepped,
+)  # fmt: skip
 from symtop.methods.runge_kutta.explicit import add, row_of, store, weighted_in_lanes
 from symtop.methods.runge_kutta.pair_tables import DOP853, TSIT5
 from symtop.methods.simd import wide_vectors
@@ -123,8 +136,6 @@ def _of_body(par: Any, M: Any) -> Any:
 
 
 Part = Callable[..., Any]
-TOP: Any = UNSPUN.top
-NUMBERS = (0.0,) * len(TOP._fields)
 
 
 @register_jitable  # now, as the hash of a method's code must not depend on what has run
@@ -155,20 +166,20 @@ def _product(count: int, terms: int, first: int, stages: int) -> Part:
     return register_jitable(made)
 
 
-def _stages(counts: tuple[int, ...], stages: int, brackets: int) -> Part:
+def _stages(field: Part, counts: tuple[int, ...], stages: int, brackets: int) -> Part:
     """A function (par, e, L, row, j): the slopes of the stages, one more than `counts`, and 0 if all are near."""
     if not counts:
 
         def slopes(par, e, L, row, j):  # type: ignore[no-untyped-def]
-            return (_of_top(par, L),), 0.0
+            return (field(par, L),), 0.0
     else:
-        before = _stages(counts[:-1], stages, brackets)
+        before = _stages(field, counts[:-1], stages, brackets)
         made = _product(counts[-1], len(counts), sum(counts[:-1]) * stages, stages)
 
         def slopes(par, e, L, row, j):  # type: ignore[no-untyped-def]
             known, far = before(par, e, L, row, j)
             so_far, element, too_far = made(e, L, known, row, j)
-            slope = _of_top(par, plus(L, 1.0, so_far[3]))
+            slope = field(par, plus(L, 1.0, so_far[3]))
             if brackets:
                 slope = bent_back(element, slope, brackets)
             return (*known, slope), max(far, too_far)
@@ -177,22 +188,22 @@ def _stages(counts: tuple[int, ...], stages: int, brackets: int) -> Part:
 
 
 @functools.cache
-def _of_shape(counts: tuple[int, ...], brackets: int) -> Lanes:
-    stages = len(counts)
-    slopes = _stages(counts[:-1], stages, brackets)
+def _of_shape(field: Part, carried: Carried, counts: tuple[int, ...], brackets: int) -> Lanes:
+    stages, top, top_at = len(counts), carried.top, reading(len(carried.top._fields))
+    slopes = _stages(field, counts[:-1], stages, brackets)
     whole = _product(counts[-1], stages, sum(counts[:-1]) * stages, stages)
 
     def part(block, table, row):  # type: ignore[no-untyped-def]
         wide_vectors()
         for j in range(W):
-            par, (q, e, L) = TOP(*column(table, 0, j, NUMBERS)), entered(block, j)
+            par, (q, e, L) = top(*top_at(table, 0, j)), entered(block, j)
             known, far = slopes(par, e, L, row, j)
             (m, v, _, dL), _, too_far = whole(e, L, known, row, j)
             left(block, j, q, m, v, dL)
             give_up(block, j, max(far, too_far) != 0.0)
 
     each = sum(counts) * stages
-    return stepped(part, _lay, 0, each, carried=UNSPUN, effort=lambda rule: len(rule.counts) * len(rule.shares))
+    return stepped(part, _lay, 0, each, carried=carried, effort=lambda rule: len(rule.counts) * len(rule.shares))
 
 
 class LieTable(NamedTuple):
@@ -208,8 +219,8 @@ def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return np.empty((len(rule.counts), 6))
 
 
-def _turning(field: Callable[..., Any]) -> Callable[..., Any]:
-    """One step, with ``field(par, L)`` in se(3); the work counted is the number of force evaluations."""
+def _loop(field: Part, carried: Carried, observe: Callable[..., Any]) -> Loop:
+    """The loop around a step with ``field(par, L)`` in se(3); the work counted is the number of force evaluations."""
 
     def turn(par, rule, e, L, slopes, h):  # type: ignore[no-untyped-def]
         stages, row = len(rule.counts), 0
@@ -228,11 +239,13 @@ def _turning(field: Callable[..., Any]) -> Callable[..., Any]:
                 store(slopes, i, bent_back(element, slope, rule.brackets) if rule.brackets > 0.0 else slope)
         return made[0], made[1], made[3], slopes, stages, OK
 
-    return turn
+    def lanes(rule: LieTable) -> Lanes:
+        return _of_shape(field, carried, tuple(map(int, rule.counts)), int(rule.brackets))
+
+    return lie_loop(turn, _begin, lanes, observe)
 
 
-march = lie_loop(_turning(_of_top), _begin, lambda rule: _of_shape(tuple(map(int, rule.counts)), int(rule.brackets)))
-march_body = lie_loop(_turning(_of_body), _begin, observe=observe_turned)
+march, march_body = _loop(_of_top, UNSPUN, observe_attitude), _loop(_of_body, TURNED, observe_turned)
 
 
 def lie_runge_kutta(

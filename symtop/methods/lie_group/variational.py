@@ -36,9 +36,8 @@ from typing import Any, NamedTuple
 from symtop.core.jit import register_jitable
 from symtop.methods.framework.body import observe_turned, torque
 from symtop.methods.framework.loop import Loop
-from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.registry import Integrator
-from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_charts, iterated_loop, lie_loop, moved
+from symtop.methods.lie_group.loop import SPUN, TURNED, cayley, gravity, in_charts, iterated_loop, moved
 from symtop.methods.splitting.coefficients import SUZUKI_4
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
@@ -132,30 +131,41 @@ def _image(par: Any, kind: float, a: Any, u: Any, Ju: Any, d: Any) -> Any:
     return plus(image, -2.0 * (1.0 - kind) * dot(u, d), a)
 
 
-def turn_body(par: Any, rule: Any, g: Any, M: Any, carry: Any, h: float) -> Any:
-    """One step of a body without symmetry, by Newton's method for u in its axes; the work is the number of passes."""
-    half, kind = 0.5 * h, rule.kind
+def _start(par: Any, rule: Any, g: Any, M: Any, carry: Any, h: float) -> Any:
+    """Gamma and M after half of the kick, and the first u."""
+    half = 0.5 * h
     kicked = plus(M, half, torque(par, *g))
     a = scaled(half, kicked)
-    u, work, ended, lost = (par.a1 * a[0], par.a2 * a[1], par.a3 * a[2]), 0, False, False
-    while not (ended or lost) and work < MOST:
-        Ju = par.I1 * u[0], par.I2 * u[1], par.I3 * u[2]
-        rest = plus(scaled(1.0 + (1.0 - kind) * dot(u, u), a), -1.0, Ju)
-        rest = plus(plus(rest, -1.0, cross(u, Ju)), -kind * dot(u, Ju), u)
-        first = _image(par, kind, a, u, Ju, (1.0, 0.0, 0.0))
-        second = _image(par, kind, a, u, Ju, (0.0, 1.0, 0.0))
-        third = _image(par, kind, a, u, Ju, (0.0, 0.0, 1.0))
-        change = solve3(first, second, third, rest)
-        u = plus(u, 1.0, change)
-        ended = dot(change, change) <= CONVERGED * CONVERGED * dot(u, u)
-        lost = not dot(first, cross(second, third)) > 0.0
-        work += 1
+    return (*g, *kicked), (par.a1 * a[0], par.a2 * a[1], par.a3 * a[2])
+
+
+def _again(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:
+    """Newton's next u, in the axes of the body."""
+    kind, a = rule[0], scaled(0.5 * h, opened[3:])
+    Ju = par.I1 * u[0], par.I2 * u[1], par.I3 * u[2]
+    rest = plus(scaled(1.0 + (1.0 - kind) * dot(u, u), a), -1.0, Ju)
+    rest = plus(plus(rest, -1.0, cross(u, Ju)), -kind * dot(u, Ju), u)
+    first = _image(par, kind, a, u, Ju, (1.0, 0.0, 0.0))
+    second = _image(par, kind, a, u, Ju, (0.0, 1.0, 0.0))
+    third = _image(par, kind, a, u, Ju, (0.0, 0.0, 1.0))
+    change = solve3(first, second, third, rest)
+    u = plus(u, 1.0, change)
+    ended = dot(change, change) <= CONVERGED * CONVERGED * dot(u, u)
+    return u, ended, not dot(first, cross(second, third)) > 0.0
+
+
+def _close(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:
+    """The rotation, and the change of M with both halves of the kick."""
+    g, kicked = opened[:3], opened[3:]
     m, v = cayley(scaled(-1.0, u))  # space turns the other way
     kick = plus(torque(par, *g), 1.0, torque(par, *plus(g, 1.0, moved(m, v, g))))
-    return m, v, plus(moved(m, v, kicked), half, kick), carry, work, OK if ended and not lost else NOT_CONVERGED
+    return m, v, plus(moved(m, v, kicked), 0.5 * h, kick), carry
 
 
-march_body = lie_loop(turn_body, observe=observe_turned)
+march_body = iterated_loop(
+    (_start, _again, _close), MOST, opened=6, unknowns=3, numbers=lambda rule: (rule.kind,), carried=TURNED,
+    observe=observe_turned,
+)  # fmt: skip
 
 
 def lie_variational(name: str, rule: Variational, order: int, summary: str, reference: str) -> Integrator:

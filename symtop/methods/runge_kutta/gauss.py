@@ -10,7 +10,7 @@ equations; these are Lie-Poisson equations, whose bracket depends on the state, 
 trait `symplectic` is false, although the motion stays on the coadjoint orbit and on the energy. `gauss-2` must not be
 confused with the `midpoint` discrete Lagrangian in angles, which is symplectic and keeps the energy only on average.
 Of a body without symmetry, in (q, M), |q| and the energy are quadratic and kept, and |M| of a free one; L_z is cubic
-and is not. There the sweeps are all, without Newton and without lanes.
+and is not. There the sweeps are all, without Newton.
 
 What makes this true to rounding over long runs (Hairer, McLachlan, Razakarivony, BIT 48 (2008) 231): conservation needs
 mu_ij + mu_ji = 1, and the table satisfies it *exactly* in doubles, whatever the rounding of b (Antonana, Makazaga,
@@ -54,14 +54,14 @@ import numpy as np
 from symtop.core.jit import register_jitable, set_item
 from symtop.core.numbers import context
 from symtop.methods.framework import body, space
-from symtop.methods.framework.lanes import Lanes, W, column, move, none_left
+from symtop.methods.framework.lanes import Lanes, W, move, none_left, put, reading
 from symtop.methods.framework.loop import FixedStep, Loop
 from symtop.methods.framework.plan import NOT_CONVERGED, OK, Array
 from symtop.methods.framework.preparation import LazyRule
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop, field_axis, field_frame, observe_axis
 from symtop.methods.simd import wide_vectors
-from symtop.methods.vectors import accumulate, zero
+from symtop.methods.vectors import accumulate, dot_of, each, total, zero
 from symtop.model.charts import BODY
 
 CONVERGED = 1e-9  # a correction in units of |e| = 1, whose square is below rounding
@@ -192,7 +192,6 @@ STAGES = (1, 2, 3, 4, 5, 6)
 DIGITS = 40  # of the multiprecision that coefficients are computed in
 SWEEPS = 100  # limit on the sweeps in a step; a step of usual size takes at most 14
 FARTHEST, PACE = 1e3, 0.68  # correction k that does not fall and is above FARTHEST PACE^k: sweeps will not converge
-IN_LANES = {6: 4, 9: 2}  # by size of the state: most stages for which lanes are faster (3.2 times); more run alone
 STILL = 5  # L_z has no slope, so its increments stay zero: left out, they save a sixth of the sums on (e, L)
 ROUND_OFF = 1e-14  # a correction that stopped falling above this, in units of |e| = 1 and |L|, has not converged
 
@@ -290,68 +289,69 @@ def _after(first: Any, then: Any) -> Any:
 
 
 def _swept(  # noqa: C901  (the loops of one step, read in one piece)
-    field: Callable[..., Any], mu: tuple[tuple[float, ...], ...], predict: tuple[tuple[float, ...], ...], dimension: int
-) -> Lanes:
-    """A Gauss method in lanes: `mu` and `predict` as `GaussRule` has them."""
-    stages, zeros, numbers = len(mu), (0.0,) * dimension, (0.0,) * len(SpaceTop._fields)
-    tops, flag, work, carry_at = len(numbers), 3 * dimension, 3 * dimension + 1, 3 * dimension + 2
+    field: Callable[..., Any], top: Any, mu: tuple[tuple[float, ...], ...], predict: tuple[tuple[float, ...], ...],
+    dimension: int, first: int, still: int, unit: Callable[..., float],
+) -> Lanes:  # fmt: skip
+    """A Gauss method in lanes: `mu` and `predict` as `GaussRule` has them, the others as `_loop`."""
+    stages, tops = len(mu), len(top._fields)
+    flag, work, carry_at = 3 * dimension, 3 * dimension + 1, 3 * dimension + 2
     carry = stages * dimension + 1  # the L_i and the unit
     unit_at = carry_at + carry - 1
     gap_at, pull_at, last_at, live_at = range(unit_at + 1, unit_at + 5)
-    nodes, carried = (0.0,) * stages, (0.0,) * carry
+    carried, state_at, top_at, weighted = (0.0,) * carry, reading(dimension), reading(tops), dot_of(stages)
+    added = total(lambda i: lambda increments: increments[i], stages)
+
+    # number m of every L_i, of the next step's L_i, and of the state at a stage
+    increments = each(lambda i: lambda block, m, j: block[(carry_at + i * dimension + m) * W + j], stages)
+    continued = each(lambda i: lambda last: weighted(predict[i], last), stages)
+
+    def displaced(m: int) -> Any:
+        if m == still:
+            return lambda _row, state, _block, _j: state[m]
+        return lambda row, state, block, j: state[m] + weighted(row, increments(block, m, j))
+
+    place = each(displaced, dimension)
+    renewed = each(
+        lambda m: lambda live, weight, slope, old: weight * slope[m] if live and m != still else old[m], dimension
+    )
+    increment = each(lambda m: lambda block, j: added(0.0, increments(block, m, j)), dimension)
 
     def ahead(m: int) -> Any:
-        at = carry_at + m
-
         @register_jitable
-        def continued(block, table):  # type: ignore[no-untyped-def]
+        def extrapolated(block, table):  # type: ignore[no-untyped-def]
             wide_vectors()
             for j in range(W):
-                last = nodes
-                for q in range(stages):
-                    last = set_item(last, q, block[(at + q * dimension) * W + j])
+                values = continued(increments(block, m, j))
                 for i in range(stages):
-                    total = 0.0
-                    for q in range(stages):
-                        total += predict[i][q] * last[q]
-                    block[(at + i * dimension) * W + j] = total
+                    block[(carry_at + i * dimension + m) * W + j] = values[i]
 
-        return continued
+        return extrapolated
 
     def stage(i: int) -> Any:
         row, own = mu[i], carry_at + i * dimension
 
         @register_jitable
-        def renewed(block, table):  # type: ignore[no-untyped-def]
+        def swept(block, table):  # type: ignore[no-untyped-def]
             wide_vectors()
             for j in range(W):
-                state, place = column(block, 0, j, zeros), zeros
-                for q in range(stages):
-                    for m in range(dimension):
-                        if m != STILL:
-                            step = row[q] * block[(carry_at + q * dimension + m) * W + j]
-                            place = set_item(place, m, place[m] + step)
-                for m in range(dimension):
-                    place = set_item(place, m, state[m] + place[m])
-                slope = field(SpaceTop(*column(table, 0, j, numbers)), place)
-                weight, live = table[(tops + i) * W + j], block[live_at * W + j] != 0.0
+                there = place(row, state_at(block, 0, j), block, j)
+                slope, old = field(top(*top_at(table, 0, j)), there), state_at(block, own, j)
+                new = renewed(block[live_at * W + j] != 0.0, table[(tops + i) * W + j], slope, old)
                 gap = 0.0 if i == 0 else block[gap_at * W + j]
                 pull = 0.0 if i == 0 else block[pull_at * W + j]
-                for m in range(dimension):
-                    if m != STILL:
-                        old, value = block[(own + m) * W + j], weight * slope[m]
-                        change = abs(value - old)
-                        if 3 <= m < 6:
-                            pull = max(pull, change)
-                        else:
-                            gap = max(gap, change)
-                        block[(own + m) * W + j] = value if live else old
+                for m in range(first):
+                    gap = max(gap, abs(new[m] - old[m]))
+                for m in range(first, first + 3):
+                    pull = max(pull, abs(new[m] - old[m]))
+                for m in range(first + 3, dimension):
+                    gap = max(gap, abs(new[m] - old[m]))
+                put(block, own, j, new)
                 block[gap_at * W + j] = gap
                 block[pull_at * W + j] = pull
 
-        return renewed
+        return swept
 
-    extrapolate = functools.reduce(_after, [ahead(m) for m in range(dimension) if m != STILL])
+    extrapolate = functools.reduce(_after, [ahead(m) for m in range(dimension) if m != still])
     sweep = functools.reduce(_after, map(stage, range(stages)))
 
     def step(block, table):  # type: ignore[no-untyped-def]
@@ -377,10 +377,7 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
             if none_left(block, live_at):
                 break
         for j in range(W):
-            dstate = zeros
-            for i in range(stages):
-                for m in range(dimension):
-                    dstate = set_item(dstate, m, dstate[m] + block[(carry_at + i * dimension + m) * W + j])
+            dstate = increment(block, j)
             healthy = np.isfinite(dstate[0]) and block[live_at * W + j] == 0.0
             move(accumulate, block, dimension, j, dstate)
             block[flag * W + j] = block[flag * W + j] if healthy else 1.0
@@ -394,14 +391,14 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
         for i in range(stages):
             for m in range(dimension):
                 values = set_item(values, i * dimension + m, shares[i] * slope[m])
-        return set_item(values, carry - 1, momentum_unit(par, state))
+        return set_item(values, carry - 1, unit(par, state))
 
-    return Lanes(step, lay, lambda _: 0.0, lambda _: stages, SpaceTop, dimension, carry, room=lambda _: 4, begin=begin)
+    return Lanes(step, lay, lambda _: 0.0, lambda _: stages, top, dimension, carry, room=lambda _: 4, begin=begin)
 
 
 def _loop(  # noqa: C901
     field: Any, dimension: int, first: int = 3, still: int = STILL, unit: Any = momentum_unit,
-    solve: Any = solve_stages, observe: Any = observe_axis,
+    solve: Any = solve_stages, observe: Any = observe_axis, top: Any = SpaceTop,
 ) -> Loop:  # fmt: skip
     """The loop on states that move by `field`, a momentum from `first` on and, in `still`, a number that has no slope.
 
@@ -489,11 +486,9 @@ def _loop(  # noqa: C901
 
     @functools.cache
     def of_rows(mu: Any, predict: Any) -> Lanes:
-        return _swept(field, mu, predict, dimension)
+        return _swept(field, top, mu, predict, dimension, first, still, unit)
 
-    def in_lanes(rule: GaussRule) -> Lanes | None:
-        if len(rule.b) > IN_LANES.get(dimension, 0):
-            return None
+    def in_lanes(rule: GaussRule) -> Lanes:
         return of_rows(*(tuple(map(tuple, rows.tolist())) for rows in (rule.mu, rule.predict)))
 
     return Loop(begin, increment, observe, lanes=in_lanes)
@@ -502,7 +497,7 @@ def _loop(  # noqa: C901
 # `solve` of a loop without Newton's iteration: no iterations, not converged
 _unsolved = register_jitable(lambda _field, _par, _state, _work, _stages: (0, False))
 march_axis, march_frame = _loop(field_axis, 6), _loop(field_frame, 9)
-march_body = _loop(body.field_body, 7, 4, -1, _unit_of_body, _unsolved, body.observe_body)
+march_body = _loop(body.field_body, 7, 4, -1, _unit_of_body, _unsolved, body.observe_body, body.General)
 
 
 RULES = {stages: LazyRule(functools.partial(gauss_rule, stages), packed) for stages in STAGES}
