@@ -1,10 +1,11 @@
-"""Many tops in lanes: nanoseconds a step of every method that has them, against its kernel for one, on one core.
+"""Many tops, or bodies, in lanes: nanoseconds a step of every method that has them, against one alone, on one core.
 
     python -m benchmarks.lanes
 
 The tops are `MEMBERS` neighbours of spheroid with the step of `benchmarks.kernels`, and a call is all that
-`FixedStep.many` does for them. The kernel for one and the lanes are interleaved in random order. Beside them stand a
-second thread, on pieces of the members as `symtop.ensemble` makes them, and heyoka's batch mode (`Batch`).
+`FixedStep.many` does for them. The kernel for one and the lanes are interleaved in random order. Bodies are neighbours
+of heavy-brick, beside `FEW` of them, which run one after another. Beside them stand a second thread, on pieces of the
+members as `symtop.ensemble` makes them, and heyoka's batch mode (`Batch`).
 
 Eight lanes are not eight times as fast where the kernel for one has much to do at a time: a processor that begins two
 operations a cycle on eight doubles begins three on one. By its machine code a step of eight takes at least, in cycles,
@@ -26,22 +27,25 @@ from benchmarks import kernels, twin
 from benchmarks.pages import Table
 from symtop.core.parallel import in_threads
 from symtop.measure.timing import timings
-from symtop.methods.framework.lanes import W, members_of
+from symtop.methods.framework.lanes import LEAST as LEAST_IN_A_BLOCK, W, members_of
 from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.runge_kutta.pairs import PAIRS
 from symtop.methods.taylor import heyoka
 from symtop.model import charts
+from symtop.model.charts import BODY
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import flat
 
 MEMBERS = 4 * W
-SPREAD = 0.001  # of theta, from one neighbour to the next
+SPREAD = 0.001  # of theta, or of a body's first rate, from one neighbour to the next
+BODY_SCENE, FEW, BODY_STEPS = "heavy-brick", LEAST_IN_A_BLOCK - 1, 400
 CALL, FASTER = 2e-3, 6  # seconds, long against the set-up of a member; rough speed-up by lanes
 BATCHES, BATCH = 25, 0.002
 ON_GROUPS = "explicit on Lie groups"
-OTHERS, WIDE = "other implicit", "series, exact-discrete and pairs with fixed steps"
+OTHERS, OF_BODIES = "other implicit", "bodies without symmetry"
+WIDE = "series, exact-discrete and pairs with fixed steps"
 LEAST = {  # required speed over the kernel for one, by kind
-    "explicit": 7.0, ON_GROUPS: 5.0, "midpoint and trapezoidal": 6.0, "gauss": 3.0, OTHERS: 3.0,
+    "explicit": 7.0, ON_GROUPS: 5.0, "midpoint and trapezoidal": 6.0, "gauss": 3.0, OTHERS: 3.0, OF_BODIES: 3.0,
 }  # fmt: skip
 FIXED = {f"{pair.name}-fixed" for pair in PAIRS}
 UNLIMITED = {"series", "exact-discrete"} | FIXED  # one step uses vectors already, or is mostly a dependency chain
@@ -94,16 +98,18 @@ class Measured(NamedTuple):
     batches: Sequence[Batch]
 
 
-def members(count: int = MEMBERS) -> np.ndarray:
-    """Neighbours of spheroid: (count, 9)."""
-    scene = symtop.scene(kernels.SCENE)
+def members(count: int = MEMBERS, name: str = kernels.SCENE) -> np.ndarray:
+    """Neighbours of a scene: (count, 9), of a body (count, 14)."""
+    scene = symtop.scene(name, bodies=True)
     numbers = np.tile(flat(scene.top, scene.start), (count, 1))
-    numbers[:, 3] += SPREAD * np.arange(count)
+    numbers[:, 11 if scene.of_body else 3] += SPREAD * np.arange(count)
     return numbers
 
 
-def kind_of(name: str) -> str:
+def kind_of(name: str, chart: str) -> str:
     """The kind of a method that a limit of `LEAST` is set for, or `WIDE`."""
+    if chart == BODY:
+        return OF_BODIES
     if name in UNLIMITED:
         return WIDE
     method = symtop.integrator(name)
@@ -114,9 +120,9 @@ def kind_of(name: str) -> str:
     return "gauss" if name.startswith("gauss-") else OTHERS
 
 
-def limit_of(name: str) -> str:
+def limit_of(name: str, chart: str) -> str:
     """The limit as the table shows it."""
-    limit = LEAST.get(kind_of(name))
+    limit = LEAST.get(kind_of(name, chart))
     return "not set" if limit is None else f"{limit:g}"
 
 
@@ -127,9 +133,9 @@ def solver_of(name: str, chart: str) -> FixedStep:
     return solver
 
 
-def together(solver: FixedStep, count: int, h: float, steps: int) -> Any:
+def together(solver: FixedStep, count: int, h: float, steps: int, scene: str = kernels.SCENE) -> Any:
     """A function that runs `count` members for this many steps."""
-    given = members(count), np.full(count, h), np.full((count, 1), steps)
+    given = members(count, scene), np.full(count, h), np.full((count, 1), steps)
     return lambda: solver.many(*given)
 
 
@@ -151,6 +157,22 @@ def steps() -> list[Row]:
     for key, (one, many), alone, beside in zip(solvers, counts, timed[::2], timed[1::2], strict=True):
         gain, *spread = (many / one * value for value in kernels.ratio(alone, beside))
         rows.append(Row(*key, alone.best / one * 1e9, beside.best / many * 1e9, gain, *spread))
+    return rows
+
+
+def on_bodies() -> list[Row]:
+    """Every method with lanes for bodies without symmetry, beside a few members one after another."""
+    h, calls = symtop.scene(BODY_SCENE, bodies=True).nutation_period / kernels.PER_NUTATION, []
+    found = {
+        name: inside(method.solvers[BODY]) for name, method in symtop.integrators().items() if BODY in method.solvers
+    }
+    solvers = {name: solver for name, solver in found.items() if solver is not None and solver.in_lanes}
+    for solver in solvers.values():
+        calls += [together(solver, count, h, BODY_STEPS, BODY_SCENE) for count in (FEW, MEMBERS)]
+    timed, rows = timings(calls, batches=BATCHES, batch=BATCH), []
+    for name, alone, beside in zip(solvers, timed[::2], timed[1::2], strict=True):
+        each, (gain, *spread) = 1e9 / BODY_STEPS, (MEMBERS / FEW * value for value in kernels.ratio(alone, beside))
+        rows.append(Row(name, BODY, alone.best / FEW * each, beside.best / MEMBERS * each, gain, *spread))
     return rows
 
 
@@ -225,7 +247,7 @@ def verdict(measured: Measured) -> list[str]:
     """Sentences: how much faster lanes are, compared with threads and heyoka's batches."""
     said = []
     for kind in (*LEAST, WIDE):
-        rows = sorted((row for row in measured.rows if kind_of(row.name) == kind), key=lambda row: row.ratio)
+        rows = sorted((row for row in measured.rows if kind_of(*row[:2]) == kind), key=lambda row: row.ratio)
         if not rows:
             continue
         limit, least = LEAST.get(kind), rows[0]
@@ -253,11 +275,11 @@ def tables(measured: Measured) -> list[Table]:
     """The tables of the report."""
     return [
         Table(
-            f"A step of {MEMBERS} tops in lanes, one core",
+            f"A step of {MEMBERS} tops, or bodies, in lanes, one core",
             ["method", "ns a step, alone", "in lanes", "times as fast", "spread of the fifths", "limit"],
             [
                 [f"{row.name}[{row.chart}]", f"{row.alone:.1f}", f"{row.in_lanes:.2f}", f"{row.ratio:.1f}",
-                 f"{row.ratio_low:.1f} to {row.ratio_high:.1f}", limit_of(row.name)]
+                 f"{row.ratio_low:.1f} to {row.ratio_high:.1f}", limit_of(*row[:2])]
                 for row in measured.rows
             ],
         ),
@@ -283,7 +305,7 @@ def tables(measured: Measured) -> list[Table]:
 
 def measure() -> Measured:
     """Measure steps, threads and batches."""
-    return Measured(steps(), threads(), batches())
+    return Measured([*steps(), *on_bodies()], threads(), batches())
 
 
 if __name__ == "__main__":
