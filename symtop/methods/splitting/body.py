@@ -220,10 +220,10 @@ def _in_lanes(outer: tuple[float, ...], inner: tuple[float, ...]) -> tuple[Any, 
         return body.General(*column(table, 0, j, PAR)), column(block, 0, j, STATE), column(block, STEP, j, STATE)
 
     @register_jitable
-    def turned(block, row, table, i, j):  # type: ignore[no-untyped-def]
+    def turned(block, row, table, part, next_part, j):  # type: ignore[no-untyped-def]
         par, state, step = opened(block, table, j)
-        step, one = first(state, step, inner[i] * (row[2 * W + j] * (par.a1 - par.a2)))
-        step, two = third(state, step, outer[i + 1] * (row[2 * W + j] * (par.a3 - par.a2)))
+        step, one = first(state, step, part * (row[2 * W + j] * (par.a1 - par.a2)))
+        step, two = third(state, step, next_part * (row[2 * W + j] * (par.a3 - par.a2)))
         put(block, STEP, j, step)
         block[FLAG * W + j] = block[FLAG * W + j] if one & two else 1.0
 
@@ -239,8 +239,9 @@ def _in_lanes(outer: tuple[float, ...], inner: tuple[float, ...]) -> tuple[Any, 
     def rest(block, row, table):  # type: ignore[no-untyped-def]
         wide_vectors()
         for i in range(len(inner)):
+            part, next_part = inner[i], outer[i + 1]  # read here: LLVM copies a tuple of 17 to read one number of it
             for j in range(W):
-                turned(block, row, table, i, j)
+                turned(block, row, table, part, next_part, j)
         for j in range(W):
             ended(block, row, table, j)
 
