@@ -144,7 +144,9 @@ def benchmark(name: str, results: Path) -> str:
     data: dict[str, Any] = json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
     given = data | {"f": data["facts"]}
     if name == "bench":
-        explicit = [row for row in data["lanes"]["rows"] if lanes.kind_of(row["name"]) == "explicit"]
+        many: dict[str, list[Any]] = {}
+        for row in sorted(data["lanes"]["rows"], key=lambda row: row["ratio"]):
+            many.setdefault(lanes.kind_of(row["name"], row["chart"]), []).append(row)
         given |= {
             "slow": [row for row in data["kernels"] if row["unfused"] > kernels.LIMIT], "limit": kernels.LIMIT,
             "fused": sum(row["ratio"] <= kernels.LIMIT for row in data["kernels"]),
@@ -152,8 +154,8 @@ def benchmark(name: str, results: Path) -> str:
             "part": {row["name"]: row["seconds"] for row in data["run"]["parts"]},
             "one_step": max(data["run"]["one_step"].values()),
             "many": {row["name"]: row["seconds"] for row in data["ensemble"]},
-            "explicit": sorted(explicit, key=lambda row: row["ratio"]),
-            "pairs": sorted(row["ratio"] for row in data["lanes"]["rows"] if row["name"] in lanes.FIXED),
+            "explicit": many["explicit"], "gauss": many["gauss"], "bodies": many[lanes.OF_BODIES],
+            "pairs": [row for row in many[lanes.WIDE] if row["name"] in lanes.FIXED],
         }  # fmt: skip
     template = (ROOT / "docs" / "generator" / f"{name}.jinja").read_text(encoding="utf-8")
     return wrapped(rendered(template, f"{name}.jinja", given).strip()) + "\n"

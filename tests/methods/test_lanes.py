@@ -118,13 +118,13 @@ def test_methods_that_have_lanes():
         "five-rotations[attitude]",  # the kernel is that of a body
     }
     assert {"rk4[angles]", "tsit5-fixed[angles]", "vern9-fixed[angles]"} <= IN_LANES
-    for name in ("exact-discrete", "series", "rk4", "vern9-fixed", "gauss-2", "gauss-12", *EXPLICIT, *ITERATED):
+    for name in ("exact-discrete", "series", "rk4", "vern9-fixed", "gauss-12", "kahan", *EXPLICIT, *ITERATED):
         assert {f"{name}[axis]", f"{name}[attitude]"} <= IN_LANES
-    without = ("exact[", "rk45", "taylor", "series-adaptive", "series-general", "collective-gauss", "kahan[")
+    without = ("exact[", "rk45", "taylor", "series-adaptive", "series-general", "collective-gauss")
     assert not any(name.startswith(without) or "unreduced" in name for name in IN_LANES)
 
 
-@pytest.mark.parametrize("name", ["strang[axis]", "kahan[axis]"])  # in lanes, and one after another
+@pytest.mark.parametrize("name", ["strang[axis]", ALONE[-1]])  # in lanes, and one after another
 def test_arrays_that_cannot_be_written_to_compile_nothing_again(name):
     """numba gives such an array another type, and the last member of a ladder came as a broadcast one."""
     solver, given = SOLVERS[name], members(1)
@@ -186,7 +186,7 @@ def test_a_lane_that_takes_more_iterations_changes_no_other(name, longer):
     assert_runs_alone(solver, numbers, h, marks, after)
 
 
-@pytest.mark.parametrize(("name", "steps"), [("takahashi-imada[attitude]", 250), ("kahan[axis]", 15)])
+@pytest.mark.parametrize(("name", "steps"), [("takahashi-imada[attitude]", 250), (ALONE[-1], 15)])
 def test_runs_of_a_few_steps_at_a_time_are_the_same(monkeypatch, name, steps):
     given, solver = members(300), SOLVERS[name]
     whole = solver.many(*given)

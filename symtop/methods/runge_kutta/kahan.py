@@ -18,12 +18,14 @@ McLachlan, Owren, Quispel, J. Phys. A 46 (2013) 025201.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from symtop.core.jit import register_jitable
+from symtop.methods.framework import space
+from symtop.methods.framework.lanes import W, one_loop
 from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import OUTCOMES, Run
 from symtop.methods.framework.preparation import Presentation
@@ -32,6 +34,7 @@ from symtop.methods.framework.space import finite_outcome, frame_to_attitude, ob
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 from symtop.model.top import Angles, SymmetricTop
 
+H_AT = len(space.SpaceTop._fields)  # the step, in the table of a block
 frame_sample = frame_to_attitude.sample
 
 
@@ -87,8 +90,22 @@ def _attitude_shown(par: Any, t: float, y: Any) -> Any:
     return frame_sample(par, t, (*e, y[3], y[4], y[5], *a))
 
 
-march_axis = Loop(no_carry, _increment_axis, observe_axis)
-march_frame = Loop(no_carry, _increment_frame, _observe_frame)
+def _loop(increment: Callable[..., Any], observe: Callable[..., Any], dimension: int) -> Loop:
+    """The loop around a step that has no branch, for one and in lanes, whose table holds h."""
+    register_jitable(increment)
+
+    def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
+        numbers[0] = h
+
+    def advance(par, state, carry, table, j):  # type: ignore[no-untyped-def]
+        dstate, carry, _, outcome = increment(par, 0.0, state, carry, table[H_AT * W + j])
+        return dstate, carry, outcome
+
+    lanes = one_loop(advance, lay, 1, top=space.SpaceTop, dimension=dimension)
+    return Loop(no_carry, increment, observe, lanes=lambda _: lanes)
+
+
+march_axis, march_frame = _loop(_increment_axis, observe_axis, 6), _loop(_increment_frame, _observe_frame, 9)
 _attitude = Presentation(_attitude_shown, 7)
 
 
