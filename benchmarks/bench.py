@@ -5,6 +5,7 @@ make bench        (needs gcc; the twins are built into benchmarks/build)
 
 import argparse
 import sys
+import warnings
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,6 +13,7 @@ from typing import Any, NamedTuple
 from benchmarks import ensemble, kernels, lanes, measured, pages, startup, targets, truth, twin, whole_run
 from benchmarks.pages import Table
 from symtop.core import netcdf
+from symtop.core.errors import SymtopWarning
 
 
 class Results(NamedTuple):
@@ -76,6 +78,7 @@ def main() -> None:
     if twin.compiler() is None:
         sys.exit("make bench needs gcc for the C twins, and there is none on the path")
     facts = measured.circumstances()
+    warnings.simplefilter("ignore", SymtopWarning)  # the guard's, of runs that are made for their time
     results = Results(
         kernels.measure(), startup.measure(), truth.measure(), options.accuracy, targets.measure(options.accuracy),
         whole_run.measure(), whole_run.one_step(), ensemble.measure(), ensemble.calls(), lanes.measure(),

@@ -4,8 +4,8 @@
 
 The tops are `MEMBERS` neighbours of spheroid with the step of `benchmarks.kernels`, and a call is all that
 `FixedStep.many` does for them. The kernel for one and the lanes are interleaved in random order. Bodies are neighbours
-of heavy-brick, beside `FEW` of them, which run one after another. Beside them stand a second thread, on pieces of the
-members as `symtop.ensemble` makes them, and heyoka's batch mode (`Batch`).
+of heavy-brick. Beside them stand a second thread, on pieces of the members as `symtop.ensemble` makes them, and
+heyoka's batch mode (`Batch`).
 
 Eight lanes are not eight times as fast where the kernel for one has much to do at a time: a processor that begins two
 operations a cycle on eight doubles begins three on one. By its machine code a step of eight takes at least, in cycles,
@@ -27,7 +27,7 @@ from benchmarks import kernels, twin
 from benchmarks.pages import Table
 from symtop.core.parallel import in_threads
 from symtop.measure.timing import timings
-from symtop.methods.framework.lanes import LEAST as LEAST_IN_A_BLOCK, W, members_of
+from symtop.methods.framework.lanes import W, members_of
 from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.runge_kutta.pairs import PAIRS
 from symtop.methods.taylor import heyoka
@@ -38,7 +38,7 @@ from symtop.model.top import flat
 
 MEMBERS = 4 * W
 SPREAD = 0.001  # of theta, or of a body's first rate, from one neighbour to the next
-BODY_SCENE, FEW, BODY_STEPS = "heavy-brick", LEAST_IN_A_BLOCK - 1, 400
+SCENES = kernels.SCENE, "heavy-brick"  # of tops and of bodies
 CALL, FASTER = 2e-3, 6  # seconds, long against the set-up of a member; rough speed-up by lanes
 BATCHES, BATCH = 25, 0.002
 ON_GROUPS = "explicit on Lie groups"
@@ -139,10 +139,21 @@ def together(solver: FixedStep, count: int, h: float, steps: int, scene: str = k
     return lambda: solver.many(*given)
 
 
+def on_bodies() -> dict[tuple[str, str], twin.Kernel]:
+    """The kernels for a body without symmetry, and the numbers that they run on."""
+    scene = symtop.scene(SCENES[1], bodies=True)
+    h = scene.nutation_period / kernels.PER_NUTATION
+    return {
+        (name, BODY): twin.kernel_of(method, BODY, scene, h)
+        for name, method in symtop.integrators().items()
+        if BODY in method.solvers and inside(method.solvers[BODY])
+    }
+
+
 def steps() -> list[Row]:
     """Every method with lanes beside its kernel for one."""
     solvers, calls, counts = dict[tuple[str, str], FixedStep](), [], []
-    for key, kernel in kernels.kernels().items():
+    for key, kernel in (kernels.kernels() | on_bodies()).items():
         solver = inside(symtop.integrator(key[0]).solvers[key[1]])
         if solver is None or not solver.in_lanes:
             continue
@@ -151,28 +162,12 @@ def steps() -> list[Row]:
         one = kernels.within(kernel, int(CALL / probe.best * kernels.CHECKED))
         each = kernels.within(kernel, max(200, FASTER * one // MEMBERS))
         counts.append((one, each * MEMBERS))
-        calls += [partial(twin.ours, kernel, one), together(solver, MEMBERS, kernel.h, each)]
+        calls += [partial(twin.ours, kernel, one), together(solver, MEMBERS, kernel.h, each, SCENES[key[1] == BODY])]
     timed = timings(calls, batches=BATCHES, batch=BATCH)
     rows = []
     for key, (one, many), alone, beside in zip(solvers, counts, timed[::2], timed[1::2], strict=True):
         gain, *spread = (many / one * value for value in kernels.ratio(alone, beside))
         rows.append(Row(*key, alone.best / one * 1e9, beside.best / many * 1e9, gain, *spread))
-    return rows
-
-
-def on_bodies() -> list[Row]:
-    """Every method with lanes for bodies without symmetry, beside a few members one after another."""
-    h, calls = symtop.scene(BODY_SCENE, bodies=True).nutation_period / kernels.PER_NUTATION, []
-    found = {
-        name: inside(method.solvers[BODY]) for name, method in symtop.integrators().items() if BODY in method.solvers
-    }
-    solvers = {name: solver for name, solver in found.items() if solver is not None and solver.in_lanes}
-    for solver in solvers.values():
-        calls += [together(solver, count, h, BODY_STEPS, BODY_SCENE) for count in (FEW, MEMBERS)]
-    timed, rows = timings(calls, batches=BATCHES, batch=BATCH), []
-    for name, alone, beside in zip(solvers, timed[::2], timed[1::2], strict=True):
-        each, (gain, *spread) = 1e9 / BODY_STEPS, (MEMBERS / FEW * value for value in kernels.ratio(alone, beside))
-        rows.append(Row(name, BODY, alone.best / FEW * each, beside.best / MEMBERS * each, gain, *spread))
     return rows
 
 
@@ -305,7 +300,7 @@ def tables(measured: Measured) -> list[Table]:
 
 def measure() -> Measured:
     """Measure steps, threads and batches."""
-    return Measured([*steps(), *on_bodies()], threads(), batches())
+    return Measured(steps(), threads(), batches())
 
 
 if __name__ == "__main__":

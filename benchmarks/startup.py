@@ -17,7 +17,7 @@ def _process(code: str, cache: str | None = None) -> float:
     """Seconds of a new Python process."""
     environment = os.environ | ({"SYMTOP_CACHE": cache} if cache else {})
     begun = time.perf_counter()
-    subprocess.run([sys.executable, "-c", code], check=True, env=environment, stdout=subprocess.DEVNULL)
+    subprocess.run([sys.executable, "-W", "ignore", "-c", code], check=True, env=environment, stdout=subprocess.DEVNULL)
     return time.perf_counter() - begun
 
 
