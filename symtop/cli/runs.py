@@ -258,6 +258,7 @@ def ensemble(
     if epsilon is not None and not bodies:
         raise SymtopError("--epsilon must come with --bodies: it is how far heavy bodies are from a top")
     noun, most = ("bodies", COMPARED_BODIES) if bodies else ("tops", COMPARED)
+    files.kernels_to_compile[0] = KERNELS
     with showing_seconds(f"drawing {noun}"):
         import numpy as np
 
@@ -283,7 +284,6 @@ def ensemble(
         own.update({name: largest(values) for name, values in wrong.items()})
         return _columns(sample, own, words)
 
-    files.kernels_to_compile[0] = KERNELS
     post(f"running {so_many(members, noun)}")
     try:
         data = runs.ensemble(sample, integrator, variables=variables, path=output, added=added, **settings)

@@ -29,8 +29,8 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, finite, one_of, whole
+from symtop.core.parallel import cores, in_threads
 from symtop.methods.framework.lanes import members_of
-from symtop.methods.framework.plan import Plan
 from symtop.methods.framework.registry import integrator
 from symtop.model.body import PARTS, Attitude, RigidBody
 from symtop.model.charts import BODY, Array, attitude_distance
@@ -42,7 +42,7 @@ FREE = ("short-axis", "long-axis", "near-separatrix", "near-symmetric", "needle"
 HEAVY = ("regular", "chaotic", "lagrange")
 STRATA = (*FREE, *HEAVY)
 KINDS = (*STRATA, "heavy", "all", "free")
-DRAWS, MOST = 16, 1_000_000
+DRAWS, MOST, PIECE = 16, 1_000_000, 64  # numbers of a member, most members, members of a piece of work
 PERIODS, CHAOS, SMALL = 10.0, 1000.0, 1e-8
 ACCURATE = 1e-13  # tolerance of the series
 FARTHEST, NEAREST = 0.5, 0.02  # largest epsilon; least of the chaotic kind, as no motion below it is chaotic
@@ -107,7 +107,8 @@ def _members(kind: str, seed: int, count: int, epsilon: float | None) -> Array:
         uniform = np.ascontiguousarray((integers * 2.0**-53).reshape(-1, DRAWS).T)
         rows = _free(kind, uniform) if kind in FREE else _heavy(uniform, 0.0 if kind == "lagrange" else epsilon)
         if kind in ("regular", "chaotic"):
-            chaotic = np.array([growth(_scene(*one)) > CHAOS for one in members_of(rows)])
+            pieces = np.array_split(rows, -(-len(rows) // PIECE))
+            chaotic = np.concatenate([*in_threads(growth, pieces, cores())]) > CHAOS
             rows = rows[chaotic == (kind == "chaotic")]
         parts.append(rows)
         missing -= len(rows)
@@ -178,15 +179,20 @@ def _heavy(u: Array, epsilon: float | None) -> Array:
     return _rows(np.stack([one, second, third]), 1.0, centre, _turn(u[9:12]), rates)
 
 
-def growth(scene: Scene) -> float:
-    """The largest factor by which two disturbances of the start grow in the attitude over `PERIODS` natural periods."""
-    solver, start = integrator("series-general-adaptive").solvers[BODY], scene.start
-    times = scene.nutation_period * np.linspace(0.0, PERIODS, 4 * round(PERIODS) + 1)[1:]
-    plan = Plan.until(times, ACCURATE)
-    w, x, y, z = start.quaternion
-    a, b, c = start.omega_body
-    scale = SMALL * math.hypot(a, b, c)
-    others = (w - SMALL * x, x + SMALL * w, y, z), start.omega_body
-    changed = [Attitude(*others), Attitude(start.quaternion, (a + scale, b - scale, c + scale))]
-    runs = [solver(scene.top, at, plan).states[:, :4] for at in (start, *changed)]
-    return max(float(np.nanmax(attitude_distance(run, runs[0]))) for run in runs[1:]) / (2.0 * SMALL)
+def growth(rows: Array) -> Array:
+    """The larger factors (n,) by which two disturbances of members (n, 14) grow in attitude over `PERIODS` periods."""
+    solver, n = integrator("series-general-adaptive").solvers[BODY], len(rows)
+    periods = np.array([body.nutation_period(start) for body, start in members_of(rows)])
+    times = periods[:, None] * np.linspace(0.0, PERIODS, 4 * round(PERIODS) + 1)[1:]
+    turned, pushed, (w, x) = rows.copy(), rows.copy(), rows[:, 7:9].T
+    turned[:, 7], turned[:, 8] = w - SMALL * x, x + SMALL * w
+    scale = SMALL * np.array([math.hypot(*rates) for rates in rows[:, 11:].tolist()])
+    pushed[:, 11:] += np.stack([scale, -scale, scale], axis=1)
+
+    def attitudes(numbers: Array) -> Array:
+        done, _ = solver.many(numbers, np.full(n, ACCURATE), times, np.full(n, times.shape[1]))  # type: ignore[attr-defined]
+        return np.asarray(done.states[:, :, :4])
+
+    run = attitudes(rows)
+    apart = [attitude_distance(attitudes(numbers), run) for numbers in (turned, pushed)]
+    return np.asarray(np.nanmax(apart, axis=(0, 2)) / (2.0 * SMALL))
