@@ -133,7 +133,7 @@ def about(drawn: dict[str, Bodies], *, long: bool) -> xr.Dataset:
     for row, bodies in enumerate(drawn.values()):
         strata[row], bounds[row] = bodies.strata, bodies.truth[1]
         if not long and not bodies.scenes[0].top.free:
-            grown[row] = [growth(scene) for scene in bodies.scenes]
+            grown[row] = growth(np.array([one.top.flat(one.start) for one in bodies.scenes]))
         chosen = [k for k in range(min(CHECKED, n)) if not bodies.scenes[k].top.free and bodies.known[k]]
         off = [_checked(bodies, k) for k in chosen] if have_heyoka() else []
         gap[row] = max(off, default=np.nan)
