@@ -32,7 +32,7 @@ from symtop.core.errors import SymtopError, finite, one_of, whole
 from symtop.core.parallel import cores, in_threads
 from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.registry import integrator
-from symtop.model.body import PARTS, Attitude, RigidBody
+from symtop.model.body import PARTS
 from symtop.model.charts import BODY, Array, attitude_distance
 from symtop.model.scenes import Scene
 from symtop.run.ensemble.population import between, check_memory, octaves, signs
@@ -88,14 +88,11 @@ def scenes_of(members: xr.Dataset) -> list[Scene]:
     rows = np.column_stack([members[name].values for name in PARTS])
     counts: dict[str, int] = {}
     scenes = list[Scene]()
-    for one, kind in zip(members_of(rows), members["stratum"].values.tolist(), strict=True):
+    for (body, start), kind in zip(members_of(rows), members["stratum"].values.tolist(), strict=True):
         counts[kind] = counts.get(kind, -1) + 1
-        scenes.append(_scene(*one, f"{kind}-{counts[kind]}", f"a random body, {kind}"))
+        horizon = PERIODS * body.nutation_period(start)
+        scenes.append(Scene(f"{kind}-{counts[kind]}", body, start, horizon, f"a random body, {kind}"))
     return scenes
-
-
-def _scene(body: RigidBody, start: Attitude, name: str = "drawn", purpose: str = "") -> Scene:
-    return Scene(name, body, start, PERIODS * body.nutation_period(start), purpose)
 
 
 def _members(kind: str, seed: int, count: int, epsilon: float | None) -> Array:
