@@ -25,7 +25,7 @@ IN_LANES = {name for name, solver in SOLVERS.items() if solver.in_lanes}
 ENDS = {  # how members end that step too far: numbers overflow, theta passes a pole, Newton finds no root
     ("not_finite",): ("strang[axis]", "takahashi-imada[attitude]", "cayley[axis]", "srkn-14-6[attitude]",
                       "rk4[attitude]", "series[axis]", "series[attitude]", "rkmk-se3-2[axis]",
-                      "crouch-grossman-3[attitude]", "vern9-fixed[axis]", "tsit5-fixed[attitude]"),
+                      "crouch-grossman-3[attitude]", "vern9-fixed[axis]", "tsit5-fixed[attitude]", "kahan[axis]"),
     (): ("exact-discrete[attitude]",),  # whose steps are parts of a nutation, however long they are
     ("not_finite", "left_chart"): ("stormer-verlet[angles]", "dop853-compiled-fixed[angles]"),
     ("not_converged",): ("gauss-4[axis]", "gauss-12[axis]", "gauss-6[attitude]", "lie-variational[axis]",
@@ -37,7 +37,7 @@ FEW = {  # a method of each family with its mark, for the others compile for 20 
     **dict.fromkeys(("strang[axis]", "rk4[attitude]", "series[axis]", "rkmk-se3-2[axis]", "gauss-4[axis]",
                      "stormer-verlet[angles]", "midpoint[angles]"), ()),
     **dict.fromkeys(("vern9-fixed[axis]", "exact-discrete[attitude]", "galerkin-simpson[angles]"), pytest.mark.quick),
-    "lie-variational[axis]": pytest.mark.quick,
+    **dict.fromkeys(("lie-variational[axis]", "kahan[axis]"), pytest.mark.quick),
 }  # fmt: skip
 ALONE = ("midpoint-unreduced[angles]", "series-general[axis]", "collective-gauss-4[axis]")  # one after another
 EXPLICIT = ("rkmk-se3-2", "rkmk-se3-4", "rkmk-se3-5", "rkmk-se3-8", "crouch-grossman-3", "commutator-free-4")
