@@ -136,7 +136,7 @@ def solver_of(name: str, chart: str) -> FixedStep:
 def together(solver: FixedStep, count: int, h: float, steps: int, scene: str = kernels.SCENE) -> Any:
     """A function that runs `count` members for this many steps."""
     given = members(count, scene), np.full(count, h), np.full((count, 1), steps)
-    return lambda: solver.many(*given)
+    return lambda: solver.many(*given, compiling=True)
 
 
 def on_bodies() -> dict[tuple[str, str], twin.Kernel]:

@@ -29,7 +29,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:  # a shell starts what run
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 from symtop.core import files
-from symtop.methods.framework import registry
+from symtop.methods.framework import lanes, registry
 from symtop.model import scenes
 from symtop.model.lazy_kernel import LAZY
 from symtop.model.scenes import Scene
@@ -106,6 +106,12 @@ def clean_registry():
     """Forget what one test registers."""
     with _registered_for_a_while():
         yield
+
+
+@pytest.fixture
+def in_lanes(monkeypatch):
+    """Ensembles of few steps, too, compile their kernels in lanes."""
+    monkeypatch.setattr(lanes, "FEW", -1)
 
 
 @pytest.fixture(autouse=True)

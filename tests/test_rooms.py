@@ -140,26 +140,22 @@ def test_imports_upward_circles_and_strangers_are_reported(tmp_path):
     """A made-up package with one fault against each rule, and statements that are allowed beside them."""
     files = {
         "symtop/__init__.py": '"""symtop.report.page"""\nimport typing\nif typing.TYPE_CHECKING:\n'
-        "    from symtop.model.good import value\n",
-        "symtop/extra.py": "",
-        "symtop/core/__init__.py": "",
+        "    from symtop.model.good import value\n", "symtop/extra.py": "", "symtop/core/__init__.py": "",
         "symtop/core/plain.py": "from symtop.core import __version__\n",
         "symtop/core/up.py": "from symtop.model import good\n",
         "symtop/core/progress.py": "def look():\n    import symtop.model.good\n",
         "symtop/core/typed.py": "from typing import TYPE_CHECKING\n"
-        "if TYPE_CHECKING:\n    from ..model.good import value\n",
-        "symtop/model/__init__.py": "",
+        "if TYPE_CHECKING:\n    from ..model.good import value\n", "symtop/model/__init__.py": "",
         "symtop/model/good.py": "from symtop.core.plain import __version__\nvalue = 1\n",
         "symtop/model/left.py": "from symtop.model import right\n",
         "symtop/model/right.py": "def turn():\n    from . import left\n",
         "symtop/model/hint.py": "import typing\nif typing.TYPE_CHECKING:\n    from symtop.model.hinted import x\n",
-        "symtop/model/hinted.py": "import symtop.model.hint\n",
+        "symtop/model/hinted.py": "import symtop.model.hint\n", "symtop/judging/__init__.py": "",
         "symtop/methods/kernel.py": "def show():\n    import matplotlib.pyplot\n",
-        "symtop/judging/__init__.py": "",
         "symtop/runner/beside.py": "import symtop.judging\n",
         "symtop/report/page.py": "from symtop_studies.drift import study\n",
         "studies/drift/study.py": "import symtop\nfrom symtop.report import page\n",
-    }
+    }  # fmt: skip
     for name, text in files.items():
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)

@@ -64,7 +64,7 @@ def fixed(name: str, chart: str, numbers: Array, steps: int) -> Call:
     """A method in lanes."""
     solver, count = lanes.solver_of(name, chart), len(numbers)
     given = numbers, np.full(count, HORIZON / steps), np.full((count, 1), steps)
-    return lambda: (solver.many(*given).states[:, 0, :3], float(steps))
+    return lambda: (solver.many(*given, compiling=True).states[:, 0, :3], float(steps))
 
 
 def coarsest(name: str, chart: str, numbers: Array, error: float) -> int | None:

@@ -173,10 +173,15 @@ PERIODS = 0.02  # nutations: the length of a run that compiles a kernel
 
 def _run(name: str) -> str:
     """Compile the kernels of a variant, alone and in an ensemble, or of the reference for name ""; returns an error."""
+    import numpy as np
+
+    from symtop.methods.framework.lanes import LEAST
+    from symtop.methods.framework.loop import inside
     from symtop.methods.framework.registry import integrator
     from symtop.model.lazy_kernel import LAZY
     from symtop.model.scenes import scene
     from symtop.run.ensemble.ensemble import ensemble
+    from symtop.run.ensemble.inputs import read_members
     from symtop.run.reference.truth import reference
     from symtop.run.simulation import simulate
 
@@ -194,7 +199,12 @@ def _run(name: str) -> str:
         observe = "axis" if name.endswith("[axis]") else "attitude"
         options: dict[str, Any] = {**setting, "observe": observe, "horizon": span, "samples": 2}
         simulate(place, name, **options)
-        ensemble([place] * 2, name, **options, threads=1, quiet=True)
+        solver = inside(*variant.solvers.values())
+        if solver is None or not solver.in_lanes:
+            ensemble([place] * 2, name, **options, threads=1, quiet=True)
+        else:  # with as many members as fill a block
+            rows, ones = read_members([place] * LEAST).numbers, np.ones(LEAST)
+            solver.many(rows, span / 2 * ones, np.array([[0, 2]] * LEAST), compiling=True)
     except Exception as error:  # noqa: BLE001  (one that fails must not keep the others from being compiled)
         return f"{name or 'truth'}: {words_of(error)}"
     return ""

@@ -331,6 +331,13 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
     return compile_now
 
 
+def is_stored(kernel: Any) -> bool:
+    """Has a kernel been compiled, for arguments of some types, in this process, on disk or in a wheel?"""
+    folder = kernel._cache.cache_path
+    places = (folder, SHIPPED / folder.name) if folder else ()
+    return bool(kernel.overloads) or any(file.is_file() for place in places for file in place.glob("*.*code"))
+
+
 @by_name
 def compile_kernel(function: Callable[..., Any]) -> Any:
     """``njit`` with the disk cache; division by zero gives infinity, as in C.

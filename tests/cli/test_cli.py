@@ -23,6 +23,7 @@ from symtop.cli.main import main
 from symtop.core import netcdf, parallel
 from symtop.core.files import cache_root
 from symtop.measure import published, timing
+from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import bibliography, citation_keys, engines, methods
 from symtop.run.ensemble import population
 from tests.commands import call
@@ -417,3 +418,8 @@ def test_all_of_them_are_compiled_once(monkeypatch, tmp_path):
     assert "not run" not in result.output
     again = call("doctor", "--warm", "--results", tmp_path / "r")
     assert "kernels compiled: 0;" in again.output
+    solvers = [inside(solver) for one in symtop.integrators().values() for solver in one.solvers.values()]
+    blocks = [solver._whole.blocks() for solver in solvers if solver and solver.in_lanes]
+    folders = {kernel._cache.cache_path.name for block in blocks for kernel in (block.prepare, block.march)}
+    assert len(folders) > 50
+    assert all(any((tmp_path / "kernels" / folder).glob("*.code")) for folder in folders)

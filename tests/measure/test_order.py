@@ -65,16 +65,13 @@ def fit(slope, interval):
 
 
 @pytest.mark.parametrize(("claim", "main", "others", "word"), [
-    (2, fit(2.001, 0.002), [], "confirmed"),
-    (12, fit(11.966, 0.055), [], "confirmed"),
+    (2, fit(2.001, 0.002), [], "confirmed"), (12, fit(11.966, 0.055), [], "confirmed"),
     (5, fit(4.604, 0.092), [], "undecided"),  # neither 5 nor clearly another order
-    (4, fit(3.0, 0.1), [], "refuted"),
-    (2, fit(1.0, 0.001), [], "refuted"),
+    (4, fit(3.0, 0.1), [], "refuted"), (2, fit(1.0, 0.001), [], "refuted"),
     (4, fit(4.0, 0.01), [fit(3.0, 0.1)], "refuted"),  # theta shows less than is declared
     (4, fit(4.0, 0.01), [fit(5.0, 0.1)], "confirmed"),  # and more by chance
     (4, fit(4.0, 0.01), [fit(3.5, 0.2)], "confirmed"),  # or less, within its doubt
-    (4, fit(math.nan, math.nan), [], "undecided"),
-    (None, fit(2.0, 0.01), [], "measured"),
+    (4, fit(math.nan, math.nan), [], "undecided"), (None, fit(2.0, 0.01), [], "measured"),
 ])  # fmt: skip
 def test_one_rule_says_what_a_slope_says_of_a_declared_order(claim, main, others, word):
     assert order_verdict(claim, main, others) == word

@@ -24,46 +24,18 @@ from symtop.methods.splitting.loop import exact_sum
 from symtop.model.top import Angles, SymmetricTop, flat
 from tests.commands import printed_by
 
-NAMES = "midpoint galerkin-simpson midpoint-unreduced stormer-verlet strang gauss-4 rk4"
-SCRIPT = """
-import gc
-import sys
-import numpy as np
-import symtop
-from symtop.model.top import flat
-from numba.core.dispatcher import Dispatcher
-for name in sys.argv[1].split():
-    symtop.simulate("spheroid", name, step_size=0.01, guard=False)
-scene = symtop.scene("spheroid")
-numbers, marks = np.tile(flat(scene.top, scene.start), (40, 1)), np.ones((40, 1), int)
-symtop.simulate("spheroid", "rk45-compiled", tolerance=1e-6, guard=False)
-for name in sys.argv[2:]:
-    method = symtop.integrator(name)
-    method.solvers[method.charts()[0]].many(numbers, np.full(40, 0.01), marks)
-ours = [one for one in gc.get_objects() if isinstance(one, Dispatcher) and one.py_func.__module__.startswith("symtop")]
-used = [one for one in ours if one.stats.cache_hits or one.stats.cache_misses or one.overloads]
-print(len(used), sum(sum(one.stats.cache_misses.values()) for one in used),
-      sum(not one.stats.cache_hits and not one.stats.cache_misses for one in used))
-"""
-
-
-@pytest.mark.slow  # tests/core/test_cold.py has a short run of one method
-def test_a_second_process_finds_the_kernels_of_every_family_on_disk(tmp_path):
-    words = SCRIPT, NAMES, "strang[axis]", "srkn-14-6[attitude]"
-    counts = [[*map(int, printed_by(*words, SYMTOP_CACHE=tmp_path).split())] for _ in range(2)]
-    (_, compiled, _), (loaded, missed, without_cache) = counts
-    assert min(compiled, loaded) >= len(NAMES.split())  # the first process starts with an empty folder
-    assert (missed, without_cache) == (0, 0)
-
-
 BITS = """
 import hashlib, sys, symtop
 from symtop.core import jit
+from symtop.methods.framework import lanes
 way, count = sys.argv[1], int(sys.argv[2])
 if way == "numba alone":
     jit.lean_probe = lambda: False
-if way == "bitcode":
+if way in ("stored", "bitcode"):
     jit.on_cold[:] = [lambda: sys.exit("compiled")]
+if way == "stored":
+    jit._Library._optimize_final_module = None  # nor is machine code made of bitcode
+lanes.FEW = -1
 every = [f"{one.name}[{chart}]" for one in symtop.integrators().values() if one.implementation == "compiled"
          for chart in one.charts()]
 for k in range(count):
@@ -80,12 +52,12 @@ for k in range(count):
 
 @pytest.mark.slow
 def test_kernels_return_the_same_bits_whichever_way_they_were_made(tmp_path):
-    """By numba alone, compiled here, from bitcode, and from that for a processor without this one's instructions."""
+    """By numba alone, compiled here, from disk, from bitcode, and from that for a processor with fewer instructions."""
     plain, output, count = {"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": ""}, {}, 36
-    ways = {"numba alone": {}, "compiled": {}, "bitcode": {}, "bitcode, x86-64": plain}
+    ways = {"numba alone": {}, "compiled": {}, "stored": {}, "bitcode": {}, "bitcode, x86-64": plain}
     for way, processor in ways.items():
         made = {file: file.read_bytes() for file in tmp_path.rglob("*.code")}
-        for file in made:
+        for file in made if way != "stored" else ():
             file.unlink()
         output[way] = printed_by(BITS, way.partition(",")[0], count, SYMTOP_CACHE=tmp_path, **processor).splitlines()
         assert len(output[way]) == count + -(-count // 3)
@@ -105,7 +77,9 @@ def _kept_twice(monkeypatch, folder):
     """A kernel with code on disk for whole and for real numbers, and the two files."""
     monkeypatch.setenv("SYMTOP_CACHE", str(folder))
     kernel = compile_kernel(_doubled)
+    assert not jit.is_stored(kernel)
     assert (kernel(2), kernel(2.5)) == (4, 5.0)
+    assert jit.is_stored(compile_kernel(_doubled))
     files = sorted(folder.rglob("*.code"))
     assert len(files) == 2
     return kernel, files

@@ -20,6 +20,7 @@ from symtop.methods.splitting.space import march_axis
 from symtop.model.top import flat
 from tests.conftest import late
 
+pytestmark = pytest.mark.usefixtures("in_lanes")
 SOLVERS = {row.name: solver for row in variants() for solver in filter(None, map(inside, row.solvers.values()))}
 IN_LANES = {name for name, solver in SOLVERS.items() if solver.in_lanes}
 ENDS = {  # how members end that step too far: numbers overflow, theta passes a pole, Newton finds no root

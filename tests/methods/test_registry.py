@@ -83,8 +83,7 @@ NAMED = {
     "kicks": ("strang", "cayley", "stormer-verlet", "lie-variational", "euler-poincare", "no-squish", "dprkn8",
               "symplectic-euler"),
     "group": ("rkmk-se3-8", "crouch-grossman-3", "simo-wong", "generalised-alpha", "collective-gauss-2", "bullet"),
-    "this-top": ("series", "series-adaptive", "exact-discrete", "cayley-tuned"),
-    "solution": ("exact",),
+    "this-top": ("series", "series-adaptive", "exact-discrete", "cayley-tuned"), "solution": ("exact",),
 }  # fmt: skip
 
 

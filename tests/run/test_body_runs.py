@@ -24,6 +24,7 @@ from tests.commands import call
 from tests.conftest import late
 from tests.run.test_ensemble import assert_alone
 
+pytestmark = pytest.mark.usefixtures("in_lanes")
 BODIES = ("check-case-2", "heavy-brick")
 # every method that steps a body and claims an order, and the longest steps of its runs, by the order
 FIXED = {name: entry.order for name, entry in (symtop.integrators() | engines()).items()

@@ -2,12 +2,14 @@
 
 import dataclasses
 import pickle
+from unittest.mock import Mock
 
 import numpy as np
 import pytest
 import xarray as xr
 
 import symtop
+from symtop.methods.framework import lanes
 from symtop.methods.framework.lanes import W, members_of
 from symtop.model.exact.closed_form import NUMBERS, ClosedForms
 from symtop.run.ensemble import chunks
@@ -15,6 +17,7 @@ from symtop.run.ensemble.chunks import nutation_periods, schedule
 from symtop.run.simulation import sample_times
 from tests.conftest import late
 
+pytestmark = pytest.mark.usefixtures("in_lanes")
 SOME = symtop.population(36, seed=5)
 COUNTS = ("steps", "force_evaluations", "newton_iterations", "reached_time")
 
@@ -210,7 +213,7 @@ def test_a_schedule_has_the_rows_of_sample_times(steps, samples):
             np.testing.assert_array_equal(rows.marks[i, : rows.counts[i]], marks)
 
 
-def test_periods_are_those_of_one_top_and_one_without_a_nutation_has_no_steps_per_nutation():
+def test_periods_are_those_of_one_top_and_one_without_a_nutation_has_no_steps_per_nutation(monkeypatch):
     hanging = {"I1": 1.0, "I3": 0.5, "mgl": -1.0, "theta": 0.0, "theta_dot": ("member", [1.9, 2.0])}
     with pytest.raises(symtop.SymtopError, match="member 1 is endless"):
         symtop.ensemble(xr.Dataset(hanging), "strang", per_nutation=20, horizon=8.0)
@@ -218,9 +221,29 @@ def test_periods_are_those_of_one_top_and_one_without_a_nutation_has_no_steps_pe
     assert data.outcome.values.tolist() == ["ok", "ok"]
     numbers = numbers_of(symtop.population(300, seed=4))
     numbers[::7, 2] = 0.0  # some are free
+    monkeypatch.setattr(chunks._periods, "compiled", None)
+    monkeypatch.setattr(chunks._periods, "_spent", 0.0)
     period = nutation_periods(numbers)
+    assert chunks._periods.compiled is None  # few are interpreted
+    assert nutation_periods(np.tile(numbers, (8, 1))).tolist() == 8 * period.tolist()
+    assert chunks._periods.compiled is not None
     assert period.tolist() == [top.nutation_period(start) for top, start in members_of(numbers)]
     np.testing.assert_allclose(period, ClosedForms(numbers).nutation_period, rtol=1e-7)
+
+
+def test_kernels_in_lanes_wait_for_many_steps_unless_they_are_stored_and_change_no_bit(monkeypatch):
+    """36 members of 60 steps."""
+    settings = {"per_nutation": 20, "nutations": 3, "samples": 9, "quiet": True}
+    whole, solver = symtop.ensemble(SOME, "strang[axis]", **settings), symtop.integrator("strang[axis]").solvers["axis"]
+    blocks = solver._whole.blocks()
+    run = Mock(side_effect=blocks.run)
+    for place, name, value in ((lanes, "FEW", 5000), (blocks, "run", run), (blocks, "asked", 0)):
+        monkeypatch.setattr(place, name, value)
+    for stored, asked, calls in ((False, 2160, 0), (False, 4320, 0), (False, 6480, 1), (True, 2160, 2)):
+        monkeypatch.setattr(lanes, "is_stored", {blocks.march: stored}.get)
+        blocks.asked = 0 if stored else blocks.asked
+        assert symtop.ensemble(SOME, "strang[axis]", **settings).identical(whole)
+        assert (run.call_count, blocks.asked) == (calls, asked)
 
 
 def marching(solver):

@@ -43,9 +43,8 @@ def refused(words, path, name="strang[axis]", **changed):
 
 @pytest.mark.parametrize(("name", "settings"), [
     ("stormer-verlet", {}), ("strang[axis]", {"variables": ["energy", "p_phi"]}),
-    *late(("strang[attitude]", {}),
+    ("exact", {"per_nutation": None, "nutations": None, "horizon": 2.0}), *late(("strang[attitude]", {}),
           ("midpoint", {"nutations": None, "horizon": 0.7, "per_nutation": None, "step_size": 0.01})),
-    ("exact", {"per_nutation": None, "nutations": None, "horizon": 2.0}),
 ])  # fmt: skip
 def test_the_file_holds_the_ensemble_in_memory(tmp_path, small_pieces, name, settings):
     whole = symtop.ensemble(SOME, name, **SETTINGS | settings)

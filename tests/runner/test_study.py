@@ -175,8 +175,7 @@ PHASE = xr.Dataset({"energy": ("sample", np.arange(4, dtype=np.uint8))})
 
 def tree(phase: xr.Dataset = PHASE) -> xr.DataTree:
     return datasets.combine([
-        (Case("spheroid", "midpoint", group="windows"), LONG),
-        (Case("goldstein", "midpoint", group="windows"), SHORT),
+        (Case("spheroid", "midpoint", group="windows"), LONG), (Case("goldstein", "midpoint", group="windows"), SHORT),
         (Case("spheroid", "strang", group="phases"), phase),
     ])  # fmt: skip
 

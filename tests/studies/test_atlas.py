@@ -57,7 +57,7 @@ def together_in(plan, n, alone=()):
 
 
 @pytest.mark.parametrize("name", ["strang", "stormer-verlet", "midpoint"])
-def test_columns_that_are_run_together_have_the_bits_of_runs_one_by_one(name, monkeypatch):
+def test_columns_that_are_run_together_have_the_bits_of_runs_one_by_one(in_lanes, name, monkeypatch):
     """Runs of few steps, which show every step, and runs that fail among them."""
     method, spins, steps = integrator(name), np.geomspace(0.1, 30.0, 7).tolist(), [*STEPS, 2.0]
     plan, tops = row_plan(method, steps, 2.0), [family("cusp")(spin) for spin in spins]

@@ -51,7 +51,7 @@ def test_errors_of_many_runs_are_those_of_each(family):
 @pytest.mark.parametrize(("name", "level", "ends"), [
     ("strang", 0, {OK}), ("rk4", 1, {NOT_NORMALISED}), ("rk4", 7, {OK}), ("gauss-4", 1, {OK, NOT_CONVERGED}),
 ])  # fmt: skip
-def test_bodies_in_lanes_run_and_end_as_one_by_one(name, level, ends):
+def test_bodies_in_lanes_run_and_end_as_one_by_one(in_lanes, name, level, ends):
     variant, bodies = integrator(f"{name}[body]"), drawn("0.3")
     plans = [Plan.steps(float(period) / FIRST * 0.5**level, bodies.marks << level) for period in bodies.period]
     lanes = run_level(variant, bodies, EVERYONE, level, 1e6)

@@ -315,7 +315,7 @@ def test_errors_of_many_runs_are_those_of_each(tops, name):
 
 
 @pytest.mark.parametrize("name", ["rk4[attitude]", "strang[attitude]", *late("tsit5-fixed[attitude]")])
-def test_coarse_runs_end_in_the_ladder_as_they_end_alone(tops, name):
+def test_coarse_runs_end_in_the_ladder_as_they_end_alone(in_lanes, tops, name):
     row, chosen = integrator(name), np.flatnonzero(tops.known)
     shown = ladder.run_level(row, tops, chosen, 0, 1e6)
     plans = [Plan.steps(float(tops.period[member]) / FIRST, tops.marks) for member in chosen]

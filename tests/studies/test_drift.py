@@ -26,8 +26,7 @@ from tests.templates import checked
 
 
 @pytest.mark.parametrize(("sizes", "exponents", "interval", "word"), [
-    ((1e-13, 2e-13), (0.5, 1.0), 0.1, "kept"),
-    ((1e-4, 1e-4), (0.0, 0.1), 0.1, "bounded"),
+    ((1e-13, 2e-13), (0.5, 1.0), 0.1, "kept"), ((1e-4, 1e-4), (0.0, 0.1), 0.1, "bounded"),
     ((1e-4, 1e-4), (0.0, 0.1), 0.6, "growing"),  # the interval does not exclude a walk
     ((1e-4, 1e-4), (0.0, 1.0), 0.1, "drift"),  # the worse of two scenes
     ((1e-12, 1e-13), (0.5, 0.5), 0.1, "random walk"),
@@ -166,7 +165,7 @@ def test_a_prediction_is_judged_by_what_was_measured():
 
 @pytest.mark.parametrize("compensated", [True, False])
 @pytest.mark.parametrize("name", ["midpoint[angles]", "cayley[axis]"])
-def test_each_has_the_bits_of_a_long_run(name, compensated):
+def test_each_has_the_bits_of_a_long_run(in_lanes, name, compensated):
     method, scenes, per_nutation = integrator(name), members(scene("spheroid"), 6), 1000.37  # six: enough for lanes
     gauges = gauges_of(scenes, method, per_nutation)
     ends, seen = side_by_side(scenes, gauges, method, 20_000, per_nutation, compensated=compensated)

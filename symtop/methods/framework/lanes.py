@@ -51,7 +51,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.core.jit import compile_kernel, register_jitable, set_item, to_fixed_tuple
+from symtop.core.jit import compile_kernel, is_stored, register_jitable, set_item, to_fixed_tuple
 from symtop.core.parallel import heed
 from symtop.methods.framework.angles import in_chart
 from symtop.methods.framework.plan import OK, Array
@@ -348,15 +348,22 @@ def groups(chosen: Whole, steps: Whole, most: int) -> list[Whole]:
 LEAST = 5  # members alone take as long as a block: 32 lanes, each in about a seventh of the time of a member alone
 ALIKE = 1.1  # numbers of steps within this factor of each other are alike, where the step iterates
 BATCH = 128 * W  # members that are prepared at a time: 4 MB for the longest table
+FEW = 1_000_000  # steps, which take members alone 0.03 to 0.6 s, where kernels in lanes take seconds to compile
 
 
-@dataclass(frozen=True)
+@dataclass
 class Blocks:
-    """The compiled kernels of one method in lanes."""
+    """The kernels of one method in lanes, which are compiled when they first run."""
 
     lanes: Lanes
     prepare: Any
     march: Any
+    asked: int = 0  # steps, of all calls of `worth`
+
+    def worth(self, steps: int) -> bool:
+        """Are the kernels compiled, or have they, with these, been asked for more than `FEW` steps?"""
+        self.asked += steps
+        return self.asked > FEW or is_stored(self.march)
 
     def run(self, members: Whole, numbers: Array, rule: Any, h: Array, marks: Whole, done: Many, most: int) -> Whole:
         """Run the chosen members, about `most` steps between returns to Python; return those to be run alone.

@@ -268,9 +268,11 @@ class FixedStep:
             done.momenta[0] = top.momenta(start)[:2]
         return done if self.present is None else done._replace(states=self.present(par, plan.times, done.states))
 
-    def many(self, numbers: Array, h: Array, marks: Whole) -> Many:
+    def many(self, numbers: Array, h: Array, marks: Whole, *, compiling: bool = False) -> Many:
         """The runs of n members: `numbers` (n, 9) as `flat` has them, steps `h` (n,), `marks` (n, samples).
 
+        Few steps are made one member after another if kernels in lanes are not stored, unless `compiling` asks for them
+        (`Blocks.worth`).
         Each has the bits of a run alone, in lanes too, and fails alone, as does one whose start the kernel cannot step.
         Threads may call it at the same time; after every `GROUP` steps, or a stretch of a longer member, it heeds an
         interrupt. Raises SymtopError for a solver `in_python`, which runs one member at a time.
@@ -286,7 +288,9 @@ class FixedStep:
         done.outcome[out] = LEFT_CHART
         left = np.flatnonzero(~out)
         if whole.blocks is not None:
-            left = whole.blocks().run(left, numbers, whole.rule, h, marks, done, most)
+            blocks = whole.blocks()
+            if compiling or blocks.worth(int(marks[left, -1].sum())):
+                left = blocks.run(left, numbers, whole.rule, h, marks, done, most)
         short, momenta = marks[left, -1] <= BLOCK, np.empty((2, marks.shape[1]))
         for chosen in many.groups(left[short], marks[:, -1], most):
             heed()

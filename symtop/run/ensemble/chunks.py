@@ -20,7 +20,7 @@ from xarray.backends import BackendArray
 from xarray.core import indexing
 
 from symtop.core.errors import SymtopError, foreign_code
-from symtop.core.jit import compile_kernel, to_fixed_tuple
+from symtop.core.jit import to_fixed_tuple
 from symtop.core.parallel import cores, heed, in_threads
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
@@ -31,10 +31,11 @@ from symtop.methods.framework.preparation import opened
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
 from symtop.methods.simd import wide_vectors
-from symtop.model import charts, top as model
+from symtop.model import charts
 from symtop.model.charts import BODY, DIMENSIONS, Array, View
 from symtop.model.exact.closed_form import ClosedForms
-from symtop.model.top import NUMBERS, SymmetricTop
+from symtop.model.lazy_kernel import LazyKernel
+from symtop.model.top import BISECTIONS, NUMBERS, SymmetricTop, bisected, nutation_cubic, period_between
 from symtop.run.simulation import WIDEST_GAP, places, unseen
 from symtop.run.trajectory import LABELS
 
@@ -45,6 +46,8 @@ HARMLESS = 1e100  # states and momenta below it have a finite energy: no inertia
 UNKNOWN_STEPS = 1000  # the steps assumed of a member of an adaptive method or of a closed form
 READ_TOGETHER = 4096  # members whose angles a thread makes continuous at a time
 RAISED = "raised"  # outcome of a member on which a solver raised an exception
+_WIDTH = len(NUMBERS)
+_NONE = (0.0,) * _WIDTH
 ENDS = (*OUTCOMES, RAISED)
 IN_LANES = "lanes"
 IN_TURN = "compiled, one after another"
@@ -100,35 +103,34 @@ def nutation_periods(numbers: Array) -> Array:
     """`Scene.nutation_period` of tops and starts (n, 9), to the bit, or of bodies (n, 14); infinite on a separatrix."""
     if of_bodies(numbers):
         return np.array([body.nutation_period(start) for body, start in members_of(numbers)])
+    if not _periods.ready(A_PERIOD * len(numbers)):
+        return np.array([top.nutation_period(start) for top, start in members_of(numbers)])
     periods = np.empty(len(numbers))
-    _all_periods()(np.ascontiguousarray(numbers), periods)
+    _periods.compiled(np.ascontiguousarray(numbers), periods)
     return periods
 
 
-@functools.cache
-def _all_periods() -> Any:
-    """The compiled loop of `nutation_periods` over tops; its bisections run in lanes, in a third of the time."""
-    period_between, cubic_of, bisected, none = model.period_between, model.nutation_cubic, model.bisected, (0.0,) * 9
-    width = len(none)
-
-    def all_periods(numbers, periods):  # type: ignore[no-untyped-def]
-        wide_vectors()
-        n, lanes = len(numbers), np.empty(len(none) * W)
-        for first in range(0, n, W):
+def all_periods(numbers: Array, periods: Array) -> None:
+    """The loop of `nutation_periods` over tops, as a kernel: its bisections run in lanes, in a third of the time."""
+    wide_vectors()
+    n, lanes = len(numbers), np.empty(len(_NONE) * W)
+    for first in range(0, n, W):
+        for j in range(W):
+            top, start = opened(to_fixed_tuple(numbers[min(first + j, n - 1)], _WIDTH))
+            cosine = math.cos(start.theta)
+            put(lanes, 0, j, (*nutation_cubic(top, start), cosine, -1.0, cosine, 1.0, cosine))
+        for _ in range(BISECTIONS):
             for j in range(W):
-                top, start = opened(to_fixed_tuple(numbers[min(first + j, n - 1)], width))
-                cosine = math.cos(start.theta)
-                put(lanes, 0, j, (*cubic_of(top, start), cosine, -1.0, cosine, 1.0, cosine))
-            for _ in range(model.BISECTIONS):
-                for j in range(W):
-                    at = column(lanes, 0, j, none)
-                    put(lanes, 5, j, bisected(at[:4], at[4], *at[5:]))
-            for j in range(min(W, n - first)):
-                top, start = opened(to_fixed_tuple(numbers[first + j], width))
-                low, below, high, above = column(lanes, 5, j, none[:4])
-                periods[first + j] = period_between(top, start, 0.5 * (low + below), 0.5 * (high + above))
+                at = column(lanes, 0, j, _NONE)
+                put(lanes, 5, j, bisected(at[:4], at[4], *at[5:]))
+        for j in range(min(W, n - first)):
+            top, start = opened(to_fixed_tuple(numbers[first + j], _WIDTH))
+            low, below, high, above = column(lanes, 5, j, _NONE[:4])
+            periods[first + j] = period_between(top, start, 0.5 * (low + below), 0.5 * (high + above))
 
-    return compile_kernel(all_periods)
+
+A_PERIOD = 5e-5  # seconds of one top, interpreted
+_periods = LazyKernel(all_periods, "(float64[:, ::1], float64[::1])", patience=0.1)  # less than compiling takes
 
 
 class _Runs(NamedTuple):

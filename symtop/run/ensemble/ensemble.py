@@ -78,11 +78,12 @@ def ensemble(
     no guard.
 
     Work is done on `threads` threads, by default one per core, or by the workers of the dask cluster at the address
-    `scheduler`. The attribute ``execution`` says how members were run: in "lanes", 32 side by side, if the method
-    allows. With a `path`, members are written to that netCDF file as they are computed, in memory that does not grow
-    with `samples` (0.4 kB a member). The same call resumes an interrupted one to the same file; the dataset is lazy.
-    `added` is called with the dataset; the variables (and in a file the attributes) that it returns are added, to a
-    file before it is moved to `path`.
+    `scheduler`. The attribute ``execution`` says how members are run: in "lanes", 32 side by side, if the method
+    allows; a process whose kernels for that are not compiled makes its first million steps one member after another.
+    With a `path`, members are written to that netCDF file as they are computed, in memory that does not grow with
+    `samples` (0.4 kB a member). The same call resumes an interrupted one to the same file; the dataset is lazy. `added`
+    is called with the dataset; the variables (and in a file the attributes) that it returns are added, to a file before
+    it is moved to `path`.
 
     Raises SymtopError for invalid arguments, for members that are no top or no start, by number, and for a path to
     which another process is writing.
