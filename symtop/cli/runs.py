@@ -27,10 +27,9 @@ PARAMETERS = ("I1", "I2", "I3", "mgl", "centre")  # variables of a population th
 
 GUARD = "Warn of a large error by the closed form (exact, of tops) or by an integration (series)."
 OUTCOME = {"ok": "reached the horizon"}  # the printed words for an outcome
-EXECUTION = {
-    "lanes": "32 at a time in vector registers (lanes)",
-    "compiled, one after another": "one after another in compiled code",
-    "one call of Python for each": "one after another, each by a call of Python",
+EXECUTION = {  # what is said of it, if it is not in lanes, which few steps may not be
+    "compiled, one after another": ", computed one after another in compiled code",
+    "one call of Python for each": ", computed one after another, each by a call of Python",
 }
 
 
@@ -302,9 +301,8 @@ def ensemble(
         click.echo(as_text({"outcomes": outcomes, "steps": steps, "largest_errors": errors}))
     else:
         counts = ", ".join(f"{count} {OUTCOME.get(name, name)}" for name, count in outcomes.items())
-        execution = data.attrs["execution"]
         say(f"{data.attrs['integrator']} on {so_many(members, noun)}: {counts}")
-        say(f"{counted(steps, 'step')}, computed {EXECUTION.get(execution, execution)}")
+        say(counted(steps, "step") + EXECUTION.get(data.attrs["execution"], ""))
         heading = [f"largest error, {so_many(min(members, most), noun)}", *(f"{100.0 * level:g} %" for level in LEVELS)]
         if worst:
             short = {name: one.replace("energy of", "that of") for name, one in words.items()}  # a line of 80 columns

@@ -234,16 +234,16 @@ def test_periods_are_those_of_one_top_and_one_without_a_nutation_has_no_steps_pe
 def test_kernels_in_lanes_wait_for_many_steps_unless_they_are_stored_and_change_no_bit(monkeypatch):
     """36 members of 60 steps."""
     settings = {"per_nutation": 20, "nutations": 3, "samples": 9, "quiet": True}
-    whole, solver = symtop.ensemble(SOME, "strang[axis]", **settings), symtop.integrator("strang[axis]").solvers["axis"]
-    blocks = solver._whole.blocks()
+    whole, blocks = symtop.ensemble(SOME, STRANG, **settings), symtop.integrator(STRANG).solvers["axis"]._whole.blocks()
     run = Mock(side_effect=blocks.run)
-    for place, name, value in ((lanes, "FEW", 5000), (blocks, "run", run), (blocks, "asked", 0)):
-        monkeypatch.setattr(place, name, value)
-    for stored, asked, calls in ((False, 2160, 0), (False, 4320, 0), (False, 6480, 1), (True, 2160, 2)):
-        monkeypatch.setattr(lanes, "is_stored", {blocks.march: stored}.get)
-        blocks.asked = 0 if stored else blocks.asked
-        assert symtop.ensemble(SOME, "strang[axis]", **settings).identical(whole)
-        assert (run.call_count, blocks.asked) == (calls, asked)
+    cases = (False, 5000, 0, 0), (False, 5000, 2160, 0), (False, 5000, 4320, 1), (True, 5000, 0, 2), (False, 2100, 0, 4)
+    for stored, few, before, calls in cases:  # the last in two chunks, each of fewer steps
+        for place, change in ((lanes, {"is_stored": {blocks.march: stored}.get, "FEW": few}),
+                              (chunks, {"LEAST_STEPS": few}), (blocks, {"run": run, "asked": before})):  # fmt: skip
+            for name, value in change.items():
+                monkeypatch.setattr(place, name, value)
+        assert symtop.ensemble(SOME, STRANG, **settings).identical(whole)
+        assert (run.call_count, blocks.asked) == (calls, before + 2160 * (few == 5000))
 
 
 def marching(solver):

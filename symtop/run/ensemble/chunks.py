@@ -162,6 +162,7 @@ class Job:
     period: Array | None = None  # of nutation, if it has been computed
     names: Any = None  # labels of the members (n,), or None
     continuous: bool = True  # make angles continuous; else they are left modulo 2 pi where that needs `Turns`
+    compiling: bool = False  # kernels in lanes even for a chunk of few steps
     first: int = 0  # number of the first member
 
     def __getstate__(self) -> dict[str, Any]:
@@ -233,7 +234,7 @@ class Job:
         solver = self.method.solvers[self.chart]
         if isinstance(solver, FixedStep) and not solver.in_python:  # it takes marks that repeat at the end of a row
             with foreign_code(f"integrator {self.method.name}"):  # its kernel may not compile
-                done = solver.many(self.numbers, plan.step_size, plan.marks)
+                done = solver.many(self.numbers, plan.step_size, plan.marks, compiling=self.compiling)
             padding = np.isnan(plan.times)
             done.states[padding], done.momenta[padding] = np.nan, np.nan
             reached, raised = done.steps * plan.step_size, ""

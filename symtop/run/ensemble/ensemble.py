@@ -25,6 +25,7 @@ from symtop.core.jit import code
 from symtop.core.parallel import MOST_THREADS, cores, in_order, in_threads
 from symtop.core.progress import progress_bar
 from symtop.core.signals import ending_on_sigterm
+from symtop.methods.framework import lanes
 from symtop.methods.framework.lanes import Whole, of_bodies
 from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
@@ -79,8 +80,8 @@ def ensemble(
 
     Work is done on `threads` threads, by default one per core, or by the workers of the dask cluster at the address
     `scheduler`. The attribute ``execution`` says how members are run: in "lanes", 32 side by side, if the method
-    allows; a process whose kernels for that are not compiled makes its first million steps one member after another.
-    With a `path`, members are written to that netCDF file as they are computed, in memory that does not grow with
+    allows. They are run one after another if they make less than a million steps and lanes are not compiled yet. With a
+    `path`, members are written to that netCDF file as they are computed, in memory that does not grow with
     `samples` (0.4 kB a member). The same call resumes an interrupted one to the same file; the dataset is lazy. `added`
     is called with the dataset; the variables (and in a file the attributes) that it returns are added, to a file before
     it is moved to `path`.
@@ -102,7 +103,8 @@ def ensemble(
     if scheduler is not None:
         cluster.check_sent(scheduler, job.of(slice(0, 1)), method.name)
     order = job.order() if path is None else None
-    ordered = replace(job if order is None else job.of(order), continuous=path is not None)
+    many = job.steps is not None and int(job.steps.sum()) > lanes.FEW
+    ordered = replace(job if order is None else job.of(order), continuous=path is not None, compiling=many)
     chunks = list(ordered.chunks())
     nouns = ("body", "bodies") if chart == BODY else ("top", "tops")
     words = {
