@@ -20,7 +20,7 @@ FEWEST, FEW, MANY = 1000, 100_000, 20  # steps of a trial; a run of more than 20
 DECADES = 2.5  # decades of time at the end of a long run, in which the growth of a change is fitted
 LONG_ENOUGH = 0.5  # seconds that a trial must take longer than one of `FEWEST` steps
 SAME = 0.01  # relative difference of the step used from --step-size above which it is printed
-KERNELS = 5  # kernels of an ensemble: periods, samples, starts, the step in lanes and alone
+KERNELS, OF_FEW = 5, 2  # kernels of an ensemble: periods, samples, starts, steps in lanes and alone; of few steps
 DRAWN = ("seed", "kind", "epsilon")  # attributes of a population that say how it was drawn
 COMPARED, COMPARED_BODIES = 100_000, 1000  # first members whose errors are computed; of a million tops they take 1 GB
 PARAMETERS = ("I1", "I2", "I3", "mgl", "centre")  # variables of a population that are not of the start
@@ -269,6 +269,7 @@ def ensemble(
         check_memory("members", members)
         draw = partial(random_bodies.body_population, epsilon=epsilon) if bodies else population
         sample = draw(members, seed=seed, kind=kind)
+    files.kernels_to_compile[0] = KERNELS if bodies else _kernels(members, **settings)
     words = QUANTITIES[noun]
     compared = [name for name in words if variables is None or SHOWN_BY[name] in variables]
     if figure is not None and not compared:
@@ -312,6 +313,14 @@ def ensemble(
         warn(f"the attitudes of {so_many(lost, noun)} are not compared: their motion is not known to 1e-9 rad")
     if "ok" not in outcomes:
         sys.exit(3)
+
+
+def _kernels(members: int, *, per_nutation: Any, nutations: Any, horizon: Any, step_size: Any, **_: Any) -> int:
+    """The most kernels that an ensemble of tops compiles: less for few steps, which are not made in lanes."""
+    from symtop.methods.framework import lanes
+
+    each = (horizon or 0.0) / step_size if step_size else (per_nutation or 0.0) * (nutations or 0.0)
+    return OF_FEW if 0.0 < members * each <= lanes.FEW else KERNELS
 
 
 def _columns(sample: Any, errors: dict[str, Any], words: dict[str, str]) -> Any:
