@@ -225,7 +225,7 @@ def kernels() -> int:
 
 @click.command(short_help="Check the installation; say what to do about faults.")
 @results_option
-@click.option("--warm", is_flag=True, help="First compile every kernel, so that no later run waits for the compiler.")
+@click.option("--warm", is_flag=True, help="First compile every method, for runs and ensembles, so that none waits.")
 @json_option
 def doctor(results: str, warm: bool, as_json: bool) -> None:
     """Check packages, caches, folders and a few computed numbers, and say what to do about each fault.
