@@ -316,7 +316,7 @@ def ensemble(
 
 
 def _kernels(members: int, *, per_nutation: Any, nutations: Any, horizon: Any, step_size: Any, **_: Any) -> int:
-    """The most kernels that an ensemble of tops compiles: less for few steps, which are not made in lanes."""
+    """The most kernels that an ensemble of tops compiles: fewer for few steps, which are not made in lanes."""
     from symtop.methods.framework import lanes
 
     each = (horizon or 0.0) / step_size if step_size else (per_nutation or 0.0) * (nutations or 0.0)
