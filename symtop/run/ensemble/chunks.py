@@ -130,7 +130,8 @@ def all_periods(numbers: Array, periods: Array) -> None:
 
 
 A_PERIOD = 5e-5  # seconds of one top, interpreted
-_periods = LazyKernel(all_periods, "(float64[:, ::1], float64[::1])", patience=0.1)  # less than compiling takes
+# less patience than compiling takes, so that thousands of tops are fast from their second call on
+_periods = LazyKernel(all_periods, "(float64[:, ::1], float64[::1])", patience=0.1)
 
 
 class _Runs(NamedTuple):
