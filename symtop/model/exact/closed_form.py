@@ -56,7 +56,7 @@ DIGITS_ERROR = 1e-40  # relative, of constants from 40 digits
 _build = LazyKernel(all_constants, "(float64[:, ::1], float64[:, ::1])", patience=10.0)
 _fill = LazyKernel(samples.all_samples, "(float64[:, ::1], float64[:, ::1], int64, float64[:, :, ::1])", patience=2.0)
 _compare = LazyKernel(
-    samples.all_gaps, "(float64[:, ::1], float64[:, ::1], float64[:, :, :], float64[:, ::1])", patience=2.0
+    samples.all_gaps, "(float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1])", patience=2.0
 )
 FORM_SECONDS, SAMPLE_SECONDS = 5e-4, 1e-5
 
@@ -214,7 +214,7 @@ def fill(constants: Array, times: Array, view: int) -> Array:
 def distances(constants: Array, times: Array, axes: Array) -> Array:
     """Angles (n, samples) between axes (n, samples, 3) and those of n tops, rad; times as in `fill`."""
     out = np.empty(axes.shape[:2])
-    _put(_compare, SAMPLE_SECONDS * axes.size / 3, constants, times, axes, out)
+    _put(_compare, SAMPLE_SECONDS * axes.size / 3, constants, times, np.ascontiguousarray(axes), out)
     return out
 
 
