@@ -9,7 +9,7 @@ import xarray as xr
 from symtop.methods.framework.registry import split_name
 from symtop.report.formats import abridged
 
-from .atlas import COMMON, FAST, NEAR, SLOW, OutcomeMap, families, halved_by_pole, map_of, maps, methods_of
+from .atlas import COMMON, FAST, NEAR, SLOW, families, halved_by_pole, map_of, maps, methods_of
 from .failures import LOST, MOST
 from .many_verdicts import SAID
 from .measures import PERIODS
@@ -18,11 +18,10 @@ from .mechanisms import BARELY, lawful, limits, measured, misses, outlasting, re
 QUOTED = "stormer-verlet[angles]"  # whose numbers are quoted
 NAMES = (  # of all facts that are measured
     "family", "stepped", "fast_variant", "fast_reach", "slow_variant", "slow_reach", "slow_none", "shortest",
-    "slow_shorter", "fast_finer", "not_angles", "slow_finer", "in_angles", "quoted_fast", "quoted_fails", "silent",
-    "cells", "settled", "checks", "refuted", "angles", "angles_halved", "others", "others_halved", "limited",
-    "sought", "limit_least", "limit_variant", "resonant", "turned", "sleep_step", "strang_sleeps", "cayley_sleeps",
-    "sleep_miss", "law_middle", "law_runs", "law_early", "outlasting", "sampled", "hidden", "small", "one_iteration",
-    "solved",
+    "slow_shorter", "quoted_fast", "quoted_fails", "silent", "cells", "settled", "checks", "refuted", "angles",
+    "angles_halved", "others", "others_halved", "limited", "sought", "limit_least", "limit_variant", "resonant",
+    "turned", "sleep_step", "strang_sleeps", "cayley_sleeps", "sleep_miss", "law_middle", "law_runs", "law_early",
+    "outlasting", "sampled", "hidden", "small", "one_iteration", "solved",
 )  # fmt: skip
 
 
@@ -59,24 +58,13 @@ def atlas_facts(data: xr.Dataset, family: str) -> dict[str, Any]:
                 most = max(known.values())
                 best = [f"`{name}`" for name, reach in known.items() if reach == most]
                 answers |= {f"{kind}_variant": abridged(best), f"{kind}_reach": most}
+        reaches = [one.usual_reach for one in steps.values()]
         answers |= {"stepped": len(steps), "shortest": min(float(one.settings[0]) for one in steps.values()),
-                  "slow_none": sum(one.usual_reach["slow"] == 0.0 for one in steps.values()),
-                  "slow_shorter": sum(slow_is_finer(one) for one in steps.values())}  # fmt: skip
-    adaptive = {name: one for name, one in shown.items() if one.control == "tolerance"}
-    if adaptive:
-        finer = {name: slow_is_finer(one) for name, one in adaptive.items() if split_name(name)[1] == "angles"}
-        others = [one.usual_reach for name, one in adaptive.items() if name not in finer]
-        answers |= {"in_angles": len(finer) or None, "slow_finer": sum(finer.values()),
-                  "not_angles": len(others) or None,
-                  "fast_finer": sum(one["fast"] < one["slow"] for one in others)}  # fmt: skip
+                  "slow_none": sum(reach["slow"] == 0.0 for reach in reaches),
+                  "slow_shorter": sum(reach["slow"] < reach["fast"] for reach in reaches)}  # fmt: skip
     if QUOTED in steps:
         answers |= {"quoted_fast": steps[QUOTED].usual_reach["fast"], "quoted_fails": steps[QUOTED].failure.setting}
     return answers
-
-
-def slow_is_finer(one: OutcomeMap) -> bool:
-    """Do slow tops need a shorter step, or a finer tolerance, than fast ones?"""
-    return one.usual_reach["slow"] < one.usual_reach["fast"]
 
 
 def pole_facts(part: xr.Dataset) -> dict[str, Any]:

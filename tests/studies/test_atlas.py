@@ -225,13 +225,11 @@ def spins(**made):
     cells = []
     for name, (control, lines) in made.items():
         data = hand_made(lines, parameter=(0.2, 0.5, 0.8, 4.0, 8.0, 16.0), knob=control)
-        chart = "angles" if name.startswith("angles_") else "axis"
-        case = Case("cusp", f"{name.removeprefix('angles_')}[{chart}]")
-        cells.append((case, data.sel(scene="cusp", variant="midpoint", drop=True)))
+        cells.append((Case("cusp", f"{name}[axis]"), data.sel(scene="cusp", variant="midpoint", drop=True)))
     return datasets.combine(cells)
 
 
-SLOW_FINER, FAST_FINER = [[A, L, L]] * 3 + [[A, A, L]] * 3, [[A, A, L]] * 3 + [[A, L, L]] * 3
+SLOW_FINER = [[A, L, L]] * 3 + [[A, A, L]] * 3
 
 
 def test_a_pole_that_halves_the_reach_is_told_and_variants_that_reach_equally_far_are_all_named():
@@ -240,11 +238,9 @@ def test_a_pole_that_halves_the_reach_is_told_and_variants_that_reach_equally_fa
     assert atlas.halved_by_pole(atlas.maps(near, "grazing")["midpoint"]) is True
     unspoiled = hand_made([[L, L, L], *[[A, A, L]] * 4], parameter=gaps, on="grazing")
     assert atlas.halved_by_pole(atlas.maps(unspoiled, "grazing")["midpoint"]) is False
-    data = spins(rk4=("step_size", SLOW_FINER), strang=("step_size", SLOW_FINER), rk45=("tolerance", FAST_FINER),
-                 angles_rk45=("tolerance", SLOW_FINER), angles_dop853=("tolerance", FAST_FINER))  # fmt: skip
+    data = spins(rk4=("step_size", SLOW_FINER), strang=("step_size", SLOW_FINER), rk45=("tolerance", SLOW_FINER))
     answers = facts.atlas_facts(data, "cusp")
-    assert [answers[name] for name in ("slow_shorter", "stepped", "slow_finer", "in_angles")] == [2, 2, 1, 2]
-    assert (answers["fast_finer"], answers["not_angles"]) == (1, 1)
+    assert (answers["slow_shorter"], answers["stepped"]) == (2, 2)
     data = spins(rk4=("step_size", SLOW_FINER), strang=("step_size", SLOW_FINER), cayley=("step_size", [[A, B, B]] * 6),
                  none=("step_size", [[L, L, L]] * 3 + [[A, L, L]] * 3))  # fmt: skip
     answers = facts.atlas_facts(data, "cusp")
@@ -316,8 +312,7 @@ def test_facts_are_those_of_the_mechanisms_and_the_page_says_them_but_none_of_wh
     measured = datasets.combine([(case, study.measure(case)) for case in smaller])
     answers = facts.facts(measured)
     assert answers.keys() >= set(facts.NAMES)
-    adaptive = {"fast_finer", "not_angles", "slow_finer", "in_angles"}  # there are none here
-    assert {name for name in facts.NAMES if answers[name] is None} == {"cayley_sleeps", "outlasting"} | adaptive
+    assert {name for name in facts.NAMES if answers[name] is None} == {"cayley_sleeps", "outlasting"}
     lost = mechanisms.resonant(measured.sel(scene="steady-fast"))
     assert lost["stormer-verlet[angles]"] == pytest.approx(math.sqrt(3.0), abs=1e-4)
     assert lost["midpoint[angles]"] == pytest.approx(2.0 * math.sqrt(3.0), abs=1e-4)
