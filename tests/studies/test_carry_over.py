@@ -262,6 +262,9 @@ def test_a_run_of_some_methods_has_every_fact_of_the_page(quick_results):
     data, page = netcdf.read_any(quick_results / "carry_over.nc"), runner.file_beside("carry_over", "page.md")
     part = xr.DataTree.from_dict({name: data[name].to_dataset() for name in ("short", "own", "prices", "bodies")})
     assert set(re.findall(r"\bf\.(\w+)", page.read_text())) <= set(facts.facts(part))
+    answers, short = facts.facts(data), by.group_of(data, "short")
+    assert [answers["growth_1_of"], answers["growth_chaotic_of"]] == [facts.exponent_gap(data, "0.1")[1], None]
+    assert [*short["needs"].values] == [integrator(str(name)).needs for name in short["variant"].values]
 
 
 def test_the_least_tau_over_long_runs_is_told_with_the_bodies_it_is_of():
