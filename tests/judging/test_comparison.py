@@ -154,16 +154,12 @@ def test_the_command_prints_a_line_for_each_variant(tmp_path, clean_registry):
     assert figure.stat().st_size > 1000
     stored, report = netcdf.read(output), json.loads(call("compare", *words, "--json").stdout)
     runs = {(one["variant"], one["target"]): one for one in report["cheapest"]}
-    assert runs["midpoint[angles]", 1e-9] == {
-        "variant": "midpoint[angles]", "target": 1e-9, "reached": False, "reason": "budget"
-    }  # fmt: skip
+    spent = {"variant": "midpoint[angles]", "target": 1e-9, "reached": False, "reason": "budget"}
+    assert runs["midpoint[angles]", 1e-9] == spent
     assert runs["rk4[axis]", 1e-6]["force_evaluations"] == least(stored, 1e-6)["rk4[axis]"]
     assert [report[name] for name in ("scene", "cost")] == ["spheroid", "evaluations"]
-    plugin = tmp_path / "still.py"
-    plugin.write_text(
-        "import symtop\nstart = symtop.Angles(theta=1.0)\n"
-        "symtop.register_scene(symtop.Scene('still', symtop.SymmetricTop(1.0, 1.0, 0.0), start, 5.0))\n"
-    )
+    plugin, still = tmp_path / "still.py", "symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(theta=1.0)"
+    plugin.write_text(f"import symtop\nsymtop.register_scene(symtop.Scene('still', {still}, 5.0))\n")
     still = call("compare", "still", "exact", "--cost", "evaluations", "--plugin", plugin).stdout
     assert still.startswith("still to t = 5: the cheapest run by evaluations\n")
     for bad in (["rk5"], [], ["rk4", "--figure", "c.doc"]):

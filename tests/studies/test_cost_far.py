@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 import xarray as xr
-from symtop_studies.cost import facts, far as runs, laws
+from symtop_studies.cost import facts, far as runs, figures, laws
 from symtop_studies.cost.far import diagram
 from symtop_studies.cost.tops import Tops
 
@@ -158,18 +158,20 @@ def test_a_variant_whose_energy_drifts_loses_it_late_and_one_that_keeps_it_takes
     assert not any("gauss" in name for name in runs.variants_of(data, "shape"))
 
 
-def test_costs_rise_with_horizon_and_accuracy_and_what_is_within_reach_is_measured(data):
-    reach = float(data["far"]["reach"].max())
-    for quantity in runs.QUANTITIES:
+def test_costs_rise_with_horizon_and_accuracy_and_cells_within_reach_are_measured_and_show_their_winner(data):
+    reach, drawn = float(data["far"]["reach"].max()), figures.draw_map(data)
+    named = dict(one.get_text().split("  ") for one in drawn.legends[0].texts if "  " in one.get_text())
+    for axis, quantity in zip(drawn.axes, runs.QUANTITIES, strict=True):
         panel = diagram(data, quantity)
-        cheapest = panel.costs.min(axis=0)
-        finite = np.isfinite(cheapest)
+        finite = np.isfinite(panel.costs.min(axis=0))
         assert finite.any()
         assert (finite[:, 1:] <= finite[:, :-1]).all()
         assert ((panel.winner >= 0) == finite).all()
-        beyond = (panel.horizons > 1.001 * reach) & (panel.winner >= 0)
-        assert panel.predicted[beyond].all()
+        assert panel.predicted[finite & (panel.horizons > 1.001 * reach)].all()
         assert not panel.predicted[:, 0].any()
+        assert len(axis.texts) == finite.sum()
+        for x, y, letter in ((*one.get_position(), one.get_text()) for one in axis.texts if one.get_text()):
+            assert named[letter.upper()] == panel.names[panel.winner[panel.place(10.0**y, 10.0**x)]]
 
 
 @pytest.mark.parametrize(("errors", "told"), [([1e-7, 1e-4, 3e-7, np.inf], 4), ([1e-5, 1e-4, 3e-7, 1e-7], 2)])
