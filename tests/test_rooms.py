@@ -111,12 +111,9 @@ def circles(modules: dict[str, Module]) -> list[str]:
 
 def strangers(modules: dict[str, Module]) -> list[str]:
     """Imports of packages that a room does without."""
-    return [
-        f"{module.name}:{arrow.line} imports {arrow.target}"
-        for module in modules.values()
-        for arrow in module.arrows
-        if arrow.target.split(".")[0] in STRANGERS.get(module.room, ())
-    ]
+    arrows = [(module, arrow) for module in modules.values() for arrow in module.arrows]
+    return [f"{module.name}:{arrow.line} imports {arrow.target}" for module, arrow in arrows
+            if arrow.target.split(".")[0] in STRANGERS.get(module.room, ())]  # fmt: skip
 
 
 @functools.cache

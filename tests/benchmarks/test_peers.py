@@ -164,16 +164,11 @@ def _stored(times, spread=0.01):
         "language": ["Python" if "Python" in name else "numba, called through Python" for name in names],
         "implementation": ["compiled"] * len(names), "formulation": ["as it is"] * len(names),
     }  # fmt: skip
-    data = xr.Dataset(
-        {
-            "axis": (one, np.full_like(flat[0], 1e-10)),
-            "steps": (one, np.full_like(flat[0], 54.0)),
-            **dict.fromkeys(("seconds", "first_call", "reliable"), (each, flat)),
-            "seconds_samples": ((*each, "batch"), samples),
-            **{key: ("variant", column) for key, column in words.items()},
-        },
-        coords={"call": list(measure.CALLS), "scene": ["spheroid"], "variant": names},
-    )
+    data = xr.Dataset({
+        "axis": (one, np.full_like(flat[0], 1e-10)), "steps": (one, np.full_like(flat[0], 54.0)),
+        **dict.fromkeys(("seconds", "first_call", "reliable"), (each, flat)),
+        "seconds_samples": ((*each, "batch"), samples), **{key: ("variant", column) for key, column in words.items()},
+    }, coords={"call": list(measure.CALLS), "scene": ["spheroid"], "variant": names})  # fmt: skip
     facts = measured.circumstances() | {"measured": "2001-02-03", "processor": "an abacus"}
     return netcdf.describe(data, "peers").assign_attrs(facts)
 

@@ -112,10 +112,8 @@ def test_run_prints_the_errors_and_writes_the_dataset_also_of_a_run_that_fails_o
     assert numbers(result.stdout)["seconds"] is None
     assert numbers(result.stdout)["accuracy"] == 1e-17
     plugin = tmp_path / "endless.py"  # a top whose nutation never ends
-    plugin.write_text(
-        "import symtop\ntop = symtop.scene('spheroid').top\n"
-        "symtop.register_scene(symtop.Scene('endless', top, symtop.Angles(theta=0.0, psi_dot=0.1), 1.0))\n"
-    )
+    start = "symtop.scene('spheroid').top, symtop.Angles(theta=0.0, psi_dot=0.1)"
+    plugin.write_text(f"import symtop\nsymtop.register_scene(symtop.Scene('endless', {start}, 1.0))\n")
     assert numbers(call("scenes", "--json", "--plugin", plugin).stdout)
 
 

@@ -114,12 +114,9 @@ def test_a_few_variables_are_kept_and_compared_and_a_budget_is_one(tmp_path, mon
 def test_members_that_raise_are_told_in_one_sentence(tmp_path, clean_registry):
     plugin = tmp_path / "raises_for_some.py"
     plugin.write_text(
-        "import symtop\n"
-        "def solve(top, start, plan):\n"
-        "    if start.theta > 1.5:\n        raise TypeError('too far')\n"
+        "import symtop\ndef solve(top, start, plan):\n    if start.theta > 1.5:\n        raise TypeError('too far')\n"
         "    return symtop.integrator('rk4[axis]').solvers['axis'](top, start, plan)\n"
-        "symtop.register(symtop.Integrator(\n"
-        "    name='raises-for-some', family='other', summary='', solvers={'axis': solve}))\n"
+        "symtop.register(symtop.Integrator(name='raises-for-some', family='other',summary='', solvers={'axis': solve}))"
     )
     result = call("--plugin", plugin, "--members", 20, "raises-for-some", *STEPS)
     assert "raised an exception, the first: integrator raises-for-some on member" in result.output

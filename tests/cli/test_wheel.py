@@ -35,12 +35,9 @@ def test_a_wheel_in_an_empty_folder(tmp_path):
     here(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", tmp_path, ROOT)
     (wheel,) = tmp_path.glob("symtop-*.whl")
     names = set(zipfile.ZipFile(wheel).namelist())
-    ours = {
-        str(Path(package, path.relative_to(ROOT / folder)))
-        for folder, package in (("symtop", "symtop"), ("studies", "symtop_studies"))
-        for path in (ROOT / folder).rglob("*")
-        if path.is_file() and path.suffix != ".pyc"
-    }
+    folders = {"symtop": "symtop", "studies": "symtop_studies"}.items()
+    ours = {str(Path(package, path.relative_to(ROOT / folder))) for folder, package in folders
+            for path in (ROOT / folder).rglob("*") if path.is_file() and path.suffix != ".pyc"}  # fmt: skip
     assert {name for name in names if ".dist-info/" not in name} == ours
     assert ours >= {"symtop/report/templates/report.html", "symtop/explore/static/page.html", "symtop/py.typed"}
     assert "symtop_studies/convergence/study.py" in ours

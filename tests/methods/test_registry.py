@@ -75,8 +75,7 @@ def test_a_field_that_makes_no_sense_is_refused_and_one_that_does_is_not(fields,
 EVERY = symtop.integrators()
 NAMED = {
     "derivative": ("euler", "rk4", "rk45", "rk45-compiled", "dop853", "dop853-compiled", "tsit5", "vern9", "adams",
-                   "gauss-4", "radau"),
-    "constants": ("dop853-projected", "vern9-projected"),
+                   "gauss-4", "radau"), "constants": ("dop853-projected", "vern9-projected"),
     "expression": ("taylor", "taylor-quad", "series-general", "series-general-adaptive", "kahan"),
     "lagrangian": ("midpoint", "trapezoidal", "simpson-linear", "galerkin-simpson", "midpoint-unreduced",
                    "galerkin-gauss-8"),

@@ -63,6 +63,26 @@ def test_every_figure_can_be_read_in_print(name, quick_results):
     assert all(one.figure.get_figheight() <= 10.0 for one in pictures)  # inches: a page
 
 
+def shows(drawn, groups, variant) -> bool:
+    """Are all of these numbers, but those too small to draw, among those of a variant, whatever their signs?"""
+    every = (one.sel(variant=variant).data_vars.values() for one in groups if variant in one["variant"].values)
+    numbers = [column.values.ravel() for each in every for column in each if column.dtype.kind == "f"]
+    return bool(np.isin(drawn[drawn > figures.SMALLEST], np.abs(np.concatenate(numbers))).all())
+
+
+@pytest.mark.parametrize("name", ["convergence", "drift", "reduction", "oscillators", "notebook"])
+def test_a_line_named_after_a_variant_shows_its_numbers_and_no_others(name, quick_results):
+    data = netcdf.read_any(quick_results / f"{name}.nc")
+    groups = [one for one in netcdf.groups(data).values() if "variant" in one.coords]
+    known = {str(variant) for one in groups for variant in one["variant"].values}
+    lines = (line for one in runner.load(name).pictures(data) for axis in one.figure.axes for line in axis.lines)
+    named = [(np.abs(line.get_ydata()), line.get_label().rpartition(", ")[2]) for line in lines]
+    assert [variant for values, variant in named if variant in known and not shows(values, groups, variant)] == []
+    large = [(values, variant) for values, variant in named if variant in known and values.max() > 1e-14]
+    assert large  # rounding is often the same
+    assert not any(shows(values, groups, min(known - {variant})) for values, variant in large)
+
+
 def test_a_figure_that_cannot_be_read_is_found(monkeypatch):
     monkeypatch.setattr(runner, "file_beside", lambda *_: None)  # as of a study without a template
     figure, axes = style.panels(1, 1)
