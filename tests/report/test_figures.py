@@ -10,9 +10,14 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.text import Text
 from PIL import Image
+from symtop_studies.carry_over.figures import MARKS
+from symtop_studies.claims.figures import SYMBOLS
 
 import symtop
 from symtop.core import netcdf
+from symtop.judging.battery import CLAIMS
+from symtop.judging.findings import claim_name
+from symtop.methods.framework.registry import FAMILIES
 from symtop.report import figures, formats, style
 from symtop.runner import run as runner
 
@@ -81,6 +86,44 @@ def test_a_line_named_after_a_variant_shows_its_numbers_and_no_others(name, quic
     large = [(values, variant) for values, variant in named if variant in known and values.max() > 1e-14]
     assert large  # rounding is often the same
     assert not any(shows(values, groups, min(known - {variant})) for values, variant in large)
+
+
+def tables_and_axes(name, folder):
+    """The tables of a study, and the axes of its figures."""
+    data, study = netcdf.read_any(folder / f"{name}.nc"), runner.load(name)
+    return dict(study.tables(data)), {one.name: one.figure.axes for one in study.pictures(data)}
+
+
+def test_points_of_carry_over_are_numbers_of_its_tables(quick_results):
+    tables, axes = tables_and_axes("carry_over", quick_results)
+    ranked = tables["rankings"].query("runs == 'short' and quantity == 'axis'")
+    shown = {line.get_label(): line.get_ydata() for line in axes["rankings"][0].lines}
+    for decades, mark in zip((3, 6, 9), MARKS, strict=True):
+        tau, part = (one[np.isclose(one["error"], 10.0**-decades)] for one in (ranked, tables["steps"]))
+        assert np.array_equal(shown[f"axis to 1e-{decades} rad"], tau["tau"], equal_nan=True)
+        marked = (line for line in axes["steps"][0].lines if line.get_marker() == mark and line.get_ydata().size)
+        dots = {round(line.get_xdata().mean()): line.get_ydata() for line in marked}
+        for place, family in enumerate(part.columns[4:]):
+            assert sorted(dots.get(place, [])) == sorted(part[family].fillna(math.inf)), family
+
+
+def test_counts_of_the_ledger_and_orders_beside_lines_are_those_of_tables(quick_results):
+    tables, axes = tables_and_axes("claims", quick_results)
+    names = [name for name in FAMILIES if name in tables["ledger"]["family"].values]
+    counts = tables["ledger"].value_counts(["family", "claim", "verdict"]).to_dict()
+    texts = [(*text.get_position(), text.get_text().split()) for text in axes["ledger"][0].texts]
+    verdicts = {symbol: verdict for verdict, symbol in SYMBOLS.items()}
+    drawn = {(names[column], claim_name(CLAIMS[line]), verdicts[one[-1]]): int(one[:-1])
+             for column, line, words in texts if column < len(names) for one in words}  # fmt: skip
+    assert drawn == counts
+    tables, axes = tables_and_axes("oscillators", quick_results)
+    orders = tables["damped"].set_index(["b", "rule"])
+    for axis in axes["orders"]:
+        what, _, damping = axis.get_title().partition("\nb = ")
+        column = "order of x" if what.startswith("position") else "order of the rate of decay"
+        for rule, _, order in (text.get_text().partition(": order ") for text in axis.texts):
+            at = float(damping.partition(",")[0]), rule.replace(" ", "-")
+            assert float(order) == round(orders.loc[at, column], 1)
 
 
 def test_a_figure_that_cannot_be_read_is_found(monkeypatch):
