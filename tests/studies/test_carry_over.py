@@ -1,9 +1,7 @@
 """What carries over: errors and truth of bodies by other ways, planted differences that are seen, verdicts."""
 
 import re
-from dataclasses import dataclass
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -333,19 +331,11 @@ def test_a_method_that_no_step_within_the_budget_makes_safe_is_counted(unserved,
 GRID = 0.1
 
 
-@dataclass
-class Longer:
-    """A solver whose steps are longer than it says: a planted lower limit."""
-
-    solver: Any
-    factor: float
-
-    def many(self, rows, h, marks):
-        return self.solver.many(rows, self.factor * h, marks)
-
-
 def stretched(name, factor):
-    return SimpleNamespace(solvers={BODY: Longer(integrator(f"{name}[{BODY}]").solvers[BODY], factor)})
+    """A method whose steps are longer than it says: a planted lower limit."""
+    solver = integrator(f"{name}[{BODY}]").solvers[BODY]
+    many = lambda rows, h, marks: solver.many(rows, factor * h, marks)
+    return SimpleNamespace(solvers={BODY: SimpleNamespace(many=many)})
 
 
 def tilted(n, size=0.05):
