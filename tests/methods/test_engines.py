@@ -177,8 +177,7 @@ def test_in_single_precision_there_is_a_best_step(name, best, error):
     """Error and step of the engines' own runs: the map meets the error within a factor of 2.5, and then gets worse."""
     counts = [best // 8, best, 32 * best if name != "bullet" else 64 * best]
     coarse, fine, finest = (axis_error(f"{name}{'-float32'}[attitude]", steps) for steps in counts)
-    assert error / 2.5 < fine < 2.5 * error
-    assert fine < coarse
+    assert error / 2.5 < fine < min(2.5 * error, coarse)
     assert finest > 1.5 * fine
     if name == "rapier":  # the control: in double it goes on
         assert axis_error(f"{name}[attitude]", counts[2]) < 0.2 * finest
