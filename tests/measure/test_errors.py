@@ -23,8 +23,7 @@ def truth():
 
 @pytest.mark.parametrize(("integrator", "observe"), [("midpoint", "nutation"), ("strang", "axis"), ("strang", None)])
 def test_a_run_needs_no_scene_and_gives_the_errors_of_every_quantity_it_shows(integrator, observe):
-    run = symtop.simulate("spheroid", integrator, step_size=0.01, observe=observe, guard=False)
-    shown = symtop.errors(run)
+    shown = symtop.errors(symtop.simulate("spheroid", integrator, step_size=0.01, observe=observe, guard=False))
     named = [name for name in QUANTITIES if name != "attitude" or observe != "axis"]
     assert set(shown.data_vars) == {*named, *(f"{name}_bound" for name in named)}
     for name in named:
