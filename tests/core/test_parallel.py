@@ -69,14 +69,10 @@ def test_pieces_that_have_begun_heed_an_interrupt():
     heed()  # nothing asks the caller's thread to stop
 
 
-def looked_up(name):
-    return os.environ.get(name)
-
-
 def seen_by(context):
     """What a process that is started so finds in its environment."""
     with ProcessPoolExecutor(1, context) as pool:
-        return [pool.submit(looked_up, name).result() for name in VARIABLES]
+        return list(pool.map(os.getenv, VARIABLES))
 
 
 @pytest.fixture(autouse=True)

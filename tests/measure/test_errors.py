@@ -23,13 +23,11 @@ def truth():
 
 @pytest.mark.parametrize(("integrator", "observe"), [("midpoint", "nutation"), ("strang", "axis"), ("strang", None)])
 def test_a_run_needs_no_scene_and_gives_the_errors_of_every_quantity_it_shows(integrator, observe):
-    run = symtop.simulate("spheroid", integrator, step_size=0.01, observe=observe, guard=False)
-    shown = symtop.errors(run)
+    shown = symtop.errors(symtop.simulate("spheroid", integrator, step_size=0.01, observe=observe, guard=False))
     named = [name for name in QUANTITIES if name != "attitude" or observe != "axis"]
     assert set(shown.data_vars) == {*named, *(f"{name}_bound" for name in named)}
     for name in named:
-        assert np.all(shown[f"{name}_bound"].values < 1e-12)
-        assert np.all(shown[f"{name}_bound"].values > 0.0)
+        assert 0.0 < shown[f"{name}_bound"].values.min() <= shown[f"{name}_bound"].values.max() < 1e-12
     assert 1e-5 < float(shown["axis"].max()) < 1e-1
 
 
@@ -96,9 +94,8 @@ def test_a_foreign_trajectory_is_compared_and_one_turned_by_a_thousandth_shows_a
         shown = symtop.errors({**mine, "quaternion": factor * mine["quaternion"]}, "spheroid")
         names = ("axis", "attitude", "theta", "quaternion_length")
         assert {*shown} == {f"{name}{end}" for name in names for end in ("", "_bound")}
-        assert shown["quaternion_length"].values == pytest.approx(
-            np.abs(factor * np.ones_like(grown))[:, 0] - 1.0, abs=4e-15
-        )
+        off = np.abs(factor * np.ones_like(grown))[:, 0] - 1.0
+        assert shown["quaternion_length"].values == pytest.approx(off, abs=4e-15)
         for name in ("axis", "attitude", "theta"):
             assert np.all(shown[name].values <= shown[f"{name}_bound"].values)
     about_the_vertical = np.array([np.cos(0.5 * TURN), 0.0, 0.0, np.sin(0.5 * TURN)])

@@ -211,8 +211,7 @@ def tops(count, seed=3):
 @pytest.mark.parametrize("prepare", PREPARATIONS, ids=lambda one: one.numbers.__name__)
 def test_a_preparation_compiles_to_its_own_bits(prepare):
     numbers = prepare.numbers
-    prepared = lambda plain: numbers(BareTop(*plain[:3]), Start(*plain[3:]))
-    compiled = compile_kernel(prepared)
+    compiled = compile_kernel(lambda plain: numbers(BareTop(*plain[:3]), Start(*plain[3:])))
     for top, at in tops(3000):
         par, state = compiled(flat(top, at))
         assert (tuple(par), state) == tuple(map(tuple, prepare(top, at)))
@@ -302,8 +301,7 @@ def test_a_rule_may_be_whatever_a_kernel_takes(rule):
 def test_tables_and_compositions_travel_as_arrays_and_arrive_whole():
     """The negative control: scaled without closing, one table in two is off by a rounding somewhere."""
     rule, steps = METHODS["srkn-14-6"].table, np.random.default_rng(0).uniform(0.01, 0.1, 100)
-    off = sum(exact_sum([a * h for a in rule.drift], h) != tuple(a * h for a in rule.drift) for h in steps)
-    assert off > 20
+    assert sum(exact_sum([a * h for a in rule.drift], h) != tuple(a * h for a in rule.drift) for h in steps) > 20
     # Numbers of every kind, a rule that hangs on the start included, to the bits of the rule that Python makes.
     scene = symtop.scene("spheroid")
     drift, kick = [0.1, 0.2, 0.4, 0.2, 0.1], [0.05, 0.15, 0.3, 0.3, 0.15, 0.05]

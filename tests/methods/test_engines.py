@@ -57,8 +57,7 @@ def test_the_reference_values(name, value):
 def test_the_energy_after_a_thousand_seconds(name, value):
     run = symtop.simulate(GOLDSTEIN, name, step_size=0.025, horizon=1000.0, samples=40001, guard=False)
     energy = run["energy"].values
-    gain = (energy[-200:].mean() - energy[0]) / (abs(energy[0]) + GOLDSTEIN.top.mgl)
-    assert gain == pytest.approx(value, rel=0.03)
+    assert (energy[-200:].mean() - energy[0]) / (abs(energy[0]) + GOLDSTEIN.top.mgl) == pytest.approx(value, rel=0.03)
 
 
 @pytest.mark.parametrize(("name", "time"), [("mujoco-euler", 91.5), ("jsbsim-default", 84.7)])
@@ -177,8 +176,7 @@ def test_in_single_precision_there_is_a_best_step(name, best, error):
     """Error and step of the engines' own runs: the map meets the error within a factor of 2.5, and then gets worse."""
     counts = [best // 8, best, 32 * best if name != "bullet" else 64 * best]
     coarse, fine, finest = (axis_error(f"{name}{'-float32'}[attitude]", steps) for steps in counts)
-    assert error / 2.5 < fine < 2.5 * error
-    assert fine < coarse
+    assert error / 2.5 < fine < min(2.5 * error, coarse)
     assert finest > 1.5 * fine
     if name == "rapier":  # the control: in double it goes on
         assert axis_error(f"{name}[attitude]", counts[2]) < 0.2 * finest

@@ -162,9 +162,8 @@ def test_one_step_is_that_of_the_stationary_polynomial(name, scene):
         right = independent_step(scene.top, point, h, degree, nodes, weights)
         assert np.max(np.abs(step.image(point) - right)) < 2e-12
         if h == 0.1 and scene.name == "random-0":  # the control: other weights are another method
-            wrong = independent_step(
-                scene.top, point, h, degree, nodes, (weights[0] + 0.01, *weights[1:-1], weights[-1] - 0.01)
-            )
+            other = (weights[0] + 0.01, *weights[1:-1], weights[-1] - 0.01)
+            wrong = independent_step(scene.top, point, h, degree, nodes, other)
             assert not np.max(np.abs(step.image(point) - wrong)) < 2e-12
 
 
@@ -173,11 +172,9 @@ def test_one_step_is_that_of_the_stationary_polynomial(name, scene):
 )
 def test_momenta_are_those_of_the_steps_made_however_long(name):
     """Of slow tops, whose steps are too long for one solution alone: a second solution would show other momenta."""
-    tops = symtop.population(200, seed=1, kind="slow")
-    runs = symtop.ensemble(
-        tops, name, per_nutation=8, nutations=10, samples=41, variables=["p_phi", "p_psi"], quiet=True
-    )
-    for momentum in (runs[name].values[runs["outcome"].values == "ok"] for name in ("p_phi", "p_psi")):
+    tops, momenta = symtop.population(200, seed=1, kind="slow"), ["p_phi", "p_psi"]
+    runs = symtop.ensemble(tops, name, per_nutation=8, nutations=10, samples=41, variables=momenta, quiet=True)
+    for momentum in (runs[name].values[runs["outcome"].values == "ok"] for name in momenta):
         assert len(momentum) > 100
         change = np.nanmax(np.abs(momentum - momentum[:, :1]), axis=1)
         assert np.max(change / np.nanmax(np.abs(momentum), axis=1)) < 1e-9

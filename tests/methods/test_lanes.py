@@ -161,21 +161,15 @@ def test_lanes_finish_what_needs_no_branch_and_a_member_does_not_see_its_neighbo
     assert moved == [100, 101, 102]
 
 
-def spread(count, steps):
-    """Starts and tops around a scene, all of them with 300 steps to its nutation."""
-    draw, at = np.random.default_rng(0), symtop.scene("spheroid")
-    numbers = np.tile(flat(at.top, at.start), (count, 1))
-    numbers[:, 3:] *= draw.uniform(0.8, 1.2, (count, 6))
-    numbers[:, 1] *= draw.uniform(0.8, 1.2, count)
-    return numbers, np.full(count, at.nutation_period / 300), np.tile([0, steps], (count, 1))
-
-
 @pytest.mark.parametrize(("name", "longer"), [
     ("midpoint[angles]", 40.0), *late(*((f"{name}[attitude]", 20.0) for name in ITERATED))])  # fmt: skip
 def test_a_lane_that_takes_more_iterations_changes_no_other(name, longer):
     """A step so large that one lane takes more passes; the others keep bits and counts, and that one does not."""
-    numbers, h, marks = spread(W, 40)
-    solver = SOLVERS[name]
+    draw, at, solver = np.random.default_rng(0), symtop.scene("spheroid"), SOLVERS[name]
+    numbers = np.tile(flat(at.top, at.start), (W, 1))  # starts and tops around a scene
+    numbers[:, 3:] *= draw.uniform(0.8, 1.2, (W, 6))
+    numbers[:, 1] *= draw.uniform(0.8, 1.2, W)
+    h, marks = np.full(W, at.nutation_period / 300), np.tile([0, 40], (W, 1))
     before = solver.many(numbers, h, marks)
     h[5] *= longer
     after, others = solver.many(numbers, h, marks), np.arange(W) != 5

@@ -46,8 +46,7 @@ def test_two_threads_that_make_the_very_first_call_together_see_every_integrator
         barrier.wait(10.0)
         return list(registry.integrators())
 
-    names = list(registry.integrators())
-    shipped = [name for name in names if registry.is_built_in(name)]
+    shipped = [name for name in registry.integrators() if registry.is_built_in(name)]
     monkeypatch.setattr(gauss, "built_in", slow)
     for name, empty in (("_registry", {}), ("_loaded", []), ("_announced", []), ("_shipped", set())):
         monkeypatch.setattr(registry, name, empty)

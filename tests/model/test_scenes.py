@@ -16,8 +16,7 @@ from tests.conftest import random_scenes
 
 def test_what_users_write_is_escaped_and_whole():
     purpose = "a < b & <script>, and a sentence that is longer than the fifty characters a table has by default"
-    scene = symtop.Scene("mine", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0), 1.0, purpose)
-    html = scene._repr_html_()
+    html = symtop.Scene("mine", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0), 1.0, purpose)._repr_html_()
     words = "a &lt; b &amp; &lt;script&gt;, and a sentence that is longer than the fifty characters"
     assert (words in html, "<script>" in html) == (True, False)
 

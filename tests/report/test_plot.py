@@ -23,8 +23,7 @@ def test_errors_are_drawn_as_the_run_and_a_trajectory_of_no_integrator_and_witho
     symtop.plot(symtop.simulate("goldstein", "rk4[axis]", step_size=0.02, horizon=10.0, guard=False), ax)
     assert (ax.get_title(), ax.get_legend_handles_labels()[1]) == ("", ["midpoint[angles]", "rk4[axis]"])
     assert symtop.plot(wrong, quantity="energy").get_ylabel() == "energy error / energy of the nutation"
-    theirs = {"time": run["time"].values, "axis": run["axis"].values}
-    wrong = symtop.errors(theirs, "goldstein")
+    wrong = symtop.errors({"time": run["time"].values, "axis": run["axis"].values}, "goldstein")
     assert np.array_equal(symtop.plot(wrong).get_lines()[0].get_ydata(), wrong["axis"].values[1:])
     with pytest.raises(symtop.SymtopError, match="does not show the attitude; it shows axis"):
         symtop.plot(wrong, quantity="attitude")
@@ -93,8 +92,7 @@ def test_a_run_that_fails_in_its_first_step_is_drawn(step, shown, tmp_path, monk
 def test_a_single_sample_is_a_point(samples, marker, tmp_path, monkeypatch):
     drawn = []
     monkeypatch.setattr("symtop.report.plot.save", lambda figure, _: drawn.append(figure))
-    words = ("run", "spheroid", "rk4", "--step-size", 0.01, "--samples", samples)
-    call(*words, "--figure", tmp_path / "f.png")
+    call("run", "spheroid", "rk4", "--step-size", 0.01, "--samples", samples, "--figure", tmp_path / "f.png")
     assert {line.get_marker() for axis in drawn[0].axes[1:] for line in axis.get_lines()} == {marker}
     run = symtop.simulate("spheroid", "rk4", step_size=0.01, samples=samples)
     assert symtop.plot(run).lines[0].get_marker() == marker

@@ -30,8 +30,7 @@ def test_the_energy_is_that_of_simulate_whether_or_not_the_momenta_are_kept(name
     """With the p_psi of the start, simo-wong, which keeps the energy, seemed to lose 1e-4 of it, and ode to gain it."""
     steps, h = 3000, 0.002
     data = long_run(SCENE, name, steps=steps, step_size=h, quiet=True)
-    chart = chart_of(symtop.integrator(name))[0]
-    row = symtop.integrator(name).variant(chart)
+    row = symtop.integrator(name).variant(chart_of(symtop.integrator(name))[0])
     dense = symtop.simulate(SCENE, row, step_size=h, horizon=steps * h, samples=steps + 1, guard=False)
     change = (dense["energy"] - dense["energy"][0]).values / SCENE.energy_scale
     extremes = float(data["energy_least"].min()), float(data["energy_largest"].max())
@@ -213,8 +212,7 @@ def test_checkpoints_of_other_runs_are_refused_and_a_failed_run_shows_the_window
     book.save()
     with pytest.raises(symtop.SymtopError, match="belongs to another run"):
         long_run(SCENE, "cayley", steps=1000, step_size=H, checkpoint=file, quiet=True)
-    scene = symtop.scene("bruls-cardona-arnold")
-    data = long_run(scene, "stormer-verlet", steps=10**6, step_size=2e-3, quiet=True)
+    data = long_run("bruls-cardona-arnold", "stormer-verlet", steps=10**6, step_size=2e-3, quiet=True)
     assert data.attrs["outcome"] == "left_chart"
 
 

@@ -134,8 +134,7 @@ def test_rows_share_phases_and_errors_are_followed_where_they_are_asked_for():
     runs = row_plan(integrator("strang"), [0.01, 0.25, 2.0], 12.0)
     assert [marks[-1] for marks in runs.marks] == [1200, 48, 6]
     assert np.isnan(runs.phases[2]).sum() == 49 - 7
-    phases = np.sort(np.mod(runs.phases[0], 1.0))
-    assert np.max(np.diff(phases)) < 0.125
+    assert np.max(np.diff(np.sort(np.mod(runs.phases[0], 1.0)))) < 0.125
     assert [piece.stop - piece.start for piece in together_in(runs, 1)] == [1, 1, 1]  # too far apart
     near = row_plan(integrator("strang"), [0.01, 0.0105, 0.1, 0.105, 0.25, 1.9, 1.91], 12.0)
     assert [piece.stop - piece.start for piece in together_in(near, 1)] == [2, 1, 2, 2]
@@ -336,8 +335,7 @@ def test_adaptive_methods_are_mapped_over_their_tolerance_to_their_budget():
     assert [VERDICTS[k] for k in runs.verdict[0][:2]] == ["accurate", "accurate"]
     assert VERDICTS[runs.verdict[0][2]] != "accurate"
     assert runs.axis_error[0, 0] < 1e-6 < runs.axis_error[0, 1]
-    exact = outcome_map("cusp", [0.3, 3.0], integrator("exact"), [math.nan], 12.0)
-    assert (exact.verdict == 0).all()
+    assert (outcome_map("cusp", [0.3, 3.0], integrator("exact"), [math.nan], 12.0).verdict == 0).all()
     loose = np.geomspace(1e-10, 0.5, 25)[[12, 22]].tolist()
     top = family("cusp")(float(np.geomspace(0.1, 30.0, 120)[23]))
     made = outcome_maps.one_by_one(row_plan(integrator("adams[axis]"), loose, 10.0), "axis", top)

@@ -40,8 +40,7 @@ def test_verdicts_are_those_of_the_one_rule_and_a_wrong_declaration_is_refuted(d
     assert {name for _, name in results} == {name for name in ROWS if integrator(name).fixed_step}
     for (_, name), (word, slopes) in results.items():
         declared, main = integrator(name).order, slopes["axis"]
-        others = [fit for quantity, fit in slopes.items() if quantity != "axis"]
-        assert word == order_verdict(declared, main, others)
+        assert word == order_verdict(declared, main, [fit for quantity, fit in slopes.items() if quantity != "axis"])
         if math.isfinite(main.slope):
             assert abs(main.slope - declared) <= main.interval + BESIDE, name
     assert sum(word == "confirmed" for word, _ in results.values()) >= 7

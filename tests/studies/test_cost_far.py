@@ -54,8 +54,7 @@ def test_a_law_predicts_a_measured_horizon_that_was_left_out_of_the_fit(name):
         full = np.append(seen[place, :, 0], np.full(FAR.size - ends.size, np.nan))[np.newaxis]  # of one run
         known = np.where(SHORT, full, np.nan)
         if full[0, ends.size - 1] < 0.1:
-            law = laws.fit(FAR, known, runs.MOST[quantity], drifts=runs.drifts_of(row))
-            told = float(law.at(ends[-1:])[0, 0])
+            told = float(laws.fit(FAR, known, runs.MOST[quantity], drifts=runs.drifts_of(row)).at(ends[-1:])[0, 0])
             assert full[0, ends.size - 1] / within < told < full[0, ends.size - 1] * within, quantity
 
 

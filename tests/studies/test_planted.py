@@ -26,8 +26,7 @@ def test_a_liar_is_judged_beside_the_honest_and_claims_on_a_free_body_by_themsel
     assert not {LIAR, "hidden-kick"} & symtop.integrators().keys()
     row = tables["planted"].iloc[0]
     assert (row["integrator"], row["claim"], row["verdict"]) == (LIAR, "symmetric", "refuted")
-    shown = {text.get_text() for picture in figures.pictures(data) for text in picture.figure.axes[0].texts}
-    assert "1 of 1" in shown
+    assert "1 of 1" in {text.get_text() for one in figures.pictures(data) for text in one.figure.axes[0].texts}
     assert (said["free_methods"], said["free_confirmed"]) == (1, 3)
     assert [*tables["body"]["claim"]] == ["order", "energy", "momentum"]
     assert {*tables["ledger"]["scene"]} == {SCENE}
