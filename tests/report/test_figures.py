@@ -126,6 +126,15 @@ def test_counts_of_the_ledger_and_orders_beside_lines_are_those_of_tables(quick_
             assert float(order) == round(orders.loc[at, column], 1)
 
 
+def test_the_safe_choices_for_any_body_are_drawn_at_their_times(quick_results):
+    tables, axes = tables_and_axes("cost", quick_results)
+    asked = tables["winners"].query("tops == 'natural' and nutations == 10.0 and needs in ('derivative', 'any body')")
+    points = np.concatenate([line.get_xydata() for line in axes["accuracy"][0].lines])
+    safe = asked[["time (us)", "error"]].dropna().to_numpy()
+    assert len(safe) >= 4
+    assert [np.isclose(points, one, rtol=1e-12, atol=0.0).all(axis=1).any() for one in safe] == [True] * len(safe)
+
+
 def test_a_figure_that_cannot_be_read_is_found(monkeypatch):
     monkeypatch.setattr(runner, "file_beside", lambda *_: None)  # as of a study without a template
     figure, axes = style.panels(1, 1)

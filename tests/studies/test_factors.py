@@ -194,10 +194,12 @@ def test_neighbours_in_the_waterfall_differ_in_exactly_the_factor_they_name(rows
 
 
 def test_the_product_of_the_ratios_is_the_total_and_a_waterfall_with_a_missing_step_is_not_drawn(quiet, rows):
-    part, answers = first_goal(rows), facts.facts(quiet)
-    for ratio, first, last in (("called", 0, -2), ("bare", 1, -1)):  # which leave out the bar of the call
+    part, answers, ((_, figure),) = first_goal(rows), facts.facts(quiet), figures.pictures(quiet)
+    sides = ("called", 0, -2), ("bare", 1, -1)  # what is left out is the bar of the call
+    for axis, (ratio, first, last) in zip(figure.axes, sides, strict=True):
         order = waterfall(part, call_first=ratio == "bare")
         seconds = order["time (s)"].to_numpy()
+        assert [line.get_xdata()[0] for line in axis.lines if line.get_marker() == "o"] == seconds.tolist()
         assert answers[ratio] == pytest.approx(seconds[first] / seconds[last])
         assert order["so far"].to_numpy() == pytest.approx(seconds[0] / seconds, rel=1e-12)
         assert math.prod(order["times faster"].iloc[1:]) == pytest.approx(seconds[0] / seconds[-1], rel=1e-12)
