@@ -9,6 +9,7 @@ Protocol: https://chromedevtools.github.io/devtools-protocol, messages of JSON e
 """
 
 import base64
+import contextlib
 import json
 import os
 import select
@@ -29,14 +30,6 @@ FLAGS = (
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE localhost, EXCLUDE 127.0.0.1",
 )  # fmt: skip
 PATIENCE = 30.0  # seconds; a first start on a busy machine takes five
-
-
-def executable() -> str:
-    """The browser on this machine; a test that needs one is skipped where there is none."""
-    for name in NAMES:
-        if path := shutil.which(name):
-            return path
-    pytest.skip(f"no browser on this machine ({', '.join(NAMES)}); on Debian: apt-get install chromium")
 
 
 FAINT = """(() => {  // texts whose contrast with what is behind them is below that of WCAG 2 AA
@@ -77,7 +70,9 @@ class Browser:
         self._count = 0
         self._buffer = b""
         self._session = ""
-        self._program = executable()
+        self._program = next(filter(None, map(shutil.which, NAMES)), "")
+        if not self._program:
+            pytest.skip(f"no browser on this machine ({', '.join(NAMES)}); on Debian: apt-get install chromium")
 
     def __enter__(self) -> Self:
         self._profile = tempfile.mkdtemp(prefix="symtop-browser-")
@@ -105,11 +100,9 @@ class Browser:
         return self
 
     def __exit__(self, *_: object) -> None:
-        try:
+        with contextlib.suppress(BrowserError, OSError):
             self._session = ""
             self._send("Browser.close")
-        except (BrowserError, OSError):
-            pass
         os.close(self._write)
         os.close(self._read)
         try:

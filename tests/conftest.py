@@ -83,8 +83,8 @@ def processes_with_dask():
         yield
 
 
-@contextlib.contextmanager
-def _registered_for_a_while():
+def _forgetting():
+    """Forget the integrators, scenes and plug-ins that are registered from now on."""
     registry.integrators()  # the built-in ones are registered first
     stores = (registry._registry, scenes._added, plugins._loaded)
     before = [store.copy() for store in stores]
@@ -94,18 +94,9 @@ def _registered_for_a_while():
         store.update(entries)
 
 
-@pytest.fixture(scope="module", autouse=True)
-def _registered_for_one_file():
-    """Forget the integrators, scenes and plug-ins that a file of tests registered, so that files run in any order."""
-    with _registered_for_a_while():
-        yield
-
-
-@pytest.fixture
-def clean_registry():
-    """Forget what one test registers."""
-    with _registered_for_a_while():
-        yield
+_registered_for_a_while = contextlib.contextmanager(_forgetting)
+_registered_for_one_file = pytest.fixture(scope="module", autouse=True)(_forgetting)  # so that files run in any order
+clean_registry = pytest.fixture(_forgetting)  # of what one test registers
 
 
 @pytest.fixture

@@ -27,10 +27,8 @@ def cases(quick: bool) -> list[Case]:
 
 
 def measure(case: Case) -> xr.Dataset:
-    log = os.environ.get("PROBE_LOG")
-    if log:
-        with Path(log).open("a") as file:
-            file.write(f"{case.label}\n")
+    with Path(os.environ.get("PROBE_LOG", os.devnull)).open("a") as log:
+        log.write(f"{case.label}\n")
     tqdm(total=1, disable=True)  # as a long run has one
     time.sleep(float(os.environ.get("PROBE_PAUSE", "0")))
     run = simulate(scene(case.scene), integrator(case.integrator), samples=51, observe="axis", guard=False,

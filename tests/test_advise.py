@@ -255,12 +255,8 @@ def test_advice_on_drawn_scenes_costs_little_more_than_the_best_and_meets_it_on_
         scene = random_scene(rng, number)
         for accuracy in (1e-3, 1e-6, 1e-9):
             advice = symtop.recommend(scene, accuracy=accuracy)
-            if advice.integrator is None:
-                successes.append(False)
-                continue
-            good = measured(scene, advice) <= accuracy
-            assert good or advice.confidence != "checked", advice
-            successes.append(good)
+            successes.append(advice.integrator is not None and measured(scene, advice) <= accuracy)
+            assert successes[-1] or advice.confidence != "checked", advice
     assert np.mean(successes) >= 0.97
     monkeypatch.setitem(settings.MOST_EVALUATIONS, "compiled", candidates.LONGEST)
     rows = candidates.excess(16)

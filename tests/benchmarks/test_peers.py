@@ -25,15 +25,7 @@ from symtop.runner import run as runner
 from tests.commands import ROOT
 
 DOUBLES = ctypes.POINTER(ctypes.c_double)
-
-
-@pytest.fixture(scope="module")
-def scene():
-    return symtop.scene("spheroid")
-
-
-def _pointer(row):
-    return row.ctypes.data_as(DOUBLES)
+SPHEROID = symtop.scene("spheroid")
 
 
 @cfunc(types.voidptr(types.voidptr))
@@ -44,9 +36,7 @@ def _numbers_of(vector):
 class Core:
     """In place of SUNDIALS: an N_Vector is a struct that holds the address of its numbers and no more."""
 
-    def __init__(self):
-        kind = ctypes.CFUNCTYPE(DOUBLES, ctypes.c_void_p)
-        self.N_VGetArrayPointer = kind(_numbers_of.address)
+    N_VGetArrayPointer = ctypes.CFUNCTYPE(DOUBLES, ctypes.c_void_p)(_numbers_of.address)
 
 
 def _vector_field(function, state):
@@ -56,22 +46,21 @@ def _vector_field(function, state):
     return numbers[1]
 
 
-def test_all_right_hand_sides_are_the_kernels_own_and_split_halves_add_up(scene):
-    y = common.start_of(scene.top, scene.start)
-    par, _ = common.on_axis(scene.top, scene.start)
+def test_all_right_hand_sides_are_the_kernels_own_and_split_halves_add_up():
+    top, start = SPHEROID.top, SPHEROID.start
+    y, (par, _) = common.start_of(top, start), common.on_axis(top, start)
     expected = np.array(field_axis(par, tuple(y)))
     filled, through_c = np.empty(6), np.empty(6)
-    common.filling_field(scene.top)(0.0, y, filled)
-    callbacks.ode_field(scene.top).ctypes(None, _pointer(through_c), _pointer(y), 0.0)
-    through_vectors = _vector_field(callbacks.vector_field(scene.top, Core()), y)
-    returned = [field(scene.top)(0.0, y) for field in (common.python_field, common.compiled_field)]
+    common.filling_field(top)(0.0, y, filled)
+    callbacks.ode_field(top).ctypes(None, *(row.ctypes.data_as(DOUBLES) for row in (through_c, y)), 0.0)
+    through_vectors = _vector_field(callbacks.vector_field(top, Core()), y)
+    returned = [field(top)(0.0, y) for field in (common.python_field, common.compiled_field)]
     for found in (*returned, filled, through_c, through_vectors):
         assert np.allclose(found, expected, rtol=1e-15, atol=0.0)
-    par, state = with_rates(scene.top, scene.start)
+    par, state = with_rates(top, start)
     expected = field_angles(par, state)
     for field in (common.python_angles, common.compiled_angles):
-        assert np.allclose(field(scene.top)(0.0, np.array(state)), expected, rtol=1e-14, atol=0.0)
-    top, start = scene.top, scene.start
+        assert np.allclose(field(top)(0.0, np.array(state)), expected, rtol=1e-14, atol=0.0)
     theta_dot, phi_dot, psi_dot, theta_ddot, *_ = expected
     expected = np.array([theta_dot, top.I1 * theta_ddot, phi_dot, psi_dot])
     y = np.array([start.theta, top.I1 * start.theta_dot, start.phi, start.psi])
@@ -82,8 +71,8 @@ def test_all_right_hand_sides_are_the_kernels_own_and_split_halves_add_up(scene)
     assert np.array_equal(moved, halves[0])  # the force depends on theta alone: H is separable
 
 
-def test_the_axis_as_a_particle_has_the_acceleration_of_the_axis(scene):
-    top, start = scene.top, scene.start
+def test_the_axis_as_a_particle_has_the_acceleration_of_the_axis():
+    top, start = SPHEROID.top, SPHEROID.start
     y = common.start_of(top, start)
     e, momentum = y[:3], y[3:]
     velocity, torque = np.cross(momentum, e) / top.I1, top.mgl * np.array([-e[1], e[0], 0.0])
@@ -97,15 +86,15 @@ def test_the_axis_as_a_particle_has_the_acceleration_of_the_axis(scene):
 
 @pytest.mark.parametrize(("name", "setting"), [
     ("vern9-fixed", 0.1), ("rk4", 0.005), ("taylor", 1e-12), ("rk45-compiled", 1e-10)])  # fmt: skip
-def test_the_kernel_alone_ends_where_simulate_ends(scene, name, setting):
+def test_the_kernel_alone_ends_where_simulate_ends(name, setting):
     peer = peers.Peer(measure.OURS, symtop.integrator(name), own.LANGUAGE)
-    whole, loop = measure.ready(scene, peer, setting)
+    whole, loop = measure.ready(SPHEROID, peer, setting)
     data = whole()
     dense = measure.shown_by(peer) == common.DENSE
     assert data["time"].size == (measure.SHOWN if dense else min(data.attrs["steps"] + 1, measure.SHOWN))
-    truth = symtop.reference(scene, data["time"].values[-1:])["axis"].values
+    truth = symtop.reference(SPHEROID, data["time"].values[-1:])["axis"].values
     there = float(common.charts.axis_distance(data["axis"].values[-1:], truth)[0])
-    assert measure.end_error(scene, peer, loop) == pytest.approx(there, rel=0.3, abs=1e-13)
+    assert measure.end_error(SPHEROID, peer, loop) == pytest.approx(there, rel=0.3, abs=1e-13)
 
 
 def _scipy(row):
@@ -115,25 +104,25 @@ def _scipy(row):
 @pytest.mark.parametrize("row", [
     "scipy-dop853-python[axis]", "scipy-dop853-numba[angles]", "scipy-lsoda-numba[axis]", "scipy-odeint-numba[axis]",
 ])  # fmt: skip
-def test_both_calls_of_scipy_end_at_the_truth(scene, row):
+def test_both_calls_of_scipy_end_at_the_truth(row):
     peer = _scipy(row)
-    whole, loop = measure.ready(scene, peer, 1e-11)
+    whole, loop = measure.ready(SPHEROID, peer, 1e-11)
     assert len(whole().states) == measure.SHOWN
-    assert measure.end_error(scene, peer, loop) < 1e-7
+    assert measure.end_error(SPHEROID, peer, loop) < 1e-7
 
 
-def test_an_inner_loop_that_does_not_start_anew_is_seen(scene):
+def test_an_inner_loop_that_does_not_start_anew_is_seen():
     """CVODE and others keep their state: a second call that went on from the first would be 20 nutations on."""
-    peer, horizon = _scipy("scipy-dop853-python[axis]"), measure.PERIODS * scene.nutation_period
-    plan, _ = make_plan(scene, peer.method, tolerance=1e-9, horizon=horizon, samples=2)
-    state = [common.start_of(scene.top, scene.start)]
+    peer, horizon = _scipy("scipy-dop853-python[axis]"), measure.PERIODS * SPHEROID.nutation_period
+    plan, _ = make_plan(SPHEROID, peer.method, tolerance=1e-9, horizon=horizon, samples=2)
+    state = [common.start_of(SPHEROID.top, SPHEROID.start)]
 
     def call():
-        field = common.python_field(scene.top)
+        field = common.python_field(SPHEROID.top)
         state[0] = solve_ivp(field, (0.0, plan.horizon), state[0], rtol=1e-9, atol=1e-9).y[:, -1]
         return state[0]
 
-    assert measure.end_error(scene, peer, common.Inner(call, lambda last: last)) > 1e-2
+    assert measure.end_error(SPHEROID, peer, common.Inner(call, lambda last: last)) > 1e-2
 
 
 def test_the_search_finds_the_loosest_setting_and_an_absent_peer_is_skipped(monkeypatch):

@@ -1,5 +1,6 @@
 """The command line: what it prints and its exit codes, that it starts fast, and `doctor`, which finds each fault."""
 
+import functools
 import importlib.metadata
 import importlib.util
 import json
@@ -10,6 +11,7 @@ import signal
 import subprocess
 import sys
 import time
+import timeit
 from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import Mock
@@ -121,12 +123,8 @@ def test_help_starts_fast():
     """At most three times what importing click costs, in one run."""
 
     def best(*command):
-        times = []
-        for _ in range(3):
-            start = time.perf_counter()
-            subprocess.run(command, check=True, capture_output=True)
-            times.append(time.perf_counter() - start)
-        return min(times)
+        call = functools.partial(subprocess.run, command, check=True, capture_output=True)
+        return min(timeit.repeat(call, number=1, repeat=3))
 
     bare = best(sys.executable, "-c", "import click")
     assert best(sys.executable, "-m", "symtop.cli", "--help") < 3.0 * bare + 0.05
@@ -189,32 +187,23 @@ def ending(before="", code="3"):
     return subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
 
 
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")
-def test_what_cannot_be_printed_is_told_in_a_sentence():
-    with Path("/dev/full").open("w") as full:
-        result = subprocess.run([sys.executable, "-m", "symtop.cli", "scenes"], stdout=full, stderr=subprocess.PIPE,
-                              text=True, timeout=60, check=False)  # fmt: skip
-    assert result.returncode == 2
-    assert result.stderr == "symtop: cannot write what there is to say: No space left on device\n"
-
-
-@pytest.mark.skipif(not Path("/bin/bash").exists(), reason="a shell with pipefail")
-@pytest.mark.parametrize(("words", "code"), [
-    ("scenes 1>&-", 0), ("run nowhere 0<&- 1>&- 2>&-", 2), ("integrators | true", 141), ("integrators | cat", 0),
-    ("run nowhere | true", 2),
+@pytest.mark.parametrize(("line", "code", "says"), [
+    ("symtop scenes 1>&-", 0, ""), ("symtop run nowhere 0<&- 1>&- 2>&-", 2, ""), ("symtop integrators | true", 141, ""),
+    ("symtop integrators | cat", 0, ""), ("symtop run nowhere | true", 2, ""),
+    pytest.param("symtop scenes > /dev/full", 2, "symtop: cannot write what there is to say: No space left on device\n",
+                 marks=pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")),
+    ("mkdir gone; cd gone; rmdir ../gone; symtop run spheroid exact -o run.nc", 2, ".*no longer there.*\n"),
 ])  # fmt: skip
-def test_a_stream_that_was_closed_or_a_reader_that_leaves_is_no_case_that_has_failed(words, code):
+def test_a_stream_or_a_folder_that_is_gone_or_a_full_disk_is_no_case_that_has_failed(line, code, says, tmp_path):
     """Python has None in the place of a stream that was closed; a refusal (the control) is one all the same."""
-    command = ["/bin/bash", "-c", f"set -o pipefail; {sys.executable} -m symtop.cli {words}"]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
+    shell = ["/bin/bash", "-o", "pipefail"] if "|" in line else ["/bin/sh"]
+    if not Path(shell[0]).exists():
+        pytest.skip(f"there is no {shell[0]}")
+    command = [*shell, "-c", line.replace("symtop", f"{sys.executable} -m symtop.cli")]
+    result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
     assert result.returncode == code, result.stderr
     assert "Traceback" not in result.stderr
-
-
-def test_a_command_in_a_folder_that_was_removed_says_so(tmp_path):
-    line = f"cd {tmp_path}; rmdir {tmp_path}; exec {sys.executable} -m symtop.cli run spheroid exact -o run.nc"
-    result = subprocess.run(["/bin/sh", "-c", line], capture_output=True, text=True, timeout=60, check=False)
-    assert (result.returncode, result.stderr.count("\n"), "no longer there" in result.stderr) == (2, 1, True)
+    assert not says or re.fullmatch(says, result.stderr), result.stderr
 
 
 def test_a_command_ends_with_its_code_takes_nothing_apart_and_waits_for_threads():

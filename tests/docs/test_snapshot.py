@@ -1,6 +1,5 @@
 """The pages say what the code says, and the snapshot holds the report; what studies write is not tracked."""
 
-import importlib.util
 import json
 import re
 import subprocess
@@ -8,16 +7,10 @@ import subprocess
 import pytest
 
 import symtop
+from docs.generator import snapshot as taker
 from symtop.run.ensemble.chunks import IN_LANES, IN_PYTHON, IN_TURN, Job
 from tests.commands import call
 from tests.pages import ROOT, pages
-
-
-def _taker():
-    spec = importlib.util.spec_from_file_location("snapshot", ROOT / "docs" / "generator" / "snapshot.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 @pytest.fixture
@@ -32,9 +25,9 @@ def results(tmp_path):
 def test_a_report_that_is_not_whole_is_not_taken(results, tmp_path):
     (results / "figures" / "a.png").unlink()
     with pytest.raises(SystemExit, match=r"figures of the report are missing: a\.png"):
-        _taker().take(results, tmp_path / "snapshot")
+        taker.take(results, tmp_path / "snapshot")
     with pytest.raises(SystemExit, match="run make studies first"):
-        _taker().take(tmp_path, tmp_path / "snapshot")
+        taker.take(tmp_path, tmp_path / "snapshot")
     assert not (tmp_path / "snapshot").exists()
 
 
@@ -67,14 +60,14 @@ H
 
 
 def test_each_question_becomes_a_page_and_links_lead_there(tmp_path):
-    pages = _taker().parted(REPORT)
+    pages = taker.parted(REPORT)
     assert list(pages) == ["report.md", "a-few.md", "b.md"]
     assert pages["report.md"].endswith("[A few](a-few.md) · [B](b.md)\n\n## Trust\n\nSee [how](b.md).\n\n")
     links = "[how](b.md), [trust](report.md#trust)"
     assert pages["a-few.md"] == f"# Why?\n\nW {links}\n\n## Sub\n\n[All questions](report.md)\n"
     for file, text in pages.items():
         (tmp_path / file).write_text(text)
-    again = _taker().whole(tmp_path)
+    again = taker.whole(tmp_path)
     assert re.findall("^##+ .+", again, re.MULTILINE) == ["## Trust", "## Why?", "### Sub", "## How?"]
     assert "W [how](#how)" in again
 
@@ -83,11 +76,11 @@ def test_a_whole_report_is_taken_without_links_to_what_is_not_tracked(results, t
     snapshot = tmp_path / "snapshot"
     (snapshot / "figures").mkdir(parents=True)
     (snapshot / "figures" / "old.png").touch()
-    assert _taker().take(results, snapshot) == ["a.png", "b.gif"]
+    assert taker.take(results, snapshot) == ["a.png", "b.gif"]
     assert sorted(path.name for path in (snapshot / "figures").iterdir()) == ["a.png", "b.gif"]
     assert (snapshot / "report.md").read_text() == (results / "report.md").read_text()
     (results / "report.md").write_text(REPORT)
-    _taker().take(results, tmp_path / "snapshot")
+    taker.take(results, tmp_path / "snapshot")
     text = (tmp_path / "snapshot" / "report.md").read_text()
     assert "All: table, CSV.\n\nData: a.nc.\n" in text
     assert "![A](figures/a.png)" in text
@@ -95,16 +88,16 @@ def test_a_whole_report_is_taken_without_links_to_what_is_not_tracked(results, t
 
 def test_the_stored_snapshot_is_whole_and_pages_quote_what_it_says():
     folder = ROOT / "docs" / "snapshot"
-    report = _taker().whole(folder)
-    assert set(_taker().SHOWN.findall(report)) == {path.name for path in (folder / "figures").iterdir()}
-    for (name, begin), said in _taker().quoted(report).items():
+    report = taker.whole(folder)
+    assert set(taker.SHOWN.findall(report)) == {path.name for path in (folder / "figures").iterdir()}
+    for (name, begin), said in taker.quoted(report).items():
         page = (ROOT / name).read_text(encoding="utf-8")
-        assert _taker().quote(said, page, begin) == page, name
+        assert taker.quote(said, page, begin) == page, name
 
 
 @pytest.mark.parametrize("name", ["bench", "peers"])
 def test_what_a_page_says_of_a_benchmark_is_what_that_has_stored(name, tmp_path):
-    taker, page = _taker(), (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
+    page = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
     said = taker.benchmark(name, ROOT / "results")
     assert taker.quote(said, page, taker.STORED_BY[name]) == page
     stored = (ROOT / "results" / f"{name}.json").read_text(encoding="utf-8")

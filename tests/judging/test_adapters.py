@@ -396,10 +396,7 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset(monkeypat
 
 EXAMPLES = ROOT / "studies" / "examples"
 STEPS = EXAMPLES / "judged_steps.py"
-
-
-def run_judge(*arguments):
-    return answer("judge", *arguments, "--quick")
+run_judge = partial(answer, "judge", "--quick")
 
 
 def test_a_file_with_a_step_says_what_it_is_and_writes_it(tmp_path, monkeypatch, only):

@@ -591,10 +591,8 @@ STEP = SPHEROID.nutation_period / 118.02
 def bytes_a_step(method: Integrator) -> float:
     """Bytes that a run keeps for each further step, by Python's own count of what NumPy and Python allocate."""
     few = 4000 if method.implementation == "compiled" else 200
-    control = {"step_size": STEP} if method.control == "step_size" else {}
-    if method.control == "tolerance" and method.default_tolerance is None:
-        control = {"tolerance": 1e-6}
-    plan = {"samples": 11, "observe": "axis", "guard": False} | control
+    control = {"step_size": STEP, "tolerance": method.default_tolerance or 1e-6}[method.control]
+    plan = {"samples": 11, "observe": "axis", "guard": False, method.control: control}
     symtop.simulate(SPHEROID, method, horizon=STEP, **plan)  # numba takes five times as long where memory is traced
     peaks, steps = [], []
     for count in (few, 6 * few, few, 6 * few):  # what is made once, or by another thread, is not in both
@@ -618,8 +616,7 @@ def test_memory_that_grows_with_the_steps_is_seen():
     good, store = symtop.integrator("stormer-verlet"), []
 
     def hoard(top, start, plan):
-        store.clear()
-        store.append(np.zeros(4 * round(plan.horizon / plan.step_size)))
+        store[:] = [np.zeros(4 * round(plan.horizon / plan.step_size))]
         return good.solvers["angles"](top, start, plan)
 
     assert 16.0 < bytes_a_step(dataclasses.replace(good, solvers={"angles": hoard})) < 48.0

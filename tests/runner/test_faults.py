@@ -74,8 +74,7 @@ def test_a_real_limit_on_the_size_of_files(tmp_path):
     succeeded(symtop("study", PROBE, "--results", tmp_path / "warm"))  # kernels are cached now
     code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192)); "
     code += "from symtop.cli.main import main; sys.argv[0] = 'symtop'; main()"
-    words = ["study", str(PROBE), "--results", str(tmp_path / "small")]
-    command = [sys.executable, "-c", code, *words]
+    command = [sys.executable, "-c", code, "study", str(PROBE), "--results", str(tmp_path / "small")]
     result = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False)
     assert result.returncode == 2, result.stderr
     assert sentences(result.stderr)[0].startswith("symtop: cannot write")
