@@ -38,7 +38,7 @@ compare goldstein stormer-verlet midpoint rk4 dop853-compiled taylor
 long spheroid stormer-verlet --steps 1e5
 run spheroid chin-4a[axis] --step-size 0.01
 run spheroid dop853-compiled-fixed[axis] --step-size 0.01
-ensemble strang --members 2000 --per-nutation 100 --nutations 10 --output runs.nc
+ensemble strang --members 10000 --per-nutation 100 --nutations 10 --output runs.nc
 """
 
 

@@ -80,8 +80,8 @@ def ensemble(
 
     Work is done on `threads` threads, by default one per core, or by the workers of the dask cluster at the address
     `scheduler`. The attribute ``execution`` says how members are run: in "lanes", 32 side by side, if the method
-    allows. They are run one after another if they make less than a million steps and lanes are not compiled yet. With a
-    `path`, members are written to that netCDF file as they are computed, in memory that does not grow with
+    allows. They are run one after another if they make less than five million steps and lanes are not compiled yet.
+    With a `path`, members are written to that netCDF file as they are computed, in memory that does not grow with
     `samples` (0.4 kB a member). The same call resumes an interrupted one to the same file; the dataset is lazy. `added`
     is called with the dataset; the variables (and in a file the attributes) that it returns are added, to a file before
     it is moved to `path`.
