@@ -12,6 +12,8 @@ from matplotlib.text import Text
 from PIL import Image
 from symtop_studies.carry_over.figures import MARKS
 from symtop_studies.claims.figures import SYMBOLS
+from symtop_studies.stability.figures import OUTCOMES
+from symtop_studies.stability.many_verdicts import EARLY
 
 import symtop
 from symtop.core import netcdf
@@ -75,16 +77,19 @@ def shows(drawn, groups, variant) -> bool:
     return bool(np.isin(drawn[drawn > figures.SMALLEST], np.abs(np.concatenate(numbers))).all())
 
 
-@pytest.mark.parametrize("name", ["convergence", "drift", "reduction", "oscillators", "notebook"])
+@pytest.mark.parametrize("name", ["convergence", "drift", "reduction", "oscillators", "notebook", "stability"])
 def test_a_line_named_after_a_variant_shows_its_numbers_and_no_others(name, quick_results):
     data = netcdf.read_any(quick_results / f"{name}.nc")
     groups = [one for one in netcdf.groups(data).values() if "variant" in one.coords]
     known = {str(variant) for one in groups for variant in one["variant"].values}
-    lines = (line for one in runner.load(name).pictures(data) for axis in one.figure.axes for line in axis.lines)
-    named = [(np.abs(line.get_ydata()), line.get_label().rpartition(", ")[2]) for line in lines]
-    assert [variant for values, variant in named if variant in known and not shows(values, groups, variant)] == []
-    large = [(values, variant) for values, variant in named if variant in known and values.max() > 1e-14]
-    assert large  # rounding is often the same
+    axes = [axis for one in runner.load(name).pictures(data) for axis in one.figure.axes]
+    drawn = [(axis.get_ylabel(), line) for axis in axes for line in axis.lines]
+    named = [(np.abs(line.get_xdata() if "lambda" in label else line.get_ydata()),  # scaled times: see the other side
+              line.get_label().rpartition(", ")[2]) for label, line in drawn]  # fmt: skip
+    named = [(values, variant) for values, variant in named if variant in known]
+    assert [variant for values, variant in named if not shows(values, groups, variant)] == []
+    large = [(values, variant) for values, variant in named if np.unique(values[values > 1e-14]).size > 1]
+    assert large  # rounding, or a bound that many reach, is often the same
     assert not any(shows(values, groups, min(known - {variant})) for values, variant in large)
 
 
@@ -124,6 +129,18 @@ def test_counts_of_the_ledger_and_orders_beside_lines_are_those_of_tables(quick_
         for rule, _, order in (text.get_text().partition(": order ") for text in axis.texts):
             at = float(damping.partition(",")[0]), rule.replace(" ", "-")
             assert float(order) == round(orders.loc[at, column], 1)
+
+
+def test_cells_of_the_atlas_have_the_shares_of_its_table(quick_results):
+    tables, axes = tables_and_axes("stability", quick_results)
+    maps, table = [axis for axis in axes["atlas"] if axis.images], tables["atlas"].set_index("variant")
+    assert len(maps) >= 9
+    for axis in maps:
+        name, _, share = axis.get_title().replace("\n", "").partition(" accurate ")
+        cells, row = np.array(list(OUTCOMES))[np.asarray(axis.images[0].get_array())], table.loc[name]
+        assert 100.0 * np.char.startswith(cells, "accurate").mean() == pytest.approx(row["accurate (%)"])
+        assert 100.0 * (cells == EARLY).mean() == pytest.approx(row["ended early (%)"])
+        assert share == f"{row['accurate (%)']:.0f} %"
 
 
 def test_the_safe_choices_for_any_body_are_drawn_at_their_times(quick_results):
