@@ -153,6 +153,9 @@ def test_the_families_are_what_they_say_and_limits_end_at_verlets_and_rk4s():
     limit, third = family_limits("cusp", integrator("stormer-verlet"), 30.0, 2.0)
     assert limit == pytest.approx(1.0 / math.pi, rel=1e-3)
     assert third == pytest.approx(math.sqrt(3.0) / (2.0 * math.pi), rel=1e-3)
+    one = {"parameters": [30.0], "ladder": [0.1, 2.0], "periods": 1.0, "limits": [30.0]}
+    table = map_table("cusp", integrator("stormer-verlet"), one)
+    assert (table["linear_limit"].item(), table["third_turn"].item()) == (limit, third)
     assert math.isnan(family_limits("cusp", integrator("midpoint"), 1.5, 2.0)[0])
     third = family_limits("cusp", integrator("gauss-2"), 30.0, 2.0)[1]
     assert third == pytest.approx(math.sqrt(3.0) / math.pi, rel=1e-2)  # 2 atan(h omega/2), as the midpoint rule has

@@ -39,7 +39,7 @@ def one_pass(scene_, times, states, momenta, followed=True):
     ("stormer-verlet", "angles", 0.03, "accurate"), ("stormer-verlet", "angles", 0.1, "bounded_but_wrong"),
     ("rk4", "axis", 0.1, "drifting"), ("rk4", "axis", 0.5, "wrong_regime"), ("rk4", "attitude", 0.03, "accurate"),
     ("commutator-free-4", "attitude", 0.3, "wrong_regime"), ("rk4", "angles", 0.15, "drifting"),
-    ("rk4", "angles", 0.1, "wrong"),
+    ("rk4", "angles", 0.1, "wrong"), ("symplectic-euler", "angles", 0.25, "wrong_regime"),
 ])  # fmt: skip
 def test_one_pass_says_what_judgement_says(name, chart, step, word):
     cusp = scene("cusp")
