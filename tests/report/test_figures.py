@@ -12,6 +12,7 @@ from matplotlib.text import Text
 from PIL import Image
 from symtop_studies.carry_over.figures import MARKS
 from symtop_studies.claims.figures import SYMBOLS
+from symtop_studies.engines.facts import ROUNDING
 from symtop_studies.stability.figures import OUTCOMES
 from symtop_studies.stability.many_verdicts import EARLY
 
@@ -143,13 +144,18 @@ def test_cells_of_the_atlas_have_the_shares_of_its_table(quick_results):
         assert share == f"{row['accurate (%)']:.0f} %"
 
 
-def test_the_safe_choices_for_any_body_are_drawn_at_their_times(quick_results):
-    tables, axes = tables_and_axes("cost", quick_results)
-    asked = tables["winners"].query("tops == 'natural' and nutations == 10.0 and needs in ('derivative', 'any body')")
-    points = np.concatenate([line.get_xydata() for line in axes["accuracy"][0].lines])
-    safe = asked[["time (us)", "error"]].dropna().to_numpy()
-    assert len(safe) >= 4
-    assert [np.isclose(points, one, rtol=1e-12, atol=0.0).all(axis=1).any() for one in safe] == [True] * len(safe)
+@pytest.mark.parametrize(("name", "picture", "table", "columns", "rows"), [
+    ("cost", "accuracy", "winners", ["time (us)", "error"],
+     "tops == 'natural' and nutations == 10.0 and needs in ('derivative', 'any body')"),
+    ("engines", "error", "maps", ["at steps a nutation", "least error (rad)"],
+     f"`least error (rad)` >= {ROUNDING}"),
+])  # fmt: skip
+def test_numbers_of_a_table_are_points_of_the_figure(name, picture, table, columns, rows, quick_results):
+    tables, axes = tables_and_axes(name, quick_results)
+    shown = tables[table].query(rows)[columns].dropna().to_numpy()
+    lines = [line.get_xydata() for line in axes[picture][0].lines if len(line.get_xdata())]
+    near = [np.isclose(np.concatenate(lines), one, rtol=1e-12, atol=0.0).all(axis=1).any() for one in shown]
+    assert (len(near) >= 4, all(near)) == (True, True)
 
 
 def test_a_figure_that_cannot_be_read_is_found(monkeypatch):
