@@ -35,6 +35,20 @@ def test_the_neighbours_have_order_two(name):
         assert power_law(1.0 / counts, errors).slope == pytest.approx(2.0, abs=0.1)
 
 
+@pytest.mark.parametrize("name", QUARTICS)
+def test_the_midpoint_rule_and_stormer_verlet_solve_their_equations(name):
+    """x'' over three positions: the force in the middle one, or the mean of those in the middles of both steps."""
+    oscillator = oscillator_of(name)
+    h = oscillator.period / 20.0
+    paths = {method: discrete_path(oscillator, method, h, 30) for method in ("midpoint", "stormer-verlet")}
+    for method, x in paths.items():
+        middle, here = (oscillator.slope(np.abs(y) ** 2) * y for y in (0.5 * (x[1:] + x[:-1]), x[1:-1]))
+        forces = {"midpoint": 0.5 * (middle[1:] + middle[:-1]), "stormer-verlet": here}
+        gaps = {rule: np.abs(np.diff(x, 2) - h * h * force).max() for rule, force in forces.items()}
+        assert gaps.pop(method) < 2e-14 * np.abs(x).max()
+        assert max(gaps.values()) > 1e-6
+
+
 @pytest.mark.parametrize("name", PLAIN)
 @pytest.mark.parametrize("steps", [30.0, 4.37, 2.1])
 def test_the_motion_solves_the_discrete_euler_lagrange_equations(name, steps):
