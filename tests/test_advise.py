@@ -90,6 +90,12 @@ def test_a_flat_error_is_rounding_of_steps_and_may_be_a_stair_of_tolerances():
     assert settings.seek(lambda h: (3e-11, 1.0 / h), 0.1, 1e-12, (1e-9, 1.0), 4.0) == settings.STOPPED
 
 
+def test_a_search_interpolates_where_the_error_is_a_power_and_halves_where_it_is_not():
+    assert settings.between(1e-3, 1e-9, 1e-1, 1e-3, 1e-7) == pytest.approx(1e-3 * 100.0 ** (1.0 / 3.0))
+    for low, high in ((0.0, 1e-3), (1e-9, math.inf), (1e-11, 1e-4)):
+        assert settings.between(1e-3, low, 1e-1, high, 1e-7) == pytest.approx(1e-2)
+
+
 def test_what_nobody_reaches_is_said_and_an_accuracy_beyond_pi_is_of_what_is_no_angle(monkeypatch):
     advice = symtop.recommend("spheroid", accuracy=1e-17, horizon=8.0)
     assert (advice.integrator, advice.confidence) == (None, "none")
