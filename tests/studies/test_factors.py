@@ -74,6 +74,7 @@ def test_a_cell_is_named_once_and_taylor_in_angles_solves_the_same_equations():
     compiled = {cell.scheme for cell in every if cell.language == COMPILED}
     assert {scheme for members in grid.FAMILIES.values() for scheme in members} == compiled == schemes - {"DOP853"}
     hy = pytest.importorskip("heyoka")
+    assert {cell.chart for cell in every if cell.scheme == "Taylor"} == {*FORMULATIONS}
     from symtop.methods.taylor.heyoka import equations
 
     scene = symtop.scene("goldstein")

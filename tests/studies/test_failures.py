@@ -262,6 +262,10 @@ def test_solvers_of_one_iteration_drift_and_tight_ones_leave_the_method():
         assert textbook_midpoint(scene, 0.1, 100_000, tolerance) == pytest.approx(3.434e-4, rel=1e-2)
     midpoint = rule_of(integrator("midpoint"))
     measured = [solver_sweep(midpoint, scene, 0.1, 20_000, tolerance) for tolerance in (math.inf, 1e-4, 1e-8)]
+    for steps in (1, 7):  # both solvers make these steps, and no other
+        tight = solver_sweep(midpoint, scene, 0.1, steps, 1e-15).energy
+        assert textbook_midpoint(scene, 0.1, steps, 1e-15) == pytest.approx(tight, rel=1e-6)
+        assert tight > 1e-7
     assert measured[0].iterations == 1.0
     assert measured[0].momentum > 1e-9 > measured[1].momentum > measured[2].momentum
     assert measured[2].momentum < 1e-14
