@@ -113,7 +113,7 @@ def test_points_of_carry_over_are_numbers_of_its_tables(quick_results):
             assert sorted(dots.get(place, [])) == sorted(part[family].fillna(math.inf)), family
 
 
-def test_counts_of_the_ledger_and_orders_beside_lines_are_those_of_tables(quick_results):
+def test_counts_of_the_ledger_are_those_of_its_table(quick_results):
     tables, axes = tables_and_axes("claims", quick_results)
     names = [name for name in FAMILIES if name in tables["ledger"]["family"].values]
     counts = tables["ledger"].value_counts(["family", "claim", "verdict"]).to_dict()
@@ -122,6 +122,9 @@ def test_counts_of_the_ledger_and_orders_beside_lines_are_those_of_tables(quick_
     drawn = {(names[column], claim_name(CLAIMS[line]), verdicts[one[-1]]): int(one[:-1])
              for column, line, words in texts if column < len(names) for one in words}  # fmt: skip
     assert drawn == counts
+
+
+def test_orders_beside_the_lines_of_oscillators_are_those_of_the_table(quick_results):
     tables, axes = tables_and_axes("oscillators", quick_results)
     orders = tables["damped"].set_index(["b", "rule"])
     for axis in axes["orders"]:

@@ -348,7 +348,7 @@ def groups(chosen: Whole, steps: Whole, most: int) -> list[Whole]:
 LEAST = 5  # members alone take as long as a block: 32 lanes, each in about a seventh of the time of a member alone
 ALIKE = 1.1  # numbers of steps within this factor of each other are alike, where the step iterates
 BATCH = 128 * W  # members that are prepared at a time: 4 MB for the longest table
-FEW = 5_000_000  # steps, which take members alone 0.2 to 3 s, where kernels in lanes take 1 to 10 s to compile
+FEW = 5_000_000  # steps, which take members alone 0.2 to 3 s, where kernels in lanes take 1 to 14 s to compile
 
 
 @dataclass
