@@ -59,7 +59,8 @@ def judge(
                     rates in body axes, inertia the three principal moments, torque(q)
                     a function that returns the torque in body axes
     ./my.so         void step(double *y, double h, const double *par, long n)
-    "./engine -x"   with --form program: a line of numbers in, states out
+    "./engine -x"   with --form program: a line of numbers in, states out; with --form
+                    server it is started once, and answers line after line
     run.csv         a trajectory without a method: time and states (see symtop.judging.judge_step)
 
     Without a claim it says what the method is. The exit code is 1 if a claim is refuted.

@@ -68,6 +68,7 @@ PLUGIN = 600.0  # seconds for a stage of a registered integrator
 VERDICT, QUICK_VERDICT = (45.0, 120.0, 15.0), (12.0, 40.0, 6.0)
 SHORTER = 4.0  # factor by which the runs of a stage that took too long are shorter when it is repeated
 SLOW = "; make a step faster", "; judge it without --quick, or make a step faster"  # the second with --quick
+STARTS = ", or if it starts slowly make it a server"  # for a program
 
 
 def judge(
@@ -90,6 +91,7 @@ def judge(
         jax       the same on batches of JAX arrays, compiled by jax.jit
         shared    "FILE.so" or "FILE.so:NAME": void step(double *y, double h, const double *par, long n)
         program   a command that reads one line and writes states (see `symtop.judging.adapters.external`)
+        server    the same, started once: it answers line after line, each answer ended by an empty line
 
     or states without a method: a CSV or netCDF file, a Dataset or a mapping (`symtop.judging.judge_step`), whose
     errors, drift and laws of growth are found.
@@ -148,7 +150,8 @@ def judge(
         facts = stepper.name, stepper.chart, stepper.implementation, subject.seconds_a_step
         about = About(*facts, seed, problem.time_scale())
         listen(about)
-        for finding in _findings(subject, process, began, QUICK_VERDICT if quick else VERDICT):
+        slow, limits = SLOW[quick] + STARTS * (form == "program"), QUICK_VERDICT if quick else VERDICT
+        for finding in _findings(subject, process, began, limits, slow):
             listen(finding)
             findings.append(finding)
     follow = frozenset(one.claim for one in findings if one.declared and implied.get(one.claim))
@@ -308,7 +311,7 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
 
 
 def _findings(
-    subject: Subject, process: Process, began: float, limits: tuple[float, float, float]
+    subject: Subject, process: Process, began: float, limits: tuple[float, float, float], slow: str = ""
 ) -> Iterator[Finding]:
     """The findings of all stages. Claims of a stage whose process was lost are undecided; of all, if it was "calls"."""
     most, together, least = limits
@@ -326,7 +329,7 @@ def _findings(
                 break
             current = replace(subject, seconds_a_step=SHORTER * max(subject.seconds_a_step, process.late))
         first = "calls" in stage.claims
-        process.lost += SLOW[subject.quick] if process.late else ""
+        process.lost += slow if process.late else ""
         if process.lost:
             claims = tuple(claim for one in (todo if first else [stage]) for claim in one.claims)
             findings = unmeasured(claims, subject.method, process.lost)

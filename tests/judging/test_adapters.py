@@ -1,5 +1,6 @@
 """Adapters: what fits is judged; what hangs, crashes, raises or keeps something is reported and stops nothing else."""
 
+import contextlib
 import itertools
 import os
 import re
@@ -19,6 +20,7 @@ from scipy.spatial.transform import Rotation
 
 import symtop
 from symtop.judging import judge_step
+from symtop.judging.adapters import external
 from symtop.judging.adapters.adapter import heartbeat, integrator, label_of
 from symtop.judging.adapters.python_step import PythonStep, RotationStep, SeparableStep
 from symtop.judging.battery import stages
@@ -166,6 +168,35 @@ def test_a_slow_program_has_the_time_that_earlier_runs_took_also_after_a_short_o
     fresh = open_target(program(tmp_path, body), "program", "axis")
     with pytest.raises(symtop.SymtopError, match="had not ended 1 s after it was asked for 200 steps"):  # the control
         fresh.march(SPHEROID.top, None, np.full(6, 5.0), 0.1, np.array([0, 200]))
+
+
+SERVES = """import sys
+print('started', file=open({mark!r}, 'a'))
+for numbers in map(str.split, sys.stdin):
+    n, stride = map(int, numbers[4:6])
+    for k in range(0, n + 1, stride): print(*numbers[6:12])
+    {body}
+"""
+
+
+@pytest.mark.parametrize(("body", "words", "starts"), [
+    ("print(flush=True)", "", 1), (r"print('\r', flush=True)", "", 1),  # one that ends lines as Windows does
+    ("break", "must answer one line after another, and ended after one: its form is program", 2),
+    ("sys.exit('no licence')", "ended with code 1: no licence", 2),
+    ("sys.stdout.flush()", "had not ended its answer with an empty line 2 s after it was asked for 3 steps of 0.1", 2),
+])  # fmt: skip
+def test_a_server_is_started_once_and_again_only_if_it_fails(tmp_path, body, words, starts, monkeypatch):
+    monkeypatch.setattr(heartbeat, "patience", 2.0 if "had not" in words else 20.0)
+    monkeypatch.setattr(external.Server, "starting", 0.0)
+    mark, file = tmp_path / "starts", tmp_path / "engine.py"
+    file.write_text(SERVES.format(mark=str(mark), body=body))
+    stepper = open_target(f"{sys.executable} {file}", "server", "axis")
+    for y in (5.0, 6.0):
+        with pytest.raises(symtop.SymtopError, match=words) if words else contextlib.nullcontext():
+            states = stepper.march(SPHEROID.top, None, np.full(6, y), 0.1, np.array([0, 1, 2, 3]))
+            np.testing.assert_array_equal(states, np.full((4, 6), y))
+    stepper.close()
+    assert mark.read_text().count("started") == starts
 
 
 def hangs(f, t, y, h):
@@ -426,7 +457,8 @@ def test_a_claim_is_implied_if_it_follows_from_those_that_are_made(only):
      "It is: order 2, symplectic, reversible, the energy bounded"),
     *(pytest.param(words, f"It is: order {words[-1]}, not symplectic", marks=pytest.mark.slow) for words in (
         (f"{STEPS}:Ralston", "--order", "3"), (f"{STEPS}:engine", "--form", "rotation", "--order", "1"),
-        (f"{sys.executable} {EXAMPLES / 'judged_program.py'}", "--form", "program", "--order", "2"))),
+        *((f"{sys.executable} {EXAMPLES / 'judged_program.py'}", "--form", form, "--order", "2")
+          for form in ("program", "server")))),
 ])  # fmt: skip
 def test_the_example_of_a_form_is_what_it_says(arguments, words, only):
     only("order", "symplectic", "symmetric", *(["energy"] if "energy" in words else []))

@@ -10,8 +10,10 @@ holds I1, I3 and mgl:
     in      I1 I3 mgl h n stride y1 y2 ...           numbers, separated by blanks
     out     the state after 0, stride, 2 stride, ... n steps, as text (any blanks or commas) or as raw doubles
 
-n is a multiple of stride. It is started for every run, so that it keeps no data between runs. For both, y is (e, L) on
-the axis, (q, L) on the attitude, (theta, phi, psi and their rates) in angles, and h may be negative.
+n is a multiple of stride. It is started for every run, so that it keeps no data between runs. *server* is a program
+that is started once, for languages that start slowly: it answers line after line, each answer in text, ended by an
+empty line and flushed. For all three, y is (e, L) on the axis, (q, L) on the attitude, (theta, phi, psi and their
+rates) in angles, and h may be negative.
 
 *torch*, *jax*: a function ``step(f, t, y, h) -> y``; y has the shape (batch, 6), a row (e, L) on the axis, or
 (batch, 7), (q, L) on the attitude, and f(t, y) has the same. A torch function is called without gradients; a JAX
@@ -29,9 +31,12 @@ import ctypes
 import dataclasses
 import functools
 import importlib
+import os
+import select
 import shlex
 import shutil
 import subprocess
+import tempfile
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -50,6 +55,7 @@ MOST = 20_000  # steps of one call, so that a call that hangs can be distinguish
 GUARD, MARK = 8, -1.2345e-67  # number and value of doubles behind the state that must not be overwritten
 TEXT = b"0123456789+-.eEinfaINFA, \t\r\n"  # characters of numbers as text
 SHORT = 1e-3  # relative: largest rounding of the numbers that a program writes
+STARTING, CHUNK = 30.0, 65536  # additional seconds for a server's first answer; bytes that are read of it at once
 SLACK = 5.0  # limit of the time of a run, in times expected from earlier runs
 COMPILING = 60.0  # additional seconds for the first call, which compiles
 OTHER = 0.7  # ratio of momenta of the second row of a batch to the first
@@ -102,6 +108,7 @@ class Program(Stepper):
     """A stepper around a command."""
 
     own_loop = True
+    starting, ending = 0.0, ""  # additional seconds for the first call; what ends an answer
 
     def __init__(self, command: str, chart: str) -> None:
         self.words, self.chart, self.form = [], chart, FORMULATIONS[chart]
@@ -131,21 +138,65 @@ class Program(Stepper):
         return states[marks // stride]
 
     def _answer(self, line: str, h: float, steps: int) -> bytes:
-        seconds, began = heartbeat.patience + SLACK * self.seconds_a_step * steps, time.monotonic()
+        seconds, began = heartbeat.patience + SLACK * self.seconds_a_step * steps + self.starting, time.monotonic()
         with heartbeat.call(h, 2.0 * seconds):
             try:
-                result = subprocess.run(  # noqa: S603  (the command is the user's)
-                    self.words, input=line.encode(), capture_output=True, timeout=seconds, check=False
-                )
+                answer, code, errors = self._run(line, seconds)
             except subprocess.TimeoutExpired:
                 what = f"{steps} step{'s' * (steps != 1)} of {h:.3g}"
-                raise SymtopError(f"{self.name} had not ended {seconds:.0f} s after it was asked for {what}") from None
-        if result.returncode != 0:
-            words = last_words(result.stderr) or "it said nothing"
-            raise SymtopError(f"{self.name} ended with code {result.returncode}: {words}")
+                words = f"had not ended{self.ending} {seconds:.0f} s after it was asked for {what}"
+                raise SymtopError(f"{self.name} {words}") from None
+        if code != 0:
+            raise SymtopError(f"{self.name} ended with code {code}: {last_words(errors) or 'it said nothing'}")
         if steps > 50:  # with fewer, starting takes most of the time
             self.seconds_a_step = max(self.seconds_a_step, (time.monotonic() - began) / steps)
-        return result.stdout
+        return answer
+
+    def _run(self, line: str, seconds: float) -> tuple[bytes, int, bytes]:
+        """What it writes, its exit code and its errors."""
+        result = subprocess.run(  # noqa: S603  (the command is the user's)
+            self.words, input=line.encode(), capture_output=True, timeout=seconds, check=False
+        )
+        return result.stdout, result.returncode, result.stderr
+
+
+class Server(Program):
+    """A stepper around a program that answers line after line."""
+
+    starting, ending = STARTING, " its answer with an empty line"
+    _server: Any = None
+
+    def _run(self, line: str, seconds: float) -> tuple[bytes, int, bytes]:
+        if self._server is None:
+            self._errors, pipe = tempfile.TemporaryFile(), subprocess.PIPE  # noqa: SIM115  (open as long as it runs)
+            self._server = subprocess.Popen(self.words, stdin=pipe, stdout=pipe, stderr=self._errors, bufsize=0)  # noqa: S603
+        server, answer, end = self._server, b"", time.monotonic() + seconds
+        with contextlib.suppress(BrokenPipeError):
+            server.stdin.write(line.encode())
+        while not answer[-4:].replace(b"\r", b"").endswith(b"\n\n"):
+            if not select.select([server.stdout], [], [], max(end - time.monotonic(), 0.0))[0]:
+                self.close()
+                raise subprocess.TimeoutExpired(self.words, seconds)
+            if not (part := os.read(server.stdout.fileno(), CHUNK)):
+                code = server.wait()
+                self._errors.seek(0)
+                errors = self._errors.read()
+                self.close()
+                if code == 0:
+                    words = "must answer one line after another, and ended after one: its form is program"
+                    raise SymtopError(f"{self.name} {words}")
+                return answer, code, errors
+            answer += part
+        self.starting = 0.0
+        return answer, 0, b""
+
+    def close(self) -> None:
+        """End the program; the next call starts another."""
+        if self._server is not None:
+            self._server.kill()
+            self._server.communicate()
+            self._errors.close()
+        self._server = None
 
 
 def _states(answer: bytes, rows: int, size: int, name: str) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from symtop.core.errors import SymtopError, foreign_code, one_of
 from symtop.judging import FORMS
 from symtop.judging.adapters.adapter import Stepper
-from symtop.judging.adapters.external import BatchStep, DiffraxSolver, Program, SharedObject, is_solver
+from symtop.judging.adapters.external import BatchStep, DiffraxSolver, Program, Server, SharedObject, is_solver
 from symtop.judging.adapters.python_step import REDUCED, PythonStep, RotationStep, ScipySolver, SeparableStep
 from symtop.judging.findings import yes_no
 from symtop.measure.conservation import CONSTANTS as MOTION
@@ -204,8 +204,8 @@ def open_target(
         raise SymtopError(f"on a body without symmetry form must be {', '.join(ON_BODY)}, not {kind}", "form")
     if chart not in ("axis", BODY, OWN_CHART.get(kind, chart)):  # and not the default
         raise SymtopError(f"chart must be left out with form {kind}, whose states are its own, not {chart!r}", "chart")
-    if kind == "program":
-        return Program(str(target), chart)
+    if kind in ("program", "server"):
+        return (Program if kind == "program" else Server)(str(target), chart)
     if kind == "shared":
         return SharedObject(path, chart, symbol or "step")
     return _python_step(*_thing(target, free=form is None), chart, kind, adaptive=adaptive, free=form is None)
