@@ -30,8 +30,6 @@ FLAGS = (
     "--host-resolver-rules=MAP * ~NOTFOUND, EXCLUDE localhost, EXCLUDE 127.0.0.1",
 )  # fmt: skip
 PATIENCE = 30.0  # seconds; a first start on a busy machine takes five
-
-
 FAINT = """(() => {  // texts whose contrast with what is behind them is below that of WCAG 2 AA
     const parts = (color) => color.match(/[\\d.]+/g).map(Number);
     const light = ([r, g, b]) => [r, g, b].map((one) => one / 255).map((one) => one <= 0.04045 ? one / 12.92

@@ -59,8 +59,7 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
         with contextlib.suppress(subprocess.TimeoutExpired):
             process.wait(draw.uniform(0.0, longest))
         if process.returncode is None:
-            alone = draw.random() < 0.5
-            (os.kill if alone else os.killpg)(process.pid, signal.SIGKILL)
+            (os.kill if draw.random() < 0.5 else os.killpg)(process.pid, signal.SIGKILL)
             count += 1
             bar.update()
         _, errors = process.communicate()

@@ -465,8 +465,7 @@ def test_engines_have_maps_and_one_without_a_gyroscopic_term_nothing_to_match():
 @pytest.mark.quick
 def test_an_accuracy_beside_an_engine_is_advised_at_its_step_below_its_errors():
     words = ["recommend", "spheroid", "--i-use", "mujoco-euler", "--accuracy", "1e-3", "--per-nutation", "500"]
-    result = call(*words)
-    engine, advice = result.output.split(" rad  mujoco-euler (mujoco-euler)\n")
+    engine, advice = call(*words).output.split(" rad  mujoco-euler (mujoco-euler)\n")
     step = symtop.scene("spheroid").nutation_period / 500.0
     assert (f"step {step:g}" in engine, f"step_size={step!r}" in advice) == (True, True)
     assert "meets axis error 0.001" in advice

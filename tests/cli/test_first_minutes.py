@@ -63,8 +63,7 @@ def test_a_proposed_step_is_of_use_and_the_guard_warns_of_what_the_verdict_calls
     assert "judged against the truth: accurate to" in right.stdout
     # The error that it leads to is between a tenth and ten times the 1e-3 rad that it is proposed for.
     for name in ("midpoint", "strang", "rk4", "gauss-4"):
-        result = call("run", "spheroid", name, code=2)
-        step = float(result.stderr.split("for example ")[1])
+        step = float(call("run", "spheroid", name, code=2).stderr.split("for example ")[1])
         error = float(symtop.errors(symtop.simulate("spheroid", name, step_size=step, guard=False))["axis"].max())
         assert 1e-5 < error < 1e-2
 

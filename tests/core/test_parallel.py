@@ -40,8 +40,7 @@ def test_an_error_is_raised_and_what_has_not_begun_is_dropped(threads):
 def test_pieces_are_taken_as_they_are_needed():
     """Results that nobody has asked for would take memory."""
     order = []
-    pieces = (order.append(k) or k for k in range(100))
-    results = in_threads(lambda piece: piece, pieces, 2)
+    results = in_threads(lambda piece: piece, (order.append(k) or k for k in range(100)), 2)
     assert next(results) == 0
     assert len(order) < 10
     assert list(results) == list(range(1, 100))

@@ -119,8 +119,6 @@ def program(folder, body):
 
 STILL = "n, stride = map(int, numbers[4:6])\nfor k in range(0, n + 1, stride): print(*numbers[6:12], sep=',')"
 RAW = "from array import array\nprint = lambda *x, sep: sys.stdout.buffer.write(array('d', map(float, x)))\n" + STILL
-
-
 FLIPPED = STILL.replace("*numbers[6:12]", "*(-float(x) for x in numbers[6:10]), *numbers[10:]")
 TURNED = STILL.replace("*numbers[6:12]", "numbers[6], float(numbers[7]) + 6.283185307179586, *numbers[8:]")
 

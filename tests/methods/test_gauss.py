@@ -80,8 +80,7 @@ OMEGA = STEADY.top.nutation_frequency(STEADY.top.momenta(STEADY.start))
 
 def pade(stages, x):
     """The stability function of a Gauss method, the diagonal approximant of exp, of a number or a square matrix."""
-    one = np.eye(len(x)) if np.ndim(x) else 1.0
-    power, above, below = one, 0.0, 0.0
+    power, above, below = np.eye(len(x)) if np.ndim(x) else 1.0, 0.0, 0.0
     for k in range(stages + 1):
         weight = math.comb(stages, k) * math.factorial(2 * stages - k) / math.factorial(2 * stages)
         above, below = above + weight * power, below + (-1) ** k * weight * power
@@ -98,8 +97,7 @@ def test_a_step_next_to_a_vertical_top_is_the_stability_function(stages, phase, 
     par, _ = on_axis(top, symtop.Angles(theta=1.0))
     spin = 7.0  # p_psi = L_z; upright tops sleep from 2 sqrt(I1 mgl) = 4.9 on
     slope = 1j * np.array([[spin / top.I1, -up / top.I1], [top.mgl, 0.0]])
-    frequencies = np.linalg.eigvals(slope).imag
-    h, tilt = phase / np.abs(frequencies).max(), 1e-6
+    h, tilt = phase / np.abs(np.linalg.eigvals(slope).imag).max(), 1e-6
     measured = np.empty((2, 2), dtype=complex)
     for column, (z, momentum) in enumerate(((tilt, 0.0), (0.0, tilt))):
         after = one_step(stages, (z, 0.0, up, momentum, 0.0, spin), par, h)

@@ -47,8 +47,7 @@ def test_starting_from_q0_plus_h_v0_costs_an_order():
         # p1 = D2 Ld(q0, q0 + h v0) moved back by a step is the momentum that this start amounts to
         d = h * start.theta_dot
         sums = node_sums(rule, start.theta, d, opening(None, rule, start.theta))
-        force = forces(par, sums)
-        return par, (state[0], par.I1 * d / h + h * force.W0, *state[2:])
+        return par, (state[0], par.I1 * d / h + h * forces(par, sums).W0, *state[2:])
 
     def solve(top, start, plan):
         begun_wrongly.h = plan.step_size
@@ -242,8 +241,7 @@ def test_midpoint_is_the_implicit_midpoint_rule_to_rounding_also_near_a_pole():
     assert residual(1e3) > 1e-9
     # theta swings through 1e-4 of the pole: the momenta of every step are still those of the start.
     top = symtop.SymmetricTop(1.0, 1.0, 1.0)
-    point = (1e-4, 0.0, 0.0, 1e-4, 1.0 + 1e-8, 1.0)
-    scene = symtop.Scene("grazing", top, angles_at(top, point), 1.0)
+    scene = symtop.Scene("grazing", top, angles_at(top, (1e-4, 0.0, 0.0, 1e-4, 1.0 + 1e-8, 1.0)), 1.0)
     run = symtop.simulate(scene, NAME, step_size=0.01, samples=101)
     assert run.attrs["outcome"] == "ok"
     momenta = top.momenta(scene.start)

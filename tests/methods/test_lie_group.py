@@ -99,8 +99,7 @@ def test_rattle_on_directors_is_the_lie_group_variational_integrator():
     J = moments(scene.top)
     Jd, rows = 0.5 * np.trace(J) * np.eye(3) - J, states("lie-variational", scene, h, 4)
     R, P = matrices(rows)[0], None
-    body = R.T @ rows[0, 4:]
-    P = R @ hat(np.linalg.solve(J, body)) @ Jd  # R' J_d
+    P = R @ hat(np.linalg.solve(J, R.T @ rows[0, 4:])) @ Jd  # R' J_d
     force = np.zeros((3, 3))
     force[2, 2] = -scene.top.mgl  # of the potential mgl (d_3)_z
     upper = np.triu_indices(3)

@@ -212,8 +212,7 @@ def compiled(name, scene, h, **changed):
     par, state = REDUCED.prepare(scene.top, scene.start)
     par, memory = par._replace(**changed), np.zeros((3, 4))
     memory[0] = REDUCED.field(par, state)
-    made = kernel(name)(par, state, memory, h)
-    return par, made, memory[-1]
+    return par, kernel(name)(par, state, memory, h), memory[-1]
 
 
 @pytest.mark.parametrize(("name", "step"), [("spheroid", 0.03), ("goldstein", 0.06)])

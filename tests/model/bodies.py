@@ -115,8 +115,7 @@ class PreciseBody:
             return *product(self.start, turn), *self.given
         m, psi = self._swing(self.u0 + self.rate * t)
         turned = self._body(self._frame(m, self.a3 * self.G * t + psi - self.psi0))
-        momentum = self._body((0, *m))[1:]
-        return *product(self.constant, turned), *momentum
+        return *product(self.constant, turned), *self._body((0, *m))[1:]
 
     def _swing(self, u: Any) -> tuple[tuple[Any, Any, Any], Any]:
         """Momentum and psi less its linear part, at u."""

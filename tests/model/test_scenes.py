@@ -75,8 +75,7 @@ def test_a_top_sleeps_above_the_threshold_precesses_steadily_above_a_spin_and_ne
 def test_energies_are_measured_by_the_nutation_and_not_by_the_spin(name):
     """Over the true motion the kinetic energy of theta goes from 0 to the energy of the nutation, where V is least."""
     scene = symtop.scene(name)
-    end = min(scene.nutation_period, scene.horizon)
-    motion = closed_form(scene)(np.linspace(0.0, end, 20_001))
+    motion = closed_form(scene)(np.linspace(0.0, min(scene.nutation_period, scene.horizon), 20_001))
     assert np.max(0.5 * scene.top.I1 * motion.theta_dot**2) == pytest.approx(scene.energy_scale, rel=1e-5)
 
 

@@ -13,7 +13,9 @@ from tests.conftest import random_scenes
 
 @pytest.mark.parametrize("chosen", random_scenes(8, seed=1), ids=lambda s: s.name)
 def test_slope_and_curvature_are_the_derivatives_of_the_potential(chosen):
-    top, momenta = chosen.top, chosen.top.momenta(chosen.start)
+    top, start, momenta = chosen.top, chosen.start, chosen.top.momenta(chosen.start)
+    energy = top.reduced_energy(start.theta, top.I1 * start.theta_dot, momenta.p_phi, momenta.p_psi)
+    assert energy == pytest.approx(top.energy(start), rel=1e-13, abs=1e-13)
     with mpmath.workdps(40):
         n, s, I1, mgl = (mpmath.mpf(v) for v in (momenta.north, momenta.south, top.I1, top.mgl))
 

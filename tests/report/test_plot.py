@@ -101,8 +101,7 @@ def test_a_single_sample_is_a_point(samples, marker, tmp_path, monkeypatch):
 def test_runs_of_different_lengths_are_drawn_forwards_and_what_is_no_ensemble_is_refused():
     tops = symtop.population(40, seed=3)
     runs = symtop.ensemble(tops, "strang", per_nutation=[2] * 20 + [100] * 20, nutations=2, samples=50, quiet=True)
-    ax = symtop.plot(runs, members=tops)
-    times = ax.get_lines()[0].get_xdata()
+    times = symtop.plot(runs, members=tops).get_lines()[0].get_xdata()
     assert (np.diff(times) > 0.0).all()
     assert times[0] == pytest.approx(0.25, abs=0.03)  # not before all have made a step
     assert times[-1] == pytest.approx(1.0)
@@ -148,8 +147,7 @@ def test_errors_at_a_place_are_those_of_the_same_time():
     assert np.isfinite(latest).all()
     np.testing.assert_array_equal(latest[2], errors[2, 10:41])
     for i, steps in enumerate((4, 5)):
-        ranks = np.floor(places * steps + 1e-6).astype(int)
-        np.testing.assert_array_equal(latest[i], errors[i, ranks])
+        np.testing.assert_array_equal(latest[i], errors[i, np.floor(places * steps + 1e-6).astype(int)])
     assert not np.array_equal(latest[0], errors[0, 10:41])  # as samples of the same index would be
 
 

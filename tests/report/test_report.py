@@ -245,8 +245,7 @@ def test_methods_cost_error_and_run_length_are_chosen(browser, results):
 
 def test_the_chart_takes_the_place_of_its_figure_and_pointing_at_a_run_shows_what_it_was(browser, results):
     browser.resize(1280, 900)
-    tip = browser.evaluate(POINT % (0, 0))
-    name, step = re.fullmatch(r"(\S+) \(\S+\): step (\S+) s", tip).groups()
+    name, step = re.fullmatch(r"(\S+) \(\S+\): step (\S+) s", browser.evaluate(POINT % (0, 0))).groups()
     cell = xr.load_dataset(results / "speed.nc").sel(scene="goldstein", variant=name).isel(nutations=0)
     assert any(f"{value:.3g}" == step for value in cell["step_size"].values)
     assert browser.evaluate(POINT % (0, 100_000)) == ""  # far from every run: nothing

@@ -103,8 +103,7 @@ def test_the_limits_of_verlet_and_rk4_are_found():
 
 
 def test_each_cause_is_named():
-    fast = steady(20.0)
-    frequency = landmarks(fast).frequency
+    frequency = landmarks(steady(20.0)).frequency
     assert "the upper pole" in caution(grazing(1e-3), "stormer-verlet", step_size=0.02)
     assert caution(grazing(1e-3), "strang", step_size=2e-3) == ""  # no pole in its chart
     assert "separatrix" in caution("separatrix", "gauss-8", step_size=0.01, horizon=150.0)

@@ -43,8 +43,7 @@ def test_grazing_tops_pass_a_pole_as_near_as_they_say_and_those_near_the_separat
     near = Motion("near-separatrix")
     assert 2.0**-17 < near.low.min() < near.low.max() < 2.0**-5.9
     assert near.sigma.max() < 0.9
-    growth = np.sqrt(1.0 - near.sigma**2)
-    assert (near.period * growth > 2.0 * np.log(1.0 / near.low)).all()
+    assert (near.period * np.sqrt(1.0 - near.sigma**2) > 2.0 * np.log(1.0 / near.low)).all()
     assert near.period.min() > 1.5 * Motion("grazing").period.max()
 
 
@@ -104,8 +103,7 @@ class Bodies:
     def __init__(self, kind, count=400):
         self.data = body_population(count, seed=3, kind=kind)
         moments = np.stack([self.data[name].values for name in ("I1", "I2", "I3")], axis=1)
-        order = np.argsort(moments, axis=1)
-        rates = np.take_along_axis(self.data.omega_body.values, order, axis=1)
+        rates = np.take_along_axis(self.data.omega_body.values, np.argsort(moments, axis=1), axis=1)
         self.low, self.middle, self.high = np.sort(moments, axis=1).T
         self.momentum = np.sort(moments, axis=1) * rates
         self.size = np.linalg.norm(self.momentum, axis=1)

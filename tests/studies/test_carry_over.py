@@ -380,8 +380,7 @@ def test_small_motions_are_those_of_the_matrix(family):
 def test_a_tilt_grows_beyond_the_limit_alone_and_an_unstable_rotation_has_no_limit(monkeypatch):
     variant, bodies = integrator("strang[body]"), of.upright("0.3", 6, 1)
     omega, most, _ = of.reach(bodies, tilted(6))
-    ends = of.limits(variant, bodies, omega, GRID)
-    h = ends[:, None] * np.array([0.05, 0.2, 1.02]) / omega[:, None]
+    h = of.limits(variant, bodies, omega, GRID)[:, None] * np.array([0.05, 0.2, 1.02]) / omega[:, None]
     far = of.radius(variant, bodies, h)[:, 2] > 1.05  # one body has left a narrow window by then
     assert far.sum() == 5
     assert of.grown(variant, bodies, h, tilted(6), most).tolist() == [[False, False, grows] for grows in far]

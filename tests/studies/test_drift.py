@@ -277,8 +277,7 @@ def test_a_horizon_is_predicted_from_a_tenth_of_it(bend):
 
 def test_a_horizon_is_the_first_crossing_and_a_phase_that_is_not_lost_has_none():
     t = np.linspace(0.0, 100.0, 5001)
-    bump = 1e-3 * t + np.exp(-(((t - 30.0) / 3.0) ** 2))
-    assert 25.0 < lost_at(t, bump, 0.5) < 30.0
+    assert 25.0 < lost_at(t, 1e-3 * t + np.exp(-(((t - 30.0) / 3.0) ** 2)), 0.5) < 30.0
     t = np.linspace(0.0, 1000.0, 4001)
     assert horizon(t, 1e-6 * t - 1e-11 * t * t, 1e-2).time == pytest.approx(1.127e4, rel=1e-3)  # before it comes back
     assert np.isnan(lost_at(t, -1e-3 * t, 2.0)) != np.isnan(lost_at(t, -1e-3 * t, 0.5))

@@ -62,8 +62,7 @@ def test_what_was_not_measured_is_none(measured):
     assert [one.name for one in study.STUDY.pictures(fast)] == ["cost"]
     alone = xr.DataTree.from_dict({"tops": measured["tops"].to_dataset().sel(variant=["no-gyro[axis]"])})
     for one, most in ((measured, 5), (alone, 1)):  # entries of the key: what is drawn, and no more
-        error = next(iter(study.STUDY.pictures(one))).figure
-        assert len(error.legends[0].get_texts()) == most
+        assert len(next(iter(study.STUDY.pictures(one))).figure.legends[0].get_texts()) == most
     many = xr.DataTree.from_dict({"population": measured["population"].to_dataset()})
     assert facts.facts(many)["share_most"] == facts.facts(measured)["share_most"]
     assert list(study.STUDY.pictures(many)) == []

@@ -67,8 +67,7 @@ def test_accelerations_and_momenta_of_the_kernels_are_those_of_the_symbolic_lagr
         for q, v in zip(symbols.q, symbols.v, strict=True)
     ]
     M = symbols.values([entry for row in mass for entry in row], points).T.reshape(-1, 3, 3)
-    F = symbols.values(force, points).T
-    true = np.linalg.solve(M, F[..., None])[..., 0]
+    true = np.linalg.solve(M, symbols.values(force, points).T[..., None])[..., 0]
     for point, expected in zip(points, true, strict=True):
         assert accelerations(*NUMBERS, point[0], *point[3:]) == pytest.approx(expected, rel=1e-11, abs=1e-11)
     top = symtop.SymmetricTop(*NUMBERS)

@@ -65,7 +65,8 @@ def scaled(rule: Composition) -> Scaled:
     return Scaled(rule, _scale, packed, body.opened)
 
 
-_FREE = {4: BLANES_MOAN_6, 6: METHODS["kahan-li-6"].table, 8: METHODS["kahan-li-8"].table}  # kicks R3, drifts R1
+_TURNS = BLANES_MOAN_6, METHODS["kahan-li-6"].table, METHODS["kahan-li-8"].table
+_FREE = {table.order: table for table in _TURNS}  # kicks R3, drifts R1
 
 
 def free_motion(rule: Composition, order: int | None) -> Table | None:
