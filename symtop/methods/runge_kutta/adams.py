@@ -9,9 +9,10 @@ and the modified divided differences phi_1 = f_n, phi_{i+1} = phi_i - phi*_i (on
 
 It predicts with order k = 1 .. 12 and corrects with order k + 1. The run starts with order 1 and raises order and step
 together until an error is too large; then the order is the one with the least error, raised only after k + 1 steps of
-one length. h is kept, doubled if the error allows it, or multiplied by 0.5 to 0.9; doubled steps are what keeps the g_i
-(after k of them they are constants). Two evaluations a step, one for a step that is rejected. A sample is the value of
-the polynomial of degree k + 1 that the corrector integrates; it takes no evaluation.
+one length (and after the next one again, where STEP waits for another). Norm and first step are those of `pairs`. h is
+kept, doubled if the error allows it, or multiplied by 0.5 to 0.9; doubled steps are what keeps the g_i (after k of them
+they are constants). Two evaluations a step, one for a step that is rejected. A sample is the value of the polynomial of
+degree k + 1 that the corrector integrates; it takes no evaluation.
 
 Explicit, with a memory of up to twelve steps: what is defined by the map of one step (symplectic, symmetric, its order
 by a fixed step) is not claimed of it. Not to be confused with Nordsieck forms (LSODA, VODE), which change the length of
