@@ -9,7 +9,7 @@ import symtop
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import power_law
 from symtop.measure.step_map import one_step, return_miss, symplectic_defect
-from symtop.methods.splitting import coefficients as tables, space
+from symtop.methods.splitting import coefficients as tables, rotor, space
 from symtop.methods.splitting.composition import built_in, composition
 from symtop.model.scenes import closed_form
 
@@ -53,6 +53,12 @@ def test_a_table_without_a_last_kick_kicks_with_the_newest_axis(chart):
         errors[kick] = abs(float(once["energy"][-1] - once["energy"][0]))
         assert once.attrs["force_evaluations"] == once.attrs["steps"]
     assert 0.5 < errors[1.0, 0.0] / errors[0.0, 1.0] < 2.0  # adjoint methods: errors of one size
+
+
+@pytest.mark.parametrize("x", [0.3, 0.999, 1.001, 2.0, 40.0])
+def test_a_drift_turns_by_its_angle_in_series_and_beyond(x):
+    s, m = rotor.exact(x * x, 0.5)  # by 2 x, for |L| = 2 x
+    np.testing.assert_allclose([2.0 * x * s, m], [np.sin(x), -2.0 * np.sin(0.5 * x) ** 2], rtol=1e-14, atol=1e-15)
 
 
 @pytest.mark.parametrize("name", ["strang", "cayley", "yoshida-4", "srkn-14-6"])

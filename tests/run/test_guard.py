@@ -7,6 +7,7 @@ import math
 import random
 import re
 import warnings
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -374,6 +375,21 @@ def test_beside_a_pole_no_growth_is_seen_where_there_is_none_and_a_length_that_d
     scene = symtop.Scene("long", top, start, 56.3)
     assert "the quaternion's length left one" in caution(scene, "rk4[attitude]", step_size=1.948e-3)
     assert caution(scene, "rk4[attitude]", step_size=1.3e-3) == ""
+
+
+def test_a_projection_onto_the_energy_lets_no_nutation_grow_and_a_run_of_two_to_three_nutations_is_tried_to_its_end():
+    top = symtop.SymmetricTop(0.303997475828333, 0.303997475828333, -12.697265039041513)
+    start = symtop.Angles(2.5666994720995975, phi_dot=280.2789550362906, psi_dot=192.3371013577066)
+    scene, method = symtop.Scene("fast", top, start, 1.325), symtop.integrator("dop853-projected")
+    assert caution(scene, "dop853-projected[axis]", step_size=1.7e-4) == ""  # right to 1e-13
+    frequency = guard.Exact(scene).landmarks.frequency
+    for one, noise in ((method, True), (replace(method, conserves=frozenset()), False)):
+        growth = nutation_growth(one, scene, 1.7e-4, "axis", frequency)
+        assert (growth.factor - 1.0 < growth.doubt) is noise
+    top, start = symtop.SymmetricTop(8.93085313694772, 17.86170627389544, 0.0), symtop.Angles(2.66, psi_dot=0.0401)
+    ending = symtop.Scene("free", top, start, 190.0)
+    assert symtop.simulate(ending, "dop853-compiled[attitude]", tolerance=2e-3, guard=False).outcome == "not_normalised"
+    assert "left one" in caution(ending, "dop853-compiled[attitude]", tolerance=2e-3)
 
 
 @pytest.mark.parametrize("x", [0.02, 0.6])
