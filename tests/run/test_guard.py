@@ -209,13 +209,13 @@ def test_nutations_that_grow_out_of_single_precision_are_announced(step, grows):
 
 
 def test_an_end_at_a_pole_after_many_passages_is_announced(monkeypatch):
-    """The axis passes the pole at 2e-16 rad, and Adams' method ends there after 17 nutations, vern9 at none of 96."""
+    """The axis passes the pole at 2e-16 rad, and Adams' method ends there after 13 nutations, vern9 at none of 96."""
     top = symtop.SymmetricTop(0.34197641538075246, 0.3742372339233947, 0.037042027632846225)
     rates = {"theta_dot": 0.0, "phi_dot": 0.458319572783573, "psi_dot": 0.40513789028252667}
     start = symtop.Angles(1.2174251215796315, 2.418827152562061, 0.7304406217729724, **rates)
     scene = symtop.Scene("through-upright", top, start, 1365.0500094145345)
-    controls = {"tolerance": 4.772194832341897e-08, "observe": "attitude"}
-    assert "stopped at t = 250.083" in caution(scene, "adams", **controls)
+    controls = {"tolerance": 2.8942661247167517e-08, "observe": "attitude"}
+    assert "stopped at t = 192.981" in caution(scene, "adams", **controls)
     assert caution(scene, "vern9", **controls) == ""
     monkeypatch.setattr(guard, "THROUGH", 1.0)
     assert caution(scene, "adams", **controls) == ""  # the control: of the first nutations it sees nothing

@@ -338,6 +338,6 @@ def test_adaptive_methods_are_mapped_over_their_tolerance_to_their_budget():
     assert runs.axis_error[0, 0] < 1e-6 < runs.axis_error[0, 1]
     assert (outcome_map("cusp", [0.3, 3.0], integrator("exact"), [math.nan], 12.0).verdict == 0).all()
     loose = np.geomspace(1e-10, 0.5, 25)[[12, 22]].tolist()
-    top = family("cusp")(float(np.geomspace(0.1, 30.0, 120)[23]))
+    top = family("cusp")(float(np.geomspace(0.1, 30.0, 120)[36]))
     made = outcome_maps.one_by_one(row_plan(integrator("adams[axis]"), loose, 10.0), "axis", top)
     assert [OUTCOMES[k] for k in made.outcome[0]] == ["ok", "out_of_budget"]
