@@ -16,7 +16,17 @@ from symtop.core.errors import SymtopError, finite, label, one_of, positive, sho
 from symtop.core.numbers import EPSILON, TINY
 from symtop.model.body import Attitude, RigidBody
 from symtop.model.charts import BODY, Array
-from symtop.model.top import BISECTIONS, Angles, SymmetricTop, effective_force, effective_potential, effective_stiffness
+from symtop.model.top import (
+    BISECTIONS,
+    Angles,
+    SymmetricTop,
+    beside_pole,
+    effective_force,
+    effective_potential,
+    effective_stiffness,
+    flat,
+    period_between,
+)
 
 if TYPE_CHECKING:
     from symtop.model.exact.closed_form import ClosedForm
@@ -35,6 +45,7 @@ TAGS = {  # by which studies choose; a scene without any is in every study
 }
 STEADY = 1e4  # a nutation with less energy than this many rounding errors of the energy is a steady precession
 SHORTEST = 1e-100  # the least horizon, in units of time
+LOOSE = 1e-6  # relative: a period beside a pole that is further from the exact one is replaced by it
 NEXT_TO_POLE = 1e-9  # rad; V is not evaluated nearer to a pole, where it has a limit and 0/0
 
 
@@ -102,7 +113,7 @@ class Scene:
     @property
     def nutation_period(self) -> float:
         """Time of one full nutation, infinite on a separatrix; of a body its natural period."""
-        return _nutation_period(self.top, self.start)
+        return nutation_period(self.top, self.start)
 
     @property
     def period_word(self) -> str:
@@ -154,8 +165,24 @@ class Scene:
 
 
 @functools.lru_cache(maxsize=256)
-def _nutation_period(top: Any, start: Any) -> float:
-    return float(top.nutation_period(start))
+def nutation_period(top: Any, start: Any) -> float:
+    """`Scene.nutation_period` of a top, or of a body, and a start."""
+    if isinstance(top, RigidBody):
+        return float(top.nutation_period(start))
+    low, high = top.turning_cosines(start)
+    period = float(period_between(top, start, low, high))
+    return float(exact_periods([flat(top, start)], [period])[0]) if beside_pole(low, high) else period
+
+
+def exact_periods(numbers: Any, periods: Any) -> Array:
+    """Periods (n,) of tops and starts (n, 9), where the closed form's differ by more than `LOOSE` in their place."""
+    from symtop.model.exact.closed_form import ClosedForms
+
+    try:
+        exact: Array = ClosedForms(numbers).nutation_period
+    except SymtopError:  # too extreme
+        return np.asarray(periods)
+    return np.where(np.isclose(periods, exact, rtol=LOOSE, atol=0.0) | np.isnan(exact), periods, exact)
 
 
 @functools.lru_cache(maxsize=256)

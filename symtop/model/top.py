@@ -123,6 +123,7 @@ def effective_potential(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -
 NUMBERS = ("I1", "I3", "mgl", "theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")  # of a top and a start
 SLACK = 1e-12  # relative tolerance of the inequalities between moments, which are given rounded
 LARGEST = 1e40  # of any parameter or rate, and one over the smallest inertia: squares of squares stay finite
+POLE = 0.999  # a larger cosine is beside a pole
 BISECTIONS = 60  # of an interval of cosines at most 2 wide: to the last place
 
 
@@ -343,7 +344,8 @@ class SymmetricTop:
     def nutation_period(self, at: Angles) -> float:
         """Time of one nutation, ``2 pi / AGM(sqrt(beta (u3-u1)), sqrt(beta (u3-u2)))``; inf on a separatrix.
 
-        Beside one, and where both turning points meet, it has half the digits; `ClosedForm.nutation_period` has all.
+        Where both turning points meet it has half the digits, beside the upright or hanging axis fewer or none:
+        `ClosedForm.nutation_period` has all, and `Scene.nutation_period` takes it there.
         """
         return nutation_period(self, at)
 
@@ -431,6 +433,12 @@ def _climb(cubic: tuple[float, float, float, float], start: float, u: float) -> 
 def nutation_period(top: Any, at: Any) -> float:
     """`SymmetricTop.nutation_period` of any records with these fields."""
     return period_between(top, at, *turning_cosines(top, at))
+
+
+@inlined
+def beside_pole(low: float, high: float) -> bool:
+    """Does a turning cosine lie so near 1 or -1 that the differences in `period_between` lose their digits?"""
+    return low < -POLE or high > POLE
 
 
 @shared

@@ -214,7 +214,7 @@ def _adaptive_forecast(
     if (far or (chart == "angles" and motion.landmarks.gap < plan.tolerance)) and cheap.implementation == "compiled":
         afforded *= THROUGH
     longer = min(plan.horizon, piece * afforded / max(probe.evaluations, 1))
-    if longer > 1.5 * piece:
+    if longer > 1.5 * piece or longer == plan.horizon > piece:
         expected, probe = probed(longer)
     return expected if probe.times[-1] >= plan.horizon else max(expected, plan.tolerance), probe
 

@@ -103,8 +103,7 @@ def test_run_prints_the_errors_and_writes_the_dataset_also_of_a_run_that_fails_o
     assert report["steps"] == 800
     assert 1e-3 < report["errors"]["axis"]["largest"] < 2e-2
     assert report["errors"]["p_psi"]["largest"] < 1e-14
-    once = call("run", "spheroid", "strang", "--step-size", 8, "--no-guard").output
-    assert "\n1 step, 1 force evaluation\n" in once
+    assert "\n1 step, 1 force evaluation\n" in call("run", "spheroid", "strang", "--step-size", 8, "--no-guard").output
     path = tmp_path / "run.nc"
     call("run", "spheroid", "stormer-verlet", "--step-size", 1.0, "--horizon", 50, "--output", path, code=3)
     assert netcdf.read(path).attrs["outcome"] == "left_chart"
@@ -151,8 +150,7 @@ def test_a_variant_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_pa
     ("symtop integrators strang[att", "strang[attitude]"),
 ])  # fmt: skip
 def test_the_shell_completes_names(line, completion):
-    words = line.split()
-    environment = {"_SYMTOP_COMPLETE": "bash_complete", "COMP_WORDS": line, "COMP_CWORD": str(len(words) - 1)}
+    environment = {"_SYMTOP_COMPLETE": "bash_complete", "COMP_WORDS": line, "COMP_CWORD": str(len(line.split()) - 1)}
     assert f"plain,{completion}" in CliRunner().invoke(main, prog_name="symtop", env=environment).output
 
 
@@ -403,8 +401,7 @@ def test_all_of_them_are_compiled_once(monkeypatch, tmp_path):
     result = call("doctor", "--warm", "--results", tmp_path / "r")
     assert doctor.kernels() > 100
     assert "not run" not in result.output
-    again = call("doctor", "--warm", "--results", tmp_path / "r")
-    assert "kernels compiled: 0;" in again.output
+    assert "kernels compiled: 0;" in call("doctor", "--warm", "--results", tmp_path / "r").output
     solvers = [inside(solver) for one in symtop.integrators().values() for solver in one.solvers.values()]
     blocks = [solver._whole.blocks() for solver in solvers if solver and solver.in_lanes]
     folders = {kernel._cache.cache_path.name for block in blocks for kernel in (block.prepare, block.march)}

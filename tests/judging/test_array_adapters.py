@@ -20,8 +20,7 @@ SPHEROID = symtop.scene("spheroid")
 
 
 def needs(package):
-    absent = importlib.util.find_spec(package) is None
-    return pytest.mark.skipif(absent, reason=f"{package} is not installed")
+    return pytest.mark.skipif(importlib.util.find_spec(package) is None, reason=f"{package} is not installed")
 
 
 def judge(*arguments):

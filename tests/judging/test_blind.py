@@ -113,8 +113,7 @@ def test_a_correct_method_is_not_refuted_in_another_chart(name, chart):
         mark="slow"),
 ])  # fmt: skip
 def test_what_is_written_in_c(tmp_path, source, options, claims, refuted):
-    target = compiled(tmp_path, source, *options, program="form" in claims)
-    ledger = symtop.judge(target, quick=True, **claims)
+    ledger = symtop.judge(compiled(tmp_path, source, *options, program="form" in claims), quick=True, **claims)
     if refuted:
         assert refuted in ledger.refuted, str(ledger)
     else:
@@ -246,5 +245,4 @@ def test_a_step_written_for_f_of_y_may_say_so(only):
     wrong_times = lambda f, t, y, h: y + h * f(t, y + h / 2 * f(t + 0.3 * h, y))
     only("time")
     assert symtop.judge(wrong_times, quick=True, order=2).refuted == ["time"]
-    ledger = symtop.judge(wrong_times, quick=True, order=2, autonomous=True)
-    assert ledger["time"].verdict == "inapplicable"
+    assert symtop.judge(wrong_times, quick=True, order=2, autonomous=True)["time"].verdict == "inapplicable"

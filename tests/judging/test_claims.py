@@ -119,8 +119,7 @@ def test_a_law_is_named_only_if_the_interval_excludes_its_neighbours(size, slope
 def test_a_bias_of_a_unit_of_rounding_a_step_is_rounding_where_sums_are_plain(a_step, plain, kind):
     """As of products of quaternions: 144,000 steps make 1.6e-11."""
     steps, rounding = 144_000, 6e-16 * np.sin(np.arange(400.0))
-    residual = a_step * steps * 1.1 * TIME / TIME[-1]
-    assert long.change_of(TIME, residual, rounding, steps, plain=plain).kind == kind
+    assert long.change_of(TIME, a_step * steps * 1.1 * TIME / TIME[-1], rounding, steps, plain=plain).kind == kind
 
 
 def test_jumps_short_runs_and_noise_are_told_from_growth():
@@ -229,8 +228,7 @@ def test_every_splitting_of_the_catalogue_has_the_order_that_it_claims():
 def test_a_method_is_not_explicit_because_it_says_so(name, declared, verdict):
     claiming = dataclasses.replace(symtop.integrator(name), explicit=declared)
     run = long.long_run(claiming, SPHEROID, "angles", quick=True)
-    by_claim = {one.claim: one for one in constants.of_run(claiming, run)}
-    assert by_claim["explicit"].verdict == verdict
+    assert {one.claim: one for one in constants.of_run(claiming, run)}["explicit"].verdict == verdict
 
 
 def test_the_angles_end_at_a_pole_and_the_space_frame_does_not():
@@ -281,8 +279,7 @@ def test_a_slope_that_decides_nothing_is_measured_over_a_longer_run(lengths, ver
     ([4, 4, 4, 4], (math.inf, math.nan)), ([4, 4, 2, 2.5], (2.5, 0.25)), ([2, 8, 4, 4], (2.0, 1.0))])  # fmt: skip
 def test_an_order_that_is_lower_at_the_finest_steps_or_jumps_below_one_that_is_lower_is_seen(orders, lower):
     misses = 1e-4 * np.cumprod([1.0, *(0.5 ** (power + 1.0) for power in orders)])
-    found = order._lower(0.5 ** np.arange(5.0), misses, 4, 0.3, 1e-13)
-    np.testing.assert_allclose(found, lower, rtol=1e-12)
+    np.testing.assert_allclose(order._lower(0.5 ** np.arange(5.0), misses, 4, 0.3, 1e-13), lower, rtol=1e-12)
 
 
 def test_what_nobody_claimed_is_measured_and_a_claim_that_denies_what_the_method_has_is_refuted():
@@ -638,8 +635,7 @@ def test_finer_runs_after_one_that_fails_late_share_its_steps(quick):
         return y * (math.nan if t > 20.0 * SPHEROID.nutation_period and h > 0.005 * SPHEROID.nutation_period else 1.0)
 
     method = adapter.integrator(PythonStep(fails, "axis"))
-    run = long_run(method, SPHEROID, "axis", quick=quick, most=4000)
-    assert (run.outcome, len(steps) < 6000) == ("ok", quick)
+    assert (long_run(method, SPHEROID, "axis", quick=quick, most=4000).outcome, len(steps) < 6000) == ("ok", quick)
 
 
 def test_limits_are_extrapolated_falls_are_seen_and_a_cayley_map_keeps_its_own_energy(monkeypatch):

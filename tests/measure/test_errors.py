@@ -41,8 +41,7 @@ def test_the_closed_form_is_within_its_bounds_and_a_coarse_run_is_not():
 
 def test_a_run_is_compared_with_no_other_top_or_start_than_its_own():
     run, spheroid = symtop.simulate("spheroid", "strang", step_size=0.01, guard=False), symtop.scene("spheroid")
-    start = symtop.Angles(spheroid.start.theta, psi_dot=1.0)
-    moved = symtop.Scene("moved", spheroid.top, start, spheroid.horizon)
+    moved = symtop.Scene("moved", spheroid.top, symtop.Angles(spheroid.start.theta, psi_dot=1.0), spheroid.horizon)
     longer = symtop.Scene("longer", spheroid.top, spheroid.start, 2.0 * spheroid.horizon)
     assert symtop.errors(run, longer)["axis"].identical(symtop.errors(run)["axis"])
     for other, name in (("goldstein", "top"), (moved, "start")):

@@ -114,8 +114,7 @@ def test_a_coefficient_that_is_slightly_off_shows_in_the_term_that_it_spoils(off
 
 def test_the_terms_of_known_functions_are_found():
     motion = lambda h: np.array([np.exp(h), np.cos(h)])
-    step = lambda h: motion(h) + np.array([1e-6 * h**2, 0.25 * h**5])
-    result = compared(step, motion, 4.0)
+    result = compared(lambda h: motion(h) + np.array([1e-6 * h**2, 0.25 * h**5]), motion, 4.0)
     assert result.order == 1
     assert result.defect[2] == pytest.approx(2e-6, rel=1e-3)  # beside 1/2
     assert result.defect[5] == pytest.approx(30.0, rel=1e-3)  # beside 1/120
@@ -158,8 +157,7 @@ def test_there_are_as_many_trees_as_there_are_and_known_tables_have_their_orders
 @pytest.mark.parametrize(("off", "order"), [(1e-9, 2), (1e-13, 4)])
 def test_a_coefficient_that_is_off_shows_beyond_rounding(off, order):
     # the same nodes; b4 off c3 = off/12 in the tall tree of order 3
-    rows = ((), (0.5,), (0.0, 0.5), (off, 0.0, 1.0 - off))
-    table = oc.conditions(square(rows), CLASSICAL[1])
+    table = oc.conditions(square(((), (0.5,), (0.0, 0.5), (off, 0.0, 1.0 - off))), CLASSICAL[1])
     assert table.order == order
     assert table.defect[2] == pytest.approx(off / 12, rel=0.01, abs=1e-16)
 

@@ -171,8 +171,7 @@ def test_steps_a_nutation_are_those_of_each_scene_and_a_file_of_something_else_i
 
 
 def test_times_are_those_of_runs_that_ended_well_and_are_kept(tmp_path):
-    file = tmp_path / "sweep.nc"
-    options = {"step_size": [0.001, 3.0], "horizon": 20.0, "timed": True, "quiet": True, "path": file}
+    options = {"step_size": [0.001, 3.0], "horizon": 20.0, "timed": True, "quiet": True, "path": tmp_path / "sweep.nc"}
     data = symtop.sweep("spheroid", ["rk4", "strang"], **options)
     good = data["outcome"].values == "ok"
     assert 0 < good.sum() < good.size

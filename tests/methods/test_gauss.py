@@ -135,8 +135,7 @@ def test_the_frame_turns_with_the_body():
     top, start = symtop.SymmetricTop(2.0, 1.0, 0.0), symtop.Angles(theta=0.7, psi_dot=3.0, phi_dot=0.4)
     par, state = on_frame(top, start)
     h, marks = 0.01, np.array([0, 500, 1000])
-    states = march_frame(par, gauss_rule(6), state, h, marks).states
-    attitude = frame_to_attitude(par, h * marks, states)
+    attitude = frame_to_attitude(par, h * marks, march_frame(par, gauss_rule(6), state, h, marks).states)
     exact = symtop.ClosedForm(top, start).quaternion(h * marks)
     assert np.max(charts.attitude_distance(attitude[:, :4], exact)) < 1e-13
 

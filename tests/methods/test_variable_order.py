@@ -15,7 +15,7 @@ from symtop.methods.framework.lanes import members_of
 from symtop.methods.framework.plan import OUTCOMES, Plan
 from symtop.methods.framework.registry import variants
 from symtop.methods.runge_kutta import adams, extrapolation, pairs
-from symtop.methods.runge_kutta.adams import ALPHA, BETA, GAMMA, HIGHEST, LAST, NUMBERS, PSI, SIGMA, G
+from symtop.methods.runge_kutta.adams import ALPHA, BETA, GAMMA, HIGHEST, LAST, NUMBERS, ORDER, PSI, SETTLED, SIGMA, G
 from symtop.model.scenes import closed_form
 from symtop.run.ensemble.chunks import nutation_periods
 from symtop.run.ensemble.inputs import read_members
@@ -56,6 +56,20 @@ def test_a_predictor_integrates_polynomials_below_its_order_on_any_nodes_and_no_
         terms, exact = h * made[:k, G] * made[:k, BETA] * differences, h ** (degree + 1) / (degree + 1)
         gap = abs(np.sum(terms) - exact) / max(np.abs(terms).sum(), exact)
         assert gap < 1e-11 if degree < k else gap > 1e-2, (degree, gap)
+
+
+def test_once_its_start_is_over_adams_raises_its_order_in_every_second_step_at_most():
+    """As STEP, which counts no more steps of one length than one above the order."""
+    form, memory, orders, t, h = FORMULATIONS["axis"], np.zeros((LAST + 1, 6)), [], 0.0, 1e-3
+    par, state = form.prepare(SPHEROID.top, SPHEROID.start)
+    advance = compile_kernel(adams.method(form.field).advance)
+    memory[0] = form.field(par, state)
+    while t < 10.0:
+        state, t, h, *_ = advance(par, state, memory, 1e-10, t, h, 10.0)
+        orders += [memory[LAST, ORDER]] if memory[LAST, SETTLED] else []
+    raised = np.diff(orders) > 0
+    assert raised.sum() > 5
+    assert not (raised[1:] & raised[:-1]).any()
 
 
 @pytest.mark.parametrize("name", ["spheroid", "goldstein"])
@@ -228,8 +242,7 @@ def test_a_pole_ends_a_run_in_angles_alone(name):
     pole = symtop.Scene("pole", top, start, 5.0, observes="axis")
     ends = ("left_chart",) if name in ("rk45", *PAIRS) else ("left_chart", "step_too_small")
     for chart in symtop.integrator(name).charts():
-        tolerance = 1e-3 if chart == "angles" else 1e-8
-        run = symtop.simulate(pole, f"{name}[{chart}]", tolerance=tolerance, guard=False)
+        run = symtop.simulate(pole, f"{name}[{chart}]", tolerance=1e-3 if chart == "angles" else 1e-8, guard=False)
         assert run.attrs["outcome"] in (ends if chart == "angles" else ("ok",))
         assert chart == "angles" or float(symtop.errors(run)["axis"].max()) < 1e-5
 

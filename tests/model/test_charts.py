@@ -55,8 +55,7 @@ def test_close_to_a_pole_the_attitude_keeps_theta_and_the_sum_or_difference(thet
 
 @pytest.mark.parametrize("size", [1e-15, 1e-12, 1e-8, 1e-3, 1.0, 3.0])
 def test_distances_measure_small_and_large_angles(size):
-    first = charts.axis_from_angles(1.0, 0.3)
-    apart = charts.axis_distance(first, charts.axis_from_angles(1.0 + size, 0.3))
+    apart = charts.axis_distance(charts.axis_from_angles(1.0, 0.3), charts.axis_from_angles(1.0 + size, 0.3))
     assert apart == pytest.approx(min(size, 2 * math.pi - size), rel=1e-12, abs=3e-16)
     base = charts.quaternion_from_angles(1.0, 0.3, 0.2)
     turned = charts.quaternion_from_angles(1.0, 0.3, 0.2 + size)

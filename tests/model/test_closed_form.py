@@ -215,7 +215,28 @@ def test_next_to_the_separatrix_the_motion_is_periodic():
         form = ClosedForm(top, Angles(0.0, theta_dot=near))
         assert 30.0 < form.nutation_period < 100.0
         assert abs(form(1.0).theta - ClosedForm(top, start)(1.0).theta) < 1e-15
-    assert ClosedForm(top, Angles(0.0, theta_dot=2.0, psi_dot=1e-9)).nutation_period < 100.0
+    T = [ClosedForm(top, Angles(0.0, theta_dot=2.0, psi_dot=10.0**-k)).nutation_period for k in (70, 105, 140)]
+    assert T[2] - T[1] == pytest.approx(T[1] - T[0], rel=1e-12)  # a logarithm
+
+
+@pytest.mark.parametrize(("start", "rest"), [
+    (Angles(1.0, 0.0, 0.0, 1e-144, 1.0, 1.0), Angles(1.0, phi_dot=1.0, psi_dot=1.0)),
+    (Angles(1.0, phi_dot=1e-143), Angles(1.0)),
+])  # fmt: skip
+def test_a_start_that_all_but_rests_moves_as_from_rest_and_a_rate_of_1e_300_is_refused(start, rest):
+    top, times = SymmetricTop(1.0, 1.0, 1.0), np.linspace(0.0, 7.0, 29)
+    near, still = (ClosedForm(top, one)(times).theta for one in (start, rest))
+    np.testing.assert_allclose(near, still, rtol=0.0, atol=4 * EPS)
+    with pytest.raises(symtop.SymtopError, match="must meet a pole or miss it"):
+        ClosedForm(top, Angles(1.0, phi_dot=1e-300))
+
+
+@pytest.mark.parametrize(("spin", "tilt"), [(1.0, 1e-8), (0.0, 1e-7), (1.9, 1e-7)])
+def test_beside_a_pole_the_period_of_a_scene_is_that_of_the_closed_form(spin, tilt):
+    beside = sleeping(spin, tilt)
+    exact = ClosedForm(beside.top, beside.start).nutation_period
+    assert beside.nutation_period == exact
+    assert not math.isclose(beside.top.nutation_period(beside.start), exact, rel_tol=1e-4)  # what it replaces
 
 
 def test_after_as_many_turns_as_doubles_count_the_attitude_is_within_its_bound():

@@ -134,8 +134,7 @@ def test_a_certificate_that_contradicts_the_bounds_raises_them(monkeypatch, cach
 
 @pytest.mark.parametrize("name", ["spheroid_ieee", "goldstein_at_rest_ieee"])
 def test_quadruple_precision_has_24_digits_at_t_8(truth, name):
-    scene = symtop.scene("spheroid" if name.startswith("spheroid") else "goldstein")
-    data = symtop.reference(scene, [8.0], "quad")
+    data = symtop.reference(symtop.scene("spheroid" if name.startswith("spheroid") else "goldstein"), [8.0], "quad")
     with workdps(40):
         for quantity in ("theta", "phi", "psi"):
             value = mpf(float(data[quantity][0])) + mpf(float(data[f"{quantity}_lo"][0]))
@@ -253,8 +252,7 @@ def test_checks_reach_the_horizon_and_a_certificate_is_of_a_known_kind_and_of_th
     checks, form = check_times(scene, 17.0), scenes.closed_form(scene)
     assert checks[-1] == 17.0
     assert np.all(np.diff(checks) > 0.0)
-    speed = np.abs(form(np.linspace(0.0, 1.2, 500)).theta_dot).max()
-    assert np.abs(form(checks).theta_dot).max() > 0.98 * speed
+    assert np.abs(form(checks).theta_dot).max() > 0.98 * np.abs(form(np.linspace(0.0, 1.2, 500)).theta_dot).max()
     with pytest.raises(symtop.SymtopError, match="certify 'twice' is unknown"):
         symtop.reference("spheroid", [1.0], certify="twice")
     with pytest.raises(symtop.SymtopError, match="certify is for the closed form"):

@@ -286,8 +286,7 @@ def test_an_early_end_is_announced_and_a_budget_that_was_kept_is_no_failure():
 def test_implicit_steps_are_solved_where_nothing_moves_but_rounding(name, turn):
     """On a steady precession the increment of theta is rounding, and no correction is small beside it."""
     for scene in (steady(20.0), symtop.scene("steady")):
-        frequency = scene.top.nutation_frequency(scene.top.momenta(scene.start))
-        h = turn / frequency
+        h = turn / scene.top.nutation_frequency(scene.top.momenta(scene.start))
         run = symtop.simulate(scene, name, step_size=h, horizon=1000 * h, samples=101, guard=False)
         assert run.attrs["outcome"] == "ok"
         assert run.attrs["newton_iterations"] < 7 * run.attrs["steps"]

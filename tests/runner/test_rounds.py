@@ -65,8 +65,7 @@ def bring(request, tmp_path, monkeypatch):
 
     def brought(folder="r"):
         read.clear()
-        computed = runner.run(study, tmp_path / folder, quick=True, quiet=True)["computed"]
-        return computed, len(read)
+        return runner.run(study, tmp_path / folder, quick=True, quiet=True)["computed"], len(read)
 
     brought.folder = tmp_path / "r"
     brought.files = lambda: sorted((tmp_path / "r" / "cases" / study.name).glob("[!.]*.npz"))

@@ -127,8 +127,7 @@ def test_the_full_grid_and_the_ordinary_one_keep_each_others_cases(tmp_path):
 
     for words, count in (([], 2), (["--full"], 2), ([], 0), (["--full"], 0)):
         assert computed(*words)[0]["computed"] == count, words
-        cases = list((tmp_path / "r" / "cases" / "grids").glob("*.npz"))
-        assert len(cases) == (2 if words == [] and count else 4)
+        assert len(list((tmp_path / "r" / "cases" / "grids").glob("*.npz"))) == (2 if words == [] and count else 4)
         assert netcdf.read(tmp_path / "r" / "grids.nc")["steps"].values.max() == (1000.0 if words else 10.0)
     assert [row["state"] for row in computed("--status")["grids"]] == ["done", "done"]
 

@@ -301,8 +301,7 @@ def test_scales_of_many_tops_are_those_of_scenes_and_samples_fall_on_the_same_ti
 def test_errors_of_many_runs_are_those_of_each(tops, name):
     row, chosen = integrator(name), np.flatnonzero(tops.kinds < 2)[:4]
     level = 5 if row.fixed_step else 4
-    shown = ladder.run_level(row, tops, chosen, level, 1e6)
-    many = tops.errors(row.charts()[0], shown, chosen)
+    many = tops.errors(row.charts()[0], ladder.run_level(row, tops, chosen, level, 1e6), chosen)
     for k, member in enumerate(chosen):
         setting = tops.period[member] / FIRST * 0.5**level if row.fixed_step else ladder.setting_of(row, level)
         alone = error_row(scene_of(tops, member), row, setting, float(tops.times[member, -1]))

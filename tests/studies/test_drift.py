@@ -303,8 +303,7 @@ def test_a_steady_precession_and_a_failed_sample_have_no_phase():
     times = np.linspace(0.0, 9.0, 101)
     for where, phased in ((steady, 0), (spheroid, 60)):
         motion = symtop.ClosedForm(where.top, where.start)(times)
-        theta = np.where(np.arange(101) < 60, motion.theta, np.nan)
-        phase = nutation_phase(where, times, theta, motion.theta_dot)
+        phase = nutation_phase(where, times, np.where(np.arange(101) < 60, motion.theta, np.nan), motion.theta_dot)
         assert np.isfinite(phase).sum() == phased
         assert not np.isfinite(phase[60:]).any()
 

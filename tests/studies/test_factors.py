@@ -42,8 +42,7 @@ def measured():
 @pytest.fixture(scope="module")
 def quiet(measured):
     """The same with times that agree from process to process."""
-    known = np.isfinite(measured["spread"])
-    return measured.assign({"spread": measured["spread"].where(~known, 0.01)})
+    return measured.assign({"spread": measured["spread"].where(~np.isfinite(measured["spread"]), 0.01)})
 
 
 @pytest.fixture(scope="module")
@@ -105,8 +104,7 @@ def test_the_search_ends_closer_if_asked_and_languages_of_one_method_have_the_sa
 def test_what_is_not_within_the_budget_has_a_reason_and_no_time(monkeypatch):
     monkeypatch.setattr(measures, "timed", lambda asked, processes: np.ones((len(asked.runs), processes)))
     goal = Goal(10.0, 1e-7, (NUMPY,), (KERNEL,))
-    strang = [cell for cell in cells(["Strang"]) if cell.chart == "axis"]
-    settled = settle(SCENE, strang, goal)
+    settled = settle(SCENE, [cell for cell in cells(["Strang"]) if cell.chart == "axis"], goal)
     assert [cell.language for cell in settled] == [COMPILED, NUMPY]
     assert list(settled.values())[1] == settings.BUDGET
     data = factorial(SCENE, ["Strang"], [goal._replace(languages=(COMPILED, NUMPY))], 1, 0.001, 1)

@@ -18,10 +18,10 @@ of them; p_phi = L_z and the energy drift. With F_j the algebra element at stage
     Munthe-Kaas       y_i = exp(U_i) y,  U_i = h sum_j a_ij K_j,  K_i = F_i - [U_i, F_i]/2 + [U_i, [U_i, F_i]]/12 - ...
 
 The last is a method for the element U that the solution is the exponential of, U' = dexp^-1_U F = sum_k B_k/k! ad_U^k F
-with Bernoulli's numbers B_k; two nested brackets suffice for order 4, four for 6, six for 8. A table is rows of
-weights, one row an exponential, so that one kernel steps all three.
-The engines' `rkmk4` acts with another group, SO(3) x R^3, on body rates and turns the spin in its stages. A body
-without symmetry moves by an element of se(3), too, and q* with it (`framework.body`): p_phi is the Casimir kept there.
+with Bernoulli's numbers B_k; q nested brackets suffice for order q + 3, as B_3 = B_5 = B_7 = 0: two for 5, four for 7,
+six for 9. A table is rows of weights, one row an exponential, so that one kernel steps all three. The engines' `rkmk4`
+acts with another group, SO(3) x R^3, on body rates and turns the spin in its stages. A body without symmetry moves by
+an element of se(3), too, and q* with it (`framework.body`): p_phi is the Casimir kept there.
 
 In lanes a kernel compiles for each shape of a table: how many exponentials each stage has, and whether slopes are bent
 back (Munthe-Kaas). The weights are numbers in the table, and those that are 0 are carried out too, in the order of the

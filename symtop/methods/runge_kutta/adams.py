@@ -9,9 +9,10 @@ and the modified divided differences phi_1 = f_n, phi_{i+1} = phi_i - phi*_i (on
 
 It predicts with order k = 1 .. 12 and corrects with order k + 1. The run starts with order 1 and raises order and step
 together until an error is too large; then the order is the one with the least error, raised only after k + 1 steps of
-one length. h is kept, doubled if the error allows it, or multiplied by 0.5 to 0.9; doubled steps are what keeps the g_i
-(after k of them they are constants). Two evaluations a step, one for a step that is rejected. A sample is the value of
-the polynomial of degree k + 1 that the corrector integrates; it takes no evaluation.
+one length, and in every second step at most. Norm and first step are those of `pairs`. h is kept, doubled if the error
+allows it, or multiplied by 0.5 to 0.9; doubled steps are what keeps the g_i (after k of them they are constants). Two
+evaluations a step, one for a step that is rejected. A sample is the value of the polynomial of degree k + 1 that the
+corrector integrates; it takes no evaluation.
 
 Explicit, with a memory of up to twelve steps: what is defined by the map of one step (symplectic, symmetric, its order
 by a fixed step) is not claimed of it. Not to be confused with Nordsieck forms (LSODA, VODE), which change the length of
@@ -90,7 +91,7 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
             h = max(least, h if h > 0.0 else step)
             after = min(t + h, end)
             h = h if after < end else end - t
-            same = memory[LAST, SAME] + 1.0 if h == memory[LAST, LENGTH] else 1.0
+            same = min(memory[LAST, SAME], memory[LAST, ORDER_THEN]) + 1.0 if h == memory[LAST, LENGTH] else 1.0
             if same <= k or k != memory[LAST, ORDER_THEN] or failures > 0:
                 coefficients(memory, k, h)
             total = place = zero(state)

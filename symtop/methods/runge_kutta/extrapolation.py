@@ -4,10 +4,13 @@
     T_j,l+1 = T_jl + (T_jl - T_{j-1,l}) / ((n_j / n_{j-l})^2 - 1),    err_j = |T_jj - T_j,j-1| as in `pairs`
 
 T_jj has order 2 j. A step is tried with k - 1, k and k + 1 lines and ends with the first whose error passes, or when
-the errors are too large to pass. With A_j evaluations for j lines and H_j = .94 h (.65/err_j)^(1/(2j-1)), the step line
-j would allow, the next k is a neighbour whose work A_j/H_j is less by a tenth. Samples inside a step are shorter steps
-with as many lines, which are not counted. Explicit, neither symplectic nor symmetric; nothing is conserved but what is
-linear in the state. No smoothing step: all n_j are even.
+that of line k - 1 or k is above ((k+1) k)^2 or (k+1)^2. With A_j evaluations for j lines and the step that line j would
+allow, H_j = .94 h (.65/err_j)^(1/(2j-1)) within [.02, 10] h, the next k is a neighbour whose work A_j/H_j is less by a
+tenth, of lines 3 to 9 up to k; ODEX has .8 for one side, other limits, and looks at line k + 1, too, where that was
+computed. A rejected step is repeated with H_k or .9 h, the shorter. The first k is 1.5 - .6 log10(tolerance), at most
+8; the first h is that of `pairs`. Samples inside a step are shorter steps with as many lines, which are not counted.
+Explicit, neither symplectic nor symmetric; nothing is conserved but what is linear in the state. No smoothing step: all
+n_j are even.
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.9 (their code is ODEX).
 """
 

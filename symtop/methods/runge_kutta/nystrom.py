@@ -7,10 +7,11 @@ and psi' are functions of theta alone:
     theta+ = theta + h theta' + h^2 sum_i b_i F_i,    (p_theta, phi, psi)+ = (p_theta, phi, psi) + h sum_i b'_i k_i
 
 Positions alone have far fewer order conditions than positions and velocities: order 8 takes eight forces, where
-`dop853` takes twelve. The ninth stage is the first one of the next step. A sample inside a step is a shorter step, not
-counted. Neither symplectic nor symmetric; p_phi and p_psi, read off the increments of phi and psi, are those of the
-start. It ends at theta = 0 and pi. Not to be confused with `srkn`, splittings, symplectic and without an error
-estimate. Source: Dormand, El-Mikkawy, Prince, IMA J. Numer. Anal. 7 (1987) 423, the pair RKN8(6)9FM.
+`dop853` takes twelve. The ninth stage is the first one of the next step. The error estimate is of order q = 6. A sample
+inside a step is a shorter step, not counted. Neither symplectic nor symmetric; p_phi and p_psi, read off the increments
+of phi and psi, are those of the start. It ends at theta = 0 and pi. Not to be confused with `srkn`, splittings,
+symplectic and without an error estimate. Source: Dormand, El-Mikkawy, Prince, IMA J. Numer. Anal. 7 (1987) 423, the
+pair RKN8(6)9FM.
 """
 
 from collections.abc import Callable

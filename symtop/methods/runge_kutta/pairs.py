@@ -1,7 +1,7 @@
 """Explicit pairs of order 5 to 9 with SciPy's control of the step, compiled, and the same tables with fixed steps.
 
     k_1 = f(y),  k_i = f(y + h sum_{j<i} a_ij k_j),  y+ = y + h sum_i b_i k_i,  f(y+) is the k_1 of the next step
-    |err| as below, of parts err_m / (atol + rtol max(|y_m|, |y+_m|)), must be below 1;  q: the order of the estimate
+    |err| as below, of parts err_m / (atol + rtol max(|y_m|, |y+_m|)), must be below 1;  q: order - 1
     h <- h min(10, .9 |err|^(-1/(q+1))) after a step (min(1, ..) after a rejection),  h max(.2, ..) when rejected
 
     name              order   f a step   |err|, e_p = rms(err of order p)   samples between steps

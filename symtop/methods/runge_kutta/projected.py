@@ -1,11 +1,11 @@
 """Explicit Runge-Kutta steps, each projected onto the constants of the motion, on the state (e, L).
 
-    y~ = y + h sum_i b_i k_i,      y+ = y~ + sum_j t_j c_j,      g(y+) = 0,      g = ((|e|^2 - 1)/2, L.e - p_psi, H - E)
+    y~ = y + h sum_i b_i k_i,    y+ = y~ + sum_j t_j D c_j,    g(y+) = 0,    g = ((|e|^2 - 1)/2, L.e - p_psi, H - E)
 
 p_phi = L_z is linear, so that the Runge-Kutta step keeps it, and no correction moves it. The c_j are the gradients of g
-at y~ without their part along L_z, made orthogonal one after another; the products of vectors weigh L by 1/s,
+at y~ without their part along L_z, made orthogonal one after another; lengths of L are in units of s,
 
-    (u, v) = u_e.v_e + s^2 (u_x v_x + u_y v_y),      s^2 = |L|^2 + I1 mgl at the start,
+    (u, v) = u_e.v_e + s^2 (u_x v_x + u_y v_y),    D = (1, 1, 1, s^2, s^2, 0),    s^2 = |L|^2 + I1 |mgl| at the start,
 
 as the corrections of e have no unit and those of L have. The t_j follow from simplified Newton iteration, two passes
 with the same c_j, which leave g at the order of e^3 of a step's error e. A gradient that depends on those before it,

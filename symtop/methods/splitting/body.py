@@ -9,8 +9,9 @@ body: R1 by the angle (1/I1 - 1/I2) M1 a h, and R3 likewise. R1 is the identity 
 
 A drift is symmetric and of order two, so that kick-drift-kick is, too, and a composition of such steps has the order
 that it has elsewhere. Other tables assume an exact free motion and would fall to order two with this one. They drift by
-a composition of turns R3 and R1 of their own order p, with S once at its end (`free_motion`); of a generalised order
-(8, 6, 4) only the last number remains. With tau = Gamma x c the force gradient is that of W = {V, {V, T}}:
+a composition of turns of their own order p, R3 first and last, with S once at its end (`free_motion`): Blanes and
+Moan's S6 (p = 4), two of whose turns of each kind go backward, Kahan and Li's compositions (p = 6, 8). Of a generalised
+order (8, 6, 4) only the last number remains. With tau = Gamma x c the force gradient is that of W = {V, {V, T}}:
 
     W = tau.(J^-1 tau),     M += Gamma x (b h c + 2 g h^3 c x J^-1 tau)
 
@@ -29,8 +30,9 @@ largest moment and R3 about that of the smallest (`SORTED`).
 
 With s, c = sin, cos of a half angle and m = c - 1 = -2 sin^2 of its half, no increment is a difference of large
 numbers; the turn S gives q the length that rounding has taken.
-Sources: Touma, Wisdom, Astron. J. 107 (1994) 1189; Fasso, J. Comput. Phys. 189 (2003) 527; Dullweber, Leimkuhler,
-McLachlan, J. Chem. Phys. 107 (1997) 5840; Miller and others, J. Chem. Phys. 116 (2002) 8649.
+Sources: Touma, Wisdom, Astron. J. 107 (1994) 1189; Blanes, Moan, J. Comput. Appl. Math. 142 (2002) 313; Fasso, J.
+Comput. Phys. 189 (2003) 527; Dullweber, Leimkuhler, McLachlan, J. Chem. Phys. 107 (1997) 5840; Miller and others, J.
+Chem. Phys. 116 (2002) 8649.
 """
 
 import functools

@@ -12,7 +12,7 @@ alone. With y = w/(h mgl), a = h/I1, m = h mgl, P = a p_phi and S_n = [Re y_n, I
 
     S_{n+2} = [1, 1, 3] (kappa (sum_{0<j<n} u_j S_{n-j} + u_0 S_n) + u_n G)/((n+1)(n+2)) + [-P, P] swap(S_{n+1})/(n+2)
     G = [a Re w, a Im w, 2 kappa u_0 - c1/3]        (u_0 S_n only of y),        S_1 = [-Im z, Re z, a Im(conj(w) z)]
-    dw = m sum y_n,    du = sum u_n,    dz = -i sum_{n>1} n y_n
+    dw = m sum_{0<n<=N} y_n,    du = sum_{0<n<=N} u_n,    dz = -i sum_{1<n<=N+1} n y_n
 
 N (N - 1)/2 fused products for the order N, 190 for N = 20, where a general compiler of Taylor series takes six scalar
 products, 3 N^2. Three traps. c1 and c0 are those of the *present* state: constants of the start make it unstable.
@@ -32,11 +32,12 @@ Re chi_2, Im chi_2] in one register,
 The own spin is exact and put on at samples, as everywhere in the space frame; |q| is kept as far as the series
 converges.
 
-*With a tolerance* the order follows from it, each step from its last two terms S_n, those of the axis or of the
-attitude at the end of the step: the tolerance is an error of one step in radians.
+*With a tolerance* the order follows from it, each step from its last two terms, in radians at the end of the step, as
+the tolerance is: T_n = (n y_n, u_n), those of z and u, on the attitude with 2 X_n beside them.
 
     order N: the least of 8, 12, 16, 20 that is at least 3 - log(tolerance)/2
-    e = max(|S_N|, |S_{N-1}|/4),    accepted if e <= 4 tolerance,    h <- h min(4, 0.95 (tolerance/e)^(1/N))
+    e = max(|T_N|, |T_{N-1}|/4),    accepted if e <= 4 tolerance,    h <- h min(4, 0.95 (tolerance/e)^(1/N))
+    first h = 1/sqrt(|L|^2/I1^2 + 4 |mgl|/I1 + 1/t^2), t the last sample
 
 The first neglected term is smaller than e by the ratio of two terms, 0.2 to 0.5. A rejected step costs one series. So
 does a sample, the series of the step with a shorter time: it is the method's dense output and, as that of `taylor`, not

@@ -187,7 +187,11 @@ class PreciseForm:
         lead = facing * self.beta
         curvature = 2 * self.beta * cosine - kinetic - self.a**2
         slope = facing * (sine2 * torque - 2 * cosine * real(theta_dot**2))
-        x1, x2, x3 = real_roots(ctx, sine2 * real(theta_dot**2), slope, curvature, lead)  # of u'^2 in u - u(0)
+        fall = sine2 * real(theta_dot**2)  # u'^2 at the start
+        x1, x2, x3 = real_roots(ctx, fall, slope, curvature, lead)  # of u'^2 in u - u(0)
+        product = x1 * x2 * (-lead * x3 if lead else curvature)
+        if abs(product - fall) > abs(product) * ctx.mpf(10) ** -20:  # noise has moved a root beside a double one
+            return False
         up, down, twist_up, twist_down = (above, below, north, south) if facing > 0 else (below, above, south, north)
         rests = x1 == x2
         if twist_down == 0 and not rests:
@@ -197,6 +201,8 @@ class PreciseForm:
         self.climbs = theta == 0 and phi_dot + psi_dot == 0 and theta_dot**2 * I1 == -4 * mgl != 0
         if self.climbs:
             x1, x2, x3 = ctx.zero, up, up
+        if lead and x2 == x3 and not (rests or self.climbs):
+            return False
         rigid = rests or not lead  # no elliptic function needed
         self.curve = Curve(
             floor=Pole(twist_down, down + x1, down + x2),
@@ -210,6 +216,8 @@ class PreciseForm:
             start_sn2=ctx.zero if rests else -x1 / (x2 - x1),
             start_cn2=ctx.one if rests else x2 / (x2 - x1),
         )
+        if not rests and any(pole.twist and not (pole.low and pole.high) for pole in self.curve[:2]):
+            return False
         span = 1 + (abs(curvature / lead) if lead else 0)
         gaps = [*self.curve.floor[1:], *self.curve.crown[1:], self.curve.swing, *self.curve[5:]]
         smallest = min(gap for gap in gaps if gap != 0)

@@ -35,7 +35,8 @@ from symtop.model import charts
 from symtop.model.charts import BODY, DIMENSIONS, Array, View
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.lazy_kernel import LazyKernel
-from symtop.model.top import BISECTIONS, NUMBERS, SymmetricTop, bisected, nutation_cubic, period_between
+from symtop.model.scenes import exact_periods, nutation_period
+from symtop.model.top import BISECTIONS, NUMBERS, SymmetricTop, beside_pole, bisected, nutation_cubic, period_between
 from symtop.run.simulation import WIDEST_GAP, places, unseen
 from symtop.run.trajectory import LABELS
 
@@ -104,14 +105,19 @@ def nutation_periods(numbers: Array) -> Array:
     if of_bodies(numbers):
         return np.array([body.nutation_period(start) for body, start in members_of(numbers)])
     if not _periods.ready(A_PERIOD * len(numbers)):
-        return np.array([top.nutation_period(start) for top, start in members_of(numbers)])
+        return np.array([nutation_period(*top) for top in members_of(numbers)])
     periods = np.empty(len(numbers))
     _periods.compiled(np.ascontiguousarray(numbers), periods)
+    if (near := np.signbit(periods)).any():
+        periods[near] = exact_periods(numbers[near], -periods[near])
     return periods
 
 
 def all_periods(numbers: Array, periods: Array) -> None:
-    """The loop of `nutation_periods` over tops, as a kernel: its bisections run in lanes, in a third of the time."""
+    """The loop of `nutation_periods` over tops, as a kernel: its bisections run in lanes, in a third of the time.
+
+    Beside a pole, where they lose their digits, they are negative.
+    """
     wide_vectors()
     n, lanes = len(numbers), np.empty(len(_NONE) * W)
     for first in range(0, n, W):
@@ -126,7 +132,9 @@ def all_periods(numbers: Array, periods: Array) -> None:
         for j in range(min(W, n - first)):
             top, start = opened(to_fixed_tuple(numbers[first + j], _WIDTH))
             low, below, high, above = column(lanes, 5, j, _NONE[:4])
-            periods[first + j] = period_between(top, start, 0.5 * (low + below), 0.5 * (high + above))
+            low, high = 0.5 * (low + below), 0.5 * (high + above)
+            period = period_between(top, start, low, high)
+            periods[first + j] = -period if beside_pole(low, high) else period
 
 
 A_PERIOD = 5e-5  # seconds of one top, interpreted
