@@ -60,7 +60,8 @@ def judge(
                     a function that returns the torque in body axes
     ./my.so         void step(double *y, double h, const double *par, long n)
     "./engine -x"   with --form program: a line of numbers in, states out; with --form
-                    server it is started once, and answers line after line
+                    server it is started once, answers line after line, and ends
+                    each answer with an empty line
     run.csv         a trajectory without a method: time and states (see symtop.judging.judge_step)
 
     Without a claim it says what the method is. The exit code is 1 if a claim is refuted.
@@ -68,7 +69,7 @@ def judge(
     \b
     symtop judge my.py:step --order 4 --symplectic
     symtop judge ./my.so --chart axis --order 2
-    symtop judge "./my_engine --top" --form program --quick
+    symtop judge "./my_engine --top" --form server --quick
     symtop judge run.csv --scene spheroid --conserves p_phi
     symtop judge brick.csv --scene check-case-2
     symtop judge my.py:step --form rotation --scene tennis-racket

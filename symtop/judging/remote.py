@@ -61,6 +61,8 @@ class Process(contextlib.AbstractContextManager["Process"]):
             self.process.join()
             self.pipe.close()
             self.output.close()
+        elif self.table:
+            self.table.get("close", dict)()
         self.process = None
 
     end = __exit__
@@ -194,7 +196,10 @@ def table_of(opened: Callable[[], Stepper]) -> Table:
         kind = next((name for name, form in FORMS.items() if form is stepper.form), "")
         return facts | {"kind": kind, "adaptive": stepper.adaptive is not None}
 
-    return {"march": march, "along": along, "about": about, "adaptive": lambda *args: stepper.adaptive(*args)._asdict()}
+    def adaptive(*args: Any) -> dict[str, Any]:
+        return stepper.adaptive(*args)._asdict()  # type: ignore[no-any-return]
+
+    return {"march": march, "along": along, "about": about, "adaptive": adaptive, "close": stepper.close}
 
 
 class Remote(Stepper):

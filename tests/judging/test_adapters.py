@@ -168,7 +168,7 @@ def test_a_slow_program_has_the_time_that_earlier_runs_took_also_after_a_short_o
         fresh.march(SPHEROID.top, None, np.full(6, 5.0), 0.1, np.array([0, 200]))
 
 
-SERVES = """import sys
+SERVES = """import os, sys, time
 print('started', file=open({mark!r}, 'a'))
 for numbers in map(str.split, sys.stdin):
     n, stride = map(int, numbers[4:6])
@@ -178,14 +178,17 @@ for numbers in map(str.split, sys.stdin):
 
 
 @pytest.mark.parametrize(("body", "words", "starts"), [
-    ("print(flush=True)", "", 1), (r"print('\r', flush=True)", "", 1),  # one that ends lines as Windows does
-    ("break", "must answer one line after another, and ended after one: its form is program", 2),
+    *((f"print({end!r}, flush=True)", "", 1) for end in ("", "\r", "  ")),  # of Windows, Fortran
+    (r"print(flush=True); time.sleep(0.3); print('\n', flush=True)", "", 1),
+    ("break", "must answer line after line, and ended after one: its form is program", 2),
     ("sys.exit('no licence')", "ended with code 1: no licence", 2),
     ("sys.stdout.flush()", "had not ended its answer with an empty line 2 s after it was asked for 3 steps of 0.1", 2),
+    ("os.close(1); time.sleep(99)", "had not ended its answer with an empty line 2 s after", 2),
 ])  # fmt: skip
 def test_a_server_is_started_once_and_again_only_if_it_fails(tmp_path, body, words, starts, monkeypatch):
-    monkeypatch.setattr(heartbeat, "patience", 2.0 if "had not" in words else 20.0)
-    monkeypatch.setattr(external.Server, "starting", 0.0)
+    late = "had not" in words
+    monkeypatch.setattr(heartbeat, "patience", 2.0 if late else 0.0 if "licence" in words else 20.0)
+    monkeypatch.setattr(external, "STARTING", 0.0 if late else 30.0)  # seconds, also of a second start
     mark, file = tmp_path / "starts", tmp_path / "engine.py"
     file.write_text(SERVES.format(mark=str(mark), body=body))
     stepper = open_target(f"{sys.executable} {file}", "server", "axis")

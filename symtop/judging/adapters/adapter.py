@@ -47,6 +47,9 @@ class Stepper:
     def renew(self) -> None:
         """Remove data that the step may keep between calls, if possible."""
 
+    def close(self) -> None:
+        """End what it has started."""
+
     def march(self, top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> Array:
         """The state after marks[0], marks[1], ... steps of h from y, (marks, dimension), NaN after a failure."""
         raise NotImplementedError  # each kind of foreign code has its own

@@ -12,8 +12,8 @@ holds I1, I3 and mgl:
 
 n is a multiple of stride. It is started for every run, so that it keeps no data between runs. *server* is a program
 that is started once, for languages that start slowly: it answers line after line, each answer in text, ended by an
-empty line and flushed. For all three, y is (e, L) on the axis, (q, L) on the attitude, (theta, phi, psi and their
-rates) in angles, and h may be negative.
+empty line and flushed; it writes nothing before it is asked, and NaN for a state that it cannot make. For all three, y
+is (e, L) on the axis, (q, L) on the attitude, (theta, phi, psi and their rates) in angles, and h may be negative.
 
 *torch*, *jax*: a function ``step(f, t, y, h) -> y``; y has the shape (batch, 6), a row (e, L) on the axis, or
 (batch, 7), (q, L) on the attitude, and f(t, y) has the same. A torch function is called without gradients; a JAX
@@ -32,6 +32,7 @@ import dataclasses
 import functools
 import importlib
 import os
+import re
 import select
 import shlex
 import shutil
@@ -56,6 +57,7 @@ GUARD, MARK = 8, -1.2345e-67  # number and value of doubles behind the state tha
 TEXT = b"0123456789+-.eEinfaINFA, \t\r\n"  # characters of numbers as text
 SHORT = 1e-3  # relative: largest rounding of the numbers that a program writes
 STARTING, CHUNK = 30.0, 65536  # additional seconds for a server's first answer; bytes that are read of it at once
+WHOLE = re.compile(rb"\n[ \t\r]*\n\Z")  # the end of a server's answer
 SLACK = 5.0  # limit of the time of a run, in times expected from earlier runs
 COMPILING = 60.0  # additional seconds for the first call, which compiles
 OTHER = 0.7  # ratio of momenta of the second row of a batch to the first
@@ -108,7 +110,8 @@ class Program(Stepper):
     """A stepper around a command."""
 
     own_loop = True
-    starting, ending = 0.0, ""  # additional seconds for the first call; what ends an answer
+    starting: Any = 0.0  # additional seconds for a call
+    ending = ""  # what ends an answer
 
     def __init__(self, command: str, chart: str) -> None:
         self.words, self.chart, self.form = [], chart, FORMULATIONS[chart]
@@ -161,41 +164,60 @@ class Program(Stepper):
 
 
 class Server(Program):
-    """A stepper around a program that answers line after line."""
+    """A stepper around a program that answers line after line, as long as it does not end."""
 
-    starting, ending = STARTING, " its answer with an empty line"
+    ending = " its answer with an empty line"
     _server: Any = None
 
+    @property
+    def starting(self) -> float:
+        """Additional seconds for a call that starts the program."""
+        return STARTING if self._server is None else 0.0
+
     def _run(self, line: str, seconds: float) -> tuple[bytes, int, bytes]:
-        if self._server is None:
+        started, end = self._server is None, time.monotonic() + seconds
+        if started:
             self._errors, pipe = tempfile.TemporaryFile(), subprocess.PIPE  # noqa: SIM115  (open as long as it runs)
             self._server = subprocess.Popen(self.words, stdin=pipe, stdout=pipe, stderr=self._errors, bufsize=0)  # noqa: S603
-        server, answer, end = self._server, b"", time.monotonic() + seconds
+        output = self._server.stdout
+        if select.select([output], [], [], 0.0)[0] and os.read(output.fileno(), CHUNK).strip():
+            self.close()
+            raise SymtopError(f"{self.name} must write nothing before it is asked")
         with contextlib.suppress(BrokenPipeError):
-            server.stdin.write(line.encode())
-        while not answer[-4:].replace(b"\r", b"").endswith(b"\n\n"):
-            if not select.select([server.stdout], [], [], max(end - time.monotonic(), 0.0))[0]:
-                self.close()
-                raise subprocess.TimeoutExpired(self.words, seconds)
-            if not (part := os.read(server.stdout.fileno(), CHUNK)):
-                code = server.wait()
-                self._errors.seek(0)
-                errors = self._errors.read()
-                self.close()
-                if code == 0:
-                    words = "must answer one line after another, and ended after one: its form is program"
-                    raise SymtopError(f"{self.name} {words}")
-                return answer, code, errors
+            self._server.stdin.write(line.encode())
+        try:
+            answer = self._read(end)
+            if WHOLE.search(answer[-64:]):
+                return answer, 0, b""
+            code = self._server.wait(max(end - time.monotonic(), 0.0))
+            self._errors.seek(0)
+            errors = self._errors.read()
+        except subprocess.TimeoutExpired:
+            self.close()
+            raise
+        self.close()
+        if code == 0:
+            after = "after one: its form is program" if started and answer.strip() else "without an answer"
+            raise SymtopError(f"{self.name} must answer line after line, and ended {after}")
+        return answer, code, errors
+
+    def _read(self, end: float) -> bytes:
+        """What it writes, up to an empty line after something else, or until it ends; TimeoutExpired after `end`."""
+        output, answer, part = self._server.stdout, b"", b"\n"
+        while part and not (WHOLE.search(answer[-64:]) and answer.strip()):
+            if not select.select([output], [], [], max(end - time.monotonic(), 0.0))[0]:
+                raise subprocess.TimeoutExpired(self.words, 0.0)
+            part = os.read(output.fileno(), CHUNK)
             answer += part
-        self.starting = 0.0
-        return answer, 0, b""
+        return answer
 
     def close(self) -> None:
         """End the program; the next call starts another."""
         if self._server is not None:
             self._server.kill()
-            self._server.communicate()
-            self._errors.close()
+            for stream in (self._server.stdin, self._server.stdout, self._errors):
+                stream.close()
+            self._server.wait()
         self._server = None
 
 
