@@ -61,8 +61,8 @@ class Process(contextlib.AbstractContextManager["Process"]):
             self.process.join()
             self.pipe.close()
             self.output.close()
-        elif self.table:
-            self.table.get("close", dict)()
+        elif self.table and "close" in self.table:
+            self.table["close"]()
         self.process = None
 
     end = __exit__

@@ -200,6 +200,17 @@ def test_a_server_is_started_once_and_again_only_if_it_fails(tmp_path, body, wor
     assert mark.read_text().count("started") == starts
 
 
+def test_a_server_ends_with_the_judging_that_is_not_forked_too(tmp_path, only, monkeypatch):
+    only("calls")
+    monkeypatch.setitem(sys.modules, "jax", None)
+    mark, file = tmp_path / "process", tmp_path / "engine.py"
+    start = f"import os\nopen({str(mark)!r}, 'w').write(str(os.getpid()))\n"
+    file.write_text(start + (EXAMPLES / "judged_program.py").read_text())
+    assert symtop.judge(f"{sys.executable} {file}", form="server", quick=True).refuted == []
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(mark.read_text()), 0)
+
+
 def hangs(f, t, y, h):
     while True:
         time.sleep(0.01)
@@ -398,8 +409,7 @@ def test_waiting_for_a_processor_takes_none_of_the_time_that_judging_has():
 @pytest.mark.slow
 def test_a_step_that_hangs_backwards_is_judged_forwards(impatient, only):
     only("calls", "order", "symplectic")
-    backwards = lambda f, t, y, h: (hangs if h < 0 else midpoint)(f, t, y, h)
-    ledger = symtop.judge(backwards, quick=True, order=2)
+    ledger = symtop.judge(lambda f, t, y, h: (hangs if h < 0 else midpoint)(f, t, y, h), quick=True, order=2)
     assert (ledger["calls"].measured.kind, ledger["order"].verdict) == ("forward only", "confirmed")
     assert (ledger["symplectic"].measured.kind, heartbeat.inside) == ("no", False)
 

@@ -148,8 +148,7 @@ def test_reduction_commutes_with_the_step():
     scene = symtop.scene("spheroid")
     h = scene.nutation_period / 4.37
     par, _ = on_oscillators(scene.top, scene.start)
-    rule = exact_map(scene.top, scene.start, h)
-    P, u = rule.D1 + par.b1, run(scene.top, scene.start, h, 200, "axis").states[:, 2]
+    P, u = exact_map(scene.top, scene.start, h).D1 + par.b1, run(scene.top, scene.start, h, 200, "axis").states[:, 2]
     y = 0.5 * (par.kappa * u + (par.b1 + par.b2))  # wp, for b1 + b2 = -mu
     sums = (2 * P * y**2 + (2 * P**2 - par.g2 / 2) * y - P * par.g2 / 2 - par.g3) / (y - P) ** 2
     assert np.abs(y[2:] + y[:-2] - sums[1:-1]).max() < 1e-12 * np.abs(y).max()

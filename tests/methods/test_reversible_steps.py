@@ -27,8 +27,7 @@ def run(scene, h, marks, solver=SOLVER):
 def energies(scene, states):
     """p^2/2 I1 + V of states in angles."""
     par, _ = symtop.on_angles(scene.top, scene.start)
-    height = effective_potential(states[:, 0], par.north, par.south, par.I1, par.mgl)
-    return 0.5 * states[:, 1] ** 2 / par.I1 + height
+    return 0.5 * states[:, 1] ** 2 / par.I1 + effective_potential(states[:, 0], par.north, par.south, par.I1, par.mgl)
 
 
 @pytest.mark.parametrize("name", ["spheroid", "goldstein"])

@@ -61,8 +61,7 @@ def test_the_right_hand_side_is_the_derivative_of_the_true_motion(name, chart):
     scene, form = symtop.scene(name), FORMULATIONS[chart]
     par, _ = form.prepare(scene.top, scene.start)
     moment, h = 0.37 * scene.nutation_period, 3e-4 * scene.nutation_period
-    times = moment + h * np.array([-2.0, -1.0, 0.0, 1.0, 2.0])
-    motion = np.array(closed_form(scene)(times)).T  # angles and rates
+    motion = np.array(closed_form(scene)(moment + h * np.array([-2.0, -1.0, 0.0, 1.0, 2.0]))).T  # angles and rates
     states = [form.prepare(scene.top, symtop.Angles(*map(float, values)))[1] for values in motion]
     back2, back, here, ahead, ahead2 = np.array(states)
     slope = (8.0 * (ahead - back) - (ahead2 - back2)) / (12.0 * h)

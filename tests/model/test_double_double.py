@@ -33,8 +33,7 @@ def _pair(draw):
 
 
 def _four(draw):
-    high = draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-10.0, 10.0)
-    parts = [high]
+    parts = [draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-10.0, 10.0)]
     for _ in range(3):
         parts.append(draw.uniform(-0.5, 0.5) * math.ulp(parts[-1]))
     return tuple(parts)

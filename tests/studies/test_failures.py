@@ -137,8 +137,7 @@ def test_a_window_between_two_steps_of_the_grid_is_seen(name, phase, unstable):
         assert max(linear.surpasses(at, at.doubt) for at in ends) <= 0.0
         assert (window.end - window.start) * OMEGA < 0.011
         own = trace(method, STEADY, phase / OMEGA).theta  # the precession itself is lost beside 2 pi
-        centre = own if math.isfinite(own) else STEADY.start.theta
-        assert swings(name, phase, 20_000, 1e-6, centre)[-1] > 1e-4
+        assert swings(name, phase, 20_000, 1e-6, own if math.isfinite(own) else STEADY.start.theta)[-1] > 1e-4
     elif phase > 6.0:  # a whole nutation a step, and nothing is driven away
         assert swings(name, phase, 20_000, 1e-6)[-1] < 1e-5
 
@@ -210,8 +209,7 @@ def test_the_splitting_window():
     edges = [h / unit for h in sign_changes(lambda h: sleep_margin(strang, 6.0, h), np.linspace(0.5, 1.5, 201) * unit)]
     assert len(edges) == 2
     assert edges[0] == pytest.approx(1.0, abs=1e-6)
-    beyond = lambda x: 6.0 * math.tan(1.5 * x * unit - 0.5 * math.pi) - x * unit
-    upper = sign_changes(beyond, np.array([1.0, 1.4]))
+    upper = sign_changes(lambda x: 6.0 * math.tan(1.5 * x * unit - 0.5 * math.pi) - x * unit, np.array([1.0, 1.4]))
     assert edges[1] == pytest.approx(upper[0], abs=1e-6)
     assert upper[0] == pytest.approx(1.1232416, abs=1e-6)
     for place, stays in ((0.99, True), (1.02, False), (1.11, False), (1.12, False), (1.13, True)):
