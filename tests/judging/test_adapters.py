@@ -180,6 +180,7 @@ for numbers in map(str.split, sys.stdin):
 @pytest.mark.parametrize(("body", "words", "starts"), [
     *((f"print({end!r}, flush=True)", "", 1) for end in ("", "\r", "  ")),  # of Windows, Fortran
     (r"print(flush=True); time.sleep(0.3); print('\n', flush=True)", "", 1),
+    ("print('\\nready', flush=True)", "must write nothing but its answer, which an empty line ends", 2),
     ("break", "must answer line after line, and ended after one: its form is program", 2),
     ("sys.exit('no licence')", "ended with code 1: no licence", 2),
     ("sys.stdout.flush()", "had not ended its answer with an empty line 2 s after it was asked for 3 steps of 0.1", 2),

@@ -57,7 +57,7 @@ GUARD, MARK = 8, -1.2345e-67  # number and value of doubles behind the state tha
 TEXT = b"0123456789+-.eEinfaINFA, \t\r\n"  # characters of numbers as text
 SHORT = 1e-3  # relative: largest rounding of the numbers that a program writes
 STARTING, CHUNK = 30.0, 65536  # additional seconds for a server's first answer; bytes that are read of it at once
-WHOLE = re.compile(rb"\n[ \t\r]*\n\Z")  # the end of a server's answer
+EMPTY = re.compile(rb"\n[ \t\r]*\n")  # the line that ends a server's answer
 SLACK = 5.0  # limit of the time of a run, in times expected from earlier runs
 COMPILING = 60.0  # additional seconds for the first call, which compiles
 OTHER = 0.7  # ratio of momenta of the second row of a batch to the first
@@ -180,14 +180,15 @@ class Server(Program):
             self._errors, pipe = tempfile.TemporaryFile(), subprocess.PIPE  # noqa: SIM115  (open as long as it runs)
             self._server = subprocess.Popen(self.words, stdin=pipe, stdout=pipe, stderr=self._errors, bufsize=0)  # noqa: S603
         output = self._server.stdout
-        if select.select([output], [], [], 0.0)[0] and os.read(output.fileno(), CHUNK).strip():
-            self.close()
-            raise SymtopError(f"{self.name} must write nothing before it is asked")
+        early = select.select([output], [], [], 0.0)[0] and os.read(output.fileno(), CHUNK).strip()
         with contextlib.suppress(BrokenPipeError):
             self._server.stdin.write(line.encode())
         try:
-            answer = self._read(end)
-            if WHOLE.search(answer[-64:]):
+            answer, *after = EMPTY.split(b"" if early else self._read(end), 1)
+            if early or b"".join(after).strip():
+                self.close()
+                raise SymtopError(f"{self.name} must write nothing but its answer, which an empty line ends")
+            if after:
                 return answer, 0, b""
             code = self._server.wait(max(end - time.monotonic(), 0.0))
             self._errors.seek(0)
@@ -197,18 +198,18 @@ class Server(Program):
             raise
         self.close()
         if code == 0:
-            after = "after one: its form is program" if started and answer.strip() else "without an answer"
-            raise SymtopError(f"{self.name} must answer line after line, and ended {after}")
+            when = "after one: its form is program" if started and answer.strip() else "without an answer"
+            raise SymtopError(f"{self.name} must answer line after line, and ended {when}")
         return answer, code, errors
 
     def _read(self, end: float) -> bytes:
-        """What it writes, up to an empty line after something else, or until it ends; TimeoutExpired after `end`."""
+        """What it writes, up to an empty line behind something else, or until it ends; TimeoutExpired after `end`."""
         output, answer, part = self._server.stdout, b"", b"\n"
-        while part and not (WHOLE.search(answer[-64:]) and answer.strip()):
+        while part and not EMPTY.search(answer):
             if not select.select([output], [], [], max(end - time.monotonic(), 0.0))[0]:
                 raise subprocess.TimeoutExpired(self.words, 0.0)
             part = os.read(output.fileno(), CHUNK)
-            answer += part
+            answer = (answer + part).lstrip()
         return answer
 
     def close(self) -> None:
