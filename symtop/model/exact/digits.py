@@ -201,7 +201,7 @@ class PreciseForm:
         self.climbs = theta == 0 and phi_dot + psi_dot == 0 and theta_dot**2 * I1 == -4 * mgl != 0
         if self.climbs:
             x1, x2, x3 = ctx.zero, up, up
-        if lead and x2 == x3 and not (rests or self.climbs):
+        if lead and x2 == x3 and not (rests or self.climbs):  # the gap has cancelled
             return False
         rigid = rests or not lead  # no elliptic function needed
         self.curve = Curve(
