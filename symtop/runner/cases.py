@@ -104,7 +104,9 @@ class StudyCases:
                 bar.update()
 
             if tasks:
-                post(f"{self.study.name}: 0 of {len(tasks)} cases, after kernels that no file holds are compiled")
+                timed = all(self.study.is_timed(task.case) for task in tasks)
+                first = "measuring times" if timed else "first compiling kernels that no file holds"
+                post(f"{self.study.name}: 0 of {len(tasks)} cases, {first}")
             pool.run(self.study, tasks, on_result)
 
     def combined(self) -> Combined:
