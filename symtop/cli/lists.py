@@ -2,6 +2,8 @@
 
 import contextlib
 import math
+import os
+import sys
 import textwrap
 from collections.abc import Callable
 from pathlib import Path
@@ -13,6 +15,7 @@ from symtop.cli import common
 from symtop.cli.common import File, as_text, completing, facts, table, terminal_width
 from symtop.core import __version__
 from symtop.core.errors import SymtopError
+from symtop.core.files import is_terminal
 from symtop.report import formats
 
 if TYPE_CHECKING:
@@ -43,7 +46,8 @@ def _print(
     elif wide:
         click.echo(table(*formats.columns(records)))
     else:
-        click.echo(table(*formats.columns(short), terminal_width()))
+        narrow = is_terminal(sys.stdout) or "COLUMNS" in os.environ  # else one line an entry, for grep
+        click.echo(table(*formats.columns(short), terminal_width() if narrow else None))
         click.echo(textwrap.fill(note, terminal_width()))
 
 

@@ -232,12 +232,15 @@ def test_however_it_is_called_linear_algebra_has_one_thread(words, tmp_path):
 
 @pytest.mark.parametrize(("command", "entries"), [
     (["integrators"], methods), (["integrators", "--engines"], engines), (["scenes"], symtop.scenes)])  # fmt: skip
-def test_a_list_fits_the_terminal_and_names_every_entry(command, entries):
+def test_a_list_fits_the_terminal_and_names_every_entry(command, entries, monkeypatch):
     for columns in (80, 120):
         lines = call(*command, COLUMNS=str(columns)).output.splitlines()
         assert max(map(len, lines)) <= columns
         assert (names := {line.split(" ")[0] for line in lines}) >= set(entries())
         assert ("mujoco-euler" in names, "strang" in names) == (entries is engines, entries is methods)
+    monkeypatch.delenv("COLUMNS", raising=False)
+    piped = call(*command).output.splitlines()  # a line each, for grep
+    assert {line.split(" ")[0] for line in piped[2 : 2 + len(entries())]} == set(entries())
     assert max(map(len, call(*command, "--wide", COLUMNS="80").output.splitlines())) > 80
 
 
