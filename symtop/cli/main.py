@@ -24,7 +24,9 @@ def main() -> None:
     symtop study convergence --quick
 
     Exit codes: 1 a case or claim failed, 2 bad input, 3 a run ended early, 130 interrupted, 141 output unread,
-    143 terminated. eval "$(_SYMTOP_COMPLETE=bash_source symtop)" completes names.
+    143 terminated.
+
+    Names complete in bash after: eval "$(_SYMTOP_COMPLETE=bash_source symtop)"
     """
 
     def announce() -> None:  # called once, before the first kernel is compiled
