@@ -163,8 +163,7 @@ def observed(quantity: str) -> str:
 
 def growth(method: Integrator, quantity: str) -> int:
     """The exponent a of the error's growth with the horizon, from the declared structure and constants."""
-    keeps = {"energy", "p_phi", "p_psi"} <= set(method.conserves or ())
-    return (quantity in ANGLES) + (not (method.symplectic or method.symmetric or keeps))
+    return (quantity in ANGLES) + (not method.keeps_frequencies)
 
 
 def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, quantity: str) -> Met:
