@@ -140,8 +140,8 @@ def _growing(method: Integrator, scene: Scene, h: float, frequency: float) -> fl
 def _edge(value: Callable[[float], float], a: float, b: float, *, lost: float) -> float:
     """Where a function that is negative at a first is not, before b; `lost` is what it is where it has no value.
 
-    NaN if a is. A trace is known to 1e-10. Brent's search takes 5 to 15 of them, and no more than bisection where the
-    function jumps.
+    NaN if a is. A trace is known to some 1e-6. Brent's search takes 5 to 15 of them, and no more than bisection where
+    the function jumps.
     """
     from scipy.optimize import brentq  # takes 0.3 s, which a study with nothing to do need not
 

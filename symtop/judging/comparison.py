@@ -127,6 +127,8 @@ def find(method: Any, on: Scene) -> Integrator:
     """The integrator of a name, a record, or a step as `judge` takes it, in the axis chart or of a body."""
     if isinstance(method, Integrator):
         return method
+    if method is None or isinstance(method, (int, float, bytes)):
+        raise SymtopError(f"methods must be names, integrators or steps, not {method!r}", "methods")
     library = str(method).partition(":")[0].endswith(LIBRARIES)
     if isinstance(method, str) and not (library or {*"/ "} & {*method} or ".py" in method):
         return find_integrator(method)

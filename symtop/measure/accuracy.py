@@ -2,9 +2,11 @@
 
 The largest error over a run is the largest at its samples. Over ten nutations `SAMPLES` of them miss no peak; over a
 thousand there is about one per nutation, and if all fall at nearly the same phase, they miss the peaks for as long as
-the phase takes to drift: 331 even samples read up to 20 % too little. `enough_samples` chooses the number of samples so
-that the stride is a whole number of nutations plus a golden section of one. Any few consecutive samples then cover all
-phases, and the result is within 5 % of the largest error of a densely sampled run.
+the phase takes to drift: 331 even samples read up to 20 % too little. Five or six a nutation miss peaks as well, of the
+energy next to a pole by 36 %. `enough_samples` chooses the number of samples so that a stride is a whole number of
+nutations plus a golden section of one, or, where it is less than half a nutation, a nutation is so many strides. Any
+few consecutive samples then cover all phases. Angles are within 5 % of the largest error of a densely sampled run (4385
+runs); so is the energy in 99 % of runs, but next to a pole its peak may be shorter than the distance of the phases.
 """
 
 import math
@@ -23,19 +25,20 @@ from symtop.run.reference.truth import reference
 from symtop.run.simulation import integrate
 
 SAMPLES = 1001
-DENSE = 5.0  # samples per nutation above which the phase of the samples does not matter
-GOLDEN_CLOSE = 0.01  # nutations: largest distance of an accepted stride from the golden section
+DENSE = 20.0  # samples per nutation above which the phase of the samples does not matter
+GOLDEN_CLOSE = 0.01  # largest distance of an accepted stride, or of an accepted number of them, from the golden section
 NO_FINER_AFTER = {"compiled": 1e9, "python": 2e4}  # after a run with more force evaluations no finer setting is run
 COUNTS = ("step_size", "tolerance", "steps", "force_evaluations", "newton_iterations", "outcome", "reached_time")
 
 
 def enough_samples(scene: Scene, horizon: float) -> int:
-    """The number of equidistant samples from which the largest error of a run is read to 5 %."""
+    """The number of equidistant samples from which the largest error of an angle over a run is read to 5 %."""
     period = scene.nutation_period
     if not math.isfinite(period) or SAMPLES * period > DENSE * horizon:
         return SAMPLES
     counts = np.arange(SAMPLES, 2 * SAMPLES)
-    phase = np.mod(horizon / (counts - 1) / period, 1.0)
+    stride = horizon / (counts - 1) / period
+    phase = np.mod(np.where(stride < 0.5, 1.0 / stride, stride), 1.0)
     off = np.minimum(np.abs(phase - GOLDEN), np.abs(phase - 1.0 + GOLDEN))
     return int(counts[np.argmax(off < GOLDEN_CLOSE) if (off < GOLDEN_CLOSE).any() else np.argmin(off)])
 

@@ -162,8 +162,8 @@ def observed(quantity: str) -> str:
 
 
 def growth(method: Integrator, quantity: str) -> int:
-    """The exponent a of the error's growth with the horizon, from the declared symplecticity and symmetry."""
-    return (quantity in ANGLES) + (not (method.symplectic or method.symmetric))
+    """The exponent a of the error's growth with the horizon, from the declared structure and constants."""
+    return (quantity in ANGLES) + (not method.keeps_frequencies)
 
 
 def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, quantity: str) -> Met:

@@ -72,7 +72,8 @@ def sweep(
         axis_end ...                                   error at the horizon
         axis_bound ...                                 the least error that the reference can judge
         steps, force_evaluations, newton_iterations    work
-        step_size, tolerance                           what was set; NaN where the method has no such setting
+        step_size, tolerance                           of the run: the step divides the horizon, so that it may differ
+                                                       from the one given; NaN where the method has no such setting
         chart                                          of the run, over scene and variant
         seconds, seconds_spread                        if `timed`: least run time, s, and its spread, as in `compare`
         outcome, message                               "ok", or how the run ended; "not_run" where a method has fewer

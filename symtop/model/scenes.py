@@ -44,19 +44,20 @@ TAGS = {  # by which studies choose; a scene without any is in every study
     "unstable": "unstable or nearly so: errors grow with the motion",
 }
 STEADY = 1e4  # a nutation with less energy than this many rounding errors of the energy is a steady precession
-SHORTEST = 1e-100  # the least horizon, in units of time
+SHORTEST, LONGEST = 1e-100, 1e100  # the least and the largest horizon, in units of time: that of the closed form
 LOOSE = 1e-6  # relative: a period beside a pole that is further from the exact one is replaced by it
 NEXT_TO_POLE = 1e-9  # rad; V is not evaluated nearer to a pole, where it has a limit and 0/0
 
 
 def horizon_of(value: object) -> float:
-    """`value` as a horizon; SymtopError for one that is not positive, or below `SHORTEST`.
+    """`value` as a horizon; SymtopError for one that is not positive, below `SHORTEST` or above `LONGEST`.
 
     No rate is above 1e40, so that nothing moves in 1e-100. LSODA's own loop never ends below 1e-200.
     """
     horizon = positive("horizon", value)
-    if horizon < SHORTEST:
-        raise SymtopError(f"horizon must be at least {SHORTEST:g}, not {horizon!r}", "horizon")
+    if not SHORTEST <= horizon <= LONGEST:
+        must = f"at least {SHORTEST:g}" if horizon < SHORTEST else f"at most {LONGEST:g}"
+        raise SymtopError(f"horizon must be {must}, not {horizon!r}", "horizon")
     return horizon
 
 

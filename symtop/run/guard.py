@@ -7,10 +7,10 @@ exponentially), so that an error e_1 of one piece becomes after n pieces
 
     e_n = n e_1 + n (n-1)/2 N e_1,      N e_1 = e_2 - 2 e_1.
 
-Symplectic and symmetric methods have N e_1 = 0: their error grows linearly. Where two nutations cost too much, the
-probe takes a coarser step and scales its error by the declared order; the passage of a pole is then probed separately
-at the step of the run. A probe in angles with long steps beside a pole, and one of a free body near an unstable
-rotation, are made as long as allowed, because the errors of a few passages may cancel.
+Symplectic and symmetric methods, and those that keep every constant, have N e_1 = 0: their error grows linearly. Where
+two nutations cost too much, the probe takes a coarser step and scales its error by the declared order; the passage of a
+pole is then probed separately at the step of the run. A probe in angles with long steps beside a pole, and one of a
+free body near an unstable rotation, are made as long as allowed, because the errors of a few passages may cancel.
 
 *The cause* is read from exact landmarks of the motion, in this order:
 
@@ -169,7 +169,7 @@ def _fixed(motion: Integrated, method: Integrator, probe: Probe, horizon: float)
     Errors of rounding and of truncated iterations are not symmetric, and an unstable motion amplifies them in every
     nutation: there the error of a symmetric method may grow quadratically, too.
     """
-    straight = bool(method.symplectic or method.symmetric)
+    straight = method.keeps_frequencies
     expected = max(grown(probe, horizon, straight=straight), _amplified(motion, probe, horizon))
     if not straight or not expected < WORTH:
         return expected
@@ -221,7 +221,7 @@ def _adaptive_forecast(
 
 def _expected(motion: Integrated, method: Integrator, chart: str, plan: Plan) -> tuple[float, Probe]:
     """The expected largest axis error of a run, and the probe from which it follows."""
-    straight, marks = bool(method.symplectic or method.symmetric), motion.landmarks
+    straight, marks = method.keeps_frequencies, motion.landmarks
     grows = motion.scene.of_body and motion.scene.top.free and _amplifies(motion, SMALL, plan.horizon, SHEARED)
     period = marks.period if math.isfinite(marks.period) else plan.horizon
     twice = min(2.0 * period, plan.horizon)

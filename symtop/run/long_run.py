@@ -61,7 +61,7 @@ def windows(steps: int) -> list[int]:
 
 
 def scattered(begin: int, end: int, samples: int = SAMPLES) -> Whole:
-    """At most `samples` whole steps in (begin, end], `end` among them, with strides of no fixed ratio."""
+    """At most `samples` whole steps in (begin, end] with strides of no fixed ratio, and `end`."""
     place = np.arange(samples, dtype=float)
     place += np.mod(GOLDEN * place, 1.0)
     marks = begin + 1 + np.floor(place * ((end - begin) / samples)).astype(np.int64)

@@ -235,11 +235,11 @@ def test_odd_times_are_refused_in_one_sentence(times):
 
 
 @pytest.mark.parametrize("name", ["rk45", "rk45-compiled", "lsoda", "radau", "dop853", "taylor", "strang", "exact"])
-def test_a_horizon_too_short_for_a_step_is_refused(name):
+def test_a_horizon_too_short_for_a_step_or_beyond_the_truth_is_refused(name):
     method = symtop.integrator(name)
-    for horizon in (5e-324, 1e-320, 1e-305, 1e-101):
+    for horizon in (5e-324, 1e-320, 1e-305, 1e-101, 1e101, 1e300):
         control = {None: {}, "tolerance": {"tolerance": 1e-6}, "step_size": {"step_size": horizon}}[method.control]
-        with pytest.raises(symtop.SymtopError, match="horizon must be at least 1e-100"):
+        with pytest.raises(symtop.SymtopError, match=r"horizon must be at (least 1e-100|most 1e\+100), not"):
             symtop.simulate(SPHEROID, name, horizon=horizon, **control)
     control = {None: {}, "tolerance": {"tolerance": 1e-6}, "step_size": {"step_size": 1e-100}}[method.control]
     assert symtop.simulate(SPHEROID, name, horizon=1e-100, **control).attrs["outcome"] == "ok"

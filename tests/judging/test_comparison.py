@@ -132,7 +132,7 @@ def test_another_quantity_takes_the_chart_that_shows_it(quantity):
 
 @pytest.mark.parametrize(("words", "sentence"), [
     ({"methods": ["rk4", "rk4[axis]"]}, "one or more, each once"), ({"horizon": 1.0, "nutations": 2.0}, "not both"),
-    ({"methods": ["rk4[axis]"], "quantity": "attitude"}, "cannot show the attitude"),
+    ({"methods": ["rk4[axis]"], "quantity": "attitude"}, "cannot show the attitude"), ({"methods": None}, "not None$"),
     ({"scene": "heavy-chaotic", "methods": "gauss-4", "horizon": 1e3}, "horizon must be at most .* is not known"),
     ({"scene": "tennis-racket", "methods": "gauss-4", "quantity": "p_psi"}, "quantity 'p_psi' is unknown"),
     ({"methods": lambda y, h: y}, "form ode must take .f, t, y, h., not .y, h.$"),  # and no option of `judge`

@@ -173,6 +173,11 @@ class Integrator:
         """Does a user set a tolerance?"""
         return self.control == "tolerance"
 
+    @property
+    def keeps_frequencies(self) -> bool:
+        """Do errors of a top's angles grow as t: is the map symplectic or symmetric, or does it keep every constant?"""
+        return bool(self.symplectic or self.symmetric or {"energy", "p_phi", "p_psi"} <= set(self.conserves or ()))
+
     def given(self, value: float) -> dict[str, float]:
         """The argument of `simulate` that sets the step or tolerance to `value`; none if there is nothing to set."""
         return {} if self.control is None else {self.control: value}
