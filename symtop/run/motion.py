@@ -25,6 +25,7 @@ from symtop.core.numbers import EPSILON
 from symtop.methods.framework.plan import LENGTH, Plan
 from symtop.methods.framework.registry import integrator
 from symtop.methods.runge_kutta.pairs import DOP8, two_runs
+from symtop.model.body import from_flat
 from symtop.model.charts import BODY, Array, attitude_distance, axes, axis_distance
 from symtop.model.exact.free_body import FreeBody
 from symtop.model.scenes import Scene, closed_form
@@ -131,11 +132,25 @@ class Integrated:
         self.chart, self.watches = (BODY, "attitude") if scene.of_body else ("axis", "axis")
         slow, self.fast, self.inertia = _frequencies(scene)
         self.landmarks = Landmarks(2.0 * math.pi / slow, slow, math.nan, math.inf, "upper", 0.0, 0.0)
+        self.rate, self.momentum, self.given = 1.0, 1.0, (scene.top, scene.start)
+        if scene.of_body:
+            self.rate, per = (2.0 ** math.frexp(unit)[1] for unit in (slow, self.inertia))
+            self.momentum = per * self.rate
+            *moments, mgl, x, y, z = scene.top.flat(scene.start)[:7]
+            turned = (rate / self.rate for rate in scene.start.omega_body)
+            numbers = *(one / per for one in moments), mgl / per / self.rate**2, x, y, z, *scene.start.quaternion
+            self.given = from_flat((*numbers, *turned))
 
     def states(self, times: Array, tolerance: float) -> Array:
-        """States (n, dimension) at `times` (n,), NaN after `MOST_WORK` steps."""
+        """States (n, dimension) at `times` (n,), NaN after `MOST_WORK` steps.
+
+        A body is integrated in units of its middle moment and natural frequency, up to powers of two: the series keeps
+        the attitude to the tolerance times the largest number of a state, and the Earth's momentum in SI is 6e33.
+        """
         solver = integrator(SERIES[self.chart]).solvers[self.chart]  # called directly: checks would double its time
-        return solver(self.scene.top, self.scene.start, Plan.until(times, tolerance, MOST_WORK)).states
+        states = solver(*self.given, Plan.until(self.rate * times, tolerance, MOST_WORK)).states
+        states[:, -3:] *= self.momentum
+        return states
 
     def apart(self, first: tuple[str, Array], second: tuple[str, Array]) -> Array:
         """The angle (n,), rad, between two runs, each a chart and its states (n, dimension)."""
