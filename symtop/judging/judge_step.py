@@ -32,7 +32,6 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, whole
-from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import heartbeat, integrator
 from symtop.judging.adapters.python_step import CONJUGATE
 from symtop.judging.battery import measure, stages, unmeasured
@@ -226,7 +225,7 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
     if rates is not None and scene.of_body:
         truth, moments = reference(scene, time), np.array(scene.top.moments)
         inside = rotated(truth["quaternion"].values * CONJUGATE, truth["momentum"].values)
-        bound = scene.momentum_scale / moments.min() * (truth["attitude_error_bound"].values + 4.0 * EPSILON)
+        bound = scene.momentum_scale / moments.min() * deviation["momentum_bound"].values
         off = np.linalg.norm(rates - inside / moments, axis=1)
         deviation = deviation.assign(rates=("time", off), rates_bound=("time", bound))
     strayed = [name for name in map(str, deviation) if name.endswith("_length") and (deviation[name] > SINGLE).any()]

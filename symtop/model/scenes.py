@@ -147,14 +147,16 @@ class Scene:
     def momentum_scale(self) -> float:
         """What errors of p_phi and p_psi are divided by: the larger of both in size, or of a body |L|, at the start.
 
-        Where that is zero to rounding, it is the larger of I1 |theta'| (of a body |L|) and sqrt(|mgl| I1).
+        Where that is zero to rounding, it is the larger of I1 |theta'| (of a body |L|) and sqrt(|mgl| I1), of a body
+        with the middle moment.
         """
         if self.of_body:
-            size = turning = math.hypot(*self.top.momentum(self.start))
+            size, inertia = math.hypot(*self.top.momentum(self.start)), sorted(self.top.moments)[1]
+            turning = size
         else:
-            momenta, turning = self.top.momenta(self.start), self.top.I1 * abs(self.start.theta_dot)
-            size = max(float(abs(momenta.p_phi)), float(abs(momenta.p_psi)))
-        other = max(turning, math.sqrt(abs(self.top.mgl) * self.top.I1), TINY)
+            momenta, inertia = self.top.momenta(self.start), self.top.I1
+            size, turning = max(abs(momenta.p_phi), abs(momenta.p_psi)), inertia * abs(self.start.theta_dot)
+        other = max(turning, math.sqrt(abs(self.top.mgl) * inertia), TINY)
         return size if size > STEADY * EPSILON * other else other
 
     def record(self) -> dict[str, str]:
