@@ -149,8 +149,7 @@ def worst_share(mp, motion, true):
 def test_without_weight_it_is_the_exact_free_motion(precise, count):
     for k, body in enumerate(bodies(count, 7, HEAVY)):
         exact = PreciseBody(*body[1:])
-        natural = 2.0 * math.pi * float(np.median(body.inertia)) / float(exact.G)
-        times = np.array([0.0, -1.7, 10.0]) * natural
+        times = np.array([0.0, -1.7, 10.0]) * 2.0 * math.pi * float(np.median(body.inertia)) / float(exact.G)
         free, states = HeavyBody(body.inertia, (0.0, 0.0, 0.0), body.quaternion, body.momentum), exact.states(times)
         motion = free.samples(times, precise=precise)
         assert worst_share(exact.mp, motion, [state[:4] for state in states]) < 1.0, body
