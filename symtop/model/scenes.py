@@ -159,6 +159,16 @@ class Scene:
         other = max(turning, math.sqrt(abs(self.top.mgl) * inertia), TINY)
         return size if size > STEADY * EPSILON * other else other
 
+    def momentum_grain(self, momentum: Any) -> float:
+        """How much larger rounding is in relative errors of p_phi where a run has the momenta (n, 3) in space, or None.
+
+        A heavy body gathers momentum, at most sqrt(2 I (E + |mgl|)), I the largest moment; it is 1 for all others.
+        """
+        if momentum is None or not self.of_body or self.top.free:
+            return 1.0
+        most = math.sqrt(2.0 * max(self.top.moments) * max(self.top.energy(self.start) + abs(self.top.mgl), 0.0))
+        return max(min(float(np.nanmax(np.abs(momentum))), most) / self.momentum_scale, 1.0)
+
     def record(self) -> dict[str, str]:
         """What tables show of this scene, by column."""
         period = f"{self.nutation_period:.6g}" if math.isfinite(self.nutation_period) else "infinite"
