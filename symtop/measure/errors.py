@@ -222,7 +222,7 @@ def errors_against(scene: Scene, run: Trajectory, truth: xr.Dataset) -> dict[str
         if run.axis is not None:
             columns["axis"] = charts.axis_distance(run.axis, true["axis"], true.get("axis_lo", 0.0))
         for name, unit in units.items():
-            if (mine := getattr(run, name)) is not None:
+            if (mine := getattr(run, name)) is not None and name in true:  # a body has no p_psi
                 columns[name] = np.abs((mine - true[name]) - true.get(f"{name}_lo", 0.0)) / unit
         if (attitude := completed(run).quaternion) is not None:
             low = true.get("quaternion_lo", 0.0)

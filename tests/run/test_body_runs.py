@@ -171,8 +171,8 @@ def test_energy_and_momentum_of_a_run_are_those_of_its_states():
     assert abs(run["energy"][0] - truth["energy"][0]) < 1e-15
     assert 1e-6 < abs(run["energy"] - run["energy"][0]).max() < 1e-1
     slow = symtop.Scene("slow", RigidBody(1.0, 1.3, 0.7, 1.0, (1.0, 0.0, 1.0)), Attitude(omega_body=(0, 0, 1e-8)), 20.0)
-    shown = symtop.errors(symtop.reference(slow, run.time.values), slow, precision="quad")  # |L| becomes 1e8 times that
-    assert 1e-10 < shown.momentum.max() < shown.momentum_bound.max()
+    shown = symtop.errors(symtop.reference(slow, run.time.values).assign(p_psi=run.time), slow, precision="quad")
+    assert 1e-10 < shown.momentum.max() < shown.momentum_bound.max()  # |L| becomes 1e8 times that of the start
     thin = symtop.Scene("thin", RigidBody(1e-13, 1.0, 1.0, 1.0, (1.0, 0.0, 0.0)), Attitude(), 500.0)
     assert thin.momentum_scale == 1.0  # whatever the order of the axes
     assert symtop.ensemble([thin], "vern9", tolerance=1e-9).outcome == "ok"
@@ -291,6 +291,7 @@ def together(members):
     (lambda: RigidBody(1.0, 1.0, 2.1), "I3 must be at most the sum of the other moments"),
     (lambda: RigidBody(1.0, 1.0, 1.0, 1.0, (0.0, 0.0, 0.0)), "centre must be a direction and of a length"),
     (lambda: RigidBody.from_inertia([[1, 0.5, 0], [0, 1, 0], [0, 0, 1]]), "matrix must be symmetric"),
+    (lambda: RigidBody.from_brick(1.0, (1.0, 1.0, 1e200)), "sides must be between 0 and 1e+40 in size, not 1e+200"),
     (lambda: Attitude((0.0, 0.0, 0.0, 0.0)), "quaternion must have unit length, not 0"),
     (lambda: symtop.Scene("x", RigidBody(1.0, 1.0, 1.0), symtop.Angles(0.3), 1.0), "must be Attitude, not Angles"),
     (lambda: symtop.simulate("heavy-brick", "stormer-verlet", step_size=1), "integrator must have the chart body"),
