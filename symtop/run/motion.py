@@ -209,10 +209,10 @@ class Integrated:
                 with contextlib.suppress(SymtopError):  # the closed form refuses some momenta
                     forms = [FreeBody(top.moments, a.quaternion, top.momentum(a), top.momentum_lo(a)) for a in starts]
                     near, far = (form.samples(times) for form in forms)
-                    turning = _changed_later(top.moments, times, near.quaternion, near.momentum)
                     if not apart.max() < SATURATED / MOVED:
                         apart = attitude_distance(near.quaternion, far.quaternion) / FINELY_MOVED
                         moved = FINELY_MOVED
+                    turning = _changed_later(top.moments, times, near.quaternion, near.momentum)
             growth = Growth.of(times, apart, SATURATED / moved)
             self.growths[until] = growth._replace(size=np.maximum(growth.size, turning))
         return self.growths[until]
