@@ -32,7 +32,6 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, whole
-from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import heartbeat, integrator
 from symtop.judging.adapters.python_step import CONJUGATE
 from symtop.judging.battery import measure, stages, unmeasured
@@ -226,7 +225,7 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
     if rates is not None and scene.of_body:
         truth, moments = reference(scene, time), np.array(scene.top.moments)
         inside = rotated(truth["quaternion"].values * CONJUGATE, truth["momentum"].values)
-        bound = scene.momentum_scale / moments.min() * (truth["attitude_error_bound"].values + 4.0 * EPSILON)
+        bound = scene.momentum_scale / moments.min() * deviation["momentum_bound"].values
         off = np.linalg.norm(rates - inside / moments, axis=1)
         deviation = deviation.assign(rates=("time", off), rates_bound=("time", bound))
     strayed = [name for name in map(str, deviation) if name.endswith("_length") and (deviation[name] > SINGLE).any()]
@@ -236,7 +235,7 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
         values = own.get(name, columns.get(name))
         declared = energy if name == "energy" and energy else "kept" if name in conserves else ""
         if values is not None:
-            findings.append(_constant(name, declared, time, np.asarray(values, float), scene))
+            findings.append(_constant(name, declared, time, np.asarray(values, float), scene, states.momentum))
         elif declared:
             remedy = f"; it would with {name}, or with the angular momentum beside the axis"
             remedy = remedy if name in CONSTANTS else ", as its axes are scaled to length one"
@@ -286,13 +285,15 @@ def _error(name: str, scene: Scene, time: np.ndarray, deviation: xr.Dataset) -> 
     return Finding(f"{name}_error", "", measured, "measured", why, largest, bound)
 
 
-def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, scene: Scene) -> Finding:
-    """The finding on the change of a constant of the motion, with the claim `declared`."""
+def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, scene: Scene, L: Any) -> Finding:
+    """The finding on the change of a constant of the motion, with the claim `declared`; L (n, 3) or None."""
     there = ~np.isnan(values)
     if not there.any():
         return undecided(name, declared, f"all of its {there.size} samples are lost")
     time, values = time[there], values[there]
-    scale, grain = (scene.energy_scale, scene.energy_grain) if name == "energy" else (scene.momentum_scale, 1.0)
+    scale, grain = scene.momentum_scale, scene.momentum_grain(L)
+    if name == "energy":
+        scale, grain = scene.energy_scale, scene.energy_grain
     true = getattr(scene.top.momenta(scene.start), name) if name != "energy" else scene.top.energy(scene.start)
     times = time if time[-1] else [1.0]  # with a single sample at the start nothing grows
     decades = math.log10(max(times[-1] / scene.time_scale(), 1.0))  # after the first nutation, in which errors begin

@@ -148,7 +148,7 @@ class RigidBody:
     def from_brick(cls, mass: float, sides: Sequence[float]) -> "RigidBody":
         """A free homogeneous brick by its sides (3,) along the principal axes, turning about its centre."""
         mass = positive("mass", mass)
-        a, b, c = (positive("sides", side) ** 2 for side in vector("sides", sides, 3))
+        a, b, c = (bounded("sides", positive("sides", side)) ** 2 for side in vector("sides", sides, 3))
         return cls(mass * (b + c) / 12.0, mass * (c + a) / 12.0, mass * (a + b) / 12.0)
 
     @classmethod

@@ -148,15 +148,27 @@ class Scene:
     def momentum_scale(self) -> float:
         """What errors of p_phi and p_psi are divided by: the larger of both in size, or of a body |L|, at the start.
 
-        Where that is zero to rounding, it is the larger of I1 |theta'| (of a body |L|) and sqrt(|mgl| I1).
+        Where that is zero to rounding, it is the larger of I1 |theta'| (of a body |L|) and sqrt(|mgl| I1), of a body
+        with the middle moment.
         """
         if self.of_body:
-            size = turning = math.hypot(*self.top.momentum(self.start))
+            size, inertia = math.hypot(*self.top.momentum(self.start)), sorted(self.top.moments)[1]
+            turning = size
         else:
-            momenta, turning = self.top.momenta(self.start), self.top.I1 * abs(self.start.theta_dot)
-            size = max(float(abs(momenta.p_phi)), float(abs(momenta.p_psi)))
-        other = max(turning, math.sqrt(abs(self.top.mgl) * self.top.I1), TINY)
+            momenta, inertia = self.top.momenta(self.start), self.top.I1
+            size, turning = max(abs(momenta.p_phi), abs(momenta.p_psi)), inertia * abs(self.start.theta_dot)
+        other = max(turning, math.sqrt(abs(self.top.mgl) * inertia), TINY)
         return size if size > STEADY * EPSILON * other else other
+
+    def momentum_grain(self, momentum: Any) -> float:
+        """How much larger rounding is in relative errors of p_phi where a run has the momenta (n, 3) in space, or None.
+
+        A heavy body gathers momentum, at most sqrt(2 I (E + |mgl|)), I the largest moment; it is 1 for all others.
+        """
+        if momentum is None or not self.of_body or self.top.free:
+            return 1.0
+        most = math.sqrt(2.0 * max(self.top.moments) * max(self.top.energy(self.start) + abs(self.top.mgl), 0.0))
+        return max(min(float(np.nanmax(np.abs(momentum))), most) / self.momentum_scale, 1.0)
 
     def record(self) -> dict[str, str]:
         """What tables show of this scene, by column."""

@@ -25,6 +25,7 @@ from symtop.core.numbers import EPSILON
 from symtop.methods.framework.plan import LENGTH, Plan
 from symtop.methods.framework.registry import integrator
 from symtop.methods.runge_kutta.pairs import DOP8, two_runs
+from symtop.model.body import from_flat
 from symtop.model.charts import BODY, Array, attitude_distance, axes, axis_distance
 from symtop.model.exact.free_body import FreeBody
 from symtop.model.scenes import Scene, closed_form
@@ -38,6 +39,8 @@ CALM = 1e3  # factor on these tolerances if A and the growth law of the guard st
 PAIR_STEPS = 7  # steps of two motions side by side, per period of the fastest turn: with 5.3, chaos is damped
 SWINGS = 8.0  # times the pull of a weight: twice what one swing adds to 2T
 MOVED, FINELY_MOVED = 1e-10, 1e-13  # change of the start, in natural frequencies, integrated and in closed form
+LEAST_MOVED, SEEN = 1e-16, 1e-13  # a change of the momentum, relative, while a body turns over; rad, above rounding
+FLIPS, TURNED = 1e6, 0.9  # A from which such a change counts; cosine between momenta in body axes, less in a turn
 SATURATED = 0.01  # rad: motions farther apart than this no longer separate at the same rate
 WATCHED = {BODY: 200.0, "axis": 20.0}  # natural periods over which A is computed; less for a top, which is integrable
 MOST_WATCHED = 6000  # steps over which A is computed
@@ -131,11 +134,25 @@ class Integrated:
         self.chart, self.watches = (BODY, "attitude") if scene.of_body else ("axis", "axis")
         slow, self.fast, self.inertia = _frequencies(scene)
         self.landmarks = Landmarks(2.0 * math.pi / slow, slow, math.nan, math.inf, "upper", 0.0, 0.0)
+        self.rate, self.momentum, self.given = 1.0, 1.0, (scene.top, scene.start)
+        if scene.of_body:
+            self.rate, per = (2.0 ** math.frexp(unit)[1] for unit in (slow, self.inertia))
+            self.momentum = per * self.rate
+            *moments, mgl, x, y, z = scene.top.flat(scene.start)[:7]
+            turned = (rate / self.rate for rate in scene.start.omega_body)
+            numbers = *(one / per for one in moments), mgl / per / self.rate**2, x, y, z, *scene.start.quaternion
+            self.given = from_flat((*numbers, *turned))
 
     def states(self, times: Array, tolerance: float) -> Array:
-        """States (n, dimension) at `times` (n,), NaN after `MOST_WORK` steps."""
+        """States (n, dimension) at `times` (n,), NaN after `MOST_WORK` steps.
+
+        A body is integrated in units of its middle moment and natural frequency, up to powers of two: the series keeps
+        the attitude to the tolerance times the largest number of a state, and the Earth's momentum in SI is 6e33.
+        """
         solver = integrator(SERIES[self.chart]).solvers[self.chart]  # called directly: checks would double its time
-        return solver(self.scene.top, self.scene.start, Plan.until(times, tolerance, MOST_WORK)).states
+        states = solver(*self.given, Plan.until(self.rate * times, tolerance, MOST_WORK)).states
+        states[:, -3:] *= self.momentum
+        return states
 
     def apart(self, first: tuple[str, Array], second: tuple[str, Array]) -> Array:
         """The angle (n,), rad, between two runs, each a chart and its states (n, dimension)."""
@@ -174,7 +191,8 @@ class Integrated:
         """A up to the horizon, or as far as `WATCHED` and `MOST_WATCHED` allow; cached.
 
         Both motions take the same steps, so that integration errors cancel in their distance. If two motions of a free
-        body separate far, A is computed again with the closed form and a smaller change.
+        body separate far, A is computed again with the closed form and a smaller change; and with that of a change made
+        while the body turns over, which moves it off the separatrix more than one of a start beside the unstable axis.
         """
         step = 2.0 * math.pi / self.fast / PAIR_STEPS
         until = min(horizon, WATCHED[self.chart] * self.landmarks.period, MOST_WATCHED * step)
@@ -185,14 +203,18 @@ class Integrated:
             momentum = self.inertia * self.landmarks.frequency
             units = (2.0 if self.chart == BODY else 1.0) / MOVED, 1.0 / (MOVED * momentum)
             two_runs(self.chart, DOP8, _apart)(*given, h, marks, units, apart)
-            times, moved, top = np.multiply(marks, h, dtype=float), MOVED, self.scene.top
-            if self.chart == BODY and top.free and not apart.max() < SATURATED / MOVED:
+            times, moved, top, turning = np.multiply(marks, h, dtype=float), MOVED, self.scene.top, np.ones(POINTS)
+            if self.chart == BODY and top.free and not apart.max() < FLIPS:
                 starts = self.scene.start, self.moved(FINELY_MOVED)
                 with contextlib.suppress(SymtopError):  # the closed form refuses some momenta
-                    forms = (FreeBody(top.moments, a.quaternion, top.momentum(a), top.momentum_lo(a)) for a in starts)
-                    apart = attitude_distance(*(form.samples(times).quaternion for form in forms)) / FINELY_MOVED
-                    moved = FINELY_MOVED
-            self.growths[until] = Growth.of(times, apart, SATURATED / moved)
+                    forms = [FreeBody(top.moments, a.quaternion, top.momentum(a), top.momentum_lo(a)) for a in starts]
+                    near, far = (form.samples(times) for form in forms)
+                    if not apart.max() < SATURATED / MOVED:
+                        apart = attitude_distance(near.quaternion, far.quaternion) / FINELY_MOVED
+                        moved = FINELY_MOVED
+                    turning = _changed_later(top.moments, times, near.quaternion, near.momentum)
+            growth = Growth.of(times, apart, SATURATED / moved)
+            self.growths[until] = growth._replace(size=np.maximum(growth.size, turning))
         return self.growths[until]
 
     def amplification(self, until: float, horizon: float) -> float:
@@ -213,6 +235,17 @@ class Integrated:
     def rounding(self, horizon: float, *, whole: bool) -> float:
         """The error by rounding at the horizon, rad, whatever the method; 0 if a probe of the `whole` run shows it."""
         return 0.0 if whole else self.displacement(EPSILON, horizon)
+
+
+def _changed_later(moments: Any, times: Array, quaternion: Array, momentum: Array) -> Array:
+    """A (n,) of a change of a free body's momentum when that first leaves the axis of the start; 1 until then."""
+    length = np.linalg.norm(momentum[0])
+    size, then = np.ones(times.size), int(np.argmax(np.abs(momentum @ momentum[0]) < TURNED * length**2))
+    small = LEAST_MOVED * length * np.array([0.6, -0.48, 0.64])
+    later, start = times[then + 1 :] - times[then], (quaternion[then], momentum[then])
+    apart = attitude_distance(*(FreeBody(moments, *start, low).samples(later).quaternion for low in (small, -small)))
+    size[then + 1 :] = np.where(apart > SEEN, apart / (2.0 * LEAST_MOVED), 1.0)
+    return np.maximum.accumulate(size)
 
 
 def _frequencies(scene: Scene) -> tuple[float, float, float]:

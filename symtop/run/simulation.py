@@ -154,7 +154,8 @@ def make_plan(
         _, marks, dithered = sample_times(horizon, samples, period, steps)
         return Plan.steps(horizon / steps, marks, horizon, budget), dithered
     bound = method.check_tolerance(tolerance) if method.adaptive else math.nan
-    swings = horizon * max(1.0 / period, math.sqrt(abs(scene.top.mgl) / scene.top.I1) / (2.0 * math.pi))
+    swinging = 0.0 if scene.of_body else math.sqrt(abs(scene.top.mgl) / scene.top.I1)
+    swings = horizon * max(1.0 / period, swinging / (2.0 * math.pi))
     if method.adaptive and swings > MOST_SWINGS:
         raise SymtopError(
             f"horizon {horizon!r} is {swings:.3g} swings of the top; an adaptive method may take {MOST_SWINGS:.3g}"

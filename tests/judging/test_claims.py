@@ -72,8 +72,7 @@ def test_the_brackets_of_every_chart_are_those_of_its_variables_and_see_growth_b
         state[-3 if chart != "angles" else 1] *= 1.0 + 1e-6
         return state
 
-    step = one_step(still(chart, swell), chart, SPHEROID, 0.1)
-    defect = symplectic_defect(step, SPHEROID.start)
+    defect = symplectic_defect(one_step(still(chart, swell), chart, SPHEROID, 0.1), SPHEROID.start)
     assert (1e-8 < defect.size < 1e-5, defect.noise < 1e-10) == (True, True)
 
 
@@ -264,8 +263,7 @@ def test_a_slope_that_is_too_large_yields_to_the_terms_of_a_step_and_a_lower_one
     hidden, five = (terms._replace(defect=np.zeros(7), noise=np.full(7, noise)) for noise in (1e-5, 1e-14))
     fits = [Fit(slope, doubt, 1.0, np.ones(1, dtype=bool)) for slope in (main, other)]
     fitted = order.Order("", *[np.ones(1)] * 4, fits[0], {})
-    decided = [order._claimed(4, fitted, fits, one, "").verdict for one in (terms, None, hidden, five)]
-    assert decided == verdicts.split()
+    assert [order._claimed(4, fitted, fits, one, "").verdict for one in (terms, None, hidden, five)] == verdicts.split()
 
 
 @pytest.mark.parametrize(("lengths", "verdict"), [((8.37, 40.0), "confirmed"), ((8.37,), "undecided")])
@@ -361,8 +359,7 @@ def test_a_liar_is_caught_for_the_right_reason(liar, clean_registry):
     findings = {row.pop("claim"): row for row in json.loads(output)}
     assert (code, findings[claim]["verdict"]) == (1, "refuted")
     assert re.search(why, findings[claim]["why"]), findings[claim]["why"]
-    refuted = {name for name, row in findings.items() if row["verdict"] == "refuted"}
-    assert refuted <= {claim} | FOLLOWS.get(liar, set())
+    assert {name for name, row in findings.items() if row["verdict"] == "refuted"} <= {claim} | FOLLOWS.get(liar, set())
 
 
 def test_a_chart_in_which_a_method_raises_hides_no_finding_of_another():
@@ -505,8 +502,7 @@ def test_a_run_that_ends_in_its_first_nutation_shows_no_constant(scene):
 def test_the_card_of_a_body_shows_the_errors_that_its_order_was_found_from(only):
     only("order")
     ledger = symtop.judge(right.rk4, scene=HEAVY, order=4, quick=True)
-    fitted = ledger.traces["fitted"] == 1.0
-    steps, errors = (ledger.traces[name][fitted] for name in ("step_size", "error"))
+    steps, errors = (ledger.traces[name][ledger.traces["fitted"] == 1.0] for name in ("step_size", "error"))
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(4.0, abs=0.2)
     assert " steps a natural period for the order" in " ".join(str(ledger).split())
 

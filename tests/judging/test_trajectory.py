@@ -236,10 +236,14 @@ def test_the_true_motion_keeps_everything_and_rates_of_a_top_are_its_momentum():
     run = symtop.simulate(SPHEROID, "strang[attitude]", step_size=1e-3, horizon=3.0, samples=31)
     q, axis = run["quaternion"].values, run["axis"].values
     rates = np.ones((len(q), 3)) * [0.3, -0.2, 0.5]
-    columns = {"time": run["time"].values, "quaternion": q, "omega_body": rates, "axis": axis}
-    energy = symtop.judge(columns)["energy"]
+    energy = symtop.judge({"time": run["time"].values, "quaternion": q, "omega_body": rates, "axis": axis})["energy"]
     moving = 0.5 * (top.I1 * 0.13 + top.I3 * 0.25) + top.mgl * axis[:, 2]
     assert energy.value == pytest.approx(np.abs(moving - moving[0]).max() / SPHEROID.energy_scale, rel=1e-9)
+    start = symtop.Attitude((0.8, 0.6, 0.0, 0.0), (0.0, 0.0, 1e-8))  # |L| becomes 1e8 times that
+    scene = symtop.Scene("let-go", symtop.scene("heavy-brick", bodies=True).top, start, 20.0)
+    time, q, rates = np.split(of_body(scene), [1, 5], axis=1)
+    ledger = symtop.judge({"time": time[:, 0], "quaternion": q, "omega_body": rates}, scene=scene, conserves=["p_phi"])
+    assert (ledger["p_phi"].verdict, ledger["rates_error"].resolution > 1e-15) == ("confirmed", True)
 
 
 def test_one_sample_is_judged_and_the_first_nutation_of_a_bounded_energy_is_no_growth(tmp_path):

@@ -197,8 +197,7 @@ def test_settings_that_make_no_sense_are_refused_as_they_were_given(name, settin
 @pytest.mark.parametrize("samples", [2, 9, 33, 41, 50, 101])
 def test_a_schedule_has_the_rows_of_sample_times(steps, samples):
     """Commensurate samples among them: every whole and half number of samples a nutation."""
-    numbers = numbers_of(symtop.population(60, seed=9))
-    period = nutation_periods(numbers)
+    period = nutation_periods(numbers_of(symtop.population(60, seed=9)))
     horizon = period * np.resize([0.5, 2.0, 4.0, 5.0, 10.0, 12.5, 33.3], 60)
     counts = None if steps is None else np.full(60, steps) + np.arange(60) % 3
     rows = schedule(period, horizon, samples, counts)
@@ -334,8 +333,7 @@ def test_a_member_on_which_a_solver_raises_is_lost_alone_and_told(path, tmp_path
     settings = {"step_size": 0.1, "horizon": 2.0, "samples": 21, "quiet": True, **more}
     one = symtop.ensemble(SOME, "rk4[axis]", **settings).load()
     one.close()
-    labelled = SOME.assign_coords(member=[f"m{i}" for i in range(36)])
-    for members, name in ((SOME, "3"), (labelled, "m3")):
+    for members, name in ((SOME, "3"), (SOME.assign_coords(member=[f"m{i}" for i in range(36)]), "m3")):
         first = rf"rk4-python\[axis\] on member {name} failed: TypeError: a reason"
         with pytest.warns(symtop.SymtopWarning, match=f"2 of 36 members raised an exception, the first: .*{first}"):
             other = symtop.ensemble(members, raising(TypeError, 3, 30), **settings).load()

@@ -203,6 +203,7 @@ def long_run(
         trajectory, run, plan = _run(method, scene, inside, blown_up / step, step, SAMPLES)
         changes = constants(scene, trajectory)
     count, grains = max(run.steps, 1), {"energy": scene.energy_grain}
+    grains["p_phi"] = scene.momentum_grain(trajectory.momentum)
     by_name = {
         name: change_of(plan.times, changes[name], every_step[name], count, grains.get(name, 1.0), plain=plain,
                         even=not scene.of_body)

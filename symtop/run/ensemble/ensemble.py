@@ -274,8 +274,8 @@ def _steps(step: Array, horizon: Array, most: float, names: Any) -> Whole:
 def _tolerances(method: Integrator, tolerance: object, members: Members, horizon: Array, period: Array) -> Array:
     """The tolerance of each member; tolerance and horizon are checked as in `simulation.make_plan`."""
     numbers, names = members.numbers, members.names
-    mgl = numbers[:, 3 if of_bodies(numbers) else 2]
-    swings = horizon * np.maximum(1.0 / period, np.sqrt(np.abs(mgl) / numbers[:, 0]) / (2.0 * np.pi))
+    swinging = 0.0 if of_bodies(numbers) else np.sqrt(np.abs(numbers[:, 2]) / numbers[:, 0])
+    swings = horizon * np.maximum(1.0 / period, swinging / (2.0 * np.pi))
     for i in np.flatnonzero(swings > MOST_SWINGS)[:1]:
         words = f"{swings[i]:.3g} swings of the top; an adaptive method may take {MOST_SWINGS:.3g}"
         raise SymtopError(f"the horizon of {member_name(names, i)} is {words}")
