@@ -237,13 +237,13 @@ def _horizons(members: Members, settings: dict[str, Any], period: Array | None) 
     if horizon is None:
         words = "give horizon or nutations: these members have no horizon of their own"
         raise SymtopError(words, "horizon", "nutations")
-    horizon_of(float(horizon.min()))
     for i in np.flatnonzero(horizon > LONGEST_TIME)[:1]:
         if "nutations" in settings:
             words = f"they take {member_name(names, i)} beyond a time of {LONGEST_TIME:g}"
             raise SymtopError(f"nutations must be fewer: {words}", "nutations")
         words = f"not {horizon[i]!s} as of {member_name(names, i)}"
         raise SymtopError(f"horizon must be at most {LONGEST_TIME:g}, {words}", "horizon")
+    horizon_of(float(horizon.min()))
     return horizon
 
 
