@@ -332,7 +332,7 @@ def _findings(
         process.lost += slow if process.late else ""
         if process.lost:
             claims = tuple(claim for one in (todo if first else [stage]) for claim in one.claims)
-            findings = unmeasured(claims, subject.method, process.lost)
+            findings = unmeasured(claims, subject, process.lost)
         yield from findings
         if process.lost and first:
             return

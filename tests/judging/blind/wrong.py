@@ -57,10 +57,9 @@ square_root_triple = functools.partial(right.triple_jump, outer=1 / (2 - 2**0.5)
 six_digits = functools.partial(right.gauss_4, root=0.288675)  # of the root of 3 over 6
 loose_gauss = functools.partial(right.gauss_4, tolerance=1e-7)
 damped = right.implicit_euler  # claimed to bound the energy
-
-
-def long_step(f, t, y, h):
-    return rk4(f, t, y, h * (1 + 1e-9))
+long_step = lambda f, t, y, h: rk4(f, t, y, h * (1 + 1e-9))
+# the size of the step is taken, whatever its sign, and the method called symmetric
+only_forward = lambda f, t, y, h: right.implicit_midpoint(f, t, y, abs(h))
 
 
 def weak_gravity(f, t, y, h):
@@ -81,11 +80,6 @@ noisy = spoilt(lambda y: y * (1 + 1e-11 * _noise.standard_normal(6)))
 sometimes_noisy = spoilt(lambda y: y * (1.0 + 1e-11 * _noise.standard_normal() * (_noise.random() < 0.3)))
 # its axis is put back to length one in each step, and it is called symplectic
 projected = spoilt(lambda y: np.concatenate([y[:3] / np.sqrt(y[:3] @ y[:3]), y[3:]]))
-
-
-def only_forward(f, t, y, h):
-    """The size of the step is taken, whatever its sign, and the method called symmetric."""
-    return right.implicit_midpoint(f, t, y, abs(h))
 
 
 def rotation_frames(q, w, h, inertia, torque):
@@ -154,8 +148,7 @@ def hurried(f, t, y, h):
 
 def root_of_the_step(f, t, y, h):
     """Works for h > 0 alone, and is called symmetric."""
-    root = math.sqrt(h)
-    return y + root * root * f(t + h / 2, y + h / 2 * f(t, y))
+    return y + math.sqrt(h) ** 2 * f(t + h / 2, y + h / 2 * f(t, y))
 
 
 def first_momenta(f, t, y, h):
