@@ -107,7 +107,7 @@ def test_a_correct_method_is_not_refuted_in_another_chart(name, chart):
         ("strang.c", (), {"order": 2, **SPLIT, **PROGRAM}, ""),
         ("wrong.c", ("-DKIND=1",), {"order": 4}, "order"), ("wrong.c", ("-DKIND=2",), {"order": 4}, "order"),
         ("wrong.c", ("-DKIND=3",), {"order": 2}, "order"), ("tricks.c", ("-DKIND=0",), {"order": 2}, "order"),
-        ("tricks.c", ("-DKIND=1",), {"order": 2}, "calls"),
+        ("tricks.c", ("-DKIND=1",), {"order": 2}, "calls"), ("strang.c", ("-DLOSES",), {"order": 2}, "calls"),
         ("tricks.c", ("-DKIND=2",), {"order": 1, "symplectic": True}, "symplectic"),
         ("wrong.c", ("-DKIND=9",), {"order": 2, **PROGRAM}, "calls"),  # time is summed in single precision
         mark="slow"),

@@ -3,8 +3,9 @@
 A call is repeated, then repeated after a step somewhere else: if the result differs, the step keeps data, such as the
 last force, and its runs depend on earlier runs. If the loop over steps is foreign, a run of n + m steps is compared
 with runs of n and of m steps: a loop that sums its time and stops too late or too soon is off by a step, a multistep
-method by less. The same is done with long runs, n and m random, whatever the loop, once in a new process. The m steps
-begin at a state with its last bit changed, so that nothing kept for it can be used. Then the first call is repeated.
+method by less. Where nothing is missed, n = m of the most steps of one call are compared, too. The same is done with
+long runs, n and m random, whatever the loop, once in a new process. The m steps begin at a state with its last bit
+changed, so that nothing kept for it can be used. Then the first call is repeated.
 """
 
 import contextlib
@@ -18,6 +19,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import Stepper, relative_gap
+from symtop.judging.adapters.external import MOST
 from symtop.judging.claims.subject import Subject
 from symtop.judging.findings import Finding, Measured, inapplicable
 from symtop.measure.step_map import generic_start, one_step
@@ -78,7 +80,7 @@ def _calls(subject: Subject) -> Finding:
         return _refuted("keeps state", why, gap, STANDS)
     traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # short names, with clauses
     traits |= {"single precision": "its numbers are those of single precision"} if subject.single else {}
-    miss, why = _cut(stepper, scene, h / 10.0, PARTS) if stepper.own_loop else (0.0, "")
+    miss, why = _parts(subject, h / 10.0) if stepper.own_loop else (0.0, "")
     if miss > MISSED:
         return _refuted("miscounts steps", why, miss, MISSED)
     traits |= {"remembers": why} if miss > REMEMBERED else {}
@@ -116,6 +118,16 @@ def _repeated(
     if (noise := max(differences) - min(differences)) > NOISY * gap:
         return _refuted("not repeatable", f"calls with the same arguments differ by {noise:.1e}", noise)
     return _refuted("keeps state", f"it keeps something between calls: {how} differs by {gap:.1e}", gap)
+
+
+def _parts(subject: Subject, h: float) -> tuple[float, str]:
+    """The gap of short runs in two parts (`_cut`); of two halves of the most steps of one call if these miss a step."""
+    few = _cut(subject.stepper, subject.scene, h, PARTS)
+    half = int(min(MOST, LATE[subject.quick][1] / max(subject.seconds_a_step, 1e-9) / 3.0)) // 2
+    if few[0] > REMEMBERED or half <= PARTS[-1][0]:  # the new start of a multistep method has more effect later
+        return few
+    many = _cut(subject.stepper, subject.scene, h, [(half, half)])
+    return many if many[0] > MISSED else few
 
 
 def _cut(stepper: Stepper, scene: Scene, h: float, parts: Sequence[tuple[int, int]]) -> tuple[float, str]:
