@@ -31,6 +31,7 @@ SAME = 1e-13  # relative difference of two calls that threads may cause
 AGAIN, NOISY = 16, 0.1  # calls to distinguish noise from kept data; scatter, relative to a difference, that is noise
 REPEATS, SECONDS = 250, 0.3  # calls with the same arguments, up to this time
 NOTHING, STANDS = 1e-8, 1e-6  # ratio of a tiny step to the usual one; largest relative move of a state by it
+DIGITS = 14  # decimal digits of numbers that are not those of doubles, which have 17
 FAR = 200.0  # ratio to the usual step of one with which most methods fail
 PARTS = [(20, 20), (64, 64), (100, 157), (311, 500), (1000, 1000)]  # steps (n, m) of runs in two parts
 REMEMBERED = 1e-9  # of a step: a larger gap shows kept data; a slope kept from the last step causes 1e-10 in 2000 steps
@@ -73,17 +74,19 @@ def _calls(subject: Subject) -> Finding:
     after = step.shown(step.run(start, step.h)), step.image(step.point(other))  # SymtopError if the second is at a pole
     own, gap = (step.gap(shown, step.at(at)) for shown, at in zip(after, (start, other), strict=True))
     if own > STANDS:
-        why = f"a step of {step.h:.0e} moves by {own:.1e}: what it returns is no state, or no next one"
+        no_state = _short(first) or "what it returns is no state, or no next one"
+        why = f"a step of {step.h:.0e} moves by {own:.1e}: {no_state}"
         return _refuted("jumps", why, own, STANDS)
     if gap > STANDS:
         why = f"it keeps something of its first start: from another one, a step of {step.h:.0e} moves by {gap:.1e}"
         return _refuted("keeps state", why, gap, STANDS)
     traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # short names, with clauses
     traits |= {"single precision": "its numbers are those of single precision"} if subject.single else {}
+    traits |= {"few digits": short} if (short := _short(first)) else {}
     miss, why = _parts(subject, h / 10.0) if stepper.own_loop else (0.0, "")
     if miss > MISSED:
         return _refuted("miscounts steps", why, miss, MISSED)
-    traits |= {"remembers": why} if miss > REMEMBERED else {}
+    traits |= {"remembers": why} if miss > REMEMBERED and "few digits" not in traits else {}
     miss, why = _cut(stepper, scene, h / 1.6, _late(subject))
     if miss > (most := MISSED if stepper.own_loop else RECALLED):
         why = f"it keeps something between calls: {why} (seed {subject.seed})"
@@ -118,6 +121,12 @@ def _repeated(
     if (noise := max(differences) - min(differences)) > NOISY * gap:
         return _refuted("not repeatable", f"calls with the same arguments differ by {noise:.1e}", noise)
     return _refuted("keeps state", f"it keeps something between calls: {how} differs by {gap:.1e}", gap)
+
+
+def _short(state: Any) -> str:
+    """A clause on numbers of at most `DIGITS` decimal digits, as a program writes them; empty if one has more."""
+    short = all(float(f"{number:.{DIGITS}g}") == number for number in state.tolist())
+    return f"its numbers have at most {DIGITS} digits: it must write 17" * short
 
 
 def _parts(subject: Subject, h: float) -> tuple[float, str]:

@@ -22,10 +22,7 @@ def explicit(a, b, c):
     return step
 
 
-def euler(f, t, y, h):
-    return y + h * f(t, y)
-
-
+euler = lambda f, t, y, h: y + h * f(t, y)
 midpoint = explicit(((), (0.5,)), (0.0, 1.0), (0.0, 0.5))
 heun = explicit(((), (1.0,)), (0.5, 0.5), (0.0, 1.0))
 ralston = explicit(((), (2 / 3,)), (1 / 4, 3 / 4), (0.0, 2 / 3))
