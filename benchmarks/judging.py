@@ -15,7 +15,7 @@ import symtop
 from tests.judging.blind import right, wrong
 from tests.judging.test_blind import SHOWN, step_of
 
-right.INERTIA = symtop.scene("spheroid").top.I1
+right.TOP = symtop.scene("spheroid").top
 
 
 def processor_time():

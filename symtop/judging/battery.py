@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from symtop.core.errors import SymtopError
 from symtop.judging.claims import calls, constants, order, structure
-from symtop.judging.claims.subject import Subject, declared
+from symtop.judging.claims.subject import Subject
 from symtop.judging.findings import AS, Finding, Ledger, claim_name, inapplicable, undecided
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
@@ -53,14 +53,14 @@ def measure(stage: Stage, subject: Subject) -> list[Finding]:
     except SymtopError as error:
         if "calls" in stage.claims:
             raise
-        return unmeasured(stage.claims, subject.method, str(error))
+        return unmeasured(stage.claims, subject, str(error))
     return [findings[claim] for claim in stage.claims]
 
 
-def unmeasured(claims: tuple[str, ...], method: Integrator, why: str) -> list[Finding]:
+def unmeasured(claims: tuple[str, ...], subject: Subject, why: str) -> list[Finding]:
     """Undecided findings on claims that could not be measured; only the first states the reason in full."""
     reasons = [why, *[AS + claim_name(claims[0])] * (len(claims) - 1)]
-    return [undecided(claim, declared(method, claim), words) for claim, words in zip(claims, reasons, strict=True)]
+    return [undecided(claim, subject.declared(claim), words) for claim, words in zip(claims, reasons, strict=True)]
 
 
 def judge(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:

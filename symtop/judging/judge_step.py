@@ -37,7 +37,7 @@ from symtop.judging.adapters.python_step import CONJUGATE
 from symtop.judging.battery import measure, stages, unmeasured
 from symtop.judging.claims.constants import KEPT, Constant, blow_up_finding, blows_up
 from symtop.judging.claims.subject import Subject, open_target, seconds_a_step
-from symtop.judging.findings import About, Finding, Ledger, Measured, error_units, undecided
+from symtop.judging.findings import SAYS, About, Finding, Ledger, Measured, error_units, undecided
 from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
 from symtop.measure.conservation import CONSTANTS, constant_of
 from symtop.measure.errors import checked, completed, doubles, errors, refuse_other_order, refuse_other_scene, unpadded
@@ -57,7 +57,8 @@ SCALARS = ("time", "theta", "phi", "psi", *CONSTANTS)
 OF_STATES = ("axis", "attitude", "theta", "momentum", "rates")
 SINGLE = 1e-6  # a length that differs less from one, as by single precision, gets no finding
 SHOWN = 3  # most faults of a line of names in a message
-AGREE = 1e-3  # rad: largest angle between the axis and the third axis of the quaternion, above the rounding of a file
+# above the rounding of a file: largest angle, in rad, between the axis and the third axis of the quaternion, and the
+AGREE = 1e-3  # largest relative difference of a constant at the start from the scene's that is not worth mentioning
 FEWEST = 100  # samples from which a law of growth is judged
 SHORTEST, DECADES = 0.2, 2.0  # decades of time at the end of a run in which it is judged: least and most
 SEEDS = 1_000_000_000  # random seeds are below this
@@ -235,7 +236,8 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
         values = own.get(name, columns.get(name))
         declared = energy if name == "energy" and energy else "kept" if name in conserves else ""
         if values is not None:
-            findings.append(_constant(name, declared, time, np.asarray(values, float), scene, states.momentum))
+            note, values = "" if name in own else ", as the file reports it", np.asarray(values, float)
+            findings.append(_constant(name, declared, time, values, scene, states.momentum, note))
         elif declared:
             remedy = f"; it would with {name}, or with the angular momentum beside the axis"
             remedy = remedy if name in CONSTANTS else ", as its axes are scaled to length one"
@@ -285,8 +287,10 @@ def _error(name: str, scene: Scene, time: np.ndarray, deviation: xr.Dataset) -> 
     return Finding(f"{name}_error", "", measured, "measured", why, largest, bound)
 
 
-def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, scene: Scene, L: Any) -> Finding:
-    """The finding on the change of a constant of the motion, with the claim `declared`; L (n, 3) or None."""
+def _constant(
+    name: str, declared: str, time: np.ndarray, values: np.ndarray, scene: Scene, L: Any, note: str
+) -> Finding:  # fmt: skip
+    """The finding on the change of a constant, with the claim `declared`; L (n, 3) or None, `note` ends its words."""
     there = ~np.isnan(values)
     if not there.any():
         return undecided(name, declared, f"all of its {there.size} samples are lost")
@@ -302,8 +306,12 @@ def _constant(name: str, declared: str, time: np.ndarray, values: np.ndarray, sc
         change = change._replace(exponent=math.nan)
     constant = Constant(change, math.nan, KEPT * grain, grain)
     count = f"{time.size}{f' of {there.size}' * (not there.all())} samples"
-    words = f"in {count}; it begins {abs(values[0] - true) / scale:.1e} from the scene's"
-    finding = constant.finding(name, declared, constant.words(words))
+    off = float(abs(values[0] - true)) / scale
+    finding = constant.finding(name, declared, constant.words(f"in {count}; it begins {off:.1e} from the scene's"))
+    note += f", and begins {off:.0e} from the scene's" * (off > AGREE)
+    if note and (seen := finding.measured):
+        text = SAYS.get(seen.kind, "{1}").format(seen.number, seen) + note
+        finding = finding._replace(measured=seen._replace(text=text))
     if finding.verdict != "refuted" and time.size < FEWEST and np.ptp(time) < scene.time_scale():
         few = f"fewer than {FEWEST}, over less than a {scene.period_word}, say nothing"
         finding = undecided(name, declared, f"{finding.why}; {few}")
@@ -333,7 +341,7 @@ def _findings(
         process.lost += slow if process.late else ""
         if process.lost:
             claims = tuple(claim for one in (todo if first else [stage]) for claim in one.claims)
-            findings = unmeasured(claims, subject.method, process.lost)
+            findings = unmeasured(claims, subject, process.lost)
         yield from findings
         if process.lost and first:
             return

@@ -379,12 +379,16 @@ def test_a_motion_that_is_wrong_is_told_so_whatever_is_claimed(claimed, only):
 
 
 def test_a_step_that_returns_nan_or_the_derivative_is_told_so(only):
-    only("calls", "order")
+    only("calls", "order", "pole")
     for value, words in ((np.nan, "returns NaN"), (np.inf, "returns infinity"), (0.0, "jumps")):
         ledger = symtop.judge(lambda f, t, y, h, value=value: f(t, y) + value, quick=True)
         assert (ledger["calls"].measured.kind, ledger["calls"].verdict) == (words, "refuted")
         assert ("differ" in ledger["calls"].why, bool(ledger["order"].measured)) == (False, False)
-    assert symtop.judge(midpoint, quick=True)["calls"].verdict == "measured"
+    assert symtop.judge(midpoint, quick=True)["calls"].measured.kind == "a function"
+    nine = lambda *given: np.array([float(f"{x:.9g}") for x in midpoint(*given)])
+    assert symtop.judge(nine, quick=True)["calls"].measured.kind == "few digits"
+    pole = symtop.judge(lambda f, t, y, h: rk4(f, t, y, h) if y[3:] @ y[3:] > 9.0 else None, quick=True)["pole"]
+    assert (pole.declared, pole.verdict) == ("", "undecided")  # a bare step that fails there has not claimed it
 
 
 @pytest.mark.skipif(not Path("/proc/self/schedstat").exists(), reason="the system does not count what waits")

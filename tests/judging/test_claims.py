@@ -273,11 +273,12 @@ def test_a_slope_that_decides_nothing_is_measured_over_a_longer_run(lengths, ver
     assert order.order_verdict(8, fit) == verdict
 
 
-@pytest.mark.parametrize(("orders", "lower"), [
-    ([4, 4, 4, 4], (math.inf, math.nan)), ([4, 4, 2, 2.5], (2.5, 0.25)), ([2, 8, 4, 4], (2.0, 1.0))])  # fmt: skip
-def test_an_order_that_is_lower_at_the_finest_steps_or_jumps_below_one_that_is_lower_is_seen(orders, lower):
-    misses = 1e-4 * np.cumprod([1.0, *(0.5 ** (power + 1.0) for power in orders)])
-    np.testing.assert_allclose(order._lower(0.5 ** np.arange(5.0), misses, 4, 0.3, 1e-13), lower, rtol=1e-12)
+@pytest.mark.parametrize(("first", "orders", "lower"), [
+    (1e-4, [4, 4, 4, 4], (math.inf, math.nan)), (1e-4, [4, 4, 2, 2.5], (2.5, 0.25)), (1e-4, [2, 8, 4, 4], (2.0, 1.0)),
+    (0.1, [-1] * 8, (-1.0, 0.5**6)), (0.1, [-1] * 4, (math.inf, math.nan))])  # fmt: skip
+def test_an_order_that_is_lower_at_the_finest_steps_or_jumps_below_one_that_is_lower_is_seen(first, orders, lower):
+    misses = np.cumprod([first, *(0.5 ** (power + 1.0) for power in orders)])
+    np.testing.assert_allclose(order._lower(0.5 ** np.arange(misses.size), misses, 4, 0.3, 1e-13), lower, rtol=1e-12)
 
 
 def test_what_nobody_claimed_is_measured_and_a_claim_that_denies_what_the_method_has_is_refuted():

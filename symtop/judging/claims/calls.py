@@ -3,8 +3,9 @@
 A call is repeated, then repeated after a step somewhere else: if the result differs, the step keeps data, such as the
 last force, and its runs depend on earlier runs. If the loop over steps is foreign, a run of n + m steps is compared
 with runs of n and of m steps: a loop that sums its time and stops too late or too soon is off by a step, a multistep
-method by less. The same is done with long runs, n and m random, whatever the loop, once in a new process. The m steps
-begin at a state with its last bit changed, so that nothing kept for it can be used. Then the first call is repeated.
+method by less. Where nothing is missed, n = m of the most steps of one call are compared, too. The same is done with
+long runs, n and m random, whatever the loop, once in a new process. The m steps begin at a state with its last bit
+changed, so that nothing kept for it can be used. Then the first call is repeated.
 """
 
 import contextlib
@@ -18,6 +19,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import Stepper, relative_gap
+from symtop.judging.adapters.external import MOST
 from symtop.judging.claims.subject import Subject
 from symtop.judging.findings import Finding, Measured, inapplicable
 from symtop.measure.step_map import generic_start, one_step
@@ -29,6 +31,7 @@ SAME = 1e-13  # relative difference of two calls that threads may cause
 AGAIN, NOISY = 16, 0.1  # calls to distinguish noise from kept data; scatter, relative to a difference, that is noise
 REPEATS, SECONDS = 250, 0.3  # calls with the same arguments, up to this time
 NOTHING, STANDS = 1e-8, 1e-6  # ratio of a tiny step to the usual one; largest relative move of a state by it
+DIGITS = 14  # decimal digits of numbers that are not those of doubles, which have 17
 FAR = 200.0  # ratio to the usual step of one with which most methods fail
 PARTS = [(20, 20), (64, 64), (100, 157), (311, 500), (1000, 1000)]  # steps (n, m) of runs in two parts
 REMEMBERED = 1e-9  # of a step: a larger gap shows kept data; a slope kept from the last step causes 1e-10 in 2000 steps
@@ -71,17 +74,19 @@ def _calls(subject: Subject) -> Finding:
     after = step.shown(step.run(start, step.h)), step.image(step.point(other))  # SymtopError if the second is at a pole
     own, gap = (step.gap(shown, step.at(at)) for shown, at in zip(after, (start, other), strict=True))
     if own > STANDS:
-        why = f"a step of {step.h:.0e} moves by {own:.1e}: what it returns is no state, or no next one"
+        no_state = _short(first) or "what it returns is no state, or no next one"
+        why = f"a step of {step.h:.0e} moves by {own:.1e}: {no_state}"
         return _refuted("jumps", why, own, STANDS)
     if gap > STANDS:
         why = f"it keeps something of its first start: from another one, a step of {step.h:.0e} moves by {gap:.1e}"
         return _refuted("keeps state", why, gap, STANDS)
     traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # short names, with clauses
     traits |= {"single precision": "its numbers are those of single precision"} if subject.single else {}
-    miss, why = _cut(stepper, scene, h / 10.0, PARTS) if stepper.own_loop else (0.0, "")
+    traits |= {"few digits": short} if (short := _short(first)) else {}
+    miss, why = _parts(subject, h / 10.0) if stepper.own_loop else (0.0, "")
     if miss > MISSED:
         return _refuted("miscounts steps", why, miss, MISSED)
-    traits |= {"remembers": why} if miss > REMEMBERED else {}
+    traits |= {"remembers": why} if miss > REMEMBERED and "few digits" not in traits else {}
     miss, why = _cut(stepper, scene, h / 1.6, _late(subject))
     if miss > (most := MISSED if stepper.own_loop else RECALLED):
         why = f"it keeps something between calls: {why} (seed {subject.seed})"
@@ -116,6 +121,22 @@ def _repeated(
     if (noise := max(differences) - min(differences)) > NOISY * gap:
         return _refuted("not repeatable", f"calls with the same arguments differ by {noise:.1e}", noise)
     return _refuted("keeps state", f"it keeps something between calls: {how} differs by {gap:.1e}", gap)
+
+
+def _short(state: Any) -> str:
+    """A clause on numbers of at most `DIGITS` decimal digits, as a program writes them; empty if one has more."""
+    short = all(float(f"{number:.{DIGITS}g}") == number for number in state.tolist())
+    return f"its numbers have at most {DIGITS} digits: it must write 17" * short
+
+
+def _parts(subject: Subject, h: float) -> tuple[float, str]:
+    """The gap of short runs in two parts (`_cut`); of two halves of the most steps of one call if these miss a step."""
+    few = _cut(subject.stepper, subject.scene, h, PARTS)
+    half = int(min(MOST, LATE[subject.quick][1] / max(subject.seconds_a_step, 1e-9) / 3.0)) // 2
+    if few[0] > REMEMBERED or half <= PARTS[-1][0]:  # the new start of a multistep method has more effect later
+        return few
+    many = _cut(subject.stepper, subject.scene, h, [(half, half)])
+    return many if many[0] > MISSED else few
 
 
 def _cut(stepper: Stepper, scene: Scene, h: float, parts: Sequence[tuple[int, int]]) -> tuple[float, str]:

@@ -72,6 +72,7 @@ DRAWS, DRAWING = (96, 32), (10.0, 3.0)  # random starts where the order of one s
 HALVINGS, SHORT = 10, 80.0  # steps from each start, each half of the one before; a short step is 1/80 of a nutation
 LOWER, JUMP = 0.6, 3.0  # differences by which a measured order is lower than, or jumps above, the declared one
 LARGE, SEEN = 1e-3, 1e-11  # errors of a step above the first follow no power, below the second they are rounding
+TINY = 8.0  # parts of a short step: errors of a smaller one are judged however large they are
 UNITS = 100.0  # single-precision epsilons: smaller errors of a step in single precision are rounding
 UNEVEN, WAVES = 0.6, 0.7  # a, and periods of the clock's speed in a nutation
 BEGIN = 0.23  # nutations: t0
@@ -122,6 +123,7 @@ def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
                 seen = max(SEEN, subject.rounding(UNITS))
                 order, h = _lower(sizes, _misses(step, scene.start, sizes), power, scale / SHORT, seen)
                 if order < power:
+                    order = max(order, 0.0)
                     return order, f"a step of h = {h:.2g} from {name} has order {order:.1f}, in the {chart} chart"
     return None
 
@@ -139,7 +141,7 @@ def _lower(sizes: Array, misses: Array, power: int, short: float, seen: float) -
     """An order lower than `power`, or infinity, and its step; errors below `seen` are rounding."""
     with np.errstate(all="ignore"):
         orders = np.log2(misses[:-1] / misses[1:]) - 1.0
-    clear = (misses[:-1] < LARGE) & (misses[1:] > seen)
+    clear = ((misses[:-1] < LARGE) | (sizes[:-1] <= short / TINY)) & (misses[1:] > seen)
     fine = np.flatnonzero(clear & (sizes[:-1] <= short))[-2:]
     if fine.size == 2 and (orders[fine] < power - LOWER).all():
         return float(orders[fine].max()), float(sizes[fine[0]])

@@ -22,8 +22,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.claims.subject import Subject, declared, hidden_by_single
-from symtop.judging.findings import Finding, Measured, agreement, undecided
+from symtop.judging.claims.subject import Subject, hidden_by_single
+from symtop.judging.findings import Finding, Measured, agreement, inapplicable, undecided
 from symtop.measure import step_map as maps
 from symtop.measure.errors import errors
 from symtop.methods.framework.plan import Array
@@ -207,8 +207,10 @@ def passages(method: Integrator, right: float = POLE_RIGHT) -> list[Passage]:
 
 def pole(subject: Subject) -> list[Finding]:
     """The finding on the pole; for a bare step it is measured without a claim, because its chart implies none."""
+    if subject.knows_top:
+        return [inapplicable("pole", "it knows equations of the top beside f, and the pole is passed on another top")]
     right = max(POLE_RIGHT, subject.rounding(2.0 * POLE_STEPS))
-    claim, rows = "" if subject.stepper else declared(subject.method, "pole"), passages(subject.method, right)
+    claim, rows = subject.declared("pole"), passages(subject.method, right)
     relevant = [one for one in rows if one.chart != "angles"] or rows
     verdict = "measured" if not claim else "confirmed" if all(one.passes for one in relevant) else "refuted"
     if claim and any(one.outcome not in ("ok", "left_chart", "not_finite", "not_normalised") for one in relevant):

@@ -26,6 +26,9 @@ static void strang(double *y, double h, const double *par) {
 }
 
 void step(double *y, double h, const double *par, long n) {
+#ifdef LOSES /* a step of many */
+    n -= n > 5000;
+#endif
 #ifdef YOSHIDA
     double outer = 1 / (2 - cbrt(2.0)), inner = 1 - 2 * outer;
 #endif

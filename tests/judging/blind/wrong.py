@@ -57,10 +57,11 @@ square_root_triple = functools.partial(right.triple_jump, outer=1 / (2 - 2**0.5)
 six_digits = functools.partial(right.gauss_4, root=0.288675)  # of the root of 3 over 6
 loose_gauss = functools.partial(right.gauss_4, tolerance=1e-7)
 damped = right.implicit_euler  # claimed to bound the energy
-
-
-def long_step(f, t, y, h):
-    return rk4(f, t, y, h * (1 + 1e-9))
+long_step = lambda f, t, y, h: rk4(f, t, y, h * (1 + 1e-9))
+# the size of the step is taken, whatever its sign, and the method called symmetric
+only_forward = lambda f, t, y, h: right.implicit_midpoint(f, t, y, abs(h))
+# works for h > 0 alone, and is called symmetric
+root_of_the_step = lambda f, t, y, h: y + math.sqrt(h) ** 2 * f(t + h / 2, y + h / 2 * f(t, y))
 
 
 def weak_gravity(f, t, y, h):
@@ -77,15 +78,11 @@ _noise = np.random.default_rng(1)
 single = spoilt(lambda y: y.astype(np.float32).astype(float))
 leaking = spoilt(lambda y: y * np.array([1, 1, 1, *[1 - 1e-12] * 3]))  # of the momentum, in each step
 rounded = spoilt(lambda y: np.round(y, 8))
+clipped = spoilt(lambda y: np.clip(y, -20.0, 20.0))  # the motion has L up to 16
 noisy = spoilt(lambda y: y * (1 + 1e-11 * _noise.standard_normal(6)))
 sometimes_noisy = spoilt(lambda y: y * (1.0 + 1e-11 * _noise.standard_normal() * (_noise.random() < 0.3)))
 # its axis is put back to length one in each step, and it is called symplectic
 projected = spoilt(lambda y: np.concatenate([y[:3] / np.sqrt(y[:3] @ y[:3]), y[3:]]))
-
-
-def only_forward(f, t, y, h):
-    """The size of the step is taken, whatever its sign, and the method called symmetric."""
-    return right.implicit_midpoint(f, t, y, abs(h))
 
 
 def rotation_frames(q, w, h, inertia, torque):
@@ -150,12 +147,6 @@ def hurried(f, t, y, h):
     """The implicit midpoint rule, whose clock runs fast by a millionth: right energies, wrong phase."""
     s = h * (1 + 1e-6)
     return y + s * solved(lambda k: f(t + h / 2, y + s / 2 * k), f(t, y))
-
-
-def root_of_the_step(f, t, y, h):
-    """Works for h > 0 alone, and is called symmetric."""
-    root = math.sqrt(h)
-    return y + root * root * f(t + h / 2, y + h / 2 * f(t, y))
 
 
 def first_momenta(f, t, y, h):
@@ -305,7 +296,7 @@ KEPT = ["energy", "p_phi", "p_psi", "axis_length"]
 ALL = {"order": 4, "symplectic": True, "symmetric": True, "conserves": ["energy"]}
 _TABLE = {  # names: claims, the line that names the defect, options
     "swapped_weights stale_stage rounded_triple square_root_triple six_digits long_step weak_gravity "
-    "third_for_fourth energy_clipped late_euler euler_off_the_energy euler_above coarse_rk2":
+    "third_for_fourth energy_clipped clipped late_euler euler_off_the_energy euler_above coarse_rk2":
         ({"order": 4}, "order", {}),
     "wrong_nodes early": ({"order": 4}, "time", {}), "noisy sometimes_noisy counted tires": ({"order": 4}, "calls", {}),
     "averaged_with_the_past stale_force compensated adams_from_memory adams_from_a_table": ({"order": 2}, "calls", {}),
