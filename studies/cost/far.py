@@ -312,8 +312,22 @@ def runs_of(data: xr.DataTree, name: str) -> xr.Dataset:
     """The runs of a variant: without padding; errors are infinite for runs that failed or have no growth law."""
     one = data["far"].to_dataset().isel(scene=0).sel(variant=name)
     one = one.isel(setting=np.flatnonzero(np.isfinite(one["setting_value"].values)))
-    dead = np.isnan(one["work"]).all("member")  # all failed within ten nutations: there is no more to measure
-    return one.assign(error=one["error"].fillna(np.inf), reach=one["reach"].where(~dead, np.inf))
+    dead = np.isnan(one["work"]).all("member")  # all failed: there is no more to measure
+    work = "setting", "member"
+    filled_in = work_of(one["work"].transpose(*work).values, one["setting_value"].values, integrator(name).fixed_step)
+    return one.assign(
+        error=one["error"].fillna(np.inf), reach=one["reach"].where(~dead, np.inf), work=(work, filled_in)
+    )
+
+
+def work_of(work: Array, settings: Array, fixed: bool) -> Array:
+    """Evaluations a nutation (settings, n), coarse to fine, NaN only of members whose runs all failed.
+
+    `work` is NaN of a run that failed before its end. It may have kept an error until then, and costs as much as the
+    next finer run of that top: in evaluations a step, or, at a tolerance, over those of the median top.
+    """
+    typical = settings if fixed else pd.DataFrame(work).median(axis=1).bfill().ffill().to_numpy()
+    return pd.DataFrame(work / typical[:, np.newaxis]).bfill().ffill().to_numpy() * typical[:, np.newaxis]
 
 
 def variants_of(data: xr.DataTree, quantity: str) -> list[str]:
@@ -337,9 +351,7 @@ def diagram(data: xr.DataTree, quantity: str) -> Diagram:
     for name in names:
         one = runs_of(data, name)
         errors = one["error"].sel(quantity=quantity).transpose("setting", "horizon", "member").values.astype(float)
-        work = one["work"].transpose("setting", "member").values
-        work = np.where(np.isfinite(work), work, 1.0)  # of a failed run, whose error is infinite: any number
-        work = work * price_of(data, name, one["setting_value"].values)[:, np.newaxis]
+        work = one["work"].values * price_of(data, name, one["setting_value"].values)[:, np.newaxis]
         seconds = np.stack([cost_to_reach(work, errors[:, k], TARGETS) for k in range(errors.shape[1])], axis=1)
         places = np.arange(len(work))[:, np.newaxis, np.newaxis]
         level = np.stack([np.where(errors <= target, -1, places).max(axis=0) for target in TARGETS]) + 1

@@ -20,8 +20,8 @@ slopes would be an outlier: a short run that was disturbed makes a slope too sma
              quartiles, at least `GRAIN`
 
 Variants with a spread above `NOISY`, or with fewer than `ENOUGH` slopes, are timed by five more processes, with
-some that are not noisy; the five processes with the smaller spread count. One that is still noisy is marked and never
-ranked first.
+some that are not noisy; the five processes with the smaller spread count. One that is still noisy is marked, and no
+lead of it is called.
 
 heyoka is timed as its own `propagate_until`, with nothing of symtop around it. The solver of `taylor[axis]`, which
 samples by dense output, is timed in the same rounds, and the ratio is a table.

@@ -9,7 +9,8 @@
 
 A hit that a finer setting misses does not count. Intervals are for the draw of the tops and for the prices: a bootstrap
 draws tops with replacement, the same for all variants, and each variant's price from a log-normal distribution of its
-relative error. One more top, of which nothing is known, is drawn with the n that were run: any variant may win it, and
+relative error. Of a safe cost the tops decide the setting; the work at it is that of the median top, which is not drawn
+again. One more top, of which nothing is known, is drawn with the n that were run: any variant may win it, and
 no setting serves it. So a share of 1 has an interval, and neither a lead on a few tops nor the upper end of a safe cost
 from fewer than some 70 tops is certain. A lead is called if `SURE` of the draws have it. Sources: Efron and Tibshirani,
 An Introduction to the Bootstrap (1993); run-length distributions: Hoos and Stuetzle, J. Autom. Reasoning 24
