@@ -136,7 +136,7 @@ class Integrated:
         self.landmarks = Landmarks(2.0 * math.pi / slow, slow, math.nan, math.inf, "upper", 0.0, 0.0)
         self.rate, self.momentum, self.given = 1.0, 1.0, (scene.top, scene.start)
         if scene.of_body:
-            self.rate, per = (2.0 ** math.frexp(unit)[1] for unit in (slow, self.inertia))
+            self.rate, per = (2.0 ** math.frexp(unit)[1] for unit in (slow, 0.25 * self.inertia))
             self.momentum = per * self.rate
             *moments, mgl, x, y, z = scene.top.flat(scene.start)[:7]
             turned = (rate / self.rate for rate in scene.start.omega_body)
@@ -146,8 +146,9 @@ class Integrated:
     def states(self, times: Array, tolerance: float) -> Array:
         """States (n, dimension) at `times` (n,), NaN after `MOST_WORK` steps.
 
-        A body is integrated in units of its middle moment and natural frequency, up to powers of two: the series keeps
-        the attitude to the tolerance times the largest number of a state, and the Earth's momentum in SI is 6e33.
+        A body is integrated in units of its natural frequency and a quarter of its middle moment, up to powers of two:
+        the series keeps all numbers of a state to the tolerance times the largest, so that q and momentum must be of
+        one size; the Earth's momentum in SI is 6e33.
         """
         solver = integrator(SERIES[self.chart]).solvers[self.chart]  # called directly: checks would double its time
         states = solver(*self.given, Plan.until(self.rate * times, tolerance, MOST_WORK)).states
