@@ -239,7 +239,10 @@ class Integrated:
 
 
 def _changed_later(moments: Any, times: Array, quaternion: Array, momentum: Array) -> Array:
-    """A (n,) of a change of a free body's momentum when that first leaves the axis of the start; 1 until then."""
+    """A (n,) of a change of a free body's momentum when that first leaves the axis of the start; 1 until then.
+
+    If it never does, A is that of a change at the start.
+    """
     length = np.linalg.norm(momentum[0])
     size, then = np.ones(times.size), int(np.argmax(np.abs(momentum @ momentum[0]) < TURNED * length**2))
     small = LEAST_MOVED * length * np.array([0.6, -0.48, 0.64])
