@@ -16,6 +16,7 @@ from symtop.core.errors import SymtopError, finite, label, one_of, positive, sho
 from symtop.core.numbers import EPSILON, TINY
 from symtop.model.body import Attitude, RigidBody
 from symtop.model.charts import BODY, Array
+from symtop.model.exact.samples import LONGEST_TIME
 from symtop.model.top import (
     BISECTIONS,
     Angles,
@@ -44,19 +45,19 @@ TAGS = {  # by which studies choose; a scene without any is in every study
     "unstable": "unstable or nearly so: errors grow with the motion",
 }
 STEADY = 1e4  # a nutation with less energy than this many rounding errors of the energy is a steady precession
-SHORTEST, LONGEST = 1e-100, 1e100  # the least and the largest horizon, in units of time: that of the closed form
+SHORTEST = 1e-100  # the least horizon, in units of time; the largest is `LONGEST_TIME`
 LOOSE = 1e-6  # relative: a period beside a pole that is further from the exact one is replaced by it
 NEXT_TO_POLE = 1e-9  # rad; V is not evaluated nearer to a pole, where it has a limit and 0/0
 
 
 def horizon_of(value: object) -> float:
-    """`value` as a horizon; SymtopError for one that is not positive, below `SHORTEST` or above `LONGEST`.
+    """`value` as a horizon; SymtopError for one that is not positive, below `SHORTEST` or above `LONGEST_TIME`.
 
     No rate is above 1e40, so that nothing moves in 1e-100. LSODA's own loop never ends below 1e-200.
     """
     horizon = positive("horizon", value)
-    if not SHORTEST <= horizon <= LONGEST:
-        must = f"at least {SHORTEST:g}" if horizon < SHORTEST else f"at most {LONGEST:g}"
+    if not SHORTEST <= horizon <= LONGEST_TIME:
+        must = f"at least {SHORTEST:g}" if horizon < SHORTEST else f"at most {LONGEST_TIME:g}"
         raise SymtopError(f"horizon must be {must}, not {horizon!r}", "horizon")
     return horizon
 
