@@ -77,8 +77,7 @@ def test_an_error_grows_over_horizons_as_the_traits_promise(name, quantity):
 ])  # fmt: skip
 def test_a_search_says_why_it_found_nothing(name, accuracy, patience, why):
     scene, method = symtop.scene("spheroid"), symtop.integrator(name)
-    reason = settings.search(scene, method, accuracy, "axis", 5.0, None, patience)
-    assert reason == why
+    assert settings.search(scene, method, accuracy, "axis", 5.0, None, patience) == why
 
 
 def test_a_flat_error_is_rounding_of_steps_and_may_be_a_stair_of_tolerances():
@@ -130,8 +129,7 @@ def test_the_advised_lines_are_the_run_that_was_checked(horizon, monkeypatch, cl
     assert str(advice).splitlines()[-2:] == [f"Run it: {advice.command}", f"In Python: {advice.python}"]
     run = eval(advice.python, {"symtop": symtop})  # a line that is printed to be run
     assert float(symtop.errors(run)["axis"].max()) <= 1e-3
-    report = json.loads(call(*advice.command.split()[1:], "--json").stdout)
-    assert report["errors"]["axis"]["largest"] <= 1e-3
+    assert json.loads(call(*advice.command.split()[1:], "--json").stdout)["errors"]["axis"]["largest"] <= 1e-3
     scene = symtop.scene("spheroid")
     own = symtop.Scene("spheroid", scene.top, scene.start, horizon=30.0)  # no scene of the catalogue has this name
     assert symtop.recommend(own, accuracy=1e-3).command == ""
@@ -326,8 +324,7 @@ def test_limits_leave_out_what_a_user_cannot_use():
     ask = functools.partial(symtop.recommend, scene, horizon=2.0)
     free, short = ask(accuracy=1e-4, needs="kicks"), ask(accuracy=1e-4, needs="kicks", max_step=0.002)
     assert short.step_size <= 0.002 < free.step_size
-    body = ask(accuracy=1e-4, needs="kicks", general=True)
-    assert symtop.integrator(body.integrator).general is True
+    assert symtop.integrator(ask(accuracy=1e-4, needs="kicks", general=True).integrator).general is True
     formula = functools.partial(ask, accuracy=1e-3, step_size=0.002, needs="expression")
     assert formula().integrator == "kahan[axis]"  # which is nowhere run on a body
     assert "body" in symtop.integrator(str(formula(general=True).integrator).partition("[")[0]).solvers
@@ -399,8 +396,7 @@ def test_who_has_the_solution_is_given_the_exact_motion_with_its_price():
     run = eval(advice.python, {"symtop": symtop})
     assert (run.attrs["integrator"], float(run["time"][-1])) == ("exact", 20.0)
     assert advice.command == "symtop run spheroid exact --horizon 20.0"
-    stepped = symtop.recommend("spheroid", accuracy=1e-6, needs="solution", step_size=0.01)
-    assert stepped.integrator is None
+    assert symtop.recommend("spheroid", accuracy=1e-6, needs="solution", step_size=0.01).integrator is None
     assert symtop.recommend("spheroid", accuracy=1e-3, needs=("solution", "kicks")).integrator != "exact"
 
 
@@ -450,8 +446,7 @@ def test_engines_have_maps_and_one_without_a_gyroscopic_term_nothing_to_match():
     assert rest <= {name.removesuffix("-float32") for name in maps} | {"fincham"}  # as published, in no engine
     advice = i_use("havok", "goldstein", horizon=10.0)
     assert (advice.advice, "With --accuracy it names" in str(advice)) == (None, True)
-    none = i_use("rapier", "goldstein", horizon=10.0, needs="solution", max_step=1.0)
-    assert none.advice.integrator is None
+    assert i_use("rapier", "goldstein", horizon=10.0, needs="solution", max_step=1.0).advice.integrator is None
     other = i_use("rapier", "goldstein", horizon=10.0, needs="derivative", accuracy=1e-3, quantity="energy")
     assert (other.advice.quantity, "Settings within" in str(other)) == ("energy", False)
     upright = symtop.Scene("upright", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(theta=0.0, psi_dot=5.0), 10.0)

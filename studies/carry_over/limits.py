@@ -18,7 +18,7 @@ slope to second order; y grows where the spectral radius of the slopes is above 
     error, lost  of engines' maps: largest error of the axis, rad, and whether it is above `WRONG` in the first period
 
 Source: Routh, Advanced Dynamics of a System of Rigid Bodies, section 214 (the sleeping body); Hairer, Lubich, Wanner,
-Geometric Numerical Integration, section X.4 (resonance).
+Geometric Numerical Integration, section X.6 (resonance).
 """
 
 import math

@@ -11,7 +11,7 @@ lengthens the run by 2.3/lambda.
 
 `sampled_energy_error` measures one energy error twice, once a nutation and at every step. The energy error of a
 symplectic method is a function of the phase of the nutation, so that samples at one phase show almost none of it.
-Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, sections I.5 and X.4 (stability, resonance).
+Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, sections I.5 and X.6 (stability, resonance).
 """
 
 import math

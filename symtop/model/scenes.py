@@ -357,7 +357,8 @@ def _catalogue() -> dict[str, Scene]:
 
 @functools.lru_cache(maxsize=1)
 def _bodies() -> dict[str, Scene]:
-    brick = RigidBody(0.00189422, 0.006211019, 0.007194665)  # kg m^2
+    slug_foot_foot = 1.3558179483314  # kg m^2
+    brick = RigidBody(0.00189422 * slug_foot_foot, 0.006211019 * slug_foot_foot, 0.007194665 * slug_foot_foot)
     rates = math.radians(10.0), math.radians(20.0), math.radians(30.0)
     swinging = Attitude((0.8, 0.6, 0.0, 0.0), (0.2, 0.3, 3.0))
     catalogue = [

@@ -14,7 +14,7 @@ energy has a minimum at the steady precession, and small nutations stay on its l
 precession becomes slow beside the nutation, their t tends to 2 Re R(i h omega), R the diagonal Pade approximant of exp.
 
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration,
-sections I.5 and X.4 (stability, resonance); Arnold, Mathematical Methods of Classical Mechanics, appendix 7.
+sections I.5 and X.6 (stability, resonance); Arnold, Mathematical Methods of Classical Mechanics, appendix 7.
 """
 
 import math

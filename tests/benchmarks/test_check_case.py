@@ -6,6 +6,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
+import symtop
 from benchmarks.check_case import ANGLES, EARTH, RATES, largest_errors, truth, yaw_pitch_roll
 from symtop.core.errors import SymtopError
 
@@ -25,6 +26,8 @@ def test_the_motion_has_the_digits_of_two_independent_ways() -> None:
     angles, wanted = zip(*EXACT.values(), strict=True)
     np.testing.assert_allclose(yaw_pitch_roll(quaternion), angles, rtol=0.0, atol=1e-12)
     np.testing.assert_allclose(rates, wanted, rtol=0.0, atol=1e-13)
+    brick = symtop.RigidBody.from_brick(2.26796, (0.2032, 0.1016, 0.05715))  # 5 pounds, 8 x 4 x 2.25 inches
+    np.testing.assert_allclose(symtop.scene("check-case-2", bodies=True).top.moments, brick.moments, rtol=1e-6)
 
 
 def history(folder: Path, off: float = 0.0, earth: float = EARTH) -> Path:
@@ -34,9 +37,8 @@ def history(folder: Path, off: float = 0.0, earth: float = EARTH) -> Path:
     half = -0.5 * earth * times
     w, x, y, z = quaternion.T
     c, s = np.cos(half), np.sin(half)
-    local = np.stack([c * w - s * x, c * x + s * w, c * y - s * z, c * z + s * y], axis=1)
     table = pd.DataFrame({"time": times, "longitude_deg": 0.0})
-    table[ANGLES] = yaw_pitch_roll(local)
+    table[ANGLES] = yaw_pitch_roll(np.stack([c * w - s * x, c * x + s * w, c * y - s * z, c * z + s * y], axis=1))
     table[RATES] = rates
     table[ANGLES[0]] += off
     table.to_csv(folder / "history.csv", index=False, float_format="%.17g")

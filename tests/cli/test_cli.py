@@ -113,9 +113,10 @@ def test_run_prints_the_errors_and_writes_the_dataset_also_of_a_run_that_fails_o
     assert numbers(result.stdout)["seconds"] is None
     assert numbers(result.stdout)["accuracy"] == 1e-17
     plugin = tmp_path / "endless.py"  # a top whose nutation never ends
-    start = "symtop.scene('spheroid').top, symtop.Angles(theta=0.0, psi_dot=0.1)"
-    plugin.write_text(f"import symtop\nsymtop.register_scene(symtop.Scene('endless', {start}, 1.0))\n")
+    start = "symtop.scene('spheroid').top, symtop.Angles(0.0, psi_dot=0.1), 1.0, reference='notes, woodhouse-2009'"
+    plugin.write_text(f"import symtop\nsymtop.register_scene(symtop.Scene('endless', {start}))\n")
     assert numbers(call("scenes", "--json", "--plugin", plugin).stdout)
+    assert "\n\n@book{woodhouse-2009," in call("scenes", "endless", "--plugin", plugin).stdout
 
 
 def test_help_starts_fast():
@@ -311,8 +312,7 @@ def test_a_run_of_many_steps_says_how_long_it_takes(capsys, monkeypatch):
     runs.estimate(5e6, run)
     assert capsys.readouterr().err == ""
     runs.estimate(1e9, run)
-    minutes = re.fullmatch(r"symtop: 1e\+09 steps take about (\d+) min\n", capsys.readouterr().err)
-    assert 15 <= int(minutes[1]) <= 25
+    assert 15 <= int(re.fullmatch(r"symtop: 1e\+09 steps take about (\d+) min\n", capsys.readouterr().err)[1]) <= 25
     runs.estimate(9e9, run)  # and so many two and a half hours
     assert re.fullmatch(r"symtop: 9e\+09 steps take about 2.\d h\n", capsys.readouterr().err)
     assert max(few) < 1.1e6

@@ -61,8 +61,7 @@ def test_a_claim_that_the_samples_do_not_show_is_undecided_and_not_lost(table, t
     whole = symtop.judge(columns | {"momentum": table[:, 4:]}, conserves=claims, energy="bounded")
     assert (whole["p_phi"].verdict, whole["energy"].verdict) == ("confirmed", "refuted")
     file.write_text(text(table[:, :4], "time,ex,ey,ez"), encoding="utf-8")
-    result = call("judge", file, "--conserves", "p_phi", "--energy", "kept")  # nothing is refuted
-    assert "Claims: 2 undecided." in result.output
+    assert "Claims: 2 undecided." in call("judge", file, "--conserves", "p_phi", "--energy", "kept").output
 
 
 def test_an_unknown_claim_about_a_trajectory_is_refused_and_one_that_a_ledger_has_not(table, tmp_path):

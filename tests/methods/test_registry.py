@@ -14,8 +14,10 @@ import pytest
 import symtop
 from symtop.methods.framework import registry
 from symtop.methods.framework.loop import inside
-from symtop.methods.framework.registry import ENGINE, NEEDS, Integrator, bibliography, paragraphs
+from symtop.methods.framework.registry import ENGINE, NEEDS, Integrator, bibliography, citation_keys, paragraphs
 from symtop.methods.runge_kutta import gauss
+from symtop.methods.splitting.body import _TURNS, free_motion
+from symtop.methods.splitting.coefficients import METHODS, STRANG
 
 
 @pytest.mark.parametrize("catalogue", [symtop.integrators, symtop.scenes])
@@ -51,8 +53,7 @@ def test_two_threads_that_make_the_very_first_call_together_see_every_integrator
     for name, empty in (("_registry", {}), ("_loaded", []), ("_announced", []), ("_shipped", set())):
         monkeypatch.setattr(registry, name, empty)
     with ThreadPoolExecutor(4) as pool:
-        results = list(pool.map(first_call, range(4)))
-    assert results == [shipped] * 4
+        assert list(pool.map(first_call, range(4))) == [shipped] * 4
 
 
 @pytest.mark.parametrize(("fields", "says"), [
@@ -162,14 +163,22 @@ def test_no_paragraph_names_another_cost_than_the_one_that_is_counted(name):
 
 @pytest.mark.parametrize("name", NAMES)
 def test_every_integrator_names_sources_that_are_known_and_its_paragraph_their_years(name):
-    method = symtop.integrator(name)
-    keys = method.reference.split()
-    assert keys
-    assert set(keys) <= set(bibliography())
+    method, keys = EVERY[name], citation_keys(EVERY[name])
+    assert len(keys) == len(method.reference.split()) > 0
     for key in keys:
         year = re.search(r"^  year = \{(\d{4})\},$", bibliography()[key], re.MULTILINE)[1]
         assert f"({year})" in method.about or name not in DESCRIBED
         assert symtop.citation(name).count(bibliography()[key]) == 1
+
+
+TURNS = {STRANG: set(), **dict(zip(_TURNS, ({"blanes-moan-2002"}, *[{"kahan-li-1997"}] * 2), strict=True))}
+
+
+@pytest.mark.parametrize("name", [name for name in METHODS if "body" in EVERY[name].solvers])
+def test_a_splitting_cites_the_table_of_its_turns_in_the_chart_of_a_body_alone(name):
+    top, body = (citation_keys(EVERY[name].variant(chart)) for chart in ("axis", "body"))
+    turns = free_motion(EVERY[name].solvers["body"].rule.rule, EVERY[name].order)
+    assert (len(top), {*body}) == (1, {*top} | TURNS[turns])
 
 
 def test_other_integrators_that_a_paragraph_names_exist_and_one_of_ones_own_cites_nobody():

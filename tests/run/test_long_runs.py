@@ -306,5 +306,4 @@ for name in ("galerkin-simpson", "gauss-4", "stormer-verlet"):  # each builds an
 print(identity())
 """
     printed = printed_by(script, cwd=ROOT).split()
-    here = longrun._identity(SCENE, symtop.integrator("midpoint"), 0.01, 1000, True)
-    assert printed == [str(here)] * 2
+    assert printed == [str(longrun._identity(SCENE, symtop.integrator("midpoint"), 0.01, 1000, True))] * 2

@@ -35,8 +35,7 @@ def test_grazing_tops_pass_a_pole_as_near_as_they_say_and_those_near_the_separat
     grazing = Motion("grazing")
     assert 2.0**-15 < grazing.gap.min() < grazing.gap.max() < 2.0**-4
     assert (grazing.gap < 2.0**-11).mean() > 0.2
-    upper = grazing.low < grazing.gap * 1.0001
-    assert 0.45 < upper.mean() < 0.55
+    assert 0.45 < (grazing.low < grazing.gap * 1.0001).mean() < 0.55
     assert grazing.period.max() < 8.0
     assert (Motion("slow").gap > 2.0**-4).mean() > 0.7  # the negative control
     # Its period grows as the logarithm of the gap: 2 ln(1/gap)/r and some, r the rate at which it leaves the pole.

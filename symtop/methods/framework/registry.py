@@ -381,8 +381,13 @@ def bibliography() -> dict[str, str]:
 
 
 def citation_keys(entry: Integrator | Scene) -> list[str]:
-    """The entries that a `reference` names, of an integrator or a scene; it may also be plain words."""
-    return [key for key in str(entry.reference).replace(",", " ").split() if key in bibliography()]
+    """The entries that a `reference` names, of an integrator or a scene; it may also be plain words.
+
+    ``CHART:KEY`` names what an integrator takes in one chart only.
+    """
+    named = (word.rpartition(":") for word in str(entry.reference).replace(",", " ").split())
+    charts = {"", *getattr(entry, "solvers", ())}
+    return [key for chart, _, key in named if chart in charts and key in bibliography()]
 
 
 def citation(name: "str | Integrator") -> str:

@@ -113,7 +113,7 @@ def integrated(
 
 _METHODS = {  # summary, order, reference, explicit
     "RK45": ("Dormand-Prince 5(4)", 5, "dormand-prince-1980", True),
-    "DOP853": ("Dormand-Prince 8(5,3)", 8, "prince-dormand-1981 hairer-norsett-wanner-1993", True),
+    "DOP853": ("Dormand-Prince 8(5,3)", 8, "hairer-norsett-wanner-1993", True),
     "LSODA": ("Adams or BDF of variable order", None, "petzold-1983 hindmarsh-1983", False),
     "Radau": ("implicit Radau IIA", 5, "hairer-wanner-1996", False),
 }

@@ -286,7 +286,7 @@ def built_in() -> list[Integrator]:
         ),
         lie_runge_kutta(
             "rkmk-se3-8", eight, 8, "Runge-Kutta-Munthe-Kaas on coadjoint orbits, the tableau of DOP853",
-            f"{munthe_kaas} prince-dormand-1981 hairer-norsett-wanner-1993", brackets=6,
+            f"{munthe_kaas} hairer-norsett-wanner-1993", brackets=6,
         ),
         lie_runge_kutta(
             "crouch-grossman-3",

@@ -1,7 +1,7 @@
 """The coefficients of embedded explicit pairs of order 5, 8 and 9, as published; `tests` has their order conditions.
 
 tsit5     Tsitouras, Comput. Math. Appl. 62 (2011) 770: 5(4)
-dop853    Hairer, Norsett, Wanner, Solving ODEs I, section II.5 and II.6: 8(5,3), samples of order 7
+dop853    Hairer, Norsett, Wanner, Solving ODEs I, sections II.5, II.6 and II.10: 8(5,3), samples of order 7
 vern9     Verner, Numer. Algorithms 53 (2010) 383: 9(8), the "most efficient" one
 """
 

@@ -393,7 +393,7 @@ def two_runs(chart: str, pair: Pair, compare: Callable[..., float]) -> Callable[
 
 
 RK45 = Pair("rk45-compiled", DORMAND_PRINCE, 5, 4, "Dormand-Prince", "dormand-prince-1980")
-DOP8 = Pair("dop853-compiled", DOP853, 8, 7, "Dormand-Prince 8(5,3)", "prince-dormand-1981 hairer-norsett-wanner-1993")
+DOP8 = Pair("dop853-compiled", DOP853, 8, 7, "Dormand-Prince 8(5,3)", "hairer-norsett-wanner-1993")
 NINE = Pair("vern9", VERN9, 9, 8, "Verner's most efficient pair 9(8)", "verner-2010")
 PAIRS = Pair("tsit5", TSIT5, 5, 4, "Tsitouras's pair 5(4)", "tsitouras-2011"), DOP8, NINE
 

@@ -30,9 +30,9 @@ largest moment and R3 about that of the smallest (`SORTED`).
 
 With s, c = sin, cos of a half angle and m = c - 1 = -2 sin^2 of its half, no increment is a difference of large
 numbers; the turn S gives q the length that rounding has taken.
-Sources: Touma, Wisdom, Astron. J. 107 (1994) 1189; Blanes, Moan, J. Comput. Appl. Math. 142 (2002) 313; Fasso, J.
-Comput. Phys. 189 (2003) 527; Dullweber, Leimkuhler, McLachlan, J. Chem. Phys. 107 (1997) 5840; Miller and others, J.
-Chem. Phys. 116 (2002) 8649.
+Sources: Touma, Wisdom, Astron. J. 107 (1994) 1189; Blanes, Moan, J. Comput. Appl. Math. 142 (2002) 313; Kahan, Li,
+Math. Comp. 66 (1997) 1089; Fasso, J. Comput. Phys. 189 (2003) 527; Dullweber, Leimkuhler, McLachlan, J. Chem. Phys.
+107 (1997) 5840; Miller and others, J. Chem. Phys. 116 (2002) 8649.
 """
 
 import functools
@@ -323,6 +323,6 @@ def built_in() -> list[Integrator]:
             name="five-rotations", family="splitting", order=2, explicit=True, symplectic=True, symmetric=True,
             summary="gravity kicks around five turns about the body's axes, one force",
             conserves=frozenset({"p_phi"}), solvers={"attitude": on_top, BODY: on_body},
-            reference="dullweber-leimkuhler-mclachlan-1997 miller-2002", needs="kicks", general=True,
+            reference="dullweber-leimkuhler-mclachlan-1997 miller-2002 fasso-2003", needs="kicks", general=True,
         )
     ]  # fmt: skip

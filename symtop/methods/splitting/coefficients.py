@@ -58,7 +58,7 @@ class Splitting(NamedTuple):
     """A built-in method: the arguments of `symtop.methods.splitting.composition.composition` beside its name."""
 
     table: Table
-    reference: str  # a key of citations.bib
+    reference: str  # keys of citations.bib; of the turns of a body, behind its chart
     summary: str
     chart: str = "space"
     rotation: str = "exact"
@@ -102,11 +102,11 @@ METHODS = {
         "Cayley rotation by the right mean angle and gravity kicks, an integrable map, one force",
         rotation="cayley-tuned"),
     "takahashi-imada": Splitting(
-        TAKAHASHI_IMADA, "takahashi-imada-1984",
+        TAKAHASHI_IMADA, "takahashi-imada-1984 rowlands-1991",
         "free top and kicks with a force gradient, processed, one force", processor=1.0 / 12.0),
     "chin-4a": Splitting(
         Table(4, (0.5, 0.5), palindrome((1.0 / 6.0,), odd=True), (0.0, -1.0 / 72.0, 0.0)),
-        "chin-1997", "free top and positive kicks with a force gradient, two forces"),
+        "chin-1997 body:blanes-moan-2002", "free top and positive kicks with a force gradient, two forces"),
     "yoshida-4": Splitting(YOSHIDA_4, "yoshida-1990", "free top and gravity kicks, three Strang steps"),
     "suzuki-4": Splitting(SUZUKI_4, "suzuki-1990", "free top and gravity kicks, five Strang steps"),
     "srkn-6-4": Splitting(
@@ -114,7 +114,8 @@ METHODS = {
                    (0.0829844064174052, 0.396309801498368, -0.0390563049223486)),
         "blanes-moan-2002", "free top and gravity kicks, Runge-Kutta-Nystrom, 6 forces"),
     "srkn-11-6": Splitting(
-        BLANES_MOAN_11, "blanes-moan-2002", "free top and gravity kicks, Runge-Kutta-Nystrom, 11 forces"),
+        BLANES_MOAN_11, "blanes-moan-2002 body:kahan-li-1997",
+        "free top and gravity kicks, Runge-Kutta-Nystrom, 11 forces"),
     "srkn-14-6": Splitting(
         drift_first(
             6,
@@ -122,7 +123,7 @@ METHODS = {
              -0.130144459517415, 0.106417700369543, -0.00879424312851058),
             (0.09171915262446165, 0.183983170005006, -0.05653436583288827, 0.004914688774712854,
              0.143761127168358, 0.328567693746804)),
-        "blanes-moan-2002", "free top and gravity kicks, Runge-Kutta-Nystrom, 14 forces"),
+        "blanes-moan-2002 body:kahan-li-1997", "free top and gravity kicks, Runge-Kutta-Nystrom, 14 forces"),
     "srkn-19-8": Splitting(  # B_19 of the paper; checked by the conditions in `tests`
         kick_first(
             8,
@@ -133,7 +134,8 @@ METHODS = {
              0.135683350134504233201330671671, -0.0579071833999963041504740663015,
              -0.0772509501792649549463874931821, -0.00264758266409925952822161203471,
              -0.0329844384945603065320797537355, 0.0476781560950366927530646289755)),
-        "blanes-casas-escorihuela-tomas-2022", "free top and gravity kicks, Runge-Kutta-Nystrom, 19 forces"),
+        "blanes-casas-escorihuela-tomas-2022 body:kahan-li-1997",
+        "free top and gravity kicks, Runge-Kutta-Nystrom, 19 forces"),
     "kahan-li-6": Splitting(
         strang_steps(6, (
             0.39216144400731413927925056, 0.33259913678935943859974864,
@@ -169,7 +171,7 @@ METHODS = {
              0.521411761772814789212136078067994229991),
             (0.183083687472197221961703757166430291072, 0.310782859898574869507522291054262796375,
              -0.0265646185119588006972121379164987592663)),
-        "blanes-casas-farres-laskar-makazaga-murua-2013",
+        "blanes-casas-farres-laskar-makazaga-murua-2013 body:blanes-moan-2002",
         "free top and gravity kicks, generalised order (8, 6, 4), 7 forces"),
     "aba-10-6-4": Splitting(
         drift_first(
@@ -178,7 +180,7 @@ METHODS = {
              0.2076276957255412507162056113249882065158, 0.4359097036515261592231548624010651844006),
             (0.09585888083707521061077150377145884776921, 0.2044461531429987806805077839164344779763,
              0.2170703479789911017143385924306336714532)),
-        "blanes-casas-farres-laskar-makazaga-murua-2013",
+        "blanes-casas-farres-laskar-makazaga-murua-2013 body:blanes-moan-2002",
         "free top and gravity kicks, generalised order (10, 6, 4), 8 forces"),
     "aba-10-4": Splitting(
         drift_first(
@@ -187,7 +189,7 @@ METHODS = {
              0.2827060056798362053243616565541452479160),
             (0.1188819173681970199453503950853885936957, 0.2410504605515015657441667865901651105675,
              -0.2732866667053238060543113981664559460630)),
-        "blanes-casas-farres-laskar-makazaga-murua-2013",
+        "blanes-casas-farres-laskar-makazaga-murua-2013 body:blanes-moan-2002",
         "free top and gravity kicks, generalised order (10, 4), 7 forces"),
 }
 # fmt: on
