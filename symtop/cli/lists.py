@@ -184,7 +184,8 @@ def _scene_page(numbers: Record) -> str:
         numbers = {"natural period" if key == "nutation period" else key: value for key, value in numbers.items()}
     numbers |= {"source": source} if source else {}
     title = textwrap.fill(f"{name}: {purpose}" if purpose else name, terminal_width())
-    return "\n\n".join([title, facts(lines | numbers), *(bibliography()[key] for key in str(source).split())])
+    cited = [bibliography().get(key) for key in str(source).replace(",", " ").split()]  # plain words name no entry
+    return "\n\n".join(filter(None, [title, facts(lines | numbers), *cited]))
 
 
 @click.command(short_help="BibTeX of the package and of what a dataset used.")

@@ -171,6 +171,8 @@ def words_of(error: BaseException) -> str:
         return f"{type(error).__name__}, which cannot be printed"
     if _COMPILING in message:
         message = re.split(_TRACE, message.rpartition(_COMPILING)[2], maxsplit=1)[0].strip()
+        if message.startswith("Untyped global name") and "class 'function'" in message:
+            message += "; a function that a kernel calls is decorated with numba.extending.register_jitable"
     cut = message if len(message) <= LONGEST else f"{message[:LONGEST]} ..."
     return f"{type(error).__name__}: {cut}" if cut else type(error).__name__
 

@@ -109,13 +109,13 @@ def test_run_prints_the_errors_and_writes_the_dataset_also_of_a_run_that_fails_o
     assert netcdf.read(path).attrs["outcome"] == "left_chart"
     with pytest.raises(pytest.fail.Exception):
         numbers("[NaN]")
-    result = call("recommend", "spheroid", "--accuracy", "1e-17", "--json", code=1)
-    assert numbers(result.stdout)["seconds"] is None
-    assert numbers(result.stdout)["accuracy"] == 1e-17
+    advice = numbers(call("recommend", "spheroid", "--accuracy", "1e-17", "--json", code=1).stdout)
+    assert (advice["seconds"], advice["accuracy"]) == (None, 1e-17)
     plugin = tmp_path / "endless.py"  # a top whose nutation never ends
-    start = "symtop.scene('spheroid').top, symtop.Angles(theta=0.0, psi_dot=0.1)"
-    plugin.write_text(f"import symtop\nsymtop.register_scene(symtop.Scene('endless', {start}, 1.0))\n")
+    start = "symtop.scene('spheroid').top, symtop.Angles(theta=0.0, psi_dot=0.1), 1.0, reference='A. Doe'"
+    plugin.write_text(f"import symtop\nsymtop.register_scene(symtop.Scene('endless', {start}))\n")
     assert numbers(call("scenes", "--json", "--plugin", plugin).stdout)
+    assert re.search(r"source +A. Doe$", call("scenes", "endless", "--plugin", plugin).stdout, re.MULTILINE)
 
 
 def test_help_starts_fast():
