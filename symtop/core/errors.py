@@ -156,7 +156,7 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     if isinstance(value, str) and value in options:
         return value
     near = difflib.get_close_matches(value.lower(), options, n=3, cutoff=0.5) if isinstance(value, str) else []
-    names = ", ".join(options[:12]) + " ..." * (len(options) > 12)
+    names = ", ".join(option or repr(option) for option in options[:12]) + " ..." * (len(options) > 12)
     hint = f"did you mean {' or '.join(near)}?" if near else f"known: {names}"
     error = UnknownNameError(f"{name} {shown(value)} is unknown; {hint}", name)
     error.value = value
