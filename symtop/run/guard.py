@@ -36,7 +36,7 @@ import numpy as np
 from symtop.core.numbers import EPSILON, GOLDEN
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import LENGTH, QUATERNIONS, Plan, sentence
-from symtop.methods.framework.registry import Integrator, integrator
+from symtop.methods.framework.registry import Integrator, integrator, is_built_in
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.run.linear_stability import Growth, nutation_growth, trace
@@ -241,7 +241,7 @@ def _expected(motion: Integrated, method: Integrator, chart: str, plan: Plan) ->
         return _fixed(motion, method, probe, plan.horizon), probe
     coarse = twice / round(allowed / step)
     probe, finer = _probe(motion, method, chart, plan, twice, coarse), (step / coarse) ** (method.order or 0)
-    if method.order and (off := float(probe.error.max())) > EXPECTED:  # of another top: no order, or a lower one
+    if method.order and (off := float(probe.error.max())) > EXPECTED:  # another top's map, or too coarse
         half = _probe(motion, method, chart, plan, twice, 0.5 * coarse)
         finer = finer if float(half.error.max()) < SAME * off else 1.0
     probe = probe._replace(evaluations=round(probe.evaluations * coarse / step), stray=probe.stray * finer)
@@ -349,7 +349,8 @@ def _remedy(motion: Integrated, method: Integrator, chart: str, plan: Plan, firs
             return f"take a step of about {step:.2g}{others}"
         errors.append(expected.axis_error)
         step = min(LESS * step, _smaller(method, finer, expected))
-    if method.order and len(errors) > 1 and SAME * errors[0] < errors[-1] < math.inf:
+    own = method.order and not is_built_in(method.method)  # the order of any other is known to hold
+    if own and len(errors) > 1 and SAME * errors[0] < errors[-1] < math.inf:
         claim = f"whether it has the order {method.order} that it claims"
         return f"shorter steps do not help: `symtop claims {method.name}` measures {claim}"
     return words or f"try a step of about {step:.2g}{others}"
