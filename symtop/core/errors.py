@@ -156,7 +156,7 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     if isinstance(value, str) and value in options:
         return value
     near = difflib.get_close_matches(value.lower(), options, n=3, cutoff=0.5) if isinstance(value, str) else []
-    names = ", ".join(options[:12]) + " ..." * (len(options) > 12)
+    names = ", ".join(option or repr(option) for option in options[:12]) + " ..." * (len(options) > 12)
     hint = f"did you mean {' or '.join(near)}?" if near else f"known: {names}"
     error = UnknownNameError(f"{name} {shown(value)} is unknown; {hint}", name)
     error.value = value
@@ -171,6 +171,8 @@ def words_of(error: BaseException) -> str:
         return f"{type(error).__name__}, which cannot be printed"
     if _COMPILING in message:
         message = re.split(_TRACE, message.rpartition(_COMPILING)[2], maxsplit=1)[0].strip()
+        if message.startswith("Untyped global name") and "class 'function'" in message:
+            message += "; a function that a kernel calls is decorated with numba.extending.register_jitable"
     cut = message if len(message) <= LONGEST else f"{message[:LONGEST]} ..."
     return f"{type(error).__name__}: {cut}" if cut else type(error).__name__
 

@@ -17,6 +17,7 @@ is left out with its title and caption, and so is a table without rows.
 """
 
 import re
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from types import SimpleNamespace
@@ -106,8 +107,11 @@ def rendered(template: str | None, name: str, context: Mapping[str, Any]) -> str
         ready = ours.get_template(PLAIN) if template is None else ours.from_string(template)
         text = ready.render(**context)
     except (TemplateError, TypeError, ValueError, LookupError, ArithmeticError) as error:
-        place = f", line {error.lineno}" if getattr(error, "lineno", None) else ""  # type: ignore[union-attr]
-        raise SymtopError(f"{name}{place}: {error}") from error
+        frames = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == "<template>"]
+        lines = [getattr(error, "lineno", None), *frames[::-1]]
+        place = f", line {line}" if (line := next(filter(None, lines), None)) else ""
+        words = str(error).replace("'types.SimpleNamespace object' has no attribute", "there is no fact")
+        raise SymtopError(f"{name}{place}: {words}") from error
     return "\n\n".join(map(_unwrapped, re.split(r"\n{2,}", text.strip()))) + "\n"
 
 

@@ -36,7 +36,7 @@ import numpy as np
 from symtop.core.numbers import EPSILON, GOLDEN
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import LENGTH, QUATERNIONS, Plan, sentence
-from symtop.methods.framework.registry import Integrator, integrator
+from symtop.methods.framework.registry import Integrator, integrator, is_built_in
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.run.linear_stability import Growth, nutation_growth, trace
@@ -71,6 +71,7 @@ COARSE = 1.0  # rad of precession in one step at a pole: more is named as the ca
 OWN = 10.0  # times: the steps of a probe multiply a change by this much more than the motion; less is a transient
 PRECESSED = 0.1  # rad of precession at a pole in a proposed step
 TRIES, LESS = 8, 0.6  # steps tried for a remedy; the largest ratio of one to the one before
+SAME = 0.9  # the least ratio of two errors that are taken for the same
 MOST_STEPS = 20_000_000_000  # of a run: ten minutes of the fastest kernel
 NO_ORDER = "it has no order, and smaller steps need not help; take another method, such as strang"
 NO_LENGTHS = np.empty(0)
@@ -240,6 +241,9 @@ def _expected(motion: Integrated, method: Integrator, chart: str, plan: Plan) ->
         return _fixed(motion, method, probe, plan.horizon), probe
     coarse = twice / round(allowed / step)
     probe, finer = _probe(motion, method, chart, plan, twice, coarse), (step / coarse) ** (method.order or 0)
+    if method.order and (off := float(probe.error.max())) > EXPECTED:  # another top's map, or too coarse
+        half = _probe(motion, method, chart, plan, twice, 0.5 * coarse)
+        finer = finer if float(half.error.max()) < SAME * off else 1.0
     probe = probe._replace(evaluations=round(probe.evaluations * coarse / step), stray=probe.stray * finer)
     expected = _fixed(motion, method, probe, plan.horizon) * finer
     if chart == "angles" and marks.rate * coarse > RESOLVED:
@@ -333,18 +337,23 @@ def warning(scene: Scene, method: Integrator, chart: str, plan: Plan, *, series:
 
 def _remedy(motion: Integrated, method: Integrator, chart: str, plan: Plan, first: Trouble) -> str:
     """The advice to use a step, of two digits, for which there is no warning: the first try or a smaller one."""
-    step, word, others = first.step, "try", f", or {first.otherwise}" if first.otherwise else ""
+    step, others, words, errors = first.step, f", or {first.otherwise}" if first.otherwise else "", "", []
     for _ in range(TRIES):
         if not plan.horizon / step <= MOST_STEPS:
-            return f"take {first.otherwise or 'another method'}: more than {MOST_STEPS:.0e} steps would be needed"
+            words = f"take {first.otherwise or 'another method'}: more than {MOST_STEPS:.0e} steps would be needed"
+            break
         step = float(f"{step:.2g}")
         finer = plan._replace(step_size=step)  # a forecast looks at the step and the horizon
         expected = forecast(motion.scene, method, chart, finer, motion)
         if expected.outcome == "ok" and trouble(motion, method, chart, finer, expected) is None:
-            word = "take"
-            break
+            return f"take a step of about {step:.2g}{others}"
+        errors.append(expected.axis_error)
         step = min(LESS * step, _smaller(method, finer, expected))
-    return f"{word} a step of about {step:.2g}{others}"
+    own = method.order and not is_built_in(method.method)  # the order of any other is known to hold
+    if own and len(errors) > 1 and SAME * errors[0] < errors[-1] < math.inf:
+        claim = f"whether it has the order {method.order} that it claims"
+        return f"shorter steps do not help: `symtop claims {method.name}` measures {claim}"
+    return words or f"try a step of about {step:.2g}{others}"
 
 
 def trouble(motion: Integrated, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:

@@ -6,6 +6,7 @@ The fingerprint of a case covers the values that a plug-in registers and all cod
 import contextlib
 import importlib.util
 import sys
+import traceback
 from pathlib import Path
 from types import ModuleType
 
@@ -54,11 +55,15 @@ def load(path: str | Path) -> list[str]:
     if file in _loaded:
         return _loaded[file]
     before = [*integrators().values(), *scenes().values(), *body_scenes().values()]
-    with foreign_code(f"plugin {file.name}"):
-        try:
-            execute(f"symtop_plugin_{file.stem}_{hashed(str(file))[:8]}", file)
-        except SymtopError as error:  # without the argument names of the error, which are no options of a command
-            raise SymtopError(f"plugin {file.name}: {error}") from error
+    try:
+        execute(f"symtop_plugin_{file.stem}_{hashed(str(file))[:8]}", file)
+    except BaseException as error:
+        lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(file)]
+        where = f"plugin {file.name}, line {lines[-1]}" if lines else f"plugin {file.name}"
+        if isinstance(error, SymtopError):  # without its argument's name, which is no option of a command
+            raise SymtopError(f"{where}: {error}") from error
+        with foreign_code(where):
+            raise
     entries = (*integrators().items(), *scenes().items(), *body_scenes().items())
     _loaded[file] = [name for name, entry in entries if not any(entry is known for known in before)]
     return _loaded[file]

@@ -84,7 +84,7 @@ def test_a_solver_does_not_reach_the_plan_or_an_earlier_run_and_its_interrupt_is
 
 KERNEL = """
 import symtop
-from beside_own import ZERO
+from beside_own import ZERO, plain
 
 def step(par, rule, state, carry, h):
     return {returns}
@@ -98,8 +98,8 @@ symtop.register(method, replace=True)
 
 @pytest.mark.parametrize(("returns", "says"), [
     ("(0.0,) * 4, carry, 1, 0", None),
-    ("(0.0, 0.0), carry, 1, 0",
-     "TypingError: Cannot unify UniTuple(float64 x 4) and UniTuple(float64 x 2) for 'dstate.N'"),
+    ("(0.0, 0.0), carry, 1, 0", "Cannot unify UniTuple(float64 x 4) and UniTuple(float64 x 2) for 'dstate.N'"),
+    ("plain(state)", "a function that a kernel calls is decorated with numba.extending.register_jitable"),
     ("unknown(state)", "TypingError: NameError: name 'unknown' is not defined"),
     ("(0.0,) * 4, carry, 1, 9", "must return an outcome from 0 to 6, not 9"),
     ("(0.0,) * 4, carry, 1, -1", "must return an outcome from 0 to 6, not -1"),
@@ -107,7 +107,7 @@ symtop.register(method, replace=True)
 def test_a_kernel_that_does_not_compile_or_returns_no_outcome_is_one_sentence(returns, says, tmp_path):
     file = tmp_path / "own.py"
     file.write_text(KERNEL.format(returns=returns))
-    (tmp_path / "beside_own.py").write_text("ZERO = 0.0\n")
+    (tmp_path / "beside_own.py").write_text("ZERO = 0.0\ndef plain(x):\n    return x\n")
     run = "spheroid", "own-kernel"
     for words in (["run", *run], ["long", *run, "--steps", "10"], ["ensemble", "own-kernel", "--members", "3"]):
         horizon = [] if words[0] == "long" else ["--horizon", "1"]

@@ -113,6 +113,8 @@ def test_each_cause_is_named():
     assert "1/3 of a turn, a resonance" in caution(nutating(), "stormer-verlet", step_size=math.sqrt(3.0) / frequency)
     assert "errors add up over" in caution("goldstein", "midpoint", step_size=0.1, horizon=1000.0)
     assert all("it has no order" in caution("goldstein", one, step_size=0.01) for one in ("no-gyro", "jolt-float32"))
+    false = replace(symtop.integrator("no-gyro"), name="own", order=2)
+    assert all("`symtop claims own`" in caution("goldstein", false, step_size=h, horizon=2.0) for h in (0.01, 5e-4))
     assert "take a step of about" in caution("goldstein", "mujoco-euler", step_size=0.01)
     assert "tolerance" in caution("goldstein", "rk45-compiled", tolerance=1e-5, horizon=1000.0)
     assert "stopped at t =" in caution("sleeping", "trapezoidal", step_size=2.0, horizon=4000.0)
@@ -163,13 +165,11 @@ def test_the_step_that_is_advised_works_whatever_the_cause():
 
 
 def test_landmarks_are_those_of_the_closed_form_and_no_step_is_advised_that_a_run_may_not_have():
-    marks = landmarks(grazing(1e-4))
-    assert marks.pole == "upper"
+    marks, lower = landmarks(grazing(1e-4)), landmarks(symtop.scene("bruls-cardona-arnold"))
+    assert (marks.pole, lower.pole) == ("upper", "lower")
     assert marks.gap == pytest.approx(1.105e-4, rel=1e-2)
     motion = closed_form(grazing(1e-4))(np.linspace(0.0, 4.23, 2_000_001))
     assert marks.rate == pytest.approx(np.abs(motion.phi_dot).max(), rel=1e-3)
-    lower = landmarks(symtop.scene("bruls-cardona-arnold"))
-    assert lower.pole == "lower"
     assert math.degrees(lower.gap) == pytest.approx(4.15e-5, rel=1e-2)
     # Past a pole at 1e-12 rad a step that follows the axis is 1e-13: more steps than `simulate` takes.
     for gap, steps in ((1e-4, True), (1e-12, False)):

@@ -101,8 +101,8 @@ def test_functions_count_wherever_they_stand_and_however_they_were_imported(tmp_
 
 @pytest.mark.parametrize(("mistake", "message"), [
     ("symtop.Integrator(name='m', family='other', summary='', solvers={'angles': print}, symplectic='yes')",
-     "plugin plug.py: symplectic must be True, False or None, not 'yes'"),
-    ("1 / 0", "plugin plug.py failed: ZeroDivisionError"),
+     "plugin plug.py, line 2: symplectic must be True, False or None, not 'yes'"),
+    ("1 / 0", "plugin plug.py, line 2 failed: ZeroDivisionError"),
 ])  # fmt: skip
 def test_a_mistake_in_a_plugin_is_told_with_its_name_and_as_no_option_of_the_command(mistake, message, tmp_path):
     result = call("integrators", "--plugin", write(tmp_path, plug=f"import symtop\n{mistake}\n"), code=2)

@@ -109,11 +109,11 @@ def test_an_answer_may_come_in_any_order_of_things():
 
 def test_a_page_that_is_wrong_is_told_of(tmp_path):
     for page, says in (
-        ("{{ f.wrost | number }}", "page of mine: 'types.SimpleNamespace object' has no attribute 'wrost'"),
+        ("{{ f.wrost | number }}", "page of mine, line 1: there is no fact 'wrost'"),
         ("# Q\n{{ f.worst | numbr }}", "page of mine, line 2: No filter named 'numbr'"),
         ("{% if f.worst %}", "page of mine, line 1: Unexpected end of template"),
-        ("# Q\n{{ table('one', columns=['b']) }}", "page of mine: \"None of [Index(['b']"),
-        ("# Q\n{{ 1 / (f.worst - 0.25) }}", "page of mine: float division by zero"),
+        ("# Q\n{{ table('one', columns=['b']) }}", "page of mine, line 2: \"None of [Index(['b']"),
+        ("# Q\n{{ 1 / (f.worst - 0.25) }}", "page of mine, line 2: float division by zero"),
     ):
         (tmp_path / "mine.md").write_text(page)
         assert says in run_study(tmp_path, "pictures = lambda data: []", code=2)
