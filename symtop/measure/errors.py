@@ -15,7 +15,8 @@ Explicit methods do not keep |e| or |q| at one. A wrong length does not change t
 A trajectory of another program is checked first. A quaternion determines the attitude, the axis and theta; so do theta,
 phi and psi; theta and phi determine the axis; an axis determines theta. Vectors are scaled to length one, and the
 deviation of their length is an error of its own, ``axis_length`` or ``quaternion_length``. It may become large in a
-valid run (SciPy's RK45 at 1e-3 takes |q| to 1.4 on `spheroid`), but is small at first unless a column or unit is wrong.
+valid run (SciPy's RK45 at 1e-3 takes |q| to 1.16 on `spheroid`), but is small at first unless a column or unit is
+wrong.
 """
 
 import contextlib

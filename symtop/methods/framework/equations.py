@@ -3,7 +3,7 @@
     chart      y                                       multiplications, divisions   sines, cosines   ends
     angles     (theta, phi, psi, theta', phi', psi')                           16                2   theta = 0 and pi
     axis       (e, L)                                                          12                0   nowhere
-    attitude   (q, L)                                                          41                0   nowhere
+    attitude   (q, L)                                                          43                0   nowhere
 
 (see `angles` and `space`). In each of the three, energy and momenta are functions of the state, so that a method's
 errors in them are visible. Every Runge-Kutta method, compiled or a library's, takes f from here, so that method and

@@ -8,7 +8,8 @@
 
 c1 and c0 are constants of the motion, so that the equation of w is linear with the coefficient u, and that of u knows u
 alone. With y = w/(h mgl), a = h/I1, m = h mgl, P = a p_phi and S_n = [Re y_n, Im y_n, u_n] the coefficients of
-(t/h)^n, an order is one product of u with all three, in one register (`symtop.methods.simd`):
+(t/h)^n, a term from n = 3 on is one product of u with all three, in one register (`symtop.methods.simd`). Here kappa
+and c1 are in units of the step, kappa = a m:
 
     S_{n+2} = [1, 1, 3] (kappa (sum_{0<j<n} u_j S_{n-j} + u_0 S_n) + u_n G)/((n+1)(n+2)) + [-P, P] swap(S_{n+1})/(n+2)
     G = [a Re w, a Im w, 2 kappa u_0 - c1/3]        (u_0 S_n only of y),        S_1 = [-Im z, Re z, a Im(conj(w) z)]

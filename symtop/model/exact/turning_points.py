@@ -20,7 +20,7 @@ d1, d2 = 1 + u1, 1 + u2; e1, e2 = 1 - u1, 1 - u2; g3 = u3 - 1:
     g3         the positive root of -w + k1 t + k2 t^2 + lead t^3, w = twist_up^2. By Descartes there is one, and its
                relative condition number is at most 2 wherever the other roots lie. Newton from above.
     L          = lead (up + g3), for a free top kinetic + a^2; then from the product and the sum of the roots
-    x1 x2      = -c0/L,  c0 = up down theta'^2,      x1 + x2 = -(slope + lead c0/L)/L
+    x1 x2      = -c0/L,  c0 = up down theta'^2,      x1 + x2 = (slope + lead c0/L)/L
     swing      = u2 - u1 = sqrt((x1 + x2)^2 + 4 c0/L): a sum, because the start lies between the roots
     e1, d2     = up - x1, down + x2: sums
     d1         = down + x1, or twist_down^2/(lead d3 d2), lead d3 = lead down + L, if x1 takes half of `down` away
