@@ -23,7 +23,7 @@ for 77 % that of rk4 and for 17 % that of tsit5-fixed, whose leading error term 
 An interval covers the scatter, not the bias of too long steps, which the error terms of one step (`judging`) show.
 
 One rule, `order_verdict`, says for every study whether a measured slope confirms a declared order.
-Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, theorem II.3.2 (even powers of a symmetric method).
+Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, theorem IX.2.2 (even powers of a symmetric method).
 """
 
 import math
