@@ -311,8 +311,7 @@ def test_a_run_of_many_steps_says_how_long_it_takes(capsys, monkeypatch):
     runs.estimate(5e6, run)
     assert capsys.readouterr().err == ""
     runs.estimate(1e9, run)
-    minutes = re.fullmatch(r"symtop: 1e\+09 steps take about (\d+) min\n", capsys.readouterr().err)
-    assert 15 <= int(minutes[1]) <= 25
+    assert 15 <= int(re.fullmatch(r"symtop: 1e\+09 steps take about (\d+) min\n", capsys.readouterr().err)[1]) <= 25
     runs.estimate(9e9, run)  # and so many two and a half hours
     assert re.fullmatch(r"symtop: 9e\+09 steps take about 2.\d h\n", capsys.readouterr().err)
     assert max(few) < 1.1e6

@@ -112,8 +112,7 @@ def test_the_error_follows_the_tolerance(chart, method, name):
         growth = 1e4 if name in ("separatrix", "sleeping") else 1e2
         assert gaps(chart, done.states, form, times).max() < growth * tolerance
     strict = method.solvers[chart](scene.top, scene.start, symtop.Plan.until(times, 1e-17))
-    loose = method.solvers[chart](scene.top, scene.start, symtop.Plan.until(times, 1e-5))
-    assert strict.steps > loose.steps
+    assert strict.steps > method.solvers[chart](scene.top, scene.start, symtop.Plan.until(times, 1e-5)).steps
     assert strict.p_psi == pytest.approx(np.full(41, scene.top.momenta(scene.start).p_psi), rel=1e-11)
 
 

@@ -37,6 +37,7 @@ import select
 import shlex
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -254,7 +255,7 @@ class BatchStep(Stepper):
             if not self._tried:
                 self._try(step, y, batch, h)
             return repeat(
-                lambda k, rows: _once(step, self.since + k * h, rows, h), batch, marks, lambda rows: np.asarray(rows[0])
+                lambda k, rows: _once(step, self.since + k * h, rows, h), batch, marks, lambda rows: np.asarray(rows)[0]
             )
 
     def _array(self, values: Array) -> Any:
@@ -317,6 +318,19 @@ def double_precision(jax: Any) -> Iterator[None]:
         yield
     finally:
         jax.config.update("jax_enable_x64", before)
+
+
+@contextlib.contextmanager
+def x64() -> Iterator[None]:
+    """A context in which a file is loaded, so that arrays of JAX that it makes as constants have double precision."""
+    set_here = "JAX_ENABLE_X64" not in os.environ
+    os.environ.setdefault("JAX_ENABLE_X64", "1")  # read where JAX is imported
+    try:
+        with double_precision(sys.modules["jax"]) if "jax" in sys.modules else contextlib.nullcontext():
+            yield
+    finally:
+        if set_here:
+            os.environ.pop("JAX_ENABLE_X64", None)
 
 
 def is_solver(thing: Any) -> bool:
