@@ -64,8 +64,7 @@ def test_every_public_name_is_there_and_none_is_that_of_a_package_beside_it():
     for name in symtop.__all__:
         assert getattr(symtop, name) is not None
         assert name == "__version__" or f"{name} as {name}" in text
-    places = {entry.name for entry in pkgutil.iter_modules(symtop.__path__)}
-    assert not places & set(symtop.__all__)
+    assert not {entry.name for entry in pkgutil.iter_modules(symtop.__path__)} & set(symtop.__all__)
     for package in ("core", "model", "methods", "run", "measure", "judging"):
         module = importlib.import_module(f"symtop.{package}")
         for entry in pkgutil.iter_modules(module.__path__):
