@@ -150,7 +150,9 @@ def judge(
         facts = stepper.name, stepper.chart, stepper.implementation, subject.seconds_a_step
         about = About(*facts, seed, problem.time_scale())
         listen(about)
-        slow, limits = SLOW[quick] + STARTS * (form == "program"), QUICK_VERDICT if quick else VERDICT
+        slow, opening = SLOW[quick] + STARTS * (form == "program"), time.monotonic() - began
+        most, together, least = QUICK_VERDICT if quick else VERDICT
+        limits = most + opening, together + opening, least + opening  # a process that is started again opens it again
         for finding in _findings(subject, process, began, limits, slow):
             listen(finding)
             findings.append(finding)

@@ -40,13 +40,17 @@ def test_the_equations_on_arrays_are_those_on_floats(chart):
 
 SOLVERS = """
 import diffrax
+import jax.numpy as jnp
 import optimistix as optx
 import symtop
+node = jnp.array(2 / 3)
 midpoint = diffrax.Midpoint()
 implicit = diffrax.ImplicitEuler(root_finder=optx.Newton(rtol=1e-13, atol=1e-13))
 own_finder = diffrax.ImplicitEuler()
 loose = diffrax.Kvaerno3(root_finder=diffrax.VeryChord(rtol=1e-2, atol=1e-2))
 in_two_parts = diffrax.SemiImplicitEuler()
+def ralston(f, t, y, h):
+    return y + h / 4 * (f(t, y) + 3 * f(t + node * h, y + node * h * f(t, y)))
 """
 
 
@@ -76,6 +80,7 @@ FORMS = [pytest.param(name, marks=needs(name)) for name in ("torch", "jax")]
     pytest.param("judged_diffrax.py:solver", (), 5, marks=needs("diffrax")),
     pytest.param("judged_batches.py:heun", ("--form", "torch"), 2, marks=needs("torch")),
     pytest.param("judged_batches.py:heun", ("--form", "jax", "--chart", "attitude"), 2, marks=needs("jax")),
+    pytest.param("ralston", ("--form", "jax"), 2, marks=needs("diffrax")),  # its constant is made as it is loaded
     pytest.param("implicit", (), 1, marks=needs("diffrax")),  # with its own tolerances
     pytest.param("own_finder", (), 1, marks=needs("diffrax")),  # its stages are solved whatever its root finder
     pytest.param("loose", (), 3, marks=needs("diffrax")),

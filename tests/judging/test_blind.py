@@ -153,7 +153,8 @@ def test_the_stages_of_an_implicit_class_are_solved_and_newton_is_left_as_it_was
 
 QUICKLY = (
     "stale_force", "symplectic_euler", "half_symmetric", "adams_from_memory", "edits_the_judge",
-    "euler_in_a_spot", "WrongSum", "separable_stale", "separable_damped",
+    "euler_in_a_spot", "WrongSum", "separable_stale", "separable_damped", "cached_by_digits", "cached_by_step",
+    "cached_without_f",
 )  # fmt: skip
 
 

@@ -93,8 +93,7 @@ def test_failed_settings_stay_with_their_outcome_and_are_drawn(data):
 def test_own_scenes_and_methods_engines_and_scipy_take_part(clean_registry, tmp_path):
     refusing = Mock(side_effect=RuntimeError("no"))
     for name, solver in (("on-the-axis", symtop.integrator("rk4").solvers["axis"]), ("refusing", refusing)):
-        own_method = symtop.Integrator(name, "other", "", {"axis": solver}, implementation="python", order=4)
-        symtop.register(own_method)
+        symtop.register(symtop.Integrator(name, "other", "", {"axis": solver}, implementation="python", order=4))
     top = symtop.SymmetricTop.from_spheroid(mass=1, polar_radius=0.2, equatorial_radius=0.1, pivot_distance=0.25)
     scene = symtop.Scene("mine", top, symtop.Angles(theta=0.4, psi_dot=60.0), horizon=0.2)
     names = ["on-the-axis", "refusing", "mujoco-euler", "rk45", "rk4[axis]", "rk4[angles]", "exact"]

@@ -25,8 +25,7 @@ def largest_errors(name, method, nutations, samples):
     period = scene.nutation_period
     run = symtop.simulate(scene, method, step_size=period / 40.0, horizon=nutations * period, samples=samples,
                           observe="axis", guard=False)  # fmt: skip
-    errors = symtop.errors(run)
-    return np.array([float(errors[quantity].max()) for quantity in ("axis", "theta")])
+    return symtop.errors(run)[["axis", "theta"]].max().to_array().values
 
 
 def test_where_the_largest_error_scatters_the_order_is_that_at_the_end():

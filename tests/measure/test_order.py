@@ -21,8 +21,7 @@ CURVES = 500
 def sampled_maximum(rng, scatter, size):
     """The largest of samples of |cos| at random phases: at most 1, and lower by about `scatter`."""
     count = max(3, round(1.3 / math.sqrt(scatter)))
-    phases = (np.arange(count) + rng.random((size, 1))) / count
-    return np.abs(np.cos(np.pi * phases)).max(axis=1)
+    return np.abs(np.cos(np.pi * ((np.arange(count) + rng.random((size, 1))) / count))).max(axis=1)
 
 
 def synthetic_curves(kind, powers=(2, 4, 6), q=2, seed=1):

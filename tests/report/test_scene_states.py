@@ -42,8 +42,7 @@ def like(entry):
 
 def digit_gap(printed, stored):
     """By how many units of the last of 30 digits two numbers differ."""
-    digit = Decimal(stored).adjusted() - (DIGITS - 1)
-    return abs(Decimal(printed) - Decimal(stored)).scaleb(-digit)
+    return abs(Decimal(printed) - Decimal(stored)).scaleb(DIGITS - 1 - Decimal(stored).adjusted())
 
 
 @pytest.mark.parametrize("name", ["spheroid_ieee", "goldstein_at_rest_ieee"])

@@ -122,8 +122,7 @@ def test_the_full_grid_and_the_ordinary_one_keep_each_others_cases(tmp_path):
     (tmp_path / "grids.py").write_text(GRIDS)
 
     def computed(*words):
-        result = call("study", tmp_path / "grids.py", "--results", tmp_path / "r", "--json", *words)
-        return json.loads(result.output)
+        return json.loads(call("study", tmp_path / "grids.py", "--results", tmp_path / "r", "--json", *words).output)
 
     for words, count in (([], 2), (["--full"], 2), ([], 0), (["--full"], 0)):
         assert computed(*words)[0]["computed"] == count, words

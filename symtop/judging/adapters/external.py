@@ -23,7 +23,8 @@ depend: this is tested once at the beginning.
 *diffrax*: a solver such as ``diffrax.Tsit5()``, run with fixed steps in a compiled loop, as by `diffrax.diffeqsolve`
 with a constant step; its internal data (a last slope, a second state) are kept during a run. The stages of an implicit
 solver are solved by Newton's iteration to `SAME`, whatever its root finder, because there is no step control to take
-tolerances from. A library is imported when a step of it is judged, and computes in double precision.
+tolerances from. A library is imported when a step of it is judged, and computes in double precision;
+JAX does so while a file is loaded, too, which may make constants.
 """
 
 import contextlib
@@ -37,6 +38,7 @@ import select
 import shlex
 import shutil
 import subprocess
+import sys
 import tempfile
 import time
 from collections.abc import Callable, Iterator
@@ -254,7 +256,7 @@ class BatchStep(Stepper):
             if not self._tried:
                 self._try(step, y, batch, h)
             return repeat(
-                lambda k, rows: _once(step, self.since + k * h, rows, h), batch, marks, lambda rows: np.asarray(rows[0])
+                lambda k, rows: _once(step, self.since + k * h, rows, h), batch, marks, lambda rows: np.asarray(rows)[0]
             )
 
     def _array(self, values: Array) -> Any:
@@ -317,6 +319,19 @@ def double_precision(jax: Any) -> Iterator[None]:
         yield
     finally:
         jax.config.update("jax_enable_x64", before)
+
+
+@contextlib.contextmanager
+def x64() -> Iterator[None]:
+    """A context in which a file is loaded, so that arrays of JAX that it makes as constants have double precision."""
+    set_here = "JAX_ENABLE_X64" not in os.environ
+    os.environ.setdefault("JAX_ENABLE_X64", "1")  # read where JAX is imported
+    try:
+        with double_precision(sys.modules["jax"]) if "jax" in sys.modules else contextlib.nullcontext():
+            yield
+    finally:
+        if set_here:
+            os.environ.pop("JAX_ENABLE_X64", None)
 
 
 def is_solver(thing: Any) -> bool:

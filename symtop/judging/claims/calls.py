@@ -5,7 +5,9 @@ last force, and its runs depend on earlier runs. If the loop over steps is forei
 with runs of n and of m steps: a loop that sums its time and stops too late or too soon is off by a step, a multistep
 method by less. Where nothing is missed, n = m of the most steps of one call are compared, too. The same is done with
 long runs, n and m random, whatever the loop, once in a new process. The m steps begin at a state with its last bit
-changed, so that nothing kept for it can be used. Then the first call is repeated.
+changed, so that nothing kept for it can be used. Then the first call is repeated. Calls that differ a little from the
+first, or in the top alone, are made after it and again in the new process: a result kept for another call, found by
+rounded numbers or without regard to f, differs there.
 """
 
 import contextlib
@@ -18,13 +20,13 @@ from typing import Any
 import numpy as np
 
 from symtop.core.errors import SymtopError
-from symtop.judging.adapters.adapter import Stepper, relative_gap
+from symtop.judging.adapters.adapter import A_STEP, Stepper, relative_gap
 from symtop.judging.adapters.external import MOST
 from symtop.judging.claims.subject import Subject
 from symtop.judging.findings import Finding, Measured, inapplicable
 from symtop.measure.step_map import generic_start, one_step
 from symtop.model.scenes import Scene
-from symtop.model.top import Angles
+from symtop.model.top import Angles, SymmetricTop
 
 SHARE = 0.0137  # nutations: the step of a call
 SAME = 1e-13  # relative difference of two calls that threads may cause
@@ -41,6 +43,9 @@ LATE = {False: (100_000, 3.0), True: (20_000, 0.5)}  # by quick: n of the longes
 LATER, AFTER, RECALLED = 4, 64, 1e-6
 BLOWN_UP = 1e6  # times the start: a state that has blown up
 GROWN = 10.0  # gaps up to this times the effect of the last bit, as beside a separatrix, do not count
+# relative changes of the start, of the step, which moves a state by less, and of mgl for calls beside the first one
+CLOSE, LONGER, HEAVIER = 1e-12, 1e-9, 1.3
+NEAR = (f" from a start {CLOSE:g} away", f" with a step {LONGER:g} longer", " on a heavier top", "")
 ELSEWHERE = 0.3  # relative change of the start for a step somewhere else
 
 
@@ -81,19 +86,16 @@ def _calls(subject: Subject) -> Finding:
         why = f"it keeps something of its first start: from another one, a step of {step.h:.0e} moves by {gap:.1e}"
         return _refuted("keeps state", why, gap, STANDS)
     traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # short names, with clauses
-    traits |= {"single precision": "its numbers are those of single precision"} if subject.single else {}
+    traits |= {"single precision": "it computes in single precision"} if subject.single else {}
     traits |= {"few digits": short} if (short := _short(first)) else {}
     miss, why = _parts(subject, h / 10.0) if stepper.own_loop else (0.0, "")
     if miss > MISSED:
         return _refuted("miscounts steps", why, miss, MISSED)
     traits |= {"remembers": why} if miss > REMEMBERED and "few digits" not in traits else {}
-    miss, why = _cut(stepper, scene, h / 1.6, _late(subject))
-    if miss > (most := MISSED if stepper.own_loop else RECALLED):
-        why = f"it keeps something between calls: {why} (seed {subject.seed})"
-        return _refuted("keeps state", why, miss, most)
-    if (gap := relative_gap(first, once(start, h))) > SAME:
-        why = f"it keeps something between calls: the first one, repeated, differs by {gap:.1e}"
-        return _refuted("keeps state", why, gap)
+    traits |= {"stands still": f"a step of {step.h:.0e} moves nothing"} if own == 0.0 and not subject.single else {}
+    gap, refuted = _kept(subject, start, h, lambda: relative_gap(first, once(start, h)))
+    if refuted:
+        return refuted
     try:
         once(start, -h)
     except SymtopError as error:
@@ -121,6 +123,36 @@ def _repeated(
     if (noise := max(differences) - min(differences)) > NOISY * gap:
         return _refuted("not repeatable", f"calls with the same arguments differ by {noise:.1e}", noise)
     return _refuted("keeps state", f"it keeps something between calls: {how} differs by {gap:.1e}", gap)
+
+
+def _kept(subject: Subject, start: Angles, h: float, again: Callable[[], float]) -> tuple[float, Finding | None]:
+    """`again` after late runs, the gap of the first call, and a refuting finding if they or calls beside it differ."""
+    stepper, top = subject.stepper, subject.scene.top
+    beside = [] if stepper.own_loop else _beside(stepper, top, start, h)
+    miss, why = _cut(stepper, subject.scene, h / 1.6, _late(subject))
+    keeps = "it keeps something between calls:"
+    if miss > (most := MISSED if stepper.own_loop else RECALLED):
+        return miss, _refuted("keeps state", f"{keeps} {why} (seed {subject.seed})", miss, most)
+    ends = zip(beside, _beside(stepper, top, start, h) if beside else [], strict=True)
+    gaps = [*(relative_gap(*pair) for pair in ends), again()]
+    for how, gap in zip(NEAR[-len(gaps) :], gaps, strict=True):
+        if gap > SAME:
+            return gap, _refuted("keeps state", f"{keeps} the first one, repeated{how}, differs by {gap:.1e}", gap)
+    return gaps[-1], None
+
+
+def _beside(stepper: Stepper, top: SymmetricTop, start: Angles, h: float) -> list[Any]:
+    """The ends of steps that differ from the first one as `NEAR` says; zeros where a step fails."""
+    near = Angles(**{name: getattr(start, name) * (1.0 + CLOSE) for name in Angles.__slots__})
+    trials = (top, near, h), (top, start, h * (1.0 + LONGER)), (replace(top, mgl=HEAVIER * top.mgl), start, h)
+    state, ends = stepper.form.prepare(top, start)[1], []
+    for of_top, at, step in trials:
+        par, y = stepper.form.prepare(of_top, at)
+        ends.append(np.zeros(len(y)))
+        with contextlib.suppress(SymtopError):
+            y = y if at is near else state
+            ends[-1] = np.nan_to_num(stepper.march(of_top, par, np.array(y, dtype=float), step, A_STEP)[0])
+    return ends
 
 
 def _short(state: Any) -> str:

@@ -454,6 +454,7 @@ def time_order(subject: Subject) -> list[Finding]:
         declared, why = "", f"{series.wrong_term()}, as for f(y)"
     else:
         verdict, why = "refuted", f"where f depends on t, {series.wrong_term()}: f is asked at wrong times"
+        why += ", or a difference quotient is off" * (series.worst(series.order + 1) < SHARPLY)
     term = min(power, series.order + 1)
     return [Finding("time", declared, measured, verdict, why, series.worst(term), series.least(term))]
 

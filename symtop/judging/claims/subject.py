@@ -15,9 +15,10 @@ from typing import Any
 import numpy as np
 
 from symtop.core.errors import SymtopError, foreign_code, one_of
+from symtop.core.numbers import EPSILON
 from symtop.judging import FORMS
 from symtop.judging.adapters.adapter import Stepper
-from symtop.judging.adapters.external import BatchStep, DiffraxSolver, Program, Server, SharedObject, is_solver
+from symtop.judging.adapters.external import BatchStep, DiffraxSolver, Program, Server, SharedObject, is_solver, x64
 from symtop.judging.adapters.python_step import REDUCED, PythonStep, RotationStep, ScipySolver, SeparableStep
 from symtop.judging.findings import yes_no
 from symtop.measure.conservation import CONSTANTS as MOTION
@@ -42,7 +43,8 @@ FEWEST = 300  # steps of the longest run for the order, however slow a step is
 SINGLE = 1000  # most steps of it in single precision, whose rounding hides smaller errors
 LADDER = 2.5  # ratio of the steps of all runs for the order to those of the longest
 ENOUGH_STEPS, AT_REST = 50.0, 1e-9  # steps per nutation with a constant right-hand side; the largest relative miss
-PUSH, UNITS = 0.01, 4.0  # its largest change of L, relative; single-precision epsilons that are rounding of a step
+PUSH, UNITS = 0.01, 4.0  # its largest change of L, relative; epsilons, of single or double, that are rounding of a step
+MOVES = 1e-6  # relative: a number that a step changes by less does not show in what precision
 QUICK_SHARE = 0.25  # of the most steps and evaluations of a registered method, if `quick`; no verdict changes
 STEPS_A_NUTATION = 118.02  # of a long run, and of timed steps, because the cost of an implicit step depends on its size
 TIMED, LEAST = 0.03, 1e-9  # seconds of a run that suffice to time a step; the least time assumed of a step
@@ -143,14 +145,19 @@ class Subject:
 
     @functools.cached_property
     def single(self) -> bool:
-        """Does a bare step compute in single precision?"""
+        """Does a bare step compute in single precision: its states, or what it adds to a state, or its slope alone?"""
         if self.stepper is None or not self.method.fixed_step:
             return False
-        scene = self.scene
-        state, run = self.stepper.from_start(scene.top, generic_start(scene), scene.time_scale() / STEPS_A_NUTATION)
+        scene, h = self.scene, self.scene.time_scale() / STEPS_A_NUTATION
+        state, run = self.stepper.from_start(scene.top, generic_start(scene), h)
         end = run(state, 1)[0]
+        added, size = end - state, np.abs(end)
+        added, size = (one[np.abs(added) > MOVES * size] for one in (added, size))
         with np.errstate(over="ignore"):  # a step may blow up beyond the range of float32
-            return bool((end == end.astype(np.float32)).all() and not (state == state.astype(np.float32)).all())
+            if (end == end.astype(np.float32)).all():
+                return not (state == state.astype(np.float32)).all()
+            off = [np.abs(one - one.astype(np.float32)) * unit for one, unit in ((added, 1.0), (added / h, h))]
+        return added.size > 2 and bool((off <= UNITS * EPSILON * size).all(axis=1).any())
 
     def rounding(self, steps: float) -> float:
         """The relative rounding error of `steps` steps in single precision, one epsilon each; 0 in double precision."""
@@ -268,7 +275,7 @@ def _thing(target: Any, *, free: bool) -> tuple[Any, str]:
         raise SymtopError(f"{words}, not {str(target)!r}{own}")
     hint = " (a command needs form program)" * free
     file = python_file(path, "a step", f"FILE.py:NAME with a file that is there{hint}")
-    with foreign_code(f"the file {file.name}"):
+    with foreign_code(f"the file {file.name}"), x64():
         module: Any = execute(f"symtop_judged_{Path(file).stem}", file)
     thing = functools.reduce(lambda one, part: getattr(one, part, None), (name or "step").split("."), module)
     if not (callable(thing) or is_solver(thing)):

@@ -80,8 +80,7 @@ def triple_jump(f, t, y, h, outer=1 / (2 - 2 ** (1 / 3))):
 
 def extrapolated(f, t, y, h, base=heun):
     """Two half steps and one whole of a second-order method, h^2 eliminated: order 3."""
-    halves = base(f, t + h / 2, base(f, t, y, h / 2), h / 2)
-    return (4 * halves - base(f, t, y, h)) / 3
+    return (4 * base(f, t + h / 2, base(f, t, y, h / 2), h / 2) - base(f, t, y, h)) / 3
 
 
 def in_place(f, t, y, h):
@@ -148,8 +147,7 @@ def linearised(f, t, y, h):
     slopes = np.stack([(f(t, y + 1e-6 * np.eye(n)[k]) - zero) / 1e-6 for k in range(n)], axis=1)
     matrix = np.linalg.inv(np.eye(n) - h * gamma * slopes)
     k1 = matrix @ zero
-    k2 = matrix @ (f(t + h, y + h * k1) - 2 * k1)
-    return y + h * (1.5 * k1 + 0.5 * k2)
+    return y + h * (1.5 * k1 + 0.5 * matrix @ (f(t + h, y + h * k1) - 2 * k1))
 
 
 NODES = [0.5 + 0.5 * x for x in (-(0.6**0.5), 0.0, 0.6**0.5)]
@@ -304,8 +302,7 @@ def rotation_negated(q, w, h, inertia, torque):
 def rotation_guarded(q, w, h, inertia, torque):
     """Of order 1, as engines write it: an angle that is not positive turns nothing, so that a step of -h is another."""
     w = w + h * rates(q, w, inertia, torque)
-    angle = h * np.sqrt(w @ w)
-    return product(q, turn(h * w)) if angle > 0.0 else q, w
+    return product(q, turn(h * w)) if h * np.sqrt(w @ w) > 0.0 else q, w
 
 
 def verlet(state, h, dT, dV):
