@@ -174,7 +174,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "busy": every.shape != frame.shape or None,
         "times": count, "loud": loud, "noisy": NOISY, "usual_spread": every["spread"].median(),
         "again": int((data["seconds_tries"] > 1).sum()),
-        "samples": SAMPLES, "near": LEAST, "near_share": (every["axis"] >= LEAST * every["target"]).mean(),
+        "samples": SAMPLES, "tie": TIE, "near": LEAST, "near_share": (every["axis"] >= LEAST * every["target"]).mean(),
     }  # fmt: skip
     for name, call_first in (("late", False), ("first", True)):
         bars = waterfall(part, call_first=call_first)

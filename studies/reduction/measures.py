@@ -19,7 +19,7 @@ from symtop.methods.framework.loop import inside
 from symtop.methods.framework.registry import SMALLEST_FIRST, Integrator, integrator, integrators
 from symtop.methods.lagrangian import unreduced
 from symtop.methods.lagrangian.discrete_lagrangian import rule_of
-from symtop.model.charts import CHARTS
+from symtop.model.charts import CHARTS, Array
 from symtop.model.scenes import Scene
 from symtop.run.simulation import simulate
 
@@ -29,6 +29,7 @@ BATCH = 0.005  # seconds, of runs in several charts
 TIMED_STEPS = 20_000  # of a timed run: the overhead of a call is that of a hundred steps
 COMPARED_STEPS = 10_000  # of a reduced kernel and its unreduced form
 COMMUTES = 1e-13  # rad: two paths of a few thousand steps with compensated sums are that close if they are one method
+SAME = 1e-3  # relative: axis errors that differ by less are the same
 CHART_PERIODS = 32.0  # nutations: long enough that the call itself does not count
 
 
@@ -53,16 +54,35 @@ def chart_table(
 
 
 class Ratio(NamedTuple):
-    """A chart against the smallest one that the same integrator has: above 1 is worse."""
+    """A chart against the preferred one that the same integrator has, mostly the axis: above 1 is worse."""
 
     chart: str
     base: str
     time: float  # median over the settings with which both runs end well, NaN if there are none
     error: float  # of the axis; geometric mean over the settings where both can be judged, NaN if there are none
+    to_error: float  # of the times to the same error, see `time_to_error`
+
+
+def judged(table: xr.Dataset) -> Array:
+    """Which errors of the axis are asymptotic, and above what the reference can tell from zero."""
+    return np.asarray((table["axis"] > 10.0 * table["axis_bound"]) & (table["axis"] < LARGEST_ERROR))
+
+
+def time_to_error(base: xr.Dataset, other: xr.Dataset) -> float:
+    """Time of the other chart over that of the base to the same axis error: the median over the errors of both.
+
+    Between two settings a time is interpolated as a power of the error. NaN if no error of one is between the other's.
+    """
+    curves = [np.log([table[name].values[judged(table)] for name in ("axis", "seconds")]) for table in (base, other)]
+    (x, before), (y, after) = (curve[:, np.argsort(curve[0])] for curve in curves)
+    low, high = max(one.min(initial=np.inf) for one in (x, y)), min(one.max(initial=-np.inf) for one in (x, y))
+    at = np.concatenate([x, y])
+    at = at[(at > low - SAME) & (at < high + SAME)]
+    return math.exp(np.median(np.interp(at, y, after) - np.interp(at, x, before))) if at.size else math.nan
 
 
 def chart_ratios(cell: xr.Dataset) -> list[Ratio]:
-    """Every other chart of one integrator on one scene against its smallest; `cell` is a table of `chart_table`."""
+    """Every other chart of one integrator on one scene against the preferred; `cell` is a table of `chart_table`."""
     by_size = [cell.sel(chart=chart) for chart in SMALLEST_FIRST["axis"]]
     base, *larger = [table for table in by_size if np.isfinite(table["seconds"]).any()] or by_size[:1]
     ratios = []
@@ -70,13 +90,11 @@ def chart_ratios(cell: xr.Dataset) -> list[Ratio]:
         ended = np.isfinite(other["axis"].values) & np.isfinite(base["axis"].values)  # a failed run has no time
         times = (other["seconds"] / base["seconds"]).values[ended]
         time = float(np.median(times)) if times.size else math.nan
-        good = np.ones(other.sizes["setting"], bool)
-        for table in (base, other):  # asymptotic, and above what the reference can tell from zero
-            error = table["axis"].values
-            good &= (error > 10.0 * table["axis_bound"].values) & (error < LARGEST_ERROR)
+        good = judged(base) & judged(other)
         logs = np.log(other["axis"].values[good] / base["axis"].values[good])
         error = math.exp(float(np.mean(logs))) if logs.size else math.nan
-        ratios.append(Ratio(str(other["chart"].item()), str(base["chart"].item()), time, error))
+        charts = (str(table["chart"].item()) for table in (other, base))
+        ratios.append(Ratio(*charts, time, error, time_to_error(base, other)))
     return ratios
 
 

@@ -32,7 +32,7 @@ from symtop.run.simulation import chart_of, make_plan
 KEEP_EVERY = 5.0  # seconds between two writings of the file
 RAISED = "raised"  # outcome of a run whose integrator raised an exception
 BATCHES, BATCH, PATIENCE = 15, 0.0005, 0.1  # of timings: most samples of a run, seconds of one, seconds of all
-CLOSE = 0.01  # relative difference of the three least samples below which a run is not timed further
+CLOSE = 0.01  # relative difference of the three least samples of each run below which none is timed further
 SPENT = {"seconds": math.nan, "seconds_spread": math.nan}
 TIMED = (
     "one call of the method's solver from the start to the horizon, with two samples and nothing around it; the least "

@@ -85,7 +85,8 @@ def timings(
     With `warm`, functions have been called before: they have no first call (NaN), and a trial call that lasts longer
     than a batch counts as a sample, so that a long run is called no more often than it has samples. A function gets no
     more samples once it has `least` of them that took `patience` seconds together, because a long call averages fast
-    and slow moments of the machine, or once its samples `agree` to the relative difference `close`. The closed form is
+    and slow moments of the machine; all end once the samples of each other one `agree` to the relative difference
+    `close`: one that ended by itself in a slow spell would be compared with those that outlast it. The closed form is
     compiled before anything is timed, unless no function uses it (`exact` is False).
     """
     if exact:
@@ -99,11 +100,12 @@ def timings(
         samples.append(single if warm else [])
     draw = random.Random(0)  # noqa: S311
     for number in range(batches):
+        long = [len(row) >= least and count * sum(row) >= patience for row, count in zip(samples, calls, strict=True)]
+        if all(enough or agree(row, close) for row, enough in zip(samples, long, strict=True)):
+            break
         for index in draw.sample(range(len(functions)), len(functions)):
-            row = samples[index]
-            done = (len(row) >= least and calls[index] * sum(row) >= patience) or agree(row, close)
-            if len(row) <= number and not done:
-                row.append(_batch(functions[index], calls[index]) / calls[index])
+            if len(samples[index]) <= number and not long[index]:
+                samples[index].append(_batch(functions[index], calls[index]) / calls[index])
     return [Timing(tuple(row), first) for row, first in zip(samples, firsts, strict=True)]
 
 

@@ -8,7 +8,7 @@ import xarray as xr
 from scipy.optimize import root
 from symtop_studies.reduction import commutation, facts, figures, study
 from symtop_studies.reduction.commutation import gap, kernel_path, path, reduced_first
-from symtop_studies.reduction.measures import Ratio, chart_ratios, commutation_table, unreduced_forms
+from symtop_studies.reduction.measures import Ratio, chart_ratios, commutation_table, time_to_error, unreduced_forms
 
 import symtop
 from symtop.measure import datasets
@@ -53,7 +53,6 @@ def lobatto_step(top, point, h):
     IIIA = np.array([[0.0, 0.0, 0.0], [5 / 24, 1 / 3, -1 / 24], [1 / 6, 2 / 3, 1 / 6]])
     IIIB, weights = np.array([[1 / 6, -1 / 6, 0.0], [1 / 6, 1 / 3, 0.0], [1 / 6, 5 / 6, 0.0]]), IIIA[2]
     theta, _, _, p_theta, p_phi, p_psi = point
-
     # the force on phi and psi is zero, so that their stage momenta are p_phi and p_psi
     slopes = lambda stages: np.array([top.potential_slope(t, top.momenta(start_with(t))) for t in stages])
 
@@ -95,7 +94,7 @@ def test_what_a_reduced_kernel_saves_is_split_into_iterations_and_the_time_of_on
     assert list(table["iterations (ratio)"]) == pytest.approx([1.5, 3.0])
     assert list(table["time of an iteration (ratio)"]) == pytest.approx([4.0 / 3.0, 1.0])
     assert (answers["step_least"], answers["step_most"]) == pytest.approx((2.0, 3.0))
-    assert (answers["commuting"], answers["charts"], answers["twins_gap"]) == (None, None, None)
+    assert (answers["commuting"], answers["attitude_count"], answers["twins_gap"]) == (None, None, None)
     h, dims = 0.1 / 2.0 ** np.arange(4), ("scene", "variant", "commutation_step")
     gaps = [[[3e-15, 1e-15, 1e-15, 1e-15], [8e-14, 1e-15, 1e-15, 1e-15], 1e-3 * h**2 * [3.0, 1.0, 1.0, 1.0]]]
     data = xr.Dataset({"commutation_gap": (dims, gaps), "commutation_step_size": (dims, np.tile(h, (1, 3, 1)))},
@@ -115,13 +114,12 @@ def test_facts_and_page_are_those_of_the_rules_and_charts(tmp_path):
             parts.append((case, study.measure(dataclasses.replace(case, settings=settings))))
     measured = datasets.combine(parts)
     answers = facts.facts(measured)
-    assert answers["commuting"] == "midpoint"
     assert answers["commuting_gap"] < 1e-13
     assert answers["others"] == "trapezoidal, simpson-linear, galerkin-simpson"
     assert (answers["power_least"], answers["power_most"]) == pytest.approx((2.0, 4.0), abs=0.2)
-    assert answers["rules"] == "midpoint, trapezoidal"
+    assert (answers["commuting"], answers["rules"]) == ("midpoint", "midpoint, trapezoidal")
     assert 0.0 < answers["twins_gap"] < 1e-11  # rounding over 10 000 steps without compensation
-    assert answers["charts"] == len(facts.tables(measured)["charts"])
+    assert answers["attitude_count"] == len(facts.tables(measured)["charts"])
     assert not (measured[["p_phi_drift", "p_psi_drift"]].to_dataarray() < 0.0).any()
     assert 1.0 <= measured["iterations_per_step"].min() <= measured["iterations_per_step"].max() < 10.0
     two = measured.isel(commutation_step=slice(2))  # too few for an order, and no less apart
@@ -140,12 +138,14 @@ def test_a_run_that_failed_has_no_part_in_the_time_of_a_chart(failed, ratio, mon
     cell = xr.Dataset({"axis": (over, axis), "axis_bound": (over, bounds), "seconds": (over, seconds)},
                       {"chart": ["angles", "axis", "attitude"]})  # fmt: skip
     (one,) = chart_ratios(cell)
-    each = [Ratio("attitude", "axis", 1.05, 1.0), Ratio("angles", "axis", 2.0, 1.0), Ratio("angles", "axis", 1.2, 1.0)]
-    monkeypatch.setattr(facts, "chart_ratios", lambda _: each)
+    each = [Ratio("attitude", "axis", 9.0, 1.0, x) for x in (1.2, 1.05, 0.95, 0.85, 0.8, np.nan)]
+    monkeypatch.setattr(facts, "chart_ratios", lambda _: [*each, Ratio("angles", "axis", 9.0, 1.0, 3.0)])
     told = facts.facts(cell.expand_dims(scene=["spheroid"], variant=["gauss-2"]))
-    assert [told[name] for name in ("charts", "charts_as_fast", "slowest_time")] == [3, 1, 2.0]
-    assert (one.chart, one.base, one.time) == ("attitude", "axis", ratio)
-    assert one.error == pytest.approx(1.0)  # twice and half as large; the last are next to their bound
+    assert [told[f"attitude_{x}"] for x in ("count", "longer", "shorter", "median", "most")] == [5, 1, 2, 0.95, 1.2]
+    assert (one.chart, one.base, one.time, told["angles_slowest"]) == ("attitude", "axis", ratio, "gauss-2[angles]")
+    back = time_to_error(*(cell.sel(chart=chart) for chart in ("attitude", "axis")))
+    # Twice and half as large; the last are next to their bound. The errors 1e-3 and 1e-4 lie between 2e-3 and 5e-5.
+    assert [one.error, one.to_error, 1.0 / back] == pytest.approx([1.0, 3.0**0.5, 3.0**0.5])
 
 
 def test_a_kernel_is_known_under_any_name_and_a_method_without_a_twin_refused(monkeypatch):

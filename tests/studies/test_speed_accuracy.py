@@ -30,22 +30,22 @@ def test_a_cost_lies_between_the_runs_and_one_of_the_coarsest_setting_is_an_uppe
     assert facts.tables(data)["times"].set_index("variant")["upper bound at (rad)"].eq("").all()  # the control
     finer = data.assign(axis=data["axis"] * xr.where(data["variant"] == "strang[axis]", 1e-3, 1.0))
     column = facts.tables(finer)["times"].set_index("variant")["upper bound at (rad)"]
-    assert column["strang[axis]"] == "1e-03"
-    assert column.drop("strang[axis]").eq("").all()
+    assert (column["strang[axis]"], {*column.drop("strang[axis]")}) == ("1e-03", {""})
 
 
 def test_the_fastest_on_f_alone_is_named_and_others_are_told_over_it(data, monkeypatch):
     names = "takahashi-imada", "rk4", "rk45-compiled", "dop853-compiled", "rk45"
     taken = dict(zip([f"{name}[axis]" for name in names], (1e-6, 2e-6, 4e-6, 6e-6, 8e-4), strict=True))
-    at = {1e-9: taken, 1e-6: taken | {"rk45[axis]": 4e-4}}  # SciPy's are told at 1e-6, others at 1e-9
-    monkeypatch.setattr(facts, "costs", lambda _, target: at.get(target, {}))
-    told = [facts.facts(data)[name] for name in ("fastest_9", "fastest_9_seconds", "beside", "scipy", "variants")]
-    assert told == ["rk4[axis]", 2e-6, pytest.approx(3.0), pytest.approx(100.0), 5]  # without the exact motion
+    monkeypatch.setattr(facts, "costs", lambda _, to: {1e-9: taken, 1e-6: taken | {"rk45[axis]": 4e-4}}.get(to, {}))
+    for spread, scipy in ((0.0, pytest.approx(100.0)), (1.0, None)):  # at 1e-6, others at 1e-9; not on a busy machine
+        one = facts.facts(data.assign(seconds_spread=spread + 0.0 * data["seconds"]))
+        told = [one[name] for name in ("fastest_9", "fastest_9_seconds", "beside", "scipy", "variants")]
+        assert told == ["rk4[axis]", 2e-6, pytest.approx(3.0), scipy, 5]  # without the exact motion
 
 
 def test_a_run_is_that_of_its_setting_and_the_page_says_what_was_measured(data, tmp_path):
-    cell = facts.shown(data).sel(variant="rk4[axis]")
-    scene, step = symtop.scene("goldstein"), float(cell["step_size"][2])
+    cell, scene = facts.shown(data).sel(variant="rk4[axis]"), symtop.scene("goldstein")
+    step = float(cell["step_size"][2])
     run = symtop.simulate(scene, "rk4[axis]", step_size=step, horizon=10.0 * scene.nutation_period, guard=False)
     assert float(symtop.errors(run)["axis"].max()) == pytest.approx(float(cell["axis"][2]), rel=0.05)
     assert np.isfinite(cell["seconds"]).all()
