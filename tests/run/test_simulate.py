@@ -350,8 +350,7 @@ def test_a_quaternion_that_keeps_its_length_has_not_failed_and_a_state_whose_squ
     assert (run.attrs["outcome"], run.attrs["reached_time"]) == ("not_finite", 87.0)
     both = symtop.ensemble([doubtful] * 2, "rk4[axis]", step_size=43.5, horizon=130.5, quiet=True)
     assert (both["outcome"].values.tolist(), both["reached_time"].values.tolist()) == (["not_finite"] * 2, [87.0] * 2)
-    good = symtop.simulate(doubtful, "rk4[axis]", step_size=0.5, guard=False)  # the control
-    assert good.attrs["outcome"] == "ok"
+    assert symtop.simulate(doubtful, "rk4[axis]", step_size=0.5, guard=False).attrs["outcome"] == "ok"  # the control
 
 
 @pytest.mark.parametrize("count", [2, pytest.param(4, marks=pytest.mark.slow)])
