@@ -169,7 +169,8 @@ def _digits(value: Any) -> str:
 
 
 def _scene_page(numbers: Record) -> str:
-    from symtop.methods.framework.registry import bibliography
+    from symtop.methods.framework.registry import bibliography, citation_keys
+    from symtop.model.scenes import scene
 
     name, purpose, angles, source = (numbers.pop(key) for key in ("name", "purpose", "theta", "source"))
     parts = {key: numbers.pop(key) for key in ("top", "start", "momenta")}
@@ -184,8 +185,8 @@ def _scene_page(numbers: Record) -> str:
         numbers = {"natural period" if key == "nutation period" else key: value for key, value in numbers.items()}
     numbers |= {"source": source} if source else {}
     title = textwrap.fill(f"{name}: {purpose}" if purpose else name, terminal_width())
-    keys = (key for key in str(source).replace(",", " ").split() if key in bibliography())  # or a user's own words
-    return "\n\n".join([title, facts(lines | numbers), *map(bibliography().__getitem__, keys)])
+    sources = (bibliography()[key] for key in citation_keys(scene(name, bodies=True)))
+    return "\n\n".join([title, facts(lines | numbers), *sources])
 
 
 @click.command(short_help="BibTeX of the package and of what a dataset used.")

@@ -23,8 +23,8 @@ depend: this is tested once at the beginning.
 *diffrax*: a solver such as ``diffrax.Tsit5()``, run with fixed steps in a compiled loop, as by `diffrax.diffeqsolve`
 with a constant step; its internal data (a last slope, a second state) are kept during a run. The stages of an implicit
 solver are solved by Newton's iteration to `SAME`, whatever its root finder, because there is no step control to take
-tolerances from. A library is imported when a step of it is judged, and computes in double precision;
-JAX does so while a file is loaded, too, which may make constants.
+tolerances from. A library is imported when a step of it is judged, and computes in double precision; JAX does so while
+a file is loaded, too, which may make constants.
 """
 
 import contextlib
