@@ -426,7 +426,7 @@ def all_scenes() -> dict[str, Scene]:
 
 
 @by_name
-def scene(name: "str | Scene", *, bodies: bool = False) -> Scene:
+def scene(name: str | Scene, *, bodies: bool = False) -> Scene:
     """The scene of that name; a Scene is returned as it is. One of a body is refused unless `bodies` is true."""
     chosen = name
     if not isinstance(chosen, Scene):
