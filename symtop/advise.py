@@ -294,7 +294,7 @@ class _Search:
             patience = max(TOO_DEAR * min(rivals, default=math.inf), CHEAP)
             failed = sum(len(self.fails.get(why, ())) for why in HOPELESS)
             most = LESS if failed >= AGREED and not rivals else math.inf
-            self._sort_in(_try(self.question, method, patience, most), self.trials, method)
+            self._sort_in(_tried(self.question, method, patience, most), self.trials, method)
         timed = _timed(self.question, self.trials, self.fails)
         self.trials = sorted(timed, key=lambda one: one.cost(self.question))
 
@@ -308,7 +308,7 @@ class _Search:
         return ranked
 
     def _sort_in(self, trial: _Trial | str | float, trials: list[_Trial], method: Integrator) -> None:
-        """Add the result of `_try` or `_confirm` to `trials`, `fails` (a reason) or `errors_at_step` (an error)."""
+        """Add the result of `_tried` or `_confirm` to `trials`, `fails` (a reason) or `errors_at_step` (an error)."""
         if isinstance(trial, _Trial):
             trials.append(trial)
         elif isinstance(trial, str):
@@ -373,7 +373,7 @@ def _candidates(question: _Question) -> tuple[list[str], str]:
     return list(dict.fromkeys([*menu, *own, *of_top])), "a study of random tops found the cheapest for such questions"
 
 
-def _try(question: _Question, method: Integrator, patience: float, most: float = math.inf) -> _Trial | str | float:
+def _tried(question: _Question, method: Integrator, patience: float, most: float = math.inf) -> _Trial | str | float:
     """A trial with a setting from short runs, or the reason of failure, or the error if too large at a given step."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
