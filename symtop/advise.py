@@ -167,7 +167,7 @@ class _Trial(NamedTuple):
 
 
 def recommend(
-    scene: "str | Scene", *, accuracy: float, quantity: str | None = None, horizon: float | None = None,
+    scene: str | Scene, *, accuracy: float, quantity: str | None = None, horizon: float | None = None,
     needs: str | Collection[str] | None = None, step_size: float | None = None,
     max_step: float | None = None, general: bool = False, keeps: str | Collection[str] | None = None,
     time_a_step: float | None = None,
@@ -294,7 +294,7 @@ class _Search:
             patience = max(TOO_DEAR * min(rivals, default=math.inf), CHEAP)
             failed = sum(len(self.fails.get(why, ())) for why in HOPELESS)
             most = LESS if failed >= AGREED and not rivals else math.inf
-            self._sort_in(_try(self.question, method, patience, most), self.trials, method)
+            self._sort_in(_tried(self.question, method, patience, most), self.trials, method)
         timed = _timed(self.question, self.trials, self.fails)
         self.trials = sorted(timed, key=lambda one: one.cost(self.question))
 
@@ -307,8 +307,8 @@ class _Search:
                 self._sort_in(_confirm(self.question, trial), ranked, trial.run.integrator)
         return ranked
 
-    def _sort_in(self, trial: "_Trial | str | float", trials: list[_Trial], method: Integrator) -> None:
-        """Add the result of `_try` or `_confirm` to `trials`, `fails` (a reason) or `errors_at_step` (an error)."""
+    def _sort_in(self, trial: _Trial | str | float, trials: list[_Trial], method: Integrator) -> None:
+        """Add the result of `_tried` or `_confirm` to `trials`, `fails` (a reason) or `errors_at_step` (an error)."""
         if isinstance(trial, _Trial):
             trials.append(trial)
         elif isinstance(trial, str):
@@ -373,7 +373,7 @@ def _candidates(question: _Question) -> tuple[list[str], str]:
     return list(dict.fromkeys([*menu, *own, *of_top])), "a study of random tops found the cheapest for such questions"
 
 
-def _try(question: _Question, method: Integrator, patience: float, most: float = math.inf) -> "_Trial | str | float":
+def _tried(question: _Question, method: Integrator, patience: float, most: float = math.inf) -> _Trial | str | float:
     """A trial with a setting from short runs, or the reason of failure, or the error if too large at a given step."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
@@ -410,7 +410,7 @@ def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]
     return [one for one in timed if one.a_step <= question.time_a_step]
 
 
-def _confirm(question: _Question, trial: _Trial) -> "_Trial | str":
+def _confirm(question: _Question, trial: _Trial) -> _Trial | str:
     """The trial run to the whole horizon, if affordable, with its setting corrected; or the reason why it fails."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:

@@ -90,7 +90,7 @@ def _settings() -> dict[str, dict[str, str]]:
 
 
 def i_use(
-    engine: str, scene: "str | Scene", *, step_size: float | None = None, horizon: float | None = None,
+    engine: str, scene: str | Scene, *, step_size: float | None = None, horizon: float | None = None,
     accuracy: float | None = None, **limits: Any,
 ) -> EngineAdvice:  # fmt: skip
     """The errors of an engine's settings on a scene at a step, and a method as accurate as the best, with its cost.

@@ -178,8 +178,8 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
 
 
 def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it(monkeypatch):
-    names, real = [], advise._try
-    monkeypatch.setattr(advise, "_try", lambda *arguments: names.append(arguments[1].name) or real(*arguments))
+    names, real = [], advise._tried
+    monkeypatch.setattr(advise, "_tried", lambda *arguments: names.append(arguments[1].name) or real(*arguments))
     scene = symtop.scene("goldstein")
     menu = ["vern9-fixed[axis]", "gauss-6[axis]", "rk4[axis]", "strang[axis]", "cayley[axis]", "srkn-14-6[axis]"]
     monkeypatch.setattr(advise, "_menu", lambda question: ["series[axis]"] if question.needs else menu)

@@ -101,8 +101,9 @@ def winners_facts(data: xr.DataTree) -> dict[str, Any]:
         one, fewest = cells.winner(data, cell), cells.fewest(data, cell)
         named["safe_called"] += bool(one["safe"] and one["safe_called"])
         named |= _safe(f"safe_{place}", data, cell)
-        misled += [(counted.seconds / one["safe"].seconds, target, fewest, counted.seconds, *one["safe"][:3:2])
-                   for counted in cells.safest(data, cell)[0] if counted.name == fewest and one["safe"]]  # fmt: skip
+        if safe := one["safe"]:
+            misled += [(counted.seconds / safe.seconds, target, fewest, counted.seconds, safe.name, safe.seconds)
+                       for counted in cells.safest(data, cell)[0] if counted.name == fewest]  # fmt: skip
     keys = "misled", "misled_at", "fewest", "fewest_seconds", "instead", "instead_seconds"
     most = max((row for row in misled if 1.0 < row[0] < np.inf), default=(None,) * len(keys))
     named |= dict(zip(keys, most, strict=True))
@@ -213,7 +214,7 @@ def use(data: xr.DataTree) -> pd.DataFrame:
                 kept = keeps(best.name) if target == AT else kept
             line[f"1e-{decades(target)} rad"] = words
         rows.append(line | {KEEPS: kept})
-        rows += [] if rows[1:] else slower(data)
+        rows += slower(data) if len(rows) == 1 else []
     return pd.DataFrame(rows)
 
 
@@ -275,12 +276,12 @@ def winners(data: xr.DataTree, each: list[dict[str, Any]]) -> pd.DataFrame:
             "safe": safe.name if safe else NOTHING if one["asked"] else "not asked",
             "setting": setting_words(safe.name, safe.setting) if safe else "",
         }  # fmt: skip
-        row |= {f"{key} (us)": US * value if np.isfinite(value) else np.nan for key, value in
-                zip(("time", "low", "high"), safe[2:5] if safe else (np.nan,) * 3, strict=True)}  # fmt: skip
+        for key, name in (("time", "seconds"), ("low", "low"), ("high", "high")):
+            row[f"{key} (us)"] = US * value if np.isfinite(value := getattr(safe, name, np.nan)) else np.nan
         row |= {"safe lead": lead(one["safe_called"], safe, marked),
                 "hindsight": best.name if best else NOTHING if one["asked"] else "not asked"}  # fmt: skip
-        row |= dict(zip(("share", "share low", "share high", "level", "meets"),
-                        best[1:6] if best else (np.nan,) * 5, strict=True))  # fmt: skip
+        shares = {"share": "share", "share low": "low", "share high": "high", "level": "level", "meets": "met"}
+        row |= {key: getattr(best, name, np.nan) for key, name in shares.items()}
         rows.append(row | {"hindsight lead": lead(one["hindsight_called"], best, marked)})
     return pd.DataFrame(rows)
 

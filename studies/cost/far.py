@@ -303,9 +303,8 @@ class Diagram(NamedTuple):
 
     def place(self, target: float, horizon: float) -> tuple[int, int]:
         """Indices of a cell."""
-        return int(np.argmin(np.abs(np.log(np.array(TARGETS) / target)))), int(
-            np.argmin(np.abs(np.log(self.horizons / horizon)))
-        )
+        row = int(np.argmin(np.abs(np.log(np.array(TARGETS) / target))))
+        return row, int(np.argmin(np.abs(np.log(self.horizons / horizon))))
 
 
 def runs_of(data: xr.DataTree, name: str) -> xr.Dataset:

@@ -157,9 +157,8 @@ class Prices(NamedTuple):
         known = np.isfinite(self.price[row])  # of a run that fails at a loose tolerance there is none
         if not known.any():
             return np.full(at.shape, np.nan), np.full(at.shape, np.nan)
-        return np.exp(np.interp(at, x[known], np.log(self.price[row, known]))), np.interp(
-            at, x[known], self.call[row, known]
-        )
+        price = np.exp(np.interp(at, x[known], np.log(self.price[row, known])))
+        return price, np.interp(at, x[known], self.call[row, known])
 
 
 def quartile_spread(samples: Array, axis: int = -1) -> Array:

@@ -29,8 +29,7 @@ if TYPE_CHECKING:
 LONGEST_NAME = 80  # characters of a file name in a message
 ENDINGS = {"figure": (".png", ".svg", ".pdf"), "card": (".html", ".htm"), "badge": (".svg",)}  # by option
 NAMES = {  # for shell completion: the module and the function that returns the names
-    "scenes": ("symtop.model.scenes", "scenes"), "all scenes": ("symtop.model.scenes", "all_scenes"),
-    "studies": ("symtop.runner.scripts", "names"),
+    "all scenes": ("symtop.model.scenes", "all_scenes"), "studies": ("symtop.runner.scripts", "names"),
     "integrators": ("symtop.methods.framework.registry", "integrators"),
     "variants": ("symtop.methods.framework.registry", "variants"),
 }  # fmt: skip

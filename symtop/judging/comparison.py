@@ -35,7 +35,7 @@ REASONS = {  # the reasons of `seek`, shortened for the cell of a table
 
 
 def compare(
-    scene: "str | Scene", methods: Any, *, horizon: float | None = None, nutations: float | None = None,
+    scene: str | Scene, methods: Any, *, horizon: float | None = None, nutations: float | None = None,
     quantity: str = "axis", cost: str = "time", budget: float | None = None, quiet: bool = False,
 ) -> xr.Dataset:  # fmt: skip
     """Error against run time, or against force evaluations, of several methods on one scene.

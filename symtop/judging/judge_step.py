@@ -72,7 +72,7 @@ STARTS = ", or if it starts slowly make it a server"  # for a program
 
 
 def judge(
-    target: Any, *, form: str | None = None, chart: str = "axis", scene: "str | Scene" = "spheroid",
+    target: Any, *, form: str | None = None, chart: str = "axis", scene: str | Scene = "spheroid",
     order: int | None = None, symplectic: bool | None = None, symmetric: bool | None = None,
     explicit: bool | None = None, conserves: Collection[str] | None = None, energy: str | None = None,
     adaptive: bool = False, autonomous: bool = False, quick: bool = False, seed: int | None = None,

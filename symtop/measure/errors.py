@@ -87,7 +87,7 @@ def quantity_words(data: xr.Dataset, quantity: str) -> str:
 
 
 def errors(
-    run: xr.Dataset | Mapping[str, Any], scene: "str | Scene | xr.Dataset | Iterable[str | Scene] | None" = None, *,
+    run: xr.Dataset | Mapping[str, Any], scene: str | Scene | xr.Dataset | Iterable[str | Scene] | None = None, *,
     precision: str = "closed-form",
 ) -> xr.Dataset:  # fmt: skip
     """The errors of a run, or of another program's trajectory of a scene, at every sample, and their uncertainty.

@@ -34,6 +34,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from symtop.model.charts import Array
+
 LEAST = 5  # points of a fit
 LARGEST_ERROR = 1e-2  # of a point that counts
 FLOOR = 1e3  # times the reference's bound: a finest error above it has not reached rounding
@@ -49,8 +51,6 @@ MISSES = 5.0  # standard deviations: a finest point further off the curve of the
 VISIBLE = 0.01  # of log error: the finest point must also be at least this far off
 BESIDE = 0.05  # a declared order at most this far beyond the interval of a slope is confirmed
 CLEARLY = 0.4  # a declared order further than this beyond the interval is refuted: orders are whole numbers
-
-Array = NDArray[np.float64]
 
 
 class Fit(NamedTuple):

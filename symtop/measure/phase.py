@@ -22,13 +22,14 @@ mostly lag and grows with the horizon while the shape error does not.
 
 import functools
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
 
 from symtop.core.numbers import EPSILON
 from symtop.measure.verdicts import STEADY
+from symtop.model.charts import Array
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.trajectory import Trajectory
@@ -41,7 +42,6 @@ TABLE = 256  # points of the true curve from which the search for tau starts
 SWEEPS = 4  # iterations of Gauss-Newton: the error falls from 1e-2 to rounding in three
 CLEAR = 0.25  # of the largest sin(theta): nearer to a pole, the branch of phi is taken from the neighbours
 LEAST_RATE = 1e-3  # of omega: errors of a slower mean precession are relative to this
-Array = Any
 
 
 class Split(NamedTuple):

@@ -55,7 +55,7 @@ class _Cell(NamedTuple):
 
 
 def sweep(
-    scenes: "str | Scene | Iterable[str | Scene]", integrators: "str | Integrator | Iterable[str | Integrator]", *,
+    scenes: str | Scene | Iterable[str | Scene], integrators: str | Integrator | Iterable[str | Integrator], *,
     step_size: object = None, tolerance: object = None, per_nutation: object = None, horizon: float | None = None,
     observe: str | None = None, path: str | Path | None = None, threads: int | None = None, timed: bool = False,
     quiet: bool = False,
@@ -228,7 +228,7 @@ def _time(cells: list[_Cell], done: dict[str, xr.Dataset]) -> bool:
     return bool(waiting)
 
 
-def timed_rows(cells: "list[tuple[Scene, Integrator, float, list[dict[str, Any]]]]") -> None:
+def timed_rows(cells: list[tuple[Scene, Integrator, float, list[dict[str, Any]]]]) -> None:
     """Time all runs with outcome "ok" against each other; adds "seconds" and "seconds_spread" to the rows of cells."""
     rows, calls, firsts = [], list[Callable[[], object]](), list[Callable[[], object]]()
     for scene, method, horizon, runs in cells:

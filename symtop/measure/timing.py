@@ -150,7 +150,7 @@ def timed_turn() -> tuple[int, float, float, float]:
     return os.getpid(), begin, end, (end - begin) / count
 
 
-def slowdown(submit: Callable[..., "Future[Any]"], size: int) -> float:
+def slowdown(submit: Callable[..., Future[Any]], size: int) -> float:
     """How many times longer a run takes while `size` workers run; infinite if they never ran at the same time.
 
     Workers time the same run, alternately one alone and all at once. The ratio is 1 where cores share nothing that a

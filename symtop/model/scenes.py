@@ -315,7 +315,7 @@ def _catalogue() -> dict[str, Scene]:
     catalogue = [
         Scene("spheroid", SymmetricTop(2.0, 1.0, 9.81 * 2.7386127875258306),
               Angles(theta=0.4, phi=0.1, psi=0.1, theta_dot=0.1, phi_dot=10.0, psi_dot=0.1), 8.0,
-              "a heavy spheroid on its tip: violent nutation from 23 to 99 degrees", units="SI"),
+              "the notebook's top, inertia about its centre: violent nutation from 23 to 99 degrees", units="SI"),
         _goldstein("goldstein", 0.0, "a top of moderate spin, its axis released at 43 degrees"),
         _goldstein("goldstein-falling", -_ALPHA_RATE, f"{printed} falling at first", "repeats"),
         _goldstein("goldstein-rising", _ALPHA_RATE, f"{printed} rising at first", "repeats"),
@@ -426,7 +426,7 @@ def all_scenes() -> dict[str, Scene]:
 
 
 @by_name
-def scene(name: "str | Scene", *, bodies: bool = False) -> Scene:
+def scene(name: str | Scene, *, bodies: bool = False) -> Scene:
     """The scene of that name; a Scene is returned as it is. One of a body is refused unless `bodies` is true."""
     chosen = name
     if not isinstance(chosen, Scene):

@@ -250,9 +250,9 @@ class SymmetricTop:
     ) -> "SymmetricTop":  # fmt: skip
         """A solid spheroid; radii along and across its axis.
 
-        Without a `pivot_distance`, inertia is about the *centre of gravity* and the polar radius is the lever arm, as
-        in the study `notebook`. With one, the fixed point lies on the axis at that distance from the centre, and
-        ``I1`` gains ``mass * pivot_distance^2`` (Huygens-Steiner).
+        The fixed point lies on the axis at `pivot_distance` from the centre: ``I1`` gains ``mass * pivot_distance^2``
+        (Huygens-Steiner). Without it this is the top of the study `notebook` and no spheroid on its tip: the lever arm
+        is the polar radius, but the inertia that about the *centre of gravity*.
         """
         mass = positive("mass", mass)
         polar = positive("polar_radius", polar_radius)

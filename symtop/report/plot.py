@@ -16,6 +16,7 @@ from symtop.core.errors import SymtopError, at_home, one_of
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES, errors, quantity_words
 from symtop.measure.sweep import failed_setting, period_word, titled
+from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.report import spread
 from symtop.report.figures import SMALLEST, error_band, name_ends
@@ -206,7 +207,7 @@ def _line(axis: Any, times: Any, values: Any, color: str, label: str) -> None:
         axis.plot(times[1:], np.maximum(values[1:], SMALLEST), color=color, lw=1.0, label=label, marker=marker)
 
 
-def draw_ensemble(data: xr.Dataset, errors: dict[str, spread.Array], path: str | Path) -> None:
+def draw_ensemble(data: xr.Dataset, errors: dict[str, Array], path: str | Path) -> None:
     """Draw a panel for each error of an ensemble to a file: quantiles of `member_errors` (n, samples) against time."""
     drawn = {name: values for name, values in errors.items() if not np.isnan(values).all()} or errors
     figure, axes = panels(len(drawn), 1, height=2.1, sharex=True)
@@ -227,7 +228,7 @@ def draw_ensemble(data: xr.Dataset, errors: dict[str, spread.Array], path: str |
     save(figure, at_home(path))
 
 
-def _bands(axis: Any, data: xr.Dataset, quantity: str, own: spread.Array) -> None:
+def _bands(axis: Any, data: xr.Dataset, quantity: str, own: Array) -> None:
     """Draw quantiles over members of an error against time, at the places of `symtop.report.spread.at_places`.
 
     The median is a line, with two bands about it, labelled at their right ends. Errors beyond `MOST` are drawn there;

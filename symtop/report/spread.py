@@ -14,18 +14,16 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError, one_of
 from symtop.measure.errors import OF_BODY, QUANTITIES as OF_TOP
 from symtop.methods.framework.lanes import members_of, of_bodies
 from symtop.model import charts, scenes
+from symtop.model.charts import Array
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.top import NUMBERS
 from symtop.run.ensemble.inputs import read_members, refuse_others
 from symtop.run.reference.truth import body_samples
-
-Array = NDArray[np.float64]
 
 QUANTITIES = {
     "tops": {name: OF_TOP[name] for name in ("axis", "energy")},

@@ -149,9 +149,9 @@ def _body_gauge(scene: Scene, method: Integrator) -> Gauge:
 
 
 def long_run(
-    scene: "str | Scene", integrator: "str | Integrator", *, steps: int, step_size: float,
-    checkpoint: "str | Path | bool" = False, compensated: bool = True, quiet: bool = False,
-    output: "str | Path | None" = None,
+    scene: str | Scene, integrator: str | Integrator, *, steps: int, step_size: float,
+    checkpoint: str | Path | bool = False, compensated: bool = True, quiet: bool = False,
+    output: str | Path | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Run a fixed-step method for any number of steps and return statistics of each window of the run.
 
@@ -243,7 +243,7 @@ def regrown(carry: Any, values: Iterator[float]) -> Any:
 class _Checkpoint(contextlib.AbstractContextManager["_Checkpoint"]):
     """The checkpoint file of one run: written from time to time and if the run is interrupted, removed at its end."""
 
-    def __init__(self, file: "str | Path | bool", identity: str) -> None:
+    def __init__(self, file: str | Path | bool, identity: str) -> None:
         self.own, self.identity, self.saved = file is True, identity, time.monotonic()
         self.file = cache_root() / "runs" / f"{identity}.nc" if self.own else None
         if not isinstance(file, bool):

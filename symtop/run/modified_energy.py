@@ -40,7 +40,7 @@ def energy(scene: Scene, chart: str, states: Array, momenta: Array | None = None
 
 
 def modified_energy(
-    scene: Scene, method: "str | Integrator", chart: str, states: Array, h: float, momenta: Array | None = None
+    scene: Scene, method: str | Integrator, chart: str, states: Array, h: float, momenta: Array | None = None
 ) -> Array:
     """The modified energy (n,) of kernel states (n, dimension) to O(h^4), up to a constant; H if none is known."""
     plain, correction = energy(scene, chart, states, momenta), integrator(method).modified_energy

@@ -65,10 +65,11 @@ def guard(
     rules = {name: getattr(next(iter(one.solvers.values())), "rule", None) for name, one in integrators().items()}
     tables = {name: rule for name, rule in rules.items() if isinstance(rule, Tableau)}
     rule = tables.get(one_of("method", method, [*SCIPY, *tables]))
-    names, values = ("step_size", "tolerance"), (step_size, tolerance)
-    if values[rule is None] is None or values[rule is not None] is not None:
-        raise SymtopError(f"{method} needs {names[rule is None]}, and no {names[rule is not None]}", *names)
-    start, setting = np.array(row("y0", y0)), positive(names[rule is None], values[rule is None])
+    own, other = names = ("tolerance", "step_size") if rule is None else ("step_size", "tolerance")
+    given, left_out = (tolerance, step_size) if rule is None else (step_size, tolerance)
+    if given is None or left_out is not None:
+        raise SymtopError(f"{method} needs {own}, and no {other}", *names)
+    start, setting = np.array(row("y0", y0)), positive(own, given)
     begin, end, accuracy = finite("t0", t0), positive("horizon", horizon), positive("accuracy", accuracy)
     if start.size == 0:
         raise SymtopError("y0 must be at least one number, not none", "y0")

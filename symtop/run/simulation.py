@@ -165,7 +165,7 @@ def make_plan(
 
 
 def simulate(
-    scene: "str | Scene", integrator: "str | Integrator", *, step_size: float | None = None,
+    scene: str | Scene, integrator: str | Integrator, *, step_size: float | None = None,
     tolerance: float | None = None, horizon: float | None = None, samples: int = 501, observe: str | None = None,
     guard: bool | str | Callable[[str], object] = True, budget: float | None = None, times: ArrayLike | None = None,
 ) -> xr.Dataset:  # fmt: skip
@@ -217,7 +217,7 @@ def simulate(
 
 
 def integrate(
-    scene: "str | Scene", integrator: "str | Integrator", *, guard: Callable[[str], object] | None = None,
+    scene: str | Scene, integrator: str | Integrator, *, guard: Callable[[str], object] | None = None,
     **settings: Any,
 ) -> Trajectory:  # fmt: skip
     """The run of `simulate` as plain arrays; `guard` is called with the guard's sentence, and None turns it off."""
@@ -226,7 +226,7 @@ def integrate(
 
 
 def _prepared(
-    scene: "str | Scene", integrator: "str | Integrator", step_size: object = None, tolerance: object = None,
+    scene: str | Scene, integrator: str | Integrator, step_size: object = None, tolerance: object = None,
     horizon: object = None, samples: int = 501, observe: str | None = None, budget: object = None,
 ) -> tuple[Scene, Integrator, str, Plan, bool]:  # fmt: skip
     """Check the arguments of `simulate`; return scene, integrator, chart, plan, and whether samples are dithered."""

@@ -155,12 +155,12 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
                 signal.signal(HANGUP, before)
             self._workers = ProcessPool(self.size, initializer=begin_worker, context=parallel.OneThreadEach())
 
-    def submit(self, function: Callable[..., Any], *args: Any, limit: float | None = None) -> "Future[Any]":
+    def submit(self, function: Callable[..., Any], *args: Any, limit: float | None = None) -> Future[Any]:
         """Call a function in a worker; after `limit` seconds the worker is killed, and the future has TimeoutError."""
         assert self._workers is not None  # noqa: S101
         return self._workers.schedule(function, args=args, timeout=limit)
 
-    def analyse(self, function: Callable[..., Any], *args: Any) -> "Future[Any]":
+    def analyse(self, function: Callable[..., Any], *args: Any) -> Future[Any]:
         """Call a function in a worker while cases of the next study run; timed cases wait until it is done."""
         self.open(self.jobs)
         self._analyses = [other for other in self._analyses if not other.done()]
@@ -277,7 +277,7 @@ def in_order(tasks: Sequence[Task]) -> list[Task]:
     return sorted(tasks, key=rank)
 
 
-def _drain(tasks: Sequence[Task], submit: Callable[[Task], "Future[Result]"], width: int, settle: OnResult) -> None:
+def _drain(tasks: Sequence[Task], submit: Callable[[Task], Future[Result]], width: int, settle: OnResult) -> None:
     """Submit all tasks, `width` at a time, and settle each; one that is busy in another command is submitted again."""
     ahead, futures = deque(tasks), dict[Future[Result], Task]()
     while ahead or futures:
@@ -294,7 +294,7 @@ def _drain(tasks: Sequence[Task], submit: Callable[[Task], "Future[Result]"], wi
                 settle(task, result)
 
 
-def _result(future: "Future[Result]", task: Task) -> Result:
+def _result(future: Future[Result], task: Task) -> Result:
     """The result of a future: failed after a timeout or an error of the cluster, died if the process ended."""
     try:
         return future.result()

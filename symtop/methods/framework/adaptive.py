@@ -18,14 +18,14 @@ from symtop.methods.framework.lanes import Many, Whole, refused
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUT_OF_BUDGET, OUTCOMES, Array, Plan, Run
 from symtop.model.top import Angles, SymmetricTop, flat
 
-Loop = Callable[..., tuple[int, int, int, int]]
+AdaptiveLoop = Callable[..., tuple[int, int, int, int]]
 
 
 @dataclass(frozen=True)
 class Adaptive:
     """A solver around compiled loops with a tolerance; a run is one call where it ends within `block`."""
 
-    loop: Callable[[float], Loop]  # (tolerance): the loop
+    loop: Callable[[float], AdaptiveLoop]  # (tolerance): the loop
     size: int  # numbers in a sample
     room: int  # numbers in `place`
     time: int  # index in `place` of the time that was reached

@@ -333,7 +333,7 @@ def engines() -> dict[str, Integrator]:
 
 
 @by_name
-def integrator(name: "str | Integrator") -> Integrator:
+def integrator(name: str | Integrator) -> Integrator:
     """The integrator or variant of that name: ``rk4[axis]``, or ``rk4-axis``, works in no other chart.
 
     An Integrator is returned as is. Raises SymtopError for an unknown name and for a chart that the method does not
@@ -390,7 +390,7 @@ def citation_keys(entry: Integrator | Scene) -> list[str]:
     return [key for chart, _, key in named if chart in charts and key in bibliography()]
 
 
-def citation(name: "str | Integrator") -> str:
+def citation(name: str | Integrator) -> str:
     """BibTeX of the source of an integrator. SymtopError for an unknown name and where no source is known."""
     method = integrator(name)
     named = citation_keys(method)

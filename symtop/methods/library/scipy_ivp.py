@@ -49,7 +49,7 @@ class RightHandSide:
         return self.field(self.par, y.tolist()) if self.compiled is None else self.compiled(y)
 
 
-def solver(method: "str | type", chart: str, *, compiled: bool = False) -> Solver:
+def solver(method: str | type, chart: str, *, compiled: bool = False) -> Solver:
     """A solver of the registry around a method of ``scipy.integrate`` or a class like it.
 
     `compiled` is for the right-hand side. The loop is that of ``solve_ivp`` with ``t_eval``, to the same bits, but a

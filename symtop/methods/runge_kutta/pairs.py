@@ -30,7 +30,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import compile_kernel, register_jitable, set_item
-from symtop.methods.framework.adaptive import Adaptive, Loop as AdaptiveLoop
+from symtop.methods.framework.adaptive import Adaptive, AdaptiveLoop
 from symtop.methods.framework.angles import LEAST_TOLERANCE
 from symtop.methods.framework.equations import FORMS
 from symtop.methods.framework.lanes import W

@@ -44,7 +44,7 @@ MOST_VALUES = 250_000_000  # numbers in memory, 2 GB: a larger dataset needs a f
 
 
 def ensemble(
-    members: "xr.Dataset | Iterable[str | Scene]", integrator: "str | Integrator", *, step_size: object = None,
+    members: xr.Dataset | Iterable[str | Scene], integrator: str | Integrator, *, step_size: object = None,
     per_nutation: object = None, tolerance: object = None, horizon: object = None, nutations: object = None,
     samples: int = SAMPLES, observe: str | None = None, variables: Iterable[str] | None = None,
     budget: float | None = None, path: str | Path | None = None, threads: int | None = None,

@@ -43,7 +43,7 @@ class Members(NamedTuple):
         return self.labels.get("member")
 
 
-def read_members(members: "xr.Dataset | Iterable[str | Scene]") -> Members:
+def read_members(members: xr.Dataset | Iterable[str | Scene]) -> Members:
     """Members from a dataset over ``member`` (scalars apply to all) or from scenes or their names.
 
     A dataset with ``I2`` is of bodies, as `symtop.body_population` makes them. Raises SymtopError for a variable that

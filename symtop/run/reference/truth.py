@@ -98,7 +98,7 @@ _written = itertools.count()
 
 
 def reference(
-    scene: "str | Scene", times: ArrayLike, precision: str = "closed-form", *, certify: str | None = None
+    scene: str | Scene, times: ArrayLike, precision: str = "closed-form", *, certify: str | None = None
 ) -> xr.Dataset:
     """The true motion at the given times, each value with a bound on its error.
 
