@@ -206,15 +206,17 @@ def served_over_interpolated(data: xr.DataTree, cell: Cell, name: str) -> float:
 def advised(data: xr.DataTree, others: Sequence[str]) -> dict[str, list[float]]:
     """By variant the safe settings for each target on natural tops, over ten nutations; NaN for other targets.
 
-    For variants within `WITHIN` of the cheapest of their class, also of those that keep every constant, and for the
-    `others`.
+    For variants within `WITHIN` of the cheapest of their class, also of those that keep every constant, the cheapest
+    where f is dear, and the `others`.
     """
     asked: dict[str, list[float]] = {}
     for place, target in enumerate(targets(data)):
+        dear = dearer(data, Cell("short", "axis", target, NATURAL, CLASSES[0]))
+        wanted = [*others, *([dear.best.name] if dear else [])]
         for needs, keeping in [*((needs, False) for needs in CLASSES), (CLASSES[0], True)]:
             choices = safest(data, Cell("short", "axis", target, NATURAL, needs), keeping)[0]
             for one in choices:
-                near = one.seconds <= WITHIN * choices[0].seconds or one.name in others
+                near = one.seconds <= WITHIN * choices[0].seconds or one.name in wanted
                 if near and math.isfinite(one.seconds):
                     asked.setdefault(one.name, [math.nan] * len(targets(data)))[place] = one.setting
     return dict(sorted(asked.items()))

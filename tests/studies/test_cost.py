@@ -573,10 +573,10 @@ def test_where_f_is_dear_the_fewest_evaluations_win(monkeypatch):
     work = {"fast": np.array([500.0, 2000.0]), "next": np.array([80.0, 80.0]), "few": np.array([40.0, 90.0])}
     monkeypatch.setattr(cells, "mean_work", lambda _, __, name: work[name])
     settings = xr.DataArray([[[4.0, 16.0], [4.0, 16.0], [1e-4, 1e-6]]], dims=("scene", "variant", "level"))
-    tree = xr.DataTree.from_dict({"short": xr.Dataset({"setting": settings}, {"variant": [*work]})})
-    # dearer by 2e-5 / 940 it leaves the fast one behind, but the next only by 1e-5 / 20
-    answer = cells.dearer(tree, Cell("short", "axis", 1e-3, NATURAL))
-    assert answer == (some[2], pytest.approx(60.0), pytest.approx(1e-5 / 20.0))  # halfway between its two settings
+    tree = xr.DataTree.from_dict({"short": xr.Dataset({"setting": settings}, {"variant": [*work], "target": [1e-3]})})
+    # dearer by 2e-5 / 940 it leaves the fast one behind, but the next only by 1e-5 / 20; halfway between two settings
+    assert cells.dearer(tree, Cell("short", "axis", 1e-3, NATURAL)) == (some[2], *map(pytest.approx, (60.0, 1e-5 / 20)))
+    assert cells.advised(tree, [])["few"] == [1e-5]  # run on other tops, as all that the front page names, though slow
     monkeypatch.setattr(cells, "safest", lambda *_: (some[:1], True))
     assert cells.dearer(tree, Cell("short", "axis", 1e-3, NATURAL)) == (some[0], pytest.approx(1000.0), 0.0)
     monkeypatch.setattr(cells, "safest", lambda *_: ([], True))

@@ -11,8 +11,8 @@ It predicts with order k = 1 .. 12 and corrects with order k + 1. The run starts
 together until an error is too large; then the order is the one with the least error, raised only after k + 1 steps of
 one length, and in every second step at most. Norm and first step are those of `pairs`. h is kept, doubled if the error
 allows it, or multiplied by 0.5 to 0.9; doubled steps are what keeps the g_i (after k of them they are constants). Two
-evaluations a step, one for a step that is rejected. A sample is the value of the polynomial of degree k + 1 that the
-corrector integrates; it takes no evaluation.
+evaluations a step, one for a step that is rejected. A sample is y_{n+1} and the integral back from there of the
+polynomial through f(y_{n+1}) and the k values of f before it; it takes no evaluation.
 
 Explicit, with a memory of up to twelve steps: what is defined by the map of one step (symplectic, symmetric, its order
 by a fixed step) is not claimed of it. Not to be confused with Nordsieck forms (LSODA, VODE), which change the length of
@@ -138,6 +138,8 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
 
     @register_jitable
     def sample(par, state, new, memory, h, x):  # type: ignore[no-untyped-def]
+        if x == 0.0:  # the start of the run, to which the polynomial does not lead back
+            return state
         back, then, g, place = (x - 1.0) * h, 0.0, 1.0, zero(state)
         terms = int(memory[LAST, ORDER_THEN]) + 1
         for q in range(terms):

@@ -40,7 +40,7 @@ the tolerance is: T_n = (n y_n, u_n), those of z and u, on the attitude with 2 X
     e = max(|T_N|, |T_{N-1}|/4),    accepted if e <= 4 tolerance,    h <- h min(4, 0.95 (tolerance/e)^(1/N))
     first h = 1/sqrt(|L|^2/I1^2 + 4 |mgl|/I1 + 1/t^2), t the last sample
 
-The first neglected term is smaller than e by the ratio of two terms, 0.2 to 0.5. A rejected step costs one series. So
+The first neglected term is smaller than e by the ratio of two terms, 0.02 to 0.5. A rejected step costs one series. So
 does a sample, the series of the step with a shorter time: it is the method's dense output and, as that of `taylor`, not
 counted as a force evaluation, so that the work of a run does not depend on its samples. Time and state are compensated
 sums.
