@@ -31,9 +31,8 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from symtop.core import files
 from symtop.core.errors import SymtopError, boolean, one_of, positive
-from symtop.core.progress import post
+from symtop.core.progress import kernels_to_compile, post
 from symtop.judging.claims.subject import declared
 from symtop.measure import settings
 from symtop.measure.errors import QUANTITIES
@@ -287,7 +286,7 @@ class _Search:
 
     def _try(self, names: Collection[str]) -> None:
         """Try methods, high orders first: these are the cheapest at most accuracies, and limit the other searches."""
-        files.kernels_to_compile[0] = math.ceil(KERNELS * len(names))
+        kernels_to_compile[0] = math.ceil(KERNELS * len(names))
         for number, method in enumerate(sorted(map(integrator, names), key=lambda method: -(method.order or 0)), 1):
             post(f"trying method {number} of {len(names)}")
             rivals = [one.run.evaluations for one in self.trials if one.run.integrator.needs not in THIS_TOP]

@@ -69,6 +69,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
         **confirmed_facts(data), **silent_facts(data), **guard_facts(data), **far_facts(data),
         "variants": group.sizes["variant"],
         "marked": len(known.marked),
+        "processor": data.attrs["processor"].partition(",")[0],
         "dense": known.sampled,  # price with dense output over heyoka's own
         "runs": sum(float(np.nansum(data[span]["made"].values)) for span in spans),
     }  # fmt: skip

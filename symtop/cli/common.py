@@ -18,9 +18,9 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
-from symtop.core import errors, files
+from symtop.core import errors
 from symtop.core.errors import SymtopError, SymtopWarning, UnknownNameError, at_home, file_path, positive, words_of
-from symtop.core.progress import showing_work
+from symtop.core.progress import is_terminal, showing_work
 from symtop.core.signals import INTERRUPTED, UNREAD, told_apart
 
 if TYPE_CHECKING:
@@ -274,7 +274,7 @@ def _warnings_as_lines() -> Iterator[None]:
 
 def warn(sentence: str) -> None:
     """Print a warning to the standard error."""
-    clear = "\r\x1b[K" if files.is_terminal(sys.stderr) else ""  # clears a progress line
+    clear = "\r\x1b[K" if is_terminal(sys.stderr) else ""  # clears a progress line
     click.echo(clear + fitted(f"symtop: {sentence}", sys.stderr), err=True)
 
 
@@ -290,7 +290,7 @@ def say(sentence: str) -> None:
 
 def fitted(text: str, stream: TextIO | None) -> str:
     """The text in lines that fit the terminal, if the stream is one."""
-    return filled(text) if files.is_terminal(stream) else text
+    return filled(text) if is_terminal(stream) else text
 
 
 def filled(text: str) -> str:

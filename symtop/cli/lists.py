@@ -15,7 +15,7 @@ from symtop.cli import common
 from symtop.cli.common import File, as_text, completing, facts, table, terminal_width
 from symtop.core import __version__
 from symtop.core.errors import SymtopError
-from symtop.core.files import is_terminal
+from symtop.core.progress import is_terminal
 from symtop.report import formats
 
 if TYPE_CHECKING:

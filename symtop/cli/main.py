@@ -9,8 +9,7 @@ import click
 
 from symtop.cli import compare, doctor, judge, lists, runs, study
 from symtop.cli.common import Group, warn
-from symtop.core import __version__, files
-from symtop.core.progress import post
+from symtop.core import __version__, progress
 
 
 @click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 100})
@@ -30,10 +29,10 @@ def main() -> None:
     """
 
     def announce() -> None:  # called once, before the first kernel is compiled
-        files.on_cold.clear()
-        (warn if files.is_terminal(sys.stderr) else post)(files.compiling())
+        progress.on_cold.clear()
+        (warn if progress.is_terminal(sys.stderr) else progress.post)(progress.compiling())
 
-    files.on_cold[:] = [announce]
+    progress.on_cold[:] = [announce]
 
 
 for command in (

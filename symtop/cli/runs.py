@@ -11,9 +11,8 @@ import click
 
 from symtop.cli import common
 from symtop.cli.common import File, as_text, check_outputs, completing, say, say_written, separated, table, warn
-from symtop.core import files
 from symtop.core.errors import SymtopError, whole
-from symtop.core.progress import post, showing_seconds
+from symtop.core.progress import kernels_to_compile, post, showing_seconds
 from symtop.report.formats import FIRM, counted, duration
 
 FEWEST, FEW, MANY = 1000, 100_000, 20  # steps of a trial; a run of more than 20 times 100,000 steps is timed before
@@ -257,7 +256,7 @@ def ensemble(
     if epsilon is not None and not bodies:
         raise SymtopError("--epsilon must come with --bodies: it is how far heavy bodies are from a top")
     noun, most = ("bodies", COMPARED_BODIES) if bodies else ("tops", COMPARED)
-    files.kernels_to_compile[0] = KERNELS
+    kernels_to_compile[0] = KERNELS
     with showing_seconds(f"drawing {noun}"):
         import numpy as np
 
@@ -269,7 +268,7 @@ def ensemble(
         check_memory("members", members)
         draw = partial(random_bodies.body_population, epsilon=epsilon) if bodies else population
         sample = draw(members, seed=seed, kind=kind)
-    files.kernels_to_compile[0] = KERNELS if bodies else _kernels(members, **settings)
+    kernels_to_compile[0] = KERNELS if bodies else _kernels(members, **settings)
     words = QUANTITIES[noun]
     compared = [name for name in words if variables is None or SHOWN_BY[name] in variables]
     if figure is not None and not compared:

@@ -11,41 +11,15 @@ import functools
 import glob
 import os
 import shutil
-import sys
 import time
 import warnings
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TextIO
 
 from symtop.core.errors import SymtopError, SymtopWarning, writing
 
 DAY = 86_400.0  # seconds
 UNUSED = 30  # days
-
-A_KERNEL, CLOSED_FORM = 3.0, 7  # seconds to compile a kernel on one core; the closed form takes this many times as long
-kernels_to_compile = [1]  # how many kernels the running command may have to compile
-
-
-def is_terminal(stream: TextIO | None) -> bool:
-    """Is this stream a terminal? A standard stream of the process that was closed is None."""
-    return stream is not None and stream.isatty()
-
-
-def compiling() -> str:
-    """The message before a compilation: how many kernels there are to compile, and how long that may take."""
-    count = f"up to {kernels_to_compile[0]} kernels" if kernels_to_compile[0] > 1 else "a kernel"
-    return f"compiling {count}, about {A_KERNEL * kernels_to_compile[0]:.0f} s on one core, once"
-
-
-def _tell() -> None:
-    """Print once, on a terminal or in a notebook, that kernels are being compiled."""
-    on_cold.remove(_tell)
-    if "ipykernel" in sys.modules or is_terminal(sys.stderr):
-        print(f"symtop: {compiling()}", file=sys.stderr, flush=True)  # noqa: T201  (no warning: nothing is wrong)
-
-
-on_cold: list[Callable[[], object]] = [_tell]  # called when a kernel is not in the cache and has to be compiled
 
 
 def cache_root() -> Path:

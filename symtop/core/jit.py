@@ -40,8 +40,9 @@ from numba.np.unsafe.ndarray import to_fixed_tuple as fixed_tuple
 
 from symtop.core.code_hash import PACKAGE, Code, Part, by_file, by_name, digest, hashed
 from symtop.core.errors import SymtopError
-from symtop.core.files import cache_root, is_trusted, locked, make_private, on_cold, prune, replacing, touch
+from symtop.core.files import cache_root, is_trusted, locked, make_private, prune, replacing, touch
 from symtop.core.jit_functions import Function, fused, marked, two_product
+from symtop.core.progress import on_cold
 from symtop.core.sines import polynomials, sincos
 
 set_item: Any = tuple_setitem  # in a kernel: set_item(tuple, i, value) is a new tuple

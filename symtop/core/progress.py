@@ -1,6 +1,6 @@
-"""Progress of long work: a bar or the elapsed time on a terminal, and a line every few seconds in a pipe.
+"""Progress of long work: a bar or the elapsed time on a terminal, a line now and then in a pipe, and what compiles.
 
-Threads write both, also during compilations: neither numba nor heyoka holds Python's lock for half a second.
+Threads write bar and lines, also during compilations: neither numba nor heyoka holds Python's lock for half a second.
 """
 
 import contextlib
@@ -8,13 +8,34 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from typing import Any
-
-from symtop.core.files import is_terminal
+from typing import Any, TextIO
 
 BEAT = 1.0  # seconds between drawings of a bar, even if no part of the work has finished
 FIRST, EVERY = 2.0, 9.0  # seconds to the first line of a command in a pipe, and from one to the next
 listeners: list[Callable[[str], object]] = []  # functions that `post` calls
+A_KERNEL, CLOSED_FORM = 3.0, 7  # seconds to compile a kernel on one core; the closed form takes this many times as long
+kernels_to_compile = [1]  # how many kernels the running command may have to compile
+
+
+def is_terminal(stream: TextIO | None) -> bool:
+    """Is this stream a terminal? A standard stream of the process that was closed is None."""
+    return stream is not None and stream.isatty()
+
+
+def compiling() -> str:
+    """The message before a compilation: how many kernels there are to compile, and how long that may take."""
+    count = f"up to {kernels_to_compile[0]} kernels" if kernels_to_compile[0] > 1 else "a kernel"
+    return f"compiling {count}, about {A_KERNEL * kernels_to_compile[0]:.0f} s on one core, once"
+
+
+def _tell() -> None:
+    """Print once, on a terminal or in a notebook, that kernels are being compiled."""
+    on_cold.remove(_tell)
+    if "ipykernel" in sys.modules or is_terminal(sys.stderr):
+        print(f"symtop: {compiling()}", file=sys.stderr, flush=True)  # noqa: T201  (no warning: nothing is wrong)
+
+
+on_cold: list[Callable[[], object]] = [_tell]  # called when a kernel is not in the cache and has to be compiled
 
 
 def post(words: str) -> None:

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from symtop.core import files, netcdf
+from symtop.core import netcdf
 from symtop.core.errors import SymtopError, boolean, one_of, positive
 from symtop.core.parallel import cores, in_threads
-from symtop.core.progress import post, progress_bar
+from symtop.core.progress import CLOSED_FORM, kernels_to_compile, post, progress_bar
 from symtop.judging.adapters.adapter import integrator as adapted
 from symtop.judging.claims.subject import LIBRARIES, open_target
 from symtop.measure import columns, settings
@@ -85,7 +85,7 @@ def compare(
     with progress_bar("compare", quiet=boolean("quiet", quiet), total=len(names)) as bar:
         results = []
         kernels = [one for one in variants if one.implementation == "compiled"]
-        files.kernels_to_compile[0] = len(kernels) + (0 if closed_form.load() else files.CLOSED_FORM)
+        kernels_to_compile[0] = len(kernels) + (0 if closed_form.load() else CLOSED_FORM)
         post(f"methods that have run: 0 of {len(names)}")
         for one in in_threads(runs_of, variants, min(cores(), len(variants))):
             results.append(one)

@@ -10,7 +10,7 @@ import xarray as xr
 from PIL import Image
 
 import symtop
-from symtop.core import files, netcdf
+from symtop.core import netcdf, progress
 from tests import commands
 
 STEPS = ("--per-nutation", 30, "--nutations", 2)
@@ -45,7 +45,7 @@ def test_the_file_and_the_figure_are_those_of_the_ensemble(tmp_path, monkeypatch
 def test_json_has_outcomes_and_errors_finer_steps_smaller_ones_and_failures_are_counted():
     words = ("--members", 40, "strang", "--nutations", 2, "--json", "--per-nutation")
     coarse, fine = (json.loads(call(*words, per).output) for per in (30, 300))
-    assert (coarse["outcomes"], files.kernels_to_compile) == ({"ok": 40}, [2])  # of so few steps
+    assert (coarse["outcomes"], progress.kernels_to_compile) == ({"ok": 40}, [2])  # of so few steps
     assert fine["largest_errors"]["axis"]["0.5"] < 0.02 * coarse["largest_errors"]["axis"]["0.5"]
     assert fine["steps"] == 10 * coarse["steps"]
     assert call("--members", 60, "stormer-verlet", *STEPS, "--samples", 21).output.count("left_chart") == 1
@@ -61,7 +61,7 @@ def test_bodies_are_run_compared_and_written(tmp_path):
     call(*kind, "strang", *STEPS, "--samples", 21, "-o", path)
     bodies = symtop.body_population(6, seed=3, kind="heavy", epsilon=0.1)
     expected = symtop.ensemble(bodies, "strang", per_nutation=30, nutations=2, samples=21, quiet=True)
-    data, kernels = netcdf.read(path), files.kernels_to_compile[0]
+    data, kernels = netcdf.read(path), progress.kernels_to_compile[0]
     assert data[list(expected.data_vars)].drop_attrs().identical(expected.drop_attrs())
     assert [kernels, *(data.attrs[name] for name in ("seed", "kind", "epsilon"))] == [5, 3, "heavy", 0.1]
     np.testing.assert_array_equal(data["I2"], bodies["I2"])

@@ -440,7 +440,9 @@ def small():
     advised = cells.advised(datasets.combine(done).assign(priced), [])
     other = {"members": 60, "seed": 2, "nutations": asked["nutations"]}
     cases = [Case(NATURAL, name, other | {"start": start}, group=study.SAFE) for name, start in advised.items()]
-    return datasets.combine([*done, *((case, study.measure(case)) for case in cases)]).assign(priced)
+    tree = datasets.combine([*done, *((case, study.measure(case)) for case in cases)]).assign(priced)
+    tree.attrs.update(netcdf.provenance())
+    return tree
 
 
 def test_facts_and_tables_are_those_of_the_cells(small):
@@ -556,15 +558,13 @@ def test_an_advised_setting_was_run_on_other_tops_and_serves_them(small):
 
 
 def test_the_page_says_what_was_measured_and_shares_of_silent_runs_are_of_their_kind(small, tmp_path):
-    silent = facts.tables(small)["silent"].set_index(["variant", "kind of top"]).sort_index()
-    rows = silent.loc[("rk4[axis]", "near-separatrix")]
+    wrong = facts.tables(small)["silent"].set_index(["variant", "kind of top"])["wrong"].sort_index()
     health, kind = cells.health(small, "rk4[axis]"), KINDS.index("near-separatrix")
     at = [int(np.argmin(np.abs(health.setting - steps))) for steps in facts.STEPS]
-    assert np.array_equal(rows["wrong"], health.wrong[at, kind] / health.drawn[kind])
-    text = checked("cost", small, tmp_path, elsewhere={"use", "have"})
+    assert np.array_equal(wrong.loc["rk4[axis]", "near-separatrix"], health.wrong[at, kind] / health.drawn[kind])
+    assert PARTIAL in checked("cost", small, tmp_path, elsewhere={"use", "have"})  # there are no long runs
     named = {one.get_text() for one in figures.draw_accuracy(small).axes[0].texts}
     assert {"takahashi-imada (symmetric)", "rk4"} <= named
-    assert PARTIAL in text  # there are no long runs
 
 
 def test_where_f_is_dear_the_fewest_evaluations_win(monkeypatch):

@@ -51,9 +51,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from symtop.core.errors import SymtopError
 from symtop.core.jit import compile_kernel, is_stored, register_jitable, set_item, to_fixed_tuple
 from symtop.core.parallel import heed
-from symtop.methods.framework.angles import in_chart
+from symtop.methods.framework.angles import in_chart, require_chart
 from symtop.methods.framework.plan import OK, Array
 from symtop.methods.framework.preparation import Preparation
 from symtop.methods.simd import wide_vectors
@@ -336,7 +337,19 @@ def members_of(numbers: Array) -> Iterator[tuple[Any, Any]]:
 
 def refused(check: Callable[..., None] | None, numbers: Array) -> NDArray[np.bool_]:
     """Which members have a start that a kernel with this check, of `Preparation`, cannot step."""
-    return np.zeros(len(numbers), dtype=bool) if check is None else ~np.asarray(in_chart(numbers[:, 3]))
+    if check is None:
+        return np.zeros(len(numbers), dtype=bool)
+    if check is require_chart:  # of all at once
+        return ~np.asarray(in_chart(numbers[:, 3]))
+    return np.array([_refuses(check, start) for _, start in members_of(numbers)], dtype=bool)
+
+
+def _refuses(check: Callable[..., None], start: Any) -> bool:
+    try:
+        check(start)
+    except SymtopError:
+        return True
+    return False
 
 
 def groups(chosen: Whole, steps: Whole, most: int) -> list[Whole]:

@@ -65,7 +65,7 @@ class Preparation:
 
     numbers: Callable[..., tuple[Any, Numbers]]  # (top, at): the parameters and the state; compiles
     size: int  # of the state
-    check: Callable[[Any], None] | None = None  # None or `angles.require_chart`: ensembles look at theta alone
+    check: Callable[[Any], None] | None = None  # refuses a start that the kernel cannot step: raises SymtopError
     opened: Callable[..., Any] = opened  # (plain): the records that `numbers` takes
     momenta: Callable[..., Any] = momenta_at  # (top, at): p_phi and p_psi
     given: int = 9  # how many plain numbers a top and a start have
