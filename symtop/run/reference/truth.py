@@ -415,7 +415,6 @@ def _sources(maker: Callable[..., Any]) -> str:
     return code_hash.digest(code | code_hash.packages("numpy", "heyoka", "mpmath"))
 
 
-@code_hash.by_name
 def place(maker: Callable[..., Any], *key: object, data: bytes = b"") -> Path:
     """The cache file of a result, named by a hash of the code of `maker` and of its arguments."""
     name = hashlib.sha256(repr([_sources(maker), *key]).encode() + data).hexdigest()[:32]
