@@ -222,7 +222,7 @@ def impatient(monkeypatch):
 
 
 @pytest.mark.parametrize(("target", "options", "words"), [
-    ("nothing.py:step", {}, "FILE.py:NAME with a file that is there"),
+    ("nothing.py:step", {}, r"form program\), not 'nothing.py', which does not exist$"),
     ("no-such-program-anywhere -x", {"form": "program"}, "must be a command that can be run"),
     ("my 'engine -x", {"form": "program"}, 'must be a command that can be run, not "my \'engine -x"'),
     ("true", {}, "a trajectory such as FILE.csv, or a command with form program, not 'true'$"),

@@ -46,7 +46,7 @@ def test_the_energy_is_that_of_simulate_whether_or_not_the_momenta_are_kept(name
 
 @pytest.mark.parametrize(("files", "words"), [
     ({"output": "keep.py"}, "no netCDF file"), ({"output": ""}, "output must be a file, not the folder"),
-    ({"checkpoint": ""}, "checkpoint must be a file, not the folder"),
+    ({"checkpoint": ""}, "checkpoint must be a file, not the folder"), ({"output": "no/a.nc"}, "folder that is there"),
     ({"output": "a.nc", "checkpoint": "a.nc"}, "output and checkpoint must be two files"),
     ({"output": "a.nc", "checkpoint": "b/../a.nc"}, "output and checkpoint must be two files"),
 ])  # fmt: skip

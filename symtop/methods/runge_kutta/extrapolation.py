@@ -7,10 +7,11 @@ T_jj has order 2 j. A step is tried with k - 1, k and k + 1 lines and ends with 
 that of line k - 1 or k is above ((k+1) k)^2 or (k+1)^2. With A_j evaluations for j lines and the step that line j would
 allow, H_j = .94 h (.65/err_j)^(1/(2j-1)) within [.02, 10] h, the next k is k - 1 if its work A_j/H_j is a tenth less
 than that of k, and k + 1 if that of k is a tenth less than that of k - 1, from 3 to 9; ODEX has .8 for the first, other
-limits, and looks at the work of line k + 1 where that was computed. A rejected step is repeated with H_k or .9 h, the
-shorter. The first k is 1.5 - .6 log10(tolerance), at most 8; the first h is that of `pairs`. Samples inside a step are
-shorter steps with as many lines, which are not counted. Explicit, neither symplectic nor symmetric; nothing is
-conserved but what is linear in the state. No smoothing step: all n_j are even.
+limits, and looks at the work of line k + 1 where that was computed. For k above the j lines that were made the step is
+H_j A_k/A_j, as long for its work as with j. A rejected step is repeated with H_k or .9 h, the shorter. The first k is
+1.5 - .6 log10(tolerance), at most 8; the first h is that of `pairs`. Samples inside a step are shorter steps with as
+many lines, which are not counted. Explicit, neither symplectic nor symmetric; nothing is conserved but what is linear
+in the state. No smoothing step: all n_j are even.
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.9 (their code is ODEX).
 """
 
