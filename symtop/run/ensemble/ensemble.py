@@ -17,7 +17,7 @@ import netCDF4
 import numpy as np
 import xarray as xr
 
-from symtop.core import netcdf
+from symtop.core import errors, netcdf
 from symtop.core.code_hash import digest, hashed, packages
 from symtop.core.errors import SymtopError, SymtopWarning, boolean, check_replaceable, file_path, positive, whole
 from symtop.core.files import only_writer, replacing, sweep
@@ -179,11 +179,9 @@ def _observables(variables: Iterable[str] | None, chart: str) -> tuple[str, ...]
     """The variables of the dataset, checked against the chart and in its order; None for all."""
     if variables is None:
         return SHOWN[chart]
-    if isinstance(variables, str) or not isinstance(variables, Iterable):
-        raise SymtopError(f"variables must be a list of names, not {variables!r}", "variables")
-    names, possible = list(variables), SHOWN[chart]
+    names, possible = errors.listed("variables", variables), SHOWN[chart]
     for name in names:
-        if name not in possible:
+        if not (isinstance(name, str) and name in possible):
             raise SymtopError(f"variables in the {chart} chart are {', '.join(possible)}, not {name!r}", "variables")
     return tuple(name for name in possible if name in names)
 
