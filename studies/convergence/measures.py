@@ -29,7 +29,7 @@ FEW = 9  # variants that a figure has room for
 HISTORY_STEPS, HISTORY_TOLERANCE = 100.0, 1e-6  # steps a nutation, and tolerance, of the runs for the energy over time
 LARGE = LARGEST_ERROR  # radians: larger errors follow no power of the step
 ABOVE_BOUND = 100.0  # errors below this many times the reference's error bound may be errors of the reference
-WRONG, ROUNDED = "wrong limit", 1e-6  # verdict on errors that stay; smaller ones may be rounding by a pole
+WRONG, ROUNDED, ALIKE = "wrong limit", 1e-6, 0.9  # errors that stay, above rounding by a pole, and nearly the same
 SAME = 0.02  # relative: variants of a method whose errors differ by less are drawn as one
 
 Pairs = dict[tuple[str, str], Fit]  # by scene and variant
@@ -84,7 +84,7 @@ def judged(data: xr.Dataset) -> dict[tuple[str, str], Judged]:
         others = [fit for quantity, fit in slopes.items() if quantity != MAIN]
         word, cell = order_verdict(declared_order(pair[1]), main, others), data.sel(scene=pair[0], variant=pair[1])
         columns = (cell[name].values for name in ("step_size", MAIN, f"{MAIN}_bound"))
-        if word == "undecided" and math.isfinite(wrong_limit(*columns, ROUNDED)):
+        if word == "undecided" and math.isfinite(wrong_limit(*columns, ROUNDED, ALIKE)):
             word = WRONG
         result[pair] = Judged(word, slopes)
     return result

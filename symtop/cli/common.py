@@ -38,8 +38,11 @@ BODY, PERIODS = "body", 20.0  # name of the scene made from the options of a bod
 TEXT = (".csv", ".tsv", ".txt", ".json")  # endings that are refused for netCDF files
 USAGE = {  # patterns of click's messages, and their replacements
     "invalid value for '(.+?)': (.+) is not (?:a valid )?(.+)": r"\1 must be \3, not \2",
-    r"invalid value for '\[?(.+?)(?:]...)?': File (.+) (does not exist|is a .+)": r"\1 must be a file, not \2, that \3",
-    "must be float( range)?,": "must be a number,", "must be integer( range)?,": "must be a whole number,",
+    r"invalid value for '\[?(.+?)(?:]...)?': File (.+) (does not exist|is a .+)":
+        r"\1 must be a file, not \2, which \3",
+    "invalid value for '(.+?)': Directory (.+) (is a .+)": r"\1 must be a folder, not \2, which \3",
+    r"\. \(Did you mean one of: (.+)\)$": r"; did you mean \1", "must be float( range)?,": "must be a number,",
+    "must be integer( range)?,": "must be a whole number,",
 }  # fmt: skip
 SILENT = ("explore",)  # commands without messages that they are still working
 

@@ -7,7 +7,6 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
-from typing import Any
 
 from symtop.core.signals import is_of_user
 
@@ -143,13 +142,6 @@ def row(name: str, values: object) -> list[float]:
         if entries is not None:
             return [finite(f"{ENTRY}{name}", value) for value in entries]
     raise SymtopError(f"{name} must be a row of numbers, not {shown(values)}", name)
-
-
-def listed(name: str, values: object) -> list[Any]:
-    """Return `values`, names, as a list; refuse a text and what is no row."""
-    if isinstance(values, Iterable) and not isinstance(values, (str, bytes)) and getattr(values, "ndim", 1) == 1:
-        return list(values)
-    raise SymtopError(f"{name} must be a list of names, not {shown(values)}", name)
 
 
 def label(name: str, value: object) -> str:

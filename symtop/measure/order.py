@@ -129,16 +129,15 @@ def order(
     return Fit(*series[:3], used)
 
 
-def wrong_limit(step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, least: float) -> float:
+def wrong_limit(step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, least: float, part: float = STAYS) -> float:
     """The error that stays however small the step, if it is above `least` and ten bounds of the reference; else NaN.
 
-    It is the smallest of the finest decade of steps, `FEWEST` or more, if none of these is twice as large.
+    It is the smallest of the finest decade of steps, `FEWEST` or more, if it is more than a `part` of the largest.
     """
     h, e, b = (np.asarray(values, float) for values in (step_size, error, bound))
-    fine = e[h <= 10.0 * np.nanmin(h)]
-    wrong = float(np.min(fine))  # NaN if a run ended early; then the comparison below is false
-    stays = fine.size >= FEWEST and wrong > max(STAYS * np.max(fine), ABOVE * np.nanmax(b), least)
-    return wrong if stays else math.nan
+    fine = e[h <= 10.0 * np.min(h, initial=math.inf, where=h > 0.0)]  # NaN of a run that ended early: no limit
+    stays = fine.size >= FEWEST and np.min(fine) > max(part * np.max(fine), ABOVE * np.nanmax(b), least)
+    return float(np.min(fine)) if stays else math.nan
 
 
 def _round_off(h: Array, e: Array) -> float:

@@ -50,10 +50,11 @@ OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --bod
     ("study convergense", ["'convergense'", "convergence"]), ("study", ["name a study", "--all", "convergence"]),
     ("archive --output ../x.py", ["in .zip"]), ("archive --test-set --output no/x", ["that is there, not 'no/x'"]),
     ("run spheroid", ["missing argument 'INTEGRATOR'", "run [OPTIONS] SCENE INTEGRATOR"]),
-    ("run spheroid rk4 more", ["argument (more)", "run [OPTIONS] SCENE INTEGRATOR"]), ("cite rk4", ["not 'rk4', that"]),
+    ("run spheroid rk4 more", ["argument (more)", "run [OPTIONS] SCENE INTEGRATOR"]), ("cite rk4", ["'rk4', which d"]),
     ("run spheroid rk4 --step-size abc", ["--step-size must be a number, not 'abc'"]), ("--nope", ["option '--nope'"]),
-    ("judge x.py:step --order two", ["--order must be a whole number, not 'two'"]),
+    ("judge x.py:step --order two", ["--order must be a whole number, not 'two'"]), ("study --scene x", ["'--scene'; did you"]),
     ("recommend spheroid", ["--accuracy", "--i-use"]), ("study convergence --status --check", ["--status and --check"]),
+    ("report --results /dev/null", ["--results must be a folder, not '/dev/null', which is a file"]),
 ])  # fmt: skip
 def test_a_refusal_names_the_argument_its_value_and_what_is_allowed(words, parts, tmp_path, monkeypatch):
     (tmp_path / "x.png").mkdir()
