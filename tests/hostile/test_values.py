@@ -149,7 +149,7 @@ CALLS = {  # a function, good arguments, names of those of which the usual value
         {"scene": "spheroid", "integrator": "strang", "steps": 10, "step_size": 0.01, "checkpoint": False},
         "scene integrator steps step_size", {"steps": [10**12], "compensated": ["no", 3], "quiet": [3]}),
     "field": (symtop.field, {"chart": "axis", "top": TOP}, "chart top", {}),
-    "plot": (symtop.plot, {"data": RUN}, "quantity", {"data": NOT_DATA}),
+    "plot": (symtop.plot, {"data": RUN}, "quantity", {"data": NOT_DATA, "ax": ["axis", 3, [], object()]}),
     "ClosedForm": (symtop.ClosedForm, {"top": TOP, "start": START}, "top start", {}),
     "judge": (symtop.judge, {"target": lambda f, t, y, h: y, "quick": True}, "chart scene order",
         {"form": NAMED, "energy": [*UNKNOWN[1:], np.array([1.0, 2.0])],
