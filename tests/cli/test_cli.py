@@ -54,7 +54,7 @@ OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --bod
     ("run spheroid rk4 --step-size abc", ["--step-size must be a number, not 'abc'"]), ("--nope", ["option '--nope'"]),
     ("judge x.py:step --order two", ["--order must be a whole number, not 'two'"]),
     ("recommend spheroid", ["--accuracy", "--i-use"]), ("study convergence --status --check", ["--status and --check"]),
-    ("report --results /dev/null", ["must be a folder, not '/dev/null', which"]), ("study --scene x", ["; did you"]),
+    ("report --results /etc/hostname", ["a folder, not '/etc/hostname', which"]), ("study --scene x", ["; did you"]),
 ])  # fmt: skip
 def test_a_refusal_names_the_argument_its_value_and_what_is_allowed(words, parts, tmp_path, monkeypatch):
     (tmp_path / "x.png").mkdir()
