@@ -132,8 +132,7 @@ def _leapfrog(attitude, w, h, inertia, tau, published):
     q = attitude.as_quat()
     half = q + 0.25 * h * _times(q, np.append(attitude.inv().apply(w), 0.0))
     L = _momentum(attitude, inertia, w) + 0.5 * h * tau(attitude)
-    frame = Rotation.from_quat(half) if published else attitude
-    b = np.linalg.solve(inertia, frame.inv().apply(L))
+    b = np.linalg.solve(inertia, (Rotation.from_quat(half) if published else attitude).inv().apply(L))
     attitude = Rotation.from_quat(q + 0.5 * h * _times(half, np.append(b, 0.0)))
     return attitude, _inverse(attitude, inertia, L + 0.5 * h * tau(attitude))
 
