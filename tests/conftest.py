@@ -149,6 +149,5 @@ def random_scenes(count: int, seed: int) -> list[Scene]:
     for k in range(count):
         I1 = draw.uniform(0.3, 4.0)
         top = SymmetricTop(I1, draw.uniform(0.2, 1.9) * I1, draw.uniform(-3.0, 6.0))
-        start = Angles(*(draw.uniform(*between) for between in ranges))
-        sample.append(Scene(f"random-{k}", top, start, 5.0))
+        sample.append(Scene(f"random-{k}", top, Angles(*(draw.uniform(*between) for between in ranges)), 5.0))
     return sample

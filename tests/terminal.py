@@ -51,5 +51,4 @@ def recorded(words: list[str], limit: float = 300.0, code: str | None = None, **
         silence, last, output = max(silence, now - last), now, output + part
     os.close(ours)
     process.kill() if time.monotonic() - began >= limit else None
-    ended = process.wait()
-    return Recording(output.decode(errors="replace"), ended, max(silence, time.monotonic() - last))
+    return Recording(output.decode(errors="replace"), process.wait(), max(silence, time.monotonic() - last))

@@ -16,6 +16,7 @@ from .measures import (
     MAIN,
     OTHERS,
     TARGET,
+    WRONG,
     adaptive,
     declared_order,
     efficiencies,
@@ -51,6 +52,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         **{word: words.count(word) if words else None for word in ("confirmed", "refuted", "undecided")},
         "higher": int((shown == "higher").sum()),
         "lower": int((shown == "lower").sum()),
+        "wrong": int((shown == WRONG).sum()),
         "unknown": stepping(data).sizes["variant"] - len({name for _, name in efficiencies(data, TARGET)}),
         "span": float(spans.max()) if len(spans) else None,  # most work over least within an order
         "span_order": span_order,
@@ -108,7 +110,7 @@ def orders(data: xr.Dataset) -> pd.DataFrame:
         rows.append([*pair, declared_order(pair[1]), shown, *measured, ends[pair].constant])
     names = [part for name in (MAIN, *OTHERS) for part in (f"order in {name}", f"+- in {name}")]
     every = pd.DataFrame(rows, columns=["scene", "variant", "declared", "verdict", *names, "C at the end (rad/s^p)"])
-    rank = {"lower": 0, "higher": 1, "undecided": 2}
+    rank = {WRONG: -1, "lower": 0, "higher": 1, "undecided": 2}
     return every.sort_values("verdict", key=lambda column: column.map(lambda word: rank.get(word, 3)), kind="stable")
 
 

@@ -15,7 +15,7 @@ from symtop_studies.memoize import of_one_dataset
 
 from symtop.core.numbers import EPSILON
 from symtop.measure.conservation import residuals
-from symtop.measure.order import LARGEST_ERROR, Fit, order_verdict, power_law
+from symtop.measure.order import LARGEST_ERROR, Fit, order_verdict, power_law, wrong_limit
 from symtop.measure.order_table import observable, order_fit
 from symtop.methods.framework.registry import Integrator, integrator, integrators, split_name
 from symtop.model.scenes import Scene, scene
@@ -29,6 +29,7 @@ FEW = 9  # variants that a figure has room for
 HISTORY_STEPS, HISTORY_TOLERANCE = 100.0, 1e-6  # steps a nutation, and tolerance, of the runs for the energy over time
 LARGE = LARGEST_ERROR  # radians: larger errors follow no power of the step
 ABOVE_BOUND = 100.0  # errors below this many times the reference's error bound may be errors of the reference
+WRONG, ROUNDED, ALIKE = "wrong limit", 1e-6, 0.9  # errors that stay, above rounding by a pole, and nearly the same
 SAME = 0.02  # relative: variants of a method whose errors differ by less are drawn as one
 
 Pairs = dict[tuple[str, str], Fit]  # by scene and variant
@@ -70,7 +71,7 @@ def fits(data: xr.Dataset, quantity: str, *, at_end: bool = False) -> Pairs:
 class Judged(NamedTuple):
     """The verdict on one variant and scene, and the slopes that it rests on."""
 
-    verdict: str  # see `order_verdict`
+    verdict: str  # see `order_verdict`; or `WRONG`
     fits: dict[str, Fit]  # by quantity; only those that the chart shows
 
 
@@ -81,7 +82,11 @@ def judged(data: xr.Dataset) -> dict[tuple[str, str], Judged]:
     for pair, main in by_quantity[MAIN].items():
         slopes = {quantity: pairs[pair] for quantity, pairs in by_quantity.items() if pair in pairs}
         others = [fit for quantity, fit in slopes.items() if quantity != MAIN]
-        result[pair] = Judged(order_verdict(declared_order(pair[1]), main, others), slopes)
+        word, cell = order_verdict(declared_order(pair[1]), main, others), data.sel(scene=pair[0], variant=pair[1])
+        columns = (cell[name].values for name in ("step_size", MAIN, f"{MAIN}_bound"))
+        if word == "undecided" and math.isfinite(wrong_limit(*columns, ROUNDED, ALIKE)):
+            word = WRONG
+        result[pair] = Judged(word, slopes)
     return result
 
 

@@ -37,8 +37,11 @@ BODY, PERIODS = "body", 20.0  # name of the scene made from the options of a bod
 TEXT = (".csv", ".tsv", ".txt", ".json")  # endings that are refused for netCDF files
 USAGE = {  # patterns of click's messages, and their replacements
     "invalid value for '(.+?)': (.+) is not (?:a valid )?(.+)": r"\1 must be \3, not \2",
-    r"invalid value for '\[?(.+?)(?:]...)?': File (.+) (?:does not exist|is a .+)": r"\1 must be a file, not \2",
-    "must be float( range)?,": "must be a number,", "must be integer( range)?,": "must be a whole number,",
+    r"invalid value for '\[?(.+?)(?:]...)?': File (.+) (does not exist|is a .+)":
+        r"\1 must be a file, not \2, which \3",
+    "invalid value for '(.+?)': Directory (.+) (is a .+)": r"\1 must be a folder, not \2, which \3",
+    r"\. \(Did you mean one of: (.+)\)$": r"; did you mean \1", "must be float( range)?,": "must be a number,",
+    "must be integer( range)?,": "must be a whole number,",
 }  # fmt: skip
 SILENT = ("explore",)  # commands without messages that they are still working
 
@@ -314,8 +317,6 @@ def check_outputs(**files: str | None) -> None:
         option, endings, path = f"--{name}", ENDINGS.get(name, ()), Path(file).absolute()
         if endings and path.suffix.lower() not in endings:
             raise SymtopError(f"{option} must be a file that ends in {' or '.join(endings)}, not {file!r}")
-        if not (file and path.parent.is_dir()):
-            raise SymtopError(f"{option} must be a file in a folder that is there, not {file!r}")
         if file_path(option, file).is_dir():
             raise SymtopError(f"{option} must be a file, not the folder {file!r}")
         if name == "output":

@@ -347,8 +347,12 @@ def explore(port: int, no_browser: bool) -> None:
     import webbrowser
 
     from symtop.core.signals import TerminatedError, ending_on_sigterm
+    from symtop.explore.answers import shows
     from symtop.explore.server import address, serve
+    from symtop.methods.framework.registry import integrators, is_built_in
 
+    if unseen := [name for name, one in integrators().items() if not (shows(one) or is_built_in(name))]:
+        warn(f"the page shows attitudes and leaves out {', '.join(unseen)}, without the chart angles or attitude")
     with ending_on_sigterm(), serve(port) as server:
         click.echo(f"symtop explore: {address(server)} (Ctrl-C ends it)")
         if not no_browser:

@@ -267,6 +267,8 @@ def archive(results: str, output: str | None, *, test_set: bool) -> None:
     if test_set:
         from symtop.report.test_set import write
 
+        if output is None:
+            Path(results).mkdir(parents=True, exist_ok=True)
         with showing_seconds("computing the test set"):
             click.echo(f"test set: {write(output or Path(results) / 'test-set')}")
         return

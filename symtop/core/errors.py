@@ -96,12 +96,14 @@ def boolean(name: str, value: object) -> bool:
 
 
 def file_path(name: str, value: object) -> Path:
-    """Return a file's name as a path, ``~`` the user's folder; refuse what can name none. No disk is looked at."""
+    """Return an output's name as a path, ``~`` the user's folder; refuse what can name none, or is in no folder."""
     if isinstance(value, (str, os.PathLike)):
         path = at_home(value)
         longest = max(len(part.encode(errors="replace")) for part in (path.name, *path.parts))
         if path.name and "\0" not in str(path) and longest <= LONGEST_PART:
-            return path
+            if Path(os.path.realpath(path)).parent.is_dir():
+                return path
+            raise SymtopError(f"{name} must be in a folder that is there, not {str(value)!r}", name)
     raise SymtopError(f"{name} must be the name of a file, not {shown(value)[:SHOWN]}", name)
 
 

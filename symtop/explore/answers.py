@@ -349,6 +349,11 @@ print(run.attrs["title"] + ": " + run.attrs["outcome_message"])
 '''
 
 
+def shows(method: Integrator) -> bool:
+    """Does a method follow the attitude of a top, so that the page can offer it?"""
+    return bool({"angles", "attitude"} & set(method.charts()))
+
+
 def catalogue() -> dict[str, Any]:
     """The scenes and integrators that the page offers, with the numbers of its controls."""
     from symtop.report import style  # matplotlib: half a second
@@ -371,6 +376,6 @@ def catalogue() -> dict[str, Any]:
             "color": style.look(entry.name).color,
         }
         for entry in integrators().values()
-        if {"angles", "attitude"} & set(entry.charts())
+        if shows(entry)
     ]
     return {"version": __version__, "scenes": offered, "integrators": methods}

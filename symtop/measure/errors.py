@@ -247,6 +247,8 @@ def scene_of(run: xr.Dataset | Mapping[str, Any]) -> Scene:
         end = attributes["horizon"] or 1.0  # the horizon is 0 for a run sampled only at its start
         return Scene(str(attributes["scene"]), _stored(run, "top"), _stored(run, "start"), end)
     except (KeyError, TypeError, ValueError) as error:
+        if not isinstance(run, Mapping):
+            checked(run)  # says what data may be
         of = "members" if "member" in getattr(run, "sizes", ()) else "scene"
         words = f"these data do not say of which top and start they are, so give errors(data, {of})"
         raise SymtopError(f"scene is missing: {words}") from error

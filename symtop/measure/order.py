@@ -50,6 +50,7 @@ EXACT = 1e-2  # ratio of the reference's bound to an error above which a point w
 MISSES = 5.0  # standard deviations: a finest point further off the curve of the others has reached round-off
 VISIBLE = 0.01  # of log error: the finest point must also be at least this far off
 BESIDE = 0.05  # a declared order at most this far beyond the interval of a slope is confirmed
+STAYS, FEWEST, ABOVE = 0.5, 3, 10.0  # the finest errors, 3 or more above 10 bounds, stay if their ratio is above 0.5
 CLEARLY = 0.4  # a declared order further than this beyond the interval is refuted: orders are whole numbers
 
 
@@ -126,6 +127,17 @@ def order(
     used = np.zeros(h.shape, dtype=bool)
     used[places[series[3]]] = True
     return Fit(*series[:3], used)
+
+
+def wrong_limit(step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, least: float, part: float = STAYS) -> float:
+    """The error that stays however small the step, if it is above `least` and ten bounds of the reference; else NaN.
+
+    It is the smallest of the finest decade of steps, `FEWEST` or more, if it is more than a `part` of the largest.
+    """
+    h, e, b = (np.asarray(values, float) for values in (step_size, error, bound))
+    fine = e[h <= 10.0 * np.min(h, initial=math.inf, where=h > 0.0)]  # NaN of a run that ended early: no limit
+    stays = fine.size >= FEWEST and np.min(fine) > max(part * np.max(fine), ABOVE * np.nanmax(b), least)
+    return float(np.min(fine)) if stays else math.nan
 
 
 def _round_off(h: Array, e: Array) -> float:

@@ -26,7 +26,7 @@ import numpy as np
 from symtop.core.errors import SymtopError, finite, positive, row, shown
 from symtop.core.jit_functions import inlined, two_product
 from symtop.core.numbers import EPSILON
-from symtop.model.top import LARGEST, SLACK, bounded, unit, vector
+from symtop.model.top import LARGEST, SLACK, bounded, of_kind, unit, vector
 
 SYMMETRIC = 1e-9  # largest difference of a matrix from its transpose, relative to its largest entry
 
@@ -186,11 +186,11 @@ class RigidBody:
     def in_principal(self, at: Attitude) -> Attitude:
         """An attitude, with its angular velocity, in the axes of the matrix as one in principal axes."""
         w, x, y, z = self.axes
-        return Attitude(product(at.quaternion, self.axes), rotated((w, -x, -y, -z), at.omega_body))
+        return Attitude(product(of_kind(at, Attitude).quaternion, self.axes), rotated((w, -x, -y, -z), at.omega_body))
 
     def momentum(self, at: Attitude) -> tuple[float, float, float]:
         """M of a start, in body axes."""
-        w1, w2, w3 = at.omega_body
+        w1, w2, w3 = of_kind(at, Attitude).omega_body
         return self.I1 * w1, self.I2 * w2, self.I3 * w3
 
     def momentum_lo(self, at: Attitude) -> tuple[float, ...]:

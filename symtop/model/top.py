@@ -34,13 +34,15 @@ import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from symtop.core.errors import SymtopError, finite, positive, row
+from symtop.core.errors import SymtopError, finite, positive, row, shown
 from symtop.core.jit_functions import inlined, shared
 from symtop.core.numbers import EPSILON
+
+Start = TypeVar("Start")
 
 UNIT = 1e-6  # a quaternion or an axis may differ from unit length by this
 
@@ -186,6 +188,8 @@ class Angles:
 
         They leave the turn about the axis open: psi is zero, except at a pole.
         """
+        if not isinstance(top, SymmetricTop):
+            raise SymtopError(f"top must be a SymmetricTop, such as symtop.scene('spheroid').top, not {shown(top)}")
         e, L = unit("axis", axis, 3), vector("angular_momentum", angular_momentum, 3)
         ex, ey, ez = e
         theta, phi = math.atan2(math.hypot(ex, ey), ez), math.atan2(ex, -ey) if ex or ey else 0.0
@@ -199,6 +203,13 @@ class Angles:
     def spin(self) -> float:
         """w3 = psi' + phi' cos theta, the angular velocity about the body's own axis."""
         return self.psi_dot + self.phi_dot * math.cos(self.theta)
+
+
+def of_kind(at: object, kind: type[Start]) -> Start:
+    """Return a start if it is of the kind, Angles or an Attitude; SymtopError for anything else, such as a scene."""
+    if isinstance(at, kind):
+        return at
+    raise SymtopError(f"a start must be an instance of symtop.{kind.__name__}, not {shown(at)}")
 
 
 def flat(top: "SymmetricTop", at: Angles) -> tuple[float, ...]:
@@ -285,7 +296,8 @@ class SymmetricTop:
 
         Raises SymtopError where there is no such body.
         """
-        square = 5.0 * self.I3 / (2.0 * positive("mass", mass))
+        mass = positive("mass", mass)
+        square = 5.0 * self.I3 / (2.0 * mass)
         rest = 5.0 * self.I1 / mass - square
         if rest <= 0.0:
             raise SymtopError(f"no spheroid has I1 = {self.I1!r} and I3 = {self.I3!r}: I3 must be below 2 I1")
@@ -293,11 +305,11 @@ class SymmetricTop:
 
     def momenta(self, at: Angles) -> Momenta:
         """The conserved momenta of a state, and their pole-safe combinations."""
-        return conserved(self, at)
+        return conserved(self, of_kind(at, Angles))
 
     def energy(self, at: Angles) -> float:
         """Total energy, kinetic plus potential."""
-        across = at.theta_dot**2 + (at.phi_dot * math.sin(at.theta)) ** 2
+        across = of_kind(at, Angles).theta_dot ** 2 + (at.phi_dot * math.sin(at.theta)) ** 2
         return 0.5 * self.I1 * across + 0.5 * self.I3 * at.spin**2 + self.mgl * math.cos(at.theta)
 
     def reduced_energy(self, theta: Any, p_theta: Any, p_phi: Any, p_psi: Any) -> Any:
@@ -339,7 +351,7 @@ class SymmetricTop:
 
         The roots in [-1, 1] of ``(1-u^2)(alpha - beta u) - (b - a u)^2`` to 1e-14, or 1e-8 where the two coincide.
         """
-        return turning_cosines(self, at)
+        return turning_cosines(self, of_kind(at, Angles))
 
     def nutation_period(self, at: Angles) -> float:
         """Time of one nutation, ``2 pi / AGM(sqrt(beta (u3-u1)), sqrt(beta (u3-u2)))``; inf on a separatrix.
@@ -347,7 +359,7 @@ class SymmetricTop:
         Where both turning points meet it has half the digits, beside the upright or hanging axis fewer or none:
         `ClosedForm.nutation_period` has all, and `Scene.nutation_period` takes it there.
         """
-        return nutation_period(self, at)
+        return nutation_period(self, of_kind(at, Angles))
 
 
 # the nutation of a state; all of it compiles as it stands

@@ -33,6 +33,7 @@ import pandas as pd
 import xarray as xr
 
 from symtop.core import __version__, netcdf
+from symtop.core.errors import SymtopError, file_path
 from symtop.core.files import replacing
 from symtop.measure import columns
 from symtop.model.exact.digits import PreciseForm
@@ -50,8 +51,11 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every file in the bundle, the first
 def bundle(results: Path, target: Path | None = None) -> Path:
     """Write the bundle of a results folder, and first its report; returns the zip file, by default NAME.zip there.
 
-    Raises SymtopError if the folder holds no findings or the bundle cannot be written.
+    Raises SymtopError if the folder holds no findings, and if `target` does not end in .zip or cannot be written.
     """
+    path = results / f"{NAME}.zip" if target is None else file_path("output", target)
+    if path.suffix != ".zip":
+        raise SymtopError(f"output must be a file that ends in .zip, not {str(path)!r}", "output")
     page.write(results)
     files = {f"results/{path.relative_to(results).as_posix()}": path.read_bytes() for path in _stored(results)}
     with tempfile.TemporaryDirectory() as folder:
@@ -67,7 +71,6 @@ def bundle(results: Path, target: Path | None = None) -> Path:
     files["README.md"] = readme(results, files).encode()
     sums = "".join(f"{hashlib.sha256(content).hexdigest()}  {name}\n" for name, content in sorted(files.items()))
     files["SHA256SUMS"] = sums.encode()
-    path = target or results / f"{NAME}.zip"
     with replacing(path) as partial, zipfile.ZipFile(partial, "w", zipfile.ZIP_DEFLATED) as archive:
         for name, content in sorted(files.items()):
             entry = zipfile.ZipInfo(f"{NAME}/{name}", EPOCH)

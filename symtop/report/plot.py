@@ -12,7 +12,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import xarray as xr
 
-from symtop.core.errors import SymtopError, at_home, one_of
+from symtop.core.errors import SymtopError, at_home, one_of, shown
 from symtop.measure.conservation import residuals
 from symtop.measure.errors import QUANTITIES, errors, quantity_words
 from symtop.measure.sweep import failed_setting, period_word, titled
@@ -74,6 +74,8 @@ def plot(
         raise SymtopError(f"quantity must be the name of one, not {type(quantity).__name__}")
     if ax is None:
         ax = plt.subplots(figsize=(7.2, 4.4), layout="constrained")[1]
+    if not hasattr(ax, "get_lines"):
+        raise SymtopError(f"ax must be Axes of matplotlib, not {shown(ax)}; a quantity is given by name, quantity=")
     if "member" in data.dims:
         _ensemble(ax, data, quantity, members)
     elif "setting" in data.dims:

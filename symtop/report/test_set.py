@@ -46,7 +46,7 @@ def times_of(scene: Scene) -> list[float]:
 
 def write(folder: str | Path, scenes: Sequence[Scene] | None = None) -> Path:
     """Write the test set, or one of other `scenes`, into a folder, which must be new or empty. It takes a minute."""
-    path, scenes = file_path("folder", folder), list(scenes or problems())
+    path, scenes = file_path("output", folder), list(scenes or problems())
     if path.exists() and (not path.is_dir() or any(path.iterdir())):
         raise SymtopError(f"the test set needs a folder that is new or empty, not {str(folder)!r}")
     path.mkdir(parents=True, exist_ok=True)

@@ -72,7 +72,7 @@ def chart_of(method: Integrator, *, of_body: bool = False) -> tuple[str, FixedSt
     """The smallest chart in which a method has a compiled loop of fixed steps (for a body "body"), and the loop."""
     loops = {chart: loop for chart, solver in method.solvers.items() if (loop := inside(solver)) is not None}
     if not loops:
-        raise SymtopError(f"{method.name} has no compiled loop of fixed steps, so that it cannot be run in stretches")
+        raise SymtopError(f"{method.name} has no compiled loop of fixed steps, as strang has, to be run in stretches")
     chart = smallest_chart(method, BODY) if of_body else method.chart_for("axis", among=loops)
     if chart not in loops:
         raise SymtopError(f"{method.name} has no compiled loop of fixed steps for bodies without symmetry")

@@ -20,10 +20,12 @@ _loaded: dict[Path, list[str]] = {}  # files of plug-ins in use, and the names t
 
 def python_file(path: str | Path, name: str, kind: str) -> Path:
     """The file at a path; without one, SymtopError that the argument `name` must be `kind`, such as "a Python file"."""
+    there = False
     with contextlib.suppress(OSError, ValueError):  # a name that is too long, or holds a null character
         if (file := at_home(path).resolve()).is_file():
             return file
-    raise SymtopError(f"{name} must be {kind}, not {str(path)!r}", name)
+        there = file.exists()
+    raise SymtopError(f"{name} must be {kind}, not {str(path)!r}{'' if there else ', which does not exist'}", name)
 
 
 def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleType:

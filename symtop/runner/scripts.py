@@ -53,7 +53,7 @@ def names() -> list[str]:
 def file_of(name: str) -> Path:
     """The script of a study by its name, or by its path, which ends in .py."""
     if name.endswith(".py"):
-        return python_file(name, "study", "a name or a Python file that is there")
+        return python_file(name, "study", "a name or a Python file")
     if (new := install().FORMER.get(name)) is not None:
         raise SymtopError(f"study {name} is now {new}: symtop study {new}")
     return _own_scripts.get(name) or folder() / one_of("study", name, names()) / "study.py"

@@ -69,8 +69,7 @@ def test_the_tops_that_lanes_are_timed_on_stay_in_lanes_and_reach_the_error():
     solver, numbers, steps = lanes.solver_of(*lanes.RIVAL), lanes.members(), 45
     h, marks = np.full(lanes.MEMBERS, lanes.HORIZON / steps), np.full((lanes.MEMBERS, 1), steps)
     done, whole = Many.empty(lanes.MEMBERS, 1, 6), solver._whole
-    left = whole.blocks().run(np.arange(lanes.MEMBERS), numbers, whole.rule, h, marks, done, loops.BLOCK)
-    assert left.size == 0
+    assert whole.blocks().run(np.arange(lanes.MEMBERS), numbers, whole.rule, h, marks, done, loops.BLOCK).size == 0
     true = ClosedForms(numbers).axis(np.full((lanes.MEMBERS, 1), lanes.HORIZON))[:, 0]
     assert 1e-8 < charts.axis_distance(done.states[:, 0, :3], true).max() < 2e-6
     assert len(np.unique(true, axis=0)) == lanes.MEMBERS  # neighbours, not copies
@@ -81,8 +80,7 @@ def test_the_tops_that_lanes_are_timed_on_stay_in_lanes_and_reach_the_error():
 def test_an_ensemble_costs_little_around_its_steps_and_a_closed_form_ten_microseconds():
     """Ratios within one run: what is around the steps is 5 us on the machine that makes 1000 of them in 4.4."""
     seconds = {item.name: item.seconds for item in ensemble.measure()}
-    around = seconds["`ensemble`, axis and energy"] - seconds["of it: the steps"]
-    assert around < 1.1 * seconds["of it: the steps"]
+    assert seconds["`ensemble`, axis and energy"] - seconds["of it: the steps"] < 1.1 * seconds["of it: the steps"]
     assert seconds["`simulate`"] > 50.0 * seconds["`ensemble`, axis and energy"]
     # Where Verlet in C takes 30 ns a step: half of the calls below 10 us, 99 % below 30, in both arithmetics; 40 digits
     # take a thousand times as long. Tests beside this one slow both down, alike: then that ratio alone counts.

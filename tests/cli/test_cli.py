@@ -48,11 +48,13 @@ OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --bod
     ("ensemble strang --members 1000000 --figure ../x.png", ["--figure must be a file, not the folder"]),
     ("recommend spheroid --accuracy 1 --step-size 1 --per-nutation 9", ["--step-size", "not both"]),
     ("study convergense", ["'convergense'", "convergence"]), ("study", ["name a study", "--all", "convergence"]),
+    ("archive --output ../x.py", ["in .zip"]), ("archive --test-set --output no/x", ["that is there, not 'no/x'"]),
     ("run spheroid", ["missing argument 'INTEGRATOR'", "run [OPTIONS] SCENE INTEGRATOR"]),
-    ("run spheroid rk4 more", ["argument (more)", "run [OPTIONS] SCENE INTEGRATOR"]), ("cite rk4", ["file, not 'rk4'"]),
+    ("run spheroid rk4 more", ["argument (more)", "run [OPTIONS] SCENE INTEGRATOR"]), ("cite rk4", ["'rk4', which d"]),
     ("run spheroid rk4 --step-size abc", ["--step-size must be a number, not 'abc'"]), ("--nope", ["option '--nope'"]),
     ("judge x.py:step --order two", ["--order must be a whole number, not 'two'"]),
     ("recommend spheroid", ["--accuracy", "--i-use"]), ("study convergence --status --check", ["--status and --check"]),
+    ("report --results /etc/hostname", ["a folder, not '/etc/hostname', which"]), ("study --scene x", ["; did you"]),
 ])  # fmt: skip
 def test_a_refusal_names_the_argument_its_value_and_what_is_allowed(words, parts, tmp_path, monkeypatch):
     (tmp_path / "x.png").mkdir()

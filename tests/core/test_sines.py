@@ -74,8 +74,7 @@ def test_no_polynomial_of_the_degree_is_much_better(coefficients, remainder, lar
     x = np.linspace(0.01, 0.25 * math.pi, 400)
     with mpmath.workdps(40):
         remainders = np.array([error(angle, coefficients) for angle in x])
-        nudged = [*coefficients[:-1], coefficients[-1] * (1.0 + 1e-5)]
-        worse = max(abs(error(angle, nudged)) for angle in x)
+        worse = max(abs(error(angle, [*coefficients[:-1], coefficients[-1] * (1.0 + 1e-5)])) for angle in x)
     arcs = np.split(remainders, np.flatnonzero(np.diff(np.sign(remainders))) + 1)
     assert np.max(np.abs(remainders)) == pytest.approx(largest, rel=0.01)
     assert len(arcs) == 7

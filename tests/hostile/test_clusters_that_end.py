@@ -106,7 +106,7 @@ def test_a_worker_that_dies_costs_nothing(cluster, tmp_path):
 @pytest.mark.parametrize("what", ["study", "ensemble"])
 def test_a_cluster_that_is_gone_before_or_never_answers_is_one_sentence(tmp_path, what, how):
     """A deaf port takes connections and says nothing, as a firewall or another service may."""
-    words = ["ensemble", "strang", "--members", 90, "--step-size", 0.1, "--horizon", 1]
+    words = ["ensemble", "strang", "--members", 90, "--step-size", 0.1, "--horizon", 1, "--output", tmp_path / "a.nc"]
     if what == "study":
         words = ["study", PROBE, "--results", tmp_path / "r"]
     with contextlib.closing(Cluster(tmp_path / "log", workers=0)) as cluster, socket.create_server((HERE, 0)) as deaf:
@@ -117,6 +117,6 @@ def test_a_cluster_that_is_gone_before_or_never_answers_is_one_sentence(tmp_path
         code, _, err = ended(symtop(*words, "--scheduler", address), 300.0)
         seconds = time.monotonic() - began
     print(f"{what}, {how}: {code} after {seconds:.1f} s, {err!r}")
-    assert code == 2
+    assert (code, [*tmp_path.glob("a.nc*")]) == (2, [])
     assert "scheduler must be the address of a dask scheduler that answers and has workers" in err
     assert seconds < SECONDS

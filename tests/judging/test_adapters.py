@@ -222,7 +222,7 @@ def impatient(monkeypatch):
 
 
 @pytest.mark.parametrize(("target", "options", "words"), [
-    ("nothing.py:step", {}, "FILE.py:NAME with a file that is there"),
+    ("nothing.py:step", {}, r"form program\), not 'nothing.py', which does not exist$"),
     ("no-such-program-anywhere -x", {"form": "program"}, "must be a command that can be run"),
     ("my 'engine -x", {"form": "program"}, 'must be a command that can be run, not "my \'engine -x"'),
     ("true", {}, "a trajectory such as FILE.csv, or a command with form program, not 'true'$"),
@@ -315,7 +315,7 @@ def test_single_precision_is_no_other_motion_and_one_of_a_step_in_it_is(scene, o
     assert symtop.judge(in_single(midpoint), order=2, **options)["order"].verdict == "confirmed"
     assert symtop.judge(in_single(midpoint), order=3, **options).refuted == ["order"]
     with pytest.MonkeyPatch.context() as slowly:  # time for every step that single precision allows, on any machine
-        slowly.setattr(subject, "SLOPES", (6.0, 6.0))
+        slowly.setattr(subject, "SLOPES", (600.0, 600.0))
         added = lambda f, t, y, h: y + (in_single(rk4)(f, t, y, h) - np.float32(y)).astype(float)
         hidden = [symtop.judge(step, order=4, **options)["order"] for step in (in_single(rk4), added)]
     words = "undecided: single precision hides errors below about 1e-04: "

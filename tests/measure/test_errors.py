@@ -203,7 +203,7 @@ AXIS = np.tile([0.0, 0.0, 1.0], (41, 1))
     ({"time": TIMES, "axis": AXIS}, None, r"give errors\(data, scene\)"),
     (xr.Dataset({"axis": (("time", "c"), AXIS)}, {"time": TIMES}), None, r"give errors\(data, scene\)"),
     (xr.Dataset({"axis": (("member", "time", "c"), [AXIS])}, {"time": TIMES}), None, r"give errors\(data, members\)"),
-    (AXIS, "spheroid", "Dataset or a mapping"), (None, None, "scene is missing"),
+    (AXIS, "spheroid", "Dataset or a mapping"), (None, None, "data must be a Dataset or a mapping"),
 ])  # fmt: skip
 def test_bad_data_are_refused_in_one_sentence(data, scene, words):
     with pytest.raises(symtop.SymtopError, match=words) as caught:

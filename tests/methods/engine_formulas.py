@@ -120,8 +120,7 @@ def no_squish(attitude, w, h, inertia, tau):
     for axis, share in zip((outer, middle, inner, middle, outer), (0.5, 0.5, 1.0, 0.5, 0.5), strict=True):
         turn = Rotation.from_rotvec(share * h * L[axis] / inertia[axis, axis] * np.eye(3)[axis])
         attitude, L = attitude * turn, turn.inv().apply(L)
-    L = L + 0.5 * h * attitude.inv().apply(tau(attitude))
-    return attitude, attitude.apply(np.linalg.solve(inertia, L))
+    return attitude, attitude.apply(np.linalg.solve(inertia, L + 0.5 * h * attitude.inv().apply(tau(attitude))))
 
 
 def _times(a, b):
@@ -133,8 +132,7 @@ def _leapfrog(attitude, w, h, inertia, tau, published):
     q = attitude.as_quat()
     half = q + 0.25 * h * _times(q, np.append(attitude.inv().apply(w), 0.0))
     L = _momentum(attitude, inertia, w) + 0.5 * h * tau(attitude)
-    frame = Rotation.from_quat(half) if published else attitude
-    b = np.linalg.solve(inertia, frame.inv().apply(L))
+    b = np.linalg.solve(inertia, (Rotation.from_quat(half) if published else attitude).inv().apply(L))
     attitude = Rotation.from_quat(q + 0.5 * h * _times(half, np.append(b, 0.0)))
     return attitude, _inverse(attitude, inertia, L + 0.5 * h * tau(attitude))
 
@@ -145,8 +143,7 @@ yade, fincham = (partial(_leapfrog, published=one) for one in (False, True))
 def _three_stages(attitude, b, h, inertia, tau):
     k1 = h * _rates(attitude, b, inertia, tau)
     k2 = h * _rates(attitude, b + k1, inertia, tau)
-    k3 = h * _rates(attitude, b + (k1 + k2) / 4.0, inertia, tau)
-    return b + (k1 + k2 + 4.0 * k3) / 6.0
+    return b + (k1 + k2 + 4.0 * (h * _rates(attitude, b + (k1 + k2) / 4.0, inertia, tau))) / 6.0
 
 
 def spiral(attitude, w, h, inertia, tau):

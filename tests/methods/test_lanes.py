@@ -113,8 +113,7 @@ def test_members_of_every_method_have_the_bits_of_runs_alone(name):
 
 
 def test_methods_that_have_lanes():
-    splitting = {row.name for row in variants() if row.family == "splitting"}
-    assert splitting - IN_LANES == {
+    assert {row.name for row in variants() if row.family == "splitting"} - IN_LANES == {
         "stormer-verlet-reversible[angles]",  # of steps that differ between members
         "five-rotations[attitude]",  # the kernel is that of a body
     }

@@ -170,8 +170,7 @@ def test_the_discrete_gradients_are_the_midpoint_rule_and_the_mean_field_loses_t
 
     def gonzalez(y):
         middle, apart = 0.5 * (before + y), y - before
-        lack = value(y) - value(before) - slope(middle) @ apart
-        return slope(middle) + lack / (apart @ apart) * apart
+        return slope(middle) + (value(y) - value(before) - slope(middle) @ apart) / (apart @ apart) * apart
 
     def itoh_abe(y):
         """Quotients of differences, one component after the other."""

@@ -222,8 +222,7 @@ def test_one_step_has_an_error_of_order_nine(name, step):
     exact, errors = closed_form(scene).axis(steps), []
     for h, axis in zip(steps, exact, strict=True):
         _, (theta, _, phi, _), _ = compiled("sample", scene, float(h))
-        mine = np.sin(theta) * np.sin(phi), -np.sin(theta) * np.cos(phi), np.cos(theta)
-        errors.append(np.linalg.norm(mine - axis))
+        errors.append(np.linalg.norm((np.sin(theta) * np.sin(phi), -np.sin(theta) * np.cos(phi), np.cos(theta)) - axis))
     assert np.log2(errors[0] / errors[1]) == pytest.approx(9.0, abs=0.6)
 
 

@@ -126,8 +126,7 @@ def test_the_attitude_takes_its_spin_from_the_state_and_a_pole_is_nan_in_angles_
     for spin in (0.0, 3.0, 80.0):
         start = symtop.Angles(theta=0.7, psi_dot=spin)
         y, h = f.state(start), 1e-6
-        truth = symtop.ClosedForm(scene.top, start).quaternion([h])[0]
-        assert np.abs(truth - (y[:4] + h * f(0.0, y)[:4])).max() < 1e-8
+        assert np.abs(symtop.ClosedForm(scene.top, start).quaternion([h])[0] - (y[:4] + h * f(0.0, y)[:4])).max() < 1e-8
     top, start = symtop.SymmetricTop(2.0, 1.0, 1.0), symtop.Angles(theta=0.0, theta_dot=1.0, psi_dot=2.0)
     for chart in ("axis", "attitude"):
         f = symtop.field(chart, top)

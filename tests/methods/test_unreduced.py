@@ -48,8 +48,7 @@ def momentum_walk(scene_name, loop, steps=1_000_000):
     par, state = with_momenta(scene.top, scene.start)
     marks = np.arange(0, steps + 1, 997)
     done = loop(par, Quadrature((0.5,), (1.0,)), state, 0.01, marks)
-    scale = max(abs(state[4]), abs(state[5]))
-    changes = [(done.momenta[1:, k] - state[4 + k]) / scale for k in (0, 1)]
+    changes = [(done.momenta[1:, k] - state[4 + k]) / max(abs(state[4]), abs(state[5])) for k in (0, 1)]
     return max(np.abs(c).max() for c in changes), max(abs(trend(marks[1:], c).rise) for c in changes)
 
 

@@ -129,8 +129,7 @@ class PreciseBody:
         third, root = self._third(sn, cn, dn) + (2 * turns * self.whole if turns else 0), mp.sqrt(self.b)
         angle = mp.atan2(sn, root * cn) + turns * mp.pi  # tan(phi)/sqrt(b)
         psi = self.s * self.gamma / self.rate * (self.G * third - self.A3 * root * angle)
-        m = self.back * side * self.A1 * cn, self.back * side * self.A2 * sn, self.A3 * dn
-        return m, psi
+        return (self.back * side * self.A1 * cn, self.back * side * self.A2 * sn, self.A3 * dn), psi
 
     def _third(self, sn: Any, cn: Any, dn: Any) -> Any:
         """The integral of du/(1 + nu sn^2) for abs(u) <= K."""

@@ -29,7 +29,7 @@ NOTHING = handmade(ORDER, Finding("energy", "", Measured(), "undecided", "it sto
 
 
 def test_the_card_is_one_page_with_every_verdict_and_the_energy_of_the_long_run(ledger, tmp_path):
-    page = card(ledger, tmp_path / "folder" / "card.html").read_text(encoding="utf-8")
+    page = card(ledger, tmp_path / "card.html").read_text(encoding="utf-8")
     assert not re.search(r'(src|href)="http', page.replace('xmlns:xlink="http', ""))
     assert page.count("<svg") == 3  # the badge, two drawings
     for finding in ledger.findings:

@@ -46,7 +46,7 @@ def test_the_energy_is_that_of_simulate_whether_or_not_the_momenta_are_kept(name
 
 @pytest.mark.parametrize(("files", "words"), [
     ({"output": "keep.py"}, "no netCDF file"), ({"output": ""}, "output must be a file, not the folder"),
-    ({"checkpoint": ""}, "checkpoint must be a file, not the folder"),
+    ({"checkpoint": ""}, "checkpoint must be a file, not the folder"), ({"output": "no/a.nc"}, "folder that is there"),
     ({"output": "a.nc", "checkpoint": "a.nc"}, "output and checkpoint must be two files"),
     ({"output": "a.nc", "checkpoint": "b/../a.nc"}, "output and checkpoint must be two files"),
 ])  # fmt: skip
@@ -249,7 +249,7 @@ def test_the_command_runs_and_says_what_changed(tmp_path):
     assert "modified_energy" in call("long", "spheroid", "cayley", "--steps", "2e4", *files).output
     assert (tmp_path / "long.nc").is_file()
     refused = call("long", "spheroid", "rk45", "--steps", "10", "--step-size", "0.1", code=2)
-    assert "rk45 has no compiled loop of fixed steps, so that it cannot" in refused.stderr
+    assert "rk45 has no compiled loop of fixed steps, as strang has, to be run" in refused.stderr
 
 
 @pytest.mark.parametrize("name", ["strang", *late("gauss-4")])  # the latter turns back what it steps, to show it

@@ -167,8 +167,8 @@ def test_nothing_is_replaced_that_is_no_netcdf_file(tmp_path, small_pieces):
     path.write_text("print(1)")
     refused("it is there, and no netCDF file", path)
     assert path.read_text() == "print(1)"
-    for place in (tmp_path, "/proc/no/such/runs.nc"):
-        refused("cannot write", place)
+    for place, says in ((tmp_path, "cannot write"), (tmp_path / "no" / "runs.nc", "path must be in a folder that is")):
+        refused(says, place)
     assert [file.name for file in tmp_path.iterdir()] == ["mine.py"]
     for name in ("strang[axis]", "rk4[axis]"):
         with symtop.ensemble(SOME, name, path=tmp_path / "runs.nc", **SETTINGS) as data:

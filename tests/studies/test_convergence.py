@@ -44,6 +44,10 @@ def test_verdicts_are_those_of_the_one_rule_and_a_wrong_declaration_is_refuted(d
         if math.isfinite(main.slope):
             assert abs(main.slope - declared) <= main.interval + BESIDE, name
     assert sum(word == "confirmed" for word, _ in results.values()) >= 7
+    off = 3e-3 * (data["variant"] == "midpoint[angles]")
+    beside = data.assign({name: data[name] + off for name in ("axis", "axis_end")})
+    told = facts.tables(beside)["orders"].set_index("variant")["verdict"], facts.facts(beside)["wrong"]
+    assert (told[0]["midpoint[angles]"], told[0]["rk4[axis]"], told[1]) == ("wrong limit", "confirmed", 1)
     monkeypatch.setattr(measures, "declared_order", lambda name: 3)
     assert {measures.judged(data)["goldstein", name].verdict for name in ("strang[axis]", "rk4[axis]")} == {"refuted"}
     monkeypatch.setattr(facts, "declared_order", lambda name: 3)

@@ -30,8 +30,7 @@ def kinds(study):
     """A case of the quick grid for each group, part of the question and set of settings."""
     cases = {}
     for case in study.grid(quick=True):
-        kind = case.group, case.settings.get("part"), *sorted(case.settings)
-        cases.setdefault(kind, case)
+        cases.setdefault((case.group, case.settings.get("part"), *sorted(case.settings)), case)
     return list(cases.values())
 
 

@@ -7,6 +7,12 @@ const DASHES = [[], [5, 2], [2, 2], [8, 2, 2, 2]];  // of lines of one colour
 
 const words = (seconds) => (seconds < 1e-3 ? `${+(seconds * 1e6).toPrecision(2)} us` : seconds < 1 ? `${+(seconds * 1e3).toPrecision(2)} ms` : `${+seconds.toPrecision(2)} s`);
 
+// A name that is too long for the room keeps its beginning and its end.
+function cut(context, text, room, half = text.length / 2) {
+  const short = half < text.length / 2 ? `${text.slice(0, half)}…${text.slice(-half)}` : text;
+  return context.measureText(short).width > room ? cut(context, text, room, Math.ceil(half) - 1) : short;
+}
+
 export function drawCost(canvas, { lines, missing }, runs, catalogue) {
   const [context, width, height] = surface(canvas);
   const color = (name) => { const own = catalogue.find((entry) => entry.name === name).color; return own === "#000000" ? tone("ink") : own; };
@@ -54,7 +60,7 @@ export function drawCost(canvas, { lines, missing }, runs, catalogue) {
     context.textAlign = "left";
     context.fillStyle = tone("ink");
     context.font = `${shown ? "bold " : ""}11px system-ui, 'DejaVu Sans', sans-serif`;
-    context.fillText(seconds.length ? name : `${name}: ${failed} failed`, width - RIGHT + 22, place, RIGHT - 22);
+    context.fillText(cut(context, seconds.length ? name : `${name}: ${failed} failed`, RIGHT - 22), width - RIGHT + 22, place);
   }
   for (const { seconds, error, color: own } of points) {
     context.fillStyle = own;

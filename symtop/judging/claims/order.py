@@ -45,7 +45,7 @@ from symtop.judging.claims.structure import ONE_MAP, map_of
 from symtop.judging.claims.subject import FINEST, QUICK_SHARE, Subject, hidden_by_single
 from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, undecided, yes_no
 from symtop.measure.accuracy import error_table
-from symtop.measure.order import BESIDE, CLEARLY, LARGEST_ERROR, Fit, order_verdict
+from symtop.measure.order import BESIDE, CLEARLY, LARGEST_ERROR, Fit, order_verdict, wrong_limit
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
 from symtop.measure.step_map import APART, SEVERAL, StepMap, aligned, generic_start, one_step, restart_gap, unit_of
@@ -79,7 +79,6 @@ BEGIN = 0.23  # nutations: t0
 UNSTABLE = 1e4  # amplification by the motion above which errors of runs follow no power of the step
 CLEAR = 1e-9  # noise of the h^1 term in double precision; rounding of a step to single precision causes 1e-8
 CONVERGES, ROUNDED, FALLS = "converges", 1e-10, (1e4, 10.0)  # converges: an error falls to a tenth over four decades
-STAYS, FEWEST = 0.5, 3  # errors of the last decade of steps, 3 or more, do not fall if their ratio is above 0.5
 SHARPLY, BESIDE_NEXT = 1e-5, 1e-3  # a wrong term with a defect below this, or this part of the next, shows in no slope
 ABOVE, FINEST_RUNS, SPREAD = 10.0, 5, 10.0  # finest errors beyond 10 bounds, and the factor by which they fit h^p
 
@@ -158,10 +157,9 @@ def on_body(subject: Subject) -> list[Finding]:
     if claim is None and subject.stepper is not None and subject.method.adaptive:
         return [_converges(fitted, why)]
     if not fitted.measured:
-        error = fitted.error[fitted.step_size <= 10.0 * np.min(fitted.step_size)]
-        wrong = float(np.min(error))  # NaN if a run ended early; then the comparison below is false
-        least = max(ABOVE * np.max(fitted.bound), TRUE_LIMIT, subject.rounding(subject.finest or 0.0))
-        if error.size >= FEWEST and wrong > max(STAYS * np.max(error), least):
+        least = max(TRUE_LIMIT, subject.rounding(subject.finest or 0.0))
+        wrong = wrong_limit(fitted.step_size, fitted.error, fitted.bound, least)
+        if math.isfinite(wrong):
             how = f"however small its step, it goes to a motion that is wrong by {wrong:.1e} rad on {scene.name}"
             return [_wrong_limit(claim, wrong, how)]
         return [undecided("order", yes_no(claim), _hidden(subject, fit.reason))]

@@ -274,7 +274,7 @@ def _thing(target: Any, *, free: bool) -> tuple[Any, str]:
         own = f", an integrator, whose claims `symtop claims {method}` measures" * known
         raise SymtopError(f"{words}, not {str(target)!r}{own}")
     hint = " (a command needs form program)" * free
-    file = python_file(path, "a step", f"FILE.py:NAME with a file that is there{hint}")
+    file = python_file(path, "a step", f"FILE.py:NAME{hint}")
     with foreign_code(f"the file {file.name}"), x64():
         module: Any = execute(f"symtop_judged_{Path(file).stem}", file)
     thing = functools.reduce(lambda one, part: getattr(one, part, None), (name or "step").split("."), module)

@@ -54,7 +54,8 @@ def in_chart(theta: Any) -> Any:
 def require_chart(at: Any) -> None:
     """Refuse a start on a pole: raises SymtopError."""
     if not in_chart(at.theta):
-        raise SymtopError(f"theta must lie inside (0, pi) for an integrator in the angles chart, not {at.theta!r}")
+        words = f"in the angles chart, not {at.theta!r}; one in the axis chart, NAME[axis], may start at a pole"
+        raise SymtopError(f"theta must lie inside (0, pi) for an integrator {words}")
 
 
 @register_jitable

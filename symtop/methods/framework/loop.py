@@ -29,7 +29,7 @@ from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
-from symtop.core.errors import SymtopError
+from symtop.core.errors import SymtopError, shown
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.parallel import heed
 from symtop.methods.framework import lanes as many, preparation
@@ -86,7 +86,9 @@ class Loop:
     lanes: Callable[[Any], Lanes | None] = lambda _: None
 
     def __post_init__(self) -> None:
-        for part in (self.begin, self.increment, self.observe, self.enter, self.present):
+        for name in ("begin", "increment", "observe", "enter", "present"):
+            if not callable(part := getattr(self, name)):
+                raise SymtopError(f"{name} must be a function of a kernel, not {shown(part)}")
             register_jitable(part)
 
     def __reduce__(self) -> NoReturn:

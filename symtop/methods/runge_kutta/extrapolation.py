@@ -8,10 +8,10 @@ that of line k - 1 or k is above ((k+1) k)^2 or (k+1)^2. With A_j evaluations fo
 allow, H_j = .94 h (.65/err_j)^(1/(2j-1)) within [.02, 10] h, the next k is m = min(j, k) of the j lines made, m - 1 if
 its work A_j/H_j is a tenth less than that of m, and m + 1 if that of m is a tenth less than that of m - 1 and no try
 was rejected, from 3 to 9. ODEX has .8 for the first, other limits, and looks at the work of line k + 1 where that was
-computed. A rejected step is repeated with H_k or .9 h, the shorter. The first k is 1.5 - .6 log10(tolerance), at most
-8; the first h is that of `pairs`. Samples inside a step are shorter steps with as many lines, which are not counted.
-Explicit, neither symplectic nor symmetric; nothing is conserved but what is linear in the state. No smoothing step: all
-n_j are even.
+computed. The next step is H_k, or for k above j as long for its work as with j, H_j A_k/A_j; a rejected one is repeated
+with that or .9 h, the shorter. The first k is 1.5 - .6 log10(tolerance), at most 8; the first h is that of `pairs`.
+Samples inside a step are shorter steps with as many lines, which are not counted. Explicit, neither symplectic nor
+symmetric; nothing is conserved but what is linear in the state. No smoothing step: all n_j are even.
 Source: Hairer, Norsett, Wanner, Solving Ordinary Differential Equations I, section II.9 (their code is ODEX).
 """
 

@@ -68,7 +68,8 @@ def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float 
         if not {*kinds} - {*FREE, "lagrange"}:
             raise SymtopError(f"epsilon is of heavy bodies, and not of the kind {chosen!r}", "epsilon")
         least = NEAREST if "chaotic" in kinds else 0.0
-        if not least <= finite("epsilon", epsilon) <= FARTHEST:
+        epsilon = finite("epsilon", epsilon)
+        if not least <= epsilon <= FARTHEST:
             raise SymtopError(f"epsilon must be from {least} to {FARTHEST}, not {epsilon!r}", "epsilon")
     rows, strata = np.empty((count, 14)), np.empty(count, dtype=f"U{max(map(len, KINDS))}")
     for place, one in enumerate(kinds[:count]):

@@ -300,23 +300,24 @@ class Stream:
     def __init__(self, path: Path, folder: Path, job: Job, labels: dict[str, Any], attributes: dict[str, Any]) -> None:
         self.path, self.folder, self.labels, self.attributes = path, folder, labels, attributes
         self.n = len(job.numbers)
-        identity, stored = _identity(job, labels), self.folder / IDENTITY
+        self.identity, self.stored = _identity(job, labels), self.folder / IDENTITY
         empty = not self.folder.exists() or (self.folder.is_dir() and not any(self.folder.iterdir()))
-        if not empty and not stored.is_file():
+        if not empty and not self.stored.is_file():
             words = "is there and does not say which ensemble it is of: remove it or name another path than"
             raise SymtopError(f"{self.folder} {words} {path}")
         sweep(path)
-        if stored.is_file() and stored.read_text(encoding="utf-8") != identity:
+        if self.stored.is_file() and self.stored.read_text(encoding="utf-8") != self.identity:
             words = "holds the beginning of another ensemble, or of another version's; remove it or name another path"
             raise SymtopError(f"{self.folder} {words} than {path}")
-        netcdf.write_text(stored, identity)
 
     def missing(self, chunks: list[slice]) -> list[slice]:
         """The chunks that are not on disk."""
         return [chunk for chunk in chunks if not self._part(chunk).is_file()]
 
     def keep(self, chunk: slice, columns: dict[str, Any]) -> None:
-        """Write a chunk to its file."""
+        """Write a chunk to its file; the first one makes the folder."""
+        if not self.stored.is_file():
+            netcdf.write_text(self.stored, self.identity)
         with ending_on_sigterm(), replacing(self._part(chunk), ".npz") as partial:
             np.savez(partial, **columns)
 
