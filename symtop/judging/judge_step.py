@@ -60,7 +60,6 @@ SHOWN = 3  # most faults of a line of names in a message
 # above the rounding of a file: largest angle, in rad, between the axis and the third axis of the quaternion, and the
 AGREE = 1e-3  # largest relative difference of a constant at the start from the scene's that is not worth mentioning
 FEWEST = 100  # samples from which a law of growth is judged
-SHORTEST, DECADES = 0.2, 2.0  # decades of time at the end of a run in which it is judged: least and most
 SEEDS = 1_000_000_000  # random seeds are below this
 OPENING = 60.0  # seconds for loading a file and its imports
 PLUGIN = 600.0  # seconds for a stage of a registered integrator
@@ -302,8 +301,7 @@ def _constant(
         scale, grain = scene.energy_scale, scene.energy_grain
     true = getattr(scene.top.momenta(scene.start), name) if name != "energy" else scene.top.energy(scene.start)
     times = time if time[-1] else [1.0]  # with a single sample at the start nothing grows
-    decades = math.log10(max(times[-1] / scene.time_scale(), 1.0))  # after the first nutation, in which errors begin
-    change = constant_of(times, (values - values[0]) / scale, min(max(decades, SHORTEST), DECADES))
+    change = constant_of(times, (values - values[0]) / scale, period=scene.time_scale())
     if time.size < FEWEST:
         change = change._replace(exponent=math.nan)
     constant = Constant(change, math.nan, KEPT * grain, grain)

@@ -45,6 +45,7 @@ CONSTANTS = ("energy", "p_phi", "p_psi")
 LAWS = {0.0: "bounded", 0.5: "random walk", 1.0: "linear", 1.5: "t^3/2", 2.0: "quadratic"}
 RUN_ROUNDING = 3e-13  # relative: the largest change that a million steps of rounding explain where sums are compensated
 WALK = 100.0  # times the rounding error: a change that grows as t^1/2 and is larger is not attributed to rounding
+SHORTEST, LONGEST = 0.2, 2.0  # decades of time at the end of a run in which growth is judged: least and most
 BLOCKS = 24  # equal stretches of a run whose means a trend is fitted to
 SLACK = 0.1  # an exponent agrees with that of a law if they differ by no more than this, or than its interval
 
@@ -69,12 +70,18 @@ class Changed(NamedTuple):
     law: str  # name of the exponent
 
 
-def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> Changed:
-    """Size, trend and growth over the last `decades` of a residual (n,) at times (n,); samples may be NaN."""
+def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = LONGEST, period: float = 0.0) -> Changed:
+    """Size, trend and growth over the last `decades` of a residual (n,) at times (n,); samples may be NaN.
+
+    Within the first `period` an oscillation only begins: growth is judged after it, in the last `SHORTEST` at least.
+    """
+    if period:
+        decades = min(max(math.log10(max(np.asarray(time)[-1] / period, 1.0)), SHORTEST), decades)
     size, power = np.abs(np.asarray(residual, float)), growth(time, residual, decades)
     good = size[np.isfinite(size)]
     largest = float(good.max()) if good.size else math.nan
-    return Changed(largest, *trend(time, residual), power.slope, power.interval, law(power))
+    with np.errstate(over="ignore", invalid="ignore"):  # squares of a run that blows up
+        return Changed(largest, *trend(time, residual), power.slope, power.interval, law(power))
 
 
 def residuals(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
@@ -84,13 +91,13 @@ def residuals(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
     return {name: (shown - shown[0]) / scales[name] for name, shown in values.items()}
 
 
-def growth(time: ArrayLike, residual: ArrayLike, decades: float = 2.0) -> Fit:
+def growth(time: ArrayLike, residual: ArrayLike, decades: float = LONGEST) -> Fit:
     """The exponent of |residual| ~ t^exponent, from the largest values in logarithmic windows of the last `decades`."""
-    return power_law(*maxima(time, residual, decades))  # within the first nutations an oscillation only switches on
+    return power_law(*maxima(time, residual, decades))
 
 
 def maxima(
-    time: ArrayLike, residual: ArrayLike, decades: float = 2.0, count: int = 12
+    time: ArrayLike, residual: ArrayLike, decades: float = LONGEST, count: int = 12
 ) -> tuple[list[float], list[float]]:
     """Middles of `count` logarithmic windows over the last `decades` of time, and the largest |residual| in each."""
     t, r = np.asarray(time, float), np.abs(np.asarray(residual, float))

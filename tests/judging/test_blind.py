@@ -235,9 +235,8 @@ def test_a_seed_draws_the_same_and_without_a_claim_the_order_is_said_and_not_the
 @pytest.mark.quick
 def test_no_order_is_below_zero(only):
     only("order")
-    shifted = lambda f, t, y, h: right.rk4(f, t, y, h) + 1e-6
     for claim in ({}, {"order": 4}):
-        ledger = symtop.judge(shifted, quick=True, seed=1, **claim)
+        ledger = symtop.judge(lambda f, t, y, h: right.rk4(f, t, y, h) + 1e-6, quick=True, seed=1, **claim)
         assert str(ledger["order"].measured).startswith("0: in one step the term in h^0 is the first that is wrong")
         assert "It is: order 0" in str(ledger)
 

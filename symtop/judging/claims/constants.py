@@ -206,7 +206,7 @@ def long_run(
     grains["p_phi"] = scene.momentum_grain(trajectory.momentum)
     by_name = {
         name: change_of(plan.times, changes[name], every_step[name], count, grains.get(name, 1.0), plain=plain,
-                        even=not scene.of_body)
+                        even=not scene.of_body, period=unit)
         for name in (changes if chart != PLANE else ("energy",))
     }  # fmt: skip
     message, nutations = sentence(run.outcome, run.reached, float(plan.times[-1])), run.reached / unit
@@ -295,9 +295,9 @@ def _cayley_residual(top: SymmetricTop, run: Trajectory) -> Array:
 
 def change_of(
     time: Array, values: Array, every_step: Array, steps: int, grain: float = 1.0, *, plain: bool = False,
-    even: bool = True,
+    even: bool = True, period: float = 0.0,
 ) -> Constant:  # fmt: skip
-    """Size, growth and trend of a residual over `steps` steps; `every_step` holds it at consecutive ones.
+    """Size, growth after a `period`, trend of a residual over `steps` steps; `every_step` holds it at consecutive ones.
 
     With `plain` sums half of the rounding error of one step may be a bias that adds up, but at most an epsilon per
     step. A motion that is not `even` may be calm at first and turn over later: sudden changes are not judged.
@@ -314,7 +314,7 @@ def change_of(
         jump = np.flatnonzero((ratio[1:] > SUDDEN) & (np.fmax.accumulate(ratio)[:-1] < SUDDEN / 10.0) & calm)
     words = "after t = {:.4g} it changes {:.0e} times as much as by its first steps"
     sudden = words.format(time[jump[0] + 1], ratio[jump[0] + 1]) if even and jump.size else ""
-    return Constant(constant_of(time, values), a_step, floor, grain, sudden)
+    return Constant(constant_of(time, values, period=period), a_step, floor, grain, sudden)
 
 
 def measure(subject: Subject) -> list[Finding]:

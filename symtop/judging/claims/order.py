@@ -323,9 +323,9 @@ def _converges(fitted: Order, slopes: str) -> Finding:
 def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | None, slopes: str) -> Finding:
     """The finding on a declared order; `fits` is empty for an adaptive method, whose steps do not all scale alike.
 
-    If the series has a first wrong term, its order is that of runs as h -> 0, and a larger slope comes from steps that
-    are too long. A lower slope, beyond its interval, counts, because a run may pass points with larger errors, and
-    refutes the order if it is clearly another. A larger slope that is no whole number is no order, and refutes none.
+    If the series has a first wrong term, its order is that of runs as h -> 0, and another slope comes from steps that
+    are too long. A slope that is clearly lower refutes the order all the same, because a run may pass points with
+    larger errors. A larger slope that is no whole number is no order, and refutes none.
     """
     main, measured, verdict = fitted.main, fitted.measured, order_verdict(power, fitted.main, fits)
     value, resolution = main.slope, BESIDE + main.interval
@@ -336,15 +336,14 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
         known = series.least(power + 1) if power + 1 < series.noise.size else math.inf
         following = float(series.defect[power + 2]) if series.is_exact and series.order == power + 1 else 0.0
     sharply = known <= max(SHARPLY, BESIDE_NEXT * following)
-    if series is not None and shown and verdict != "confirmed":
-        lower = any(_below(fit, power, BESIDE) for fit in fits)
-        if (early and not lower) or (not measured and _agree(fitted, power)):
-            why = f"{why} ({main.reason or 'at steps too long for a slope'})"
-            defect = series.worst(power), series.least(power)
-            return Finding("order", str(power), _terms(series), "confirmed", why, *defect)
-    if early and verdict == "refuted" and not any(_below(fit, power, CLEARLY) for fit in fits):
+    lower = any(fit.slope + fit.interval < power - CLEARLY for fit in fits)
+    if series is not None and shown and verdict != "confirmed" and not lower and (measured or _agree(fitted, power)):
+        why = f"{why} ({main.reason or 'at steps too long for a slope'})"
+        defect = series.worst(power), series.least(power)
+        return Finding("order", str(power), _terms(series), "confirmed", why, *defect)
+    if early and verdict == "refuted" and not lower:
         whole = abs(main.slope - round(main.slope)) <= resolution
-        verdict = "undecided" if shown or not (sharply and whole) else verdict
+        verdict = verdict if sharply and whole else "undecided"
     if verdict == "refuted":
         why = f"the error falls with another power of the step: {why}"
     elif series is not None and series.order < min(power, series.resolved):
@@ -357,11 +356,6 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
             neither = f"the slope is above {power}, and {doubt}"
         why = f"{neither}: {why}" if measured else f"{main.reason} ({why})"
     return Finding("order", str(power), measured, verdict, why, value, resolution)
-
-
-def _below(fit: Fit, power: int, by: float) -> bool:
-    """Is a slope with its interval lower than the order `power` by more than `by`?"""
-    return fit.slope + fit.interval < power - by
 
 
 def _agree(fitted: Order, power: int) -> bool:
@@ -392,8 +386,8 @@ def limit(method: Integrator, scene: Scene, power: int, finest: float | None = N
     # eliminate the term in h^power, then that in h^(power + 1)
     coarse, fine = (b + (b - a) / (2.0**power - 1.0) for a, b in ((first, second), (second, third)))
     last = fine + (fine - coarse) / (2.0 ** (power + 1) - 1.0)
-    size = [float(np.max(np.abs(value))) for value in (third, fine, last)]
-    return min(size[0], size[2]), abs(size[2] - size[1])
+    size = [float(np.max(np.abs(value))) for value in (third, last, last - fine)]
+    return min(size[:2]), size[2]
 
 
 def _exactness(subject: Subject) -> Finding:
