@@ -4,8 +4,9 @@ The method makes a piece of the run, which is compared with DOP853 at a tight to
 error is extrapolated by the law of `symtop.run.guard`, linear to quadratic, or by the amplification A(t) of a small
 change (`symtop.run.motion`), whichever is more; A is computed as far as `WATCHED` steps of DOP853 lead. An error that
 fades within the piece, as in a transient, is not extrapolated. The error of a run that departs from the motion grows on
-as in the second half of the piece. Any other error is at most twice the extent of the motion, if all of the motion is
-known or it goes back and forth. Causes:
+as in the second half of the piece. Any other forecast is at most twice the extent of the motion, if all of the motion
+is known or it goes back and forth. A run with an error above the extent has lost the motion and may go anywhere:
+the sentence says that no size is known. Causes:
 
     stiffness      f has rates far above that of the motion, and they limit an explicit step
     instability    steps multiply a small change more than the motion does, or the motion itself is unstable
@@ -42,7 +43,7 @@ FIRST, FADED = 1e-7, 0.1  # part of a piece where comparison begins; part of the
 class Outlook(NamedTuple):
     """The forecast of a run; as a string, one sentence."""
 
-    error: float  # the largest distance from the truth up to the horizon, Euclidean, in units of y
+    error: float  # the largest distance from the truth up to the horizon, in units of y; no size above the extent
     setting: float  # a step or tolerance that should keep the accuracy; nan if none does
     cause: str  # of an error beyond the accuracy, see above; "" if there is none
     amplification: float  # of a small change of y0, at the horizon
@@ -221,6 +222,7 @@ def _outlook(
         )
     elif float(error.max()) < 10.0 * FINE * float(np.abs(true).max()):
         cause, better, why = "rounding", math.nan, f"rounding adds up, and no {kind} helps"
-    sentence = f"{method}: expect an error of {expected:.1g} by t = {t + end:.4g}: {why}"
+    words = ", with the motion lost and no size known" if whole and extent < expected < math.inf else ""
+    sentence = f"{method}: expect an error of {expected:.1g} by t = {t + end:.4g}{words}: {why}"
     sentence += "" if whole else f"; the motion was watched to t = {t + watched:.4g} alone"
     return Outlook(expected, better, cause, total, sentence)
