@@ -33,7 +33,7 @@ from symtop.run.motion import MOST_FOLDS, Growth
 
 SCIPY = {"rk45": ("RK45", 6), "dop853": ("DOP853", 12), "radau": ("Radau", 0), "bdf": ("BDF", 0), "lsoda": ("LSODA", 0)}
 FINE, WATCHED, PROBED = 1e-13, 4000, 5000  # tolerance of DOP853; most steps of it, and of the method on a piece
-PERIODS, SHARE, POINTS = 10.0, 0.2, 400  # least length of a piece, in periods or as part of the run; compared times
+PERIODS, TURNS, SHARE, POINTS = 10.0, 4.0, 0.2, 400  # least length of a piece, or as part of a run; compared times
 TIGHTEST, LOOSEST = 2.3e-14, 0.1  # tolerances: the least of SciPy's solvers, the largest that is proposed
 MOVED, SATURATED = (1e-7, 1e-10), 1e-2  # of the extent of the motion: first distances of two motions, and the largest
 UNSTABLE, STIFF = 10.0, 20.0  # growth of A in the second half of an unstable run; ratio of rates of a stiff f
@@ -176,7 +176,8 @@ def _outlook(
     slow = min(frequency, 2.0 * math.pi * turns / watched)
     moved, kind = y + MOVED[0] * extent / math.sqrt(y.size), "step" if rule else "tolerance"
     growth = _growth(f, near, t, y, elapsed, extent)
-    piece = min(end, watched, max(SHARE * end, PERIODS * 2.0 * math.pi / max(frequency, TINY)))
+    turn = 2.0 * math.pi / max(slow, TINY)  # longer than a period at `frequency` where a motion is fast now and then
+    piece = min(end, watched, max(SHARE * end, PERIODS * 2.0 * math.pi / max(frequency, TINY), TURNS * turn))
     places = np.union1d(np.geomspace(FIRST, 1.0, POINTS // 4), elapsed / watched)  # compared times, in pieces
 
     def run_piece(start: Array) -> tuple[Array, Array, float]:
