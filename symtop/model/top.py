@@ -32,6 +32,7 @@ the rates hold all of w. Units are any consistent set. Source: Goldstein, Classi
 
 import functools
 import math
+import operator
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple, TypeVar
@@ -125,6 +126,7 @@ def effective_potential(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -
 NUMBERS = ("I1", "I3", "mgl", "theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")  # of a top and a start
 SLACK = 1e-12  # relative tolerance of the inequalities between moments, which are given rounded
 LARGEST = 1e40  # of any parameter or rate, and one over the smallest inertia: squares of squares stay finite
+HEAVY = 128.0  # a larger momentum is counted in another unit by a series
 POLE = 0.999  # a larger cosine is beside a pole
 BISECTIONS = 60  # of an interval of cosines at most 2 wide: to the last place
 
@@ -217,6 +219,24 @@ def flat(top: "SymmetricTop", at: Angles) -> tuple[float, ...]:
     if not isinstance(top, SymmetricTop):
         return top.flat(at)
     return top.I1, top.I3, top.mgl, at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot
+
+
+def lightened(plain: Sequence[float]) -> tuple[tuple[float, ...], float]:
+    """A top or a body and a start, as `flat` has them, in a unit of mass in which momenta are near 1, and that unit.
+
+    It is a power of two, which changes no digit, and 1 for momenta up to `HEAVY`: a series weighs momenta and a
+    quaternion or an axis of length one in one norm, so that momenta far above 1 would hide the errors of the others.
+    """
+    masses = 3 if len(plain) == len(NUMBERS) else 4
+    if masses == 4:
+        moments, rates = plain[:3], plain[11:]
+    else:
+        theta, _, _, theta_dot, phi_dot, psi_dot = plain[3:]
+        moments = plain[0], plain[0], plain[1]
+        rates = theta_dot, phi_dot * math.sin(theta), psi_dot + phi_dot * math.cos(theta)
+    size = math.hypot(*map(operator.mul, moments, rates), math.sqrt(abs(plain[masses - 1]) * max(moments)))
+    unit = 2.0 ** math.frexp(size)[1] if size > HEAVY else 1.0
+    return (*(number / unit for number in plain[:masses]), *plain[masses:]), unit
 
 
 @inlined

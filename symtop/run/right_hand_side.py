@@ -4,8 +4,9 @@ The method makes a piece of the run, which is compared with DOP853 at a tight to
 error is extrapolated by the law of `symtop.run.guard`, linear to quadratic, or by the amplification A(t) of a small
 change (`symtop.run.motion`), whichever is more; A is computed as far as `WATCHED` steps of DOP853 lead. An error that
 fades within the piece, as in a transient, is not extrapolated. The error of a run that departs from the motion grows on
-as in the second half of the piece. Any other error is at most twice the extent of the motion, if all of the motion is
-known or it goes back and forth. Causes:
+as in the second half of the piece. Any other forecast is at most twice the extent of the motion, if all of the motion
+is known or it goes back and forth. A run with an error above the extent has lost the motion and may go anywhere:
+the sentence says that no size is known. Causes:
 
     stiffness      f has rates far above that of the motion, and they limit an explicit step
     instability    steps multiply a small change more than the motion does, or the motion itself is unstable
@@ -32,7 +33,7 @@ from symtop.run.motion import MOST_FOLDS, Growth
 
 SCIPY = {"rk45": ("RK45", 6), "dop853": ("DOP853", 12), "radau": ("Radau", 0), "bdf": ("BDF", 0), "lsoda": ("LSODA", 0)}
 FINE, WATCHED, PROBED = 1e-13, 4000, 5000  # tolerance of DOP853; most steps of it, and of the method on a piece
-PERIODS, SHARE, POINTS = 10.0, 0.2, 400  # least length of a piece, in periods or as part of the run; compared times
+PERIODS, TURNS, SHARE, POINTS = 10.0, 4.0, 0.2, 400  # least length of a piece, or as part of a run; compared times
 TIGHTEST, LOOSEST = 2.3e-14, 0.1  # tolerances: the least of SciPy's solvers, the largest that is proposed
 MOVED, SATURATED = (1e-7, 1e-10), 1e-2  # of the extent of the motion: first distances of two motions, and the largest
 UNSTABLE, STIFF = 10.0, 20.0  # growth of A in the second half of an unstable run; ratio of rates of a stiff f
@@ -42,7 +43,7 @@ FIRST, FADED = 1e-7, 0.1  # part of a piece where comparison begins; part of the
 class Outlook(NamedTuple):
     """The forecast of a run; as a string, one sentence."""
 
-    error: float  # the largest distance from the truth up to the horizon, Euclidean, in units of y
+    error: float  # the largest distance from the truth up to the horizon, in units of y; no size above the extent
     setting: float  # a step or tolerance that should keep the accuracy; nan if none does
     cause: str  # of an error beyond the accuracy, see above; "" if there is none
     amplification: float  # of a small change of y0, at the horizon
@@ -176,7 +177,8 @@ def _outlook(
     slow = min(frequency, 2.0 * math.pi * turns / watched)
     moved, kind = y + MOVED[0] * extent / math.sqrt(y.size), "step" if rule else "tolerance"
     growth = _growth(f, near, t, y, elapsed, extent)
-    piece = min(end, watched, max(SHARE * end, PERIODS * 2.0 * math.pi / max(frequency, TINY)))
+    turn = 2.0 * math.pi / max(slow, TINY)  # longer than a period at `frequency` where a motion is fast now and then
+    piece = min(end, watched, max(SHARE * end, PERIODS * 2.0 * math.pi / max(frequency, TINY), TURNS * turn))
     places = np.union1d(np.geomspace(FIRST, 1.0, POINTS // 4), elapsed / watched)  # compared times, in pieces
 
     def run_piece(start: Array) -> tuple[Array, Array, float]:
@@ -222,6 +224,7 @@ def _outlook(
         )
     elif float(error.max()) < 10.0 * FINE * float(np.abs(true).max()):
         cause, better, why = "rounding", math.nan, f"rounding adds up, and no {kind} helps"
-    sentence = f"{method}: expect an error of {expected:.1g} by t = {t + end:.4g}: {why}"
+    words = ", with the motion lost and no size known" if whole and extent < expected < math.inf else ""
+    sentence = f"{method}: expect an error of {expected:.1g} by t = {t + end:.4g}{words}: {why}"
     sentence += "" if whole else f"; the motion was watched to t = {t + watched:.4g} alone"
     return Outlook(expected, better, cause, total, sentence)

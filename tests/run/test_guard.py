@@ -402,8 +402,7 @@ def test_no_body_turns_much_faster_than_the_watch_takes_it_to():
     """By what the start says alone, the natural period and its own rate, some turn a fifth faster or more."""
     drawn = [one for one in scenes_of(body_population(48, seed=29)) if math.isfinite(one.nutation_period)]
     np.testing.assert_allclose([one.horizon / one.nutation_period for one in drawn], 10.0, rtol=1e-12)
-    rates = np.array([fastest(one) for one in drawn])
-    bounds = np.array([Integrated(one).fast for one in drawn])
+    rates, bounds = (np.array([rate(one) for one in drawn]) for rate in (fastest, lambda one: Integrated(one).fast))
     starts = [math.hypot(2.0 * math.pi / one.nutation_period, *one.start.omega_body) for one in drawn]
     assert (rates / bounds).max() < 1.1
     assert np.median(rates / bounds) > 0.8

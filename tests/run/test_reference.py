@@ -116,8 +116,7 @@ def test_a_bound_too_small_would_be_seen_and_times_at_which_it_is_read_change_no
 def test_a_certificate_that_contradicts_the_bounds_raises_them(monkeypatch, cache):
     """One of a witness that is 1e-6 away, one of an error three times its bound, and one that finds nothing."""
     module, times = sys.modules["symtop.run.reference.truth"], [1.0, 2.0, 3.0]
-    quantities = ("axis", "attitude", "theta", "phi", "psi")
-    plain = symtop.reference("goldstein", times)
+    plain, quantities = symtop.reference("goldstein", times), ("axis", "attitude", "theta", "phi", "psi")
     for record, floor, factor in (
         (Certificate(1e6, 30, 0.3, 100.0, 0.0, 1e-6), 1e-6, 1.0),
         (Certificate(1e6, 30, 0.3, 100.0, 1e-6, math.nan), 1e-6, 1.0),

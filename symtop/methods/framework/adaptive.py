@@ -16,7 +16,7 @@ import numpy as np
 from symtop.core.parallel import heed
 from symtop.methods.framework.lanes import Many, Whole, refused
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUT_OF_BUDGET, OUTCOMES, Array, Plan, Run
-from symtop.model.top import Angles, SymmetricTop, flat
+from symtop.model.top import Angles, SymmetricTop, flat, lightened
 
 AdaptiveLoop = Callable[..., tuple[int, int, int, int]]
 
@@ -33,6 +33,7 @@ class Adaptive:
     block: int  # units between returns to Python, so that an interrupt is heard within a second
     unit: Callable[[float], int] = lambda _: 1  # (tolerance): force evaluations in a unit of effort
     check: Callable[[Angles], None] | None = None  # as `Preparation` has it
+    light: bool = False  # a sample ends with three momenta, which the loop has in the unit of `lightened`
 
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         """Run from the start to the last sample of the plan."""
@@ -73,6 +74,7 @@ class Adaptive:
     ) -> tuple[int, int, int, float]:  # fmt: skip
         """Fill in the samples: steps, force evaluations, outcome and the time that was reached."""
         loop, unit = self.loop(tolerance), self.unit(tolerance)
+        numbers, mass = lightened(numbers) if self.light else (numbers, 1.0)
         place, most = np.empty(self.room), self.most if budget is None else budget / unit
         seen, steps, effort, outcome = -1, 0, 0, OK
         while seen < times.size and outcome == OK and effort < most:
@@ -81,5 +83,8 @@ class Adaptive:
             steps, effort = steps + more, effort + work
         if seen < times.size and outcome == OK:
             outcome = OUT_OF_BUDGET
+        if mass != 1.0:
+            states[:, -3:] *= mass
+            momenta *= mass
         reached = float(times[-1] if outcome == OK else place[self.time])
         return steps, effort * unit, outcome, reached

@@ -170,8 +170,8 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
     return compiled
 
 
-def solver(form: Any, method: Any, rows: int) -> Adaptive:
-    """A solver of the registry on the equations of a `Formulation`."""
+def solver(form: Any, method: Any, rows: int, *, light: bool = False) -> Adaptive:
+    """A solver of the registry on the equations of a `Formulation`; `light` as `Adaptive` has it."""
     size, shown = form.prepare.size, form.prepare.size if form.present is None else form.present.size
     clock = size * (1 + rows)
 
@@ -179,7 +179,8 @@ def solver(form: Any, method: Any, rows: int) -> Adaptive:
     def compiled() -> AdaptiveLoop:
         return loop(form, method, rows)
 
-    return Adaptive(lambda _: compiled(), shown, clock + 2, clock, EVALUATIONS, BLOCK, check=form.prepare.check)
+    limits = EVALUATIONS, BLOCK
+    return Adaptive(lambda _: compiled(), shown, clock + 2, clock, *limits, check=form.prepare.check, light=light)
 
 
 def integrator(name: str, summary: str, reference: str, method: Any, rows: int, **claims: Any) -> Integrator:

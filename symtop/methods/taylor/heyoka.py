@@ -8,7 +8,8 @@
 The order follows from the tolerance (about 20 in double), the step from the size of the series' last terms. Asking for
 a hundredth of the rounding unit removes the truncation bias that makes energy drift linearly at tolerance eps.
 `taylor` works in double, `taylor-longdouble` and `taylor-quad` with mantissas of 64 and 113 bits: they show the errors
-of the method without rounding, and `symtop.reference` uses the same function. A Taylor step of order n computes n
+of the method without rounding, and `symtop.reference` uses the same function. Its norm has all numbers of a state, so
+that momenta above 128 are counted in another unit (`lightened`). A Taylor step of order n computes n
 derivatives of the state; `force_evaluations` counts them. The registry has the two charts without poles; the study of
 charts makes an integrator in angles for itself.
 Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99; Biscani and Izzo, MNRAS 504 (2021) 2614.
@@ -31,7 +32,7 @@ from symtop.methods.framework.registry import Integrator
 from symtop.model import charts
 from symtop.model.charts import BODY
 from symtop.model.exact import heavy_body
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, SymmetricTop, flat, lightened
 
 START_DIGITS = 60  # of the multiprecision that a start is converted in
 MOST_STEPS = {"double": 30_000_000, "longdouble": 5_000_000, "quad": 100_000}  # of one run: 10 to 25 s
@@ -105,23 +106,28 @@ def _idle(chart: str, precision: str, tolerance: float) -> list[Any]:
     return []
 
 
+def _unit(chart: str, top: Any, at: Any) -> float:
+    """That of the momenta; angles come with rates."""
+    return 1.0 if chart == "angles" else lightened(flat(top, at))[1]
+
+
 @functools.lru_cache(maxsize=256)
 def start_numbers(chart: str, precision: str, top: Any, at: Any) -> tuple[tuple[Any, ...], tuple[Any, ...]]:
-    """State and parameters of a start, correctly rounded; in double theta(8) would move by 5e-15."""
-    kind, mp = arithmetic(precision).kind, context(START_DIGITS)
+    """State and parameters of a start in the unit of `lightened`, correctly rounded; in double theta(8) moves 5e-15."""
+    kind, mp, unit = arithmetic(precision).kind, context(START_DIGITS), _unit(chart, top, at)
     if chart == BODY:
-        momentum = [mp.mpf(moment) * rate for moment, rate in zip(top.moments, at.omega_body, strict=True)]
-        numbers = *(1 / mp.mpf(moment) for moment in top.moments), *map(mp.mpf, top.torque)
+        momentum = [mp.mpf(one) * rate / unit for one, rate in zip(top.moments, at.omega_body, strict=True)]
+        numbers = *(unit / mp.mpf(one) for one in top.moments), *(mp.mpf(part) / unit for part in top.torque)
         return _rounded(kind, mp, (*map(mp.mpf, at.quaternion), *momentum)), _rounded(kind, mp, numbers)
     theta, phi, psi, *rates = (mp.mpf(getattr(at, name)) for name in at.__slots__)
     if chart == "angles":
         numbers = 1 / mp.mpf(top.I1), mp.mpf(top.mgl), mp.mpf(top.I3)
         return _rounded(kind, mp, (theta, phi, psi, *rates)), _rounded(kind, mp, numbers)
     place = charts.axis_parts(mp, theta, phi) if chart == "axis" else charts.quaternion_parts(mp, theta, phi, psi)
-    state = [*place, *charts.momentum_parts(mp, top, theta, phi, *rates)]
+    state = [*place, *(part / unit for part in charts.momentum_parts(mp, top, theta, phi, *rates))]
     spin = top.I3 * (rates[2] + rates[1] * mp.cos(theta))
     twist = spin * (1 / mp.mpf(top.I3) - 1 / mp.mpf(top.I1))
-    return _rounded(kind, mp, state), _rounded(kind, mp, (1 / mp.mpf(top.I1), mp.mpf(top.mgl), twist))
+    return _rounded(kind, mp, state), _rounded(kind, mp, (unit / mp.mpf(top.I1), mp.mpf(top.mgl) / unit, twist))
 
 
 def _rounded(kind: Any, mp: Any, values: Iterable[Any]) -> tuple[Any, ...]:
@@ -155,6 +161,8 @@ def propagate(
     integrator.pars[:] = parameters[: integrator.pars.size]  # the axis chart does not need the last one
     outcome, _, _, steps, *_, states = integrator.propagate_grid(numbers, max_steps=most)
     order, time = int(integrator.order), float(integrator.time)
+    if (unit := _unit(chart, top, start)) != 1.0:
+        states[:, -3:] *= kind(repr(unit))
     idle.append(integrator)  # not after an exception, which may leave it in any state
     return Flight(states[grid.size - times.size :], int(steps), order, outcome.name, time)
 

@@ -13,8 +13,9 @@ A comparison with `series` shows the gain by those, one with `taylor` the gain b
 
     h = exp(-2 - 0.7/(N - 1)) min((s/|c_{N-1}|)^(1/(N-1)), (s/|c_N|)^(1/N)),    s = max(1, |y|)
 
-with the largest components as norms, as `taylor` has it: both take the same steps, and none is rejected. A sample is
-the polynomial. An order counts as an evaluation of f. Explicit, without poles; neither symplectic nor symmetric; L_z
+with the largest components as norms, as `taylor` has it: both take the same steps, and none is rejected. Momenta above
+128 are counted in another unit (`symtop.model.top.lightened`), as one norm weighs them and e or q. A sample is the
+polynomial. An order counts as an evaluation of f. Explicit, without poles; neither symplectic nor symmetric; L_z
 does not move.
 Source: Jorba, Zou, Experimental Mathematics 14 (2005) 99.
 """
@@ -199,7 +200,7 @@ def built_in() -> list[Integrator]:
         "conserves": frozenset({"p_phi"}), "reference": "jorba-zou-2005", "needs": "expression", "general": True,
     }  # fmt: skip
     fixed = {chart: FixedStep(loop(chart), (0.0,), FORMS[chart].prepare, ORDER, implicit=False) for chart in CHARTS}
-    adaptive = {chart: solver(FORMS[chart], method, HIGHEST + 2) for chart, method in CHARTS.items()}
+    adaptive = {chart: solver(FORMS[chart], method, HIGHEST + 2, light=True) for chart, method in CHARTS.items()}
     summary = "Taylor series of the unreduced space-frame equations by recurrence"
     return [
         Integrator("series-general", summary=f"{summary}, order {ORDER}", solvers=fixed, order=ORDER, **same),
