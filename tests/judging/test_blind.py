@@ -12,8 +12,8 @@ import pytest
 from scipy import integrate
 
 import symtop
-from symtop.judging import battery
-from symtop.judging.claims import calls
+from symtop.judging import battery, judge_step
+from symtop.judging.claims import calls, subject
 from symtop.judging.findings import description
 from symtop.judging.remote import Remote
 from tests.conftest import late
@@ -49,8 +49,10 @@ def confirmed(ledger, *claims):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seconds", [0.0, 0.01])  # those that a step takes, or as if it took these: runs are short then
 @pytest.mark.parametrize("name", right.CLAIMS)
-def test_a_correct_method_is_not_refuted(name):
+def test_a_correct_method_is_not_refuted(name, seconds, monkeypatch):
+    monkeypatch.setattr(judge_step, "seconds_a_step", lambda *by: seconds or subject.seconds_a_step(*by))
     claims, options = right.CLAIMS[name]
     ledger = symtop.judge(step_of(name, right), quick=True, **claims, **options)
     explicit = ["explicit"] if claims.get("explicit") else []  # that it is not, nobody sees from outside
