@@ -139,12 +139,11 @@ def test_jumps_short_runs_and_noise_are_told_from_growth():
 def test_an_energy_that_leaves_its_scale_is_said_to_blow_up_and_the_rest_judged_until_then(only, monkeypatch):
     """Euler's method gains energy, and keeps p_phi; the implicit one loses all that it can, which is no blow-up."""
     only("energy", "p_phi")
-    monkeypatch.setattr("symtop.judging.claims.subject.LONG", (10.0, 2.5))  # in full, for its 39,288 steps
+    monkeypatch.setattr("symtop.judging.claims.subject.LONG", (10.0, 60.0))  # time for its 39,288 steps on any machine
     ledger = symtop.judge(euler, quick=True, energy="bounded")
-    kinds = ledger["energy"].measured.kind, ledger["p_phi"].measured.kind
-    assert (kinds, ledger.refuted) == (("blows up", "kept"), ["energy"])
-    rise = 1.0 + 2.0 * SPHEROID.top.mgl / SPHEROID.energy_scale
-    assert rise < ledger["energy"].value < 2.0 * rise
+    assert [ledger[one].measured.kind for one in (*ledger.refuted, "p_phi")] == ["blows up", "kept"]
+    assert 1.0 < ledger["energy"].value / (1.0 + 2.0 * SPHEROID.top.mgl / SPHEROID.energy_scale) < 2.0
+    monkeypatch.setattr("symtop.judging.claims.subject.LONG", (10.0, 2.5))
     assert symtop.judge(implicit_euler, quick=True)["energy"].measured.kind in ("drift", "growing", "bounded")
     growing = symtop.judge(lambda q, w, h, inertia, torque: (q, w + h * w), form="rotation", scene=HEAVY, quick=True)
     assert growing["energy"].measured.kind == "blows up"
