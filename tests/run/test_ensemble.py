@@ -179,7 +179,7 @@ FIXED = {"step_size": 0.1, "horizon": 2.0}
     (STRANG, FIXED | {"step_size": [0.1] * 35 + [np.nan]}, "step_size of member 35 must be a finite number"),
     (STRANG, FIXED | {"step_size": 1e-12}, "member 0 asks for"),
     (STRANG, FIXED | {"variables": ["psi"]}, "variables in the axis chart are theta, .* not 'psi'"),
-    (STRANG, FIXED | {"variables": "axis"}, "a list of names"), (STRANG, FIXED | {"budget": 5}, "limit is 5"),
+    (STRANG, FIXED | {"variables": np.array(1)}, "a list of names"), (STRANG, FIXED | {"budget": 5}, "limit is 5"),
     (STRANG, {"nutations": 2, "per_nutation": 0.3}, "per_nutation must be at least 0.5.* not 0.3 as of member 0"),
     (STRANG, {"nutations": 1e308, "per_nutation": 20}, "nutations must be fewer"),
     (RK45, FIXED, "chooses its own steps"), (RK45, {"horizon": 2.0, "tolerance": 2.0}, "below 1"),

@@ -134,7 +134,7 @@ def field(chart: str, top: SymmetricTop | Scene | str, *, compiled: bool = False
 
     Raises SymtopError for another chart and for what is no top; so does a call for a y of another shape.
     """
-    top = scene(top).top if isinstance(top, (Scene, str)) else top
+    top = scene(top, bodies=True).top if isinstance(top, (Scene, str)) else top
     if not isinstance(top, SymmetricTop):
         raise SymtopError(f"top must be a SymmetricTop, a scene or its name, not {type(top).__name__}")
     return Field(one_of("chart", chart, CHARTS), top, compiled=compiled)
