@@ -191,6 +191,7 @@ def test_a_body_from_its_moments_about_the_centre_is_the_spheroid():
     (lambda: symtop.Angles.from_axis(symtop.SymmetricTop(1, 1, 1), [0, 0, 2], [0, 0, 1]), "axis must have unit"),
     (lambda: symtop.SymmetricTop.from_inertia(1, 1, 3, 1), "axial must be at most 2 at_centre"),
     (lambda: symtop.scene("tennis-racket"), r"not tennis-racket, a RigidBody: symtop.scene\(name, bodies=True\) ret"),
+    (lambda: symtop.field("axis", "spheroid").state([0.4]), "a start must be an instance of symtop.Angles, not .0.4"),
     (lambda: symtop.RigidBody.from_inertia(5.0), "matrix must be rows of 3 numbers, not 5.0"),
     (lambda: symtop.RigidBody.from_points(2.0, [[0, 0, 1]]), "masses must be a row of numbers, not 2.0"),
     (lambda: symtop.RigidBody.from_points([2.0], 1.0), "places must be rows of 3 numbers, not 1.0"),
