@@ -27,11 +27,11 @@ the pure top it is mostly the fastest way, and the advice says so with its time.
 import math
 import re
 import shlex
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
-from symtop.core.errors import SymtopError, boolean, one_of, positive
+from symtop.core.errors import SymtopError, boolean, entries, one_of, positive
 from symtop.core.progress import kernels_to_compile, post
 from symtop.judging.claims.subject import declared
 from symtop.measure import settings
@@ -190,7 +190,7 @@ def recommend(
     """
     scene = scenes.scene(scene, bodies=True)
     quantity = ("attitude" if scene.of_body else "axis") if quantity is None else quantity
-    allowed = _needs(_words(needs))
+    allowed = _needs(_words("needs", needs))
     accuracy = positive("accuracy", accuracy)
     one_of("quantity", quantity, settings.OF_BODY if scene.of_body else (*QUANTITIES, *FREQUENCIES))
     if quantity in settings.ANGLES and accuracy >= math.pi:
@@ -207,7 +207,7 @@ def recommend(
     if step is not None and step > longest:
         raise SymtopError(f"step_size must be at most max_step {longest:g}, not {step:g}", "step_size", "max_step")
     time_a_step = math.inf if time_a_step is None else positive("time_a_step", time_a_step)
-    constants = tuple(one_of("keeps", one, [*KEPT][: 1 if scene.of_body else None]) for one in _words(keeps))
+    constants = tuple(one_of("keeps", one, [*KEPT][: 1 if scene.of_body else None]) for one in _words("keeps", keeps))
     limits = step, longest, boolean("general", general), constants, time_a_step
     question = _Question(scene, accuracy, quantity, horizon, allowed, *limits)
     if accuracy < limit:
@@ -232,11 +232,11 @@ def recommend(
     return _advice(question, ranked, sentences, source, beside)
 
 
-def _words(given: object) -> list[object]:
+def _words(name: str, given: object) -> list[object]:
     """The entries of a list, or of a text with commas; empty for None."""
     if isinstance(given, str):
         return [*COMMA.split(given.strip())]
-    return [] if given is None else [*given] if isinstance(given, Iterable) else [given]
+    return [] if given is None else entries(name, given)
 
 
 def _needs(choice: Collection[object]) -> tuple[str, ...]:

@@ -349,7 +349,7 @@ def test_energy_and_momenta_may_both_be_asked_to_be_kept():
     words = functools.partial(symtop.recommend, "spheroid", accuracy=1e-3, horizon=2.0, step_size=0.01, needs="kicks")
     for kept in ("energy, momenta", ["energy", "momenta"]):
         assert words(keeps=kept).integrator in both
-    for wrong in ("energy,time", 3, ["energy", 3]):
+    for wrong in ("energy,time", ["energy", 3]):
         with pytest.raises(symtop.SymtopError, match=r"keeps .* is unknown; known: energy, momenta"):
             words(keeps=wrong)
         with pytest.raises(symtop.SymtopError, match=r"needs .* is unknown; known: derivative"):

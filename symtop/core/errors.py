@@ -7,6 +7,7 @@ import os
 import re
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 from symtop.core.signals import is_of_user
 
@@ -49,11 +50,12 @@ class SymtopWarning(UserWarning):
 
 
 def shown(value: object) -> str:
-    """The `repr` of a value, or if that raises anything, its type."""
+    """The `repr` of a value, at most 300 characters of it, or if that raises anything, its type."""
     try:
-        return repr(value)
+        text = repr(value)
     except Exception:  # noqa: BLE001
         return f"a {type(value).__name__} that cannot be printed"
+    return text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
 
 
 def finite(name: str, value: object, least: float = -math.inf) -> float:
@@ -99,11 +101,12 @@ def file_path(name: str, value: object) -> Path:
     """Return an output's name as a path, ``~`` the user's folder; refuse what can name none, or is in no folder."""
     if isinstance(value, (str, os.PathLike)):
         path = at_home(value)
-        longest = max(len(part.encode(errors="replace")) for part in (path.name, *path.parts))
-        if path.name and "\0" not in str(path) and longest <= LONGEST_PART:
-            if Path(os.path.realpath(path)).parent.is_dir():
-                return path
-            raise SymtopError(f"{name} must be in a folder that is there, not {str(value)!r}", name)
+        with contextlib.suppress(UnicodeEncodeError):  # half a letter
+            longest = max(len(os.fsencode(part)) for part in (path.name, *path.parts))
+            if path.name and "\0" not in str(path) and longest <= LONGEST_PART:
+                if Path(os.path.realpath(path)).parent.is_dir():
+                    return path
+                raise SymtopError(f"{name} must be in a folder that is there, not {str(value)!r}", name)
     raise SymtopError(f"{name} must be the name of a file, not {shown(value)[:SHOWN]}", name)
 
 
@@ -137,11 +140,15 @@ def at_home(path: str | os.PathLike[str]) -> Path:
 
 def row(name: str, values: object) -> list[float]:
     """Return `values` as a list of finite floats; refuse anything that is not a row of them."""
+    return [finite(f"{ENTRY}{name}", value) for value in entries(name, values, "a row of numbers", set)]
+
+
+def entries(name: str, values: Any, what: str = "a list of names", *refused: type) -> list[Any]:
+    """Return the entries of `values` as a list; refuse text, mappings and what has none, and the types `refused`."""
     with contextlib.suppress(TypeError):  # not iterable, such as an array without dimensions
-        entries = None if isinstance(values, (str, bytes, dict, set)) else list(values)  # type: ignore[call-overload]
-        if entries is not None:
-            return [finite(f"{ENTRY}{name}", value) for value in entries]
-    raise SymtopError(f"{name} must be a row of numbers, not {shown(values)}", name)
+        if not isinstance(values, (str, bytes, Mapping, *refused)):
+            return list(values)
+    raise SymtopError(f"{name} must be {what}, not {shown(values)}", name)
 
 
 def label(name: str, value: object) -> str:

@@ -236,7 +236,7 @@ def grid(fields: Mapping[str, Any]) -> tuple[Setup, np.ndarray, np.ndarray]:
     least, most = (positive(name, fields.get(name)) for name in ("step_least", "step_most"))
     low, high = (finite(name, fields.get(name)) for name in ("spin_least", "spin_most"))
     if not (least < most and low < high):
-        raise SymtopError(f"the ranges of a map must not be empty, not {least!r} to {most!r} s, {low!r} to {high!r}")
+        raise SymtopError(f"the ranges of a map must not be empty, not {least!r} to {most!r}, {low!r} to {high!r}")
     steps, spins = np.geomspace(least, most, COLUMNS), np.linspace(low, high, ROWS)
     if (total := ROWS * float(np.sum(config.scene.horizon / steps))) > MOST_MAP_STEPS:
         raise SymtopError(f"a map must have at most {MOST_MAP_STEPS} steps, not {total:.3g}: take a shorter time")
@@ -322,9 +322,9 @@ def inclination(config: Setup, friction: float) -> dict[str, Any]:
     exact = theta_before_pole(scene, torque, dense, MOST_TOP_EVALUATIONS)
     valid = np.searchsorted(dense, times) < exact.size
     error = np.degrees(np.abs(theta[valid] - exact[np.searchsorted(dense, times[valid])]))
-    ended = [f"midpoint: {OUTCOMES[run.outcome].replace('_', ' ')} at t = {run.steps * h:.3g} s"] if run.outcome else []
+    ended = [f"midpoint: {OUTCOMES[run.outcome].replace('_', ' ')} at t = {run.steps * h:.3g}"] if run.outcome else []
     if exact.size < dense.size:
-        near = f"within {NEAR} rad of a pole at t = {dense[exact.size]:.3g} s"
+        near = f"within {NEAR} rad of a pole at t = {dense[exact.size]:.3g}"
         ended.append(f"the exact motion comes {near} and ends there")
     of_exact = {"exact_time": dense[: exact.size], "exact": np.degrees(exact)}
     largest = {"midpoint": float(np.nanmax(error))}
@@ -360,7 +360,7 @@ def catalogue() -> dict[str, Any]:
 
     offered = [
         {
-            **{name: getattr(entry, name) for name in ("name", "purpose", "horizon")},
+            **{name: getattr(entry, name) for name in ("name", "purpose", "horizon", "units")},
             "period": float(np.nan_to_num(entry.nutation_period, posinf=0.0)),
             **asdict(entry.top),
             **(dict(zip(RATES, entry.start.omega_body, strict=True)) if entry.of_body else asdict(entry.start)),

@@ -16,6 +16,7 @@ from symtop.core.errors import SymtopError, boolean, one_of, positive
 from symtop.core.parallel import cores, in_threads
 from symtop.core.progress import CLOSED_FORM, kernels_to_compile, post, progress_bar
 from symtop.judging.adapters.adapter import integrator as adapted
+from symtop.judging.adapters.external import x64
 from symtop.judging.claims.subject import LIBRARIES, open_target
 from symtop.measure import columns, settings
 from symtop.measure.accuracy import as_table, blank_row
@@ -69,7 +70,8 @@ def compare(
     until = horizon if nutations is None else positive("nutations", nutations) * problem.nutation_period
     end = problem.horizon if until is None else horizon_of(until)
     most = None if budget is None else positive("budget", budget)
-    records = [find(one, problem) for one in listed(methods)]
+    with x64(restored=True):
+        records = [find(one, problem) for one in listed(methods)]
     variants = [one.variant(chart_of(one, problem.observes, settings.observed(quantity))) for one in records]
     names = [one.name for one in variants]
     if not names or len(set(names)) < len(names):
@@ -82,7 +84,7 @@ def compare(
         return _runs(problem, method, end, limit, quantity)
 
     exact = find_integrator("exact")
-    with progress_bar("compare", quiet=boolean("quiet", quiet), total=len(names)) as bar:
+    with progress_bar("compare", quiet=boolean("quiet", quiet), total=len(names)) as bar, x64(restored=True):
         results = []
         kernels = [one for one in variants if one.implementation == "compiled"]
         kernels_to_compile[0] = len(kernels) + (0 if closed_form.load() else CLOSED_FORM)

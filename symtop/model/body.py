@@ -15,7 +15,6 @@ top of `symtop.model.top`, and M3 = p_psi is conserved, too. A start of a body i
 Units are any consistent set. Source: Goldstein, Classical Mechanics, chapter 5.
 """
 
-import contextlib
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -23,7 +22,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from symtop.core.errors import SymtopError, finite, positive, row, shown
+from symtop.core.errors import SymtopError, entries, finite, positive, row
 from symtop.core.jit_functions import inlined, two_product
 from symtop.core.numbers import EPSILON
 from symtop.model.top import LARGEST, SLACK, bounded, of_kind, unit, vector
@@ -48,13 +47,6 @@ def _as_stored(given: Sequence[float], scaled: Sequence[float]) -> tuple[float, 
     """`scaled`, numbers of length one; `given` if that agrees to rounding, so that a stored body is read unchanged."""
     near = all(abs(float(old) - new) <= 2.0 * EPSILON for old, new in zip(given, scaled, strict=True))
     return tuple(float(number) for number in (given if near else scaled))
-
-
-def _rows(name: str, value: Any) -> list[Any]:
-    """The entries of a list; SymtopError for what is not iterable."""
-    with contextlib.suppress(TypeError):
-        return list(value)
-    raise SymtopError(f"{name} must be rows of 3 numbers, not {shown(value)}", name)
 
 
 @dataclass(frozen=True, slots=True)
@@ -126,7 +118,7 @@ class RigidBody:
         if others:
             words = "mgl, which is mass times gravity times the distance of the centre from the fixed point"
             raise SymtopError(f"a heavy body by its inertia needs {words}, not {', '.join(others)}", "mgl")
-        rows = [vector("a row of matrix", row, 3) for row in _rows("matrix", matrix)]
+        rows = [vector("a row of matrix", row, 3) for row in entries("matrix", matrix, "rows of 3 numbers")]
         if len(rows) != 3:
             raise SymtopError(f"matrix must have 3 rows, not {len(rows)}", "matrix")
         inertia = np.array(rows)
@@ -157,7 +149,8 @@ class RigidBody:
     ) -> "RigidBody":
         """Points of `masses` (n,) at `places` (n, 3) from the fixed point, in any body axes; free without `gravity`."""
         weights = np.array([positive("masses", mass) for mass in row("masses", masses)])
-        points = np.array([vector("a place of places", place, 3) for place in _rows("places", places)]).reshape(-1, 3)
+        rows = [vector("a place of places", place, 3) for place in entries("places", places, "rows of 3 numbers")]
+        points = np.array(rows).reshape(-1, 3)
         if len(weights) != len(points):
             raise SymtopError(f"places must be as many as masses, {len(weights)}, not {len(points)}", "places")
         squares = (points * points).sum(axis=1)

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from symtop.core.code_hash import by_name
-from symtop.core.errors import SymtopError, finite, label, one_of, positive, shown
+from symtop.core.errors import SymtopError, entries, finite, label, one_of, positive, shown
 from symtop.core.numbers import EPSILON, TINY
 from symtop.model.body import Attitude, RigidBody
 from symtop.model.charts import BODY, Array
@@ -95,9 +95,8 @@ class Scene:
             object.__setattr__(self, "observes", BODY)
         one_of("observes", self.observes, (BODY,) if self.of_body else OBSERVABLES)
         one_of("units", self.units, UNITS)
-        if isinstance(self.tags, str) or not isinstance(self.tags, Iterable):
-            raise SymtopError(f"tags must be a list of names, not {shown(self.tags)}")
-        object.__setattr__(self, "tags", tuple(sorted({one_of("tags", tag, TAGS) for tag in self.tags})))
+        tags = {one_of("tags", tag, TAGS) for tag in entries("tags", self.tags)}
+        object.__setattr__(self, "tags", tuple(sorted(tags)))
 
     def _repr_html_(self) -> str:
         return Catalogue({self.name: self})._repr_html_()
@@ -436,7 +435,8 @@ def scene(name: str | Scene, *, bodies: bool = False) -> Scene:
         catalogue = all_scenes()
         chosen = catalogue[one_of("scene", name, catalogue)]
     if chosen.of_body and not bodies:
-        raise SymtopError(f"scene must be one of a SymmetricTop here, not {chosen.name}, a RigidBody")
+        words = f"{chosen.name}, a RigidBody: symtop.scene(name, bodies=True) returns it"
+        raise SymtopError(f"scene must be one of a SymmetricTop, not {words}", "scene")
     return chosen
 
 

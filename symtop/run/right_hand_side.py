@@ -81,8 +81,8 @@ def guard(
     if rule is not None and setting > end:
         raise SymtopError(f"step_size must be at most the horizon {end!r}, not {setting!r}", "step_size")
 
-    def rate(t: float, y: Array) -> Array:
-        value = real_numbers("what f returns", f(t, y.copy())).copy()  # f may change y or reuse its result
+    def rate(t: float, y: Array) -> Array:  # t counts from t0: near 1e9 doubles are 1e-7 apart
+        value = real_numbers("what f returns", f(begin + t, y.copy())).copy()  # f may change y or reuse its result
         if value.shape != start.shape:
             raise SymtopError(f"f must return {start.size} numbers, not an array of shape {value.shape}")
         return value
@@ -91,7 +91,7 @@ def guard(
         return _outlook(rate, begin, start, end, method, rule, setting, accuracy)
 
 
-def _stepped(f: Any, rule: Tableau, t: float, y: Array, h: float, marks: Any) -> Array:
+def _stepped(f: Any, rule: Tableau, y: Array, h: float, marks: Any) -> Array:
     """States (marks, n) of an explicit Runge-Kutta method after the numbers of steps `marks`."""
     b = np.array(rule.b)
     a, slopes, states, done = np.zeros((b.size, b.size)), np.zeros((b.size, y.size)), [], 0
@@ -99,47 +99,47 @@ def _stepped(f: Any, rule: Tableau, t: float, y: Array, h: float, marks: Any) ->
     for mark in marks:
         for k in range(done, int(mark)):
             for i in range(b.size):
-                slopes[i] = f(t + (k + a[i].sum()) * h, y + h * (a[i, :i] @ slopes[:i]))
+                slopes[i] = f((k + a[i].sum()) * h, y + h * (a[i, :i] @ slopes[:i]))
             y = y + h * (b @ slopes)
         done = int(mark)
         states.append(y)
     return np.array(states)
 
 
-def _finite(f: Any) -> Any:
+def _finite(f: Any, begin: float) -> Any:
     """f, with SymtopError where it is not finite: SciPy's solvers would reduce their steps without end."""
 
     def rate(t: float, y: Array) -> Array:
         value: Array = f(t, y)
         if not np.isfinite(value).all():
-            raise SymtopError(f"f must be finite, not {value.tolist()} at t = {float(t)!r}")
+            raise SymtopError(f"f must be finite, not {value.tolist()} at t = {begin + float(t)!r}")
         return value
 
     return rate
 
 
-def _motion(f: Any, t: float, y: Array, end: float) -> tuple[Any, float]:
+def _motion(f: Any, y: Array, end: float) -> tuple[Any, float]:
     """The solution by DOP853 as a function of time, or None if its first step fails, and the time that it covers."""
     from scipy.integrate import DOP853, OdeSolution  # 0.2 s
 
     # a start at zero gives no scale for the tolerance; take a negligible part of the expected size of y
-    size = float(np.abs(y).max()) or EPSILON * (end * float(np.abs(f(t, y)).max()) or 1.0)
-    solver = DOP853(_finite(f), t, y, t + end, rtol=FINE, atol=FINE * size)
-    times, parts = [t], list[Any]()
+    size = float(np.abs(y).max()) or EPSILON * (end * float(np.abs(f(0.0, y)).max()) or 1.0)
+    solver = DOP853(f, 0.0, y, end, rtol=FINE, atol=FINE * size)
+    times, parts = [0.0], list[Any]()
     while solver.status == "running" and len(parts) < WATCHED and solver.step() is None:
         times.append(solver.t)
         parts.append(solver.dense_output())
-    return OdeSolution(times, parts) if parts else None, times[-1] - t
+    return OdeSolution(times, parts) if parts else None, times[-1]
 
 
-def _growth(f: Any, near: Any, t: float, y: Array, elapsed: Array, extent: float) -> Growth:
+def _growth(f: Any, near: Any, y: Array, elapsed: Array, extent: float) -> Growth:
     """The amplification A of a small change of the start; with a smaller change if the two motions separate too far."""
     for moved in MOVED:
-        far, reached = _motion(f, t, y + moved * extent / math.sqrt(y.size), float(elapsed[-1]))
+        far, reached = _motion(f, y + moved * extent / math.sqrt(y.size), float(elapsed[-1]))
         times, most = elapsed[elapsed <= reached * (1.0 + EPSILON)], SATURATED / moved
         if times.size == 0:
             return Growth(elapsed[:1], np.array([math.inf]))
-        apart = np.linalg.norm(far(t + times) - near(t + times), axis=0) / (moved * extent)
+        apart = np.linalg.norm(far(times) - near(times), axis=0) / (moved * extent)
         if apart.max() < most:
             break
     return Growth.of(times, apart, most)
@@ -162,21 +162,22 @@ def _outlook(
 ) -> Outlook:
     from scipy.integrate import solve_ivp
 
-    near, watched = _motion(f, t, y, end)
-    if near is None or (near.t_max < t + end and len(near.interpolants) < WATCHED):
+    safe = _finite(f, t)
+    near, watched = _motion(safe, y, end)
+    if near is None or (near.t_max < end and len(near.interpolants) < WATCHED):
         words = f"below {watched:.6g}, not {end!r}: the motion goes beyond all bounds there, as far as DOP853 can tell"
         raise SymtopError(f"horizon must be {words}", "horizon")
     elapsed = watched * np.arange(1.0, POINTS + 1.0) / POINTS
-    true = near(t + elapsed)
+    true = near(elapsed)
     path = np.column_stack([y, true])  # with the start, which a transient may leave before the first of these times
     spread, extent = np.std(true, axis=1), float(np.linalg.norm(np.ptp(path, axis=1))) or 1.0
     turns = 0.5 * float(np.linalg.norm(np.diff(path, axis=1), axis=0).sum()) / extent  # oscillations, from path length
-    rates = np.std([f(t + time, state) for time, state in zip(elapsed, true.T, strict=True)], axis=0)
+    rates = np.std([f(time, state) for time, state in zip(elapsed, true.T, strict=True)], axis=0)
     frequency = float(np.linalg.norm(rates)) / max(float(np.linalg.norm(spread)), TINY)
     whole = watched >= end or turns >= 1.0  # the extent of the motion is known
     slow = min(frequency, 2.0 * math.pi * turns / watched)
     moved, kind = y + MOVED[0] * extent / math.sqrt(y.size), "step" if rule else "tolerance"
-    growth = _growth(f, near, t, y, elapsed, extent)
+    growth = _growth(safe, near, y, elapsed, extent)
     turn = 2.0 * math.pi / max(slow, TINY)  # longer than a period at `frequency` where a motion is fast now and then
     piece = min(end, watched, max(SHARE * end, PERIODS * 2.0 * math.pi / max(frequency, TINY), TURNS * turn))
     places = np.union1d(np.geomspace(FIRST, 1.0, POINTS // 4), elapsed / watched)  # compared times, in pieces
@@ -185,13 +186,13 @@ def _outlook(
         """Times and states of the piece, and the mean step (0 for an implicit method)."""
         if rule:
             marks = np.unique(np.rint(min(int(piece / setting * (1.0 + 1e-9)), PROBED) * places).clip(1.0))
-            return marks * setting, _stepped(f, rule, t, start, setting, marks), setting
-        (name, cost), shown = SCIPY[method], np.unique(np.minimum(t + piece * places, t + piece))
-        run = solve_ivp(_finite(f), (t, t + piece), start, name, shown, rtol=setting, atol=setting)
-        return run.t - t, run.y.T, piece * cost / run.nfev
+            return marks * setting, _stepped(f, rule, start, setting, marks), setting
+        (name, cost), shown = SCIPY[method], np.unique(np.minimum(piece * places, piece))
+        run = solve_ivp(safe, (0.0, piece), start, name, shown, rtol=setting, atol=setting)
+        return run.t, run.y.T, piece * cost / run.nfev
 
     times, states, mean = run_piece(y)
-    error = np.linalg.norm(states - near(t + times).T, axis=1)
+    error = np.linalg.norm(states - near(times).T, axis=1)
     short = setting > watched if rule else times[-1] < 0.99 * piece  # the piece has no step, or SciPy ended early
     ended = bool(short) or not np.isfinite(error).all()
     total, since = growth.at(end), growth.at(float(times[-1]))
@@ -199,8 +200,8 @@ def _outlook(
     better = setting * (accuracy / max(expected, TINY)) ** (1.0 / ((rule and integrator(method).order) or 1))
     better = 0.3 * setting if ended else min(better, end if rule else LOOSEST)
     change = math.sqrt(EPSILON) * extent
-    rate = f(t, y)
-    slopes = [(f(t, y + change * unit) - rate) / change for unit in np.eye(y.size)]
+    rate = f(0.0, y)
+    slopes = [(f(0.0, y + change * unit) - rate) / change for unit in np.eye(y.size)]
     modes, cause = np.linalg.eigvals(np.array(slopes)), "step"
     fastest = float(np.abs(modes).max())
     if rule and fastest > STIFF * slow:  # limit the step by stability

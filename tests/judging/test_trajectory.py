@@ -69,7 +69,7 @@ def test_an_unknown_claim_about_a_trajectory_is_refused_and_one_that_a_ledger_ha
     result = call("judge", tmp_path / "run.csv", "--conserves", "p_phi,enrgy", code=2)
     assert "'enrgy' is unknown; did you mean energy" in result.output
     columns = {"time": table[:, 0], "axis": table[:, 1:4]}
-    with pytest.raises(symtop.SymtopError, match="conserves must be a set of names, not 'p_phi'"):
+    with pytest.raises(symtop.SymtopError, match="conserves must be a list of names, not 'p_phi'"):
         symtop.judge(columns, conserves="p_phi")
     ledger = symtop.judge(columns)
     assert [ledger[claim].claim for claim in ledger] == ["axis_error", "theta_error"]

@@ -7,6 +7,9 @@ const FLOOR = 1e-17;
 // A colour of the style sheet, which follows the light or dark scheme.
 export const tone = (name) => getComputedStyle(document.documentElement).getPropertyValue(`--${name}`).trim();
 
+// A unit, of a scene in SI units; nothing of any other.
+export const unit = (words) => (document.body.classList.contains("si") ? words : "");
+
 // A canvas scaled to the screen's own pixels; returns its context and its size in page units.
 export function surface(canvas) {
   const box = canvas.getBoundingClientRect();
@@ -255,7 +258,7 @@ export function plot(canvas, time, curves, logarithmic, now) {
   context.textAlign = "center"; context.textBaseline = "top";
   for (const tick of ticks(0, end, 5, false)) context.fillText(`${+tick.toPrecision(4)}`, Math.min(x(tick), width - 22), height - BOTTOM + 5);
   context.textAlign = "right";
-  context.fillText("s", width - 1, height - BOTTOM + 5);
+  context.fillText(unit("s"), width - 1, height - BOTTOM + 5);
   shown.forEach((values, k) => {
     context.strokeStyle = curves[k].color;
     context.lineWidth = 1.4;

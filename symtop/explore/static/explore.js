@@ -1,6 +1,6 @@
 // Controls, requests to the server, and the animation.
 
-import { Sphere, plot, tone } from "./draw.js";
+import { Sphere, plot, tone, unit } from "./draw.js";
 import { drawCost } from "./cost.js";
 import { OutcomeMap } from "./map.js";
 import { portrait } from "./portrait.js";
@@ -33,10 +33,9 @@ function control([name, label, least, most, logarithmic], group) {
   const row = document.createElement("div");
   row.className = "slider";
   const [words, slider, number] = ["label", "input", "input"].map((tag) => document.createElement(tag));
-  words.textContent = label;
   words.htmlFor = number.id = name;
   slider.id = `${name}-slider`;
-  slider.setAttribute("aria-label", label);
+  const inUnits = () => { words.textContent = label.replace(/ \((kg m²|N m|rad\/s|s)\)/, unit("$&")); slider.setAttribute("aria-label", words.textContent); };
   number.type = "number";
   number.step = "any";
   slider.type = "range";
@@ -49,7 +48,8 @@ function control([name, label, least, most, logarithmic], group) {
   slider.addEventListener("input", () => { values[name] = +back(+slider.value).toPrecision(6); number.value = values[name]; changed(group); });
   number.addEventListener("change", () => { values[name] = number.value === "" ? null : +number.value; slider.value = forth(values[name]); changed(group); });
   const span = (value) => { if (/_dot$|^w\d$/.test(name)) Object.assign(slider, { min: Math.min(least, -2 * Math.abs(value)), max: Math.max(most, 2 * Math.abs(value)) }); };
-  rows[name] = { row, set: (value) => { values[name] = value; span(value); show(value); } };
+  inUnits();
+  rows[name] = { row, inUnits, set: (value) => { values[name] = value; span(value); show(value); } };
 }
 
 // Friction is no part of the run.
@@ -81,6 +81,8 @@ function chooseScene(name) {
   values.scene = name;
   $("reset").disabled = true;
   document.body.classList.toggle("a-body", "I2" in entry);
+  document.body.classList.toggle("si", entry.units === "SI");
+  for (const row of Object.values(rows)) row.inUnits();
   for (const [key] of [...TOP, ...START]) {
     rows[key].row.hidden = !(key in entry);
     if (key in entry) rows[key].set(entry[key]); else values[key] = null;
@@ -361,7 +363,7 @@ function frame(instant) {
     if (playing) place = place + passed * speed > last ? 0 : place + passed * speed;
     place = Math.min(place, last);
     $("clock").value = place / last;
-    $("now").textContent = `${run.time[Math.round(place)].toFixed(2)} s`;
+    $("now").textContent = `${run.time[Math.round(place)].toFixed(2)}${unit(" s")}`;
     sphere.draw(run, place, second);
     if (playing && instant - drawnAt > 100) drawPlots();
   }

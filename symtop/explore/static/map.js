@@ -1,6 +1,6 @@
 // The map of outcomes: step across, spin upward, each cell one run; a click or the arrow keys choose a cell.
 
-import { surface, tone } from "./draw.js";
+import { surface, tone, unit } from "./draw.js";
 
 const LEFT = 46, RIGHT = 10, TOP = 8, BOTTOM = 32;
 // From an axis error of 1e-6 rad to 1 rad: cividis, which colour-blind eyes and grey prints keep in order.
@@ -63,7 +63,7 @@ export class OutcomeMap {
     context.fillText(`${+range.spin_most.toPrecision(3)}`, LEFT - 5, TOP + 6);
     context.fillText(`${+range.spin_least.toPrecision(3)}`, LEFT - 5, TOP + h - 6);
     context.textAlign = "center";
-    context.fillText("step (s), logarithmic", LEFT + w / 2, height - 7);
+    context.fillText(`step${unit(" (s)")}, logarithmic`, LEFT + w / 2, height - 7);
     const [across, upward] = this.place(at);
     if (across < 0 || across > 1 || upward < 0 || upward > 1) return;
     for (const [color, line] of [["#000000", 4], ["#ffffff", 2]]) {

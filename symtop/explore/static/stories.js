@@ -3,7 +3,7 @@
 export const STORIES = {
   cusp: {
     scene: "cusp", integrator: "stormer-verlet", second: "midpoint", step_size: 0.33,
-    watch: "The axis comes to rest at each cusp; with 4 steps a nutation both methods reach the cusps at wrong times. Raise the step to 0.45 s: Stormer-Verlet leaves its phase curve and fails, midpoint stays near it.",
+    watch: "The axis comes to rest at each cusp; with 4 steps a nutation both methods reach the cusps at wrong times. Raise the step to 0.45: Stormer-Verlet leaves its phase curve and fails, midpoint stays near it.",
   },
   loop: {
     scene: "loop", integrator: "rk4", second: "gauss-4", step_size: 0.26,
@@ -11,7 +11,7 @@ export const STORIES = {
   },
   sleeping: {
     scene: "sleeping-unstable", integrator: "rk4", second: "midpoint", step_size: 0.71,
-    watch: "Let go almost upright below the threshold spin of 2 rad/s, the top falls and rises again; with this step rk4 does so at the wrong time. Raise psi' to 2.5 rad/s: the top sleeps, and both methods stay upright.",
+    watch: "Let go almost upright below the threshold spin of 2, the top falls and rises again; with this step rk4 does so at the wrong time. Raise psi' to 2.5: the top sleeps, and both methods stay upright.",
   },
   "pole jump": {
     scene: "grazing", integrator: "midpoint", second: "strang", step_size: 0.07,
@@ -19,10 +19,10 @@ export const STORIES = {
   },
   resonance: {
     scene: "steady-fast", integrator: "stormer-verlet", second: "strang", step_size: 0.2,
-    watch: "The steady precession is exact for Stormer-Verlet until the step reaches 1/pi of a nutation, 0.202 s. Move the step from 0.2 to 0.21 s: a rounding error grows at every step until the run fails, while Strang only wobbles.",
+    watch: "The steady precession is exact for Stormer-Verlet until the step reaches 1/pi of a nutation, 0.202. Move the step from 0.2 to 0.21: a rounding error grows at every step until the run fails, while Strang only wobbles.",
   },
   "tennis-racket": {
     scene: "tennis-racket", integrator: "lie-variational", second: "gauss-4", step_size: 0.6,
-    watch: "A free body let go about its middle axis flips over again and again, exactly at 14.9, 42.4, 69.9 and 97.5 s. Both methods take ten steps a turn and keep the energy to 1e-15; gauss-4 flips on time, lie-variational at 13.3, 37.7, 62.2 and 86.7 s. A step of 0.1 s leaves it 0.2 s too early: kept energy does not say when.",
+    watch: "A free body let go about its middle axis flips over again and again, exactly at t = 14.9, 42.4, 69.9 and 97.5. Both methods take ten steps a turn and keep the energy to 1e-15; gauss-4 flips on time, lie-variational at 13.3, 37.7, 62.2 and 86.7. A step of 0.1 leaves it 0.2 too early: kept energy does not say when.",
   },
 };

@@ -322,16 +322,21 @@ def double_precision(jax: Any) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def x64() -> Iterator[None]:
-    """A context in which a file is loaded, so that arrays of JAX that it makes as constants have double precision."""
-    set_here = "JAX_ENABLE_X64" not in os.environ
+def x64(*, restored: bool = False) -> Iterator[None]:
+    """A context in which JAX makes arrays of double precision, as constants of a file that is loaded in it, too.
+
+    Where JAX was not imported before, its mode after is single precision if `restored`, and else stays double.
+    """
+    set_here, imported = "JAX_ENABLE_X64" not in os.environ, "jax" in sys.modules
     os.environ.setdefault("JAX_ENABLE_X64", "1")  # read where JAX is imported
     try:
-        with double_precision(sys.modules["jax"]) if "jax" in sys.modules else contextlib.nullcontext():
+        with double_precision(sys.modules["jax"]) if imported else contextlib.nullcontext():
             yield
     finally:
         if set_here:
             os.environ.pop("JAX_ENABLE_X64", None)
+        if set_here and restored and not imported and "jax" in sys.modules:
+            sys.modules["jax"].config.update("jax_enable_x64", False)
 
 
 def is_solver(thing: Any) -> bool:

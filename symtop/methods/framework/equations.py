@@ -27,7 +27,7 @@ from symtop.methods.framework.preparation import BareTop
 from symtop.methods.framework.space import AttitudeTop, SpaceTop, field_attitude, field_axis
 from symtop.model.charts import BODY, CHARTS, lifted, space_momenta
 from symtop.model.scenes import Scene, scene
-from symtop.model.top import Angles, SymmetricTop
+from symtop.model.top import Angles, SymmetricTop, of_kind
 
 
 class Formulation(NamedTuple):
@@ -102,7 +102,7 @@ class Field:
 
     def __call__(self, _: float, y: Any) -> Array:
         """y' at any time: an array like y. Raises SymtopError for a y that is no state of the chart."""
-        if not isinstance(y, np.ndarray):
+        if not isinstance(y, np.ndarray) or y.dtype.kind != "f":
             y = real_numbers("y", y)
         if y.shape != self._shape:  # compiled code would read beyond the end of the array
             raise SymtopError(f"y must have the shape {self._shape} in the chart {self.chart}, not {y.shape}")
@@ -117,7 +117,7 @@ class Field:
 
     def state(self, start: Angles) -> Array:
         """The state y of a start."""
-        return np.array(FORMULATIONS[self.chart].prepare(self.top, start)[1], dtype=float)
+        return np.array(FORMULATIONS[self.chart].prepare(self.top, of_kind(start, Angles))[1], dtype=float)
 
 
 def field(chart: str, top: SymmetricTop | Scene | str, *, compiled: bool = False) -> Field:
@@ -134,7 +134,7 @@ def field(chart: str, top: SymmetricTop | Scene | str, *, compiled: bool = False
 
     Raises SymtopError for another chart and for what is no top; so does a call for a y of another shape.
     """
-    top = scene(top).top if isinstance(top, (Scene, str)) else top
+    top = scene(top, bodies=True).top if isinstance(top, (Scene, str)) else top
     if not isinstance(top, SymmetricTop):
         raise SymtopError(f"top must be a SymmetricTop, a scene or its name, not {type(top).__name__}")
     return Field(one_of("chart", chart, CHARTS), top, compiled=compiled)

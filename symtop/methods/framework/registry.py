@@ -129,10 +129,8 @@ class Integrator:
         if self.exact_steps and (self.order is not None or not self.fixed_step):
             raise SymtopError("exact_steps must be False for a method that has an order or no step_size")
         if self.conserves is not None:
-            some = isinstance(self.conserves, Collection) and getattr(self.conserves, "shape", None) != ()
-            if isinstance(self.conserves, str) or not some:
-                raise SymtopError(f"conserves must be a set of names, not {shown(self.conserves)}")
-            names = frozenset(one_of("an entry of conserves", name, CONSERVED) for name in self.conserves)
+            claims = errors.entries("conserves", self.conserves)
+            names = frozenset(one_of("an entry of conserves", name, CONSERVED) for name in claims)
             object.__setattr__(self, "conserves", names)
 
     def _check_kinds(self) -> None:
@@ -277,11 +275,11 @@ def _load_packages() -> None:
 def register(entry: Integrator, *, replace: bool = False) -> Integrator:
     """Add an integrator to the registry; a name that is taken is refused unless `replace` is true."""
     if not isinstance(entry, Integrator):
-        raise SymtopError(f"register needs an Integrator, not {entry!r}")
+        raise SymtopError(f"register needs an Integrator, not {shown(entry)}")
     if entry.method != entry.name:
         raise SymtopError(f"register needs an integrator and not one of its variants, {entry.name!r}")
     _load()
-    if entry.name in _registry and not replace:
+    if not errors.boolean("replace", replace) and entry.name in _registry:
         raise SymtopError(f"integrator {entry.name!r} is already registered; choose another name or pass replace=True")
     _registry[entry.name] = entry
     return entry

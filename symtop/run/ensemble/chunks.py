@@ -43,6 +43,7 @@ from symtop.run.trajectory import LABELS
 CHUNK = 65_536  # values of one column in a chunk: half a megabyte, which stays in a core's cache
 CHUNK_STEPS = 5_000_000  # most steps in a chunk: 0.01 s in lanes, to 1 s
 SHARES, LEAST_STEPS = 16, 200_000  # an ensemble has at least 16 chunks, unless these had fewer steps (1 ms) than this
+SLOWER = 25  # how much fewer steps a chunk has of a method that is called from Python: 200 runs of rk45 take 12 s
 HARMLESS = 1e100  # states and momenta below it have a finite energy: no inertia is below 1e-40
 UNKNOWN_STEPS = 1000  # the steps assumed of a member of an adaptive method or of a closed form
 READ_TOGETHER = 4096  # members whose angles a thread makes continuous at a time
@@ -193,13 +194,13 @@ class Job:
         return IN_TURN if solver is exact.solve or isinstance(solver, Adaptive) else IN_PYTHON
 
     def chunks(self) -> Iterator[slice]:
-        """Slices of the members with at most `CHUNK` values per column and about `CHUNK_STEPS` steps.
+        """Slices of the members with at most `CHUNK` values per column and about `CHUNK_STEPS` steps, fewer in Python.
 
         They do not depend on the number of workers; one of more than 4 W members has whole blocks of W lanes.
         """
         n, begin, size = len(self.numbers), 0, max(1, CHUNK // self.samples)
         ends = np.cumsum(np.full(n, UNKNOWN_STEPS) if self.steps is None else self.steps)
-        most = min(CHUNK_STEPS, max(LEAST_STEPS, ends[-1] // SHARES))
+        most = min(CHUNK_STEPS, max(LEAST_STEPS, ends[-1] // SHARES)) // (SLOWER if self.execution == IN_PYTHON else 1)
         while begin < n:
             done = ends[begin - 1] if begin else 0
             length = min(int(np.searchsorted(ends, done + most, "right")) - begin, size)

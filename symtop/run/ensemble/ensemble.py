@@ -17,7 +17,7 @@ import netCDF4
 import numpy as np
 import xarray as xr
 
-from symtop.core import netcdf
+from symtop.core import errors, netcdf
 from symtop.core.code_hash import digest, hashed, packages
 from symtop.core.errors import SymtopError, SymtopWarning, boolean, check_replaceable, file_path, positive, whole
 from symtop.core.files import only_writer, replacing, sweep
@@ -179,9 +179,7 @@ def _observables(variables: Iterable[str] | None, chart: str) -> tuple[str, ...]
     """The variables of the dataset, checked against the chart and in its order; None for all."""
     if variables is None:
         return SHOWN[chart]
-    if isinstance(variables, str) or not isinstance(variables, Iterable):
-        raise SymtopError(f"variables must be a list of names, not {variables!r}", "variables")
-    names, possible = list(variables), SHOWN[chart]
+    names, possible = [str(name) for name in errors.entries("variables", variables)], SHOWN[chart]
     for name in names:
         if name not in possible:
             raise SymtopError(f"variables in the {chart} chart are {', '.join(possible)}, not {name!r}", "variables")
@@ -279,8 +277,8 @@ def _tolerances(method: Integrator, tolerance: object, members: Members, horizon
     for i in np.flatnonzero(swings > MOST_SWINGS)[:1]:
         words = f"{swings[i]:.3g} swings of the top; an adaptive method may take {MOST_SWINGS:.3g}"
         raise SymtopError(f"the horizon of {member_name(names, i)} is {words}")
-    if np.ndim(tolerance) == 0:  # type: ignore[arg-type]
-        return np.broadcast_to(method.check_tolerance(tolerance), len(numbers))
+    if tolerance is None:
+        return np.broadcast_to(method.check_tolerance(None), len(numbers))
     row = for_each("tolerance", tolerance, len(numbers), names)
     for value in (row.min(), row.max()):
         method.check_tolerance(float(value))
