@@ -131,7 +131,7 @@ def costs(question: advise._Question, advised: symtop.Advice, menu: list[str]) -
         price, call = each[name]
         most = math.inf if name in menu else min(PATIENCE * min(spent.values(), default=math.inf) / price, MOST)
         met = settings.search(scene, integrator(name), accuracy, quantity, scene.horizon, patience=most)
-        if isinstance(met, settings.Met):
+        if not met.why:
             mets[name] = met
             part = settings.at_accuracy(met.integrator, met.error / accuracy)
             spent[name] = met.evaluations * price * part + call
@@ -141,7 +141,7 @@ def costs(question: advise._Question, advised: symtop.Advice, menu: list[str]) -
         found = settings.search(
             scene, met.integrator, accuracy, quantity, scene.horizon, met.setting, least=advise.CLOSE
         )  # fmt: skip
-        near[name] = found if isinstance(found, settings.Met) else met
+        near[name] = met if found.why else found
     if advised.integrator is not None:
         setting = float(advised.step_size or advised.tolerance or math.nan)
         near[ADVISED] = settings.attempt(scene, integrator(advised.integrator), setting, scene.horizon, quantity)

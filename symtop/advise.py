@@ -51,6 +51,7 @@ THIS_TOP = ("this-top", "solution")  # needs of methods that are only named in a
 OF_ANY = tuple(need for need in NEEDS if need not in THIS_TOP)  # needs of methods that may be recommended by default
 COMMA = re.compile(r",\s*(?![^(]*\))")  # a comma between words of `NEEDS`, not that in f(t, y)
 KEPT = {"energy": ("energy",), "momenta": ("p_phi", "p_psi")}  # the claims for each value of `keeps`
+INACCURATE = "Not accurate enough at this step, each with its error"  # the reason why a method fails at a given step
 KERNELS = 0.65  # expected kernels to compile per method: some methods share one
 FEW = 5  # methods of the table that are tried
 AGREED, TIED = 3, 1.1  # a sixth is tried if fewer serve, the fastest is not among the first 3, or the next is as fast
@@ -127,7 +128,7 @@ class _Question(NamedTuple):
         return Advice(self.scene.name, self.quantity, self.accuracy, self.horizon, **facts)
 
     def trial(self, run: settings.Met) -> "_Trial":
-        """The trial of a candidate that was run to the horizon; seconds are not known yet."""
+        """The trial of a candidate that was run to the horizon, or failed; seconds are not known yet."""
         confidence = "checked" if run.error + run.bound <= self.accuracy else "at the reference's limit"
         return _Trial(run, run.error, math.nan, confidence, self.horizon)
 
@@ -227,7 +228,7 @@ def recommend(
     if own := [one.name for one in every if one.implementation == "python" and not is_built_in(one.name)]:
         fails["Not tried, as only compiled methods are timed"] = own
     errors = [f"{name} {error:.2e}" for name, error in sorted(search.errors_at_step.items(), key=lambda one: one[1])]
-    fails = ({"Not accurate enough at this step, each with its error": errors} if errors else {}) | fails
+    fails = ({INACCURATE: errors} if errors else {}) | fails
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
     return _advice(question, ranked, sentences, source, beside)
 
@@ -293,7 +294,7 @@ class _Search:
             patience = max(TOO_DEAR * min(rivals, default=math.inf), CHEAP)
             failed = sum(len(self.fails.get(why, ())) for why in HOPELESS)
             most = LESS if failed >= AGREED and not rivals else math.inf
-            self._sort_in(_tried(self.question, method, patience, most), self.trials, method)
+            self._sort_in(_tried(self.question, method, patience, most), self.trials)
         timed = _timed(self.question, self.trials, self.fails)
         self.trials = sorted(timed, key=lambda one: one.cost(self.question))
 
@@ -303,17 +304,17 @@ class _Search:
         costs = [one.cost(self.question) for one in trials]
         for number, trial in enumerate(trials):
             if number < most or not ranked or costs[number] <= LEVEL * costs[0]:
-                self._sort_in(_confirm(self.question, trial), ranked, trial.run.integrator)
+                self._sort_in(_confirm(self.question, trial), ranked)
         return ranked
 
-    def _sort_in(self, trial: _Trial | str | float, trials: list[_Trial], method: Integrator) -> None:
-        """Add the result of `_tried` or `_confirm` to `trials`, `fails` (a reason) or `errors_at_step` (an error)."""
-        if isinstance(trial, _Trial):
+    def _sort_in(self, trial: _Trial, trials: list[_Trial]) -> None:
+        """Add the result of `_tried` or `_confirm` to `trials`, or the method to `errors_at_step` or `fails`."""
+        if not trial.run.why:
             trials.append(trial)
-        elif isinstance(trial, str):
-            self.fails.setdefault(trial, []).append(method.name)
+        elif trial.run.why == INACCURATE:
+            self.errors_at_step[trial.run.integrator.name] = trial.error
         else:
-            self.errors_at_step[method.name] = trial
+            self.fails.setdefault(trial.run.why, []).append(trial.run.integrator.name)
 
 
 def _everyone(question: _Question) -> list[str]:
@@ -372,28 +373,26 @@ def _candidates(question: _Question) -> tuple[list[str], str]:
     return list(dict.fromkeys([*menu, *own, *of_top])), "a study of random tops found the cheapest for such questions"
 
 
-def _tried(question: _Question, method: Integrator, patience: float, most: float = math.inf) -> _Trial | str | float:
-    """A trial with a setting from short runs, or the reason of failure, or the error if too large at a given step."""
+def _tried(question: _Question, method: Integrator, patience: float, most: float) -> _Trial:
+    """A trial with a setting from short runs, or with the given step; its `run.why` is the reason of a failure."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
         try:
             run = settings.attempt(scene, method, question.step, horizon, quantity)
         except SymtopError as error:  # a start at a pole, for a method in the angles chart
-            return f"Not run, as {error}"
-        if not run.error <= accuracy:
-            return run.error if math.isfinite(run.error) else "No run ends well at this step"
-        return question.trial(run)
+            return question.trial(settings.unmet(method, horizon, f"Not run, as {error}"))
+        wrong = INACCURATE if math.isfinite(run.error) else "No run ends well at this step"
+        return question.trial(run._replace(why="" if run.error <= accuracy else wrong))
     period = scene.nutation_period
     short = min(horizon, settings.SHORT * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** settings.growth(method, quantity)
     best = settings.search(
         scene, method, accuracy * law, quantity, short, patience=min(patience, most), longest=question.max_step
     )  # fmt: skip
-    if isinstance(best, str):
-        dear = best == settings.BUDGET and patience < min(settings.MOST_EVALUATIONS[method.implementation], most)
-        return f"Not within {TOO_DEAR:g} times the work of the best" if dear else best
+    if best.why == settings.BUDGET and patience < min(settings.MOST_EVALUATIONS[method.implementation], most):
+        best = best._replace(why=f"Not within {TOO_DEAR:g} times the work of the best")
     if method.fixed_step and horizon / best.setting > MOST_STEPS:
-        return f"Would need more than {MOST_STEPS:.0e} steps"
+        best = best._replace(why=f"Would need more than {MOST_STEPS:.0e} steps")
     return _Trial(best, best.error / law, math.nan, "extrapolated", horizon)
 
 
@@ -409,8 +408,8 @@ def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]
     return [one for one in timed if one.a_step <= question.time_a_step]
 
 
-def _confirm(question: _Question, trial: _Trial) -> _Trial | str:
-    """The trial run to the whole horizon, if affordable, with its setting corrected; or the reason why it fails."""
+def _confirm(question: _Question, trial: _Trial) -> _Trial:
+    """The trial run to the whole horizon, if affordable, with its setting corrected; its `run.why` as in `_tried`."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
         return trial
@@ -422,8 +421,9 @@ def _confirm(question: _Question, trial: _Trial) -> _Trial | str:
         scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting, least=CLOSE,
         longest=question.max_step,
     )  # fmt: skip
-    if isinstance(best, str):
-        return f"Good enough over a short run but not to the end ({best[0].lower()}{best[1:]})"
+    if best.why:
+        why = f"Good enough over a short run but not to the end ({best.why[0].lower()}{best.why[1:]})"
+        return question.trial(best._replace(why=why))
     return question.trial(settings.rounded(scene, best, MARGIN * accuracy, quantity))
 
 
