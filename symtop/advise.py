@@ -127,7 +127,7 @@ class _Question(NamedTuple):
     def advice(self, **facts: Any) -> Advice:
         return Advice(self.scene.name, self.quantity, self.accuracy, self.horizon, **facts)
 
-    def trial(self, run: settings.Met) -> "_Trial":
+    def trial(self, run: settings.Attempt) -> "_Trial":
         """The trial of a candidate that was run to the horizon, or failed; seconds are not known yet."""
         confidence = "checked" if run.error + run.bound <= self.accuracy else "at the reference's limit"
         return _Trial(run, run.error, math.nan, confidence, self.horizon)
@@ -144,7 +144,7 @@ class _Question(NamedTuple):
 class _Trial(NamedTuple):
     """A candidate with its setting, the error expected at the horizon, and the wall time of the whole run."""
 
-    run: settings.Met
+    run: settings.Attempt
     error: float
     seconds: float
     confidence: str  # a key of CONFIDENCE
@@ -215,7 +215,7 @@ def recommend(
         source = f"no run was made, as that is below {limit:.2g}, the least error that the reference can judge"
         return _advice(question, [], (), source)
     if {*allowed} == {"solution"} and not scene.of_body and question.allows(integrator("exact")):
-        return _the_motion(question, limit)
+        return _exact_advice(question, limit)
     names, source = _candidates(question)
     search = _Search(question, names, _menu(question))
     ranked, beside, fails = search.answers(), search.beside(), search.fails
@@ -275,7 +275,7 @@ class _Search:
         """The finalists, which were run to the end, the fastest first."""
         ranked = self._confirmed(self._general, FINALISTS)
         if not ranked and self.menu:
-            everyone = _everyone(self.question._replace(needs=self.question.needs or OF_ANY))
+            everyone = _usable(self.question._replace(needs=self.question.needs or OF_ANY))
             self.widened, rest = len(everyone), {*everyone} - {*self.names, *self.menu}
             self._try(rest)
             ranked = self._confirmed([one for one in self.trials if one.run.integrator.name in rest], FINALISTS)
@@ -317,7 +317,7 @@ class _Search:
             self.fails.setdefault(trial.run.why, []).append(trial.run.integrator.name)
 
 
-def _everyone(question: _Question) -> list[str]:
+def _usable(question: _Question) -> list[str]:
     """Every compiled method that the user can use, in each chart that determines the quantity."""
     if question.scene.of_body:
         names = [method.name for method in registry.methods().values() if BODY in method.solvers]
@@ -340,18 +340,14 @@ def _same(variant: str, usable: Sequence[str]) -> str | None:
 
 
 def _menu(question: _Question) -> list[str]:
-    """The first six usable methods of the table; empty if it has no such row.
-
-    With `keeps`, for a top, the table's methods that keep these come first, then those of every class; for bodies the
-    table does not apply.
-    """
+    """The first six usable methods of the table, with `keeps` (of tops alone) those that keep these first; or none."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None or question.max_step < math.inf or question.time_a_step < math.inf:
         return []
     if question.keeps and scene.of_body:
         return []
     asked, general = (quantity, accuracy, horizon / scene.time_scale(horizon)), question.general or scene.of_body
-    rows, usable = cheapest(question.needs, *asked, general=general), _everyone(question)
+    rows, usable = cheapest(question.needs, *asked, general=general), _usable(question)
     if question.keeps and not question.needs:
         rows += cheapest(OF_ANY, *asked, general=general)
     menu = list(dict.fromkeys(name for row in rows if (name := _same(row, usable))))[: FEW + 1]
@@ -360,7 +356,7 @@ def _menu(question: _Question) -> list[str]:
 
 def _candidates(question: _Question) -> tuple[list[str], str]:
     """The names of methods to try, and a phrase on their origin."""
-    everyone = _everyone(question)
+    everyone = _usable(question)
     if not everyone:
         return everyone, "no compiled method is within these limits"
     if question.step is not None:
@@ -434,7 +430,7 @@ def _advice(
     scene, goal = question.scene, question.goal
     if not ranked:
         reason = f"Nothing that was tried meets {goal}; {source}."
-        without = _without_steps(question, math.nan)
+        without = _exact_words(question, math.nan)
         return question.advice(reason=reason, beside=_beside(beside), closed_form=without, fails=fails)
     best = ranked[0]
     name, fixed = best.run.integrator.name, best.run.integrator.fixed_step
@@ -452,7 +448,7 @@ def _advice(
         integrator=name, expected_error=best.error, seconds=best.seconds, confidence=best.confidence, fails=fails,
         reason="\n".join(filter(None, sentences)),
         runner_up="".join(runners), beside=_beside(beside, best.seconds),
-        closed_form=_without_steps(question, best.seconds), **setting,
+        closed_form=_exact_words(question, best.seconds), **setting,
         **_lines(question, best.run.integrator, **setting),
     )  # fmt: skip
 
@@ -466,7 +462,7 @@ def _as_long(ratio: float) -> str:
     return "in the same time" if _times(ratio) == "1 times" else f"{_times(ratio)} the time"
 
 
-def _the_motion(question: _Question, limit: float) -> Advice:
+def _exact_advice(question: _Question, limit: float) -> Advice:
     closed_form.compile_now()  # its time is the answer
     exact, seconds = integrator("exact"), _exact_seconds(question)
     reason = (
@@ -518,11 +514,11 @@ def command_of(scene: Scene, method: str, horizon: float, **setting: float | Non
 
 def _exact_seconds(question: _Question) -> float:
     scene, _, quantity, horizon = question[:4]
-    exact = settings.Met(integrator("exact"), math.nan, 0.0, 0.0, horizon, 0.0)
+    exact = settings.Attempt(integrator("exact"), math.nan, 0.0, 0.0, horizon, 0.0)
     return settings.seconds(scene, [exact], quantity, horizon)[0]
 
 
-def _without_steps(question: _Question, best: float) -> str:
+def _exact_words(question: _Question, best: float) -> str:
     """Sentences on the time of the closed form, compared with a run of `best` seconds (nan: none)."""
     scene, _, quantity, horizon = question[:4]
     if scene.of_body:

@@ -39,15 +39,15 @@ class Goal(NamedTuple):
     calls: tuple[str, ...]
 
 
-def settle(scene: Scene, grid: Sequence[Cell], goal: Goal) -> dict[Cell, settings.Met]:
+def settle(scene: Scene, grid: Sequence[Cell], goal: Goal) -> dict[Cell, settings.Attempt]:
     """A setting of every cell that meets the goal; its `why` is the reason if there is none.
 
     One search for each scheme and chart, in its first language; the others take the same setting, and their error is
     measured again.
     """
     horizon = goal.nutations * scene.nutation_period
-    leaders: dict[tuple[str, str], settings.Met] = {}
-    settled: dict[Cell, settings.Met] = {}
+    leaders: dict[tuple[str, str], settings.Attempt] = {}
+    settled: dict[Cell, settings.Attempt] = {}
     for cell in grid:
         pair, patience = (cell.scheme, cell.chart), PATIENCE[cell.language]
         leader = leaders.get(pair)

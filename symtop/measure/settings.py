@@ -145,7 +145,7 @@ def seek(
     return math.nan, FAILED if math.isinf(smallest) and why != BUDGET else why
 
 
-class Met(NamedTuple):
+class Attempt(NamedTuple):
     """A setting and the run with it: the largest error over `horizon`, the least judgeable error, and the work."""
 
     integrator: Integrator
@@ -157,9 +157,9 @@ class Met(NamedTuple):
     why: str = ""  # the reason if no setting meets the accuracy; then the numbers may be NaN
 
 
-def unmet(method: Integrator, horizon: float, why: str) -> Met:
+def unmet(method: Integrator, horizon: float, why: str) -> Attempt:
     """The result without a setting, for the reason `why`."""
-    return Met(method, math.nan, math.inf, math.nan, horizon, math.nan, why)
+    return Attempt(method, math.nan, math.inf, math.nan, horizon, math.nan, why)
 
 
 def observed(quantity: str) -> str:
@@ -172,12 +172,12 @@ def growth(method: Integrator, quantity: str) -> int:
     return (quantity in ANGLES) + (not method.keeps_frequencies)
 
 
-def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, quantity: str) -> Met:
+def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, quantity: str) -> Attempt:
     """One run; the error of a run that failed is infinite."""
     row = error_row(scene, method, setting, horizon, observed(quantity), phases=quantity in FREQUENCIES)
     error, bound, work = (float(row[name]) for name in (quantity, f"{quantity}_bound", "force_evaluations"))
     good = row["outcome"] == "ok" and math.isfinite(error)
-    return Met(method, setting, error if good else math.inf, bound, horizon, work)
+    return Attempt(method, setting, error if good else math.inf, bound, horizon, work)
 
 
 def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
@@ -193,7 +193,7 @@ def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
 def search(
     scene: Scene, method: Integrator, accuracy: float, quantity: str, horizon: float, guess: float | None = None,
     patience: float = math.inf, least: float = LEAST, longest: float = math.inf,
-) -> Met:  # fmt: skip
+) -> Attempt:  # fmt: skip
     """The coarsest setting found that meets the accuracy over the horizon, or `unmet`.
 
     Without a `guess` it begins at the setting expected to meet the accuracy if the error is about (h/period)^p, or at a
@@ -206,7 +206,7 @@ def search(
         guess = likely_step(scene, method, horizon, accuracy) if method.fixed_step else 0.1 * accuracy
     if method.fixed_step and horizon / min(guess, ends[1]) > patience:
         return unmet(method, horizon, BUDGET)
-    results: dict[float, Met] = {}
+    results: dict[float, Attempt] = {}
 
     def run(setting: float) -> tuple[float, float]:
         met = results[setting] = attempt(scene, method, setting, horizon, quantity)
@@ -221,21 +221,18 @@ def search(
 
 
 def at_accuracy(method: Integrator, ratio: float) -> float:
-    """The factor from the work of a run to the work at exactly the accuracy, if the run's error is `ratio` times that.
-
-    The work of a method of order p grows as error^(-1/p). A ratio below `LEAST` occurs only at the coarsest setting.
-    """
+    """The factor from the work of a run, with an error of `ratio` times the accuracy, to the work at the accuracy."""
     return float(min(max(ratio, LEAST), 1.0) ** (1.0 / (method.order or math.inf)))
 
 
-def rounded(scene: Scene, met: Met, accuracy: float, quantity: str) -> Met:
+def rounded(scene: Scene, met: Attempt, accuracy: float, quantity: str) -> Attempt:
     """The result with its setting rounded down to five digits, if a run with that meets the accuracy; else `met`."""
     setting = float(Context(prec=5, rounding=ROUND_DOWN).create_decimal(repr(float(met.setting))))
     again = met if setting == met.setting else attempt(scene, met.integrator, setting, met.horizon, quantity)
     return again if again.error <= accuracy else met
 
 
-def seconds(scene: Scene, mets: Sequence[Met], quantity: str, horizon: float, batches: int = 5) -> list[float]:
+def seconds(scene: Scene, mets: Sequence[Attempt], quantity: str, horizon: float, batches: int = 5) -> list[float]:
     """Wall times of bare runs with the settings of `mets`, timed against each other, scaled to `horizon`; seconds."""
     runs = []
     for met in mets:
