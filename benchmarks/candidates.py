@@ -108,7 +108,7 @@ def prices(quantity: str) -> dict[str, tuple[float, float]]:
     As in the study, methods that conserve the energy are not asked for it: any step would meet the accuracy.
     """
     scene = symtop.scene("goldstein")
-    known = advise._everyone(advise._Question(scene, PRICED, quantity, scene.horizon, advise.OF_ANY))
+    known = advise._usable(advise._Question(scene, PRICED, quantity, scene.horizon, advise.OF_ANY))
     each = [one for one in map(integrator, known) if quantity not in (one.conserves or ())]
     runs = []
     for horizon in (scene.horizon, SHORT * scene.nutation_period):
@@ -126,12 +126,12 @@ def costs(question: advise._Question, advised: symtop.Advice, menu: list[str]) -
     """Seconds of the candidates that meet the accuracy and may be the cheapest, of the table's, and of `ADVISED`."""
     scene, accuracy, quantity = question.scene, advise.MARGIN * question.accuracy, question.quantity
     each, first = prices(quantity), ranking.cheapest((), quantity, accuracy, 100.0)
-    mets, spent = dict[str, settings.Met](), dict[str, float]()
+    mets, spent = dict[str, settings.Attempt](), dict[str, float]()
     for name in sorted(each, key=lambda name: (name not in first, -(integrator(name).order or 0))):
         price, call = each[name]
         most = math.inf if name in menu else min(PATIENCE * min(spent.values(), default=math.inf) / price, MOST)
         met = settings.search(scene, integrator(name), accuracy, quantity, scene.horizon, patience=most)
-        if isinstance(met, settings.Met):
+        if not met.why:
             mets[name] = met
             part = settings.at_accuracy(met.integrator, met.error / accuracy)
             spent[name] = met.evaluations * price * part + call
@@ -141,7 +141,7 @@ def costs(question: advise._Question, advised: symtop.Advice, menu: list[str]) -
         found = settings.search(
             scene, met.integrator, accuracy, quantity, scene.horizon, met.setting, least=advise.CLOSE
         )  # fmt: skip
-        near[name] = found if isinstance(found, settings.Met) else met
+        near[name] = met if found.why else found
     if advised.integrator is not None:
         setting = float(advised.step_size or advised.tolerance or math.nan)
         near[ADVISED] = settings.attempt(scene, integrator(advised.integrator), setting, scene.horizon, quantity)

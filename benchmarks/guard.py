@@ -38,7 +38,7 @@ from symtop.report import style
 from symtop.run import guard
 from symtop.run.ensemble.bodies import body_population, scenes_of
 from symtop.run.ensemble.population import STRATA, population
-from symtop.run.motion import Exact, Integrated
+from symtop.run.motion import Exact, Integrated, Motion
 from symtop.run.simulation import make_plan
 
 CHUNK = 100
@@ -184,7 +184,7 @@ def _off(scene: Scene, chart: str, times: Any, states: Any) -> Any:
     return attitude_distance(states[:, :4], true.states[:, :4])
 
 
-def score(motion: Integrated, method: Integrator, chart: str, plan: Plan) -> tuple[float, bool]:
+def score(motion: Motion, method: Integrator, chart: str, plan: Plan) -> tuple[float, bool]:
     """The error that the guard expects, rad, and whether its trial was the whole run."""
     expected = guard.forecast(motion.scene, method, chart, plan, motion)
     value = max(expected.axis_error, expected.rounding)

@@ -51,6 +51,7 @@ THIS_TOP = ("this-top", "solution")  # needs of methods that are only named in a
 OF_ANY = tuple(need for need in NEEDS if need not in THIS_TOP)  # needs of methods that may be recommended by default
 COMMA = re.compile(r",\s*(?![^(]*\))")  # a comma between words of `NEEDS`, not that in f(t, y)
 KEPT = {"energy": ("energy",), "momenta": ("p_phi", "p_psi")}  # the claims for each value of `keeps`
+INACCURATE = "Not accurate enough at this step, each with its error"  # the reason why a method fails at a given step
 KERNELS = 0.65  # expected kernels to compile per method: some methods share one
 FEW = 5  # methods of the table that are tried
 AGREED, TIED = 3, 1.1  # a sixth is tried if fewer serve, the fastest is not among the first 3, or the next is as fast
@@ -126,8 +127,8 @@ class _Question(NamedTuple):
     def advice(self, **facts: Any) -> Advice:
         return Advice(self.scene.name, self.quantity, self.accuracy, self.horizon, **facts)
 
-    def trial(self, run: settings.Met) -> "_Trial":
-        """The trial of a candidate that was run to the horizon; seconds are not known yet."""
+    def trial(self, run: settings.Attempt) -> "_Trial":
+        """The trial of a candidate that was run to the horizon, or failed; seconds are not known yet."""
         confidence = "checked" if run.error + run.bound <= self.accuracy else "at the reference's limit"
         return _Trial(run, run.error, math.nan, confidence, self.horizon)
 
@@ -143,7 +144,7 @@ class _Question(NamedTuple):
 class _Trial(NamedTuple):
     """A candidate with its setting, the error expected at the horizon, and the wall time of the whole run."""
 
-    run: settings.Met
+    run: settings.Attempt
     error: float
     seconds: float
     confidence: str  # a key of CONFIDENCE
@@ -214,7 +215,7 @@ def recommend(
         source = f"no run was made, as that is below {limit:.2g}, the least error that the reference can judge"
         return _advice(question, [], (), source)
     if {*allowed} == {"solution"} and not scene.of_body and question.allows(integrator("exact")):
-        return _the_motion(question, limit)
+        return _exact_advice(question, limit)
     names, source = _candidates(question)
     search = _Search(question, names, _menu(question))
     ranked, beside, fails = search.answers(), search.beside(), search.fails
@@ -227,7 +228,7 @@ def recommend(
     if own := [one.name for one in every if one.implementation == "python" and not is_built_in(one.name)]:
         fails["Not tried, as only compiled methods are timed"] = own
     errors = [f"{name} {error:.2e}" for name, error in sorted(search.errors_at_step.items(), key=lambda one: one[1])]
-    fails = ({"Not accurate enough at this step, each with its error": errors} if errors else {}) | fails
+    fails = ({INACCURATE: errors} if errors else {}) | fails
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
     return _advice(question, ranked, sentences, source, beside)
 
@@ -274,7 +275,7 @@ class _Search:
         """The finalists, which were run to the end, the fastest first."""
         ranked = self._confirmed(self._general, FINALISTS)
         if not ranked and self.menu:
-            everyone = _everyone(self.question._replace(needs=self.question.needs or OF_ANY))
+            everyone = _usable(self.question._replace(needs=self.question.needs or OF_ANY))
             self.widened, rest = len(everyone), {*everyone} - {*self.names, *self.menu}
             self._try(rest)
             ranked = self._confirmed([one for one in self.trials if one.run.integrator.name in rest], FINALISTS)
@@ -293,7 +294,7 @@ class _Search:
             patience = max(TOO_DEAR * min(rivals, default=math.inf), CHEAP)
             failed = sum(len(self.fails.get(why, ())) for why in HOPELESS)
             most = LESS if failed >= AGREED and not rivals else math.inf
-            self._sort_in(_tried(self.question, method, patience, most), self.trials, method)
+            self._sort_in(_tried(self.question, method, patience, most), self.trials)
         timed = _timed(self.question, self.trials, self.fails)
         self.trials = sorted(timed, key=lambda one: one.cost(self.question))
 
@@ -303,20 +304,20 @@ class _Search:
         costs = [one.cost(self.question) for one in trials]
         for number, trial in enumerate(trials):
             if number < most or not ranked or costs[number] <= LEVEL * costs[0]:
-                self._sort_in(_confirm(self.question, trial), ranked, trial.run.integrator)
+                self._sort_in(_confirm(self.question, trial), ranked)
         return ranked
 
-    def _sort_in(self, trial: _Trial | str | float, trials: list[_Trial], method: Integrator) -> None:
-        """Add the result of `_tried` or `_confirm` to `trials`, `fails` (a reason) or `errors_at_step` (an error)."""
-        if isinstance(trial, _Trial):
+    def _sort_in(self, trial: _Trial, trials: list[_Trial]) -> None:
+        """Add the result of `_tried` or `_confirm` to `trials`, or the method to `errors_at_step` or `fails`."""
+        if not trial.run.why:
             trials.append(trial)
-        elif isinstance(trial, str):
-            self.fails.setdefault(trial, []).append(method.name)
+        elif trial.run.why == INACCURATE:
+            self.errors_at_step[trial.run.integrator.name] = trial.error
         else:
-            self.errors_at_step[method.name] = trial
+            self.fails.setdefault(trial.run.why, []).append(trial.run.integrator.name)
 
 
-def _everyone(question: _Question) -> list[str]:
+def _usable(question: _Question) -> list[str]:
     """Every compiled method that the user can use, in each chart that determines the quantity."""
     if question.scene.of_body:
         names = [method.name for method in registry.methods().values() if BODY in method.solvers]
@@ -339,18 +340,14 @@ def _same(variant: str, usable: Sequence[str]) -> str | None:
 
 
 def _menu(question: _Question) -> list[str]:
-    """The first six usable methods of the table; empty if it has no such row.
-
-    With `keeps`, for a top, the table's methods that keep these come first, then those of every class; for bodies the
-    table does not apply.
-    """
+    """The first six usable methods of the table, with `keeps` (of tops alone) those that keep these first; or none."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None or question.max_step < math.inf or question.time_a_step < math.inf:
         return []
     if question.keeps and scene.of_body:
         return []
     asked, general = (quantity, accuracy, horizon / scene.time_scale(horizon)), question.general or scene.of_body
-    rows, usable = cheapest(question.needs, *asked, general=general), _everyone(question)
+    rows, usable = cheapest(question.needs, *asked, general=general), _usable(question)
     if question.keeps and not question.needs:
         rows += cheapest(OF_ANY, *asked, general=general)
     menu = list(dict.fromkeys(name for row in rows if (name := _same(row, usable))))[: FEW + 1]
@@ -359,7 +356,7 @@ def _menu(question: _Question) -> list[str]:
 
 def _candidates(question: _Question) -> tuple[list[str], str]:
     """The names of methods to try, and a phrase on their origin."""
-    everyone = _everyone(question)
+    everyone = _usable(question)
     if not everyone:
         return everyone, "no compiled method is within these limits"
     if question.step is not None:
@@ -372,28 +369,26 @@ def _candidates(question: _Question) -> tuple[list[str], str]:
     return list(dict.fromkeys([*menu, *own, *of_top])), "a study of random tops found the cheapest for such questions"
 
 
-def _tried(question: _Question, method: Integrator, patience: float, most: float = math.inf) -> _Trial | str | float:
-    """A trial with a setting from short runs, or the reason of failure, or the error if too large at a given step."""
+def _tried(question: _Question, method: Integrator, patience: float, most: float) -> _Trial:
+    """A trial with a setting from short runs, or with the given step; its `run.why` is the reason of a failure."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
         try:
             run = settings.attempt(scene, method, question.step, horizon, quantity)
         except SymtopError as error:  # a start at a pole, for a method in the angles chart
-            return f"Not run, as {error}"
-        if not run.error <= accuracy:
-            return run.error if math.isfinite(run.error) else "No run ends well at this step"
-        return question.trial(run)
+            return question.trial(settings.unmet(method, horizon, f"Not run, as {error}"))
+        wrong = INACCURATE if math.isfinite(run.error) else "No run ends well at this step"
+        return question.trial(run._replace(why="" if run.error <= accuracy else wrong))
     period = scene.nutation_period
     short = min(horizon, settings.SHORT * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** settings.growth(method, quantity)
     best = settings.search(
         scene, method, accuracy * law, quantity, short, patience=min(patience, most), longest=question.max_step
     )  # fmt: skip
-    if isinstance(best, str):
-        dear = best == settings.BUDGET and patience < min(settings.MOST_EVALUATIONS[method.implementation], most)
-        return f"Not within {TOO_DEAR:g} times the work of the best" if dear else best
+    if best.why == settings.BUDGET and patience < min(settings.MOST_EVALUATIONS[method.implementation], most):
+        best = best._replace(why=f"Not within {TOO_DEAR:g} times the work of the best")
     if method.fixed_step and horizon / best.setting > MOST_STEPS:
-        return f"Would need more than {MOST_STEPS:.0e} steps"
+        best = best._replace(why=f"Would need more than {MOST_STEPS:.0e} steps")
     return _Trial(best, best.error / law, math.nan, "extrapolated", horizon)
 
 
@@ -409,8 +404,8 @@ def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]
     return [one for one in timed if one.a_step <= question.time_a_step]
 
 
-def _confirm(question: _Question, trial: _Trial) -> _Trial | str:
-    """The trial run to the whole horizon, if affordable, with its setting corrected; or the reason why it fails."""
+def _confirm(question: _Question, trial: _Trial) -> _Trial:
+    """The trial run to the whole horizon, if affordable, with its setting corrected; its `run.why` as in `_tried`."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
         return trial
@@ -422,8 +417,9 @@ def _confirm(question: _Question, trial: _Trial) -> _Trial | str:
         scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting, least=CLOSE,
         longest=question.max_step,
     )  # fmt: skip
-    if isinstance(best, str):
-        return f"Good enough over a short run but not to the end ({best[0].lower()}{best[1:]})"
+    if best.why:
+        why = f"Good enough over a short run but not to the end ({best.why[0].lower()}{best.why[1:]})"
+        return question.trial(best._replace(why=why))
     return question.trial(settings.rounded(scene, best, MARGIN * accuracy, quantity))
 
 
@@ -434,7 +430,7 @@ def _advice(
     scene, goal = question.scene, question.goal
     if not ranked:
         reason = f"Nothing that was tried meets {goal}; {source}."
-        without = _without_steps(question, math.nan)
+        without = _exact_words(question, math.nan)
         return question.advice(reason=reason, beside=_beside(beside), closed_form=without, fails=fails)
     best = ranked[0]
     name, fixed = best.run.integrator.name, best.run.integrator.fixed_step
@@ -452,7 +448,7 @@ def _advice(
         integrator=name, expected_error=best.error, seconds=best.seconds, confidence=best.confidence, fails=fails,
         reason="\n".join(filter(None, sentences)),
         runner_up="".join(runners), beside=_beside(beside, best.seconds),
-        closed_form=_without_steps(question, best.seconds), **setting,
+        closed_form=_exact_words(question, best.seconds), **setting,
         **_lines(question, best.run.integrator, **setting),
     )  # fmt: skip
 
@@ -466,7 +462,7 @@ def _as_long(ratio: float) -> str:
     return "in the same time" if _times(ratio) == "1 times" else f"{_times(ratio)} the time"
 
 
-def _the_motion(question: _Question, limit: float) -> Advice:
+def _exact_advice(question: _Question, limit: float) -> Advice:
     closed_form.compile_now()  # its time is the answer
     exact, seconds = integrator("exact"), _exact_seconds(question)
     reason = (
@@ -518,11 +514,11 @@ def command_of(scene: Scene, method: str, horizon: float, **setting: float | Non
 
 def _exact_seconds(question: _Question) -> float:
     scene, _, quantity, horizon = question[:4]
-    exact = settings.Met(integrator("exact"), math.nan, 0.0, 0.0, horizon, 0.0)
+    exact = settings.Attempt(integrator("exact"), math.nan, 0.0, 0.0, horizon, 0.0)
     return settings.seconds(scene, [exact], quantity, horizon)[0]
 
 
-def _without_steps(question: _Question, best: float) -> str:
+def _exact_words(question: _Question, best: float) -> str:
     """Sentences on the time of the closed form, compared with a run of `best` seconds (nan: none)."""
     scene, _, quantity, horizon = question[:4]
     if scene.of_body:

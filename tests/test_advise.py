@@ -77,16 +77,16 @@ def test_an_error_grows_over_horizons_as_the_traits_promise(name, quantity):
 ])  # fmt: skip
 def test_a_search_says_why_it_found_nothing(name, accuracy, patience, why):
     scene, method = symtop.scene("spheroid"), symtop.integrator(name)
-    assert settings.search(scene, method, accuracy, "axis", 5.0, None, patience) == why
+    assert settings.search(scene, method, accuracy, "axis", 5.0, None, patience).why == why
 
 
 def test_a_flat_error_is_rounding_of_steps_and_may_be_a_stair_of_tolerances():
     stair = lambda tolerance: (10.0 ** (-1 - 2 * math.floor(-math.log10(tolerance) / 2)), 1.0)  # one for a hundred
     floor = lambda tolerance: (max(tolerance, 3e-11), 100.0)
     for target in (1e-9, 1e-10, 1e-12):
-        assert stair(settings.seek(stair, 0.99e-8, target, (1e-15, 1.0), 1.0, fixed_step=False))[0] <= target
-    assert settings.seek(floor, 1e-9, 1e-12, (1e-15, 1.0), 1.0, fixed_step=False) == settings.STOPPED
-    assert settings.seek(lambda h: (3e-11, 1.0 / h), 0.1, 1e-12, (1e-9, 1.0), 4.0) == settings.STOPPED
+        assert stair(settings.seek(stair, 0.99e-8, target, (1e-15, 1.0), 1.0, fixed_step=False)[0])[0] <= target
+    assert settings.seek(floor, 1e-9, 1e-12, (1e-15, 1.0), 1.0, fixed_step=False)[1] == settings.STOPPED
+    assert settings.seek(lambda h: (3e-11, 1.0 / h), 0.1, 1e-12, (1e-9, 1.0), 4.0)[1] == settings.STOPPED
 
 
 def test_a_search_interpolates_where_the_error_is_a_power_and_halves_where_it_is_not():
@@ -143,7 +143,7 @@ def few(monkeypatch, count):
 
 
 def usable(quantity, needs=()):
-    return advise._everyone(advise._Question(symtop.scene("spheroid"), 1e-3, quantity, 20.0, needs))
+    return advise._usable(advise._Question(symtop.scene("spheroid"), 1e-3, quantity, 20.0, needs))
 
 
 def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_with_it():
@@ -166,7 +166,7 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
         if horizon < 60.0 or len(ended) >= 3:
             return real(scene, method, accuracy, quantity, horizon, *rest, **limits)
         ended.append(method.name)
-        return settings.STOPPED
+        return settings.unmet(method, horizon, settings.STOPPED)
 
     monkeypatch.setattr(settings, "search", search)
     advice = symtop.recommend("spheroid", accuracy=1e-4, horizon=60.0)
@@ -192,7 +192,7 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     names.clear()
     menu[:] = ["stormer-verlet", "strang[axis]", "midpoint", "trapezoidal", "cayley[axis]", "kahan[axis]"]
     everyone = {*menu, "vern9-fixed[axis]", "srkn-14-6[axis]"}  # of many more: each takes its kernel and its trials
-    monkeypatch.setattr(advise, "_everyone", lambda _: sorted(everyone))
+    monkeypatch.setattr(advise, "_usable", lambda _: sorted(everyone))
     monkeypatch.setattr(settings, "MOST_EVALUATIONS", {"compiled": 3e4, "python": 3e4})
     advice = symtop.recommend(scene, accuracy=1e-11, horizon=30.0)  # where none of the menu gets
     assert advice.confidence == "checked"
@@ -215,13 +215,13 @@ def test_the_table_names_methods_for_every_class_and_none_where_a_user_limits_st
     assert all(symtop.integrator(name).general for name in advise._menu(ask((), general=True)))
     limits = {"step": 0.01, "max_step": 0.1, "time_a_step": 1e-3}
     assert not any(advise._menu(ask((), **{name: value})) for name, value in limits.items())
-    run = settings.Met(symtop.integrator("rk4"), 0.1, 1e-9, 0.0, scene.horizon, 1.0)  # no longer step makes it cheaper
+    run = settings.Attempt(symtop.integrator("rk4"), 0.1, 1e-9, 0.0, scene.horizon, 1.0)  # as a longer step does not
     trial = advise._Trial(run, run.error, 1.0, "checked", scene.horizon)
     assert trial.cost(ask((), max_step=0.1)) == 1.0 > trial.cost(ask(()))
     for kept in (("energy",), ("energy", "momenta")):
         assert len(menu := advise._menu(ask((), keeps=kept))) >= 5
         assert menu[0] == next(name for name in advise._menu(ask(())) if name in menu)  # the best of all that keep it
-        assert {*menu} <= {*advise._everyone(ask(advise.OF_ANY, keeps=kept))}
+        assert {*menu} <= {*advise._usable(ask(advise.OF_ANY, keeps=kept))}
         assert {symtop.integrator(name).needs for name in menu} >= {"kicks", "lagrangian"}
     assert advise._menu(ask(("expression",), keeps=("energy",))) == []  # too few of the table's: all are tried
     body = symtop.scene("heavy-brick", bodies=True)
@@ -298,7 +298,7 @@ def test_at_the_step_that_a_user_has_it_says_what_is_good_enough(monkeypatch):
     some = ["midpoint", "trapezoidal", "stormer-verlet", "strang[axis]", "cayley[axis]", "rk4[axis]", "kahan[axis]",
             "takahashi-imada[axis]", "srkn-6-4[axis]", "gauss-6[axis]"]  # fmt: skip
     assert {*some} < {*usable("axis")}
-    monkeypatch.setattr(advise, "_everyone", lambda _: some)
+    monkeypatch.setattr(advise, "_usable", lambda _: some)
     scene, step = symtop.scene("spheroid"), 0.004
     advice = symtop.recommend(scene, accuracy=1e-4, step_size=step)
     assert advice.step_size == step
@@ -342,7 +342,7 @@ def test_limits_leave_out_what_a_user_cannot_use():
 def test_energy_and_momenta_may_both_be_asked_to_be_kept():
     ask = functools.partial(advise._Question, symtop.scene("spheroid"), 1e-3, "axis", 2.0, ())
     choices = (), ("energy",), ("momenta",), ("energy", "momenta")
-    every, *one, both = ({*advise._everyone(ask(keeps=kept))} for kept in choices)
+    every, *one, both = ({*advise._usable(ask(keeps=kept))} for kept in choices)
     assert both == one[0] & one[1]
     assert both < one[0] < every
     assert both < one[1] < every
@@ -358,8 +358,8 @@ def test_energy_and_momenta_may_both_be_asked_to_be_kept():
 
 def test_a_step_that_takes_too_long_stays_named_when_another_does_later(monkeypatch):
     question = advise._Question(symtop.scene("spheroid"), 1e-3, "axis", 2.0, (), 0.002, time_a_step=1e-6)
-    mets = [settings.Met(symtop.integrator(name), 0.002, 1e-4, 0.0, 2.0, 1e3) for name in ("rk4", "strang", "cayley")]
-    trials, fails = [advise._Trial(one, 1e-4, math.nan, "checked", 2.0) for one in mets], {}
+    runs = [settings.Attempt(symtop.integrator(one), 0.002, 1e-4, 0.0, 2.0, 1e3) for one in ("rk4", "strang", "cayley")]
+    trials, fails = [advise._Trial(one, 1e-4, math.nan, "checked", 2.0) for one in runs], {}
     for seconds in ([1e-2, 1e-4, 1e-4], [1e-2, 1e-4]):  # 1e-5, and 1e-7 s a step
         monkeypatch.setattr(settings, "seconds", lambda *_, seconds=seconds: seconds)
         trials = advise._timed(question, trials, fails)

@@ -40,9 +40,9 @@ def decades(target: float) -> int:
     return round(-math.log10(target))
 
 
-def worst_tau(data: xr.DataTree, family: str, span: str = "short") -> by.Interval:
-    """The least tau over all targets, with the least ends of its interval (`least`)."""
-    return least([by.tau(data, family, target, span=span) for target in ASKED])
+def worst_tau(data: xr.DataTree, family: str) -> by.Interval:
+    """The least tau over all targets in the short runs, with the least ends of its interval (`least`)."""
+    return least([by.tau(data, family, target, span="short") for target in ASKED])
 
 
 def long_tau(data: xr.DataTree, family: str) -> tuple[float, int]:
@@ -71,7 +71,7 @@ def worst_winner(data: xr.DataTree, family: str) -> by.Interval:
                default=by.Interval(*(math.nan,) * 3))  # fmt: skip
 
 
-class Pooled(NamedTuple):
+class PooledFactors(NamedTuple):
     """Factors of all methods and targets: a summary of those within the budget, and how many exceed it."""
 
     middle: float  # median of those within the budget
@@ -93,20 +93,20 @@ class Pooled(NamedTuple):
         return by.worst((told, by.PARTLY)) if self.beyond > (1.0 - MOST_OF) * self.asked else told
 
 
-def pooled(each: list[dict[str, float]]) -> Pooled:
+def pooled(each: list[dict[str, float]]) -> PooledFactors:
     """Factors of all methods and targets together."""
     values = np.array([value for one in each for value in one.values()])
     within = values[np.isfinite(values)]
     ends = (float(np.median(within)), float(np.quantile(within, MOST_OF))) if within.size else (math.nan, math.nan)
-    return Pooled(*ends, values.size - within.size, values.size)
+    return PooledFactors(*ends, values.size - within.size, values.size)
 
 
-def steps(data: xr.DataTree, family: str, span: str = "short") -> Pooled:
+def steps(data: xr.DataTree, family: str, span: str = "short") -> PooledFactors:
     """Safe steps over those of epsilon = 0."""
     return pooled([by.step_factors(data, family, target, span) for target in ASKED])
 
 
-def own_steps(data: xr.DataTree, family: str, without: str = "") -> Pooled:
+def own_steps(data: xr.DataTree, family: str, without: str = "") -> PooledFactors:
     """Safe steps over those of the top's own charts; `without` a stratum of free bodies."""
     return pooled([by.own_factors(data, family, target, without) for target in ASKED])
 

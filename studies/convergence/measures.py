@@ -68,14 +68,14 @@ def fits(data: xr.Dataset, quantity: str, *, at_end: bool = False) -> Pairs:
     return fitted
 
 
-class Judged(NamedTuple):
+class OrderVerdict(NamedTuple):
     """The verdict on one variant and scene, and the slopes that it rests on."""
 
     verdict: str  # see `order_verdict`; or `WRONG`
     fits: dict[str, Fit]  # by quantity; only those that the chart shows
 
 
-def judged(data: xr.Dataset) -> dict[tuple[str, str], Judged]:
+def judged(data: xr.Dataset) -> dict[tuple[str, str], OrderVerdict]:
     """The verdict of the measured slopes on the declared order of every variant, on every scene."""
     by_quantity = {quantity: fits(data, quantity) for quantity in (MAIN, *OTHERS)}
     result = {}
@@ -86,7 +86,7 @@ def judged(data: xr.Dataset) -> dict[tuple[str, str], Judged]:
         columns = (cell[name].values for name in ("step_size", MAIN, f"{MAIN}_bound"))
         if word == "undecided" and math.isfinite(wrong_limit(*columns, ROUNDED, ALIKE)):
             word = WRONG
-        result[pair] = Judged(word, slopes)
+        result[pair] = OrderVerdict(word, slopes)
     return result
 
 

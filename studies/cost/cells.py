@@ -167,7 +167,7 @@ def mean_work(data: xr.DataTree, cell: Cell, name: str) -> Array:
     return np.asarray((np.where(weights > 0.0, work, 0.0) * weights).sum(axis=1) / max(weights.sum(), 1.0))
 
 
-class Dear(NamedTuple):
+class FewestCalls(NamedTuple):
     """The safe choice with the fewest evaluations."""
 
     best: Safe
@@ -175,7 +175,7 @@ class Dear(NamedTuple):
     price: float  # s by which an evaluation must take longer for it to be the fastest of all; 0 if it is so already
 
 
-def dearer(data: xr.DataTree, cell: Cell) -> Dear | None:
+def fewest_calls(data: xr.DataTree, cell: Cell) -> FewestCalls | None:
     """The safe choice if evaluations are expensive; None if no choice reaches the error."""
     choices = [one for one in safest(data, cell)[0] if np.isfinite(one.seconds)]
     counts = []
@@ -190,7 +190,7 @@ def dearer(data: xr.DataTree, cell: Cell) -> Dear | None:
     best, least = choices[int(np.argmin(counts))], min(counts)
     others = [(best.seconds - one.seconds) / (count - least) for one, count in zip(choices, counts, strict=True)
               if count > least]  # fmt: skip
-    return Dear(best, least, max([0.0, *others]))
+    return FewestCalls(best, least, max([0.0, *others]))
 
 
 def served_over_interpolated(data: xr.DataTree, cell: Cell, name: str) -> float:
@@ -211,7 +211,7 @@ def advised(data: xr.DataTree, others: Sequence[str]) -> dict[str, list[float]]:
     """
     asked: dict[str, list[float]] = {}
     for place, target in enumerate(targets(data)):
-        dear = dearer(data, Cell("short", "axis", target, NATURAL, CLASSES[0]))
+        dear = fewest_calls(data, Cell("short", "axis", target, NATURAL, CLASSES[0]))
         wanted = [*others, *([dear.best.name] if dear else [])]
         for needs, keeping in [*((needs, False) for needs in CLASSES), (CLASSES[0], True)]:
             choices = safest(data, Cell("short", "axis", target, NATURAL, needs), keeping)[0]

@@ -224,7 +224,7 @@ def slower(data: xr.DataTree) -> list[dict[str, str]]:
 
     A cell has the evaluations in the place of the time; no row if the winners have the fewest already.
     """
-    each = {target: cells.dearer(data, Cell("short", "axis", target, NATURAL, CLASSES[0]))
+    each = {target: cells.fewest_calls(data, Cell("short", "axis", target, NATURAL, CLASSES[0]))
             for target in cells.targets(data)}  # fmt: skip
     known = {target: one for target, one in each.items() if one is not None}
     price = max((one.price for one in known.values()), default=0.0)

@@ -39,28 +39,28 @@ class Goal(NamedTuple):
     calls: tuple[str, ...]
 
 
-def settle(scene: Scene, grid: Sequence[Cell], goal: Goal) -> dict[Cell, settings.Met | str]:
-    """A setting of every cell that meets the goal, or the reason why there is none.
+def settle(scene: Scene, grid: Sequence[Cell], goal: Goal) -> dict[Cell, settings.Attempt]:
+    """A setting of every cell that meets the goal; its `why` is the reason if there is none.
 
     One search for each scheme and chart, in its first language; the others take the same setting, and their error is
     measured again.
     """
     horizon = goal.nutations * scene.nutation_period
-    leaders: dict[tuple[str, str], settings.Met | str] = {}
-    settled: dict[Cell, settings.Met | str] = {}
+    leaders: dict[tuple[str, str], settings.Attempt] = {}
+    settled: dict[Cell, settings.Attempt] = {}
     for cell in grid:
         pair, patience = (cell.scheme, cell.chart), PATIENCE[cell.language]
         leader = leaders.get(pair)
         if leader is None:
             plan = {"patience": patience, "least": LEAST}
             met = settings.search(scene, cell.method, goal.target, "axis", horizon, **plan)
-            if met == settings.STOPPED:  # the error of an adaptive method need not fall with every finer tolerance
+            if met.why == settings.STOPPED:  # the error of an adaptive method need not fall with every finer tolerance
                 met = settings.search(scene, cell.method, goal.target, "axis", horizon, FINER * goal.target, **plan)
             settled[cell] = leaders[pair] = met
-        elif isinstance(leader, str):
+        elif leader.why:
             settled[cell] = leader
         elif leader.evaluations > patience:
-            settled[cell] = settings.BUDGET
+            settled[cell] = settings.unmet(cell.method, horizon, settings.BUDGET)
         else:
             settled[cell] = settings.attempt(scene, cell.method, leader.setting, horizon, "axis")
     return settled
@@ -125,8 +125,8 @@ def factorial(
         settled = settle(scene, part, goal)
         at = horizons.index(goal.nutations), targets.index(goal.target)
         for cell, met in settled.items():
-            if isinstance(met, str):
-                reasons[(grid.index(cell), *at)] = met
+            if met.why:
+                reasons[(grid.index(cell), *at)] = met.why
                 continue
             for name, value in zip(names, (met.setting, met.error, met.bound, met.evaluations), strict=True):
                 numbers[name][(grid.index(cell), *at)] = value

@@ -184,6 +184,11 @@ def scene_options(command: Callable[..., None]) -> Callable[..., None]:
 class Group(click.Group):
     """A group of commands that prints an error as one sentence and exits with code 2, or 130 after Ctrl-C."""
 
+    def make_context(self, *args: Any, **settings: Any) -> click.Context:
+        """The context of the group's own options, with errors as messages."""
+        with _plain_usage():
+            return super().make_context(*args, **settings)
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
@@ -200,7 +205,7 @@ class Group(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         """Run a command, with errors as messages and exit codes."""
         try:
-            with told_apart(), _warnings_as_lines():
+            with told_apart(), _warnings_as_lines(), _plain_usage():
                 return super().invoke(ctx)
         except SymtopError as error:
             warn(_in_options(error, self.commands.get(ctx.invoked_subcommand or "")))
@@ -228,18 +233,21 @@ class Group(click.Group):
             ctx.exit(2)
 
 
-def _show(error: click.UsageError, file: Any = None) -> None:  # noqa: ARG001  (click calls it so)
-    """Print an error of a command line in one sentence: the option, its value, and what is allowed."""
-    words = error.format_message().removesuffix(".").replace(". Did", "; did")
-    words = words[0].lower() + words[1:]
-    for click_says, we_say in USAGE.items():
-        words = re.sub(click_says, we_say, words)
-    if error.ctx is not None and not (" must be " in words or words.endswith("?")):
-        words += f"; {error.ctx.get_usage()} (--help says more)".replace("Usage: ", "usage: ")
-    warn(words)
-
-
-click.UsageError.show = _show  # type: ignore[assignment, method-assign]
+@contextlib.contextmanager
+def _plain_usage() -> Iterator[None]:
+    """Let an error of the command line print one sentence: the option, its value, and what is allowed."""
+    try:
+        yield
+    except click.UsageError as error:
+        if type(error).show is click.UsageError.show:  # else it prints the help
+            words = error.format_message().removesuffix(".").replace(". Did", "; did")
+            words = words[0].lower() + words[1:]
+            for click_says, we_say in USAGE.items():
+                words = re.sub(click_says, we_say, words)
+            if error.ctx is not None and not (" must be " in words or words.endswith("?")):
+                words += f"; {error.ctx.get_usage()} (--help says more)".replace("Usage: ", "usage: ")
+            error.show = lambda file=None: warn(words)  # type: ignore[method-assign]  # noqa: ARG005
+        raise
 
 
 def _in_options(error: SymtopError, command: click.Command | None) -> str:

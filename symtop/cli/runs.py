@@ -48,7 +48,7 @@ EXECUTION = {  # what is said of it, if it is not in lanes, which few steps may 
 @click.option("--figure", type=File(), help="Draw the run and its errors: .png, .svg or .pdf.")
 @common.scene_options
 def run(
-    scene: Any, integrator: str, guard: str, output: str | None, figure: str | None, as_json: bool, **settings: Any
+    scene: Any, integrator: str, guard: Any, output: str | None, figure: str | None, as_json: bool, **settings: Any
 ) -> None:
     """Run one INTEGRATOR on one SCENE and compare it with the exact motion.
 

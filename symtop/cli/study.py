@@ -136,7 +136,7 @@ def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict
     from symtop.runner.study import StudyError
 
     ahead, refused = deque(studies), list[SymtopError]()
-    waiting: deque[tuple[Any, Any]] = deque()  # (study, `Started`) whose findings have not been yielded
+    waiting: deque[tuple[Any, Any]] = deque()  # (study, `PendingFindings`) whose findings have not been yielded
     try:
         while ahead:
             study = ahead.popleft()

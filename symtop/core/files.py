@@ -36,10 +36,7 @@ def make_private(folder: Path) -> None:
 
 
 def distrust(path: Path) -> tuple[str, str]:
-    """Why another user may have written this file or folder, and what to do about it; "" and "" if nobody else can.
-
-    What the system's administrator owns is trusted, and so is a path that does not exist.
-    """
+    """Why others (not root) may have written a path, and a remedy; "" and "" if they cannot or it is not there."""
     try:
         status = path.stat()
     except OSError:
@@ -141,10 +138,7 @@ def lock_path(path: Path) -> Path:
 
 @contextlib.contextmanager
 def locked(path: Path, *, wait: bool) -> Iterator[bool]:
-    """Hold a file's lock, so that no other process computes it; yields False if one holds it and `wait` is false.
-
-    The lock file exists while the lock is held, and afterwards if its holder was killed.
-    """
+    """Hold a file's lock, so that no other process computes it; yields False if one holds it and `wait` is false."""
     if fcntl is None:
         yield True
         return

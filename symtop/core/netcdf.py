@@ -74,10 +74,7 @@ def _git(*arguments: str) -> str:
 
 @functools.cache
 def provenance(*, changes: bool = False) -> dict[str, str]:
-    """The provenance of a dataset: versions, revision, machine. Flat strings, as netCDF needs them.
-
-    With `changes`, the revision is marked if the checkout holds code that is not committed (a report says so).
-    """
+    """Versions, revision and machine, flat strings as netCDF needs; `changes` marks code that is not committed."""
     edited = changes and _git("status", "--porcelain", "--", "symtop", "studies")
     return {
         "symtop_version": __version__,

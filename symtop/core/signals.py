@@ -69,10 +69,7 @@ def told_apart() -> contextlib.AbstractContextManager[None]:
 
 @contextlib.contextmanager
 def deferred() -> Iterator[None]:
-    """Delay SIGINT, SIGTERM and SIGHUP to the end of the block, in the main thread.
-
-    A signal without a handler still ends the process at once. For calls of milliseconds: Ctrl-C waits for their end.
-    """
+    """Delay SIGINT, SIGTERM and SIGHUP, where handled, to the end of the block (milliseconds), in the main thread."""
     requests: list[int] = []
     numbers = {signal.SIGINT, signal.SIGTERM, HANGUP} if _in_main_thread() else ()
     handlers = {number: signal.getsignal(number) for number in numbers}

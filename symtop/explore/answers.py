@@ -224,10 +224,7 @@ def _curves(largest: dict[str, float], message: str = "", /, **arrays: Any) -> d
 
 
 def grid(fields: Mapping[str, Any]) -> tuple[Setup, np.ndarray, np.ndarray]:
-    """The run, the steps and the spins of a map: `step_least`, `step_most` (s), `spin_least`, `spin_most` (rad/s).
-
-    Raises SymtopError for a method without a step, a range that is empty, and a map of too many steps.
-    """
+    """The run, steps and spins of a map: step_least, step_most (s), spin_least, spin_most (rad/s); or SymtopError."""
     config = setup(fields)
     if config.scene.of_body:
         raise SymtopError(f"a map must be of a top, not of {config.scene.name}, a body without symmetry")

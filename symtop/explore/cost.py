@@ -86,10 +86,7 @@ def _line(name: str, rows: list[dict[str, Any]], message: str) -> dict[str, Any]
 
 
 def _seconds(one: Setup) -> float | None:
-    """The least of several times of a run of the page; None if its outcome is not "ok".
-
-    `timings` is not used, because it compiles the closed form and waits for other compilations.
-    """
+    """The least time of a run of the page, None if it failed; `timings` would compile the closed form and wait."""
     chart = chart_of(one.method, one.scene.observes, "attitude")
     setting = math.nan if one.setting is None else one.setting
     run = bare_run(one.scene, one.method, chart, setting, one.scene.horizon, budget=one.budget)
@@ -100,10 +97,7 @@ def _seconds(one: Setup) -> float | None:
 
 
 def chart(setups: list[Setup]) -> dict[str, Any]:
-    """The lines that are computed, the number of missing ones, and the seconds of the runs of the page.
-
-    While a chart is being computed, its lines are those of the last chart on the scene.
-    """
+    """The lines computed (of the last chart until this one is), the number missing, and seconds of the page's runs."""
     scene, variants = setups[0].scene, _variants(setups)
     last, key = _charts.get(scene, {}), (scene, *variants)
     missing = len(variants) - len(lines := [last[name] for name in variants if name in last])

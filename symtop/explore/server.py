@@ -172,10 +172,7 @@ class Handler(BaseHTTPRequestHandler):
             return True
 
     def _is_local(self) -> bool:
-        """Is this machine the host of the request, and the origin of a POST? If not, refuse it.
-
-        This also refuses a foreign host name that resolves to 127.0.0.1.
-        """
+        """Is this machine the host of a request, and a POST's origin? Refuse all else, also other names of it."""
         origin, site = self.headers.get("Origin"), self.headers.get("Sec-Fetch-Site", "none")
         foreign = origin not in (None, f"http://{self.headers.get('Host')}") or site not in ("none", "same-origin")
         if self.command == "POST" and foreign:

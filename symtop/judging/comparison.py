@@ -168,18 +168,18 @@ def _runs(
             affordable = work / budget if method.fixed_step else 0.0
             guess *= min(max(finer, affordable), 1.0)
         if method.fixed_step and horizon / min(guess, ends[1]) > budget:
-            answer: float | str = settings.BUDGET
+            why = settings.BUDGET
         else:
-            answer = settings.seek(run, guess, target, ends, power, fixed_step=method.fixed_step, patience=budget)
-        if answer == settings.BUDGET and rows and method.fixed_step:  # the last run that can be afforded
+            guess, why = settings.seek(run, guess, target, ends, power, fixed_step=method.fixed_step, patience=budget)
+        if why == settings.BUDGET and rows and method.fixed_step:  # the last run that can be afforded
             last = min(rows)
             affordable = last * run(last)[1] / budget
-            answer = affordable if 0.0 < affordable < last / 1.2 and run(affordable)[0] <= target else answer
-        if isinstance(answer, str):
-            why = RAISED if rows and all(row["outcome"] == RAISED for row in rows.values()) else REASONS[answer]
+            meets = 0.0 < affordable < last / 1.2 and run(affordable)[0] <= target
+            guess, why = (affordable, "") if meets else (guess, why)
+        if why:
+            why = RAISED if rows and all(row["outcome"] == RAISED for row in rows.values()) else REASONS[why]
             reached += [why] * (len(settings.TARGETS) - k)
             break
-        guess = answer
         reached.append("met")
     while rows and method.fixed_step and rows[max(rows)]["outcome"] == "ok" and max(rows) < ends[1]:
         run(min(2.0 * max(rows), ends[1]))

@@ -32,7 +32,7 @@ import xarray as xr
 
 from symtop.core import netcdf
 from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, whole
-from symtop.judging.adapters.adapter import heartbeat, integrator
+from symtop.judging.adapters.adapter import Stepper, heartbeat, integrator
 from symtop.judging.adapters.python_step import CONJUGATE
 from symtop.judging.battery import measure, stages, unmeasured
 from symtop.judging.claims.constants import KEPT, Constant, blow_up_finding, blows_up
@@ -119,7 +119,7 @@ def judge(
     seed = secrets.randbelow(SEEDS) if seed is None else whole("seed", seed, 0, SEEDS)
     structure: dict[str, Any] = {"order": order, "symplectic": symplectic, "symmetric": symmetric, "explicit": explicit}
     claims = structure | {"conserves": conserves, "energy_error": energy}
-    record = Integrator("claims", "other", "", {chart: _no_solver}, **claims)  # checked before anything is loaded
+    record = Integrator("claims", "other", "", {chart: Stepper()}, **claims)  # checked before anything is loaded
     names = record.conserves or frozenset()
     if states:
         if set(structure.values()) != {None}:
@@ -157,10 +157,6 @@ def judge(
             findings.append(finding)
     follow = frozenset(one.claim for one in findings if one.declared and implied.get(one.claim))
     return Ledger(about.name, problem.name, tuple(findings), subject.traces, about, follow)
-
-
-def _no_solver(*_: Any) -> Any:
-    raise SymtopError("these are claims alone, without a step to run")
 
 
 def read(target: Any) -> dict[str, Any]:
@@ -202,10 +198,7 @@ def read(target: Any) -> dict[str, Any]:
 
 
 def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy: str | None) -> list[Finding]:
-    """A finding for each error and each constant that the samples determine; undecided for one only claimed.
-
-    Raises SymtopError for data that are no trajectory, or that have another top or start than the scene.
-    """
+    """A finding for each error and constant that samples show or that is claimed; SymtopError for another scene's."""
     if isinstance(target, (str, Path)) and str(target).lower().endswith(".nc"):
         target = netcdf.read(target)
     if isinstance(target, xr.Dataset):

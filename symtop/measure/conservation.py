@@ -58,7 +58,7 @@ class Trend(NamedTuple):
     rise: float  # slope times the length of the run
 
 
-class Changed(NamedTuple):
+class Change(NamedTuple):
     """The change of a constant of the motion over a run: its size, its trend and its law of growth."""
 
     largest: float  # NaN if there is no finite sample
@@ -70,7 +70,7 @@ class Changed(NamedTuple):
     law: str  # name of the exponent
 
 
-def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = LONGEST, period: float = 0.0) -> Changed:
+def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = LONGEST, period: float = 0.0) -> Change:
     """Size, trend and growth over the last `decades` of a residual (n,) at times (n,); samples may be NaN.
 
     Within the first `period` an oscillation only begins: growth is judged after it, in the last `SHORTEST` at least.
@@ -81,7 +81,7 @@ def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = LONGEST, 
     good = size[np.isfinite(size)]
     largest = float(good.max()) if good.size else math.nan
     with np.errstate(over="ignore", invalid="ignore"):  # squares of a run that blows up
-        return Changed(largest, *trend(time, residual), power.slope, power.interval, law(power))
+        return Change(largest, *trend(time, residual), power.slope, power.interval, law(power))
 
 
 def residuals(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:

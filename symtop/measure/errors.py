@@ -44,17 +44,12 @@ from symtop.run.reference.truth import PRECISIONS, reference
 from symtop.run.trajectory import Trajectory, column, dataset
 
 QUANTITIES: dict[str, str] = {
-    "axis": "angle between axes (rad)",
-    "attitude": "angle between attitudes (rad)",
-    "theta": "error of theta (rad)",
-    "energy": "energy error / energy of the nutation",
-    "p_phi": "relative error of p_phi",
+    "axis": "angle between axes (rad)", "attitude": "angle between attitudes (rad)", "theta": "error of theta (rad)",
+    "energy": "energy error / energy of the nutation", "p_phi": "relative error of p_phi",
     "p_psi": "relative error of p_psi",
-}
-OF_BODY = {  # for bodies without symmetry: replaces "energy" and adds "momentum"
-    "energy": "energy error / (T0 + |mgl|)",
-    "momentum": "relative error of the momentum",
-}
+}  # fmt: skip
+# for bodies without symmetry: replaces "energy" and adds "momentum"
+OF_BODY = {"energy": "energy error / (T0 + |mgl|)", "momentum": "relative error of the momentum"}
 
 ERRORS = {  # long name, with the reference of the error, and units
     "axis": ("angle between the axis and the true axis", "rad"),

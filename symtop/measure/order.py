@@ -68,10 +68,7 @@ class Fit(NamedTuple):
 
 
 def line(x: Array, y: Array) -> tuple[float, float, tuple[float, float], Array]:
-    """The least-squares line through points (n,), n at least 3.
-
-    Returns its slope, the slope's standard error, the point of means, which is on the line, and the residuals (n,).
-    """
+    """Least-squares line through n >= 3 points: slope, its standard error, the point of means, and residuals (n,)."""
     middle = x.mean(), y.mean()
     dx, dy = x - middle[0], y - middle[1]
     spread = float(dx @ dx)

@@ -96,10 +96,7 @@ BOUND = 8.0 * float(np.finfo(Wide).eps)  # rounding error of the start and of a 
 
 
 def extended_errors(scene: Scene, method: Integrator) -> xr.Dataset | None:
-    """``extended_step``, ``extended_error`` (rad, of the axis at the end) and ``extended_bound`` over ``extended``.
-
-    None if the method is no such composition, if long double is only double, or if there is no reference in it.
-    """
+    """``extended_step``, ``extended_error`` (rad, of the axis at the end), ``extended_bound``; or None."""
     stages = _composition(scene, method)
     if stages is None or not have_heyoka() or np.finfo(Wide).eps == EPSILON:
         return None

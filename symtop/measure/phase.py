@@ -34,10 +34,7 @@ from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.trajectory import Trajectory
 
-FREQUENCIES: dict[str, str] = {
-    "nutation_period": "relative error of nutation period",
-    "precession_rate": "relative error of precession rate",
-}
+FREQUENCIES = ("nutation_period", "precession_rate")  # relative errors of these
 TABLE = 256  # points of the true curve from which the search for tau starts
 SWEEPS = 4  # iterations of Gauss-Newton: the error falls from 1e-2 to rounding in three
 CLEAR = 0.25  # of the largest sin(theta): nearer to a pole, the branch of phi is taken from the neighbours
@@ -123,10 +120,7 @@ def _slope(t: Array, values: Array, bound: Array, weights: Array) -> tuple[float
 
 
 def phase(scene: Scene, run: Trajectory, truth: xr.Dataset) -> dict[str, float]:
-    """Errors of the `FREQUENCIES` of a run; ``NAME_bound`` is the least error that the reference can judge.
-
-    All NaN if the run failed or has fewer than three samples.
-    """
+    """Errors of the `FREQUENCIES` of a run and ``NAME_bound``; NaN if it failed or has fewer than three samples."""
     if run.outcome != "ok" or run.time.size < 3:
         return {f"{name}{end}": math.nan for end in ("", "_bound") for name in FREQUENCIES}
     form, t = closed_form(scene), run.time

@@ -102,12 +102,12 @@ def between(fine: float, low: float, coarse: float, high: float, goal: float) ->
 def seek(
     run: Callable[[float], tuple[float, float]], guess: float, target: float, ends: tuple[float, float], power: float,
     *, fixed_step: bool = True, patience: float = math.inf, least: float = LEAST,
-) -> float | str:  # fmt: skip
-    """The coarsest setting found whose error is at most `target`, if possible above `least * target`; else the reason.
+) -> tuple[float, str]:  # fmt: skip
+    """The coarsest setting found with an error of at most `target`, if possible above `least * target`, and "".
 
-    `run` takes a setting and returns the error, infinite after a failure, and the force evaluations of a run. `ends`
-    are the finest and the coarsest setting, `power` is the exponent of the error in the setting. A run that is
-    estimated to take more than `patience` force evaluations is not begun.
+    Without one, NaN and the reason. `run` takes a setting and returns the error, infinite after a failure, and the
+    force evaluations of a run. `ends` are the finest and the coarsest setting, `power` is the exponent of the error in
+    the setting. A run that is estimated to take more than `patience` force evaluations is not begun.
     """
     (finest, coarsest), goal = ends, math.sqrt(least) * target
     # factors by which a setting changes: after a failed run, at the least and at the most
@@ -141,11 +141,11 @@ def seek(
             why = STOPPED if setting == last else BUDGET
             break
     if met is not None:
-        return met[0]
-    return FAILED if math.isinf(smallest) and why != BUDGET else why
+        return met[0], ""
+    return math.nan, FAILED if math.isinf(smallest) and why != BUDGET else why
 
 
-class Met(NamedTuple):
+class Attempt(NamedTuple):
     """A setting and the run with it: the largest error over `horizon`, the least judgeable error, and the work."""
 
     integrator: Integrator
@@ -154,6 +154,12 @@ class Met(NamedTuple):
     bound: float  # the least error that the reference can judge
     horizon: float
     evaluations: float  # of the force
+    why: str = ""  # the reason if no setting meets the accuracy; then the numbers may be NaN
+
+
+def unmet(method: Integrator, horizon: float, why: str) -> Attempt:
+    """The result without a setting, for the reason `why`."""
+    return Attempt(method, math.nan, math.inf, math.nan, horizon, math.nan, why)
 
 
 def observed(quantity: str) -> str:
@@ -166,12 +172,12 @@ def growth(method: Integrator, quantity: str) -> int:
     return (quantity in ANGLES) + (not method.keeps_frequencies)
 
 
-def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, quantity: str) -> Met:
+def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, quantity: str) -> Attempt:
     """One run; the error of a run that failed is infinite."""
     row = error_row(scene, method, setting, horizon, observed(quantity), phases=quantity in FREQUENCIES)
     error, bound, work = (float(row[name]) for name in (quantity, f"{quantity}_bound", "force_evaluations"))
     good = row["outcome"] == "ok" and math.isfinite(error)
-    return Met(method, setting, error if good else math.inf, bound, horizon, work)
+    return Attempt(method, setting, error if good else math.inf, bound, horizon, work)
 
 
 def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
@@ -187,8 +193,8 @@ def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
 def search(
     scene: Scene, method: Integrator, accuracy: float, quantity: str, horizon: float, guess: float | None = None,
     patience: float = math.inf, least: float = LEAST, longest: float = math.inf,
-) -> Met | str:  # fmt: skip
-    """The coarsest setting found that meets the accuracy over the horizon, or the reason why there is none.
+) -> Attempt:  # fmt: skip
+    """The coarsest setting found that meets the accuracy over the horizon, or `unmet`.
 
     Without a `guess` it begins at the setting expected to meet the accuracy if the error is about (h/period)^p, or at a
     tenth of the accuracy for a tolerance. No setting is above `longest`. `patience` and `least` are those of `seek`.
@@ -199,36 +205,34 @@ def search(
     if guess is None:
         guess = likely_step(scene, method, horizon, accuracy) if method.fixed_step else 0.1 * accuracy
     if method.fixed_step and horizon / min(guess, ends[1]) > patience:
-        return BUDGET
-    results: dict[float, Met] = {}
+        return unmet(method, horizon, BUDGET)
+    results: dict[float, Attempt] = {}
 
     def run(setting: float) -> tuple[float, float]:
         met = results[setting] = attempt(scene, method, setting, horizon, quantity)
         return met.error, met.evaluations
 
     try:
-        setting = seek(run, guess, accuracy, ends, power, fixed_step=method.fixed_step, patience=patience, least=least)
+        answer = seek(run, guess, accuracy, ends, power, fixed_step=method.fixed_step, patience=patience, least=least)
     except SymtopError as error:  # a start at a pole, for a method in the angles chart
-        return f"Not run, as {error}"
-    return setting if isinstance(setting, str) else results[setting]
+        answer = math.nan, f"Not run, as {error}"
+    setting, why = answer
+    return unmet(method, horizon, why) if why else results[setting]
 
 
 def at_accuracy(method: Integrator, ratio: float) -> float:
-    """The factor from the work of a run to the work at exactly the accuracy, if the run's error is `ratio` times that.
-
-    The work of a method of order p grows as error^(-1/p). A ratio below `LEAST` occurs only at the coarsest setting.
-    """
+    """The factor from the work of a run, with an error of `ratio` times the accuracy, to the work at the accuracy."""
     return float(min(max(ratio, LEAST), 1.0) ** (1.0 / (method.order or math.inf)))
 
 
-def rounded(scene: Scene, met: Met, accuracy: float, quantity: str) -> Met:
+def rounded(scene: Scene, met: Attempt, accuracy: float, quantity: str) -> Attempt:
     """The result with its setting rounded down to five digits, if a run with that meets the accuracy; else `met`."""
     setting = float(Context(prec=5, rounding=ROUND_DOWN).create_decimal(repr(float(met.setting))))
     again = met if setting == met.setting else attempt(scene, met.integrator, setting, met.horizon, quantity)
     return again if again.error <= accuracy else met
 
 
-def seconds(scene: Scene, mets: Sequence[Met], quantity: str, horizon: float, batches: int = 5) -> list[float]:
+def seconds(scene: Scene, mets: Sequence[Attempt], quantity: str, horizon: float, batches: int = 5) -> list[float]:
     """Wall times of bare runs with the settings of `mets`, timed against each other, scaled to `horizon`; seconds."""
     runs = []
     for met in mets:

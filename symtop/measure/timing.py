@@ -110,10 +110,7 @@ def timings(
 
 
 def agree(samples: Sequence[float], close: float) -> bool:
-    """Do the three least of at least `LEAST_SAMPLES` samples differ by less than `close`, relative to the least?
-
-    Fewer samples may agree on a wrong time: on a busy machine an interrupted batch takes one time slice longer.
-    """
+    """Do the least three of at least `LEAST_SAMPLES` samples agree within `close`? Fewer may agree on a wrong time."""
     least = sorted(samples)[:3]
     return len(samples) >= LEAST_SAMPLES and least[2] < (1.0 + close) * least[0]
 
@@ -121,10 +118,7 @@ def agree(samples: Sequence[float], close: float) -> bool:
 def bare_run(
     scene: Scene, method: Integrator, chart: str, setting: float, horizon: float, budget: float | None = None
 ) -> Callable[[], Any]:
-    """A call of a method's solver in one chart from start to horizon, with two samples and no checks around it.
-
-    For heyoka it is its own integration loop. With a `budget` it is the solver, whose result says how the run ended.
-    """
+    """A solver in a chart as a call, two samples and no checks; heyoka's own loop unless there is a `budget`."""
     plan, _ = make_plan(scene, method, **method.given(setting), horizon=horizon, samples=2, budget=budget)
     solve = method.solvers[chart]
     if budget is None and hasattr(solve, "bare"):

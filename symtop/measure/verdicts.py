@@ -32,10 +32,7 @@ NO_GAP = 1e-9  # of the momentum scale: a gap p_phi -+ p_psi below this has no s
 
 
 def barriers(scene: Scene) -> tuple[float, float, float, float]:
-    """Smallest and largest theta of the true motion, the margin allowed beyond them, and the largest accurate error.
-
-    All in rad. The error is that of the axis.
-    """
+    """Least and largest true theta, the margin allowed beyond them, and the largest accurate axis error, all in rad."""
     if scene.of_body:  # the axis may point anywhere
         return 0.0, math.pi, OUTSIDE, ACCURATE
     low, high = scene.top.turning_cosines(scene.start)

@@ -53,8 +53,8 @@ def _as_stored(given: Sequence[float], scaled: Sequence[float]) -> tuple[float, 
 class Attitude:
     """An attitude and the angular velocity at one instant: the start of a `RigidBody`.
 
-    `quaternion` (w, x, y, z) turns body vectors into space vectors; `omega_body` (3,) is in rad per unit time, along
-    the principal axes of the body.
+    `quaternion` (w, x, y, z), of length one or SymtopError, turns body vectors into space vectors; `omega_body` (3,)
+    is in rad per unit time, along the principal axes of the body.
     """
 
     quaternion: tuple[float, float, float, float] = (1.0, 0.0, 0.0, 0.0)
@@ -72,7 +72,7 @@ class RigidBody:
 
     `mgl` is mass x gravity x distance of the centre of mass, 0 for a free body; `centre` its direction in principal
     axes, of any length but zero. `axes` is the turn from principal axes to those that the matrix of `from_inertia`
-    was given in, a quaternion; states and starts are in principal axes.
+    was given in, a quaternion; states and starts are in principal axes. Raises SymtopError for what no body has.
     """
 
     I1: float

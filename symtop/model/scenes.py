@@ -69,7 +69,7 @@ class Scene:
     ``nutation`` is theta alone, ``axis`` the direction of the axis, ``attitude`` the whole orientation. `units` decides
     the units in datasets. Studies leave out scenes by their `tags`, any of `TAGS`. A `RigidBody` with an `Attitude` is
     the scene of a body without symmetry: it observes ``body``, and only functions that say so accept it. `reference`
-    names where the scene was published.
+    names where the scene was published. Raises SymtopError for an invalid field.
     """
 
     name: str
@@ -382,7 +382,7 @@ _added: dict[str, Scene] = {}
 
 
 def register_scene(entry: Scene) -> Scene:
-    """Add a scene to the catalogue, so that studies and commands find it by name."""
+    """Add a scene to the catalogue, for studies and commands; SymtopError for what is none and for a known name."""
     if not isinstance(entry, Scene):
         raise SymtopError(f"register_scene needs a Scene, not {shown(entry)}")
     if entry.name in _catalogue() | _bodies() or _added.get(entry.name, entry) != entry:
@@ -426,7 +426,7 @@ def all_scenes() -> dict[str, Scene]:
 
 @by_name
 def scene(name: str | Scene, *, bodies: bool = False) -> Scene:
-    """The scene of that name; a Scene is returned as it is. One of a body is refused unless `bodies` is true."""
+    """The scene of a name, or the Scene itself; SymtopError for an unknown one, and without `bodies` for a body's."""
     chosen = name
     if not isinstance(chosen, Scene):
         if isinstance(name, (SymmetricTop, RigidBody)):

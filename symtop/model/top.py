@@ -150,7 +150,7 @@ class Momenta(NamedTuple):
 
 @dataclass(frozen=True, slots=True)
 class Angles:
-    """Euler angles z-x-z, theta from the upward vertical (radians), and their rates (radians per unit time)."""
+    """Euler angles z-x-z, rad, theta in [0, pi] from the upward vertical or SymtopError; rates in rad a unit time."""
 
     theta: float
     phi: float = 0.0
@@ -256,10 +256,10 @@ def conserved(top: Any, at: Any) -> Momenta:
 
 @dataclass(frozen=True, slots=True)
 class SymmetricTop:
-    """A rigid body with a fixed point on its axis of symmetry.
+    """A rigid body with a fixed point on its axis of symmetry, in any consistent units.
 
-    `I1` is the moment of inertia across the axis and `I3` along it, both about the fixed point; `mgl` is mass x gravity
-    x distance of the centre of gravity from that point: 0 for the free top, below for the hanging one.
+    `I1` is the moment of inertia across the axis, `I3` along it, about the fixed point; `mgl` is mass x gravity x
+    distance of the centre of gravity from it: 0 if free, below if hanging. Raises SymtopError if I3 > 2 I1, and so on.
     """
 
     I1: float
@@ -279,11 +279,11 @@ class SymmetricTop:
         cls, mass: float, polar_radius: float, equatorial_radius: float, gravity: float = 9.81,
         pivot_distance: float | None = None,
     ) -> "SymmetricTop":  # fmt: skip
-        """A solid spheroid; radii along and across its axis.
+        """A solid spheroid by its radii along and across its axis. Raises SymtopError for numbers out of range.
 
-        The fixed point lies on the axis at `pivot_distance` from the centre: ``I1`` gains ``mass * pivot_distance^2``
-        (Huygens-Steiner). Without it this is the top of the study `notebook` and no spheroid on its tip: the lever arm
-        is the polar radius, but the inertia that about the *centre of gravity*.
+        The fixed point lies on the axis at `pivot_distance` from the centre: ``I1`` gains ``mass * pivot_distance^2``.
+        Without it this is the top of the study `notebook` and no spheroid on its tip: the lever arm is the polar
+        radius, but the inertia that about the *centre of gravity*.
         """
         mass = positive("mass", mass)
         polar = positive("polar_radius", polar_radius)
@@ -303,7 +303,8 @@ class SymmetricTop:
         """Any symmetric body, by its moments of inertia about the centre of gravity, as they are measured.
 
         `at_centre` is across the axis, `axial` along it; the fixed point is on the axis at a `distance` below the
-        centre (negative: above, a hanging top). ``I1 = at_centre + mass distance^2`` (Huygens-Steiner).
+        centre (negative: above, a hanging top). ``I1 = at_centre + mass distance^2`` (Huygens-Steiner). Raises
+        SymtopError for numbers that no body has.
         """
         mass, arm = positive("mass", mass), finite("distance", distance)
         across, axial = positive("at_centre", at_centre), positive("axial", axial)
@@ -312,10 +313,7 @@ class SymmetricTop:
         return cls(across + mass * arm * arm, axial, mass * finite("gravity", gravity, 0.0) * arm)
 
     def spheroid_radii(self, mass: float) -> tuple[float, float]:
-        """Polar and equatorial radius of the solid spheroid of `from_spheroid` without a pivot distance.
-
-        Raises SymtopError where there is no such body.
-        """
+        """Polar and equatorial radius, as in `from_spheroid` without a pivot distance; SymtopError for no such body."""
         mass = positive("mass", mass)
         square = 5.0 * self.I3 / (2.0 * mass)
         rest = 5.0 * self.I1 / mass - square

@@ -49,10 +49,7 @@ EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every file in the bundle, the first
 
 
 def bundle(results: Path, target: Path | None = None) -> Path:
-    """Write the bundle of a results folder, and first its report; returns the zip file, by default NAME.zip there.
-
-    Raises SymtopError if the folder holds no findings, and if `target` does not end in .zip or cannot be written.
-    """
+    """Write the bundle of a folder, after its report; by default NAME.zip there. SymtopError without findings."""
     path = results / f"{NAME}.zip" if target is None else file_path("output", target)
     if path.suffix != ".zip":
         raise SymtopError(f"output must be a file that ends in .zip, not {str(path)!r}", "output")

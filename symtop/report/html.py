@@ -63,7 +63,9 @@ class Writer:
         return f'<div class="formulas">{mathml}</div>'
 
     def _markdown(self, text: str) -> str:
-        blocks, title, parts = _blocks(self._parser.parse(text)), "", []
+        tokens, title, parts = self._parser.parse(text), "", []
+        ends = [place + 1 for place, token in enumerate(tokens) if token.level == 0 and token.nesting <= 0]
+        blocks = [tokens[begin:end] for begin, end in itertools.pairwise([0, *ends])]  # of the top level
         while blocks:
             block = blocks.pop(0)
             kind = block[0].type
@@ -121,12 +123,6 @@ class Writer:
 def link(name: str, what: str) -> str:
     """A link, shown as #, to the anchor `name`."""
     return f'<a class="anchor" href="#{name}" aria-label="Link to {html.escape(what)}">#</a>'
-
-
-def _blocks(tokens: Sequence[Token]) -> list[Sequence[Token]]:
-    """The tokens of each top-level block."""
-    ends = [place + 1 for place, token in enumerate(tokens) if token.level == 0 and token.nesting <= 0]
-    return [tokens[begin:end] for begin, end in itertools.pairwise([0, *ends])]
 
 
 def _only(inline: Token, kind: str) -> bool:

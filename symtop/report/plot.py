@@ -18,25 +18,9 @@ from symtop.measure.errors import QUANTITIES, errors, quantity_words
 from symtop.measure.sweep import failed_setting, period_word, titled
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
-from symtop.report import spread
+from symtop.report import spread, style
 from symtop.report.figures import SMALLEST, error_band, name_ends
-from symtop.report.style import (
-    BLACK,
-    BLUE,
-    GREEN,
-    GREY,
-    LEAST_TEXT,
-    ORANGE,
-    PURPLE,
-    SKY,
-    VERMILLION,
-    headline,
-    legend_below,
-    line,
-    look,
-    panels,
-    save,
-)  # fmt: skip
+from symtop.report.style import BLACK, BLUE, GREEN, GREY, LEAST_TEXT, ORANGE, PURPLE, SKY, VERMILLION
 from symtop.run.trajectory import Trajectory
 
 if TYPE_CHECKING:
@@ -91,7 +75,7 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
         raise SymtopError("data must have the dimension time, setting or member, as simulate, sweep and ensemble give")
     times, has_bounds = data["time"].values, any(f"{name}_bound" in data for name in QUANTITIES)
     name, chart, several = data.attrs.get("integrator", ""), data.attrs.get("chart", ""), bool(ax.get_lines())
-    color = look(name).color if name else "black"
+    color = style.look(name).color if name else "black"
     label = name if name.endswith("]") or not chart else f"{name}[{chart}]"
     drawn: dict[str, Any] = {"color": color, "lw": 1.2, "label": label or None}
     if quantity in QUANTITIES:
@@ -145,7 +129,7 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
         for name in map(str, data["variant"].values):
             cell = data.sel(scene=scene, variant=name)
             variant = name if "chart" not in cell or name.endswith("]") else f"{name}[{cell['chart'].item()}]"
-            options = line(variant) | ({"ls": LINES[number % len(LINES)]} if data.sizes["scene"] > 1 else {})
+            options = style.line(variant) | ({"ls": LINES[number % len(LINES)]} if data.sizes["scene"] > 1 else {})
             label = titled(cell.assign_coords(variant=variant))
             label = label if data.sizes["scene"] == 1 else f"{label} on {scene}"
             across, errors = cell[x].where(cell[x] > 0).values, np.maximum(cell[quantity].values, SMALLEST)
@@ -181,13 +165,13 @@ def _ensemble(ax: "Axes", data: xr.Dataset, quantity: str, members: Any) -> None
 
 def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Dataset, path: str | Path) -> None:
     """Draw three panels to a file: theta and the true theta, errors of angles, residuals of energy and momenta."""
-    figure, axes = panels(3, 1, height=1.7, sharex=True)
+    figure, axes = style.panels(3, 1, height=1.7, sharex=True)
     times = run["time"].values
     motion, angles, constants = axes[:, 0]
     motion.plot(times, np.degrees(truth["theta"].values), color=ORANGE, lw=2.4, alpha=0.6, label="true theta")
     motion.plot(times, np.degrees(run["theta"].values), color=BLUE, lw=1.0, label=f"theta of {run.attrs['integrator']}")
     motion.set_ylabel("theta (degrees)")
-    headline(figure, f"{run.attrs['title']}: {run.attrs['outcome_message']}")
+    style.headline(figure, f"{run.attrs['title']}: {run.attrs['outcome_message']}")
     for name in ("axis", "attitude", "theta"):
         if name in errors:
             _line(angles, times, errors[name].values, COLORS[name], QUANTITIES[name])
@@ -198,8 +182,8 @@ def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Datase
     if run.attrs["outcome"] != "ok":
         for axis in axes[:, 0]:
             axis.axvline(run.attrs["reached_time"], color=VERMILLION, ls="--", label="stopped here")
-    legend_below(figure, axes)
-    save(figure, at_home(path))
+    style.legend_below(figure, axes)
+    style.save(figure, at_home(path))
 
 
 def _line(axis: Any, times: Any, values: Any, color: str, label: str) -> None:
@@ -212,7 +196,7 @@ def _line(axis: Any, times: Any, values: Any, color: str, label: str) -> None:
 def draw_ensemble(data: xr.Dataset, errors: dict[str, Array], path: str | Path) -> None:
     """Draw a panel for each error of an ensemble to a file: quantiles of `member_errors` (n, samples) against time."""
     drawn = {name: values for name, values in errors.items() if not np.isnan(values).all()} or errors
-    figure, axes = panels(len(drawn), 1, height=2.1, sharex=True)
+    figure, axes = style.panels(len(drawn), 1, height=2.1, sharex=True)
     for axis, (name, values) in zip(axes[:, 0], drawn.items(), strict=True):
         _bands(axis, data, name, values)
         axis.label_outer()
@@ -226,8 +210,8 @@ def draw_ensemble(data: xr.Dataset, errors: dict[str, Array], path: str | Path) 
         sentence += ", and those that failed count as infinitely wrong, at the upper edge"
     if lost := max(np.isnan(values).all(axis=1).sum() for values in errors.values()):
         sentence += f"; the angle is without {lost}, whose motion is not known"
-    headline(figure, sentence)
-    save(figure, at_home(path))
+    style.headline(figure, sentence)
+    style.save(figure, at_home(path))
 
 
 def _bands(axis: Any, data: xr.Dataset, quantity: str, own: Array) -> None:
@@ -245,7 +229,7 @@ def _bands(axis: Any, data: xr.Dataset, quantity: str, own: Array) -> None:
     if not valid.any():
         raise SymtopError("there is nothing to draw: the true motion of no member is known")
     times, errors = (places * (horizons[0] if shared else 1.0))[valid], quantiles[:, valid]
-    most, color = MOST[quantity], look(data.attrs["integrator"]).color
+    most, color = MOST[quantity], style.look(data.attrs["integrator"]).color
     quantiles = np.clip(errors, SMALLEST, most)
     for low, high, opaque in BANDS:
         axis.fill_between(times, quantiles[low], quantiles[high], color=color, alpha=opaque, lw=0.0)
@@ -264,6 +248,6 @@ def _bands(axis: Any, data: xr.Dataset, quantity: str, own: Array) -> None:
 
 def draw_compare(data: xr.Dataset, path: str | Path) -> None:
     """Draw the figure of a comparison to a file."""
-    figure, axes = panels(1, 1, height=3.6)
+    figure, axes = style.panels(1, 1, height=3.6)
     _sweep(axes[0, 0], data, "axis", None)
-    save(figure, at_home(path))
+    style.save(figure, at_home(path))

@@ -47,16 +47,9 @@ YELLOWS = ("#B8A500", YELLOW, "#7A6F00")
 PURPLES = (PURPLE, PLUM, "#E6B8D2")
 SKIES = (SKY, "#2B7BA8", "#A6D5F2")
 SHADES = {
-    "discrete-lagrangian": BLUES,
-    "splitting": GREENS,
-    "runge-kutta": ORANGES,
-    "lie-group": YELLOWS,
-    "taylor": BLACKS,
-    "library": REDS,
-    "exact": (GREY,),
-    "engine": SKIES,
-    "other": PURPLES,
-}
+    "discrete-lagrangian": BLUES, "splitting": GREENS, "runge-kutta": ORANGES, "lie-group": YELLOWS, "taylor": BLACKS,
+    "library": REDS, "exact": (GREY,), "engine": SKIES, "other": PURPLES,
+}  # fmt: skip
 DASHES = {  # dash patterns of lines by family; other families have solid lines
     "splitting": (0, (6.0, 1.2)), "runge-kutta": (0, (3.0, 1.2)), "lie-group": (0, (6.0, 1.2, 1.0, 1.2)),
     "taylor": (0, (1.5, 0.8)), "library": (0, (1.0, 1.6)), "engine": (0, (3.0, 1.2, 1.0, 1.2)),

@@ -38,10 +38,7 @@ Findings = Mapping[str, Any]
 
 
 def filled(findings: Findings, results: Path, *, pages: Mapping[str, str] | None = None) -> str:
-    """The page of a study in Markdown, its question as a heading of the first level.
-
-    `pages` are links to the pages of all studies, by name. Raises SymtopError for a template that is wrong.
-    """
+    """The page of a study in Markdown; `pages` are links by names of studies. SymtopError for a wrong template."""
     name = findings["study"]
     context = {"question": findings["question"], "pages": Links(pages or {})} | _names([findings], results)
     context |= {"f": SimpleNamespace(**findings["facts"]), "facts": findings["facts"]}

@@ -40,7 +40,7 @@ from symtop.methods.framework.registry import Integrator, integrator, is_built_i
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.run.linear_stability import Growth, nutation_growth, trace
-from symtop.run.motion import MOST_FOLDS, MOVED, SHEARED, UNSTABLE, Exact, Integrated, Landmarks
+from symtop.run.motion import MOST_FOLDS, MOVED, SHEARED, UNSTABLE, Exact, Integrated, Landmarks, Motion
 from symtop.run.reference.sensitivity import SMALL
 
 STEPS = {"compiled": 2000, "python": 50}  # most steps of a probe of two nutations
@@ -116,7 +116,7 @@ def _marks(steps: int, points: int) -> Any:
 
 
 def _probe(
-    motion: Integrated, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
+    motion: Motion, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
 ) -> Probe:
     """Run `method` from the time `since` of the true motion for `duration`, with `step` or the plan's tolerance."""
     most = min(plan.most(math.inf), MOST_WORK[method.implementation])
@@ -154,31 +154,27 @@ def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
     return n * first + 0.5 * max(abs(whole - 2.0 * first), LEAST_GROWTH * whole) * n * (n - 1.0)
 
 
-def _amplifies(motion: Integrated, change: float, horizon: float, times: float = UNSTABLE) -> bool:
+def _amplifies(motion: Motion, change: float, horizon: float, times: float = UNSTABLE) -> bool:
     """Does the motion amplify a change of its start more than `times` as much as the shear of a stable motion?"""
     return motion.displacement(change, horizon) > change * times * (1.0 + horizon / motion.landmarks.period)
 
 
-def _amplified(motion: Integrated, probe: Probe, horizon: float) -> float:
-    """The largest error of a probe as the motion amplifies it by the horizon; 0 if `grown` covers it (`Exact`)."""
-    return motion.amplified(float(probe.error.max()), float(probe.times[-1]), horizon)
-
-
-def _fixed(motion: Integrated, method: Integrator, probe: Probe, horizon: float) -> float:
+def _fixed(motion: Motion, method: Integrator, probe: Probe, horizon: float) -> float:
     """The largest error of a fixed-step probe at the horizon: by the law of `grown` or by amplification, the larger.
 
     Errors of rounding and of truncated iterations are not symmetric, and an unstable motion amplifies them in every
     nutation: there the error of a symmetric method may grow quadratically, too.
     """
     straight = method.keeps_frequencies
-    expected = max(grown(probe, horizon, straight=straight), _amplified(motion, probe, horizon))
+    later = motion.amplified(float(probe.error.max()), float(probe.times[-1]), horizon)  # 0 if `grown` covers it
+    expected = max(grown(probe, horizon, straight=straight), later)
     if not straight or not expected < WORTH:
         return expected
     bent = grown(probe, horizon, straight=False)
     return bent if bent > WORTH and _amplifies(motion, SMALL, horizon) else expected
 
 
-def _grown_tolerance(motion: Integrated, method: Integrator, plan: Plan) -> float:
+def _grown_tolerance(motion: Motion, method: Integrator, plan: Plan) -> float:
     """The error of an adaptive method at the horizon, rad, if an unstable motion amplifies it; 0 for a stable motion.
 
     A probe of a method in Python is shorter than the run and does not show errors made elsewhere: in 44 wrong runs of
@@ -192,7 +188,7 @@ def _grown_tolerance(motion: Integrated, method: Integrator, plan: Plan) -> floa
 
 
 def _adaptive_forecast(
-    motion: Integrated, method: Integrator, chart: str, plan: Plan, period: float, share: float, twice: float, far: bool
+    motion: Motion, method: Integrator, chart: str, plan: Plan, period: float, share: float, twice: float, far: bool
 ) -> tuple[float, Probe]:
     """`_expected` for an adaptive method, whose work per time is known after a first probe.
 
@@ -206,7 +202,8 @@ def _adaptive_forecast(
         partial = piece < min(period, 0.5 * plan.horizon)
         since = max(0.0, motion.closest() - 0.5 * piece) if partial else 0.0
         probe = _probe(motion, cheap, chart, plan, piece, math.nan, since)
-        expected = max(grown(probe, plan.horizon, straight=False), _amplified(motion, probe, plan.horizon))
+        later = motion.amplified(float(probe.error.max()), float(probe.times[-1]), plan.horizon)
+        expected = max(grown(probe, plan.horizon, straight=False), later)
         return expected * (PARTIAL if partial else 1.0), probe
 
     piece = max(share, least)
@@ -220,7 +217,7 @@ def _adaptive_forecast(
     return expected if probe.times[-1] >= plan.horizon else max(expected, plan.tolerance), probe
 
 
-def _expected(motion: Integrated, method: Integrator, chart: str, plan: Plan) -> tuple[float, Probe]:
+def _expected(motion: Motion, method: Integrator, chart: str, plan: Plan) -> tuple[float, Probe]:
     """The expected largest axis error of a run, and the probe from which it follows."""
     straight, marks = method.keeps_frequencies, motion.landmarks
     grows = motion.scene.of_body and motion.scene.top.free and _amplifies(motion, SMALL, plan.horizon, SHEARED)
@@ -255,7 +252,7 @@ def _expected(motion: Integrated, method: Integrator, chart: str, plan: Plan) ->
     return expected, probe
 
 
-def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: Integrated | None = None) -> Forecast:
+def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: Motion | None = None) -> Forecast:
     """Forecast the error of a run from a short run (a probe) of the same method; the run itself is not changed.
 
     A method without a step or a tolerance, such as the closed form, is not probed. The default `motion` is the closed
@@ -296,10 +293,7 @@ def _length_lost(probe: Probe, horizon: float) -> tuple[str, float] | None:
 
 
 def _own_growth(motion: Integrated, method: Integrator, chart: str, plan: Plan, piece: float) -> float:
-    """The factor by which a method multiplies a small change in a piece of the run more than the motion does; or 1.
-
-    It is a lower bound, as it divides by the square of the motion's own factor.
-    """
+    """A lower bound of how many times more than the motion a method multiplies a small change in a piece; or 1."""
     steps = max(1, round(min(piece, STEPS[method.implementation] * plan.step_size) / plan.step_size))
     top, marks = motion.scene.top, Plan.steps(plan.step_size, _marks(steps, motion.points))
     pair = [solve(method, chart, top, start, marks).states for start in (motion.scene.start, motion.moved())]
@@ -326,7 +320,7 @@ def warning(scene: Scene, method: Integrator, chart: str, plan: Plan, *, series:
     """
     if method.control is None:
         return ""
-    motion: Integrated = Integrated(scene) if series or scene.of_body else Exact(scene)
+    motion: Motion = Integrated(scene) if series or scene.of_body else Exact(scene)
     expected = forecast(scene, method, chart, plan, motion)
     problem = trouble(motion, method, chart, plan, expected)
     if problem is None:
@@ -335,7 +329,7 @@ def warning(scene: Scene, method: Integrator, chart: str, plan: Plan, *, series:
     return f"{method.name} on {scene.name}: {problem.reason}{remedy}"
 
 
-def _remedy(motion: Integrated, method: Integrator, chart: str, plan: Plan, first: Trouble) -> str:
+def _remedy(motion: Motion, method: Integrator, chart: str, plan: Plan, first: Trouble) -> str:
     """The advice to use a step, of two digits, for which there is no warning: the first try or a smaller one."""
     step, others, words, errors = first.step, f", or {first.otherwise}" if first.otherwise else "", "", []
     for _ in range(TRIES):
@@ -356,7 +350,7 @@ def _remedy(motion: Integrated, method: Integrator, chart: str, plan: Plan, firs
     return words or f"try a step of about {step:.2g}{others}"
 
 
-def trouble(motion: Integrated, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
+def trouble(motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
     """Why a run is expected to be wrong; None if it is not."""
     known = isinstance(motion, Exact) and _instability(motion.scene, method, chart, plan, expected)
     return known or _cause(motion, method, chart, plan, expected)
@@ -399,7 +393,7 @@ def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expec
     return Trouble(f"{words}: {NO_ORDER}") if method.order is None else Trouble(words, finer)
 
 
-def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
+def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
     """The first cause that applies, except instability; None if no large error is expected."""
     marks = expected.landmarks
     if expected.rounding > EXPECTED and not isinstance(motion, Exact):
@@ -437,7 +431,7 @@ def _cause(motion: Integrated, method: Integrator, chart: str, plan: Plan, expec
 
 
 def _coarse(
-    motion: Integrated, method: Integrator, chart: str, plan: Plan, expected: Forecast, size: str
+    motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast, size: str
 ) -> Trouble | None:
     """The trouble of a step that is too long for a pole or for the nutation, or in resonance with it; else None."""
     marks, step, frequency = expected.landmarks, plan.step_size, expected.landmarks.frequency

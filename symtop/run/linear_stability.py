@@ -84,10 +84,7 @@ NO_TRACE = Trace(math.nan, math.nan, math.nan)
 
 
 def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None) -> Trace:
-    """The trace of the map of one step h at the method's fixed point next to the steady precession of these momenta.
-
-    `chart` is by default the smallest that determines the axis.
-    """
+    """The trace of the map of a step h at the method's steady precession; in the axis' smallest chart by default."""
     top, momenta = scene.top, scene.top.momenta(scene.start)
     chart = chart or method.chart_for("axis")
     theta, moved = top.steady_theta(momenta), math.inf

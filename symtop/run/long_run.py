@@ -29,7 +29,7 @@ from symtop.core.jit import code_of
 from symtop.core.numbers import GOLDEN
 from symtop.core.progress import progress_bar
 from symtop.core.signals import ending_on_sigterm
-from symtop.methods.framework.lanes import Whole
+from symtop.methods.framework.lanes import Ints
 from symtop.methods.framework.loop import FixedStep, Loop, Position, inside
 from symtop.methods.framework.plan import NOT_NORMALISED, OK, ending, off_length, sentence
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
@@ -60,7 +60,7 @@ def windows(steps: int) -> list[int]:
     return ends
 
 
-def scattered(begin: int, end: int, samples: int = SAMPLES) -> Whole:
+def scattered(begin: int, end: int, samples: int = SAMPLES) -> Ints:
     """At most `samples` whole steps in (begin, end] with strides of no fixed ratio, and `end`."""
     place = np.arange(samples, dtype=float)
     place += np.mod(GOLDEN * place, 1.0)

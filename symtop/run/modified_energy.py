@@ -50,10 +50,7 @@ def modified_energy(
 
 
 def section(chart: str, states: Array) -> tuple[Array, Array]:
-    """(theta, p_theta) or (u, I1 u') of kernel states: a plane in which one nutation is a closed curve.
-
-    In the angles chart the series of stormer-verlet needs twice as many harmonics in u as in theta.
-    """
+    """(theta, p_theta), or off the angles chart (u, I1 u'), of kernel states: one nutation is a closed curve there."""
     if chart == "angles":
         return states[:, 0], states[:, 1]
     e, L = axis_of(chart, states), states[:, -3:]

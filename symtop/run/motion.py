@@ -1,9 +1,9 @@
 """The true motion that the guard compares a probe with: the closed form, or an integration where there is none.
 
-`Exact` evaluates a top's motion at any time. `Integrated` needs only the equations, and so works for bodies too: a
-Taylor series with a tolerance near rounding, for a body of order 19, or 15 where errors do not grow much. Its error is
-estimated by the distance from a series of a looser tolerance, for a body of order 16 or 13, at the beginning or, where
-the motion amplifies errors, all the way. The amplification of an error by the motion is
+`Exact` evaluates a top's motion at any time. `Integrated`, with the same interface, needs only the equations, and so
+works for bodies too: a Taylor series with a tolerance near rounding, for a body of order 19, or 15 where errors do not
+grow much. Its error is estimated by the distance from a series of a looser tolerance, for a body of order 16 or 13, at
+the beginning or, where the motion amplifies errors, all the way. The amplification of an error by the motion is
 
     A(t) = max over s <= t of |y~(s) - y(s)|/delta,      |y~(0) - y(0)| = delta,
 
@@ -123,7 +123,7 @@ def _apart(near: Any, far: Any, units: Any) -> Any:
 
 
 class Integrated:
-    """The motion of a body, or of a top as if it had no closed form, by Taylor series, with the guard's interface."""
+    """The motion of a body, or of a top as if it had no closed form, by Taylor series."""
 
     longest, reach = 20.0, 40.0  # natural periods: most of a probe that is a share of the run, and of a minimal one
     points = 100  # of a probe that are compared
@@ -278,7 +278,7 @@ def _frequencies(scene: Scene) -> tuple[float, float, float]:
     return slow, max(slow, math.sqrt(max(turning, swinging))), middle
 
 
-class Exact(Integrated):
+class Exact:
     """The motion of a top by its closed form, at any time."""
 
     watches, longest, reach, points, period_word = "axis", 20.0, math.inf, 300, "nutation"
@@ -315,3 +315,6 @@ class Exact(Integrated):
         """See `Integrated`; not 0 for a `whole` run."""
         marks, turns = self.landmarks, horizon / self.landmarks.period
         return marks.shear * 2.0 * math.pi * turns * min(marks.width, 1.0) if turns > 0.5 else 0.0
+
+
+Motion = Exact | Integrated  # one interface for the guard

@@ -17,7 +17,7 @@ import math
 import warnings
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -42,6 +42,7 @@ WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider range of phases 
 USUAL = 1e-3  # rad: the error at which an error message proposes a step if none was given
 SAME = 8.0 * EPSILON  # relative: times that differ by less are the same, because products are rounded
 BRIEF = 0.01  # nutations: the length of the run of an adaptive method that is sampled at its start only
+Guard = bool | Literal["exact", "series"] | Callable[[str], object]  # the values are those in `simulate`
 STRETCHES = 17  # equal ranges of phase; two of them are less than `WIDEST_GAP`
 
 
@@ -70,10 +71,7 @@ def places(samples: int, *, dithered: bool) -> Array:
 
 
 def sample_times(horizon: float, samples: int, period: float, steps: int | None = None) -> tuple[Any, Any, bool]:
-    """Times and step marks of the samples, and whether they had to be dithered.
-
-    With `steps`, times are whole multiples of horizon/steps; the first sample is 0 and the last the horizon.
-    """
+    """Times and marks of samples from 0 to the horizon, at whole steps of `steps`, and whether they are dithered."""
     if steps is not None and steps < samples:  # every step is a sample
         marks: Any = np.arange(steps + 1)
         return marks * (horizon / steps), marks, False
@@ -94,10 +92,7 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
 
 
 def chart_of(method: Integrator, watched: str, observe: str | None = None) -> str:
-    """The chart of a run: the smallest of the method that determines `observe`; a body without symmetry has one chart.
-
-    Without `observe` it is the scene's default, `watched`, or "axis" if the method does not determine that.
-    """
+    """The smallest chart of a method for `observe`, by default for `watched` or else for "axis"; or `BODY`."""
     if watched == BODY:
         one_of("observe", observe or "attitude", ("axis", "attitude"))
         if BODY not in method.solvers:
@@ -167,7 +162,7 @@ def make_plan(
 def simulate(
     scene: str | Scene, integrator: str | Integrator, *, step_size: float | None = None,
     tolerance: float | None = None, horizon: float | None = None, samples: int = 501, observe: str | None = None,
-    guard: bool | str | Callable[[str], object] = True, budget: float | None = None, times: ArrayLike | None = None,
+    guard: Guard = True, budget: float | None = None, times: ArrayLike | None = None,
 ) -> xr.Dataset:  # fmt: skip
     """Run one integrator on one scene and return the trajectory.
 
@@ -185,33 +180,35 @@ def simulate(
     of exactly `step_size` from 0: a time that equals the end of a step, to rounding, has its state, and one inside a
     step is the end of one shorter step of the same method. ``steps`` and ``force_evaluations`` count whole steps only.
 
-    Before the run the `guard` (`symtop.run.guard`) warns (`SymtopWarning`) in one sentence with a remedy if a large
-    error is expected; it does not change the run. It compares a piece of the run with the closed form ("exact", tops
-    only) or with an accurate integration ("series", always for bodies). A function as `guard` is called with the
-    sentence instead; False turns it off. `budget` is the most steps of a fixed-step run (`MOST_STEPS` by default; more
-    are refused) and the most force evaluations, or Taylor steps, of any other, which ends `out_of_budget`.
+    Before the run the guard (`symtop.run.guard`) compares a piece of it with the true motion, and has a sentence with a
+    remedy if a large error is expected; it does not change the run. `guard` is one of
+
+        True           warn (`SymtopWarning`); a top is compared with its closed form, a body with an integration
+        "exact"        the same, for tops only           "series"    the same, with an integration also of a top
+        a function     called with the sentence in the place of a warning, compared as with True
+        False          no guard
+
+    `budget` is the most steps of a fixed-step run (`MOST_STEPS` by default; more are refused) and the most force
+    evaluations, or Taylor steps, of any other, which ends `out_of_budget`.
 
     Raises SymtopError for invalid arguments. A run that fails raises no exception: see ``outcome``.
     """
     warn = functools.partial(warnings.warn, category=SymtopWarning, stacklevel=3)  # where `simulate` was called
     report = guard if callable(guard) else warn if isinstance(guard, str) or boolean("guard", guard) else None
-    arguments = scene, integrator, step_size, tolerance, horizon, samples, observe, budget
-    chosen, method, chart, plan, dithered = _prepared(*arguments) if times is None else _at_times(times, *arguments)
+    asked = _prepared(scene, integrator, step_size, tolerance, horizon, samples, observe, budget, times)
+    chosen, method, plan = asked.scene, asked.method, asked.plan
     if isinstance(guard, str) and one_of("guard", guard, ("exact", "series")) == "exact" and chosen.of_body:
         raise SymtopError(f"guard must be series on {chosen.name}, a body without symmetry, not 'exact'", "guard")
-    options = {"series": guard == "series", "at_times": times is not None}
-    trajectory, caution = _guarded(chosen, method, chart, plan, report, **options)
-    uneven = times is None and plan.marks.size and plan.marks[-1] % (plan.marks.size - 1)  # unequal numbers of steps
-    sampling = "dithered" if dithered else "nearest steps" if uneven else "uniform"
+    trajectory, caution = _guarded(asked, report, guard == "series")
     data = dataset(trajectory.time, trajectory.columns, chosen.units)
     data.attrs = netcdf.attributes_of(
-        f"{method.name} on {chosen.name}", integrator=method.name, scene=chosen.name, chart=chart,
+        f"{method.name} on {chosen.name}", integrator=method.name, scene=chosen.name, chart=asked.chart,
         implementation=method.implementation, horizon=plan.horizon, step_size=plan.step_size, tolerance=plan.tolerance,
         steps=trajectory.steps, force_evaluations=trajectory.force_evaluations,
         newton_iterations=trajectory.newton_iterations, outcome=trajectory.outcome,
         outcome_message=sentence(trajectory.outcome, trajectory.reached_time, plan.horizon, chosen.second),
-        reached_time=trajectory.reached_time, guard=caution, sampling=sampling if times is None else "at times",
-        top=_json(chosen.top), start=_json(chosen.start),
+        reached_time=trajectory.reached_time, guard=caution, sampling=asked.sampling, top=_json(chosen.top),
+        start=_json(chosen.start),
     )  # fmt: skip
     return data
 
@@ -221,46 +218,50 @@ def integrate(
     **settings: Any,
 ) -> Trajectory:  # fmt: skip
     """The run of `simulate` as plain arrays; `guard` is called with the guard's sentence, and None turns it off."""
-    chosen, method, chart, plan, _ = _prepared(scene, integrator, **settings)
-    return _guarded(chosen, method, chart, plan, guard)[0]
+    return _guarded(_prepared(scene, integrator, **settings), guard)[0]
+
+
+class _Prepared(NamedTuple):
+    """The checked arguments of `simulate`, and the attribute ``sampling``."""
+
+    scene: Scene
+    method: Integrator
+    chart: str
+    plan: Plan
+    sampling: str
 
 
 def _prepared(
-    scene: str | Scene, integrator: str | Integrator, step_size: object = None, tolerance: object = None,
-    horizon: object = None, samples: int = 501, observe: str | None = None, budget: object = None,
-) -> tuple[Scene, Integrator, str, Plan, bool]:  # fmt: skip
-    """Check the arguments of `simulate`; return scene, integrator, chart, plan, and whether samples are dithered."""
-    chosen, method = find_scene(scene, bodies=True), find_integrator(integrator)
+    scene: Any, integrator: Any, step_size: Any = None, tolerance: object = None, horizon: object = None,
+    samples: int = 501, observe: str | None = None, budget: Any = None, times: Any = None,
+) -> _Prepared:  # fmt: skip
+    """Check the arguments of `simulate`. With `times`, the marks are the whole steps before each of them."""
+    row = None if times is None else _checked_times(times, horizon, samples)
+    chosen, method, h = find_scene(scene, bodies=True), find_integrator(integrator), math.nan
+    if row is not None:
+        horizon, samples = float(row[-1]) or BRIEF * chosen.time_scale(), 2
+        if step_size is not None:
+            h = positive("step_size", step_size)
+            step_size = min(h, horizon)  # it may be longer than the run
     end = chosen.horizon if horizon is None else horizon_of(horizon)
     count = whole("samples", samples, 2, MOST_SAMPLES)
     chart = chart_of(method, chosen.observes, observe)
     limit = None if budget is None else positive("budget", budget)
     plan, dithered = make_plan(chosen, method, step_size, tolerance, horizon=end, samples=count, budget=limit)
-    return chosen, method, chart, plan, dithered
+    marks = plan.marks
+    uneven = marks.size and marks[-1] % (marks.size - 1)  # unequal numbers of steps
+    sampling = "dithered" if dithered else "nearest steps" if uneven else "uniform"
+    if row is not None:
+        if method.fixed_step:
+            near = np.rint(row / h)
+            marks = np.where(np.abs(row - near * h) <= SAME * row, near, np.floor(row / h)).astype(np.int64)
+        plan = plan._replace(times=row, horizon=float(row[-1]), step_size=h, marks=marks)
+        sampling = "at times"
+    return _Prepared(chosen, method, chart, plan, sampling)
 
 
-def _guarded(
-    scene: Scene, method: Integrator, chart: str, plan: Plan, guard: Callable[[str], object] | None, *,
-    series: bool = False, at_times: bool = False,
-) -> tuple[Trajectory, str]:  # fmt: skip
-    """Call `guard` with the guard's sentence, if any, and make the run; the sentence is "off" without a guard."""
-    caution = "off" if guard is None else ""
-    forecast = plan._replace(step_size=plan.horizon) if plan.step_size > plan.horizon else plan
-    if guard is not None and plan.horizon > 0.0 and (caution := warning(scene, method, chart, forecast, series=series)):
-        guard(caution)
-    if at_times and method.fixed_step:
-        return Trajectory.of_run(scene, chart, plan, _stepped(scene, method, chart, plan)), caution
-    brief = plan if plan.horizon else Plan.until([0.0, BRIEF * scene.time_scale()], plan.tolerance, plan.budget)
-    run = solve(method, chart, scene.top, scene.start, brief, f" on {scene.name}")
-    run = run if plan.horizon else Run(run.states[:1], run.p_phi[:1], run.p_psi[:1], 0, 0, 0, "ok", 0.0)
-    return Trajectory.of_run(scene, chart, plan, run), caution
-
-
-def _at_times(
-    times: ArrayLike, scene: Any, integrator: Any, step_size: object, tolerance: object, horizon: object,
-    samples: object, observe: str | None, budget: Any,
-) -> tuple[Scene, Integrator, str, Plan, bool]:  # fmt: skip
-    """`_prepared` for a run to the last of `times`; marks of the plan are the whole steps before each of them."""
+def _checked_times(times: ArrayLike, horizon: object, samples: object) -> Array:
+    """The row of `times`; SymtopError for anything else, and where `horizon` or `samples` are given, too."""
     for name, given, usual in (("horizon", horizon, None), ("samples", samples, 501)):
         if type(given) is not type(usual) or given != usual:
             raise SymtopError(f"{name} must be left out where times are given, not {shown(given)}", name, "times")
@@ -271,15 +272,22 @@ def _at_times(
         wrong = f"{float(flat[bad][0])!r} in place {np.argmax(bad)}" if bad.any() else f"of shape {row.shape}"
         must = f"an increasing row of finite numbers, each 0 or at least {SHORTEST:g}"
         raise SymtopError(f"times must be {must}, not {wrong}", "times")
-    end = float(row[-1]) or BRIEF * find_scene(scene, bodies=True).time_scale()
-    h = math.nan if step_size is None else positive("step_size", step_size)
-    first = None if step_size is None else min(h, end)  # it may be longer than the run
-    chosen, method, chart, plan, _ = _prepared(scene, integrator, first, tolerance, end, 2, observe, budget)
-    marks = plan.marks
-    if method.fixed_step:
-        near = np.rint(row / h)
-        marks = np.where(np.abs(row - near * h) <= SAME * row, near, np.floor(row / h)).astype(np.int64)
-    return chosen, method, chart, plan._replace(times=row, horizon=float(row[-1]), step_size=h, marks=marks), False
+    return row
+
+
+def _guarded(asked: _Prepared, guard: Callable[[str], object] | None, series: bool = False) -> tuple[Trajectory, str]:
+    """Call `guard` with the guard's sentence, if any, and make the run; the sentence is "off" without a guard."""
+    scene, method, chart, plan, sampling = asked
+    caution = "off" if guard is None else ""
+    forecast = plan._replace(step_size=plan.horizon) if plan.step_size > plan.horizon else plan
+    if guard is not None and plan.horizon > 0.0 and (caution := warning(scene, method, chart, forecast, series=series)):
+        guard(caution)
+    if sampling == "at times" and method.fixed_step:
+        return Trajectory.of_run(scene, chart, plan, _stepped(scene, method, chart, plan)), caution
+    brief = plan if plan.horizon else Plan.until([0.0, BRIEF * scene.time_scale()], plan.tolerance, plan.budget)
+    run = solve(method, chart, scene.top, scene.start, brief, f" on {scene.name}")
+    run = run if plan.horizon else Run(run.states[:1], run.p_phi[:1], run.p_psi[:1], 0, 0, 0, "ok", 0.0)
+    return Trajectory.of_run(scene, chart, plan, run), caution
 
 
 def _stepped(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Run:

@@ -168,10 +168,7 @@ def check(
     study: Study, results: Path, pool: Pool, *, quick: bool = False, full: bool = False, everything: bool = False,
     limit: float | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Compute `SAMPLE` stored cases again, or every one, and compare; also combine them and compare the dataset.
-
-    Returns the numbers of cases ``stored`` and up to date and of those ``compared``, and the ``differences`` in words.
-    """
+    """Compute `SAMPLE` stored cases, or all, again, and the dataset; ``stored``, ``compared``, and ``differences``."""
     cases = StudyCases.stored(study, results, quick=quick, full=full)
     # in the order of their digests, so that the sample is spread over the grid
     stored = sorted(cases.data.items(), key=lambda item: store.digest_of(item[0]))

@@ -218,10 +218,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             remaining.update(died)
 
     def at_once(self, width: int) -> tuple[int, float]:
-        """How many timed cases may run at once, and the slowdown of a run by that.
-
-        It is `width` if a trial shows a slowdown of at most `DISTURBED`, otherwise half of that, and so on, down to 1.
-        """
+        """How many timed cases run at once, and the slowdown: `width`, halved until a trial is within `DISTURBED`."""
         ratio = math.nan  # without a trial
         while width > 1:
             if width not in self._trials:

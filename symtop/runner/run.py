@@ -35,7 +35,7 @@ Findings = dict[str, Any]
 QUICK = "quick pass: coarse grid"  # text at the edge of figures of a quick pass
 
 
-class Started(NamedTuple):
+class PendingFindings(NamedTuple):
     """A study whose cases are computed, except `failures`: `result` waits for its findings, `done` is True if ready."""
 
     result: Callable[[], Findings]
@@ -55,8 +55,8 @@ def run(study: Study, results: Path, *, jobs: int | None = None, pool: Pool | No
 
 def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full: bool = False,
           fresh: bool = False, quiet: bool = False, limit: float | None = None, save: Save | None = None,
-          beside: bool = False) -> Started:  # fmt: skip
-    """Compute the missing cases of a study; the findings are made by `Started.result`.
+          beside: bool = False) -> PendingFindings:  # fmt: skip
+    """Compute the missing cases of a study; the findings are made by `PendingFindings.result`.
 
     `quick` is the coarse grid, `full` the longest one of a study that has it; `limit` is the time a case may take, in
     seconds (the study's own by default); `save` writes figures to files, and without it none are drawn. With `beside`
@@ -74,7 +74,7 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
     if not fresh and store.is_current(results, study.name, made_of):
         stored = netcdf.read_json(results / f"{study.name}.json")
         if isinstance(stored, dict):
-            return Started(lambda: stored | {"computed": 0, "seconds": time.monotonic() - began})
+            return PendingFindings(lambda: stored | {"computed": 0, "seconds": time.monotonic() - began})
     try:
         for new in chain([first], rounds):
             cases.compute(cases.missing(new, fresh=fresh), pool, seconds, fresh=fresh, quiet=quiet)
@@ -102,7 +102,7 @@ def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full:
                 findings = analyse(cases, made_of, save, quick)
         return findings | {"computed": cases.computed, "seconds": computing + time.monotonic() - begin}
 
-    return Started(result, lambda: future is None or future.done(), cases.failures)
+    return PendingFindings(result, lambda: future is None or future.done(), cases.failures)
 
 
 def analyse_stored(

@@ -60,10 +60,7 @@ def file_of(name: str) -> Path:
 
 
 def file_beside(name: str, file: str) -> Path | None:
-    """A file of a study beside its script: page.md, the template of its page, or columns.tsv, the table of its columns.
-
-    Beside study.py it has that name, beside any other script, NAME.py, it is NAME.md or NAME.tsv; None without one.
-    """
+    """page.md or columns.tsv beside a study.py, NAME.md or NAME.tsv beside another script NAME.py; None without one."""
     script = file_of(name)
     path = script.with_name(file) if script.stem == "study" else script.with_suffix(Path(file).suffix)
     return path if path.is_file() else None

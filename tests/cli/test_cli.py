@@ -16,8 +16,8 @@ from pathlib import Path
 from types import SimpleNamespace
 from unittest.mock import Mock
 
+import click.testing
 import pytest
-from click.testing import CliRunner
 
 import symtop
 from symtop.cli import doctor, runs
@@ -65,6 +65,7 @@ def test_a_refusal_names_the_argument_its_value_and_what_is_allowed(words, parts
     assert all(part in line for part in parts), line
     assert ("the scene comes first" in line) is ("scene comes first" in parts)
     assert list(Path().iterdir()) == []
+    assert click.UsageError.show.__module__ == "click.exceptions"  # that of other programs of this process
 
 
 def test_a_plugin_that_registers_nothing_is_told_of(tmp_path):
@@ -98,15 +99,14 @@ def numbers(text):
 
 
 def test_run_prints_the_errors_and_writes_the_dataset_also_of_a_run_that_fails_or_has_nan(tmp_path):
-    words = ("run", "spheroid", "midpoint", "--step-size", 0.01, "-o", tmp_path / "run.nc")
+    words = ("run", "spheroid", "midpoint", "--step-size", 0.01, "-o", path := tmp_path / "run.nc")
     assert "angle between axes" in call(*words).output
-    assert netcdf.read(tmp_path / "run.nc").attrs["integrator"] == "midpoint"
+    assert netcdf.read(path).attrs["integrator"] == "midpoint"
     report = numbers(call(*words, "--json").stdout)
     assert report["steps"] == 800
     assert 1e-3 < report["errors"]["axis"]["largest"] < 2e-2
     assert report["errors"]["p_psi"]["largest"] < 1e-14
     assert "\n1 step, 1 force evaluation\n" in call("run", "spheroid", "strang", "--step-size", 8, "--no-guard").output
-    path = tmp_path / "run.nc"
     call("run", "spheroid", "stormer-verlet", "--step-size", 1.0, "--horizon", 50, "--output", path, code=3)
     assert netcdf.read(path).attrs["outcome"] == "left_chart"
     with pytest.raises(pytest.fail.Exception):
@@ -153,7 +153,7 @@ def test_a_variant_runs_in_its_own_chart_and_the_help_says_how_to_name_it(tmp_pa
 ])  # fmt: skip
 def test_the_shell_completes_names(line, completion):
     environment = {"_SYMTOP_COMPLETE": "bash_complete", "COMP_WORDS": line, "COMP_CWORD": str(len(line.split()) - 1)}
-    assert f"plain,{completion}" in CliRunner().invoke(main, prog_name="symtop", env=environment).output
+    assert f"plain,{completion}" in click.testing.CliRunner().invoke(main, prog_name="symtop", env=environment).output
 
 
 ENDING = """
@@ -360,7 +360,7 @@ def test_a_cache_that_cannot_be_written_and_a_wrong_number_are_seen(tmp_path, mo
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "file" / "cache"))
     assert "SYMTOP_CACHE" in faults(doctor._caches(Path()))["cache"].advice
     assert set(faults(doctor._results(Path("/proc/none")))) == {"results"}
-    wrong = published.Published("somebody", "something", 1.0, 1.1, 1e-3, "printed")
+    wrong = published.KnownValue("somebody", "something", 1.0, 1.1, 1e-3, "printed")
     monkeypatch.setattr(published, "published_values", lambda: [wrong])
     findings = faults(doctor._self_check(Path()))
     assert "not somebody, something" in findings["published values"].result

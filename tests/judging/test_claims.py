@@ -22,7 +22,7 @@ from symtop.judging.claims.step_series import Series
 from symtop.judging.claims.subject import Subject, seconds_a_step
 from symtop.judging.findings import VERDICTS, About, Finding, Ledger, Measured, as_time, description
 from symtop.judging.remote import Process, separated, solvers_of
-from symtop.measure.conservation import Changed, behaviour
+from symtop.measure.conservation import Change, behaviour
 from symtop.measure.order import Fit
 from symtop.measure.step_map import bracket, one_step, restart_gap, return_miss, step_map, symplectic_defect
 from symtop.methods.framework.plan import Run
@@ -155,7 +155,7 @@ def test_an_energy_that_leaves_its_scale_is_said_to_blow_up_and_the_rest_judged_
 def test_an_energy_that_sinks_to_its_least_and_stays_there_is_not_bounded(largest, verdict):
     """As the implicit Euler method has it: no longer growth, and more than 0.008 a step come to in a nutation."""
     run = long.long_run(symtop.integrator("rk4"), SPHEROID, "axis", quick=True, most=1000)
-    sunk = long.Constant(Changed(largest, 0.0, 1.0, 0.0, 0.2, 0.01, ""), 0.008, 1e-11)
+    sunk = long.Constant(Change(largest, 0.0, 1.0, 0.0, 0.2, 0.01, ""), 0.008, 1e-11)
     run = run._replace(outcome="ok", steps=32_000, nutations=271.0, constants={"energy": sunk})
     claiming = dataclasses.replace(symtop.integrator("rk4"), energy_error="bounded", conserves=None)
     assert constants.of_run(claiming, run)[0].verdict == verdict

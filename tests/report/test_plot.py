@@ -78,7 +78,7 @@ def test_one_integrator_or_scene_of_a_sweep_is_drawn():
 def test_a_run_that_fails_in_its_first_step_is_drawn(step, shown, tmp_path, monkeypatch):
     """Lines without a number are left out, and one with a single one has a marker."""
     drawn = []
-    monkeypatch.setattr("symtop.report.plot.save", lambda figure, path: (save(figure, path), drawn.append(figure)))
+    monkeypatch.setattr("symtop.report.style.save", lambda figure, path: (save(figure, path), drawn.append(figure)))
     call("run", "spheroid", "midpoint", "--step-size", step, "--no-guard", "--figure", tmp_path / "f.png", code=3)
     errors = [line for line in drawn[0].axes[1].get_lines() if line.get_label() != "stopped here"]
     assert [np.isfinite(line.get_ydata()).sum() for line in errors] == [shown] * (3 if shown else 0)
@@ -91,7 +91,7 @@ def test_a_run_that_fails_in_its_first_step_is_drawn(step, shown, tmp_path, monk
 @pytest.mark.parametrize(("samples", "marker"), [(2, "o"), (3, "None")])
 def test_a_single_sample_is_a_point(samples, marker, tmp_path, monkeypatch):
     drawn = []
-    monkeypatch.setattr("symtop.report.plot.save", lambda figure, _: drawn.append(figure))
+    monkeypatch.setattr("symtop.report.style.save", lambda figure, _: drawn.append(figure))
     call("run", "spheroid", "rk4", "--step-size", 0.01, "--samples", samples, "--figure", tmp_path / "f.png")
     assert {line.get_marker() for axis in drawn[0].axes[1:] for line in axis.get_lines()} == {marker}
     run = symtop.simulate("spheroid", "rk4", step_size=0.01, samples=samples)
@@ -122,7 +122,7 @@ def test_quantiles_are_members_failed_ones_infinitely_wrong_and_samples_a_run_ha
     errors, failed = member_errors(symtop.population(200, seed=3), data, "axis"), data.outcome.values != "ok"
     assert 0 < failed.sum() < 100
     np.testing.assert_array_equal(np.isinf(largest(errors)), failed)
-    monkeypatch.setattr("symtop.report.plot.save", lambda *_: None)
+    monkeypatch.setattr("symtop.report.style.save", lambda *_: None)
     draw_ensemble(data, {"axis": errors}, "f.png")
     assert f"{100.0 * (1.0 - failed.mean()):.4g} % of the runs ended ok" in " ".join(plt.gcf().get_suptitle().split())
     quantiles = spread(errors)

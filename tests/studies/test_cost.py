@@ -566,7 +566,7 @@ def test_the_page_says_what_was_measured_and_shares_of_silent_runs_are_of_their_
     assert {"takahashi-imada (symmetric)", "rk4"} <= named
 
 
-def test_where_f_is_dear_the_fewest_evaluations_win(monkeypatch):
+def test_where_f_is_dear_the_fewest_calls_win(monkeypatch):
     some = [Safe("fast", 8.0, 1e-5, 0.0, 0.0), Safe("next", 8.0, 2e-5, 0.0, 0.0), Safe("few", 1e-5, 3e-5, 0.0, 0.0)]
     monkeypatch.setattr(cells, "safest", lambda *_: (some, True))
     work = {"fast": np.array([500.0, 2000.0]), "next": np.array([80.0, 80.0]), "few": np.array([40.0, 90.0])}
@@ -574,19 +574,19 @@ def test_where_f_is_dear_the_fewest_evaluations_win(monkeypatch):
     settings = xr.DataArray([[[4.0, 16.0], [4.0, 16.0], [1e-4, 1e-6]]], dims=("scene", "variant", "level"))
     tree = xr.DataTree.from_dict({"short": xr.Dataset({"setting": settings}, {"variant": [*work], "target": [1e-3]})})
     # dearer by 2e-5 / 940 it leaves the fast one behind, but the next only by 1e-5 / 20; halfway between two settings
-    assert cells.dearer(tree, Cell("short", "axis", 1e-3, NATURAL)) == (some[2], *map(pytest.approx, (60.0, 1e-5 / 20)))
+    assert cells.fewest_calls(tree, Cell("short", "axis", 1e-3, NATURAL)) == (some[2], *map(pytest.approx, (60, 5e-7)))
     assert cells.advised(tree, [])["few"] == [1e-5]  # run on other tops, as all that the front page names, though slow
     monkeypatch.setattr(cells, "safest", lambda *_: (some[:1], True))
-    assert cells.dearer(tree, Cell("short", "axis", 1e-3, NATURAL)) == (some[0], pytest.approx(1000.0), 0.0)
+    assert cells.fewest_calls(tree, Cell("short", "axis", 1e-3, NATURAL)) == (some[0], pytest.approx(1000.0), 0.0)
     monkeypatch.setattr(cells, "safest", lambda *_: ([], True))
-    assert cells.dearer(tree, Cell("short", "axis", 1e-3, NATURAL)) is None
+    assert cells.fewest_calls(tree, Cell("short", "axis", 1e-3, NATURAL)) is None
 
 
 def test_a_row_of_the_front_page_is_of_a_slower_f(monkeypatch):
-    each = {1e-3: cells.Dear(Safe("adams[axis]", 1e-4, 1e-5, 0.0, 0.0), 81.6, 1.7e-7),
-            1e-6: cells.Dear(Safe("rk4[axis]", 8.0, 1e-5, 0.0, 0.0), 320.0, 0.0)}  # fmt: skip
+    each = {1e-3: cells.FewestCalls(Safe("adams[axis]", 1e-4, 1e-5, 0.0, 0.0), 81.6, 1.7e-7),
+            1e-6: cells.FewestCalls(Safe("rk4[axis]", 8.0, 1e-5, 0.0, 0.0), 320.0, 0.0)}  # fmt: skip
     monkeypatch.setattr(cells, "targets", lambda _: [*each])
-    monkeypatch.setattr(cells, "dearer", lambda _, cell: each[cell.target])
+    monkeypatch.setattr(cells, "fewest_calls", lambda _, cell: each[cell.target])
     monkeypatch.setattr(facts, "over", lambda _: "")
     first = "f(t, y) that takes 0.2\xa0us longer", "adams[axis], tolerance 0.0001, 82 evaluations"
     assert (*facts.slower(None)[0].values(),) == (*first, "rk4[axis], 8 steps, 320 evaluations", "p_phi")

@@ -16,7 +16,7 @@ from symtop_studies.drift.study import TOLERANCE, cases
 import symtop
 from symtop.judging.claims.constants import KEPT, Constant
 from symtop.measure import datasets
-from symtop.measure.conservation import CONSTANTS, Changed, growth, law
+from symtop.measure.conservation import CONSTANTS, Change, growth, law
 from symtop.methods.framework.lanes import LEAST
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import scene
@@ -59,7 +59,7 @@ def test_a_history_says_with_what_it_ran_and_has_one_behaviour_in_every_study():
         columns = {"outcome": ("scene", ["ok"]), **{name: ("scene", [value]) for name, value in measured.items()}}
         cell = xr.Dataset(columns, coords={"scene": ["spheroid"]})
         grain = symtop.scene("spheroid").energy_grain
-        ledger = Constant(Changed(size, 0.0, 1.0, 0.0, exponent, interval, ""), 0.0, KEPT * grain, grain)
+        ledger = Constant(Change(size, 0.0, 1.0, 0.0, exponent, interval, ""), 0.0, KEPT * grain, grain)
         assert measures.worst_behaviour(cell, "energy") == ledger.kind
 
 

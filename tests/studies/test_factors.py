@@ -106,7 +106,7 @@ def test_what_is_not_within_the_budget_has_a_reason_and_no_time(monkeypatch):
     goal = Goal(10.0, 1e-7, (NUMPY,), (KERNEL,))
     settled = settle(SCENE, [cell for cell in cells(["Strang"]) if cell.chart == "axis"], goal)
     assert [cell.language for cell in settled] == [COMPILED, NUMPY]
-    assert list(settled.values())[1] == settings.BUDGET
+    assert list(settled.values())[1].why == settings.BUDGET
     data = factorial(SCENE, ["Strang"], [goal._replace(languages=(COMPILED, NUMPY))], 1, 0.001, 1)
     slow, fast = (data.sel(variant=name, call=KERNEL).squeeze() for name in ("strang-numpy[axis]", "strang[axis]"))
     assert (str(slow["reason"].values), bool(np.isnan(slow["seconds"]))) == (settings.BUDGET, True)

@@ -32,7 +32,7 @@ from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import Stepper
 from symtop.judging.claims.subject import CONSTANTS, PLANE, QUICK_SHARE, STEPS_A_NUTATION, Subject, declared
 from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided, yes_no
-from symtop.measure.conservation import Changed, Difference, behaviour, constant_of, from_increments, maxima, residuals
+from symtop.measure.conservation import Change, Difference, behaviour, constant_of, from_increments, maxima, residuals
 from symtop.measure.step_map import one_step
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.plan import Array, Plan, Run, sentence
@@ -73,7 +73,7 @@ Rows = dict[str, Array]  # by the names of constants
 class Constant(NamedTuple):
     """The change of one constant of the motion over a long run."""
 
-    changed: Changed  # relative change, its trend and its growth
+    changed: Change  # relative change, its trend and its growth
     a_step: float  # largest change in one step
     floor: float  # a smaller change is rounding
     grain: float = 1.0  # rounding error of the constant, in machine epsilons

@@ -451,7 +451,7 @@ def time_order(subject: Subject) -> list[Finding]:
     return [Finding("time", declared, measured, verdict, why, series.worst(term), series.least(term))]
 
 
-class Hastened:
+class ClockedField:
     """The right-hand side g'(t) f(y) in the axis chart, for a clock with a, w and t0; `times` collects its calls."""
 
     def __init__(self, par: Any, uneven: float, rate: float, begin: float) -> None:
@@ -471,7 +471,7 @@ def series_by_clock(subject: Subject, uneven: float) -> tuple[Series, set[float]
     scene, start, scale = subject.scene, generic_start(subject.scene), subject.scene.time_scale()
     begin, rate, unit = BEGIN * scale, 2.0 * math.pi * WAVES / scale, np.repeat([1.0, unit_of(scene)], 3)
     par, state = FORMULATIONS["axis"].prepare(scene.top, start)
-    true, f = one_step(subject.method, "axis", scene, scale).motion(start), Hastened(par, uneven, rate, begin)
+    true, f = one_step(subject.method, "axis", scene, scale).motion(start), ClockedField(par, uneven, rate, begin)
 
     def motion(h: float) -> Array:
         return true(h + uneven * (math.sin(rate * h + 1.0) - math.sin(1.0)) / rate)

@@ -182,10 +182,7 @@ def _spread(column: Array, letter: int) -> Array:
 def splitting_conditions(
     drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] = (), processor: float = 0.0
 ) -> Conditions:
-    """The defects of the conditions of a splitting: the largest coefficient of each length that must vanish.
-
-    `drift`, `kick` (kick[0] comes first), `gradient` and `processor` are those of `symtop.composition`.
-    """
+    """Defects of the conditions of a splitting, the largest of each length; arguments are those of `composition`."""
     t, v = element(t=1.0), element(v=1.0)
     bent = commutator(v, commutator(v, t))
     step = exponential(element())

@@ -290,10 +290,7 @@ def engine_loop(
     step: Callable[..., Any], chart: str, carried: Carried, reused: Callable[..., Any] = _nothing,
     number: Any = np.float64,
 ) -> Loop:  # fmt: skip
-    """The loop around a map in a chart; `reused` gives the carry of its first step.
-
-    `number` is the type of its arithmetic, single precision only in charts with a quaternion.
-    """
+    """The loop around a map; `reused` gives the first carry; `number` is its type, single only with a quaternion."""
     orientation, step = register_jitable(ORIENTATION[chart]), register_jitable(step)
     kind: Any = EngineBody if chart == BODY else EngineTop
     numbers, zeros = (number(0.0),) * len(kind._fields), (number(0.0),) * carried.prepare.size

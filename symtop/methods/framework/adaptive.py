@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from symtop.core.parallel import heed
-from symtop.methods.framework.lanes import Many, Whole, refused
+from symtop.methods.framework.lanes import Ints, Many, refused
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUT_OF_BUDGET, OUTCOMES, Array, Plan, Run
 from symtop.model.top import Angles, SymmetricTop, flat, lightened
 
@@ -50,7 +50,7 @@ class Adaptive:
         return plan.most(self.most * self.unit(plan.tolerance))
 
     def many(
-        self, numbers: Array, tolerance: Array, times: Array, counts: Whole, budget: float | None = None
+        self, numbers: Array, tolerance: Array, times: Array, counts: Ints, budget: float | None = None
     ) -> tuple[Many, Array]:
         """The runs of n members one after another, and the times that they reached, (n,).
 

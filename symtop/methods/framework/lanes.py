@@ -62,7 +62,7 @@ from symtop.methods.vectors import accumulate
 from symtop.model.body import from_flat
 from symtop.model.top import NUMBERS, Angles, SymmetricTop
 
-Whole = NDArray[np.int64]
+Ints = NDArray[np.int64]
 
 W = 32  # lanes of a block: four vectors of eight doubles
 NEVER = np.iinfo(np.int64).max  # the next mark of a lane that has none left
@@ -313,9 +313,9 @@ class Many(NamedTuple):
 
     states: Array  # (n, samples, dimension) of the chart, NaN after a failure
     momenta: Array  # (n, samples, 2): p_phi and p_psi recomputed from the increments
-    steps: Whole  # (n,) completed
-    work: Whole  # (n,) force evaluations or solver iterations, as the family counts them
-    outcome: Whole  # (n,) indices into OUTCOMES
+    steps: Ints  # (n,) completed
+    work: Ints  # (n,) force evaluations or solver iterations, as the family counts them
+    outcome: Ints  # (n,) indices into OUTCOMES
 
     @classmethod
     def empty(cls, n: int, samples: int, size: int) -> "Many":
@@ -352,7 +352,7 @@ def _refuses(check: Callable[..., None], start: Any) -> bool:
     return False
 
 
-def groups(chosen: Whole, steps: Whole, most: int) -> list[Whole]:
+def groups(chosen: Ints, steps: Ints, most: int) -> list[Ints]:
     """The chosen members, in order, in groups that make about `most` steps together."""
     ends = np.cumsum(steps[chosen]) // most
     return np.split(chosen, np.flatnonzero(np.diff(ends)) + 1) if chosen.size else []
@@ -378,11 +378,8 @@ class Blocks:
         self.asked += steps
         return self.asked > FEW or is_stored(self.march)
 
-    def run(self, members: Whole, numbers: Array, rule: Any, h: Array, marks: Whole, done: Many, most: int) -> Whole:
-        """Run the chosen members, about `most` steps between returns to Python; return those to be run alone.
-
-        `rule` is a pair: as the method has it, and as it is passed to compiled code.
-        """
+    def run(self, members: Ints, numbers: Array, rule: Any, h: Array, marks: Ints, done: Many, most: int) -> Ints:
+        """Run members, about `most` steps a call; return those to run alone. `rule`: as it is, and as compiled."""
         (rule, coefficients), lanes, steps = rule, self.lanes, marks[:, -1]
         counts_itself = lanes.effort(rule) == 0  # the step iterates
         chosen, left = divided(members, steps, turns(numbers, h) if counts_itself else None)
@@ -426,7 +423,7 @@ def turns(numbers: Array, h: Array) -> Array:
         return np.abs(h) * rate
 
 
-def divided(members: Whole, steps: Whole, turns: Array | None = None) -> tuple[Whole, Whole]:
+def divided(members: Ints, steps: Ints, turns: Array | None = None) -> tuple[Ints, Ints]:
     """The members whose steps fill blocks well, in order (of `turns` where steps are `ALIKE`), and the others."""
     if not len(members):
         return members, members

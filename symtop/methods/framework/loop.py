@@ -33,7 +33,7 @@ from symtop.core.errors import SymtopError, shown
 from symtop.core.jit import compile_kernel, register_jitable
 from symtop.core.parallel import heed
 from symtop.methods.framework import lanes as many, preparation
-from symtop.methods.framework.lanes import Blocks, Lanes, Many, Whole
+from symtop.methods.framework.lanes import Blocks, Ints, Lanes, Many
 from symtop.methods.framework.plan import LEFT_CHART, OK, Array, Plan, Run, ending
 from symtop.methods.framework.preparation import Preparation, Presentation, as_it_steps
 from symtop.methods.framework.registry import Solver
@@ -145,7 +145,7 @@ class Loop:
 
         return march
 
-    def __call__(self, par: Any, rule: Any, state: tuple[float, ...], h: float, marks: Whole) -> March:
+    def __call__(self, par: Any, rule: Any, state: tuple[float, ...], h: float, marks: Ints) -> March:
         """From the start to the last mark."""
         return self.advance(par, rule, self.start(par, rule, state, h), h, marks)[0]
 
@@ -154,7 +154,7 @@ class Loop:
         state, carry = self.prepare(par, rule, state, h)
         return Position(state, (0.0,) * len(state), carry, 0)
 
-    def advance(self, par: Any, rule: Any, at: Position, h: float, marks: Whole) -> tuple[March, Position]:
+    def advance(self, par: Any, rule: Any, at: Position, h: float, marks: Ints) -> tuple[March, Position]:
         """Continue a run from `at` to the last mark; all marks lie beyond `at`, but for a mark 0 at the start."""
         state, low, carry, k = at
         if isinstance(carry, np.ndarray):  # a kernel's working space: `at` stays what it is
@@ -270,14 +270,13 @@ class FixedStep:
             done.momenta[0] = top.momenta(start)[:2]
         return done if self.present is None else done._replace(states=self.present(par, plan.times, done.states))
 
-    def many(self, numbers: Array, h: Array, marks: Whole, *, compiling: bool = False) -> Many:
+    def many(self, numbers: Array, h: Array, marks: Ints, *, compiling: bool = False) -> Many:
         """The runs of n members: `numbers` (n, 9) as `flat` has them, steps `h` (n,), `marks` (n, samples).
 
         Few steps are made one member after another if kernels in lanes are not stored, unless `compiling` asks for them
-        (`Blocks.worth`).
-        Each has the bits of a run alone, in lanes too, and fails alone, as does one whose start the kernel cannot step.
-        Threads may call it at the same time; after every `GROUP` steps, or a stretch of a longer member, it heeds an
-        interrupt. Raises SymtopError for a solver `in_python`, which runs one member at a time.
+        (`Blocks.worth`). Each has the bits of a run alone, in lanes too, and fails alone, as does one whose start the
+        kernel cannot step. Threads may call it at the same time; after every `GROUP` steps, or a stretch of a longer
+        member, it heeds an interrupt. Raises SymtopError for a solver `in_python`, which runs one member at a time.
         """
         # writable too: a kernel is compiled again for an array that is not, as a broadcast one
         numbers, h = np.require(numbers, requirements=("C", "W")), np.require(h, requirements=("C", "W"))

@@ -56,10 +56,7 @@ def settled(correction: Any, last: float) -> Any:
 
 @register_jitable
 def newton(evaluate: Any, correct: Any, restart: Any, problem: Any, guess: Any, most: int) -> Any:
-    """Solve from a first guess with at most `most` evaluations.
-
-    Returns x, the trial at x, the correction that is not applied to x, the number of evaluations, and convergence.
-    """
+    """Solve with at most `most` evaluations: x, the trial there, the correction left, evaluations, convergence."""
     x, trial = guess, evaluate(problem, guess)
     evaluations, size = 1, np.inf
     while True:

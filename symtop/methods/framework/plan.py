@@ -103,10 +103,7 @@ QUATERNIONS = ("attitude", "body")  # charts that begin with one
 
 
 def off_length(chart: str, states: Array) -> NDArray[np.bool_]:
-    """True from the first sample on at which | |q| - 1 | > `LENGTH`; states (..., samples, dimension).
-
-    States that are not finite are passed over.
-    """
+    """True from the first finite sample on at which | |q| - 1 | > `LENGTH`; states (..., samples, dimension)."""
     if chart not in QUATERNIONS:
         return np.zeros(states.shape[:-1], dtype=bool)
     with np.errstate(all="ignore"):  # a run may have blown up

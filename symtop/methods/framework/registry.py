@@ -273,7 +273,7 @@ def _load_packages() -> None:
 
 
 def register(entry: Integrator, *, replace: bool = False) -> Integrator:
-    """Add an integrator to the registry; a name that is taken is refused unless `replace` is true."""
+    """Add an integrator to the registry; SymtopError for a variant, and unless `replace` for a name that is taken."""
     if not isinstance(entry, Integrator):
         raise SymtopError(f"register needs an Integrator, not {shown(entry)}")
     if entry.method != entry.name:
@@ -379,10 +379,7 @@ def bibliography() -> dict[str, str]:
 
 
 def citation_keys(entry: Integrator | Scene) -> list[str]:
-    """The entries that a `reference` names, of an integrator or a scene; it may also be plain words.
-
-    ``CHART:KEY`` names what an integrator takes in one chart only.
-    """
+    """The entries that a `reference` names, if any; ``CHART:KEY`` names what an integrator takes in one chart only."""
     named = (word.rpartition(":") for word in str(entry.reference).replace(",", " ").split())
     charts = {"", *getattr(entry, "solvers", ())}
     return [key for chart, _, key in named if chart in charts and key in bibliography()]

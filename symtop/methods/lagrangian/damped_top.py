@@ -22,7 +22,7 @@ from collections.abc import Callable
 from typing import Any, NamedTuple
 
 from symtop.core.errors import SymtopError
-from symtop.methods.framework.lanes import Whole
+from symtop.methods.framework.lanes import Ints
 from symtop.methods.framework.loop import March
 from symtop.methods.lagrangian.discrete_lagrangian import RULES, quadrature
 from symtop.methods.lagrangian.unreduced import march, with_momenta
@@ -41,7 +41,7 @@ class Friction(NamedTuple):
     spin: float
 
 
-def damped_run(scene: Scene, friction: Friction, rule: str, h: float, marks: Whole) -> March:
+def damped_run(scene: Scene, friction: Friction, rule: str, h: float, marks: Ints) -> March:
     """States (theta, phi, psi, p_theta, p_phi, p_psi) after the numbers of steps in `marks`, shape (samples, 6).
 
     `rule` is a name of `discrete_lagrangian.RULES`. SymtopError for a start at a pole.
@@ -76,10 +76,7 @@ _near_pole.terminal, _near_pole.direction = True, -1.0  # type: ignore[attr-defi
 
 
 def theta_before_pole(scene: Scene, friction: Friction, times: Array, most: int) -> Array:
-    """Theta (rad) at tolerance 1e-13, at the times before the axis comes within `NEAR` of a pole, perhaps all.
-
-    SymtopError if it takes more than `most` evaluations.
-    """
+    """Theta (rad), to 1e-13, until the axis comes within `NEAR` of a pole; SymtopError beyond `most` evaluations."""
     (rates, start), count = four_equations(scene, friction), itertools.count(1)
 
     def counted(t: float, y: Any) -> tuple[float, ...]:

@@ -296,10 +296,7 @@ def is_midpoint(method: Integrator) -> bool:
 
 
 def midpoint_energy(view: View, momenta: Momenta, h: float) -> Array:
-    """What the midpoint rule conserves to O(h^4), less the energy: -h^2 (p^2 V''/I1^2 + V'^2/I1)/24.
-
-    Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
-    """
+    """The rule's energy to O(h^4), less E: -h^2 (p^2 V''/I1^2 + V'^2/I1)/24 (Hairer, Lubich, Wanner, IX.3)."""
     top, p = view.top, view.p_theta
     slope = top.potential_slope(view.theta, momenta)
     return np.asarray(
@@ -313,7 +310,8 @@ def discrete_lagrangian(
 ) -> Integrator:  # fmt: skip
     """A variational integrator from the nodes and weights of a quadrature rule on [0, 1].
 
-    The rule is symmetric if it reads the same from both ends; a rule that integrates t exactly has order 2.
+    The rule is symmetric if it reads the same from both ends, and has order 2 if it integrates t exactly. Raises
+    SymtopError for nodes outside [0, 1], for other numbers of weights, and for weights that do not sum to 1.
     """
     rule, symmetric = quadrature(nodes, weights)
     at_start = sum(node == 0.0 for node in rule.nodes)  # evaluated once a step, not once an iteration

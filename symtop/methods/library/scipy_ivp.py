@@ -98,10 +98,7 @@ def solver(method: str | type, chart: str, *, compiled: bool = False) -> Solver:
 def integrated(
     rates: Callable[..., Any], start: Sequence[float], times: Array, method: str, tolerance: float, events: Any = None
 ) -> Array:
-    """Solution by ``solve_ivp`` (rtol = atol) at times from 0 on, shape (variables, times). SymtopError if it fails.
-
-    A terminal event of `events` ends it: the result has the times before the event only.
-    """
+    """``solve_ivp`` at times from 0, (variables, times), those before a terminal event of `events`; or SymtopError."""
     from scipy.integrate import solve_ivp  # 0.6 s to import
 
     span = (0.0, float(times[-1]))

@@ -47,10 +47,7 @@ def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
 
 
 def written_out(count: int, stage: Callable[[int], Callable[..., Any]]) -> Callable[..., Any]:
-    """A function (par, state, first, at, h) that returns `count` slopes, a tuple of tuples.
-
-    Those after the first are ``stage(i)(par, state, made, at, h)``, i = 1, 2, ..., where `made` are the slopes before.
-    """
+    """A function (par, state, first, at, h) -> `count` slopes, the others ``stage(i)(par, state, made, at, h)``."""
     if count == 1:
 
         def slopes(par, state, first, at, h):  # type: ignore[no-untyped-def]

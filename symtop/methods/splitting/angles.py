@@ -85,10 +85,7 @@ march = Loop(_begin, _increment, observe, lanes=lambda _: _LANES)
 
 
 def verlet_energy(view: View, momenta: Momenta, h: float) -> Array:
-    """What kick-drift-kick conserves to O(h^4), less the energy: h^2 (p^2 V''/12 I1^2 - V'^2/24 I1).
-
-    Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, section IX.3.
-    """
+    """Verlet's energy to O(h^4), less E: h^2 (p^2 V''/12 I1^2 - V'^2/24 I1) (Hairer, Lubich, Wanner, IX.3)."""
     top, p = view.top, view.p_theta
     slope = top.potential_slope(view.theta, momenta)
     bend = (p / top.I1) ** 2 * top.potential_curvature(view.theta, momenta)

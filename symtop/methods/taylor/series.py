@@ -291,10 +291,7 @@ def order_for(tolerance: float) -> int:
 
 @functools.cache
 def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int, int]]:  # noqa: C901
-    """The loop of one order in one chart as `adaptive` takes it, compiled; it counts the series of its steps.
-
-    The place is (state, its low half, time, its low half, step).
-    """
+    """The loop of one order as `adaptive` takes it, counting series; place: (state, low half, time, low half, step)."""
     preparation, series_of, sample, axis = CHARTS[chart]
     prepare, size, series = preparation.numbers, preparation.size, series_of(order)
     register_jitable(axis)

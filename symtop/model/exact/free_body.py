@@ -241,10 +241,7 @@ def _orbit(c: Constants, phase: float) -> tuple[Vector, float, float, float]:
 
 @inlined
 def _reduced(c: Constants, place: int, t: float) -> tuple[float, float]:
-    """A line at t less the nearest multiple of 1/2, and -1 if that is an odd one.
-
-    The low half is added last: near half a turn of u it has the digits that a long stay at the middle axis takes away.
-    """
+    """A line at t less the nearest multiple of 1/2, its low half added last, and -1 if that multiple is odd."""
     high, low = line(c, place, t)
     part = high - 2.0 * whole_part(0.5 * high)  # doubles from 2^51 to 2^52 have halves
     halves = whole_part(2.0 * part)

@@ -24,7 +24,7 @@ from symtop.core.jit import to_fixed_tuple
 from symtop.core.parallel import cores, heed, in_threads
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.lanes import W, Whole, column, divided, members_of, of_bodies, put, turns
+from symtop.methods.framework.lanes import Ints, W, column, divided, members_of, of_bodies, put, turns
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, ending, off_length
 from symtop.methods.framework.preparation import opened
@@ -67,20 +67,20 @@ class Schedule(NamedTuple):
     """Sample times of n runs. A run of fewer steps than samples is sampled at every step; its row is padded."""
 
     step_size: Array  # (n,), NaN for adaptive methods
-    marks: Whole  # (n, samples) whole steps; the last one repeated beyond `counts`; zeros for adaptive methods
+    marks: Ints  # (n, samples) whole steps; the last one repeated beyond `counts`; zeros for adaptive methods
     times: Array  # (n, samples), NaN beyond `counts`
-    counts: Whole  # (n,) samples of each
+    counts: Ints  # (n,) samples of each
     dithered: NDArray[np.bool_]  # (n,)
 
 
-def schedule(period: Array, horizon: Array, samples: int, steps: Whole | None) -> Schedule:
+def schedule(period: Array, horizon: Array, samples: int, steps: Ints | None) -> Schedule:
     """The samples of `simulation.sample_times` for n runs of `steps` (n,) steps (None: adaptive), to the same bits."""
     n = len(horizon)
     h = np.full(n, np.nan) if steps is None else horizon / steps
     marks, times = np.zeros((n, samples), np.int64), np.empty((n, samples))
     plan = Schedule(h, marks, times, np.full(n, samples), np.zeros(n, dtype=bool))
 
-    def lay_out(rows: Whole, *, dithered: bool) -> None:
+    def lay_out(rows: Ints, *, dithered: bool) -> None:
         place = places(samples, dithered=dithered)
         plan.dithered[rows] = dithered
         if steps is None:
@@ -115,10 +115,7 @@ def nutation_periods(numbers: Array) -> Array:
 
 
 def all_periods(numbers: Array, periods: Array) -> None:
-    """The loop of `nutation_periods` over tops, as a kernel: its bisections run in lanes, in a third of the time.
-
-    Beside a pole, where they lose their digits, they are negative.
-    """
+    """`nutation_periods` of tops as a kernel with bisections in lanes: a third of the time; negative beside a pole."""
     wide_vectors()
     n, lanes = len(numbers), np.empty(len(_NONE) * W)
     for first in range(0, n, W):

@@ -26,7 +26,7 @@ from symtop.core.parallel import MOST_THREADS, cores, in_order, in_threads
 from symtop.core.progress import progress_bar
 from symtop.core.signals import ending_on_sigterm
 from symtop.methods.framework import lanes
-from symtop.methods.framework.lanes import Whole, of_bodies
+from symtop.methods.framework.lanes import Ints, of_bodies
 from symtop.methods.framework.plan import OUTCOMES
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.charts import BODY, Array
@@ -256,7 +256,7 @@ def _parts(period: Array, counted: Array, horizon: Array, names: Any) -> Array:
     return step
 
 
-def _steps(step: Array, horizon: Array, most: float, names: Any) -> Whole:
+def _steps(step: Array, horizon: Array, most: float, names: Any) -> Ints:
     """The number of steps of each member, computed and checked as in `simulation.make_plan`."""
     with np.errstate(over="ignore"):
         ratio = horizon / step

@@ -156,13 +156,9 @@ def _sleeping(draw: Array) -> Start:
 
 
 STRATA: dict[str, tuple[float, Callable[[Array], Start]]] = {
-    "slow": (0.25, _slow),
-    "fast": (0.25, _fast),
-    "grazing": (0.15, _grazing),
-    "near-separatrix": (0.10, _near_separatrix),
-    "hanging": (0.10, _hanging),
-    "sleeping": (0.15, _sleeping),
-}
+    "slow": (0.25, _slow), "fast": (0.25, _fast), "grazing": (0.15, _grazing),
+    "near-separatrix": (0.10, _near_separatrix), "hanging": (0.10, _hanging), "sleeping": (0.15, _sleeping),
+}  # fmt: skip
 KINDS = (*STRATA, "all")
 
 

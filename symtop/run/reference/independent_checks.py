@@ -40,10 +40,7 @@ Checks = dict[str, Array]  # largest errors up to each check time (running maxim
 
 
 def integrate(scene: Scene, times: Array, precision: str, chart: str = "attitude") -> tuple[Any, int]:
-    """heyoka's states at increasing times, in the working precision, and the number of steps it took.
-
-    Raises SymtopError if it does not reach the last time, as where mgl/I1 is 1e60.
-    """
+    """heyoka's states at increasing times in its precision, and the steps; SymtopError if it ends before the last."""
     tolerance = heyoka.arithmetic(precision).epsilon / 100.0
     with foreign_code(f"heyoka's integration of {scene.name} in {precision}"):
         flight = heyoka.propagate(chart, precision, tolerance, scene.top, scene.start, times)
@@ -67,10 +64,7 @@ def iterate_map(scene: Scene, times: Array, per_nutation: float = MAP_STEPS[0]) 
 
 
 def iterate_map_with_error(scene: Scene, times: Array) -> tuple[Any, Array]:
-    """Attitudes of the discrete map, and their estimated error: `SAFETY` times the distance from two other runs so far.
-
-    These have another step size, and mgl one unit in the last place up or down, which matters next to a separatrix.
-    """
+    """Attitudes of the discrete map, and `SAFETY` times their distance from runs with another step and another mgl."""
     attitudes, apart = iterate_map(scene, times)[0], np.zeros(len(times))
     for way in (-math.inf, math.inf):
         mgl = math.nextafter(scene.top.mgl, way) if scene.top.mgl else 0.0

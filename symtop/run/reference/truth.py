@@ -299,10 +299,7 @@ def closed_bounds(scene: Scene, times: Array, values: dict[str, Any]) -> dict[st
 
 
 def disagreement(form: ClosedForm, times: Array, values: dict[str, Any]) -> Array:
-    """The largest inconsistency of the closed form at each time (n,): between attitudes, rad, or of an integral.
-
-    Angles, axis and quaternion are compared; energy and p_phi with those of the start, relative to their terms.
-    """
+    """The largest inconsistency of the closed form (n,): of its three attitudes, rad, or of a constant, relative."""
     axis, (x, y, z) = charts.axis_from_quaternion(values["quaternion"]), values["axis"].T
     apart = np.sqrt(((axis - values["axis"]) ** 2).sum(axis=1))
     named = charts.quaternion_from_angles(values["theta"], values["phi"], values["psi"])
@@ -349,10 +346,7 @@ class Certificate(NamedTuple):
 
 
 def certificate(scene: Scene, kind: str | None = None) -> Certificate | None:
-    """The certificate of a scene of this kind, made if it is not stored; without a kind the best on disk, or None.
-
-    Without heyoka there is no integration, and the certificate is one of the discrete map.
-    """
+    """The certificate of this kind, made if missing (without heyoka: discrete-map); without a kind the best stored."""
     if kind is None:
         return _on_disk(scene, cache_root())
     _on_disk.cache_clear()
