@@ -308,9 +308,6 @@ def test_changes_tell_chaos_from_order_and_unstable_motions_are_warned_of_beyond
         grown = whole / motion.amplification(5.0, 50.0)
         assert motion.amplified(1e-12, 5.0, 50.0) == pytest.approx(1e-12 * grown * margin)
         assert whole > 1e4 if scene is chaotic else whole < 1e3
-    method = symtop.integrator("rkmk-se3-2")
-    plan, _ = make_plan(brick, method, brick.nutation_period / 4.0, horizon=60.0 * brick.nutation_period, samples=11)
-    assert guard.forecast(brick, method, "body", plan).axis_error > 100.0  # its own steps multiply a small change
 
 
 def fastest(scene, periods=40.0):
