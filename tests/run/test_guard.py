@@ -66,6 +66,8 @@ def test_errors_are_grown_by_their_law(law, straight):
     probe = Probe(times, law(times), "ok", 10.0, 0)
     assert grown(probe, 1000.0, straight=straight) == pytest.approx(law(1000.0), rel=0.03)
     assert grown(probe, 10.0, straight=straight) == law(10.0)
+    bounded = probe._replace(error=np.full(times.size, 1e-6))
+    assert 1e-6 < grown(bounded, 1000.0, straight=True) < 1e-5  # of an error that does not grow the guard is not sure
     if not straight:  # the wrong law would be silent
         assert grown(probe, 1000.0, straight=True) < 0.1 * law(1000.0)
 
