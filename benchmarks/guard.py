@@ -4,6 +4,7 @@
     python -m benchmarks.guard bodies 5000      bodies of `symtop.run.ensemble.bodies`, over 1 to 100 natural periods
     python -m benchmarks.guard hostile 5000     thin, flat and almost round bodies, at rest and spinning, in any units
     python -m benchmarks.guard page             of the runs that were made: results/guard.json and its figure
+    python -m benchmarks.guard tops 300 --ablate   runs with the guard less each check, and with other thresholds
 
 Run k is drawn from a seed of its own; runs are kept in results/tables/guard-NAME.csv and not made again. The score of a
 run is what the guard expects, infinite where it warns of something else; it warns from `EXPECTED` on, and another
@@ -15,12 +16,14 @@ form of a top, and of a body heyoka's series in long double.
 import argparse
 import csv
 import functools
+import itertools
 import math
 import random
 import warnings
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any, NamedTuple
+from unittest import mock
 
 import numpy as np
 
@@ -61,6 +64,19 @@ CAPTION = (
 )
 
 
+CHECKS: dict[str, dict[str, Any]] = {  # what is set in `symtop.run.guard` to switch a check off
+    "small nutations grow": {"_instability": lambda *_: None},
+    "errors grow beyond the probe": {"grown": lambda probe, *_, **__: float(probe.error.max())},
+    "errors grow by a least part": {"LEAST_GROWTH": 0.0}, "rounding grows as n^1.5": {"ROUNDED": 0.0},
+    "symmetric methods, too": {"WORTH": math.inf}, "the motion amplifies errors": {"_amplified": lambda *_: 0.0},
+    "and the tolerance": {"_grown_tolerance": lambda *_: 0.0}, "luck at a pole": {"CLOSE": 0.0},
+    "the length of q drifts": {"_length_lost": lambda *_: None}, "tilt beside a pole": {"BESIDE": 0.0},
+    "long probes at a pole": {"THROUGH": 1.0}, "a least probe": {"AT_LEAST": 0.0},
+}  # fmt: skip
+THRESHOLDS = (
+    *("STEPS", "AT_LEAST", "AT_MOST", "SHARE", "MOST_PROBED", "ROUNDED", "AFFORDED", "THROUGH", "MOST_WORK", "LOOSE"),
+    *("LEAST_GROWTH", "COMMITTED", "CLOSE", "PASSING", "WORTH", "RESOLVED", "SMALL_TURN", "NONLINEAR", "BESIDE"),
+)
 SUMMED = ["runs", "guard", "wrong: silent", "worst silent (rad)", "correct: warned of", "ended early: warned of"]
 
 
@@ -145,8 +161,8 @@ def hostile(k: int) -> tuple[Scene, random.Random]:
 SAMPLERS = {"tops": tops, "bodies": bodies, "hostile": hostile}
 
 
-def one(name: str, k: int) -> Run:
-    """Draw and make run k: 2 to 500 steps a period, or a tolerance of 0.1 to 1e-13."""
+def drawn(name: str, k: int) -> tuple[Scene, Integrator, str, Plan, float, float]:
+    """Run k, 2 to 500 steps a period or a tolerance of 0.1 to 1e-13: this setting and the periods are the last."""
     scene, draw = SAMPLERS[name](k)
     of_top = name == "tops"
     known = [m for m in integrators().values() if m.control is not None and (of_top or BODY in m.solvers)]
@@ -165,14 +181,24 @@ def one(name: str, k: int) -> Run:
     control = {"step_size": min(period / steps, horizon)} if method.fixed_step else {"tolerance": setting}
     scene = Scene(scene.name, scene.top, scene.start, horizon)
     plan, _ = make_plan(scene, method, **control, horizon=horizon, samples=SAMPLES[name])
+    return scene, method, chart, plan, setting, periods
+
+
+def made(scene: Scene, method: Integrator, chart: str, plan: Plan) -> tuple[str, float]:
+    """The outcome of a run and its largest error, rad."""
+    run = solve(method, chart, scene.top, scene.start, plan)
+    good = run.outcome == "ok"
+    return run.outcome, float(np.max(_off(scene, chart, plan.times, run.states))) if good else math.inf
+
+
+def one(name: str, k: int) -> Run:
+    """Draw and make run k."""
+    (scene, method, chart, plan, setting, periods), of_top = drawn(name, k), name == "tops"
     series, whole = score(Integrated(scene), method, chart, plan)
     exact, whole = score(Exact(scene), method, chart, plan) if of_top else (math.nan, whole)
-    run = solve(method, chart, scene.top, scene.start, plan)
-    error = math.inf
-    if run.outcome == "ok":
-        error = float(np.max(_off(scene, chart, plan.times, run.states)))
+    outcome, error = made(scene, method, chart, plan)
     return Run(k, scene.name.split(".")[0], method.name, method.needs, chart, str(method.control), setting, periods,
-               whole, run.outcome, error, exact, series)  # fmt: skip
+               whole, outcome, error, exact, series)  # fmt: skip
 
 
 def _off(scene: Scene, chart: str, times: Any, states: Any) -> Any:
@@ -190,6 +216,33 @@ def score(motion: Motion, method: Integrator, chart: str, plan: Plan) -> tuple[f
     value = max(expected.axis_error, expected.rounding)
     silent = guard.trouble(motion, method, chart, plan, expected) is None
     return (value if silent or value > guard.EXPECTED else math.inf), expected.whole
+
+
+def ablation(name: str, count: int) -> Table:
+    """Counts of runs with the guard as it is, less each check, and with each threshold halved and doubled."""
+    ways: dict[str, dict[str, Any]] = {"as it is": {"EXPECTED": guard.EXPECTED}}
+    ways |= {f"less: {check}": values for check, values in CHECKS.items()}
+    for threshold, factor in itertools.product(THRESHOLDS, (0.5, 2.0)):
+        was = getattr(guard, threshold)
+        each = was if isinstance(was, dict) else dict(enumerate(np.atleast_1d(was).tolist()))
+        other = {key: type(part)(factor * part) for key, part in each.items()}
+        ways[f"{threshold} times {factor:g}"] = {threshold: other[0] if isinstance(was, float | int) else other}
+    counted, total = {way: np.zeros(4, dtype=int) for way in ways}, np.zeros(4, dtype=int)
+    for k in range(count):
+        scene, method, chart, plan, *_ = drawn(name, k)
+        outcome, error = made(scene, method, chart, plan)
+        motion, good = (Exact if name == "tops" else Integrated)(scene), outcome == "ok"
+        kinds = good and error > guard.EXPECTED, good and error <= guard.EXPECTED, not good, good
+        total += kinds
+        for way, values in ways.items():
+            with mock.patch.multiple(guard, **values):
+                expected = guard.forecast(scene, method, chart, plan, motion)
+                warned = guard.trouble(motion, method, chart, plan, expected) is not None
+            off = abs(math.log10(np.clip(expected.axis_error, 1e-4, 1.0) / np.clip(error, 1e-4, 1.0))) > 1.0
+            counted[way] += np.logical_and(kinds, (not warned, warned, not warned, off))
+    header = ["the guard", "wrong: silent", "right: warned of", "ended early: silent", "size off by ten"]
+    rows = [[way, *map("{} of {}".format, counts, total)] for way, counts in counted.items()]
+    return Table(f"{count} {name}", header, rows)
 
 
 def chunk(name: str, first: int) -> list[Run]:
@@ -346,9 +399,14 @@ def main() -> None:
     parser.add_argument("name", choices=[*SAMPLERS, "page"])
     parser.add_argument("count", type=int, nargs="?", default=CHUNK)
     parser.add_argument("--workers", type=int, default=2)
+    parser.add_argument("--ablate", action="store_true", help="sizes are compared between 1e-4 and 1 rad")
     asked = parser.parse_args()
     if asked.name == "page":
         page(Path("results"))
+        return
+    if asked.ablate:
+        warnings.simplefilter("ignore")
+        print(ablation(asked.name, asked.count).text)
         return
     make(asked.name, asked.count, asked.workers)
     for guarded in ("exact", "series") if asked.name == "tops" else ("series",):

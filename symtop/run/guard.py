@@ -40,7 +40,7 @@ from symtop.methods.framework.registry import Integrator, integrator, is_built_i
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.run.linear_stability import Growth, nutation_growth, trace
-from symtop.run.motion import MOST_FOLDS, MOVED, SHEARED, UNSTABLE, Exact, Integrated, Landmarks, Motion
+from symtop.run.motion import MOST_FOLDS, SHEARED, UNSTABLE, Exact, Integrated, Landmarks, Motion
 from symtop.run.reference.sensitivity import SMALL
 
 STEPS = {"compiled": 2000, "python": 50}  # most steps of a probe of two nutations
@@ -48,12 +48,11 @@ AT_LEAST, AT_MOST = 0.25, 10.0  # times `STEPS`: least steps of a probe, and of 
 SHARE = 0.1  # of the run: a probe may always be so long, up to `Integrated.longest` nutations and `MOST_PROBED` steps
 MOST_PROBED = 20_000  # steps
 ROUNDED = 1e-13  # rad: a smaller error of a probe is rounding, which grows as n^1.5
-PARTIAL = 10.0  # factor on the forecast from less than a nutation, which may miss where errors arise or are amplified
 AFFORDED = {"compiled": 12_000, "python": 1200}  # evaluations of a longer probe of an adaptive method
 THROUGH = 20.0  # times `AFFORDED` where the axis passes a pole closer than the tolerance, or a free body turns over
 MOST_WORK = {"compiled": 5e6, "python": 5e5}  # evaluations of any probe: beside a pole steps may become tiny
 LOOSE = 1e-4  # tolerance above which a method in Python is probed for a whole nutation: a few of its steps
-LEAST_GROWTH = 0.05  # of the error of a probe: the least growth assumed from its first half to its second
+LEAST_GROWTH = 0.02  # of the error of a probe: the least growth assumed from its first half to its second
 COMMITTED = 1e4, 1e7  # tolerances: the occasional large error of an adaptive method, and of one of variable order
 CLOSE, PASSING = 0.2, 100.0  # rad from a pole; tolerances: the occasional error of a step past it in the angles chart
 WORTH = 1e-2  # rad: stability is checked only if quadratic growth leads to a larger error
@@ -63,12 +62,10 @@ EXPECTED = 1e-2  # rad: a larger forecast gives a warning; also the axis error f
 AIM = 1e-3  # rad: the error that the proposed step or tolerance should have
 SMALL_TURN = 0.3  # h omega up to which every method is stable for small nutations
 GROWS = 1e-3  # a method is unstable if a step multiplies small nutations by more than 1 + GROWS
-NO_GROWTH = 3e-8  # rounding error of the growth of a step
 NONLINEAR = 0.03  # times the nutation that a method adds: less growth may be a nonlinear effect (8e-6 at 4e-4 rad)
 BESIDE = 1e-2  # rad: nearer to a pole than this, small nutations grow in the tilt of the axis
 NEAR = 0.12  # rad between three or four turns of a step and a whole turn: a resonance
 COARSE = 1.0  # rad of precession in one step at a pole: more is named as the cause
-OWN = 10.0  # times: the steps of a probe multiply a change by this much more than the motion; less is a transient
 PRECESSED = 0.1  # rad of precession at a pole in a proposed step
 TRIES, LESS = 8, 0.6  # steps tried for a remedy; the largest ratio of one to the one before
 SAME = 0.9  # the least ratio of two errors that are taken for the same
@@ -98,7 +95,6 @@ class Forecast(NamedTuple):
     landmarks: Landmarks
     unstable: float = 0.0  # an error of the tolerance as the motion amplifies it, rad; 0 where a probe shows it
     whole: bool = False  # the probe was as long as the run
-    growth: float = 1.0  # factor by which steps of the probe multiply a small change more than the motion does
 
 
 @functools.cache
@@ -159,6 +155,11 @@ def _amplifies(motion: Motion, change: float, horizon: float, times: float = UNS
     return motion.displacement(change, horizon) > change * times * (1.0 + horizon / motion.landmarks.period)
 
 
+def _amplified(motion: Motion, probe: Probe, horizon: float) -> float:
+    """The largest error of a probe as the motion amplifies it by the horizon; 0 if `grown` covers it (`Exact`)."""
+    return motion.amplified(float(probe.error.max()), float(probe.times[-1]), horizon)
+
+
 def _fixed(motion: Motion, method: Integrator, probe: Probe, horizon: float) -> float:
     """The largest error of a fixed-step probe at the horizon: by the law of `grown` or by amplification, the larger.
 
@@ -166,8 +167,7 @@ def _fixed(motion: Motion, method: Integrator, probe: Probe, horizon: float) -> 
     nutation: there the error of a symmetric method may grow quadratically, too.
     """
     straight = method.keeps_frequencies
-    later = motion.amplified(float(probe.error.max()), float(probe.times[-1]), horizon)  # 0 if `grown` covers it
-    expected = max(grown(probe, horizon, straight=straight), later)
+    expected = max(grown(probe, horizon, straight=straight), _amplified(motion, probe, horizon))
     if not straight or not expected < WORTH:
         return expected
     bent = grown(probe, horizon, straight=False)
@@ -192,19 +192,16 @@ def _adaptive_forecast(
 ) -> tuple[float, Probe]:
     """`_expected` for an adaptive method, whose work per time is known after a first probe.
 
-    If `AFFORDED` evaluations allow a longer probe, that is made, up to the whole run. The forecast from a probe shorter
-    than the run is at least the tolerance.
+    If `AFFORDED` evaluations allow a longer probe, that is made, up to the whole run.
     """
     cheap = method if method.same_steps_as is None else integrator(method.same_steps_as)  # a hundredth of the time
     least = twice if cheap.implementation == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0
 
     def probed(piece: float) -> tuple[float, Probe]:
-        partial = piece < min(period, 0.5 * plan.horizon)
-        since = max(0.0, motion.closest() - 0.5 * piece) if partial else 0.0
+        part = piece < min(period, 0.5 * plan.horizon)
+        since = max(0.0, motion.closest() - 0.5 * piece) if part else 0.0
         probe = _probe(motion, cheap, chart, plan, piece, math.nan, since)
-        later = motion.amplified(float(probe.error.max()), float(probe.times[-1]), plan.horizon)
-        expected = max(grown(probe, plan.horizon, straight=False), later)
-        return expected * (PARTIAL if partial else 1.0), probe
+        return max(grown(probe, plan.horizon, straight=False), _amplified(motion, probe, plan.horizon)), probe
 
     piece = max(share, least)
     expected, probe = probed(piece)
@@ -213,8 +210,8 @@ def _adaptive_forecast(
         afforded *= THROUGH
     longer = min(plan.horizon, piece * afforded / max(probe.evaluations, 1))
     if longer > 1.5 * piece or longer == plan.horizon > piece:
-        expected, probe = probed(longer)
-    return expected if probe.times[-1] >= plan.horizon else max(expected, plan.tolerance), probe
+        return probed(longer)
+    return expected, probe
 
 
 def _expected(motion: Motion, method: Integrator, chart: str, plan: Plan) -> tuple[float, Probe]:
@@ -267,11 +264,7 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: M
     if partly and chart == "angles" and marks.gap < CLOSE:
         error = max(error, float(np.nan_to_num(motion.displacement(PASSING * plan.tolerance, plan.horizon))))
     unstable = _grown_tolerance(motion, method, plan) if partly else 0.0
-    whole, growth = bool(probe.times[-1] >= plan.horizon * (1.0 - 1e-9)), 1.0
-    if not isinstance(motion, Exact) and not whole and plan.step_size * marks.frequency > SMALL_TURN:
-        growth = _own_growth(motion, method, chart, plan, float(probe.times[-1]))
-        pieces = plan.horizon / float(probe.times[-1]) - 1.0
-        error = max(error, float(probe.error.max()) * math.exp(min(pieces * math.log(growth), MOST_FOLDS)))
+    whole = bool(probe.times[-1] >= plan.horizon * (1.0 - 1e-9))
     ended, rounding = (probe.outcome, probe.reached), motion.rounding(plan.horizon, whole=whole)
     if probe.outcome == "ok" and probe.stray.size and not whole:
         ended = _length_lost(probe, plan.horizon) or ended
@@ -280,7 +273,7 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: M
         reached = float(probe.times[-1]) * limit(plan) / max(probe.evaluations, 1)
         if reached < plan.horizon:
             error, ended = math.inf, ("out_of_budget", reached)
-    return Forecast(max(error, unstable), rounding, *ended, marks, unstable, whole, growth)
+    return Forecast(max(error, unstable), rounding, *ended, marks, unstable, whole)
 
 
 def _length_lost(probe: Probe, horizon: float) -> tuple[str, float] | None:
@@ -290,18 +283,6 @@ def _length_lost(probe: Probe, horizon: float) -> tuple[str, float] | None:
     if most + drift * (horizon - 2.0 * half) <= LENGTH:
         return None
     return "not_normalised", 2.0 * half + (LENGTH - most) / drift
-
-
-def _own_growth(motion: Integrated, method: Integrator, chart: str, plan: Plan, piece: float) -> float:
-    """A lower bound of how many times more than the motion a method multiplies a small change in a piece; or 1."""
-    steps = max(1, round(min(piece, STEPS[method.implementation] * plan.step_size) / plan.step_size))
-    top, marks = motion.scene.top, Plan.steps(plan.step_size, _marks(steps, motion.points))
-    pair = [solve(method, chart, top, start, marks).states for start in (motion.scene.start, motion.moved())]
-    with np.errstate(all="ignore"):
-        apart = float(np.max(motion.apart(*((chart, one) for one in pair)))) / MOVED
-    natural = motion.amplification(float(marks.times[-1]), plan.horizon)
-    excess = apart / (natural * natural) if math.isfinite(apart) else math.inf
-    return excess ** (piece / float(marks.times[-1])) if excess > OWN else 1.0
 
 
 class Trouble(NamedTuple):
@@ -372,7 +353,7 @@ def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expec
     growth, steps = _growth(scene, method, chart, step, frequency), plan.horizon / step
     beside = marks.gap if marks.gap < BESIDE else 0.0  # of a pole, the tilt grows
     size, folds = marks.width + beside + growth.size, steps * math.log(max(growth.factor, 1.0))
-    grows = growth.factor > 1.0 + max(NO_GROWTH, NONLINEAR * growth.size, growth.doubt)
+    grows = growth.factor > 1.0 + max(NONLINEAR * growth.size, growth.doubt)
     if not grows or not size * math.expm1(min(folds, MOST_FOLDS)) > EXPECTED:
         return None
     good, bad = SMALL_TURN / frequency, step
@@ -435,9 +416,6 @@ def _coarse(
 ) -> Trouble | None:
     """The trouble of a step that is too long for a pole or for the nutation, or in resonance with it; else None."""
     marks, step, frequency = expected.landmarks, plan.step_size, expected.landmarks.frequency
-    if expected.growth > 1.0:
-        times = f"at least {expected.growth:.1g} times as much as the motion does"
-        return Trouble(f"{size}: steps of {step:.4g} multiply a small change {times}", SMALL_TURN / frequency)
     if chart == "angles" and marks.rate * step > COARSE:
         return Trouble(
             f"{size}: the axis passes the {marks.pole} pole at {marks.gap:.2g} rad and precesses there by "

@@ -28,7 +28,7 @@ from symtop.core.numbers import EPSILON, TINY, real_numbers
 from symtop.methods.framework.plan import Array
 from symtop.methods.framework.registry import integrator, integrators
 from symtop.methods.runge_kutta.explicit import Tableau
-from symtop.run.guard import OWN, Probe, grown
+from symtop.run.guard import Probe, grown
 from symtop.run.motion import MOST_FOLDS, Growth
 
 SCIPY = {"rk45": ("RK45", 6), "dop853": ("DOP853", 12), "radau": ("Radau", 0), "bdf": ("BDF", 0), "lsoda": ("LSODA", 0)}
@@ -37,6 +37,7 @@ PERIODS, TURNS, SHARE, POINTS = 10.0, 4.0, 0.2, 400  # least length of a piece, 
 TIGHTEST, LOOSEST = 2.3e-14, 0.1  # tolerances: the least of SciPy's solvers, the largest that is proposed
 MOVED, SATURATED = (1e-7, 1e-10), 1e-2  # of the extent of the motion: first distances of two motions, and the largest
 UNSTABLE, STIFF = 10.0, 20.0  # growth of A in the second half of an unstable run; ratio of rates of a stiff f
+OWN = 10.0  # times: the steps of a piece multiply a change by this much more than the motion; less is a transient
 FIRST, FADED = 1e-7, 0.1  # part of a piece where comparison begins; part of the largest error that has faded
 
 

@@ -6,7 +6,7 @@ import os
 import numpy as np
 import pytest
 
-from benchmarks import adaptive, candidates, ensemble, kernels, lanes, machines, truth, twin
+from benchmarks import adaptive, candidates, ensemble, guard, kernels, lanes, machines, truth, twin
 from symtop.measure.timing import timings
 from symtop.methods.framework import loop as loops
 from symtop.methods.framework.lanes import Many
@@ -134,10 +134,16 @@ def test_what_one_processor_chooses_is_priced_on_another():
 
     there = row(b=1.0, a=1.5, called=False)
     pairs = [machines.compare(row(**one), there) for one in ({"a": 2.0, "b": 3.2}, {"b": 2.0}, {"c": 1.0})]
-    assert [tuple(pair[:5]) for pair in pairs[:2]] == [
-        (1, 0, 1, 0, 1.6),
-        (1, 1, 1, 1, pytest.approx(math.nan, nan_ok=True)),
-    ]
+    nan = pytest.approx(math.nan, nan_ok=True)
+    assert [tuple(pair[:5]) for pair in pairs[:2]] == [(1, 0, 1, 0, 1.6), (1, 1, 1, 1, nan)]
     assert pairs[0].differing == [["f(t, y), to 10\N{SUPERSCRIPT MINUS}³ rad", "a", "b", "1.5", "1.6"]]
     assert pairs[2].differing[0][3:] == ["over 10", "not kept"]
     assert machines.compare([], there).cells == 0
+
+
+def test_the_ablation_of_the_guard_misses_a_run_whose_error_adds_up_beyond_its_probe(monkeypatch):
+    scene, method = guard.tops(1)[0], methods()["midpoint"]
+    plan, _ = guard.make_plan(scene, method, (period := scene.nutation_period) / 60, horizon=300 * period, samples=101)
+    monkeypatch.setattr(guard, "drawn", lambda *_: (scene, method, "angles", plan))
+    missed = [row[0] for row in guard.ablation("tops", 1).rows if row[1] == "1 of 1"]
+    assert missed == ["less: errors grow beyond the probe"]
