@@ -155,12 +155,6 @@ class Integrated:
         states[:, -3:] *= self.momentum
         return states
 
-    def apart(self, first: tuple[str, Array], second: tuple[str, Array]) -> Array:
-        """The angle (n,), rad, between two runs, each a chart and its states (n, dimension)."""
-        if self.chart == BODY:
-            return attitude_distance(first[1][:, :4], second[1][:, :4])
-        return axis_distance(axes(*first), axes(*second))
-
     def error(self, times: Array, chart: str, states: Array, _: float, horizon: float, /) -> Array:
         """The error (n,), rad, of states (n, dimension) at `times` (n,), plus the estimated error of the reference."""
         end = float(times[-1])
@@ -170,7 +164,9 @@ class Integrated:
         looser = CALM if calm else 1.0
         true, check = self.states(times, FINE * looser), self.states(times[some], CHECK * looser)
         gap = np.abs(check - true[some])[:, : 4 if self.chart == BODY else 3].max(initial=0.0)
-        return np.asarray(self.apart((chart, states), (self.chart, true)) + gap)
+        if self.chart == BODY:
+            return np.asarray(attitude_distance(states[:, :4], true[:, :4]) + gap)
+        return np.asarray(axis_distance(axes(chart, states), axes(self.chart, true)) + gap)
 
     def start(self, _: float, /) -> Any:
         """The state at a time, as a start. Here it is always the scene's start: probes begin nowhere else."""
