@@ -68,6 +68,7 @@ NEAR = 0.12  # rad between three or four turns of a step and a whole turn: a res
 COARSE = 1.0  # rad of precession in one step at a pole: more is named as the cause
 PRECESSED = 0.1  # rad of precession at a pole in a proposed step
 TRIES, LESS = 8, 0.6  # steps tried for a remedy; the largest ratio of one to the one before
+CURABLE = ("not_converged", "not_finite", "not_normalised")  # outcomes of steps that are too long
 SAME = 0.9  # the least ratio of two errors that are taken for the same
 MOST_STEPS = 20_000_000_000  # of a run: ten minutes of the fastest kernel
 NO_ORDER = "it has no order, and smaller steps need not help; take another method, such as strang"
@@ -396,7 +397,9 @@ def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected:
     if not limited and (coarse := _coarse(motion, method, chart, plan, expected, size)) is not None:
         return coarse
     if expected.outcome != "ok":
-        return Trouble(f"expect the run to be {sentence(expected.outcome, expected.reached, plan.horizon, second)}")
+        cured = expected.outcome in CURABLE and method.fixed_step and method.order is not None  # by a shorter step
+        words = sentence(expected.outcome, expected.reached, plan.horizon, second, remedy=not cured)
+        return Trouble(f"expect the run to be {words}", _smaller(method, plan, expected) if cured else math.nan)
     if method.adaptive:
         tolerance = max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance)
         advice = f"try tolerance {tolerance:.1g}"

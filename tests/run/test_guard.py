@@ -118,7 +118,7 @@ def test_each_cause_is_named():
     assert all("`symtop claims own`" in caution("goldstein", false, step_size=h, horizon=2.0) for h in (0.01, 5e-4))
     assert "take a step of about" in caution("goldstein", "mujoco-euler", step_size=0.01)
     assert "tolerance" in caution("goldstein", "rk45-compiled", tolerance=1e-5, horizon=1000.0)
-    assert "stopped at t =" in caution("sleeping", "trapezoidal", step_size=2.0, horizon=4000.0)
+    assert "not solved; take a step of about 0.063" in caution("sleeping", "trapezoidal", step_size=2.0, horizon=4000.0)
     assert "a step is 1/2.36 of a nutation" in caution("spheroid", "gauss-2", step_size=0.5, observe="axis")  # goes on
 
 

@@ -87,15 +87,18 @@ def ending(outcome: int) -> str:
     return OUTCOMES[outcome]
 
 
-_CAUSES = {
-    "left_chart": "theta left (0, pi), where the angles chart ends; take a smaller step or an integrator without poles",
-    "not_converged": "the implicit equation of the step was not solved; take a smaller step",
-    "not_finite": "the state became infinite or not a number; take a smaller step or a tighter tolerance",
-    "step_too_small": "the step size fell below the spacing of the numbers: the state grows without bound, or is at a "
-    "pole; tighten the tolerance or take an integrator without poles",
-    "not_normalised": "the quaternion's length left one by more than 0.1 %; take a smaller step or a tighter tolerance",
-    "out_of_budget": "the limit on the work of one run was reached; shorten the horizon or loosen the tolerance",
-}
+_CAUSES = {  # and remedies
+    "left_chart": ("theta left (0, pi), where the angles chart ends",
+                   "take a smaller step or an integrator without poles"),
+    "not_converged": ("the implicit equation of the step was not solved", "take a smaller step"),
+    "not_finite": ("the state became infinite or not a number", "take a smaller step or a tighter tolerance"),
+    "step_too_small": (
+        "the step size fell below the spacing of the numbers: the state grows without bound, or is at a pole",
+        "tighten the tolerance or take an integrator without poles"),
+    "not_normalised": ("the quaternion's length left one by more than 0.1 %",
+                       "take a smaller step or a tighter tolerance"),
+    "out_of_budget": ("the limit on the work of one run was reached", "shorten the horizon or loosen the tolerance"),
+}  # fmt: skip
 
 
 LENGTH = 1e-3  # how far from one the length of a quaternion may be
@@ -111,8 +114,9 @@ def off_length(chart: str, states: Array) -> NDArray[np.bool_]:
     return np.logical_or.accumulate(np.isfinite(length) & (np.abs(length - 1.0) > LENGTH), axis=-1)
 
 
-def sentence(outcome: str, reached: float, horizon: float, unit: str = "") -> str:
-    """One sentence on how a run ended, at what time (`unit` follows it: " s") and why."""
+def sentence(outcome: str, reached: float, horizon: float, unit: str = "", *, remedy: bool = True) -> str:
+    """One sentence on how a run ended, at what time (`unit` follows it: " s"), why, and with what `remedy`."""
     if outcome == "ok":
         return f"reached t = {reached:.6g}{unit}"
-    return f"stopped at t = {reached:.6g} of {horizon:.6g}{unit}: {_CAUSES[outcome]}"
+    words = "; ".join(_CAUSES[outcome][: 1 + remedy])
+    return f"stopped at t = {reached:.6g} of {horizon:.6g}{unit}: {words}"
