@@ -59,6 +59,7 @@ WORTH = 1e-2  # rad: stability is checked only if quadratic growth leads to a la
 RESOLVED = 0.3  # rad of precession in one step at a pole: a probe with more does not show the error of the passage
 
 EXPECTED = 1e-2  # rad: a larger forecast gives a warning; also the axis error from which a verdict calls a run wrong
+FASTER = 2.5  # times, from quarter to quarter of a probe: faster than t^3; 2 would warn of 6 right runs of 1,400
 AIM = 1e-3  # rad: the error that the proposed step or tolerance should have
 SMALL_TURN = 0.3  # h omega up to which every method is stable for small nutations
 GROWS = 1e-3  # a method is unstable if a step multiplies small nutations by more than 1 + GROWS
@@ -151,6 +152,17 @@ def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
     return n * first + 0.5 * max(abs(whole - 2.0 * first), LEAST_GROWTH * whole) * n * (n - 1.0)
 
 
+def exploded(probe: Probe, horizon: float) -> float:
+    """The largest error of a probe at the horizon if it grows as an exponential: `FASTER` from quarter to quarter.
+
+    So the wobble of a free disc grows with an explicit gyroscopic term, however steady the motion is. 0 if it does not.
+    """
+    end = float(probe.times[-1])
+    each = [float(probe.error[probe.times <= part * end].max(initial=0.0)) for part in (0.5, 0.75, 1.0)]
+    times = min(np.divide(each[1:], each[:-1]).tolist()) if each[0] > ROUNDED else 0.0
+    return each[2] * math.exp(min(math.log(times) * 4.0 * (horizon / end - 1.0), MOST_FOLDS)) if times > FASTER else 0.0
+
+
 def _amplifies(motion: Motion, change: float, horizon: float, times: float = UNSTABLE) -> bool:
     """Does the motion amplify a change of its start more than `times` as much as the shear of a stable motion?"""
     return motion.displacement(change, horizon) > change * times * (1.0 + horizon / motion.landmarks.period)
@@ -169,6 +181,8 @@ def _fixed(motion: Motion, method: Integrator, probe: Probe, horizon: float) -> 
     """
     straight = method.keeps_frequencies
     expected = max(grown(probe, horizon, straight=straight), _amplified(motion, probe, horizon))
+    if not isinstance(motion, Exact):
+        expected = max(expected, exploded(probe, horizon))
     if not straight or not expected < WORTH:
         return expected
     bent = grown(probe, horizon, straight=False)
