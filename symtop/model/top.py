@@ -259,7 +259,7 @@ class SymmetricTop:
     """A rigid body with a fixed point on its axis of symmetry, in any consistent units.
 
     `I1` is the moment of inertia across the axis, `I3` along it, about the fixed point; `mgl` is mass x gravity x
-    distance of the centre of gravity from it: 0 if free, below if hanging. Raises SymtopError if I3 > 2 I1, and so on.
+    distance of the centre of gravity from it: 0 if free, below if hanging. SymtopError for what no body has: I3 > 2 I1.
     """
 
     I1: float
