@@ -67,7 +67,7 @@ CAPTION = (
 CHECKS: dict[str, dict[str, Any]] = {  # what is set in `symtop.run.guard` to switch a check off
     "small nutations grow": {"_instability": lambda *_: None},
     "errors grow beyond the probe": {"grown": lambda probe, *_, **__: float(probe.error.max())},
-    "errors grow as an exponential": {"exploded": lambda *_: 0.0},
+    "errors grow as an exponential": {"exponential": lambda *_: 0.0},
     "errors grow by a least part": {"LEAST_GROWTH": 0.0}, "rounding grows as n^1.5": {"ROUNDED": 0.0},
     "symmetric methods, too": {"WORTH": math.inf}, "the motion amplifies errors": {"_amplified": lambda *_: 0.0},
     "and the tolerance": {"_grown_tolerance": lambda *_: 0.0}, "luck at a pole": {"CLOSE": 0.0},

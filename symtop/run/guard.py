@@ -69,7 +69,7 @@ NEAR = 0.12  # rad between three or four turns of a step and a whole turn: a res
 COARSE = 1.0  # rad of precession in one step at a pole: more is named as the cause
 PRECESSED = 0.1  # rad of precession at a pole in a proposed step
 TRIES, LESS = 8, 0.6  # steps tried for a remedy; the largest ratio of one to the one before
-CURABLE = ("not_converged", "not_finite", "not_normalised")  # outcomes of steps that are too long
+CURABLE = ("not_converged", "not_finite", "not_normalised")  # outcomes that a shorter step prevents
 SAME = 0.9  # the least ratio of two errors that are taken for the same
 MOST_STEPS = 20_000_000_000  # of a run: ten minutes of the fastest kernel
 NO_ORDER = "it has no order, and smaller steps need not help; take another method, such as strang"
@@ -152,15 +152,17 @@ def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
     return n * first + 0.5 * max(abs(whole - 2.0 * first), LEAST_GROWTH * whole) * n * (n - 1.0)
 
 
-def exploded(probe: Probe, horizon: float) -> float:
+def exponential(probe: Probe, horizon: float) -> float:
     """The largest error of a probe at the horizon if it grows as an exponential: `FASTER` from quarter to quarter.
 
     So the wobble of a free disc grows with an explicit gyroscopic term, however steady the motion is. 0 if it does not.
     """
     end = float(probe.times[-1])
-    each = [float(probe.error[probe.times <= part * end].max(initial=0.0)) for part in (0.5, 0.75, 1.0)]
-    times = min(np.divide(each[1:], each[:-1]).tolist()) if each[0] > ROUNDED else 0.0
-    return each[2] * math.exp(min(math.log(times) * 4.0 * (horizon / end - 1.0), MOST_FOLDS)) if times > FASTER else 0.0
+    half, more, whole = (float(probe.error[probe.times <= part * end].max(initial=0.0)) for part in (0.5, 0.75, 1.0))
+    if not (half > ROUNDED and FASTER * half < more and FASTER * more < whole < math.inf):
+        return 0.0
+    folds = math.log(min(more / half, whole / more)) * 4.0 * (horizon / end - 1.0)
+    return whole * math.exp(min(folds, MOST_FOLDS))
 
 
 def _amplifies(motion: Motion, change: float, horizon: float, times: float = UNSTABLE) -> bool:
@@ -181,8 +183,8 @@ def _fixed(motion: Motion, method: Integrator, probe: Probe, horizon: float) -> 
     """
     straight = method.keeps_frequencies
     expected = max(grown(probe, horizon, straight=straight), _amplified(motion, probe, horizon))
-    if not isinstance(motion, Exact):
-        expected = max(expected, exploded(probe, horizon))
+    if not isinstance(motion, Exact):  # of a top `_instability` knows the growth
+        expected = max(expected, exponential(probe, horizon))
     if not straight or not expected < WORTH:
         return expected
     bent = grown(probe, horizon, straight=False)
@@ -213,8 +215,8 @@ def _adaptive_forecast(
     least = twice if cheap.implementation == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0
 
     def probed(piece: float) -> tuple[float, Probe]:
-        part = piece < min(period, 0.5 * plan.horizon)
-        since = max(0.0, motion.closest() - 0.5 * piece) if part else 0.0
+        partial = piece < min(period, 0.5 * plan.horizon)
+        since = max(0.0, motion.closest() - 0.5 * piece) if partial else 0.0
         probe = _probe(motion, cheap, chart, plan, piece, math.nan, since)
         return max(grown(probe, plan.horizon, straight=False), _amplified(motion, probe, plan.horizon)), probe
 
@@ -411,9 +413,9 @@ def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected:
     if not limited and (coarse := _coarse(motion, method, chart, plan, expected, size)) is not None:
         return coarse
     if expected.outcome != "ok":
-        cured = expected.outcome in CURABLE and method.fixed_step and method.order is not None  # by a shorter step
-        words = sentence(expected.outcome, expected.reached, plan.horizon, second, remedy=not cured)
-        return Trouble(f"expect the run to be {words}", _smaller(method, plan, expected) if cured else math.nan)
+        curable = expected.outcome in CURABLE and method.fixed_step and method.order is not None
+        words = sentence(expected.outcome, expected.reached, plan.horizon, second, remedy=not curable)
+        return Trouble(f"expect the run to be {words}", _smaller(method, plan, expected) if curable else math.nan)
     if method.adaptive:
         tolerance = max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance)
         advice = f"try tolerance {tolerance:.1g}"
