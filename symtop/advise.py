@@ -208,7 +208,7 @@ def recommend(
     if step is not None and step > longest:
         raise SymtopError(f"step_size must be at most max_step {longest:g}, not {step:g}", "step_size", "max_step")
     time_a_step = math.inf if time_a_step is None else positive("time_a_step", time_a_step)
-    constants = tuple(one_of("keeps", one, [*KEPT][: 1 if scene.of_body else None]) for one in _words("keeps", keeps))
+    constants = tuple(one_of("keeps", word, [*KEPT][: 1 if scene.of_body else None]) for word in _words("keeps", keeps))
     limits = step, longest, boolean("general", general), constants, time_a_step
     question = _Question(scene, accuracy, quantity, horizon, allowed, *limits)
     if accuracy < limit:
@@ -225,9 +225,9 @@ def recommend(
         source = f"tried the {search.of_table} methods that {source}"
     # times of the user's methods in plain Python cannot be compared with those of compiled ones
     every = registry.integrators().values()
-    if own := [one.name for one in every if one.implementation == "python" and not is_built_in(one.name)]:
+    if own := [method.name for method in every if method.implementation == "python" and not is_built_in(method.name)]:
         fails["Not tried, as only compiled methods are timed"] = own
-    errors = [f"{name} {error:.2e}" for name, error in sorted(search.errors_at_step.items(), key=lambda one: one[1])]
+    errors = [f"{name} {error:.2e}" for name, error in sorted(search.errors_at_step.items(), key=lambda item: item[1])]
     fails = ({INACCURATE: errors} if errors else {}) | fails
     sentences = tuple(f"{reason}: {', '.join(names)}." for reason, names in fails.items())
     return _advice(question, ranked, sentences, source, beside)
@@ -244,7 +244,7 @@ def _needs(choice: Collection[object]) -> tuple[str, ...]:
     """Names of `NEEDS`, from names or words of them: words that make up no need whole select all that contain them."""
     parts = {name: set(COMMA.split(words)) for name, words in NEEDS.items()}
     terms = dict.fromkeys([*NEEDS, *sorted(set().union(*parts.values()))])
-    given = COMMA.split(", ".join(str(one).strip() for one in choice)) if choice else []
+    given = COMMA.split(", ".join(str(term).strip() for term in choice)) if choice else []
     words = {one_of("needs", word, terms) for word in given}
     whole = [name for name in NEEDS if name in words or parts[name] <= words]
     rest = words.difference(NEEDS, *(parts[name] for name in whole))
@@ -261,15 +261,15 @@ class _Search:
         self.errors_at_step: dict[str, float] = {}  # errors of methods that are too inaccurate at the given step
         self.widened = 0  # the number of all methods, if all had to be tried
         self._try(names)
-        costs = {name: one.cost(question) for one in self.trials if (name := one.run.integrator.name) in menu}
+        costs = {name: trial.cost(question) for trial in self.trials if (name := trial.run.integrator.name) in menu}
         first, second, *_ = [*costs.values(), math.inf, math.inf]
         self.of_table = len(menu[:FEW])  # methods of the table that were tried
         if menu and (len(costs) < AGREED or menu.index(next(iter(costs))) >= AGREED or second < TIED * first):
             self._try(menu[FEW : FEW + 1])
             self.of_table = len(menu[: FEW + 1])
         no_answer = () if question.needs else THIS_TOP
-        self._of_top = [one for one in self.trials if one.run.integrator.needs in no_answer][:1]
-        self._general = [one for one in self.trials if one.run.integrator.needs not in no_answer]
+        self._of_top = [trial for trial in self.trials if trial.run.integrator.needs in no_answer][:1]
+        self._general = [trial for trial in self.trials if trial.run.integrator.needs not in no_answer]
 
     def answers(self) -> list[_Trial]:
         """The finalists, which were run to the end, the fastest first."""
@@ -278,7 +278,7 @@ class _Search:
             everyone = _usable(self.question._replace(needs=self.question.needs or OF_ANY))
             self.widened, rest = len(everyone), {*everyone} - {*self.names, *self.menu}
             self._try(rest)
-            ranked = self._confirmed([one for one in self.trials if one.run.integrator.name in rest], FINALISTS)
+            ranked = self._confirmed([trial for trial in self.trials if trial.run.integrator.name in rest], FINALISTS)
         return _timed(self.question, ranked, self.fails, ROUNDS)
 
     def beside(self) -> list[_Trial]:
@@ -290,18 +290,18 @@ class _Search:
         kernels_to_compile[0] = math.ceil(KERNELS * len(names))
         for number, method in enumerate(sorted(map(integrator, names), key=lambda method: -(method.order or 0)), 1):
             post(f"trying method {number} of {len(names)}")
-            rivals = [one.run.evaluations for one in self.trials if one.run.integrator.needs not in THIS_TOP]
+            rivals = [trial.run.evaluations for trial in self.trials if trial.run.integrator.needs not in THIS_TOP]
             patience = max(TOO_DEAR * min(rivals, default=math.inf), CHEAP)
             failed = sum(len(self.fails.get(why, ())) for why in HOPELESS)
             most = LESS if failed >= AGREED and not rivals else math.inf
             self._sort_in(_tried(self.question, method, patience, most), self.trials)
         timed = _timed(self.question, self.trials, self.fails)
-        self.trials = sorted(timed, key=lambda one: one.cost(self.question))
+        self.trials = sorted(timed, key=lambda trial: trial.cost(self.question))
 
     def _confirmed(self, trials: Sequence[_Trial], most: int) -> list[_Trial]:
         """Confirm the first `most` trials and those as fast, or more until one is confirmed."""
         ranked: list[_Trial] = []
-        costs = [one.cost(self.question) for one in trials]
+        costs = [trial.cost(self.question) for trial in trials]
         for number, trial in enumerate(trials):
             if number < most or not ranked or costs[number] <= LEVEL * costs[0]:
                 self._sort_in(_confirm(self.question, trial), ranked)
@@ -327,9 +327,9 @@ def _usable(question: _Question) -> list[str]:
     needs, entries = question.needs, {name: integrator(name) for name in names}
     return [
         name
-        for name, one in entries.items()
-        if one.control is not None and one.implementation == "compiled" and (not needs or one.needs in needs)
-        and question.allows(one)
+        for name, method in entries.items()
+        if method.control is not None and method.implementation == "compiled" and (not needs or method.needs in needs)
+        and question.allows(method)
     ]  # fmt: skip
 
 
@@ -394,14 +394,14 @@ def _tried(question: _Question, method: Integrator, patience: float, most: float
 
 def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]], rounds: int = 5) -> list[_Trial]:
     """The trials with times, measured against each other, the fastest first; slow steps are noted in `fails`."""
-    runs = [one.run for one in trials]
+    runs = [trial.run for trial in trials]
     times = settings.seconds(question.scene, runs, question.quantity, question.horizon, rounds)
     pairs = zip(trials, times, strict=True)
-    timed = sorted((one._replace(seconds=time) for one, time in pairs), key=lambda one: one.seconds)
-    slow = [one.run.integrator.name for one in timed if one.a_step > question.time_a_step]
+    timed = sorted((trial._replace(seconds=time) for trial, time in pairs), key=lambda trial: trial.seconds)
+    slow = [trial.run.integrator.name for trial in timed if trial.a_step > question.time_a_step]
     if slow:
         fails.setdefault(f"A step takes over {question.time_a_step:g} s", []).extend(slow)
-    return [one for one in timed if one.a_step <= question.time_a_step]
+    return [trial for trial in timed if trial.a_step <= question.time_a_step]
 
 
 def _confirm(question: _Question, trial: _Trial) -> _Trial:
@@ -488,8 +488,8 @@ def _carries(question: _Question, method: Integrator) -> str:
 
 
 def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
-    times = [f", {_as_long(one.seconds / best)}" if math.isfinite(best) else "" for one in trials]
-    return "".join(f"Made for this top: {one.words()}{time}." for one, time in zip(trials, times, strict=True))
+    times = [f", {_as_long(trial.seconds / best)}" if math.isfinite(best) else "" for trial in trials]
+    return "".join(f"Made for this top: {trial.words()}{time}." for trial, time in zip(trials, times, strict=True))
 
 
 def _lines(question: _Question, method: Integrator, **setting: float) -> dict[str, str]:

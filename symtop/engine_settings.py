@@ -111,9 +111,9 @@ def i_use(
     if start.of_body:  # refuse a horizon beyond its reference
         settings.judgeable(start, "axis", end)
     runs = {}
-    for name, one in maps[engine].items():
-        post(f"running {one}")
-        runs[name] = settings.attempt(start, integrator(one), h, end, "axis")
+    for name, method in maps[engine].items():
+        post(f"running {method}")
+        runs[name] = settings.attempt(start, integrator(method), h, end, "axis")
     errors = {name: min(run.error, math.pi) for name, run in runs.items()}
     best = min(errors, key=lambda name: errors[name])
     error = errors[best]

@@ -79,7 +79,7 @@ def completing(kind: str) -> Callable[[click.Context, click.Parameter, str], lis
     def complete(_: click.Context, __: click.Parameter, prefix: str) -> list[str]:
         module, function = NAMES["variants" if "[" in prefix and kind == "integrators" else kind]
         entries = getattr(importlib.import_module(module), function)()
-        return [name for name in (getattr(one, "name", one) for one in entries) if name.startswith(prefix)]
+        return [name for name in (getattr(entry, "name", entry) for entry in entries) if name.startswith(prefix)]
 
     return complete
 
@@ -253,8 +253,8 @@ def _plain_usage() -> Iterator[None]:
 def _in_options(error: SymtopError, command: click.Command | None) -> str:
     """An error's message with names of options for arguments, and hints for an unknown scene or integrator."""
     parameters = command.params if command is not None else []
-    options = [one for one in parameters if isinstance(one, click.Option)]
-    named = {str(one.name): max(one.opts, key=len) for one in reversed(options)}  # the first option of a name
+    options = [parameter for parameter in parameters if isinstance(parameter, click.Option)]
+    named = {str(option.name): max(option.opts, key=len) for option in reversed(options)}  # the first option of a name
     sentence = error.renamed({"quaternion": "--attitude", "omega_body": "--rates"} | named)
     if not isinstance(error, UnknownNameError) or error.parameters[0] not in ("scene", "integrator"):
         return sentence
@@ -264,11 +264,11 @@ def _in_options(error: SymtopError, command: click.Command | None) -> str:
     (kind,), name = error.parameters, str(error.value)
     if name in all_scenes() or split_name(name)[0] in integrators():
         other = "an integrator" if kind == "scene" else "a scene"
-        both = {"scene", "integrator"} <= {one.name for one in parameters if isinstance(one, click.Argument)}
+        both = {"scene", "integrator"} <= {given.name for given in parameters if isinstance(given, click.Argument)}
         order = ", and the scene comes first" if both else ""
         return f"{kind} {name!r} is unknown; it is the name of {other}{order}"
     own = {"scene": {"body": f"{BODY} with --body I1,I2,I3"}, "integrator": {}}[kind] | {"plugin": "--plugin FILE"}
-    ways = " or ".join(words for name, words in own.items() if name in {one.name for one in options})
+    ways = " or ".join(words for name, words in own.items() if name in {option.name for option in options})
     return f"{sentence} (symtop {kind}s lists all{ways and f'; one of your own: {ways}'})"
 
 

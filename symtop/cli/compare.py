@@ -63,7 +63,7 @@ def compare(
     exact = data["exact_seconds"].item()  # NaN for a body without symmetry
     if as_json:
         facts = {name: data.attrs[name] for name in FACTS}
-        every = [one for own in records for one in own]
+        every = [record for own in records for record in own]
         click.echo(as_text({"scene": data["scene"].item(), **facts, "exact_seconds": exact, "cheapest": every}))
         return
     timed, end, count = options["cost"] == "time", data.attrs["horizon"], data.attrs["nutations"]
@@ -73,11 +73,11 @@ def compare(
     say(f"{data['scene'].item()} to t = {end:.6g}{unit}{span}: the cheapest run by {options['cost']}")
     cost = "time" if timed else "force evaluations"
     say(f"steps a {period} or tolerance (tol), {cost}; error of {data.attrs['quantity']}")
-    rows = [[titled(cell), *(_cell(one, timed) for one in own)] for cell, own in zip(cells, records, strict=True)]
+    rows = [[titled(cell), *(_cell(record, timed) for record in own)] for cell, own in zip(cells, records, strict=True)]
     click.echo(table(["variant", *map("error {:.0e}".format, TARGETS)], rows))
     for cell in cells:
         least = cell["error"].min().item()
-        words = [str(one) for one in cell["message"].values if one][:1] or [failed_setting(cell)]
+        words = [str(message) for message in cell["message"].values if message][:1] or [failed_setting(cell)]
         words += [f"its least error was {least:.1e}"] if least > TARGETS[-1] else []
         if any(words):
             say(f"{cell['variant'].item()}: {'; '.join(filter(None, words))}")

@@ -89,7 +89,7 @@ def judge(
 
     _check(options["form"], output=output, card=card, badge=badge, figure=figure)
     ledger = judged(target, scene=scene, tell=tell, **options)
-    click.echo(as_text([one.plain() for one in ledger.findings]) if as_json else findings.summary(ledger))
+    click.echo(as_text([finding.plain() for finding in ledger.findings]) if as_json else findings.summary(ledger))
     if output is not None:
         from symtop.core import netcdf
 
@@ -167,7 +167,7 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
 
         problem = scenes.scene(scene, bodies=True)
         added = [name for name in registry.integrators() if not registry.is_built_in(name)]
-        known = [name for name, one in registry.integrators().items() if not problem.of_body or BODY in one.solvers]
+        known = [name for name, own in registry.integrators().items() if not problem.of_body or BODY in own.solvers]
         methods = [registry.integrator(name) for name in names or added or known]
     refuted, entries = False, []
     for method in methods:

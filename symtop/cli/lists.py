@@ -35,12 +35,12 @@ PACKAGE = f"""\
 
 
 def _print(
-    records: list[Record], short: list[Record], note: str, one: Record | None, page: Callable[[Record], str],
+    records: list[Record], short: list[Record], note: str, entry: Record | None, page: Callable[[Record], str],
     *, wide: bool, as_json: bool,
 ) -> None:  # fmt: skip
-    """Print the entry `one` with `page`, if given, else a table of the `short` records; with options all, or JSON."""
-    if one is not None and (as_json or not wide):
-        click.echo(as_text([one]) if as_json else page(one))
+    """Print the `entry` with `page`, if given, else a table of the `short` records; with options all, or JSON."""
+    if entry is not None and (as_json or not wide):
+        click.echo(as_text([entry]) if as_json else page(entry))
     elif as_json:
         click.echo(as_text(records))
     elif wide:
@@ -87,8 +87,8 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, eng
     needs = "; ".join(f"{name}: {words}" for name, words in registry.NEEDS.items())
     note = f"flags: {FLAGS}. What a method needs of you (needs) is one of {needs}."
     note += " One in full: symtop integrators NAME; in one chart: NAME[CHART]."
-    one = None if name is None else _described(methods[0])
-    _print(records, short, note, one, _integrator_page, wide=wide, as_json=as_json)
+    entry = None if name is None else _described(methods[0])
+    _print(records, short, note, entry, _integrator_page, wide=wide, as_json=as_json)
 
 
 def _flags(method: "Integrator") -> str:
@@ -145,8 +145,8 @@ def scenes(name: Any, wide: bool, as_json: bool) -> None:
     short: list[Record] = [{column: record[key] for column, key in keys.items()} for record in records]
     times = "horizon: the time a run covers; nutation: one period of it, of a body its natural period."
     note = f"{times} One in full: symtop scenes NAME."
-    one = None if name is None else _numbers(entries[0])
-    _print(records, short, note, one, _scene_page, wide=wide, as_json=as_json)
+    entry = None if name is None else _numbers(entries[0])
+    _print(records, short, note, entry, _scene_page, wide=wide, as_json=as_json)
 
 
 def _numbers(scene: "Scene") -> Record:

@@ -305,7 +305,7 @@ def ensemble(
         say(counted(steps, "step") + EXECUTION.get(data.attrs["execution"], ""))
         heading = [f"largest error, {so_many(min(members, most), noun)}", *(f"{100.0 * level:g} %" for level in LEVELS)]
         if worst:
-            short = {name: one.replace("energy of", "that of") for name, one in words.items()}  # a line of 80 columns
+            short = {name: text.replace("energy of", "that of") for name, text in words.items()}  # a line of 80 columns
             click.echo(table(heading, [[short[name], *map("{:.1e}".format, row)] for name, row in worst.items()]))
         say_written(output, figure)
     if lost := sum(np.isnan(own.get("attitude", []))):
@@ -330,7 +330,7 @@ def _columns(sample: Any, errors: dict[str, Any], words: dict[str, str]) -> Any:
     from symtop.measure.errors import ERRORS
 
     numbers = {name: column.variable for name, column in sample.data_vars.items() if column.dtype.kind == "f"}
-    added: dict[str, Any] = {name if name in PARAMETERS else f"start_{name}": one for name, one in numbers.items()}
+    added: dict[str, Any] = {name if name in PARAMETERS else f"start_{name}": row for name, row in numbers.items()}
     for name, values in errors.items():
         padded = np.pad(values, (0, sample.sizes["member"] - len(values)), constant_values=math.nan)
         about = {"long_name": f"{words[name]}, largest over the run, infinite after a failure"}
@@ -351,7 +351,7 @@ def explore(port: int, no_browser: bool) -> None:
     from symtop.explore.server import address, serve
     from symtop.methods.framework.registry import integrators, is_built_in
 
-    if unseen := [name for name, one in integrators().items() if not (shows(one) or is_built_in(name))]:
+    if unseen := [name for name, method in integrators().items() if not (shows(method) or is_built_in(name))]:
         warn(f"the page shows attitudes and leaves out {', '.join(unseen)}, without the chart angles or attitude")
     with ending_on_sigterm(), serve(port) as server:
         click.echo(f"symtop explore: {address(server)} (Ctrl-C ends it)")

@@ -101,7 +101,7 @@ def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick
     if not only:
         return studies
     remaining, reasons = [], []
-    for narrowed in (one.only(only) for one in studies):
+    for narrowed in (study.only(only) for study in studies):
         try:
             narrowed.grid(quick=quick)
             remaining.append(narrowed)

@@ -328,7 +328,7 @@ class Code:
 def _statements(file: Path) -> str:
     """Hash of the statements of a user's file outside of functions, classes and imports, which fill its lists."""
     with contextlib.suppress(OSError, SyntaxError, ValueError):  # no file, as at a prompt
-        return hashed(*(ast.dump(one) for one in ast.parse(file.read_bytes()).body if not isinstance(one, DEFINING)))
+        return hashed(*(ast.dump(node) for node in ast.parse(file.read_bytes()).body if not isinstance(node, DEFINING)))
     return ""
 
 

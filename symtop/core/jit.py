@@ -132,11 +132,11 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
     bitcode = b""  # of a kernel with all that it calls, before it is optimised for a processor
 
     def _defined(self) -> list[Any]:
-        return [one for one in self._final_module.functions if not one.is_declaration]
+        return [function for function in self._final_module.functions if not function.is_declaration]
 
     def _own(self) -> set[str]:
         """The names under which Python and C call a kernel; none for a function that only kernels call."""
-        wrappers = {one.name for one in self._defined() if one.name.startswith(WRAPPERS)}
+        wrappers = {function.name for function in self._defined() if function.name.startswith(WRAPPERS)}
         return wrappers | {name.removeprefix(WRAPPERS[1]) for name in wrappers}
 
     def _optimize_final_module(self) -> None:
@@ -146,14 +146,14 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
 
     def _finalize_final_module(self) -> None:
         own, defined = self._own(), self._defined()
-        if not own and any(one.name.startswith("_ZN") for one in defined):
+        if not own and any(function.name.startswith("_ZN") for function in defined):
             self._finalize_dynamic_globals()
             self._verify_declare_only_symbols()
             self._finalized = True
             return
-        for one in defined:
-            if own and one.name not in own:
-                one.linkage = "internal"
+        for function in defined:
+            if own and function.name not in own:
+                function.linkage = "internal"
         super()._finalize_final_module()
 
 
@@ -192,10 +192,11 @@ class _Cache:
         with contextlib.suppress(*UNUSABLE):
             library, kernel, constants = result.library, result.fndesc, result.environment.consts
             about = {name: getattr(kernel, name) for name in NAMED} | {"library": library.name}
-            about |= {"returned": _words(result.signature.return_type), "constants": [str(one) for one in constants]}
-            inner = [one for one in result._find_referenced_environments() if one is not result.environment]
+            about |= {"returned": _words(result.signature.return_type), "constants": [str(kind) for kind in constants]}
+            inner = [own for own in result._find_referenced_environments() if own is not result.environment]
             same = _type(about["returned"]) == result.signature.return_type
-            same &= [np.dtype(one) for one in about["constants"]] == constants and not any(one.consts for one in inner)
+            same &= [np.dtype(kind) for kind in about["constants"]] == constants
+            same &= not any(own.consts for own in inner)
             if same and not library.has_dynamic_globals and not result.reload_init:
                 code, bitcode, _ = self.files(signature, library.codegen)
                 entry = json.dumps(about).encode() + b"\n" + zlib.compress(library.bitcode, 1)
@@ -226,7 +227,7 @@ def _loaded(arguments: tuple[Any, ...], context: Any, entry: bytes, code: Path) 
     )  # fmt: skip
     kernel.mangled_name = about["mangled_name"]
     environment = Environment.from_fndesc(kernel)
-    environment.consts[:] = [np.dtype(one) for one in about["constants"]]
+    environment.consts[:] = [np.dtype(kind) for kind in about["constants"]]
     return compile_result(
         typing_context=context.typing_context, target_context=context, library=library, fndesc=kernel,
         entry_point=context.get_executable(library, kernel, environment), environment=environment, objectmode=False,
@@ -354,7 +355,8 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     kernel.compile = _once(kernel, kernel.compile)
     functions = (part.thing for part in parts if isinstance(part.thing, FunctionType))
     written = [part for part in functions if not part.__module__.startswith("namedtuple_")]
-    folder, filed = cache_root() / "kernels" / made_of, all(Path(one.__code__.co_filename).is_file() for one in written)
+    folder = cache_root() / "kernels" / made_of
+    filed = all(Path(part.__code__.co_filename).is_file() for part in written)
     if filed and all(map(is_trusted, (cache_root(), folder.parent, folder))):
         touch(folder)
         kernel._cache = _Cache(folder)

@@ -155,7 +155,8 @@ def read_json(path: Path) -> Any:
 
 def _encoding(data: xr.Dataset) -> dict[Any, dict[str, Any]]:
     bare = {name: {"_FillValue": None} for name in data.coords if data[name].dtype.kind == "f"}
-    rounded = [name for name, one in data.data_vars.items() if one.dtype.kind == "u" or one.dtype == np.float32]
+    kinds = {name: variable.dtype for name, variable in data.data_vars.items()}
+    rounded = [name for name, kind in kinds.items() if kind.kind == "u" or kind == np.float32]
     return bare | {name: {"zlib": True} for name in rounded}
 
 

@@ -220,7 +220,7 @@ def _float32(values: Any) -> str:
 
 def _curves(largest: dict[str, float], message: str = "", /, **arrays: Any) -> dict[str, Any]:
     """The answer for the views with friction: message, largest errors, and arrays as base64."""
-    return {"message": message, "largest": largest, "arrays": {name: _float32(one) for name, one in arrays.items()}}
+    return {"message": message, "largest": largest, "arrays": {name: _float32(array) for name, array in arrays.items()}}
 
 
 def grid(fields: Mapping[str, Any]) -> tuple[Setup, np.ndarray, np.ndarray]:

@@ -40,8 +40,10 @@ def question(fields: Mapping[str, Any]) -> list[Setup]:
 def _variants(setups: list[Setup]) -> dict[str, Integrator]:
     """The variants of a chart by the names of their methods, those of the page first; all determine the attitude."""
     scene, beside = setups[0].scene, map(integrator, BESIDE)
-    methods = [*(one.method for one in setups), *(one for one in beside if not scene.of_body or BODY in one.solvers)]
-    return {one.name: one.variant(chart_of(one, scene.observes, "attitude")) for one in methods if one.control}
+    methods = [setup.method for setup in setups]
+    methods += [method for method in beside if not scene.of_body or BODY in method.solvers]
+    able = [method for method in methods if method.control]
+    return {method.name: method.variant(chart_of(method, scene.observes, "attitude")) for method in able}
 
 
 @functools.lru_cache(MOST_LINES)
@@ -50,7 +52,7 @@ def _runs(scene: Scene, name: str) -> list[tuple[float, str, float]]:
     variant, quantity = integrator(name), "attitude" if scene.of_body else "axis"
     budget = SHARE * BUDGET[variant.implementation] * min(variant.speed, 1.0)
     data = compare(scene, [variant], quantity=quantity, cost="evaluations", budget=budget, quiet=True).isel(variant=0)
-    values = (data[one].values.tolist() for one in (str(variant.control), "outcome", "error"))
+    values = (data[name].values.tolist() for name in (str(variant.control), "outcome", "error"))
     return [run for run in zip(*values, strict=True) if run[1] != "not_run"]
 
 
@@ -79,17 +81,17 @@ def _compute(scene: Scene, variants: dict[str, Integrator], key: tuple[Any, ...]
 
 def _line(name: str, rows: list[dict[str, Any]], message: str) -> dict[str, Any]:
     """Seconds and errors of the runs of a method with outcome "ok", and the number of failed ones."""
-    good = [one for one in rows if one["outcome"] == "ok" and one["error"] > 0.0]
-    failed = sum(one["outcome"] != "ok" for one in rows)
-    numbers = {name: [one[name] for one in good] for name in ("seconds", "error")}
+    good = [row for row in rows if row["outcome"] == "ok" and row["error"] > 0.0]
+    failed = sum(row["outcome"] != "ok" for row in rows)
+    numbers = {name: [row[name] for row in good] for name in ("seconds", "error")}
     return {"name": name, **numbers, "failed": failed, "message": message}
 
 
-def _seconds(one: Setup) -> float | None:
+def _seconds(setup: Setup) -> float | None:
     """The least time of a run of the page, None if it failed; `timings` would compile the closed form and wait."""
-    chart = chart_of(one.method, one.scene.observes, "attitude")
-    setting = math.nan if one.setting is None else one.setting
-    run = bare_run(one.scene, one.method, chart, setting, one.scene.horizon, budget=one.budget)
+    chart = chart_of(setup.method, setup.scene.observes, "attitude")
+    setting = math.nan if setup.setting is None else setup.setting
+    run = bare_run(setup.scene, setup.method, chart, setting, setup.scene.horizon, budget=setup.budget)
     if run().outcome != "ok":
         return None
     first = first_call(run)
@@ -104,4 +106,4 @@ def chart(setups: list[Setup]) -> dict[str, Any]:
     if missing and _newest != [key]:
         _newest[:] = [key]
         threading.Thread(target=_compute, args=(scene, variants, key), daemon=True).start()
-    return {"lines": lines, "missing": missing, "seconds": [_seconds(one) for one in setups]}
+    return {"lines": lines, "missing": missing, "seconds": [_seconds(setup) for setup in setups]}

@@ -105,7 +105,7 @@ class Handler(BaseHTTPRequestHandler):
         """Send the page, its files or the catalogue."""
         if not self._is_local():
             return
-        file = {one.name: one for one in STATIC.iterdir()}.get(self.place.removeprefix("/") or "page.html")
+        file = {path.name: path for path in STATIC.iterdir()}.get(self.place.removeprefix("/") or "page.html")
         if file is not None and file.suffix in KINDS:
             self._reply(200, file.read_bytes(), f"{KINDS[file.suffix]}; charset=utf-8")
         elif self.place == "/catalogue":

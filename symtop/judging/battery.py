@@ -49,7 +49,7 @@ def measure(stage: Stage, subject: Subject) -> list[Finding]:
     if subject.in_plane and "plane" not in stage.applies:
         return [inapplicable(claim, "a map of (theta, p_theta) does not show it") for claim in stage.claims]
     try:
-        findings = {one.claim: one for one in stage.measure(subject)}
+        findings = {finding.claim: finding for finding in stage.measure(subject)}
     except SymtopError as error:
         if "calls" in stage.claims:
             raise

@@ -71,9 +71,9 @@ def compare(
     end = problem.horizon if until is None else horizon_of(until)
     most = None if budget is None else positive("budget", budget)
     with x64(restored=True):
-        records = [find(one, problem) for one in listed(methods)]
-    variants = [one.variant(chart_of(one, problem.observes, settings.observed(quantity))) for one in records]
-    names = [one.name for one in variants]
+        records = [find(method, problem) for method in listed(methods)]
+    variants = [record.variant(chart_of(record, problem.observes, settings.observed(quantity))) for record in records]
+    names = [variant.name for variant in variants]
     if not names or len(set(names)) < len(names):
         raise SymtopError(f"methods must be one or more, each once, not {names!r}", "methods")
     if problem.of_body:  # refuse a horizon beyond its reference before any run
@@ -86,11 +86,11 @@ def compare(
     exact = find_integrator("exact")
     with progress_bar("compare", quiet=boolean("quiet", quiet), total=len(names)) as bar, x64(restored=True):
         results = []
-        kernels = [one for one in variants if one.implementation == "compiled"]
+        kernels = [variant for variant in variants if variant.implementation == "compiled"]
         kernels_to_compile[0] = len(kernels) + (0 if closed_form.load() else CLOSED_FORM)
         post(f"methods that have run: 0 of {len(names)}")
-        for one in in_threads(runs_of, variants, min(cores(), len(variants))):
-            results.append(one)
+        for runs_and_messages in in_threads(runs_of, variants, min(cores(), len(variants))):
+            results.append(runs_and_messages)
             bar.update()
             post(f"methods that have run: {len(results)} of {len(names)}")
         rows: list[dict[str, Any]] = [{"setting_value": math.nan, "outcome": "ok"}]

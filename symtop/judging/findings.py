@@ -158,9 +158,9 @@ class Ledger:
 
     def dataset(self) -> xr.Dataset:
         """The table as a dataset over ``claim``, with traces over ``setting`` (order), ``width`` and ``window``."""
-        rows = [one._replace(measured=str(one.measured)) for one in self.findings]  # type: ignore[arg-type]
+        rows = [finding._replace(measured=str(finding.measured)) for finding in self.findings]  # type: ignore[arg-type]
         columns: dict[str, Any] = {
-            name: ("claim", [getattr(one, name) for one in rows]) for name in Finding._fields[1:]
+            name: ("claim", [getattr(row, name) for row in rows]) for name in Finding._fields[1:]
         }
         axes = dict.fromkeys(("step_size", "error", "fitted"), "setting")
         axes |= dict.fromkeys(("long_nutations", "energy_change"), "window")
@@ -172,7 +172,7 @@ class Ledger:
 
 def as_time(seconds: float) -> str:
     """A short time as text with a suitable unit: 5.4 us, 4.8 ms."""
-    size, unit = next(one for one in UNITS if not float(f"{seconds:.3g}") < one[0])
+    size, unit = next(pair for pair in UNITS if not float(f"{seconds:.3g}") < pair[0])
     return f"{seconds / (size or 1e-9):.3g} {unit}"
 
 
@@ -205,10 +205,10 @@ def line(finding: Finding, width: int = WIDTH) -> str:
 
 def description(findings: Sequence[Finding]) -> str:
     """The measured properties of a method in a phrase: "order 2, symplectic, reversible, keeps p_phi; not p_psi"."""
-    measured = {one.claim: one.measured for one in findings}
-    errors = ((one.claim.removesuffix("_error"), one) for one in findings if one.claim.endswith("_error"))
-    words = [f"{name} within {one.value:.1e}{error_units(name)} of {'one' if name.endswith('_length') else 'the truth'}"
-             for name, one in errors if one.measured]  # fmt: skip
+    measured = {finding.claim: finding.measured for finding in findings}
+    errors = {row.claim.removesuffix("_error"): row.value for row in findings if row.measured and "_error" in row.claim}
+    words = [f"{name} within {value:.1e}{error_units(name)} of {'one' if name.endswith('_length') else 'the truth'}"
+             for name, value in errors.items()]  # fmt: skip
     if order := measured.get("order"):
         p, limits = order.number, {"wrong limit": "converges to another motion", "converges": order.text}
         words += [limits.get(order.kind) or (f"order {round(p)}" if abs(p - round(p)) < 0.3 else f"order {p:.1f}")]
@@ -237,8 +237,8 @@ def summary(ledger: Ledger) -> str:
     """The end of a report: the runs, the measured properties, and the verdicts on the claims made and implied."""
     counts = []
     for follows in (False, True):
-        claimed = [one for one in ledger.findings if one.declared and (one.claim in ledger.implied) is follows]
-        count = Counter(one.verdict for one in claimed)
+        claimed = [row for row in ledger.findings if row.declared and (row.claim in ledger.implied) is follows]
+        count = Counter(row.verdict for row in claimed)
         counts.append(", ".join(f"{count[word]} {word}" for word in VERDICTS if count[word]))
     claims = f"Claims: {counts[0]}" if counts[0] else "No claims were made"
     names = _listed([claim_name(name) for name in sorted(ledger.implied)])
@@ -254,8 +254,8 @@ def _runs(ledger: Ledger) -> str:
     if np.isfinite(ladder).any():
         failed = ladder[np.isnan(traces["error"]) & np.isfinite(ladder)]
         fails = f" ({failed.max():.0f} and fewer fail)" if failed.size else ""
-        one = ledger.about.nutation / traces.get("structure_step", math.nan)
-        structure = f", {one:.1f} for the structure" if math.isfinite(one) else ""
+        density = ledger.about.nutation / traces.get("structure_step", math.nan)
+        structure = f", {density:.1f} for the structure" if math.isfinite(density) else ""
         span = f"{np.nanmin(ladder):.0f} to {np.nanmax(ladder):.0f}"
         words.append(f"{span} steps a {period} for the order{fails}{structure}")
     if "steps_run" in traces and (steps := float(traces["steps_run"])):

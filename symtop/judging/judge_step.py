@@ -155,7 +155,7 @@ def judge(
         for finding in _findings(subject, process, began, limits, slow):
             listen(finding)
             findings.append(finding)
-    follow = frozenset(one.claim for one in findings if one.declared and implied.get(one.claim))
+    follow = frozenset(finding.claim for finding in findings if finding.declared and implied.get(finding.claim))
     return Ledger(about.name, problem.name, tuple(findings), subject.traces, about, follow)
 
 
@@ -182,7 +182,7 @@ def read(target: Any) -> dict[str, Any]:
     if wrong:
         begin = f"{path.name} must begin with names, commas or spaces between: time and of {', '.join(fields[1:])}"
         raise SymtopError(f"{begin}, but of {head[:60]!r} {', '.join(wrong[:SHOWN])}{' ...' * (len(wrong) > SHOWN)}")
-    if not any(one.partition("#")[0].strip() for one in lines):
+    if not any(line.partition("#")[0].strip() for line in lines):
         raise SymtopError(f"{path.name} must have a line of numbers below its names, and has none")
     must = f"{path.name} must have {len(names)} numbers in each line"
     try:
@@ -333,7 +333,7 @@ def _findings(
         first = "calls" in stage.claims
         process.lost += slow if process.late else ""
         if process.lost:
-            claims = tuple(claim for one in (todo if first else [stage]) for claim in one.claims)
+            claims = tuple(claim for lost in (todo if first else [stage]) for claim in lost.claims)
             findings = unmeasured(claims, subject, process.lost)
         yield from findings
         if process.lost and first:

@@ -132,7 +132,7 @@ class Process(contextlib.AbstractContextManager["Process"]):
         code = self.process.exitcode
         if code is not None and code < 0:
             during = f" in a step of h = {heartbeat.step:.3g}" if heartbeat.inside else ""
-            name = next((one.name for one in signal.Signals if one == -code), f"signal {-code}")  # one in real time
+            name = next((sent.name for sent in signal.Signals if sent == -code), f"signal {-code}")  # one in real time
             return f"its process was ended by {name}{during}"
         self.output.seek(0)
         words = last_words(self.output.read())
@@ -234,12 +234,12 @@ class Remote(Stepper):
 
 def _run(process: Process, name: str, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
     fields = process.call(name, top, start, plan)
-    return Run(**fields | {one: np.array(fields[one], dtype=float) for one in Run._fields[:3]})
+    return Run(**fields | {name: np.array(fields[name], dtype=float) for name in Run._fields[:3]})
 
 
 def separated(method: Integrator, process: Process) -> Integrator:
     """The method with its foreign solvers called in a process with the table `solvers_of`; symtop's stay here."""
-    foreign = [chart for chart, one in method.solvers.items() if not getattr(one, "__module__", "").startswith(OWN)]
+    foreign = [chart for chart, run in method.solvers.items() if not getattr(run, "__module__", "").startswith(OWN)]
     solvers = {chart: functools.partial(_run, process, chart) for chart in foreign}
     return replace(method, solvers=dict(method.solvers) | solvers)
 

@@ -39,7 +39,7 @@ def described(
     `own` is the table of the study. A group with an ``axis_bound`` is an error table. A variable that no table declares
     keeps its attributes. `units` is that of `netcdf.describe`; `of_body` has `Scene.of_body` of each scene.
     """
-    for group, variables in ((path, one.variables) for path, one in netcdf.groups(data).items()):
+    for group, variables in ((path, table.variables) for path, table in netcdf.groups(data).items()):
         known = netcdf.VARIABLES | (ERROR_TABLE if "axis_bound" in variables else {})
         for name, variable in variables.items():
             column = own.get(f"{group}/{name}", own.get(str(name)))

@@ -204,7 +204,7 @@ def from_increments(method: Integrator, scene: Scene, plan: Plan) -> Difference 
         apart, own = trend(times, (values - reported) / scene.momentum_scale), trend(times, values)
         hidden = abs(apart.rise) > max(LEAST, SHARE * abs(own.rise) / scene.momentum_scale)
         sizes[name] = abs(apart.rise) if hidden and abs(apart.slope) > SURE * apart.interval else 0.0
-    name = max(sizes, key=lambda one: sizes[one])
+    name = max(sizes, key=lambda name: sizes[name])
     return Difference(name, sizes[name], LEAST, f"more at the end of {int(again.marks[-1])} steps than at their start")
 
 

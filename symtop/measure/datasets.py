@@ -63,11 +63,11 @@ def _dense(cases: list[tuple[Any, xr.Dataset]]) -> xr.Dataset:
             own[place] = variable
     variables: dict[str, Any] = {}
     for name, own in measured.items():
-        dims, attributes = next((one.dims, one.attrs) for one in own.values())
+        dims, attributes = next((array.dims, array.attrs) for array in own.values())
         shape = len(scenes), len(methods), *(sizes[str(dim)] for dim in dims)
-        filled: Any = np.full(shape, *_blank([one.dtype for one in own.values()]))
-        for place, one in own.items():
-            filled[(*place, *map(slice, one.shape))] = one.values
+        filled: Any = np.full(shape, *_blank([array.dtype for array in own.values()]))
+        for place, array in own.items():
+            filled[(*place, *map(slice, array.shape))] = array.values
         variables[name] = ("scene", "variant", *dims), as_text(filled), dict(attributes)
     return xr.Dataset(variables, coords={"scene": scenes, "variant": methods} | coordinates)
 
@@ -117,17 +117,17 @@ def _differences(stored: xr.Dataset, again: xr.Dataset, attributes: bool) -> lis
     ours, theirs = set(map(str, stored.variables)), set(map(str, again.variables))
     differing = [f"{name} is in one of them only" for name in sorted(ours ^ theirs)]
     for name in sorted(ours & theirs):
-        one, other = stored[name], again[name]
-        if one.dims != other.dims or one.shape != other.shape:
-            differing.append(f"{name} has another shape: {dict(one.sizes)} and {dict(other.sizes)}")
-        elif not any(word in name for word in CLOCKED) and not (name in PRICES and one.dtype.kind == "f"):
-            numbers = one.dtype.kind == "f" and one.dtype == other.dtype  # equal to the last bit
-            if one.values.tobytes() == other.values.tobytes() if numbers else one.equals(other):
+        old, new = stored[name], again[name]
+        if old.dims != new.dims or old.shape != new.shape:
+            differing.append(f"{name} has another shape: {dict(old.sizes)} and {dict(new.sizes)}")
+        elif not any(word in name for word in CLOCKED) and not (name in PRICES and old.dtype.kind == "f"):
+            numbers = old.dtype.kind == "f" and old.dtype == new.dtype  # equal to the last bit
+            if old.values.tobytes() == new.values.tobytes() if numbers else old.equals(new):
                 continue
             how_much = ""
-            if one.dtype.kind == other.dtype.kind == "f":
+            if old.dtype.kind == new.dtype.kind == "f":
                 with np.errstate(all="ignore"):
-                    gap = np.abs(one.values - other.values)
+                    gap = np.abs(old.values - new.values)
                 finite = np.isfinite(gap).any()
                 how_much = f" by up to {np.nanmax(gap):.3g}" if finite else " in which values are NaN"
             differing.append(f"{name} differs{how_much}")

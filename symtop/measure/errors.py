@@ -167,9 +167,9 @@ def _of_members(runs: xr.Dataset, members: Any, precision: str) -> xr.Dataset:
     refuse_others(given, runs)
     tables, doubtful = [], list[str]()  # `warnings.catch_warnings` would also record warnings of other threads
     for i, (top, start) in enumerate(members_of(given.numbers)):
-        one = runs.isel(member=i)
-        end = float(one["horizon"]) if "horizon" in one else float(np.nanmax(one["time"].values))
-        tables.append(_of_run(one, Scene(f"member-{i}", top, start, end), precision, doubtful.append))
+        run = runs.isel(member=i)
+        end = float(run["horizon"]) if "horizon" in run else float(np.nanmax(run["time"].values))
+        tables.append(_of_run(run, Scene(f"member-{i}", top, start, end), precision, doubtful.append))
     if doubtful:
         words = f"{len(doubtful)} warnings on members, the first: {doubtful[0]}"
         warnings.warn(words, SymtopWarning, stacklevel=3)

@@ -43,13 +43,13 @@ TRIED = f"Not within {TRIES} runs"
 def smallest_charts(observe: str) -> list[Integrator]:
     """Every method in each chart that determines `observe`, but not in "attitude" if it also has the chart "axis"."""
     larger = ("attitude",)  # this chart costs more for the same axis and angular momentum
-    return [one for one in variants(observe) if one.charts() != larger or "axis" not in integrator(one.method).charts()]
+    return [row for row in variants(observe) if row.charts() != larger or "axis" not in integrator(row.method).charts()]
 
 
 def compared(observe: str) -> list[Integrator]:
     """Every method to compare, in its `smallest_charts` for "axis" or in each chart with "attitude"."""
     every = smallest_charts(observe) if observe == "axis" else variants(observe)
-    return [one for one in every if not one.exact_steps]  # these evaluate a closed form that other problems do not have
+    return [row for row in every if not row.exact_steps]  # these evaluate a closed form that other problems do not have
 
 
 def least_tolerance(method: Integrator) -> float:

@@ -203,8 +203,8 @@ def coarsest(trial: StepMap, start: Angles) -> StepMap:
 
 def canonical(size: int) -> Array:
     """The canonical matrix J (size, size), angles before momenta."""
-    none, one = np.zeros((size // 2, size // 2)), np.eye(size // 2)
-    return np.block([[none, one], [-one, none]])
+    zero, unit = np.zeros((size // 2, size // 2)), np.eye(size // 2)
+    return np.block([[zero, unit], [-unit, zero]])
 
 
 def bracket(chart: str, y: Array) -> Array:

@@ -86,17 +86,18 @@ def sweep(
     scenes and integrators than the file holds, but not fewer. Raises SymtopError for invalid arguments, for a damaged
     file, and for one that another process is writing.
     """
-    chosen = [find_scene(one, bodies=True) for one in listed(scenes)]
-    methods = [find_integrator(one) for one in listed(integrators)]
+    chosen = [find_scene(scene, bodies=True) for scene in listed(scenes)]
+    methods = [find_integrator(name) for name in listed(integrators)]
     silent = boolean("quiet", quiet)
     workers = cores() if threads is None else whole("threads", threads, 1, MOST_THREADS)
-    for words, names in (("scenes", [one.name for one in chosen]), ("integrators", [one.name for one in methods])):
+    named = {"scenes": [scene.name for scene in chosen], "integrators": [method.name for method in methods]}
+    for words, names in named.items():
         if not names or len(set(names)) < len(names):
             raise SymtopError(f"{words} must be one or more, each once, not {names!r}")
     asked = {"step_size": step_size, "per_nutation": per_nutation, "tolerance": tolerance}
     given = {name: _settings(name, values) for name, values in asked.items() if values is not None}
     clock = boolean("timed", timed)
-    grid = [[_cell(one, method, given, horizon, observe, clock) for method in methods] for one in chosen]
+    grid = [[_cell(scene, method, given, horizon, observe, clock) for method in methods] for scene in chosen]
     cells = [cell for row in grid for cell in row]
     pairs = [(cell.scene.name, cell.method.name) for cell in cells]
     file = None if path is None else file_path("path", path)
@@ -113,13 +114,13 @@ def sweep(
             size = max(len(cell.settings) for cell in cells)
             tables = [[_padded(done.get(cell.made_of), cell, size) for cell in row] for row in grid]
             data = xr.concat([xr.concat(row, "variant") for row in tables], "scene")
-            data = data.assign_coords(scene=[one.name for one in chosen], variant=[one.name for one in methods])
-            charts = [[chart_of(method, one.observes, observe) for method in methods] for one in chosen]
+            data = data.assign_coords(scene=named["scenes"], variant=named["integrators"])
+            charts = [[chart_of(method, scene.observes, observe) for method in methods] for scene in chosen]
             data["chart"] = ("scene", "variant"), charts
-            units = chosen[0].units if len({one.units for one in chosen}) == 1 else ""
+            units = chosen[0].units if len({scene.units for scene in chosen}) == 1 else ""
             words = {"timed": TIMED if timed else "nothing: timed was not asked for", "units": units}
             title, content = "errors and work of a sweep", netcdf.content_hash(data)
-            data = columns.described(data, units, of_body=[one.of_body for one in chosen])
+            data = columns.described(data, units, of_body=[scene.of_body for scene in chosen])
             ends = {row[0].scene.name: row[0].horizon for row in grid}
             return netcdf.describe(data, title, content=content, **words, **attributes(chosen, ends))
 
@@ -147,7 +148,7 @@ def sweep(
 def attributes(scenes: list[Scene], horizons: dict[str, float]) -> dict[str, Any]:
     """Attributes ``top`` and ``start`` by scene name, and ``horizon``: a number, or by scene name if scenes differ."""
     ends = {*horizons.values()}
-    records = {name: {one.name: asdict(getattr(one, name)) for one in scenes} for name in ("top", "start")}
+    records = {name: {scene.name: asdict(getattr(scene, name)) for scene in scenes} for name in ("top", "start")}
     return {"horizon": horizons if len(ends) > 1 else ends.pop(), **records}
 
 
@@ -166,8 +167,8 @@ def listed(things: Any) -> list[Any]:
 
 def _settings(name: str, values: object) -> list[float]:
     values = values.ravel() if isinstance(values, np.ndarray) else values
-    one = isinstance(values, (str, bytes)) or not isinstance(values, Iterable)
-    settings = [positive(name, value) for value in ([values] if one else row(name, values))]
+    single = isinstance(values, (str, bytes)) or not isinstance(values, Iterable)
+    settings = [positive(name, value) for value in ([values] if single else row(name, values))]
     if not settings:
         raise SymtopError(f"{name} must be one or more numbers, not none")
     return settings
@@ -224,7 +225,7 @@ def _time(cells: list[_Cell], done: dict[str, xr.Dataset]) -> bool:
         runs.append((cell.scene, cell.method.variant(chart), cell.horizon, rows))
     timed_rows(runs)
     for (cell, table), (*_, rows) in zip(waiting, runs, strict=True):
-        done[cell.made_of] = table.assign({name: ("setting", [one[name] for one in rows]) for name in SPENT})
+        done[cell.made_of] = table.assign({name: ("setting", [run[name] for run in rows]) for name in SPENT})
     return bool(waiting)
 
 
@@ -232,8 +233,8 @@ def timed_rows(cells: list[tuple[Scene, Integrator, float, list[dict[str, Any]]]
     """Time all runs with outcome "ok" against each other; adds "seconds" and "seconds_spread" to the rows of cells."""
     rows, calls, firsts = [], list[Callable[[], object]](), list[Callable[[], object]]()
     for scene, method, horizon, runs in cells:
-        rows += (ended := [one for one in runs if one["outcome"] == "ok"])
-        own = [bare_run(scene, method, next(iter(method.solvers)), one["setting_value"], horizon) for one in ended]
+        rows += (ended := [run for run in runs if run["outcome"] == "ok"])
+        own = [bare_run(scene, method, next(iter(method.solvers)), run["setting_value"], horizon) for run in ended]
         calls += own
         firsts += own[:1]
     with foreign_code("a method that is timed"):
@@ -242,8 +243,8 @@ def timed_rows(cells: list[tuple[Scene, Integrator, float, list[dict[str, Any]]]
         for first in firsts:  # otherwise the calibration would time the loading of code and make batches of one call
             first()
         results = timings(calls, BATCHES, BATCH, warm=True, patience=PATIENCE, close=CLOSE) if calls else []
-    for one, timing in zip(rows, results, strict=True):
-        one |= {"seconds": timing.best, "seconds_spread": timing.spread}
+    for run, timing in zip(rows, results, strict=True):
+        run |= {"seconds": timing.best, "seconds_spread": timing.spread}
 
 
 def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:

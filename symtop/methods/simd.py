@@ -154,7 +154,7 @@ def _of_both(name: str) -> Any:
     @intrinsic
     def operation(typing, a, b):  # type: ignore[no-untyped-def]
         def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-            return getattr(builder, name)(*(_paired(builder, one, one) for one in arguments))
+            return getattr(builder, name)(*(_paired(builder, value, value) for value in arguments))
 
         return two()(a, b), emit
 
@@ -195,7 +195,7 @@ def side_by_side(typing, first, second):  # type: ignore[no-untyped-def]
     """A tuple of `two()` of two tuples of doubles."""
 
     def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
-        numbers = zip(*(unpack_tuple(builder, one) for one in arguments), strict=True)
+        numbers = zip(*(unpack_tuple(builder, pair) for pair in arguments), strict=True)
         return context.make_tuple(builder, signature.return_type, [_paired(builder, *two) for two in numbers])
 
     return types.UniTuple(two(), len(first))(first, second), emit
@@ -204,14 +204,14 @@ def side_by_side(typing, first, second):  # type: ignore[no-untyped-def]
 @intrinsic
 def apart(typing, both):  # type: ignore[no-untyped-def]
     """The two tuples of doubles that a tuple of `two()` is made of."""
-    one = types.UniTuple(types.float64, len(both))
+    row = types.UniTuple(types.float64, len(both))
 
     def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         values = unpack_tuple(builder, arguments[0])
         lanes = ([builder.extract_element(value, ir.Constant(_INDEX, k)) for value in values] for k in range(2))
         return context.make_tuple(builder, signature.return_type, [*map(Vectors(builder).array, lanes)])
 
-    return types.UniTuple(one, 2)(both), emit
+    return types.UniTuple(row, 2)(both), emit
 
 
 @intrinsic
@@ -225,12 +225,12 @@ def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
     def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         result, rows, numbers, step = arguments
         factors = [(j, builder.fmul(step, builder.extract_value(numbers, j))) for j in used]
-        as_place = _paired if place.dtype is two() else lambda _, one, __: one
+        as_place = _paired if place.dtype is two() else lambda _, value, __: value
         for m in range(len(place)):
             total = builder.extract_value(result, m)
             for j, factor in factors:
                 term = builder.extract_value(rows, [j, m])
-                product = builder.fmul(*(as_place(builder, one, one) for one in (factor, term)))
+                product = builder.fmul(*(as_place(builder, value, value) for value in (factor, term)))
                 total = builder.fadd(total, product)
             result = builder.insert_value(result, total, m)
         return result

@@ -65,11 +65,11 @@ def each(make: Callable[[int], Callable[..., Any]], count: int, i: int = 0) -> C
 
     In the place of a loop over tuples: LLVM unrolls those only if they are short, and most of them too late for lanes.
     """
-    one = register_jitable(make(i))
+    part = register_jitable(make(i))
     if i + 1 == count:
-        return register_jitable(lambda *given: (one(*given),))
+        return register_jitable(lambda *given: (part(*given),))
     rest = each(make, count, i + 1)
-    return register_jitable(lambda *given: (one(*given), *rest(*given)))
+    return register_jitable(lambda *given: (part(*given), *rest(*given)))
 
 
 def total(make: Callable[[int], Callable[..., Any]], count: int) -> Callable[..., Any]:

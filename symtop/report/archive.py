@@ -61,7 +61,7 @@ def bundle(results: Path, target: Path | None = None) -> Path:
     files["scenes/states.csv"] = states_csv(list(scenes().values())).encode()
     files["scenes/scenes.csv"] = scenes_csv(list(scenes().values())).encode()
     files["citations.bib"] = resources.files("symtop.methods").joinpath("citations.bib").read_bytes()
-    packages = {(str(one.metadata["Name"]), one.version) for one in metadata.distributions()}
+    packages = {(str(package.metadata["Name"]), package.version) for package in metadata.distributions()}
     versions = (f"{name}=={version}\n" for name, version in sorted(packages, key=lambda pair: pair[0].lower()))
     files["versions.txt"] = "".join(versions).encode()  # as pip writes them
     files["machine.txt"] = _machine().encode()
@@ -79,8 +79,8 @@ def bundle(results: Path, target: Path | None = None) -> Path:
 def _stored(results: Path) -> list[Path]:
     """The files of a results folder that are bundled: no cases, and only figures and tables of the report."""
     gathered = page.gather(results)
-    report_files = {results / kind / one["file"] for study in gathered for kind, items in (
-        ("figures", study["pictures"]), ("tables", study["tables"])) for one in items}  # fmt: skip
+    report_files = {results / kind / item["file"] for study in gathered for kind, items in (
+        ("figures", study["pictures"]), ("tables", study["tables"])) for item in items}  # fmt: skip
     endings = "*.nc", "*.json", "report.html", page.WORDS, page.REFERENCE
     files = [path for ending in endings for path in results.glob(ending)]
     return sorted([*files, *report_files])
@@ -187,7 +187,7 @@ def states(entries: Sequence[Scene]) -> xr.Dataset:
         variables |= {f"{name}{ending}": (both, numbers[..., k]) for k, name in enumerate(ANGLES)}
         variables[f"axis{ending}"] = ((*both, "component"), numbers[..., 6:9])
         variables[f"quaternion{ending}"] = ((*both, "part"), numbers[..., 9:])
-    for name, column in zip(NUMBERS, zip(*(flat(one.top, one.start) for one in entries), strict=True), strict=True):
+    for name, column in zip(NUMBERS, zip(*(flat(row.top, row.start) for row in entries), strict=True), strict=True):
         variables[f"{name}_0" if name in ANGLES else name] = ("scene", list(column))
     names = [scene.name for scene in entries]
     coordinates = {"scene": names, "component": ["x", "y", "z"], "part": ["w", "x", "y", "z"]}

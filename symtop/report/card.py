@@ -111,9 +111,9 @@ def card(ledger: Ledger, path: str | Path) -> Path:
         badge=badge(ledger),
         drawings=[_as_svg(figure) for figure in figures(ledger)],
         rows=[
-            one.plain() | {"verdict": f"{SIGNS[one.verdict]} {one.verdict}", "claim": claim_name(one.claim)}
-            for one in ledger.findings
-            if one.declared or one.verdict != "inapplicable"
+            row.plain() | {"verdict": f"{SIGNS[row.verdict]} {row.verdict}", "claim": claim_name(row.claim)}
+            for row in ledger.findings
+            if row.declared or row.verdict != "inapplicable"
         ],
     )
     return _write(text, path)
@@ -121,7 +121,7 @@ def card(ledger: Ledger, path: str | Path) -> Path:
 
 def badge(ledger: Ledger) -> str:
     """The badge as SVG: the method's properties in green, or its refuted claims in vermillion."""
-    refuted = [claim_name(one.claim) for one in ledger.findings if one.verdict == "refuted"]
+    refuted = [claim_name(finding.claim) for finding in ledger.findings if finding.verdict == "refuted"]
     words = f"refuted: {', '.join(refuted)}" if refuted else description(ledger.findings).partition(";")[0]
     if len(words) > LONGEST:
         words = words[:LONGEST].rsplit(",", 1)[0]

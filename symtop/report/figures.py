@@ -88,7 +88,7 @@ def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: S
         name, color, x, y = lines[place]
         text = axis.annotate(name, (x[0], y[0]), (0, 0), color=ink(color), path_effects=halo, **look)
         size, own = text.get_window_extent(renderer).size, dots[place]
-        foreign = np.concatenate([marks[:0], *(each for one, each in enumerate(dots) if one != place)])
+        foreign = np.concatenate([marks[:0], *(points for i, points in enumerate(dots) if i != place)])
         between = np.concatenate([own[1:-1], 0.5 * (own[1:] + own[:-1])])
         spots = [own[-1], own[0], *between[:: len(between) // MOST_SPOTS + 1]]
         candidates: list[Any] = []

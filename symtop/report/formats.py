@@ -72,7 +72,7 @@ def fixed(value: float, digits: int = 2, unit: str = "") -> str:
 
 def duration(seconds: float, digits: int = 2) -> str:
     """A time, given in seconds, in a suitable unit: ``5.4 µs``, ``176 µs``, ``4.8 ms``, ``2 h``."""
-    size, unit = next((one for one in reversed(UNITS) if abs(seconds) >= one[0]), UNITS[0])
+    size, unit = next((pair for pair in reversed(UNITS) if abs(seconds) >= pair[0]), UNITS[0])
     return number(seconds / size, digits, unit)
 
 

@@ -50,7 +50,7 @@ class Writer:
     def anchor(self, name: str) -> str:
         """A unique anchor: the name, with a number appended if it is taken."""
         candidates = (f"{name}-{count}" for count in itertools.count(1))
-        free = next(one for one in itertools.chain([name], candidates) if one not in self.anchors)
+        free = next(anchor for anchor in itertools.chain([name], candidates) if anchor not in self.anchors)
         self.anchors.add(free)
         return free
 
@@ -126,11 +126,11 @@ def link(name: str, what: str) -> str:
 
 
 def _only(inline: Token, kind: str) -> bool:
-    return [one.type for one in inline.children or []] == [kind]
+    return [token.type for token in inline.children or []] == [kind]
 
 
 def _title(inline: Token) -> str:
     """The bold text at the beginning of a paragraph, unless it is a sentence."""
-    children = [one for one in inline.children or [] if one.type != "text" or one.content]
+    children = [token for token in inline.children or [] if token.type != "text" or token.content]
     bold = children[1].content if children and children[0].type == "strong_open" else ""
     return "" if bold.endswith(".") else bold

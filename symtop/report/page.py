@@ -81,8 +81,8 @@ def gather(results: Path) -> list[dict[str, Any]]:
         try:
             about = {"measured": findings.get("measured", ""), "dataset": f"{name}.nc"}
             about["dataset"] *= (results / f"{name}.nc").is_file()
-            missing = [f"figures/{one['file']}" for one in findings["pictures"]]
-            missing += [f"tables/{one['file']}" for one in findings["tables"]]
+            missing = [f"figures/{picture['file']}" for picture in findings["pictures"]]
+            missing += [f"tables/{table['file']}" for table in findings["tables"]]
             for file in (file for file in missing if not (results / file).is_file()):
                 raise FileNotFoundError(f"{file} is missing")
             page = findings["page"] if shipped is None else shipped.read_text(encoding="utf-8")
@@ -99,7 +99,7 @@ def gather(results: Path) -> list[dict[str, Any]]:
 def has_studies(results: Path) -> bool:
     """Does the folder hold findings, or damaged ones, that are not of a benchmark?"""
     contents = map(netcdf.read_json, results.glob("*.json"))
-    return any(not (isinstance(one, dict) and one.get("measured")) for one in contents)
+    return any(not (isinstance(content, dict) and content.get("measured")) for content in contents)
 
 
 def _stored(file: Path, remedy: str) -> Any:
@@ -189,12 +189,12 @@ def write(results: Path, *, embed: bool = False) -> Path:
     page, studies = template.environment(autoescape=True).get_template("report.html"), gather(results)
     parts, more = texts(results, studies)
     images = {
-        f"figures/{one['file']}": _image(results / "figures" / one["file"], embed=embed)
+        f"figures/{picture['file']}": _image(results / "figures" / picture["file"], embed=embed)
         for study in studies
-        for one in study["pictures"]
+        for picture in study["pictures"]
     }
     charts = {f"{study['study']}-{chart['name']}": chart for study in studies for chart in study["charts"]}
-    records = formats.columns([one.record() for one in integrators().values()])
+    records = formats.columns([method.record() for method in integrators().values()])
 
     def marked(kind: str, name: str) -> str:
         if kind == "table":

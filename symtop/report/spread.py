@@ -58,7 +58,7 @@ def member_errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array
     n, samples = data.sizes["member"], data.sizes["time"]
     stride = max(1, BLOCK // samples)
     parts = [slice(begin, begin + stride) for begin in range(0, n, stride)]
-    return np.concatenate([_errors(inputs.numbers[one], data.isel(member=one), quantity) for one in parts])
+    return np.concatenate([_errors(inputs.numbers[member], data.isel(member=member), quantity) for member in parts])
 
 
 @functools.lru_cache(maxsize=1)

@@ -92,17 +92,17 @@ def look(name: str) -> Look:
     dash = ADAPTIVE if adaptive else DASHES.get(family, "-")
     if name in _LOOKS:
         return _LOOKS[name]._replace(dash=dash)
-    pairs = {one[:2] for one in _LOOKS.values()}
+    pairs = {known[:2] for known in _LOOKS.values()}
     free = [Look(shade, marker) for marker in _MARKERS for shade in SHADES[family] if (shade, marker) not in pairs]
-    alike = [one for one, method in registered.items() if method.family == family and one not in _LOOKS]
+    alike = [other for other, method in registered.items() if method.family == family and other not in _LOOKS]
     place = alike.index(name) if name in alike else zlib.crc32(name.encode())
     return free[place % len(free)]._replace(dash=dash)
 
 
 def line(name: str, scale: float = 1.0) -> dict[str, Any]:
     """Arguments of ``plot`` for an integrator or a variant: colour, line, and marker of `scale` times its size."""
-    one = look(name)
-    return {"color": one.color, "ls": one.dash, "marker": one.marker, "fillstyle": one.fill, "ms": scale * one.size}
+    color, marker, size, fill, dash = look(name)
+    return {"color": color, "ls": dash, "marker": marker, "fillstyle": fill, "ms": scale * size}
 
 
 def ink(color: str) -> tuple[float, float, float]:
@@ -209,10 +209,10 @@ def few_ticks(*axes: Any, most: int = 6) -> None:
     from matplotlib.ticker import LogLocator, NullFormatter
 
     for panel in axes:
-        for one in (panel.xaxis, panel.yaxis):
-            if one.get_scale() == "log":
-                one.set_major_locator(LogLocator(numticks=most + 1))
-                one.set_minor_formatter(NullFormatter())
+        for axis in (panel.xaxis, panel.yaxis):
+            if axis.get_scale() == "log":
+                axis.set_major_locator(LogLocator(numticks=most + 1))
+                axis.set_minor_formatter(NullFormatter())
 
 
 def legend_below(figure: Any, axes: Any) -> None:
@@ -221,7 +221,7 @@ def legend_below(figure: Any, axes: Any) -> None:
     for axis in np.ravel(axes):
         for handle, label in zip(*axis.get_legend_handles_labels(), strict=True):
             handles.setdefault(label, handle)
-    handles = dict(sorted(handles.items(), key=lambda one: isinstance(one[1], mpl.patches.Patch)))  # patches last
+    handles = dict(sorted(handles.items(), key=lambda item: isinstance(item[1], mpl.patches.Patch)))  # patches last
     columns = max(1, min(len(handles), int(17.0 * figure.get_figwidth()) // (max(map(len, handles), default=0) + 6)))
     figure.legend(list(handles.values()), list(handles), loc="outside lower center", ncols=columns, frameon=False)
 

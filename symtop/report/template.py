@@ -42,7 +42,7 @@ def filled(findings: Findings, results: Path, *, pages: Mapping[str, str] | None
     name = findings["study"]
     context = {"question": findings["question"], "pages": Links(pages or {})} | _names([findings], results)
     context |= {"f": SimpleNamespace(**findings["facts"]), "facts": findings["facts"]}
-    context |= {kind: [one["name"] for one in findings[kind]] for kind in ("pictures", "tables")}
+    context |= {kind: [entry["name"] for entry in findings[kind]] for kind in ("pictures", "tables")}
     text = rendered(findings["page"], f"page of {name}", context)
     head, _, body = without_gaps(text).strip().partition("\n\n")
     parts = [head, PARTIAL if GAP in text else "", body, *findings["failures"], findings.get("measured")]
@@ -98,7 +98,7 @@ def rendered(template: str | None, name: str, context: Mapping[str, Any]) -> str
     from jinja2 import TemplateError
 
     ours = environment(autoescape=False, finalize=lambda value: GAP if value is None else value)
-    ours.filters |= {one.__name__: _passing(one) for one in formats.FILTERS}
+    ours.filters |= {function.__name__: _passing(function) for function in formats.FILTERS}
     template = template and template.replace("endraw %}", "endraw +%}")  # keeps the empty line after it
     try:
         ready = ours.get_template(PLAIN) if template is None else ours.from_string(template)
@@ -150,8 +150,8 @@ def _names(studies: Sequence[Findings], results: Path, *, whole: bool = False) -
     facts: set[str] = set()
     for study in studies:
         before = f"{study['study']}-" if whole else ""
-        pictures |= {f"{before}{one['name']}": one for one in study["pictures"]}
-        tables |= {f"{before}{one['name']}": one for one in study["tables"] if one["rows"]}
+        pictures |= {f"{before}{picture['name']}": picture for picture in study["pictures"]}
+        tables |= {f"{before}{table['name']}": table for table in study["tables"] if table["rows"]}
         facts |= {f"{before}{name}" for name, value in study["facts"].items() if value is not None}
 
     def figure(name: str, title: str = "", alt: str = "", chart: str = "", caller: Any = None) -> str:

@@ -113,11 +113,11 @@ def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None) 
 
 def _recurrence(y: np.ndarray, *, symmetric: bool) -> tuple[float, float, float]:
     """t, d and c of y_{k+1} - t y_k + d y_{k-1} = c by least squares; d = 1 for a symmetric method."""
-    one = np.ones(y.size - 2)
+    ones = np.ones(y.size - 2)
     if symmetric:
-        t, c = np.linalg.lstsq(np.stack([y[1:-1], one], axis=1), y[2:] + y[:-2], rcond=None)[0]
+        t, c = np.linalg.lstsq(np.stack([y[1:-1], ones], axis=1), y[2:] + y[:-2], rcond=None)[0]
         return float(t), 1.0, float(c)
-    t, minus_d, c = np.linalg.lstsq(np.stack([y[1:-1], y[:-2], one], axis=1), y[2:], rcond=None)[0]
+    t, minus_d, c = np.linalg.lstsq(np.stack([y[1:-1], y[:-2], ones], axis=1), y[2:], rcond=None)[0]
     return float(t), -float(minus_d), float(c)
 
 
@@ -191,11 +191,11 @@ def _apart(
     runs = [few_steps(method, chart, top, at, h, (count + WARM_UP) * stride) for at in pair]
     with np.errstate(all="ignore"):
         if beside:
-            one, other = (axis[:, 0] + 1j * axis[:, 1] for axis in (axis_of(chart, run.states) for run in runs))
+            first, second = (axis[:, 0] + 1j * axis[:, 1] for axis in (axis_of(chart, run.states) for run in runs))
         else:
-            one, other = (np.asarray(View(chart, top, run.states).theta) for run in runs)
-        off = 0.0 if beside else float(np.max(np.abs(0.5 * (one + other) - theta)))
-        return runs, 0.5 * (one - other)[WARM_UP * stride :: stride], off
+            first, second = (np.asarray(View(chart, top, run.states).theta) for run in runs)
+        off = 0.0 if beside else float(np.max(np.abs(0.5 * (first + second) - theta)))
+        return runs, 0.5 * (first - second)[WARM_UP * stride :: stride], off
 
 
 def _root(delta: np.ndarray, left_over: float) -> float:

@@ -112,12 +112,14 @@ class Growth(NamedTuple):
 def _apart(near: Any, far: Any, units: Any) -> Any:
     """The larger of the distances of two states in place and in momentum; NaN if not finite or |q| is far from 1."""
     first = len(near) - 3  # of the momentum
-    place, momentum, one, other = 0.0, 0.0, 0.0, 0.0
+    place, momentum, near_square, far_square = 0.0, 0.0, 0.0, 0.0
     for m in range(first):
-        place, one, other = place + (far[m] - near[m]) ** 2, one + near[m] ** 2, other + far[m] ** 2
+        place += (far[m] - near[m]) ** 2
+        near_square += near[m] ** 2
+        far_square += far[m] ** 2
     for m in range(first, len(near)):
         momentum += (far[m] - near[m]) ** 2
-    long = max(abs(math.sqrt(one) - 1.0), abs(math.sqrt(other) - 1.0)) if first == 4 else 0.0
+    long = max(abs(math.sqrt(near_square) - 1.0), abs(math.sqrt(far_square) - 1.0)) if first == 4 else 0.0
     sound = place + momentum < math.inf and long <= LENGTH
     return max(math.sqrt(place) * units[0], math.sqrt(momentum) * units[1]) if sound else math.nan
 
@@ -140,7 +142,7 @@ class Integrated:
             self.momentum = per * self.rate
             *moments, mgl, x, y, z = scene.top.flat(scene.start)[:7]
             turned = (rate / self.rate for rate in scene.start.omega_body)
-            numbers = *(one / per for one in moments), mgl / per / self.rate**2, x, y, z, *scene.start.quaternion
+            numbers = *(moment / per for moment in moments), mgl / per / self.rate**2, x, y, z, *scene.start.quaternion
             self.given = from_flat((*numbers, *turned))
 
     def states(self, times: Array, tolerance: float) -> Array:
@@ -268,9 +270,9 @@ def _frequencies(scene: Scene) -> tuple[float, float, float]:
     pulls = [abs(top.mgl) * math.sqrt(max(1.0 - along * along, 0.0)) for along in top.centre]
     twice = 2.0 * (top.energy(at) + abs(top.mgl))
     parts = zip(top.moments, at.omega_body, pulls, strict=True)
-    part = sum((1.0 - one / most) * (one * rate * rate + SWINGS * pull) for one, rate, pull in parts)
+    part = sum((1.0 - moment / most) * (moment * rate * rate + SWINGS * pull) for moment, rate, pull in parts)
     turning = max(twice / most, 0.0) + max(min(part, twice * (1.0 - least / most)), 0.0) / least
-    swinging = max(pull / one for one, pull in zip(top.moments, pulls, strict=True))
+    swinging = max(pull / moment for moment, pull in zip(top.moments, pulls, strict=True))
     return slow, max(slow, math.sqrt(max(turning, swinging))), middle
 
 

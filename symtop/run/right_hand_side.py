@@ -64,7 +64,7 @@ def guard(
     SciPy with a `tolerance`, relative and absolute. `accuracy` is the error that the run may have, in units of y.
     Raises SymtopError for invalid arguments, for an f that fails and for a motion that diverges before the horizon.
     """
-    rules = {name: getattr(next(iter(one.solvers.values())), "rule", None) for name, one in integrators().items()}
+    rules = {name: getattr(next(iter(method.solvers.values())), "rule", None) for name, method in integrators().items()}
     tables = {name: rule for name, rule in rules.items() if isinstance(rule, Tableau)}
     rule = tables.get(one_of("method", method, [*SCIPY, *tables]))
     own, other = names = ("tolerance", "step_size") if rule is None else ("step_size", "tolerance")

@@ -97,8 +97,8 @@ def chart_of(method: Integrator, watched: str, observe: str | None = None) -> st
         one_of("observe", observe or "attitude", ("axis", "attitude"))
         if BODY not in method.solvers:
             able = [name for name, entry in methods().items() if BODY in entry.solvers]
-            one = f"one of {len(able)}, such as strang or dop853-compiled (all: symtop integrators --wide)"
-            other = f"{method.method} without brackets" if method.method in able else one
+            words = f"one of {len(able)}, such as strang or dop853-compiled (all: symtop integrators --wide)"
+            other = f"{method.method} without brackets" if method.method in able else words
             raise SymtopError(f"integrator must have the chart body, of a RigidBody, not {method.name}: take {other}")
         return BODY
     if isinstance(observe, str) and observe == "theta":
@@ -309,11 +309,11 @@ def _stepped(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Run:
         except SymtopError:  # the state is finite, but has no direction or is too large for a start
             outcome, reached = "not_finite", float(since[i])
             break
-        one = solve(method, chart, top, start, Plan.steps(float(times[i] - since[i]), [1]), words)
-        if one.outcome != "ok":
-            outcome, reached = one.outcome, float(since[i])
+        rest = solve(method, chart, top, start, Plan.steps(float(times[i] - since[i]), [1]), words)
+        if rest.outcome != "ok":
+            outcome, reached = rest.outcome, float(since[i])
             break
-        lost[i:], states[i], p_phi[i], p_psi[i] = False, one.states[0], one.p_phi[0], one.p_psi[0]
+        lost[i:], states[i], p_phi[i], p_psi[i] = False, rest.states[0], rest.p_phi[0], rest.p_psi[0]
         if r != 1.0:
             states[i, :-3] *= r
             (p_phi if chart == BODY else p_psi)[i] *= r if chart == "axis" else r * r

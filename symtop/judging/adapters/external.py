@@ -269,8 +269,8 @@ class BatchStep(Stepper):
     def _try(self, step: Callable[..., Any], y: Array, batch: Any, h: float) -> None:
         """Compare a step of the first row alone with one in the batch; SymtopError if they differ."""
         pair = (_once(step, 0.0, rows, h, COMPILING)[0] for rows in (self._array(y[None]), batch + 0.0))
-        one, two = (state_like(y, np.asarray(row)) for row in pair)
-        if (gap := relative_gap(one, two)) > SAME:
+        alone, beside = (state_like(y, np.asarray(row)) for row in pair)
+        if (gap := relative_gap(alone, beside)) > SAME:
             how = f"the same state with another row beside it comes out different by {gap:.1e}"
             raise SymtopError(f"a row of a batch must be stepped by itself: {how}")
         self._tried = True
@@ -341,7 +341,7 @@ def x64(*, restored: bool = False) -> Iterator[None]:
 
 def is_solver(thing: Any) -> bool:
     """Is it an instance of a solver of diffrax, or of a class derived from one?"""
-    bases = [one.__module__.partition(".")[0] for one in type(thing).__mro__]
+    bases = [base.__module__.partition(".")[0] for base in type(thing).__mro__]
     return "diffrax" in bases and hasattr(thing, "term_structure")
 
 

@@ -173,8 +173,8 @@ class ScipySolver(PythonStep):
             return state_like(y, solver.y, "a solver")
 
         with contextlib.ExitStack() as undo:  # allow Newton's iteration `MOST_NEWTON` iterations
-            modules = {sys.modules.get(one.__module__) for one in self.function.__mro__}  # type: ignore[attr-defined]
-            for module in [one for one in modules if hasattr(one, NEWTON)]:
+            modules = {sys.modules.get(base.__module__) for base in self.function.__mro__}  # type: ignore[attr-defined]
+            for module in [module for module in modules if hasattr(module, NEWTON)]:
                 undo.enter_context(_patching)
                 undo.callback(setattr, module, NEWTON, getattr(module, NEWTON))
                 setattr(module, NEWTON, MOST_NEWTON)

@@ -197,7 +197,7 @@ def _late(subject: Subject) -> list[tuple[int, int]]:
     draw, (most, seconds) = np.random.default_rng(subject.seed), LATE[subject.quick]
     longest = max(min(most, seconds / max(subject.seconds_a_step, 1e-9)), AFTER)
     shares = *np.sort(draw.uniform(0.2, 1.0, LATER - 1)).tolist(), 1.0
-    return [(round(longest**one * draw.uniform(1.0, 1.1)), int(draw.integers(1, AFTER))) for one in shares]
+    return [(round(longest**share * draw.uniform(1.0, 1.1)), int(draw.integers(1, AFTER))) for share in shares]
 
 
 def _gap(first: Any, second: Any) -> float:

@@ -190,7 +190,7 @@ def long_run(
         if quick and most is not None:
             most = max(most - run.steps, LEAST_SHARE * most)
     _, other, _ = _run(method, scene, inside, PILOT, 0.21 * step, PILOT + 1)
-    steady = len({one.force_evaluations / max(one.steps, 1) for one in (first, other)}) == 1
+    steady = len({run.force_evaluations / max(run.steps, 1) for run in (first, other)}) == 1
     reported = None
     plain = isinstance(method.solvers[inside], Stepper)
     if not (plain or scene.of_body):  # else its momenta are those of its states
@@ -253,11 +253,11 @@ def _reported(
 ) -> Difference | None:
     run, plan = long
     if chart == "angles":
-        found = from_increments(method, scene, plan) if method.fixed_step else None
-        if found is not None and found.size > found.floor:  # aliasing may give a drift at one length only
+        drift = from_increments(method, scene, plan) if method.fixed_step else None
+        if drift is not None and drift.size > drift.floor:  # aliasing may give a drift at one length only
             fewer = Plan.steps(plan.step_size, [0, round(OTHER * int(plan.marks[-1]))])
-            found = min(found, from_increments(method, scene, fewer) or found, key=lambda one: one.size)
-        return found
+            drift = min(drift, from_increments(method, scene, fewer) or drift, key=lambda found: found.size)
+        return drift
     gaps = {name: np.abs(getattr(run, name) - getattr(trajectory, name)) for name in ("p_phi", "p_psi")}
     size, name = max((float(np.max(gap[np.isfinite(gap)], initial=0.0)), name) for name, gap in gaps.items())
     return Difference(name, size / scene.momentum_scale, REPORTED, f"of the larger momentum in {run.steps} steps")
@@ -328,10 +328,10 @@ def measure(subject: Subject) -> list[Finding]:
             findings = of_run(method, runs[-1])
         except SymtopError as error:
             findings = [undecided(claim, declared(method, claim), str(error)) for claim in (*OF_A_RUN, "momentum")]
-        for k, one in enumerate(findings):  # name the chart in the reason
-            if one.verdict != "inapplicable" and not one.why.endswith(" chart"):
-                findings[k] = one._replace(why=f"{one.why}, in the {chart} chart")
-        by_chart.append({one.claim: one for one in findings})
+        for k, finding in enumerate(findings):  # name the chart in the reason
+            if finding.verdict != "inapplicable" and not finding.why.endswith(" chart"):
+                findings[k] = finding._replace(why=f"{finding.why}, in the {chart} chart")
+        by_chart.append({finding.claim: finding for finding in findings})
     if runs:
         run = min(runs, key=lambda run: run.steps)
         length = {"steps_run": np.array(run.steps), "nutations_run": np.array(run.nutations)}
@@ -341,14 +341,14 @@ def measure(subject: Subject) -> list[Finding]:
 
 def of_run(method: Integrator, run: LongRun) -> list[Finding]:
     """The findings from one long run on each claim of `OF_A_RUN`, and on the momentum of a body."""
-    motion = [_constant(method, one, declared(method, one), run, run.constants.get(one)) for one in OF_MOTION]
+    motion = [_constant(method, name, declared(method, name), run, run.constants.get(name)) for name in OF_MOTION]
     return [*motion, _of_states(run), _invariant(method, run), *_costs(method, run)]
 
 
-def _badness(one: Finding) -> tuple[int, int, float]:
+def _badness(finding: Finding) -> tuple[int, int, float]:
     """The rank of a finding among the charts: by its verdict, then by the kind of growth, then by its number."""
-    growth = KINDS.index(one.measured.kind) if one.measured.kind in KINDS else -1
-    return BADNESS.index(one.verdict), growth, one.value if math.isfinite(one.value) else -1.0
+    growth = KINDS.index(finding.measured.kind) if finding.measured.kind in KINDS else -1
+    return BADNESS.index(finding.verdict), growth, finding.value if math.isfinite(finding.value) else -1.0
 
 
 def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, constant: Constant | None) -> Finding:

@@ -192,7 +192,7 @@ def series_of(subject: Subject) -> Series | None:
             step, start = map_of(subject, chart)
             if restart_gap(step, start) <= ONE_MAP:
                 candidates.append(step_series(step, start, subject.scene.time_scale()))
-    return min((one for one in candidates if one.resolved >= 0), key=lambda one: one.order, default=None)
+    return min((series for series in candidates if series.resolved >= 0), key=lambda series: series.order, default=None)
 
 
 class Order(NamedTuple):
@@ -245,7 +245,7 @@ def measured_order(
         decided = problem is scene or order_verdict(method.order, fits[main], fits.values()) != "undecided"
         if orders[-1].measured and decided:
             return orders[-1]
-    return next((one for one in orders if one.measured), orders[-1 if scene.of_body else 0])
+    return next((finding for finding in orders if finding.measured), orders[-1 if scene.of_body else 0])
 
 
 def _by_steps(subject: Subject) -> Finding:

@@ -118,7 +118,7 @@ def product(first: Words, second: Words) -> Words:
 
 def commutator(first: Words, second: Words) -> Words:
     """[first, second]."""
-    return [one - other for one, other in zip(product(first, second), product(second, first), strict=True)]
+    return [left - right for left, right in zip(product(first, second), product(second, first), strict=True)]
 
 
 def element(t: float = 0.0, v: float = 0.0) -> Words:
@@ -128,8 +128,8 @@ def element(t: float = 0.0, v: float = 0.0) -> Words:
 
 def exponential(words: Words) -> Words:
     """exp of a series without a constant."""
-    one: Words = [np.ones(1), *(np.zeros_like(row) for row in words[1:])]
-    total, power = one, one
+    total: Words = [np.ones(1), *(np.zeros_like(row) for row in words[1:])]
+    power = total
     for k in range(1, len(words)):
         power = [row / k for row in product(power, words)]
         total = [row + more for row, more in zip(total, power, strict=True)]
@@ -175,8 +175,8 @@ def _vanishing(length: int, letters: int) -> Array:
 
 def _spread(column: Array, letter: int) -> Array:
     """[X, column] for the letter X."""
-    one = np.eye(2)[letter]
-    return np.asarray(np.kron(one, column) - np.kron(column, one))
+    x = np.eye(2)[letter]
+    return np.asarray(np.kron(x, column) - np.kron(column, x))
 
 
 def splitting_conditions(
@@ -188,7 +188,7 @@ def splitting_conditions(
     step = exponential(element())
     for place, (b, c) in enumerate(zip(kick, gradient or [0.0] * len(kick), strict=True)):
         if b or c:
-            step = product(step, exponential([b * one + c * more for one, more in zip(v, bent, strict=True)]))
+            step = product(step, exponential([b * row + c * more for row, more in zip(v, bent, strict=True)]))
         if place < len(drift):
             step = product(step, exponential(element(t=drift[place])))
     if processor:

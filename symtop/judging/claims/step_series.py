@@ -144,7 +144,7 @@ def _fitted(
         raise SymtopError("a step is not finite")
     scatter, degree = _degree(nodes, error)
     power = max(degree, LEAST_POWER)
-    fits = (chebyshev.chebfit(nodes, error, one) for one in (power, power + FURTHER))
+    fits = (chebyshev.chebfit(nodes, error, degree) for degree in (power, power + FURTHER))
     terms, finer = (_monomials(fit, backward=backward) for fit in fits)
     _, top = _degree(nodes, exact)
     true = _monomials(chebyshev.chebfit(nodes, exact, max(top, power)), backward=backward)[: power + 1]

@@ -110,9 +110,9 @@ def map_of(subject: Subject, chart: str) -> tuple[maps.StepMap, Angles]:
     return maps.coarsest(Plane(subject.method, "angles", scene.top, maps.unit_of(scene), h, momenta), start), start
 
 
-def _badness(one: Finding) -> tuple[int, float]:
+def _badness(finding: Finding) -> tuple[int, float]:
     """The rank of a finding among the charts: no, then yes, then neither; then by its number."""
-    return ("", "yes", "no").index(one.measured.kind), one.value if math.isfinite(one.value) else -1.0
+    return ("", "yes", "no").index(finding.measured.kind), finding.value if math.isfinite(finding.value) else -1.0
 
 
 def _answer_at(ask: Callable[..., Answer], step: maps.StepMap, start: Angles, *traces: dict[str, Any]) -> Answer:
@@ -211,10 +211,10 @@ def pole(subject: Subject) -> list[Finding]:
         return [inapplicable("pole", "it knows equations of the top beside f, and the pole is passed on another top")]
     right = max(POLE_RIGHT, subject.rounding(2.0 * POLE_STEPS))
     claim, rows = subject.declared("pole"), passages(subject.method, right)
-    relevant = [one for one in rows if one.chart != "angles"] or rows
-    verdict = "measured" if not claim else "confirmed" if all(one.passes for one in relevant) else "refuted"
-    if claim and any(one.outcome not in ("ok", "left_chart", "not_finite", "not_normalised") for one in relevant):
+    relevant = [row for row in rows if row.chart != "angles"] or rows
+    verdict = "measured" if not claim else "confirmed" if all(row.passes for row in relevant) else "refuted"
+    if claim and any(row.outcome not in ("ok", "left_chart", "not_finite", "not_normalised") for row in relevant):
         verdict = "undecided"
-    measured = Measured(", ".join(dict.fromkeys(one.word for one in relevant)))
-    value = max(one.finer for one in relevant)
+    measured = Measured(", ".join(dict.fromkeys(row.word for row in relevant)))
+    value = max(row.finer for row in relevant)
     return [Finding("pole", claim, measured, verdict, "; ".join(map(str, rows)), value, right)]

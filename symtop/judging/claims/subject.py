@@ -152,11 +152,11 @@ class Subject:
         state, run = self.stepper.from_start(scene.top, generic_start(scene), h)
         end = run(state, 1)[0]
         added, size = end - state, np.abs(end)
-        added, size = (one[np.abs(added) > MOVES * size] for one in (added, size))
+        added, size = (values[np.abs(added) > MOVES * size] for values in (added, size))
         with np.errstate(over="ignore"):  # a step may blow up beyond the range of float32
             if (end == end.astype(np.float32)).all():
                 return not (state == state.astype(np.float32)).all()
-            off = [np.abs(one - one.astype(np.float32)) * unit for one, unit in ((added, 1.0), (added / h, h))]
+            off = [np.abs(sums - sums.astype(np.float32)) * unit for sums, unit in ((added, 1.0), (added / h, h))]
         return added.size > 2 and bool((off <= UNITS * EPSILON * size).all(axis=1).any())
 
     def rounding(self, steps: float) -> float:
@@ -277,9 +277,9 @@ def _thing(target: Any, *, free: bool) -> tuple[Any, str]:
     file = python_file(path, "a step", f"FILE.py:NAME{hint}")
     with foreign_code(f"the file {file.name}"), x64():
         module: Any = execute(f"symtop_judged_{Path(file).stem}", file)
-    thing = functools.reduce(lambda one, part: getattr(one, part, None), (name or "step").split("."), module)
-    if not (callable(thing) or is_solver(thing)):
+    step = functools.reduce(lambda owner, part: getattr(owner, part, None), (name or "step").split("."), module)
+    if not (callable(step) or is_solver(step)):
         functions = [key for key, value in vars(module).items() if callable(value) and not key.startswith("_")]
         hint = f"it has {', '.join(functions[:8])}" if functions else "it has no function"
         raise SymtopError(f"{file.name} must have a function {name or 'step'!r}; {hint}")
-    return thing, f"{file.stem}-{name}" if name else file.stem
+    return step, f"{file.stem}-{name}" if name else file.stem

@@ -296,8 +296,8 @@ class FixedStep:
         for chosen in many.groups(left[short], marks[:, -1], most):
             heed()
             plain = map(tuple, numbers[chosen].tolist())
-            for i, one, step in zip(chosen.tolist(), plain, h[chosen].tolist(), strict=True):
-                done.steps[i], done.work[i], done.outcome[i] = run(one, rule, step, marks[i], done.states[i], momenta)
+            for i, at, step in zip(chosen.tolist(), plain, h[chosen].tolist(), strict=True):
+                done.steps[i], done.work[i], done.outcome[i] = run(at, rule, step, marks[i], done.states[i], momenta)
                 done.momenta[i] = momenta.T
         for i, top in zip(left[~short].tolist(), many.members_of(numbers[left[~short]]), strict=True):
             heed()

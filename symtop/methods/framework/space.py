@@ -156,9 +156,9 @@ def _turning(par: Any, twist: float, right: float, back: float, y: Any) -> Any:
 def field_attitude(par: Any, y: Any) -> Any:
     """Time derivative of (q, L); |q| stays one only as far as a method keeps it, and nothing else depends on it."""
     w, x, y1, z = y[0], y[1], y[2], y[3]
-    one = 1.0 / (w * w + x * x + y1 * y1 + z * z)
+    inverse = 1.0 / (w * w + x * x + y1 * y1 + z * z)
     right, back, up = axis_of(w, x, y1, z)
-    right, back, up = one * right, one * back, one * up
+    right, back, up = inverse * right, inverse * back, inverse * up
     return _turning(par, par.lean * (right * y[4] + back * y[5] + up * y[6]), right, back, y)
 
 

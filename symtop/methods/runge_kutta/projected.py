@@ -77,23 +77,23 @@ def projected(par: Any, state: Any, step: Any) -> Any:
     """The step with the correction that brings its end back onto the constants."""
     end = summed(state, step)
     a, L = 1.0 / par.I1, end[3:]
-    one = end[0], end[1], end[2], 0.0, 0.0
-    two = L[0], L[1], L[2], end[0], end[1]
-    three = 0.0, 0.0, par.mgl, a * L[0], a * L[1]
+    g1 = end[0], end[1], end[2], 0.0, 0.0
+    g2 = L[0], L[1], L[2], end[0], end[1]
+    g3 = 0.0, 0.0, par.mgl, a * L[0], a * L[1]
     # Gram-Schmidt; what is left out has a multiplier of 0
-    i1 = 1.0 / _product(par, one, one)
-    p21 = _product(par, two, one)
-    c2 = _without(two, p21 * i1, one)
-    i2 = _inverse(_product(par, c2, c2), _product(par, two, two))
-    p31, p32 = _product(par, three, one), _product(par, three, c2)
-    c3 = _without(_without(three, p31 * i1, one), p32 * i2, c2)
-    i3 = _inverse(_product(par, c3, c3), _product(par, three, three))
+    i1 = 1.0 / _product(par, g1, g1)
+    p21 = _product(par, g2, g1)
+    c2 = _without(g2, p21 * i1, g1)
+    i2 = _inverse(_product(par, c2, c2), _product(par, g2, g2))
+    p31, p32 = _product(par, g3, g1), _product(par, g3, c2)
+    c3 = _without(_without(g3, p31 * i1, g1), p32 * i2, c2)
+    i3 = _inverse(_product(par, c3, c3), _product(par, g3, g3))
     for _ in range(2):
         e, L = end[:3], end[3:]
         t1 = 0.5 * (1.0 - dot(e, e)) * i1
         t2 = (par.p_psi - dot(L, e) - p21 * t1) * i2
         t3 = (par.energy - 0.5 * a * dot(L, L) - par.mgl * e[2] - p31 * t1 - p32 * t2) * i3
-        moved = _without(_without(_without((0.0, 0.0, 0.0, 0.0, 0.0), -t1, one), -t2, c2), -t3, c3)
+        moved = _without(_without(_without((0.0, 0.0, 0.0, 0.0, 0.0), -t1, g1), -t2, c2), -t3, c3)
         step = summed(step, (moved[0], moved[1], moved[2], par.weight * moved[3], par.weight * moved[4], 0.0))
         end = summed(state, step)
     return step

@@ -225,10 +225,10 @@ def _in_lanes(outer: tuple[float, ...], inner: tuple[float, ...]) -> tuple[Any, 
     @register_jitable
     def turned(block, row, table, part, next_part, j):  # type: ignore[no-untyped-def]
         par, state, step = opened(block, table, j)
-        step, one = first(state, step, part * (row[2 * W + j] * (par.a1 - par.a2)))
-        step, two = third(state, step, next_part * (row[2 * W + j] * (par.a3 - par.a2)))
+        step, first_ok = first(state, step, part * (row[2 * W + j] * (par.a1 - par.a2)))
+        step, third_ok = third(state, step, next_part * (row[2 * W + j] * (par.a3 - par.a2)))
         put(block, STEP, j, step)
-        block[FLAG * W + j] = block[FLAG * W + j] if one & two else 1.0
+        block[FLAG * W + j] = block[FLAG * W + j] if first_ok & third_ok else 1.0
 
     @register_jitable
     def ended(block, row, table, j):  # type: ignore[no-untyped-def]

@@ -116,8 +116,8 @@ def start_numbers(chart: str, precision: str, top: Any, at: Any) -> tuple[tuple[
     """State and parameters of a start in the unit of `lightened`, correctly rounded; in double theta(8) moves 5e-15."""
     kind, mp, unit = arithmetic(precision).kind, context(START_DIGITS), _unit(chart, top, at)
     if chart == BODY:
-        momentum = [mp.mpf(one) * rate / unit for one, rate in zip(top.moments, at.omega_body, strict=True)]
-        numbers = *(unit / mp.mpf(one) for one in top.moments), *(mp.mpf(part) / unit for part in top.torque)
+        momentum = [mp.mpf(moment) * rate / unit for moment, rate in zip(top.moments, at.omega_body, strict=True)]
+        numbers = *(unit / mp.mpf(moment) for moment in top.moments), *(mp.mpf(part) / unit for part in top.torque)
         return _rounded(kind, mp, (*map(mp.mpf, at.quaternion), *momentum)), _rounded(kind, mp, numbers)
     theta, phi, psi, *rates = (mp.mpf(getattr(at, name)) for name in at.__slots__)
     if chart == "angles":
@@ -197,14 +197,14 @@ class HeyokaSolver:
     def bare(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[Callable[[], Any], int]:
         """A function that runs heyoka's own loop to the horizon, without samples, and the derivatives it computes."""
         state, parameters = start_numbers(self.chart, self.precision, top, start)
-        one, kind = stepper(self.chart, self.precision, plan.tolerance), arithmetic(self.precision).kind
-        begin, end, parameters = kind("0"), kind(plan.horizon), parameters[: one.pars.size]
+        taylor, kind = stepper(self.chart, self.precision, plan.tolerance), arithmetic(self.precision).kind
+        begin, end, parameters = kind("0"), kind(plan.horizon), parameters[: taylor.pars.size]
 
         def run() -> Any:
-            one.time, one.state[:], one.pars[:] = begin, state, parameters
-            return one.propagate_until(end)
+            taylor.time, taylor.state[:], taylor.pars[:] = begin, state, parameters
+            return taylor.propagate_until(end)
 
-        return run, int(run()[3] * one.order)
+        return run, int(run()[3] * taylor.order)
 
 
 def _padded(values: Any, size: int) -> Array:

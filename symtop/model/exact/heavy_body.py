@@ -161,9 +161,9 @@ class _Way:
             self._work += steps * (QUAD_STEP if len(self._others) == 3 else 1)
             value, rest = _halves(solution(_row(self.main, points)))
             gaps = []
-            for run, one in enumerate(self._others):
+            for run, witness in enumerate(self._others):
                 most = {"max_delta_t": np.longdouble(longest)} if run < 2 else {}
-                _, _, _, count, *_, states = one.propagate_grid(points, callback=_heard, **most)
+                _, _, _, count, *_, states = witness.propagate_grid(points, callback=_heard, **most)
                 self._work += count
                 other, less = _halves(states)
                 gaps.append(((other - value) + (less - rest))[1:, :4])

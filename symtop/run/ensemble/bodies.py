@@ -72,9 +72,9 @@ def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float 
         if not least <= epsilon <= FARTHEST:
             raise SymtopError(f"epsilon must be from {least} to {FARTHEST}, not {epsilon!r}", "epsilon")
     rows, strata = np.empty((count, 14)), np.empty(count, dtype=f"U{max(map(len, KINDS))}")
-    for place, one in enumerate(kinds[:count]):
-        rows[place :: len(kinds)] = _members(one, first, len(range(place, count, len(kinds))), epsilon)
-        strata[place :: len(kinds)] = one
+    for place, stratum in enumerate(kinds[:count]):
+        rows[place :: len(kinds)] = _members(stratum, first, len(range(place, count, len(kinds))), epsilon)
+        strata[place :: len(kinds)] = stratum
     columns: dict[str, Any] = {
         name: (("member", VECTORS[name]), part) if name in VECTORS else ("member", part[:, 0], PRINCIPAL.get(name))
         for name, part in zip(PARTS, np.split(rows, SPLIT, axis=1), strict=True)
@@ -139,8 +139,8 @@ def _rows(moments: Array, mgl: float, centre: Array, turns: Array, rates: Array)
 
 def _free(kind: str, u: Array) -> Array:
     """Free bodies with |L| = 1, their principal axes in random order."""
-    low, one, high = between(0.3, 0.9, u[0]), np.ones(u.shape[1]), between(1.1, 1.25, u[1])
-    moments = np.stack([low, one, np.minimum(high, 0.99 * (1.0 + low))])
+    low, ones, high = between(0.3, 0.9, u[0]), np.ones(u.shape[1]), between(1.1, 1.25, u[1])
+    moments = np.stack([low, ones, np.minimum(high, 0.99 * (1.0 + low))])
     tilt, turn, small = 0.5 * u[2], 2.0 * math.pi * u[3], octaves(-16.0, -4.0, u[4])
     side = np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn)
     momentum = np.stack([*side, np.cos(tilt)])
@@ -148,11 +148,11 @@ def _free(kind: str, u: Array) -> Array:
         momentum = np.stack([np.cos(tilt), *side])
     elif kind == "needle":
         thin = octaves(-12.0, -5.0, u[5])
-        moments = np.stack([thin, 1.0 - 0.5 * thin * u[6], one])
+        moments = np.stack([thin, 1.0 - 0.5 * thin * u[6], ones])
         momentum = np.stack([(2.0 * u[2] - 1.0) * np.sqrt(thin), np.cos(turn), np.sin(turn)])
     elif kind == "near-symmetric":
         equal = 1.0 + octaves(-20.0, -6.0, u[5])
-        moments = np.where(u[6] < 0.5, np.stack([low, one, equal]), np.stack([one, equal, 1.3 * one]))
+        moments = np.where(u[6] < 0.5, np.stack([low, ones, equal]), np.stack([ones, equal, 1.3 * ones]))
         momentum = _direction(u[2], u[3])
     elif kind == "near-separatrix":  # I1 (I3 - I2) M3^2 = I3 (I2 - I1) M1^2 on it
         slope = np.sqrt((moments[1] - moments[0]) * moments[2] / ((moments[2] - moments[1]) * moments[0]))
@@ -161,20 +161,20 @@ def _free(kind: str, u: Array) -> Array:
     rates = momentum / np.sqrt((momentum**2).sum(axis=0)) / moments
     order = np.argsort(u[8:11], axis=0)
     moments, rates = (np.take_along_axis(part, order, axis=0) for part in (moments, rates))
-    return _rows(moments, 0.0, np.stack([0.0 * one, 0.0 * one, one]), _turn(u[11:14]), rates)
+    return _rows(moments, 0.0, np.stack([0.0 * ones, 0.0 * ones, ones]), _turn(u[11:14]), rates)
 
 
 def _heavy(u: Array, epsilon: float | None) -> Array:
     """Heavy bodies with I1 = mgl = 1, at the distance `epsilon` from a Lagrange top, or at a random one for None."""
-    off, one = octaves(-7.0, -1.0, u[0]) if epsilon is None else np.full(u.shape[1], epsilon), np.ones(u.shape[1])
+    off, ones = octaves(-7.0, -1.0, u[0]) if epsilon is None else np.full(u.shape[1], epsilon), np.ones(u.shape[1])
     third = between(0.2, 1.8, u[2])
     second = np.minimum(1.0 + off * between(0.5, 1.0, u[1]), 0.99 * (1.0 + third))
     third = np.minimum(third, 0.99 * (1.0 + second))
-    centre = np.stack([*(off * _direction(u[3], u[4])[:2]), one])
+    centre = np.stack([*(off * _direction(u[3], u[4])[:2]), ones])
     spin = signs(u[5]) * octaves(-4.0, 2.0, u[6]) * 2.0 / third
     turn = 2.0 * math.pi * u[8]
     rates = np.stack([1.5 * u[7] * np.cos(turn), 1.5 * u[7] * np.sin(turn), spin])
-    return _rows(np.stack([one, second, third]), 1.0, centre, _turn(u[9:12]), rates)
+    return _rows(np.stack([ones, second, third]), 1.0, centre, _turn(u[9:12]), rates)
 
 
 def growth(rows: Array) -> Array:

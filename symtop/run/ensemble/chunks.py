@@ -273,18 +273,18 @@ class Job:
             if self.chart == "angles" and not 0.0 < start.theta < np.pi:
                 runs.outcome[i] = LEFT_CHART
                 continue
-            one = self._plan(i, plan)
+            own = self._plan(i, plan)
             try:
                 name = self.first + i if self.names is None else self.names[i]
-                run = solve(self.method, self.chart, top, start, one, f" on member {name}")
+                run = solve(self.method, self.chart, top, start, own, f" on member {name}")
             except SymtopError as error:
                 arithmetic = isinstance(error.__cause__, (ArithmeticError, np.linalg.LinAlgError))
                 runs.outcome[i] = NOT_FINITE if arithmetic else ENDS.index(RAISED)
                 if not (arithmetic or runs.raised):
                     runs = runs._replace(raised=str(error))
                 continue
-            runs.states[i, : one.times.size] = run.states
-            runs.momenta[i, : one.times.size] = np.stack([run.p_phi, run.p_psi], axis=-1)
+            runs.states[i, : own.times.size] = run.states
+            runs.momenta[i, : own.times.size] = np.stack([run.p_phi, run.p_psi], axis=-1)
             runs.steps[i], runs.force_evaluations[i], runs.newton_iterations[i] = run[3:6]
             runs.outcome[i], runs.reached[i] = OUTCOMES.index(run.outcome), run.reached
         return runs

@@ -199,9 +199,9 @@ def _job(
     budget: float | None, observables: tuple[str, ...],
 ) -> Job:  # fmt: skip
     """Check the settings and return the `Job` of the members."""
-    for one, other in (("step_size", "per_nutation"), ("horizon", "nutations")):
-        if one in settings and other in settings:
-            raise SymtopError(f"give {one} or {other}, not both", one, other)
+    for name, other in (("step_size", "per_nutation"), ("horizon", "nutations")):
+        if name in settings and other in settings:
+            raise SymtopError(f"give {name} or {other}, not both", name, other)
     control = "per_nutation" if "per_nutation" in settings else "step_size"
     check_control(method, settings.get(control), tolerance, control)
     if method.fixed_step and control not in settings:
