@@ -52,23 +52,23 @@ OF_ANY = tuple(need for need in NEEDS if need not in THIS_TOP)  # needs of metho
 COMMA = re.compile(r",\s*(?![^(]*\))")  # a comma between words of `NEEDS`, not that in f(t, y)
 KEPT = {"energy": ("energy",), "momenta": ("p_phi", "p_psi")}  # the claims for each value of `keeps`
 INACCURATE = "Not accurate enough at this step, each with its error"  # the reason why a method fails at a given step
-KERNELS = 0.65  # expected kernels to compile per method: some methods share one
-FEW = 5  # methods of the table that are tried
-AGREED, TIED = 3, 1.1  # a sixth is tried if fewer serve, the fastest is not among the first 3, or the next is as fast
-FINALISTS, LEVEL = 3, 1.3  # least methods run to the whole horizon; ratio of costs up to which others are, too
-TOO_DEAR = 40.0  # a search ends at this multiple of the evaluations of the cheapest candidate so far
-CHEAP = 1e5  # evaluations below which no search ends: it may have begun with a step that is far too fine
-LESS = 3e7  # most evaluations of a run after `AGREED` methods have failed and none has served: then often none does
-HOPELESS = (settings.STOPPED, settings.BUDGET, settings.TRIED)  # the reasons of failure that count for `LESS`
+KERNELS_A_METHOD = 0.65  # expected kernels to compile per method: some methods share one
+MOST_LISTED = 5  # methods of the table that are tried
+ENOUGH, TIE_RATIO = 3, 1.1  # one more is tried if fewer serve, the fastest is not among the first, the next as fast
+FINALISTS, FINALIST_RATIO = 3, 1.3  # least methods run to the whole horizon; ratio of costs up to which others are, too
+GIVE_UP_RATIO = 40.0  # a search ends at this multiple of the evaluations of the cheapest candidate so far
+LEAST_EVALUATIONS = 1e5  # evaluations below which no search ends: it may have begun with a step that is far too fine
+LOWER_BUDGET = 3e7  # evaluations of a run after `ENOUGH` methods have failed and none has served: then often none does
+HOPELESS_REASONS = (settings.STOPPED, settings.BUDGET, settings.TRIED)  # that count for `LOWER_BUDGET`
 CONFIDENCE = {
     "checked": "measured to the end",
     "at the reference's limit": "measured to the end, as far as the reference can tell",
     "extrapolated": "extrapolated from a short run",
 }
-LEAD = 1.05  # least ratio of times with which the closed form is called the fastest way
-CLOSE = 0.85  # a search for a finalist ends at an error between this part of the target and the target
-ROUNDS = 15  # of timing, for finalists
-MARGIN = 0.8  # part of the accuracy that the errors at samples must meet; between samples errors may be larger
+LEAST_LEAD = 1.05  # least ratio of times with which the closed form is called the fastest way
+CLOSE_TO_TARGET = 0.85  # a search for a finalist ends at an error between this part of the target and the target
+TIMING_ROUNDS = 15  # of timing, for finalists
+SAMPLE_MARGIN = 0.8  # part of the accuracy that the errors at samples must meet; between samples errors may be larger
 
 
 @dataclass(frozen=True)
@@ -263,10 +263,10 @@ class _Search:
         self._try(names)
         costs = {name: trial.cost(question) for trial in self.trials if (name := trial.run.integrator.name) in menu}
         first, second, *_ = [*costs.values(), math.inf, math.inf]
-        self.of_table = len(menu[:FEW])  # methods of the table that were tried
-        if menu and (len(costs) < AGREED or menu.index(next(iter(costs))) >= AGREED or second < TIED * first):
-            self._try(menu[FEW : FEW + 1])
-            self.of_table = len(menu[: FEW + 1])
+        self.of_table = len(menu[:MOST_LISTED])  # methods of the table that were tried
+        if menu and (len(costs) < ENOUGH or menu.index(next(iter(costs))) >= ENOUGH or second < TIE_RATIO * first):
+            self._try(menu[MOST_LISTED : MOST_LISTED + 1])
+            self.of_table = len(menu[: MOST_LISTED + 1])
         no_answer = () if question.needs else THIS_TOP
         self._of_top = [trial for trial in self.trials if trial.run.integrator.needs in no_answer][:1]
         self._general = [trial for trial in self.trials if trial.run.integrator.needs not in no_answer]
@@ -279,7 +279,7 @@ class _Search:
             self.widened, rest = len(everyone), {*everyone} - {*self.names, *self.menu}
             self._try(rest)
             ranked = self._confirmed([trial for trial in self.trials if trial.run.integrator.name in rest], FINALISTS)
-        return _timed(self.question, ranked, self.fails, ROUNDS)
+        return _timed(self.question, ranked, self.fails, TIMING_ROUNDS)
 
     def beside(self) -> list[_Trial]:
         """The fastest method made for the symmetric top only, run to the end; empty without one."""
@@ -287,13 +287,13 @@ class _Search:
 
     def _try(self, names: Collection[str]) -> None:
         """Try methods, high orders first: these are the cheapest at most accuracies, and limit the other searches."""
-        kernels_to_compile[0] = math.ceil(KERNELS * len(names))
+        kernels_to_compile[0] = math.ceil(KERNELS_A_METHOD * len(names))
         for number, method in enumerate(sorted(map(integrator, names), key=lambda method: -(method.order or 0)), 1):
             post(f"trying method {number} of {len(names)}")
             rivals = [trial.run.evaluations for trial in self.trials if trial.run.integrator.needs not in THIS_TOP]
-            patience = max(TOO_DEAR * min(rivals, default=math.inf), CHEAP)
-            failed = sum(len(self.fails.get(why, ())) for why in HOPELESS)
-            most = LESS if failed >= AGREED and not rivals else math.inf
+            patience = max(GIVE_UP_RATIO * min(rivals, default=math.inf), LEAST_EVALUATIONS)
+            failed = sum(len(self.fails.get(why, ())) for why in HOPELESS_REASONS)
+            most = LOWER_BUDGET if failed >= ENOUGH and not rivals else math.inf
             self._sort_in(_tried(self.question, method, patience, most), self.trials)
         timed = _timed(self.question, self.trials, self.fails)
         self.trials = sorted(timed, key=lambda trial: trial.cost(self.question))
@@ -303,7 +303,7 @@ class _Search:
         ranked: list[_Trial] = []
         costs = [trial.cost(self.question) for trial in trials]
         for number, trial in enumerate(trials):
-            if number < most or not ranked or costs[number] <= LEVEL * costs[0]:
+            if number < most or not ranked or costs[number] <= FINALIST_RATIO * costs[0]:
                 self._sort_in(_confirm(self.question, trial), ranked)
         return ranked
 
@@ -350,8 +350,8 @@ def _menu(question: _Question) -> list[str]:
     rows, usable = cheapest(question.needs, *asked, general=general), _usable(question)
     if question.keeps and not question.needs:
         rows += cheapest(OF_ANY, *asked, general=general)
-    menu = list(dict.fromkeys(name for row in rows if (name := _same(row, usable))))[: FEW + 1]
-    return menu if len(menu) >= AGREED or not question.keeps else []
+    menu = list(dict.fromkeys(name for row in rows if (name := _same(row, usable))))[: MOST_LISTED + 1]
+    return menu if len(menu) >= ENOUGH or not question.keeps else []
 
 
 def _candidates(question: _Question) -> tuple[list[str], str]:
@@ -362,7 +362,7 @@ def _candidates(question: _Question) -> tuple[list[str], str]:
     if question.step is not None:
         return everyone, f"tried all {len(everyone)} compiled methods of fixed step that you can use"
     of_top = [] if question.needs else _menu(question._replace(needs=THIS_TOP[:1]))[:1]  # named beside the answer
-    menu = _menu(question)[:FEW]
+    menu = _menu(question)[:MOST_LISTED]
     if not menu:
         return everyone, f"tried all {len(everyone)} compiled methods"
     own = [name for name in everyone if not is_built_in(name)]
@@ -380,13 +380,13 @@ def _tried(question: _Question, method: Integrator, patience: float, most: float
         wrong = INACCURATE if math.isfinite(run.error) else "No run ends well at this step"
         return question.trial(run._replace(why="" if run.error <= accuracy else wrong))
     period = scene.nutation_period
-    short = min(horizon, settings.SHORT * period) if math.isfinite(period) else horizon
+    short = min(horizon, settings.TRIAL_NUTATIONS * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** settings.growth(method, quantity)
     best = settings.search(
         scene, method, accuracy * law, quantity, short, patience=min(patience, most), longest=question.max_step
     )  # fmt: skip
     if best.why == settings.BUDGET and patience < min(settings.MOST_EVALUATIONS[method.implementation], most):
-        best = best._replace(why=f"Not within {TOO_DEAR:g} times the work of the best")
+        best = best._replace(why=f"Not within {GIVE_UP_RATIO:g} times the work of the best")
     if method.fixed_step and horizon / best.setting > MOST_STEPS:
         best = best._replace(why=f"Would need more than {MOST_STEPS:.0e} steps")
     return _Trial(best, best.error / law, math.nan, "extrapolated", horizon)
@@ -414,13 +414,13 @@ def _confirm(question: _Question, trial: _Trial) -> _Trial:
         run = settings.rounded(scene, short, accuracy * short.error / (trial.error or 1.0), quantity)
         return trial._replace(run=run, error=trial.error * run.error / (short.error or 1.0))
     best = settings.search(
-        scene, short.integrator, MARGIN * accuracy, quantity, horizon, short.setting, least=CLOSE,
+        scene, short.integrator, SAMPLE_MARGIN * accuracy, quantity, horizon, short.setting, least=CLOSE_TO_TARGET,
         longest=question.max_step,
     )  # fmt: skip
     if best.why:
         why = f"Good enough over a short run but not to the end ({best.why[0].lower()}{best.why[1:]})"
         return question.trial(best._replace(why=why))
-    return question.trial(settings.rounded(scene, best, MARGIN * accuracy, quantity))
+    return question.trial(settings.rounded(scene, best, SAMPLE_MARGIN * accuracy, quantity))
 
 
 def _advice(
@@ -528,7 +528,7 @@ def _exact_words(question: _Question, best: float) -> str:
     if not closed_form.load():  # compiling takes 10 s, and its time without compiling is of no use
         return f"The closed form, integrator exact, takes no step{error}."
     seconds = _exact_seconds(question)
-    if not best > LEAD * seconds:
+    if not best > LEAST_LEAD * seconds:
         more = f", {_times(seconds / best)} that" if math.isfinite(best) else ""
         return f"The closed form, integrator exact, takes {seconds * 1e6:.2g} us{more}{error}, and no step."
     fastest = f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us"

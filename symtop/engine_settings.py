@@ -17,7 +17,7 @@ from symtop.methods.framework.registry import integrator
 from symtop.model import scenes
 from symtop.model.scenes import Scene, horizon_of
 
-STEP = 1.0 / 240.0  # s
+DEFAULT_STEP = 1.0 / 240.0  # s
 WORST = 0.5  # rad: with a larger least error no method is recommended
 SETTINGS = {  # the maps of an engine by its settings, the default first
     "mujoco": {
@@ -104,7 +104,7 @@ def i_use(
         raise SymtopError(f"engine must be a physics engine or a map of one, not the method {engine!r}: compare "
                           "methods with `symtop compare`", "engine")  # fmt: skip
     one_of("engine", engine, maps)
-    start, h = scenes.scene(scene, bodies=True), STEP if step_size is None else positive("step_size", step_size)
+    start, h = scenes.scene(scene, bodies=True), DEFAULT_STEP if step_size is None else positive("step_size", step_size)
     end = start.horizon if horizon is None else horizon_of(horizon)
     if h >= end:
         raise SymtopError(f"step_size must be below the horizon {end:g}, not {h:g}", "step_size")

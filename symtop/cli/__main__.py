@@ -17,7 +17,7 @@ def run(name: str | None = None) -> None:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback for Ctrl-C during imports
     from symtop.cli.main import main
     from symtop.core.parallel import VARIABLES
-    from symtop.core.signals import UNREAD
+    from symtop.core.signals import BROKEN_PIPE
 
     if heard:
         signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -35,7 +35,7 @@ def run(name: str | None = None) -> None:
             try:
                 stream.flush()
             except OSError as error:  # its reader has ended, or the disk is full
-                code = code or (UNREAD if isinstance(error, BrokenPipeError) else 1)
+                code = code or (BROKEN_PIPE if isinstance(error, BrokenPipeError) else 1)
         os._exit(code)
 
 

@@ -21,7 +21,7 @@ import click
 from symtop.core import errors
 from symtop.core.errors import SymtopError, SymtopWarning, UnknownNameError, at_home, file_path, positive, words_of
 from symtop.core.progress import is_terminal, showing_work
-from symtop.core.signals import INTERRUPTED, UNREAD, told_apart
+from symtop.core.signals import BROKEN_PIPE, INTERRUPTED, told_apart
 
 if TYPE_CHECKING:
     from symtop.model.scenes import Scene
@@ -33,8 +33,8 @@ NAMES = {  # for shell completion: the module and the function that returns the 
     "integrators": ("symtop.methods.framework.registry", "integrators"),
     "variants": ("symtop.methods.framework.registry", "variants"),
 }  # fmt: skip
-BODY, PERIODS = "body", 20.0  # name of the scene made from the options of a body; its horizon in natural periods
-TEXT = (".csv", ".tsv", ".txt", ".json")  # endings that are refused for netCDF files
+BODY, BODY_PERIODS = "body", 20.0  # name of the scene made from the options of a body; its horizon in natural periods
+TEXT_ENDINGS = (".csv", ".tsv", ".txt", ".json")  # endings that are refused for netCDF files
 USAGE = {  # patterns of click's messages, and their replacements
     "invalid value for '(.+?)': (.+) is not (?:a valid )?(.+)": r"\1 must be \3, not \2",
     r"invalid value for '\[?(.+?)(?:]...)?': File (.+) (does not exist|is a .+)":
@@ -43,7 +43,7 @@ USAGE = {  # patterns of click's messages, and their replacements
     r"\. \(Did you mean one of: (.+)\)$": r"; did you mean \1", "must be float( range)?,": "must be a number,",
     "must be integer( range)?,": "must be a whole number,",
 }  # fmt: skip
-SILENT = ("explore",)  # commands without messages that they are still working
+SILENT_COMMANDS = ("explore",)  # commands without messages that they are still working
 
 
 def _load_plugins(ctx: click.Context, _: click.Parameter, files: tuple[str, ...]) -> None:
@@ -148,8 +148,8 @@ def _own_body(numbers: dict[str, Any]) -> "Scene":
     if top.I1 == top.I2 and (top.free or abs(top.centre[2]) == 1.0):
         start = Angles.from_quaternion(start.quaternion, omega_body=start.omega_body)
         top = SymmetricTop(top.I1, top.I3, top.torque[2])
-    purpose = f"a body of your own, over {PERIODS:g} natural periods"
-    return scenes.Scene(BODY, top, start, PERIODS * period, purpose, "axis")  # "axis" for a top; a body has one chart
+    purpose = f"a body of your own, over {BODY_PERIODS:g} natural periods"
+    return scenes.Scene(BODY, top, start, BODY_PERIODS * period, purpose, "axis")  # "axis" for a top
 
 
 def step_of(scene: "str | Scene", settings: dict[str, Any]) -> float | None:
@@ -194,7 +194,7 @@ class Group(click.Group):
     ) -> tuple[str | None, click.Command | None, list[str]]:
         """The command of a command line; from here on messages say that it is still working."""
         name, command, rest = super().resolve_command(ctx, args)
-        if not ctx.resilient_parsing and name not in SILENT:
+        if not ctx.resilient_parsing and name not in SILENT_COMMANDS:
             ctx.with_resource(showing_work(str(name)))
         return name, command, rest
 
@@ -216,7 +216,7 @@ class Group(click.Group):
         except OSError as error:
             if error.errno == errno.EPIPE:
                 sys.stdout = None  # its reader has ended
-                ctx.exit(UNREAD)
+                ctx.exit(BROKEN_PIPE)
             name, words = str(error.filename), f"cannot write what there is to say: {error.strerror}"
             if error.filename is not None:
                 words = f"cannot use {name[:LONGEST_NAME]}{'...' if name[LONGEST_NAME:] else ''}: {error.strerror}"
@@ -328,7 +328,7 @@ def check_outputs(**files: str | None) -> None:
         if file_path(option, file).is_dir():
             raise SymtopError(f"{option} must be a file, not the folder {file!r}")
         if name == "output":
-            if path.suffix.lower() in TEXT:
+            if path.suffix.lower() in TEXT_ENDINGS:
                 raise SymtopError(f"{option} is written as netCDF, such as run.nc, not as {file!r}")
             errors.check_replaceable(path)
         with errors.writing(file):

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     import xarray as xr
 
 TARGETS = (1e-3, 1e-6, 1e-9)  # errors for which the cheapest runs are printed
-FACTS = ("quantity", "horizon", "nutations", "cost", "timed", "budget")
+ATTRIBUTES = ("quantity", "horizon", "nutations", "cost", "timed", "budget")
 COLUMNS = ("step_size", "tolerance", "steps_per_nutation", "error", "seconds", "seconds_spread", "force_evaluations")
 
 
@@ -48,7 +48,7 @@ def compare(
         from symtop.judging import comparison
         from symtop.judging.findings import as_time
         from symtop.measure.sweep import failed_setting, period_word, titled
-        from symtop.measure.timing import NOISY
+        from symtop.measure.timing import NOISY_SPREAD
 
     data = comparison.compare(scene, methods, **options)
     if output is not None:
@@ -62,7 +62,7 @@ def compare(
     records = [[_record(cell, target, places[target][k]) for target in TARGETS] for k, cell in enumerate(cells)]
     exact = data["exact_seconds"].item()  # NaN for a body without symmetry
     if as_json:
-        facts = {name: data.attrs[name] for name in FACTS}
+        facts = {name: data.attrs[name] for name in ATTRIBUTES}
         every = [record for own in records for record in own]
         click.echo(as_text({"scene": data["scene"].item(), **facts, "exact_seconds": exact, "cheapest": every}))
         return
@@ -84,7 +84,7 @@ def compare(
     if timed:
         motion = f"The exact motion takes {as_time(exact)}. " if math.isfinite(exact) else ""
         say(f"{motion}A time is that of one call of the solver, with nothing around it.")
-        if float((data["seconds_spread"] > NOISY).sum() / data["seconds_spread"].notnull().sum()) > 0.5:
+        if float((data["seconds_spread"] > NOISY_SPREAD).sum() / data["seconds_spread"].notnull().sum()) > 0.5:
             warn("the machine is busy: times are the least of some, and most others took a quarter longer")
     say_written(output, figure)
 

@@ -168,14 +168,14 @@ CHECKS: dict[str, Callable[[Path], list[Finding]]] = {
     "self-check": _self_check,
 }  # fmt: skip
 SCENE, BODY_SCENE = "goldstein", "heavy-brick"
-PERIODS = 0.02  # nutations: the length of a run that compiles a kernel
+WARM_PERIODS = 0.02  # nutations: the length of a run that compiles a kernel
 
 
 def _run(name: str) -> str:
     """Compile the kernels of a variant, alone and in an ensemble, or of the reference for name ""; returns an error."""
     import numpy as np
 
-    from symtop.methods.framework.lanes import LEAST
+    from symtop.methods.framework.lanes import LEAST_MEMBERS
     from symtop.methods.framework.loop import inside
     from symtop.methods.framework.registry import integrator
     from symtop.model.lazy_kernel import LAZY
@@ -186,7 +186,7 @@ def _run(name: str) -> str:
     from symtop.run.simulation import simulate
 
     place = BODY_SCENE if name.endswith("[body]") else SCENE
-    span = PERIODS * scene(place, bodies=True).nutation_period
+    span = WARM_PERIODS * scene(place, bodies=True).nutation_period
     try:
         if not name:
             for kernel in LAZY:
@@ -203,8 +203,8 @@ def _run(name: str) -> str:
         if solver is None or not solver.in_lanes:
             ensemble([place] * 2, name, **options, threads=1, quiet=True)
         else:  # with as many members as fill a block
-            rows, ones = read_members([place] * LEAST).numbers, np.ones(LEAST)
-            solver.many(rows, span / 2 * ones, np.array([[0, 2]] * LEAST), compiling=True)
+            rows, ones = read_members([place] * LEAST_MEMBERS).numbers, np.ones(LEAST_MEMBERS)
+            solver.many(rows, span / 2 * ones, np.array([[0, 2]] * LEAST_MEMBERS), compiling=True)
     except Exception as error:  # noqa: BLE001  (one that fails must not keep the others from being compiled)
         return f"{name or 'truth'}: {words_of(error)}"
     return ""

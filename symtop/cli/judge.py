@@ -13,7 +13,7 @@ from symtop.core.progress import showing_seconds
 from symtop.judging import FORMS
 
 # methods in the figure of a judged step, length of their runs, most evaluations of one
-BESIDE, NUTATIONS, MOST_BESIDE = ("rk4", "strang", "dop853", "taylor"), 10.0, 2e4
+PEERS, NUTATIONS, MOST_PEER_STEPS = ("rk4", "strang", "dop853", "taylor"), 10.0, 2e4
 LONGEST_BESIDE = 5.0  # seconds of a run of the judged step
 
 
@@ -116,7 +116,7 @@ def _check(form: str | None, **files: str | None) -> None:
 def _draw_beside(
     target: str, scene: str, file: str | None, quiet: bool, options: dict[str, Any], seconds_a_step: float
 ) -> None:
-    """Draw a step's error against force evaluations with those of `BESIDE`, if `file` is given, and print a ranking."""
+    """Draw a step's error against force evaluations with those of `PEERS`, if `file` is given, and print a ranking."""
     if file is None:
         return
     with showing_seconds("comparing"):
@@ -129,9 +129,9 @@ def _draw_beside(
 
         on = find_scene(scene, bodies=True)
         stepper = open_target(target, options["form"], options["chart"], on=on, adaptive=options["adaptive"])
-        methods = [integrator(stepper, order=options["order"]), *BESIDE]
+        methods = [integrator(stepper, order=options["order"]), *PEERS]
         # `compare` counts at least one force evaluation per step
-        budget = min(MOST_BESIDE, LONGEST_BESIDE / max(seconds_a_step, 1e-9))
+        budget = min(MOST_PEER_STEPS, LONGEST_BESIDE / max(seconds_a_step, 1e-9))
         data = compare(on, methods, cost="evaluations", nutations=NUTATIONS, budget=budget, quiet=True)
         draw_compare(data, file)
     most, errors = ranked(data)

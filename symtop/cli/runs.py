@@ -13,15 +13,15 @@ from symtop.cli import common
 from symtop.cli.common import File, as_text, check_outputs, completing, say, say_written, separated, table, warn
 from symtop.core.errors import SymtopError, whole
 from symtop.core.progress import kernels_to_compile, post, showing_seconds
-from symtop.report.formats import FIRM, counted, duration
+from symtop.report.formats import NO_BREAK, counted, duration
 
-FEWEST, FEW, MANY = 1000, 100_000, 20  # steps of a trial; a run of more than 20 times 100,000 steps is timed before
-DECADES = 2.5  # decades of time at the end of a long run, in which the growth of a change is fitted
-LONG_ENOUGH = 0.5  # seconds that a trial must take longer than one of `FEWEST` steps
-SAME = 0.01  # relative difference of the step used from --step-size above which it is printed
-KERNELS, OF_FEW = 5, 2  # kernels of an ensemble: periods, samples, starts, steps in lanes and alone; of few steps
-DRAWN = ("seed", "kind", "epsilon")  # attributes of a population that say how it was drawn
-COMPARED, COMPARED_BODIES = 100_000, 1000  # first members whose errors are computed; of a million tops they take 1 GB
+TRIAL_STEPS, TIMED_STEPS, TIMED_RATIO = 1000, 100_000, 20  # a run of more than 20 times 100,000 steps is timed before
+FITTED_DECADES = 2.5  # decades of time at the end of a long run, in which the growth of a change is fitted
+LONG_ENOUGH = 0.5  # seconds that a trial must take longer than one of `TRIAL_STEPS` steps
+SAME_STEP = 0.01  # relative difference of the step used from --step-size above which it is printed
+ENSEMBLE_KERNELS, KERNELS_OF_FEW = 5, 2  # periods, samples, starts, steps in lanes and alone; of few steps
+DRAW_ATTRIBUTES = ("seed", "kind", "epsilon")  # attributes of a population that say how it was drawn
+MOST_COMPARED, MOST_COMPARED_BODIES = 100_000, 1000  # whose errors are computed; of a million tops they take 1 GB
 PARAMETERS = ("I1", "I2", "I3", "mgl", "centre")  # variables of a population that are not of the start
 
 GUARD = "Warn of a large error by the closed form (exact, of tops) or by an integration (series)."
@@ -92,7 +92,7 @@ def run(
         method, actual, nominal = facts["integrator"], facts["step_size"], settings["step_size"]
         variant = method if method.endswith("]") else f"{method}[{facts['chart']}]"
         say(f"{variant} on {problem.name}: {facts['outcome_message']}")
-        other = nominal is not None and abs(actual / nominal - 1.0) > SAME
+        other = nominal is not None and abs(actual / nominal - 1.0) > SAME_STEP
         of = f" of {actual:.6g}, for a whole number of them fills the horizon" if other else ""
         say(f"{counted(facts['steps'], 'step')}{of}, {counted(facts['force_evaluations'], 'force evaluation')}")
         if facts["sampling"] == "dithered":
@@ -141,18 +141,18 @@ def estimate(steps: float, run: Callable[[int], object]) -> None:
     from symtop.measure.timing import first_call
     from symtop.run.guard import MOST_STEPS
 
-    if not MANY * FEW < steps <= MOST_STEPS:  # more are refused
+    if not TIMED_RATIO * TIMED_STEPS < steps <= MOST_STEPS:  # more are refused
         return
     with showing_seconds("timing some steps"):
-        run(FEWEST)  # compiles the kernel
-        few, fixed, seconds = FEWEST, first_call(partial(run, FEWEST)), 0.0
-        while seconds < LONG_ENOUGH and few * MANY < steps:
+        run(TRIAL_STEPS)  # compiles the kernel
+        few, fixed, seconds = TRIAL_STEPS, first_call(partial(run, TRIAL_STEPS)), 0.0
+        while seconds < LONG_ENOUGH and few * TIMED_RATIO < steps:
             few *= 4
             seconds = first_call(partial(run, few)) - fixed  # without the fixed cost of a run
-    took = seconds * steps / (few - FEWEST)
+    took = seconds * steps / (few - TRIAL_STEPS)
     post("running")  # no longer compiling
     if took > 10.0:
-        warn(f"{steps:.3g} steps take about {duration(took).replace(FIRM, ' ')}")
+        warn(f"{steps:.3g} steps take about {duration(took).replace(NO_BREAK, ' ')}")
 
 
 @click.command(short_help="Run up to billions of steps in little memory.")
@@ -206,7 +206,7 @@ def long(
         for name in (OF_BODY if problem.of_body else QUANTITIES)[:-1]:  # except theta
             least, most, mean = (data[f"{name}_{kind}"].values for kind in ("least", "largest", "mean"))
             sizes = np.maximum.accumulate(np.maximum(np.abs(least), np.abs(most)))
-            fit = power_law(steps_made, sizes, steps_made > steps_made[-1] / 10.0**DECADES)
+            fit = power_law(steps_made, sizes, steps_made > steps_made[-1] / 10.0**FITTED_DECADES)
             grows = f"t^{abs(fit.slope):.2f}" if math.isfinite(fit.slope) else ""  # no interval
             words = "|L|" if name == "momentum" else name
             rows.append([words, *(f"{float(value):+.3e}" for value in (least.min(), most.max(), mean[-1])), grows])
@@ -255,8 +255,8 @@ def ensemble(
     check_outputs(output=output, figure=figure)
     if epsilon is not None and not bodies:
         raise SymtopError("--epsilon must come with --bodies: it is how far heavy bodies are from a top")
-    noun, most = ("bodies", COMPARED_BODIES) if bodies else ("tops", COMPARED)
-    kernels_to_compile[0] = KERNELS
+    noun, most = ("bodies", MOST_COMPARED_BODIES) if bodies else ("tops", MOST_COMPARED)
+    kernels_to_compile[0] = ENSEMBLE_KERNELS
     with showing_seconds(f"drawing {noun}"):
         import numpy as np
 
@@ -264,11 +264,11 @@ def ensemble(
         from symtop.run.ensemble import bodies as random_bodies, ensemble as runs
         from symtop.run.ensemble.population import check_memory, population
 
-        whole("members", members, 1, random_bodies.MOST if bodies else math.inf)  # the argument n of `population`
+        whole("members", members, 1, random_bodies.MOST_MEMBERS if bodies else math.inf)  # n of `population`
         check_memory("members", members)
         draw = partial(random_bodies.body_population, epsilon=epsilon) if bodies else population
         sample = draw(members, seed=seed, kind=kind)
-    kernels_to_compile[0] = KERNELS if bodies else _kernels(members, **settings)
+    kernels_to_compile[0] = ENSEMBLE_KERNELS if bodies else _kernels(members, **settings)
     words = QUANTITIES[noun]
     compared = [name for name in words if variables is None or SHOWN_BY[name] in variables]
     if figure is not None and not compared:
@@ -319,7 +319,7 @@ def _kernels(members: int, *, per_nutation: Any, nutations: Any, horizon: Any, s
     from symtop.methods.framework import lanes
 
     each = (horizon or 0.0) / step_size if step_size else (per_nutation or 0.0) * (nutations or 0.0)
-    return OF_FEW if 0.0 < members * each <= lanes.FEW else KERNELS
+    return KERNELS_OF_FEW if 0.0 < members * each <= lanes.FEW_STEPS else ENSEMBLE_KERNELS
 
 
 def _columns(sample: Any, errors: dict[str, Any], words: dict[str, str]) -> Any:
@@ -335,7 +335,7 @@ def _columns(sample: Any, errors: dict[str, Any], words: dict[str, str]) -> Any:
         padded = np.pad(values, (0, sample.sizes["member"] - len(values)), constant_values=math.nan)
         about = {"long_name": f"{words[name]}, largest over the run, infinite after a failure"}
         added[f"{name}_error"] = "member", padded, about | {"units": ERRORS[name][1]}
-    return xr.Dataset(added, attrs={name: sample.attrs[name] for name in DRAWN if name in sample.attrs})
+    return xr.Dataset(added, attrs={name: sample.attrs[name] for name in DRAW_ATTRIBUTES if name in sample.attrs})
 
 
 @click.command(short_help="Open the explorer: one run in a browser, with sliders.")

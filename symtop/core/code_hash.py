@@ -11,7 +11,7 @@ number is stale. Cases of studies, cached kernels and references, checkpoints an
 that it names (attributes of modules included) and to what it imports when it runs; from a class to its methods and
 bases; from an instance to its class and attributes. Comments, line numbers and docstrings (but those of functions
 inside functions) do not count. By name alone count functions that look something up (`by_name`), the files of
-`PLUMBING`, which pass on numbers but compute none, and libraries, with their version (`packages`). Lists, dicts, sets
+`NO_NUMBERS`, which pass on numbers but compute none, and libraries, with their version (`packages`). Lists, dicts, sets
 under a module's lower-case names are state of a process and do not count (in a user's file its statements outside of
 functions count instead); nor do dataclass fields with the metadata ``words``. A file whose path is a constant counts.
 """
@@ -36,18 +36,18 @@ import numpy as np
 
 Reasons = dict[str, str]
 
-LENGTH = 20  # hexadecimal digits of a digest
-COMPUTING = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "mpmath")  # packages that may change a number
+DIGEST_LENGTH = 20  # hexadecimal digits of a digest
+NUMERICS = ("numpy", "scipy", "numba", "heyoka", "xarray", "netCDF4", "mpmath")  # packages that may change a number
 PACKAGE = Path(__file__).resolve().parent.parent
 _PLUMBING = ("code_hash", "errors", "files", "netcdf", "parallel", "progress", "signals")
-PLUMBING = frozenset([PACKAGE / "run" / "cluster.py", *(PACKAGE / "core" / f"{name}.py" for name in _PLUMBING)])
+NO_NUMBERS = frozenset([PACKAGE / "run" / "cluster.py", *(PACKAGE / "core" / f"{name}.py" for name in _PLUMBING)])
 roots: dict[str, Path] = {PACKAGE.name: PACKAGE}  # name of a known package: its folder
 _path = functools.cache(lambda name: Path(name).resolve())
 
 
 def hashed(*parts: str) -> str:
     """Hash of some text, 20 hexadecimal digits."""
-    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:LENGTH]
+    return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:DIGEST_LENGTH]
 
 
 def digest(reasons: Mapping[str, str]) -> str:
@@ -74,7 +74,7 @@ def merged(mappings: Iterable[Mapping[str, str]]) -> Reasons:
 @functools.cache
 def file_hash(path: Path) -> str:
     """Hash of a file's content at the first call; later changes of the file are not seen."""
-    return hashlib.sha256(path.read_bytes()).hexdigest()[:LENGTH]
+    return hashlib.sha256(path.read_bytes()).hexdigest()[:DIGEST_LENGTH]
 
 
 @functools.cache
@@ -96,9 +96,9 @@ def processor() -> str:
 
 
 def packages(*names: str) -> Reasons:
-    """Versions of packages; by default those of `COMPUTING` and of Python, whose bytecode differs by version."""
+    """Versions of packages; by default those of `NUMERICS` and of Python, whose bytecode differs by version."""
     python = {} if names else {"package python": ".".join(platform.python_version_tuple()[:2])}
-    return {f"package {name}": version(name) for name in names or COMPUTING} | python
+    return {f"package {name}": version(name) for name in names or NUMERICS} | python
 
 
 def add_root(name: str, folder: Path) -> None:
@@ -137,10 +137,10 @@ def _of_library(module: str | None) -> bool:
 Parts = Callable[[Any], Iterable[Any]]
 Function = TypeVar("Function", bound=Callable[..., Any])
 
-STATE = (list, dict, set)  # types of globals that do not count under a module's lower-case name
+STATE_TYPES = (list, dict, set)  # types of globals that do not count under a module's lower-case name
 SHIPPED = ("symtop.", "symtop_studies.")
-DEFINING = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom
-PLAIN = (type(None), bool, int, float, complex, str, bytes, np.generic)
+DEFINITIONS = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom
+PLAIN_TYPES = (type(None), bool, int, float, complex, str, bytes, np.generic)
 _IMPORT = dis.opmap["IMPORT_NAME"]
 _by_name: set[Callable[..., Any]] = set()
 _CONTAINERS: tuple[tuple[Any, Parts], ...] = (
@@ -156,8 +156,8 @@ _CONTAINERS: tuple[tuple[Any, Parts], ...] = (
 
 @functools.cache
 def _is_plumbing(file: str) -> bool:
-    """Is a file one of `PLUMBING` or of Python's own library, which compute no numbers of the project?"""
-    return _path(file) in PLUMBING or _path(contextlib.__file__).parent in _path(file).parents
+    """Is a file one of `NO_NUMBERS` or of Python's own library, which compute no numbers of the project?"""
+    return _path(file) in NO_NUMBERS or _path(contextlib.__file__).parent in _path(file).parents
 
 
 def by_name(function: Function) -> Function:
@@ -240,7 +240,7 @@ class Code:
             self._add(thing)
 
     def _add(self, thing: Any) -> None:
-        if isinstance(thing, PLAIN):
+        if isinstance(thing, PLAIN_TYPES):
             self._note(repr(thing))
             return
         if not isinstance(thing, (FunctionType, type, ModuleType)):  # compiled by numba, or cached
@@ -317,9 +317,9 @@ class Code:
         for name, value in named_globals(function):
             if callable(value) or isinstance(value, ModuleType):
                 self._add(value)
-            elif isinstance(value, PLAIN):
+            elif isinstance(value, PLAIN_TYPES):
                 self._note(f"{name} = {value!r}")
-            elif not (isinstance(value, STATE) and name == name.lower()):
+            elif not (isinstance(value, STATE_TYPES) and name == name.lower()):
                 self._lead_to("constant", name, file, value)
             elif not (function.__module__ or "").startswith(SHIPPED):
                 self._note(f"{name} of {_statements(_path(function.__code__.co_filename))}")
@@ -328,7 +328,8 @@ class Code:
 def _statements(file: Path) -> str:
     """Hash of the statements of a user's file outside of functions, classes and imports, which fill its lists."""
     with contextlib.suppress(OSError, SyntaxError, ValueError):  # no file, as at a prompt
-        return hashed(*(ast.dump(node) for node in ast.parse(file.read_bytes()).body if not isinstance(node, DEFINING)))
+        body = ast.parse(file.read_bytes()).body
+        return hashed(*(ast.dump(node) for node in body if not isinstance(node, DEFINITIONS)))
     return ""
 
 

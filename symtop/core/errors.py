@@ -12,10 +12,10 @@ from typing import Any
 from symtop.core.signals import is_of_user
 
 LONGEST_PART = 255  # bytes of a name in a folder
-SHOWN = 80  # characters of a name that are shown
+SHOWN_CHARACTERS = 80  # characters of a name that are shown
 ENTRY = "an entry of "  # stands before the name of a row in messages about one of its entries
-MAGIC = (b"\x89HDF", b"CDF")  # the first bytes of netCDF files
-LONGEST = 300  # characters that are shown of the message of an error or a process
+NETCDF_MAGIC = (b"\x89HDF", b"CDF")  # the first bytes of netCDF files
+LONGEST_MESSAGE = 300  # characters that are shown of the message of an error or a process
 _COMPILING = "(step: nopython frontend)"  # numba's text before each cause, from the loop inwards; the last is the cause
 _TRACE = r",? (?:defined at |raised from |File \"|During: |There are \d+ candidate)"  # what follows a cause
 
@@ -55,7 +55,7 @@ def shown(value: object) -> str:
         text = repr(value)
     except Exception:  # noqa: BLE001
         return f"a {type(value).__name__} that cannot be printed"
-    return text if len(text) <= LONGEST else f"{text[:LONGEST]} ..."
+    return text if len(text) <= LONGEST_MESSAGE else f"{text[:LONGEST_MESSAGE]} ..."
 
 
 def finite(name: str, value: object, least: float = -math.inf) -> float:
@@ -107,7 +107,7 @@ def file_path(name: str, value: object) -> Path:
                 if Path(os.path.realpath(path)).parent.is_dir():
                     return path
                 raise SymtopError(f"{name} must be in a folder that is there, not {str(value)!r}", name)
-    raise SymtopError(f"{name} must be the name of a file, not {shown(value)[:SHOWN]}", name)
+    raise SymtopError(f"{name} must be the name of a file, not {shown(value)[:SHOWN_CHARACTERS]}", name)
 
 
 @contextlib.contextmanager
@@ -127,7 +127,7 @@ def check_replaceable(path: Path) -> None:
     if path.is_file():
         with writing(path), path.open("rb") as file:
             head = file.read(4)
-    if path.exists() and not head.startswith(MAGIC):
+    if path.exists() and not head.startswith(NETCDF_MAGIC):
         raise SymtopError(f"cannot write {path}: it is there, and no netCDF file; remove it or name another path")
 
 
@@ -182,14 +182,14 @@ def words_of(error: BaseException) -> str:
         message = re.split(_TRACE, message.rpartition(_COMPILING)[2], maxsplit=1)[0].strip()
         if message.startswith("Untyped global name") and "class 'function'" in message:
             message += "; a function that a kernel calls is decorated with numba.extending.register_jitable"
-    cut = message if len(message) <= LONGEST else f"{message[:LONGEST]} ..."
+    cut = message if len(message) <= LONGEST_MESSAGE else f"{message[:LONGEST_MESSAGE]} ..."
     return f"{type(error).__name__}: {cut}" if cut else type(error).__name__
 
 
 def last_words(output: bytes) -> str:
     """The end of what a process printed, in one line of whole words."""
-    words = " ".join(output[-4 * LONGEST :].decode(errors="replace").split())
-    return words if len(words) <= LONGEST else f"... {words[-LONGEST:].partition(' ')[2]}"
+    words = " ".join(output[-4 * LONGEST_MESSAGE :].decode(errors="replace").split())
+    return words if len(words) <= LONGEST_MESSAGE else f"... {words[-LONGEST_MESSAGE:].partition(' ')[2]}"
 
 
 @contextlib.contextmanager

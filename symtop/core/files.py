@@ -1,8 +1,8 @@
 """Files that are written completely or not at all, the cache folder, and file locks.
 
 The cache holds compiled kernels, references and checkpoints of long runs. Every use of an entry sets its time of
-modification, at most once a day. Entries that nobody used for `UNUSED` days are removed, and those used longest ago
-until the folder is small enough. Several processes may do so at the same time.
+modification, at most once a day. Entries that nobody used for `UNUSED_DAYS` days are removed, and those used longest
+ago until the folder is small enough. Several processes may do so at the same time.
 """
 
 import contextlib
@@ -19,7 +19,7 @@ from pathlib import Path
 from symtop.core.errors import SymtopError, SymtopWarning, writing
 
 DAY = 86_400.0  # seconds
-UNUSED = 30  # days
+UNUSED_DAYS = 30  # days
 
 
 def cache_root() -> Path:
@@ -75,8 +75,8 @@ def size_of(entry: Path) -> int:
 
 
 def prune(folder: Path, most_bytes: int) -> None:
-    """Remove the entries of a folder that nobody used for `UNUSED` days, and the oldest beyond `most_bytes`."""
-    oldest, total = time.time() - UNUSED * DAY, 0
+    """Remove the entries of a folder that nobody used for `UNUSED_DAYS` days, and the oldest beyond `most_bytes`."""
+    oldest, total = time.time() - UNUSED_DAYS * DAY, 0
     for entry in by_last_use(folder):
         with contextlib.suppress(OSError):
             total += size_of(entry)

@@ -50,16 +50,16 @@ to_fixed_tuple: Any = fixed_tuple  # in a kernel: to_fixed_tuple(array, n)
 
 MOST_BYTES = 200_000_000  # of kernels that are kept, about 2000 of them
 OPTIONS = {"error_model": "numpy", "nogil": True}  # division by zero gives infinity, as in C; no Python lock
-HASH = hashlib.sha256().digest_size  # length in bytes of the hash that a code file begins with
+HASH_BYTES = hashlib.sha256().digest_size  # length in bytes of the hash that a code file begins with
 FORMAT = "bitcode and machine code"  # of what is stored of a kernel
 SHIPPED = PACKAGE / "kernels"  # bitcode that comes with a wheel, a folder for each kernel
-NAMED = ("modname", "qualname", "unique_name", "mangled_name", "env_name", "args")  # of numba's record of a kernel
-WITHIN = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # for functions only kernels call: 14 % less to compile
+KERNEL_NAMES = ("modname", "qualname", "unique_name", "mangled_name", "env_name", "args")  # in numba's record
+KERNEL_ONLY = {"no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # less to compile by 14 %
 WRAPPERS = ("_ZN7cpython", "cfunc.")  # how the names of functions begin that Python and C can call
-INLINED = {"forceinline": True, **WITHIN}
-UNUSABLE = (OSError, ValueError, LookupError, RuntimeError, zlib.error, AttributeError, TypeError)  # of files or numba
+INLINED = {"forceinline": True, **KERNEL_ONLY}
+LOAD_ERRORS = (OSError, ValueError, LookupError, RuntimeError, zlib.error, AttributeError, TypeError)  # files, numba
 _ARRAYS = [types.Array(kind, n, "C") for kind in (types.float64, types.int64) for n in (1, 2, 3)]
-RETURNED = {repr(kind): kind for kind in (types.none, types.boolean, types.int64, types.float64, *_ARRAYS)}
+RETURN_TYPES = {repr(kind): kind for kind in (types.none, types.boolean, types.int64, types.float64, *_ARRAYS)}
 
 _stands_for: dict[int, list[object]] = {}  # id of a function: what numba compiles in its place
 _registered: set[Callable[..., Any]] = set()
@@ -111,7 +111,7 @@ def _overloads(function: FunctionType) -> Iterator[object]:
 def code_of(thing: object) -> list[Part]:
     """The parts that a kernel, or an object with kernels, is compiled from, whatever the process has run before."""
     for function, is_inlined in marked:  # by the modules loaded so far that do not import numba
-        register_jitable(function, INLINED if is_inlined else OPTIONS | WITHIN)
+        register_jitable(function, INLINED if is_inlined else OPTIONS | KERNEL_ONLY)
     return Code(_overloads).reached("kernel", thing, OPTIONS, sys.version_info[:2], numba.__version__)
 
 
@@ -180,7 +180,7 @@ class _Cache:
         """The kernel from disk, for numba; if it has to be compiled, None, after a call of the functions `on_cold`."""
         context.refresh()
         for of in (1, 2):
-            with contextlib.suppress(*UNUSABLE):
+            with contextlib.suppress(*LOAD_ERRORS):
                 files = self.files(signature, context.codegen())
                 return _loaded(signature, context, _read(files[of], _name(files[of])), files[0])
         for tell in on_cold:
@@ -189,9 +189,9 @@ class _Cache:
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Store a compiled kernel, for numba, unless the file would lack something that another process needs."""
-        with contextlib.suppress(*UNUSABLE):
+        with contextlib.suppress(*LOAD_ERRORS):
             library, kernel, constants = result.library, result.fndesc, result.environment.consts
-            about = {name: getattr(kernel, name) for name in NAMED} | {"library": library.name}
+            about = {name: getattr(kernel, name) for name in KERNEL_NAMES} | {"library": library.name}
             about |= {"returned": _words(result.signature.return_type), "constants": [str(kind) for kind in constants]}
             inner = [own for own in result._find_referenced_environments() if own is not result.environment]
             same = _type(about["returned"]) == result.signature.return_type
@@ -245,7 +245,7 @@ def _words(kind: Any) -> Any:
 
 def _type(words: Any) -> Any:
     if isinstance(words, str):
-        return RETURNED[words]
+        return RETURN_TYPES[words]
     return types.BaseTuple.from_types(tuple(map(_type, words[-1])), getattr(sys.modules[words[0]], words[1]))
 
 
@@ -258,9 +258,9 @@ def _read(file: Path, of: bytes) -> bytes:
     if SHIPPED not in file.parents and not is_trusted(file):
         raise ValueError("the code on disk may be somebody else's")
     whole = file.read_bytes()
-    if hashlib.sha256(of + whole[HASH:]).digest() != whole[:HASH]:
+    if hashlib.sha256(of + whole[HASH_BYTES:]).digest() != whole[:HASH_BYTES]:
         raise ValueError("the code on disk is damaged")
-    return whole[HASH:]
+    return whole[HASH_BYTES:]
 
 
 def _write(file: Path, content: bytes, of: bytes) -> None:
@@ -298,7 +298,7 @@ def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
 @functools.cache
 def lean_probe() -> Any:
     """A test kernel, if numba has the private parts that `_Library` needs; else None, for numba's own way. 0.06 s."""
-    part = register_jitable(lambda x: x + 1.0, OPTIONS | WITHIN)
+    part = register_jitable(lambda x: x + 1.0, OPTIONS | KERNEL_ONLY)
     kernel = njit(**OPTIONS)(lambda x: 2.0 * part(x))
     with contextlib.suppress(Exception):
         _lean(kernel, kernel.compile, (types.float64,))

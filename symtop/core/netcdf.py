@@ -22,7 +22,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.core import __version__
-from symtop.core.code_hash import COMPUTING, processor, version
+from symtop.core.code_hash import NUMERICS, processor, version
 from symtop.core.errors import SymtopError, words_of
 from symtop.core.files import replacing
 from symtop.core.signals import deferred
@@ -59,7 +59,7 @@ CONVENTIONS = {"Conventions": "CF-1.11", "source": "symtop", "history": f"made b
 
 Tree = TypeVar("Tree", bound=xr.Dataset | xr.DataTree)
 
-LITTLE = 1_000_000  # bytes: with less free space a write error is reported as a full disk
+LITTLE_SPACE = 1_000_000  # bytes: with less free space a write error is reported as a full disk
 ROOT = Path(__file__).resolve().parents[2]
 
 
@@ -80,7 +80,7 @@ def provenance(*, changes: bool = False) -> dict[str, str]:
         "symtop_version": __version__,
         "symtop_revision": (_git("rev-parse", "HEAD")[:12] or "unknown") + ("+changes" if edited else ""),
         "python_version": platform.python_version(),
-        "dependencies": json.dumps({name: version(name) for name in (*COMPUTING, "matplotlib")}, sort_keys=True),
+        "dependencies": json.dumps({name: version(name) for name in (*NUMERICS, "matplotlib")}, sort_keys=True),
         "platform": f"{platform.system()} {platform.machine()}",
         "processor": processor(),
     }
@@ -177,7 +177,7 @@ def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
                 whole = encoding if isinstance(data, xr.DataTree) else encoding["/"]
                 data.to_netcdf(partial, engine="netcdf4", encoding=whole)
         except RuntimeError as error:  # the netCDF library's error for a full disk, among others
-            full = shutil.disk_usage(partial.parent).free < LITTLE
+            full = shutil.disk_usage(partial.parent).free < LITTLE_SPACE
             raise OSError(None, f"no room is left in {partial.parent}" if full else str(error)) from error
     return Path(path)
 

@@ -17,7 +17,7 @@ Piece = TypeVar("Piece")
 Result = TypeVar("Result")
 
 MOST_THREADS = 1024
-AHEAD = 2  # pieces for each thread that are computed before their turn: results that wait take memory
+MOST_WAITING = 2  # pieces for each thread that are computed before their turn: results that wait take memory
 VARIABLES = ("OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS")  # of NumPy's and SciPy's builds
 _stop = threading.local()
 _starting = threading.Lock()  # held while a process starts, as its environment is set meanwhile
@@ -50,7 +50,7 @@ def in_threads(work: Callable[[Piece], Result], pieces: Iterable[Piece], threads
     stopped = threading.Event()
     pool = ThreadPoolExecutor(threads, initializer=setattr, initargs=(_stop, "stopped", stopped))
     try:
-        yield from in_order(pool, work, pieces, AHEAD * threads)
+        yield from in_order(pool, work, pieces, MOST_WAITING * threads)
     except BaseException:
         stopped.set()
         pool.shutdown(wait=False, cancel_futures=True)

@@ -10,8 +10,8 @@ import time
 from collections.abc import Callable, Iterator
 from typing import Any, TextIO
 
-BEAT = 1.0  # seconds between drawings of a bar, even if no part of the work has finished
-FIRST, EVERY = 2.0, 9.0  # seconds to the first line of a command in a pipe, and from one to the next
+REDRAW_SECONDS = 1.0  # seconds between drawings of a bar, even if no part of the work has finished
+FIRST_LINE, NEXT_LINE = 2.0, 9.0  # seconds to the first line of a command in a pipe, and from one to the next
 listeners: list[Callable[[str], object]] = []  # functions that `post` calls
 A_KERNEL, CLOSED_FORM = 3.0, 7  # seconds to compile a kernel on one core; the closed form takes this many times as long
 kernels_to_compile = [1]  # how many kernels the running command may have to compile
@@ -53,7 +53,7 @@ def progress_bar(words: str, *, quiet: bool = False, **options: Any) -> Iterator
     ended = threading.Event()
 
     def beat() -> None:
-        while not ended.wait(BEAT):
+        while not ended.wait(REDRAW_SECONDS):
             bar.refresh()
 
     thread = threading.Thread(target=beat, daemon=True)
@@ -83,10 +83,10 @@ def showing_work(words: str) -> Iterator[None]:
     posted, began, ended = [words], time.monotonic(), threading.Event()
 
     def tell() -> None:
-        wait = FIRST
+        wait = FIRST_LINE
         with contextlib.suppress(OSError):  # the reader of the pipe has ended
             while not ended.wait(wait):
-                seconds, wait = time.monotonic() - began, EVERY
+                seconds, wait = time.monotonic() - began, NEXT_LINE
                 print(f"symtop: {posted[-1]}, {seconds:.0f} s", file=sys.__stderr__, flush=True)
 
     listeners.append(posted.append)

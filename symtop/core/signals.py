@@ -11,7 +11,7 @@ import threading
 from collections.abc import Callable, Iterator
 from typing import Any
 
-INTERRUPTED, TERMINATED, UNREAD = 130, 143, 141  # exit codes: 128 and the number of the signal, as shells have it
+INTERRUPTED, TERMINATED, BROKEN_PIPE = 130, 143, 141  # exit codes: 128 and the number of the signal, as shells have it
 HANGUP = getattr(signal, "SIGHUP", signal.SIGTERM)  # Windows has none
 
 

@@ -24,7 +24,7 @@ from symtop.measure.conservation import CONSTANTS, residuals
 from symtop.methods.framework.plan import OUTCOMES, sentence
 from symtop.methods.framework.registry import Integrator, integrator, integrators
 from symtop.methods.lagrangian.damped_oscillator import Oscillator, discrete_path, notebook_positions, rule_sums
-from symtop.methods.lagrangian.damped_top import NEAR, Friction, damped_run, theta_before_pole
+from symtop.methods.lagrangian.damped_top import NEAR_POLE, Friction, damped_run, theta_before_pole
 from symtop.model import charts
 from symtop.model.body import rotated
 from symtop.model.scenes import Scene, all_scenes, body_scenes, closed_form, horizon_of
@@ -321,7 +321,7 @@ def inclination(config: Setup, friction: float) -> dict[str, Any]:
     error = np.degrees(np.abs(theta[valid] - exact[np.searchsorted(dense, times[valid])]))
     ended = [f"midpoint: {OUTCOMES[run.outcome].replace('_', ' ')} at t = {run.steps * h:.3g}"] if run.outcome else []
     if exact.size < dense.size:
-        near = f"within {NEAR} rad of a pole at t = {dense[exact.size]:.3g}"
+        near = f"within {NEAR_POLE} rad of a pole at t = {dense[exact.size]:.3g}"
         ended.append(f"the exact motion comes {near} and ends there")
     of_exact = {"exact_time": dense[: exact.size], "exact": np.degrees(exact)}
     largest = {"midpoint": float(np.nanmax(error))}

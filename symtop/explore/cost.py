@@ -21,10 +21,10 @@ from symtop.model.charts import BODY
 from symtop.model.scenes import Scene
 from symtop.run.simulation import chart_of
 
-BESIDE = ("stormer-verlet", "strang", "rk4", "gauss-4", "dop853-compiled")  # methods in every chart
-SHARE = 0.1  # budget of a run, as part of that of `compare`
+PEERS = ("stormer-verlet", "strang", "rk4", "gauss-4", "dop853-compiled")  # methods in every chart
+BUDGET_SHARE = 0.1  # budget of a run, as part of that of `compare`
 MOST_LINES, MOST_CHARTS = 500, 100  # most that are cached
-REPEATS, LONG = 9, 0.05  # repetitions of a timed run; seconds of a run that is not repeated
+REPEATS, LONG_RUN = 9, 0.05  # repetitions of a timed run; seconds of a run that is not repeated
 
 _charts: dict[Scene, dict[str, dict[str, Any]]] = {}  # by scene, the lines by the names of their methods
 _newest: list[tuple[Any, ...]] = []  # scene and methods of the chart that is being computed
@@ -39,7 +39,7 @@ def question(fields: Mapping[str, Any]) -> list[Setup]:
 
 def _variants(setups: list[Setup]) -> dict[str, Integrator]:
     """The variants of a chart by the names of their methods, those of the page first; all determine the attitude."""
-    scene, beside = setups[0].scene, map(integrator, BESIDE)
+    scene, beside = setups[0].scene, map(integrator, PEERS)
     methods = [setup.method for setup in setups]
     methods += [method for method in beside if not scene.of_body or BODY in method.solvers]
     able = [method for method in methods if method.control]
@@ -50,7 +50,7 @@ def _variants(setups: list[Setup]) -> dict[str, Integrator]:
 def _runs(scene: Scene, name: str) -> list[tuple[float, str, float]]:
     """Setting, outcome and largest error (rad; of the axis, or of a body's attitude) of each run of a line."""
     variant, quantity = integrator(name), "attitude" if scene.of_body else "axis"
-    budget = SHARE * BUDGET[variant.implementation] * min(variant.speed, 1.0)
+    budget = BUDGET_SHARE * BUDGET[variant.implementation] * min(variant.speed, 1.0)
     data = compare(scene, [variant], quantity=quantity, cost="evaluations", budget=budget, quiet=True).isel(variant=0)
     values = (data[name].values.tolist() for name in (str(variant.control), "outcome", "error"))
     return [run for run in zip(*values, strict=True) if run[1] != "not_run"]
@@ -95,7 +95,7 @@ def _seconds(setup: Setup) -> float | None:
     if run().outcome != "ok":
         return None
     first = first_call(run)
-    return min([first, *(first_call(run) for _ in range(REPEATS if first < LONG else 0))])
+    return min([first, *(first_call(run) for _ in range(REPEATS if first < LONG_RUN else 0))])
 
 
 def chart(setups: list[Setup]) -> dict[str, Any]:

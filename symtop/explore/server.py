@@ -29,10 +29,10 @@ from symtop.core.parallel import cores
 from symtop.explore import answers, cost
 
 STATIC = Path(__file__).parent / "static"
-KINDS = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}  # of static files
+CONTENT_TYPES = {".html": "text/html", ".js": "text/javascript", ".css": "text/css"}  # of static files
 PATIENCE = 60.0  # seconds to wait for the rest of a request, or for the next one of a connection
 MOST_WAITING = 256  # length of the system's queue of connections
-MOST_OPEN, FEW, HURRY = 256, 64, 2.0  # most connections at once; with more than 64, wait only 2 s for a request
+MOST_OPEN, MANY_OPEN, HURRIED_PATIENCE = 256, 64, 2.0  # connections; with more than 64, wait only 2 s for a request
 BUSY = b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 2\r\nContent-Length: 0\r\nConnection: close\r\n\r\n"
 LONGEST_BODY = 65_536  # bytes of a POST request
 POLICY = "default-src 'self'; img-src 'self' data:; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
@@ -94,7 +94,7 @@ class Handler(BaseHTTPRequestHandler):
     @property
     def timeout(self) -> float:  # type: ignore[override]
         """Seconds to wait for bytes; if many connections are open, idle ones are closed soon."""
-        return PATIENCE if threading.active_count() <= FEW else HURRY
+        return PATIENCE if threading.active_count() <= MANY_OPEN else HURRIED_PATIENCE
 
     def handle(self) -> None:
         """Answer the requests of one connection, until the browser closes it, even in the middle of one."""
@@ -106,8 +106,8 @@ class Handler(BaseHTTPRequestHandler):
         if not self._is_local():
             return
         file = {path.name: path for path in STATIC.iterdir()}.get(self.place.removeprefix("/") or "page.html")
-        if file is not None and file.suffix in KINDS:
-            self._reply(200, file.read_bytes(), f"{KINDS[file.suffix]}; charset=utf-8")
+        if file is not None and file.suffix in CONTENT_TYPES:
+            self._reply(200, file.read_bytes(), f"{CONTENT_TYPES[file.suffix]}; charset=utf-8")
         elif self.place == "/catalogue":
             self._reply(200, json.dumps(answers.catalogue()).encode(), JSON)
         else:

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from symtop.core.errors import SymtopError
 from symtop.judging.claims import calls, constants, order, structure
 from symtop.judging.claims.subject import Subject
-from symtop.judging.findings import AS, Finding, Ledger, claim_name, inapplicable, undecided
+from symtop.judging.findings import AS_WITH, Finding, Ledger, claim_name, inapplicable, undecided
 from symtop.methods.framework.registry import Integrator
 from symtop.model.scenes import Scene
 
@@ -59,7 +59,7 @@ def measure(stage: Stage, subject: Subject) -> list[Finding]:
 
 def unmeasured(claims: tuple[str, ...], subject: Subject, why: str) -> list[Finding]:
     """Undecided findings on claims that could not be measured; only the first states the reason in full."""
-    reasons = [why, *[AS + claim_name(claims[0])] * (len(claims) - 1)]
+    reasons = [why, *[AS_WITH + claim_name(claims[0])] * (len(claims) - 1)]
     return [undecided(claim, subject.declared(claim), words) for claim, words in zip(claims, reasons, strict=True)]
 
 

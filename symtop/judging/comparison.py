@@ -21,7 +21,7 @@ from symtop.judging.claims.subject import LIBRARIES, open_target
 from symtop.measure import columns, settings
 from symtop.measure.accuracy import as_table, blank_row
 from symtop.measure.errors import QUANTITIES
-from symtop.measure.sweep import RAISED, SPENT, TIMED, attributes, error_row_or_message, listed, timed_rows
+from symtop.measure.sweep import NOT_TIMED, RAISED, TIMED, attributes, error_row_or_message, listed, timed_rows
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.model.exact import closed_form
 from symtop.model.scenes import Scene, horizon_of, scene as find_scene
@@ -101,7 +101,7 @@ def compare(
             timed = [(problem, method, end, runs) for method, runs in pairs]
             timed_rows(timed[1:] if problem.of_body else timed)
     size = max(len(runs) for runs, _ in results)
-    blank: dict[str, Any] = {**SPENT, "message": "", "setting_value": math.nan}
+    blank: dict[str, Any] = {**NOT_TIMED, "message": "", "setting_value": math.nan}
     tables = [
         as_table([blank | run for run in runs] + [blank_row(method) | blank] * (size - len(runs)))
         for method, (runs, _) in zip(variants, results, strict=True)

@@ -16,11 +16,11 @@ import xarray as xr
 from symtop.core.errors import SymtopError, shown
 
 VERDICTS = ("confirmed", "refuted", "measured", "undecided", "inapplicable")
-LONGEST, CUT = 240, " [...]"  # characters of a foreign error message, and the end of one that was longer
-WIDTH, AS = 100, "as with "  # characters in a line; the begin of a reason that refers to that of another claim
+LONGEST, ELLIPSIS = 240, " [...]"  # characters of a foreign error message, and the end of one that was longer
+WIDTH, AS_WITH = 100, "as with "  # characters in a line; the begin of a reason that refers to that of another claim
 UNITS = ((1.0, "s"), (1e-3, "ms"), (1e-6, "us"), (0.0, "ns"))
-KEPT = {"energy": "the energy", "p_phi": "p_phi", "p_psi": "p_psi", "axis_length": "|e|", "momentum": "the momentum"}
-SAYS = {  # phrases for measured values: {0} is the number, {1} the text
+NOUNS = {"energy": "the energy", "p_phi": "p_phi", "p_psi": "p_psi", "axis_length": "|e|", "momentum": "the momentum"}
+PHRASES = {  # phrases for measured values: {0} is the number, {1} the text
     "wrong limit": "as h -> 0 it goes to another motion, {0:.1e} away",
     "kept": "kept, to {0:.0e}", "bounded": "bounded, within {0:.1e}", "drift": "drifts, by {0:.1e}",
     "random walk": "wanders as rounding does, by {0:.1e}", "growing": "changes, by {0:.1e}, and may grow",
@@ -57,7 +57,7 @@ class Measured(NamedTuple):
         return bool(str(self))
 
 
-NOTHING = Measured()
+UNMEASURED = Measured()
 
 
 class Finding(NamedTuple):
@@ -101,19 +101,19 @@ def agreement(
 ) -> Finding:
     """The finding on a claim that is true or false, from the measured answer `yes`; None is undecided."""
     verdict = "measured" if declared is None else "confirmed" if declared == yes else "refuted"
-    measured, verdict = (NOTHING, "undecided") if yes is None else (Measured(yes_no(yes), value), verdict)
+    measured, verdict = (UNMEASURED, "undecided") if yes is None else (Measured(yes_no(yes), value), verdict)
     return Finding(claim, yes_no(declared), measured, verdict, why, value, resolution)
 
 
 def undecided(claim: str, declared: str, why: str) -> Finding:
     """The finding on a claim that could not be judged; a reason above `LONGEST` characters is cut."""
-    short = why.rstrip(".") if len(why) <= LONGEST else why[: LONGEST - len(CUT)].rsplit(" ", 1)[0] + CUT
-    return Finding(claim, declared, NOTHING, "undecided", short)
+    short = why.rstrip(".") if len(why) <= LONGEST else why[: LONGEST - len(ELLIPSIS)].rsplit(" ", 1)[0] + ELLIPSIS
+    return Finding(claim, declared, UNMEASURED, "undecided", short)
 
 
 def inapplicable(claim: str, why: str, declared: str = "") -> Finding:
     """The finding on a claim that does not apply, with the reason."""
-    return Finding(claim, declared, NOTHING, "inapplicable", why)
+    return Finding(claim, declared, UNMEASURED, "inapplicable", why)
 
 
 class About(NamedTuple):
@@ -190,7 +190,7 @@ def line(finding: Finding, width: int = WIDTH) -> str:
     silent = verdict == "inapplicable" or claim == "explicit" or measured.kind in ("a function", "its states'")
     if silent and not declared:
         return ""
-    says = SAYS.get(f"{claim} {measured.kind}") or ("{1}" if measured.text else SAYS.get(measured.kind, "{1}"))
+    says = PHRASES.get(f"{claim} {measured.kind}") or ("{1}" if measured.text else PHRASES.get(measured.kind, "{1}"))
     number = value if math.isnan(measured.number) else measured.number
     words = says.format(number, measured).replace("to 0e+00", "to the last bit") if measured else verdict
     text = f"{claim_name(claim):<14} {words}"
@@ -198,7 +198,7 @@ def line(finding: Finding, width: int = WIDTH) -> str:
         text += f" (claimed: {declared}{f'; {verdict}' if measured else ''})"
     if verdict in ("confirmed", "measured") and claim != "calls":
         return text
-    if why.startswith(AS):
+    if why.startswith(AS_WITH):
         return f"{text}, {why}"
     return text + "\n" + textwrap.indent(textwrap.fill(f"{why}.", width - 4), "    ")
 
@@ -214,11 +214,11 @@ def description(findings: Sequence[Finding]) -> str:
         words += [limits.get(order.kind) or (f"order {round(p)}" if abs(p - round(p)) < 0.3 else f"order {p:.1f}")]
         words[-1] += " or more" * order.text.endswith("or more")
     for claim, yes in (("symplectic", "symplectic"), ("symmetric", "reversible")):
-        answer = measured.get(claim, NOTHING).kind
+        answer = measured.get(claim, UNMEASURED).kind
         words += [yes] if answer == "yes" else [f"not {yes}"] if answer == "no" else []
 
     def of_kind(*kinds: str) -> str:
-        return _listed([name for claim, name in KEPT.items() if measured.get(claim, NOTHING).kind in kinds])
+        return _listed([name for claim, name in NOUNS.items() if measured.get(claim, UNMEASURED).kind in kinds])
 
     constant, bounded = of_kind("kept"), of_kind("bounded")
     changing = of_kind("drift", "growing", "random walk", "blows up")

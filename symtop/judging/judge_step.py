@@ -35,9 +35,9 @@ from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, who
 from symtop.judging.adapters.adapter import Stepper, heartbeat, integrator
 from symtop.judging.adapters.python_step import CONJUGATE
 from symtop.judging.battery import measure, stages, unmeasured
-from symtop.judging.claims.constants import KEPT, Constant, blow_up_finding, blows_up
+from symtop.judging.claims.constants import KEPT_CHANGE, Constant, blow_up_finding, blows_up
 from symtop.judging.claims.subject import Subject, open_target, seconds_a_step
-from symtop.judging.findings import SAYS, About, Finding, Ledger, Measured, error_units, undecided
+from symtop.judging.findings import PHRASES, About, Finding, Ledger, Measured, error_units, undecided
 from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
 from symtop.measure.conservation import CONSTANTS, constant_of
 from symtop.measure.errors import checked, completed, doubles, errors, refuse_other_order, refuse_other_scene, unpadded
@@ -55,19 +55,19 @@ VECTORS = {
 }  # fmt: skip
 SCALARS = ("time", "theta", "phi", "psi", *CONSTANTS)
 OF_STATES = ("axis", "attitude", "theta", "momentum", "rates")
-SINGLE = 1e-6  # a length that differs less from one, as by single precision, gets no finding
-SHOWN = 3  # most faults of a line of names in a message
+SINGLE_LENGTH = 1e-6  # a length that differs less from one, as by single precision, gets no finding
+MOST_FAULTS = 3  # most faults of a line of names in a message
 # above the rounding of a file: largest angle, in rad, between the axis and the third axis of the quaternion, and the
-AGREE = 1e-3  # largest relative difference of a constant at the start from the scene's that is not worth mentioning
-FEWEST = 100  # samples from which a law of growth is judged
+AGREE = 1e-3  # relative difference of a constant at the start from the scene's that is not worth mentioning
+FEWEST_SAMPLES = 100  # samples from which a law of growth is judged
 SEEDS = 1_000_000_000  # random seeds are below this
-OPENING = 60.0  # seconds for loading a file and its imports
-PLUGIN = 600.0  # seconds for a stage of a registered integrator
+LOADING_SECONDS = 60.0  # seconds for loading a file and its imports
+PLUGIN_SECONDS = 600.0  # seconds for a stage of a registered integrator
 # seconds for a stage of a step: at most, for all stages together, and at least in any case
-VERDICT, QUICK_VERDICT = (45.0, 120.0, 15.0), (12.0, 40.0, 6.0)
-SHORTER = 4.0  # factor by which the runs of a stage that took too long are shorter when it is repeated
-SLOW = "; make a step faster", "; judge it without --quick, or make a step faster"  # the second with --quick
-STARTS = ", or if it starts slowly make it a server"  # for a program
+VERDICT_SECONDS, QUICK_VERDICT_SECONDS = (45.0, 120.0, 15.0), (12.0, 40.0, 6.0)
+SHORTER_RUNS = 4.0  # factor by which the runs of a stage that took too long are shorter when it is repeated
+SLOW_HINTS = "; make a step faster", "; judge it without --quick, or make a step faster"  # the second with --quick
+SERVER_HINT = ", or if it starts slowly make it a server"  # for a program
 
 
 def judge(
@@ -138,7 +138,7 @@ def judge(
     began, findings = time.monotonic(), []
     load = functools.partial(open_target, target, form, chart, on=problem, adaptive=adaptive)
     with Process(lambda: table_of(load)) as process:
-        process.allow(OPENING)
+        process.allow(LOADING_SECONDS)
         try:
             stepper = Remote(process)
             method = integrator(stepper, **claims)
@@ -149,8 +149,8 @@ def judge(
         facts = stepper.name, stepper.chart, stepper.implementation, subject.seconds_a_step
         about = About(*facts, seed, problem.time_scale())
         listen(about)
-        slow, opening = SLOW[quick] + STARTS * (form == "program"), time.monotonic() - began
-        most, together, least = QUICK_VERDICT if quick else VERDICT
+        slow, opening = SLOW_HINTS[quick] + SERVER_HINT * (form == "program"), time.monotonic() - began
+        most, together, least = QUICK_VERDICT_SECONDS if quick else VERDICT_SECONDS
         limits = most + opening, together + opening, least + opening  # a process that is started again opens it again
         for finding in _findings(subject, process, began, limits, slow):
             listen(finding)
@@ -181,7 +181,8 @@ def read(target: Any) -> dict[str, Any]:
     wrong += ["there is no time"] * ("time" not in names)
     if wrong:
         begin = f"{path.name} must begin with names, commas or spaces between: time and of {', '.join(fields[1:])}"
-        raise SymtopError(f"{begin}, but of {head[:60]!r} {', '.join(wrong[:SHOWN])}{' ...' * (len(wrong) > SHOWN)}")
+        faults = ", ".join(wrong[:MOST_FAULTS]) + " ..." * (len(wrong) > MOST_FAULTS)
+        raise SymtopError(f"{begin}, but of {head[:60]!r} {faults}")
     if not any(line.partition("#")[0].strip() for line in lines):
         raise SymtopError(f"{path.name} must have a line of numbers below its names, and has none")
     must = f"{path.name} must have {len(names)} numbers in each line"
@@ -223,7 +224,8 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
         bound = scene.momentum_scale / moments.min() * deviation["momentum_bound"].values
         off = np.linalg.norm(rates - inside / moments, axis=1)
         deviation = deviation.assign(rates=("time", off), rates_bound=("time", bound))
-    strayed = [name for name in map(str, deviation) if name.endswith("_length") and (deviation[name] > SINGLE).any()]
+    lengths = [name for name in map(str, deviation) if name.endswith("_length")]
+    strayed = [name for name in lengths if (deviation[name] > SINGLE_LENGTH).any()]
     findings = [_error(name, scene, time, deviation) for name in (*OF_STATES, *strayed) if name in deviation]
     own = _from_states(scene, states)
     for name in (*CONSTANTS, *sorted({*conserves} - {*CONSTANTS})):
@@ -269,7 +271,7 @@ def _error(name: str, scene: Scene, time: np.ndarray, deviation: xr.Dataset) -> 
     if not there.any():
         return undecided(f"{name}_error", "", f"all of its {there.size} samples are lost")
     time, values, lost = time[there], deviation[name].values[there], int((~there).sum())
-    growth = constant_of(time, values) if time.size >= FEWEST else None
+    growth = constant_of(time, values) if time.size >= FEWEST_SAMPLES else None
     largest, gone = float(values.max()), f", {lost} of {there.size} samples lost" * bool(lost)
     bound = float(np.nanmax(deviation[f"{name}_bound"].values))
     unit = error_units(name)
@@ -295,18 +297,18 @@ def _constant(
     true = getattr(scene.top.momenta(scene.start), name) if name != "energy" else scene.top.energy(scene.start)
     times = time if time[-1] else [1.0]  # with a single sample at the start nothing grows
     change = constant_of(times, (values - values[0]) / scale, period=scene.time_scale())
-    if time.size < FEWEST:
+    if time.size < FEWEST_SAMPLES:
         change = change._replace(exponent=math.nan)
-    constant = Constant(change, math.nan, KEPT * grain, grain)
+    constant = Constant(change, math.nan, KEPT_CHANGE * grain, grain)
     count = f"{time.size}{f' of {there.size}' * (not there.all())} samples"
     off = float(abs(values[0] - true)) / scale
     finding = constant.finding(name, declared, constant.words(f"in {count}; it begins {off:.1e} from the scene's"))
     note += f", and begins {off:.0e} from the scene's" * (off > AGREE)
     if note and (seen := finding.measured):
-        text = SAYS.get(seen.kind, "{1}").format(seen.number, seen) + note
+        text = PHRASES.get(seen.kind, "{1}").format(seen.number, seen) + note
         finding = finding._replace(measured=seen._replace(text=text))
-    if finding.verdict != "refuted" and time.size < FEWEST and np.ptp(time) < scene.time_scale():
-        few = f"fewer than {FEWEST}, over less than a {scene.period_word}, say nothing"
+    if finding.verdict != "refuted" and time.size < FEWEST_SAMPLES and np.ptp(time) < scene.time_scale():
+        few = f"fewer than {FEWEST_SAMPLES}, over less than a {scene.period_word}, say nothing"
         finding = undecided(name, declared, f"{finding.why}; {few}")
     beyond = blows_up(scene, (values - values[0]) / scale) if name == "energy" else np.empty(0)
     return blow_up_finding(finding, time[beyond[0]], scene.of_body) if beyond.size else finding
@@ -329,7 +331,7 @@ def _findings(
                     raise
             if not (process.late and subject.seconds_a_step):
                 break
-            current = replace(subject, seconds_a_step=SHORTER * max(subject.seconds_a_step, process.late))
+            current = replace(subject, seconds_a_step=SHORTER_RUNS * max(subject.seconds_a_step, process.late))
         first = "calls" in stage.claims
         process.lost += slow if process.late else ""
         if process.lost:
@@ -343,7 +345,7 @@ def _findings(
 def judge_separately(method: Integrator, scene: Scene, *, quick: bool = False) -> Ledger:
     """The `Ledger` of a registered integrator, as `symtop.judging.battery.judge`; foreign solvers run in a process."""
     heartbeat.reset(quick=quick)
-    limits = PLUGIN, math.inf, PLUGIN
+    limits = PLUGIN_SECONDS, math.inf, PLUGIN_SECONDS
     with Process(lambda: solvers_of(method)) as process:
         subject = Subject(separated(method, process), scene, quick, seed=secrets.randbelow(SEEDS))
         findings = tuple(_findings(subject, process, time.monotonic(), limits))

@@ -36,10 +36,10 @@ from symtop.model.top import Angles, SymmetricTop
 
 Table = dict[str, Callable[..., Any]]
 THREADED = "jax"  # hangs in a process that was forked after its import
-LOOK = 0.05  # seconds between two checks for an answer
+LOOK_SECONDS = 0.05  # seconds between two checks for an answer
 PATIENCE = 60.0  # seconds for loading
 FORMS = {"rotation": ROTATION, "matrix": MATRIX, "plane": REDUCED}  # other steppers have the form of their chart
-FACTS = ("name", "chart", "implementation", "own_loop", "takes_field")  # attributes of a stepper that are sent
+SENT_ATTRIBUTES = ("name", "chart", "implementation", "own_loop", "takes_field")  # of a stepper
 
 
 class Process(contextlib.AbstractContextManager["Process"]):
@@ -113,7 +113,7 @@ class Process(contextlib.AbstractContextManager["Process"]):
     def _answer(self) -> Any:
         """The answer of the process; SymtopError if it ends, hangs in a call or exceeds `limit`."""
         calls, since = heartbeat.calls, clock(self.process.pid)
-        while not self.pipe.poll(LOOK):
+        while not self.pipe.poll(LOOK_SECONDS):
             now = clock(self.process.pid)
             if heartbeat.calls != calls or not heartbeat.inside:
                 calls, since = heartbeat.calls, now
@@ -192,7 +192,7 @@ def table_of(opened: Callable[[], Stepper]) -> Table:
         return stepper.along(f, *args), sorted(getattr(f, "times", ()))
 
     def about() -> dict[str, Any]:
-        facts = {name: getattr(stepper, name) for name in FACTS}
+        facts = {name: getattr(stepper, name) for name in SENT_ATTRIBUTES}
         kind = next((name for name, form in FORMS.items() if form is stepper.form), "")
         return facts | {"kind": kind, "adaptive": stepper.adaptive is not None}
 
@@ -209,7 +209,7 @@ class Remote(Stepper):
         self.process, facts = process, process.call("about")
         self.form = FORMS.get(facts["kind"]) or equations.FORMS[facts["chart"]]
         self.adaptive = functools.partial(_run, process, "adaptive") if facts["adaptive"] else None
-        for name in FACTS:
+        for name in SENT_ATTRIBUTES:
             setattr(self, name, facts[name])
 
     def clock(self) -> float:

@@ -26,7 +26,7 @@ from symtop.run.reference.truth import reference
 from symtop.run.simulation import integrate
 
 SAMPLES = 1001
-DENSE = 20.0  # samples per nutation above which the phase of the samples does not matter
+DENSE_SAMPLES = 20.0  # samples per nutation above which the phase of the samples does not matter
 GOLDEN_CLOSE = 0.01  # largest distance of an accepted stride, or of an accepted number of them, from the golden section
 NO_FINER_AFTER = {"compiled": 1e9, "python": 2e4}  # after a run with more force evaluations no finer setting is run
 COUNTS = ("step_size", "tolerance", "steps", "force_evaluations", "newton_iterations", "outcome", "reached_time")
@@ -35,7 +35,7 @@ COUNTS = ("step_size", "tolerance", "steps", "force_evaluations", "newton_iterat
 def enough_samples(scene: Scene, horizon: float) -> int:
     """The number of equidistant samples from which the largest error of an angle over a run is read to 5 %."""
     period = scene.nutation_period
-    if not math.isfinite(period) or SAMPLES * period > DENSE * horizon:
+    if not math.isfinite(period) or SAMPLES * period > DENSE_SAMPLES * horizon:
         return SAMPLES
     counts = np.arange(SAMPLES, 2 * SAMPLES)
     stride = horizon / (counts - 1) / period

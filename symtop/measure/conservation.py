@@ -44,10 +44,10 @@ from symtop.run.trajectory import Trajectory
 CONSTANTS = ("energy", "p_phi", "p_psi")
 LAWS = {0.0: "bounded", 0.5: "random walk", 1.0: "linear", 1.5: "t^3/2", 2.0: "quadratic"}
 RUN_ROUNDING = 3e-13  # relative: the largest change that a million steps of rounding explain where sums are compensated
-WALK = 100.0  # times the rounding error: a change that grows as t^1/2 and is larger is not attributed to rounding
-SHORTEST, LONGEST = 0.2, 2.0  # decades of time at the end of a run in which growth is judged: least and most
+WALK_RATIO = 100.0  # times the rounding error: a change that grows as t^1/2 and is larger is not attributed to rounding
+LEAST_DECADES, MOST_DECADES = 0.2, 2.0  # decades of time at the end of a run in which growth is judged: least and most
 BLOCKS = 24  # equal stretches of a run whose means a trend is fitted to
-SLACK = 0.1  # an exponent agrees with that of a law if they differ by no more than this, or than its interval
+EXPONENT_SLACK = 0.1  # an exponent agrees with that of a law if they differ by no more than this, or than its interval
 
 
 class Trend(NamedTuple):
@@ -70,13 +70,14 @@ class Change(NamedTuple):
     law: str  # name of the exponent
 
 
-def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = LONGEST, period: float = 0.0) -> Change:
+def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = MOST_DECADES, period: float = 0.0) -> Change:
     """Size, trend and growth over the last `decades` of a residual (n,) at times (n,); samples may be NaN.
 
-    Within the first `period` an oscillation only begins: growth is judged after it, in the last `SHORTEST` at least.
+    Within the first `period` an oscillation only begins: growth is judged after it, in the last `LEAST_DECADES` at
+    least.
     """
     if period:
-        decades = min(max(math.log10(max(np.asarray(time)[-1] / period, 1.0)), SHORTEST), decades)
+        decades = min(max(math.log10(max(np.asarray(time)[-1] / period, 1.0)), LEAST_DECADES), decades)
     size, power = np.abs(np.asarray(residual, float)), growth(time, residual, decades)
     good = size[np.isfinite(size)]
     largest = float(good.max()) if good.size else math.nan
@@ -91,13 +92,13 @@ def residuals(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
     return {name: (shown - shown[0]) / scales[name] for name, shown in values.items()}
 
 
-def growth(time: ArrayLike, residual: ArrayLike, decades: float = LONGEST) -> Fit:
+def growth(time: ArrayLike, residual: ArrayLike, decades: float = MOST_DECADES) -> Fit:
     """The exponent of |residual| ~ t^exponent, from the largest values in logarithmic windows of the last `decades`."""
     return power_law(*maxima(time, residual, decades))
 
 
 def maxima(
-    time: ArrayLike, residual: ArrayLike, decades: float = LONGEST, count: int = 12
+    time: ArrayLike, residual: ArrayLike, decades: float = MOST_DECADES, count: int = 12
 ) -> tuple[list[float], list[float]]:
     """Middles of `count` logarithmic windows over the last `decades` of time, and the largest |residual| in each."""
     t, r = np.asarray(time, float), np.abs(np.asarray(residual, float))
@@ -118,7 +119,7 @@ def law(fit: Fit) -> str:
     nearest = min(LAWS, key=lambda exponent: abs(exponent - fit.slope))
     if any(abs(exponent - fit.slope) <= fit.interval for exponent in LAWS if exponent != nearest):
         return "undecided"
-    return LAWS[nearest] if abs(nearest - fit.slope) <= max(fit.interval, SLACK) else f"t^{fit.slope:.2f}"
+    return LAWS[nearest] if abs(nearest - fit.slope) <= max(fit.interval, EXPONENT_SLACK) else f"t^{fit.slope:.2f}"
 
 
 def behaviour(size: float, slope: float, interval: float, grain: float = 1.0, rounding: float = 0.0) -> str:
@@ -129,7 +130,7 @@ def behaviour(size: float, slope: float, interval: float, grain: float = 1.0, ro
 
         kept          size <= RUN_ROUNDING grain, whatever the exponent; or size <= rounding, and not bounded
         bounded       the exponent is nearest to 0, and its interval excludes 1/2: an error of the step, however small
-        random walk   nearest to 1/2, the interval excludes 0 and 1, and size <= `WALK` times rounding
+        random walk   nearest to 1/2, the interval excludes 0 and 1, and size <= `WALK_RATIO` times rounding
         drift         nearest to 1 or larger, and the interval excludes 1/2
         growing       anything else: the interval includes two laws, or the change grows as t^1/2 but is too large for
                       rounding, or there is no exponent (NaN)
@@ -145,7 +146,7 @@ def behaviour(size: float, slope: float, interval: float, grain: float = 1.0, ro
     if slope >= 0.75 and low > 0.5:
         return "drift"
     walks = 0.25 <= slope < 0.75 and low > 0.0 and high < 1.0
-    return "random walk" if walks and size <= WALK * rounding else "growing"
+    return "random walk" if walks and size <= WALK_RATIO * rounding else "growing"
 
 
 def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
@@ -166,12 +167,12 @@ def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
 
 
 STENCIL = np.array([1 / 280, -4 / 105, 1 / 5, -4 / 5, 0.0, 4 / 5, -1 / 5, 4 / 105, -1 / 280])
-REACH = 4  # steps of the stencil to either side
+STENCIL_REACH = 4  # steps of the stencil to either side
 PLACES = 240  # places of a run where rates are differenced
-FEWEST = 4000  # steps: in a shorter run the stencils would overlap
-SURE = 8.0  # half-widths of the 95 % interval that a drift must exceed
-LEAST = 1e-8  # relative: the least drift that counts, above the rounding of differences of angles of many turns
-SHARE = 0.5  # least ratio of the drift of the difference to the drift of the implied momentum, if a run hides it
+FEWEST_STEPS = 4000  # steps: in a shorter run the stencils would overlap
+SURE_WIDTHS = 8.0  # half-widths of the 95 % interval that a drift must exceed
+LEAST_DRIFT = 1e-8  # relative: the least drift that counts, above the rounding of differences of angles of many turns
+HIDDEN_SHARE = 0.5  # least ratio of the drift of the difference to the drift of the implied momentum, if a run hides it
 
 
 class Difference(NamedTuple):
@@ -186,31 +187,32 @@ class Difference(NamedTuple):
 def from_increments(method: Integrator, scene: Scene, plan: Plan) -> Difference | None:
     """The drift of reported against implied momenta over a run like `plan` in the angles chart; None if too short."""
     steps = int(plan.marks[-1])
-    if steps < FEWEST:
+    if steps < FEWEST_STEPS:
         return None
     places = np.arange(PLACES) + np.mod(GOLDEN * np.arange(PLACES), 1.0)
-    middles = np.rint(places * (steps - 2 * REACH - 1) / PLACES).astype(np.int64) + REACH
-    marks = (middles[:, None] + np.arange(-REACH, REACH + 1)).ravel()
+    middles = np.rint(places * (steps - 2 * STENCIL_REACH - 1) / PLACES).astype(np.int64) + STENCIL_REACH
+    marks = (middles[:, None] + np.arange(-STENCIL_REACH, STENCIL_REACH + 1)).ravel()
     again = Plan.steps(plan.step_size, np.unique(marks))
     run = solve(method, "angles", scene.top, scene.start, again, f" on {scene.name}")
     if run.outcome != "ok":
         return None
     place = np.searchsorted(again.marks, middles)
-    around = run.states[place[:, None] + np.arange(-REACH, REACH + 1)]  # (places, 9, 4)
+    around = run.states[place[:, None] + np.arange(-STENCIL_REACH, STENCIL_REACH + 1)]  # (places, 9, 4)
     implied = dict(zip(("p_phi", "p_psi"), momenta_of(scene.top, around, again.step_size), strict=True))
     times, sizes = again.times[place], {}
     for name, values in implied.items():
         reported = getattr(run, name)[place]
         apart, own = trend(times, (values - reported) / scene.momentum_scale), trend(times, values)
-        hidden = abs(apart.rise) > max(LEAST, SHARE * abs(own.rise) / scene.momentum_scale)
-        sizes[name] = abs(apart.rise) if hidden and abs(apart.slope) > SURE * apart.interval else 0.0
+        hidden = abs(apart.rise) > max(LEAST_DRIFT, HIDDEN_SHARE * abs(own.rise) / scene.momentum_scale)
+        sizes[name] = abs(apart.rise) if hidden and abs(apart.slope) > SURE_WIDTHS * apart.interval else 0.0
     name = max(sizes, key=lambda name: sizes[name])
-    return Difference(name, sizes[name], LEAST, f"more at the end of {int(again.marks[-1])} steps than at their start")
+    where = f"more at the end of {int(again.marks[-1])} steps than at their start"
+    return Difference(name, sizes[name], LEAST_DRIFT, where)
 
 
 def momenta_of(top: SymmetricTop, around: Array, h: float) -> tuple[Array, Array]:
     """p_phi and p_psi (places,) that the rates imply, from nine consecutive states (places, 9, 4) in angles."""
-    theta = around[:, REACH, 0]
-    phi_dot, psi_dot = ((around[:, :, k] - around[:, REACH, None, k]) @ STENCIL / h for k in (2, 3))
+    theta = around[:, STENCIL_REACH, 0]
+    phi_dot, psi_dot = ((around[:, :, k] - around[:, STENCIL_REACH, None, k]) @ STENCIL / h for k in (2, 3))
     p_psi = top.I3 * (psi_dot + phi_dot * np.cos(theta))
     return top.I1 * phi_dot * np.sin(theta) ** 2 + p_psi * np.cos(theta), p_psi

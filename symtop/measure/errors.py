@@ -137,7 +137,7 @@ def _of_run(run: Any, scene: Any, precision: str, warn: Callable[[str], object])
     doubtful = [] if sure else start_warnings(data.time, columns)
     if doubtful and data.axis is not None:
         x, up, z = data.axis[0]
-        if np.min(charts.axis_distance(np.array([[x, -z, up], [x, z, up]]), truth["axis"].values[0])) < NEAR:
+        if np.min(charts.axis_distance(np.array([[x, -z, up], [x, z, up]]), truth["axis"].values[0])) < RIGHT_WITHIN:
             doubtful[0] += " It is the true one if y is read as up, where here z is up."
     for sentence in [*doubtful, *(trajectory_warnings(data.time, columns, chosen.horizon) if foreign else ())]:
         warn(f"on {chosen.name}: {sentence}")
@@ -228,10 +228,10 @@ def errors_against(scene: Scene, run: Trajectory, truth: xr.Dataset) -> dict[str
     return columns
 
 
-LENGTH = 0.5  # largest deviation from one of the length of the first axis or quaternion; else it is no unit vector
+LENGTH_OFF = 0.5  # largest deviation from one of the length of the first axis or quaternion; else it is no unit vector
 UNIT_VECTORS = ("axis", "quaternion")
-FAR, NEAR = 0.1, 0.01  # rad from the true attitude: farther is a wrong convention of a quaternion, nearer the right one
-BEYOND = 100.0  # horizons: a longer run probably has another unit of time (milliseconds for seconds: a factor 1000)
+WRONG_BEYOND, RIGHT_WITHIN = 0.1, 0.01  # rad from the true attitude: convention of a quaternion
+MOST_HORIZONS = 100.0  # a longer run probably has another unit of time (milliseconds for seconds: a factor 1000)
 SHAPES = {"axis": (3,), "quaternion": (4,), "momentum": (3,), **dict.fromkeys(("theta", "phi", "psi", *CONSTANTS), ())}
 
 
@@ -304,9 +304,9 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
             length = largest * np.linalg.norm(columns[name] / np.where(largest > 0.0, largest, 1.0)[:, None], axis=1)
             off = (length == 0.0) | np.isinf(length)  # such a vector has no direction
             first = int(np.argmax(~np.isnan(length)))
-            off[first] |= np.abs(length[first] - 1.0) > LENGTH
+            off[first] |= np.abs(length[first] - 1.0) > LENGTH_OFF
             if off.any():
-                must = f"of length 1, at first within {LENGTH:g}, and later of any above 0"
+                must = f"of length 1, at first within {LENGTH_OFF:g}, and later of any above 0"
                 place = f"{length[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
                 raise SymtopError(f"{name} must be {must}, but its length is {place}")
             columns[name] = columns[name] / length[:, None]
@@ -354,12 +354,12 @@ def doubles(name: str, values: Any) -> charts.Array:
 def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:
     """SymtopError for quaternions that match the true attitude only if read in another convention."""
     true = truth["quaternion"].values  # near some attitudes two conventions agree: the first sample far off decides
-    far = np.flatnonzero(charts.attitude_distance(quaternion, true) > FAR)
+    far = np.flatnonzero(charts.attitude_distance(quaternion, true) > WRONG_BEYOND)
     if not far.size:
         return
     given, k = quaternion[far[0]], far[0]
     for other, moved in (("x, y, z, w", np.roll(given, 1)), ("from space to body", given * [1.0, -1.0, -1.0, -1.0])):
-        if float(charts.attitude_distance(moved, true[k])) < NEAR:
+        if float(charts.attitude_distance(moved, true[k])) < RIGHT_WITHIN:
             place = "first sample" if k == 0 else f"sample at t = {truth.time.values[k]:.6g}"
             must = "quaternion must be in the order w, x, y, z and from body to space"
             raise SymtopError(f"{must}, but its {place} is the true one if it is read as {other}")
@@ -368,7 +368,7 @@ def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:
 def start_warnings(time: charts.Array, errors: Mapping[str, charts.Array]) -> list[str]:
     """A warning if the first sample of a trajectory is far from the true motion, as a list of at most one sentence."""
     for name in ("attitude", "axis", "theta"):
-        if name in errors and errors[name][0] > FAR:
+        if name in errors and errors[name][0] > WRONG_BEYOND:
             place = f"at t = {time[0]:.6g}, is {errors[name][0]:.2g} rad from the true {name}"
             return [f"the first sample, {place}: is this the start of the scene, and is its time counted from there?"]
     return []
@@ -377,7 +377,7 @@ def start_warnings(time: charts.Array, errors: Mapping[str, charts.Array]) -> li
 def trajectory_warnings(time: charts.Array, errors: Mapping[str, charts.Array], horizon: float) -> list[str]:
     """Warnings about a foreign trajectory: times far beyond the scene's horizon, samples that are NaN."""
     sentences = []
-    if time[-1] > BEYOND * horizon:
+    if time[-1] > MOST_HORIZONS * horizon:
         far = f"{time[-1]:.6g}, {time[-1] / horizon:.3g} times the horizon {horizon:.6g}"
         sentences.append(f"times reach to {far}: are they in the scene's unit of time?")
     for name, values in errors.items():

@@ -13,14 +13,15 @@ by least squares. At the coarsest step of the fit a, b, c have priors of mean 0 
 has: where the steps span too little to tell a h^q from a power, the prior decides, and its uncertainty is part of the
 interval. A point counts if its error is above ten times the reference's own bound and the run's round-off, below 1e-2,
 and h omega < 0.45 for a method of order 2 (in proportion more for higher orders, whose steps have more stages). Points
-within a hundred times the bound weigh less. The coarsest points are dropped while the correction exceeds `CORRECTION`
-there or the interval exceeds `WIDEST`.
+within a hundred times the bound weigh less. The coarsest points are dropped while the correction exceeds
+`LARGEST_CORRECTION` there or the interval exceeds `WIDEST_INTERVAL`.
 
-The interval is Student's, for the degrees of freedom that the data leave, and never less than `RESOLVED`. It covers p
-for 93 to 97 % of synthetic curves with an h^2 correction and the scatter of sampled maxima; that of a straight line
-covers it for less than 4 %. On 100 random tops it covers the order of 11 symmetric methods for 93 to 100 %, but only
-for 77 % that of rk4 and for 17 % that of tsit5-fixed, whose leading error term is small, so that its slopes are near 6.
-An interval covers the scatter, not the bias of too long steps, which the error terms of one step (`judging`) show.
+The interval is Student's, for the degrees of freedom that the data leave, and never less than `LEAST_INTERVAL`. It
+covers p for 93 to 97 % of synthetic curves with an h^2 correction and the scatter of sampled maxima; that of a straight
+line covers it for less than 4 %. On 100 random tops it covers the order of 11 symmetric methods for 93 to 100 %, but
+only for 77 % that of rk4 and for 17 % that of tsit5-fixed, whose leading error term is small, so that its slopes are
+near 6. An interval covers the scatter, not the bias of too long steps, which the error terms of one step (`judging`)
+show.
 
 One rule, `order_verdict`, says for every study whether a measured slope confirms a declared order.
 Source: Hairer, Lubich, Wanner, Geometric Numerical Integration, theorem IX.2.2 (even powers of a symmetric method).
@@ -36,22 +37,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from symtop.model.charts import Array
 
-LEAST = 5  # points of a fit
+LEAST_POINTS = 5  # points of a fit
 LARGEST_ERROR = 1e-2  # of a point that counts
-FLOOR = 1e3  # times the reference's bound: a finest error above it has not reached rounding
+ROUNDING_FLOOR = 1e3  # times the reference's bound: a finest error above it has not reached rounding
 LARGEST_PHASE = 0.45  # h omega of a point that counts, for a method of order 2
-WIDEST = 0.2  # largest half-width of the 95 % interval of an accepted fit
-CORRECTION = 0.7  # largest correction of log error to the straight line, at the coarsest step of an accepted fit
-TERMS, PRIOR = 3, 0.5  # correction terms of the series; prior deviation of the k-th at the coarsest step: PRIOR^k
-ITERATIONS, SMOOTH = 12, 1e-12  # for the scatter of the points; the least scatter assumed
-LEVEL = 30.0  # times the least error: only smaller errors may be round-off
-RESOLVED = 1e-3  # least half-width of an interval: rounding shifts slopes by less than this
-EXACT = 1e-2  # ratio of the reference's bound to an error above which a point weighs less
-MISSES = 5.0  # standard deviations: a finest point further off the curve of the others has reached round-off
-VISIBLE = 0.01  # of log error: the finest point must also be at least this far off
-BESIDE = 0.05  # a declared order at most this far beyond the interval of a slope is confirmed
-STAYS, FEWEST, ABOVE = 0.5, 3, 10.0  # the finest errors, 3 or more above 10 bounds, stay if their ratio is above 0.5
-CLEARLY = 0.4  # a declared order further than this beyond the interval is refuted: orders are whole numbers
+WIDEST_INTERVAL = 0.2  # largest half-width of the 95 % interval of an accepted fit
+LARGEST_CORRECTION = 0.7  # of log error to the straight line, at the coarsest step of an accepted fit
+TERMS, PRIOR_DEVIATION = 3, 0.5  # terms of the series; the k-th has this to the power k at the coarsest step
+ITERATIONS, LEAST_SCATTER = 12, 1e-12  # for the scatter of the points; the least scatter assumed
+ROUND_OFF_LEVEL = 30.0  # times the least error: only smaller errors may be round-off
+LEAST_INTERVAL = 1e-3  # least half-width of an interval: rounding shifts slopes by less than this
+EXACT_RATIO = 1e-2  # ratio of the reference's bound to an error above which a point weighs less
+OUTLIER_DEVIATIONS = 5.0  # a finest point further off the curve of the others has reached round-off
+OUTLIER_LOG = 0.01  # of log error: the finest point must also be at least this far off
+CONFIRMED_BEYOND = 0.05  # a declared order at most this far beyond the interval of a slope is confirmed
+STAYS, STAYING_POINTS, STAYING_BOUNDS = 0.5, 3, 10.0  # 3 or more finest errors above 10 bounds
+REFUTED_BEYOND = 0.4  # a declared order further than this beyond the interval is refuted: orders are whole numbers
 
 
 class Fit(NamedTuple):
@@ -118,7 +119,7 @@ def order(
     places = rank[used[rank]]
     series = _widest(h[places], e[places], b[places], 2 if symmetric else 1)
     if series is None:
-        if np.min(finest) > FLOOR * np.max(judged):
+        if np.min(finest) > ROUNDING_FLOOR * np.max(judged):
             return _unjudged(used, "the error does not fall to rounding as a power of the step")
         return _unjudged(used, "fewer than five points follow a power of the step before rounding")
     used = np.zeros(h.shape, dtype=bool)
@@ -129,11 +130,13 @@ def order(
 def wrong_limit(step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, least: float, part: float = STAYS) -> float:
     """The error that stays however small the step, if it is above `least` and ten bounds of the reference; else NaN.
 
-    It is the smallest of the finest decade of steps, `FEWEST` or more, if it is more than a `part` of the largest.
+    It is the smallest of the finest decade of steps, `STAYING_POINTS` or more, if it is more than a `part` of the
+    largest.
     """
     h, e, b = (np.asarray(values, float) for values in (step_size, error, bound))
     fine = e[h <= 10.0 * np.min(h, initial=math.inf, where=h > 0.0)]  # NaN of a run that ended early: no limit
-    stays = fine.size >= FEWEST and np.min(fine) > max(part * np.max(fine), ABOVE * np.nanmax(b), least)
+    floor = max(STAYING_BOUNDS * np.nanmax(b), least)
+    stays = fine.size >= STAYING_POINTS and np.min(fine) > max(part * np.max(fine), floor)
     return float(np.min(fine)) if stays else math.nan
 
 
@@ -148,7 +151,7 @@ def _round_off(h: Array, e: Array) -> float:
     level = [
         place
         for place, ((fine, low), (coarse, high)) in enumerate(pairwise(zip(h, e, strict=True)), start=1)
-        if high < LEVEL * np.min(e) and high <= low * math.sqrt(coarse / fine)
+        if high < ROUND_OFF_LEVEL * np.min(e) and high <= low * math.sqrt(coarse / fine)
     ]
     return float(np.median(e[: level[-1]])) if level else 0.0
 
@@ -156,8 +159,9 @@ def _round_off(h: Array, e: Array) -> float:
 def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> str:
     """The verdict of a measured slope on a declared order; every study uses this rule.
 
-    confirmed   the interval, widened by `BESIDE`, contains the declared order
-    refuted     the declared order is more than `CLEARLY` outside the interval, or as far above that of one of `others`
+    confirmed   the interval, widened by `CONFIRMED_BEYOND`, contains the declared order
+    refuted     the declared order is more than `REFUTED_BEYOND` outside the interval, or as far above that of one of
+    `others`
                 (the same method's slopes in other quantities; a faster fall of those may be chance)
     undecided   the slope lies between, or could not be measured
     measured    nothing is declared
@@ -167,40 +171,40 @@ def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> s
     if claim is None:
         return "measured"
     off = abs(main.slope - claim) - main.interval
-    lower = any(fit.slope + fit.interval < claim - CLEARLY for fit in others)
-    if off > CLEARLY or lower:
+    lower = any(fit.slope + fit.interval < claim - REFUTED_BEYOND for fit in others)
+    if off > REFUTED_BEYOND or lower:
         return "refuted"
-    return "confirmed" if off <= BESIDE else "undecided"
+    return "confirmed" if off <= CONFIRMED_BEYOND else "undecided"
 
 
 def _widest(h: Array, e: Array, b: Array, power: int) -> tuple[float, float, float, slice] | None:
     """Fit the series over the widest window of points that it describes: slope, interval, constant, window, or None."""
     first, last = 0, h.size
-    while last - first >= LEAST:
+    while last - first >= LEAST_POINTS:
         window = slice(first, last)
         relative = (h[window] / h[last - 1]) ** power
         terms = range(1, min(TERMS, last - first - 4) + 1)  # two degrees of freedom are left at least
         columns = np.stack([np.ones(last - first), np.log(h[window]), *(relative**k for k in terms)], axis=1)
-        values, weights = np.log(e[window]), 1.0 / (1.0 + (b[window] / (EXACT * e[window])) ** 2)
+        values, weights = np.log(e[window]), 1.0 / (1.0 + (b[window] / (EXACT_RATIO * e[window])) ** 2)
         if last - first > columns.shape[1] + 2 and _missed(columns, values, weights):
             first += 1
             continue
         fitted, deviations, freedom = _regularised(columns, values, weights)
         interval = student(max(int(freedom), 1)) * float(deviations[1])
-        if interval <= WIDEST and np.max(np.abs(columns[:, 2:] @ fitted[2:])) <= CORRECTION:
-            return float(fitted[1]), max(interval, RESOLVED), math.exp(float(fitted[0])), window
+        if interval <= WIDEST_INTERVAL and np.max(np.abs(columns[:, 2:] @ fitted[2:])) <= LARGEST_CORRECTION:
+            return float(fitted[1]), max(interval, LEAST_INTERVAL), math.exp(float(fitted[0])), window
         last -= 1
     return None
 
 
 def _regularised(columns: Array, values: Array, weights: Array) -> tuple[Array, Array, float]:
-    """Weighted least squares with the prior `PRIOR` on the terms: coefficients, standard errors, degrees of freedom.
+    """Weighted least squares with the prior on the terms: coefficients, standard errors, degrees of freedom.
 
     The prior adds a row for each term, scaled by the scatter of the values. The variance of the scatter is found by
     iteration: the sum of squares divided by n minus the trace of the hat matrix.
     """
     count, terms = values.size, columns.shape[1] - 2
-    prior = np.diag([0.0, 0.0, *(PRIOR**-k for k in range(1, terms + 1))])[2:]
+    prior = np.diag([0.0, 0.0, *(PRIOR_DEVIATION**-k for k in range(1, terms + 1))])[2:]
     top, right = columns * np.sqrt(weights)[:, None], np.append(values * np.sqrt(weights), np.zeros(terms))
     scatter = 1e-2
     for _ in range(ITERATIONS):
@@ -209,7 +213,7 @@ def _regularised(columns: Array, values: Array, weights: Array) -> tuple[Array, 
         freedom = count - float(np.sum(basis[:count] ** 2))
         rest = values - columns @ fitted
         spread = np.sqrt(np.sum(np.linalg.inv(triangle) ** 2, axis=1)) * scatter
-        scatter = max(math.sqrt(float(weights @ rest**2) / max(freedom, 1.0)), SMOOTH)
+        scatter = max(math.sqrt(float(weights @ rest**2) / max(freedom, 1.0)), LEAST_SCATTER)
     return fitted, spread, freedom
 
 
@@ -218,7 +222,7 @@ def _missed(columns: Array, values: Array, weights: Array) -> bool:
     fitted, _, freedom = _regularised(columns[1:], values[1:], weights[1:])
     rest = values[1:] - columns[1:] @ fitted
     scatter = math.sqrt(float(weights[1:] @ rest**2) / max(freedom, 1.0) / float(weights[0]))
-    return bool(abs(values[0] - columns[0] @ fitted) > max(VISIBLE, MISSES * scatter))
+    return bool(abs(values[0] - columns[0] @ fitted) > max(OUTLIER_LOG, OUTLIER_DEVIATIONS * scatter))
 
 
 def _unjudged(used: NDArray[Any], reason: str) -> Fit:

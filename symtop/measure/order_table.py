@@ -1,9 +1,9 @@
 """Tables of errors against step sizes from which an order is fitted, and the fit of the order in any quantity.
 
 A ladder of steps that spans all decades of error has few steps where a method of high order is asymptotic: for order
-12, ten decades of error are less than one of step. If the order cannot be fitted, `ASYMPTOTIC` more steps are added,
-whose errors lie between rounding and `DECADES` above it. Where double precision runs out before the error is a power of
-the step, a splitting is run in long double: in the axis chart a composition of exact drifts and kicks is
+12, ten decades of error are less than one of step. If the order cannot be fitted, `ADDED_STEPS` more steps are added,
+whose errors lie between rounding and `ADDED_DECADES` above it. Where double precision runs out before the error is a
+power of the step, a splitting is run in long double: in the axis chart a composition of exact drifts and kicks is
 
     drift a:  e turns about L by the angle a h |L|/I1        kick b:  L += b h mgl (z x e)
 
@@ -31,9 +31,9 @@ from symtop.model.scenes import Scene
 from symtop.run.reference.independent_checks import have_heyoka
 from symtop.run.reference.truth import reference
 
-ASYMPTOTIC, DECADES = 12, 3.0  # steps that are added, and the decades of error that they span
+ADDED_STEPS, ADDED_DECADES = 12, 3.0  # steps that are added, and the decades of error that they span
 ABOVE_ROUNDING = 20.0  # times the bound: the least error that an added step should have
-FURTHER = 0.5  # times the finest useful step: no added step is finer, even if the error hardly falls with the step
+FINEST_ADDED = 0.5  # times the finest useful step: no added step is finer, even if the error hardly falls with the step
 
 
 def observable(method: Integrator) -> str:
@@ -42,14 +42,14 @@ def observable(method: Integrator) -> str:
 
 
 def asymptotic_steps(table: xr.Dataset, quantity: str, power: int) -> list[float]:
-    """Added steps, whose errors reach from just above rounding `DECADES` up; none if all errors are rounding."""
+    """Added steps, whose errors reach from just above rounding `ADDED_DECADES` up; none if all errors are rounding."""
     h, error, bound = (table[name].values for name in ("step_size", quantity, f"{quantity}_bound"))
     judged = np.flatnonzero(np.isfinite(error) & (error > 2.5 * ABOVE_ROUNDING * bound))
     if judged.size == 0:
         return []
     finest = judged[np.argmin(h[judged])]
-    first = h[finest] * max(float((ABOVE_ROUNDING * bound[finest] / error[finest]) ** (1.0 / power)), FURTHER)
-    return [float(first * 10.0 ** (DECADES / power * k / (ASYMPTOTIC - 1))) for k in range(ASYMPTOTIC)]
+    first = h[finest] * max(float((ABOVE_ROUNDING * bound[finest] / error[finest]) ** (1.0 / power)), FINEST_ADDED)
+    return [float(first * 10.0 ** (ADDED_DECADES / power * k / (ADDED_STEPS - 1))) for k in range(ADDED_STEPS)]
 
 
 def order_table(

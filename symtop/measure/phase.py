@@ -28,16 +28,16 @@ import numpy as np
 import xarray as xr
 
 from symtop.core.numbers import EPSILON
-from symtop.measure.verdicts import STEADY
+from symtop.measure.verdicts import STEADY_WIDTH
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.trajectory import Trajectory
 
 FREQUENCIES = ("nutation_period", "precession_rate")  # relative errors of these
-TABLE = 256  # points of the true curve from which the search for tau starts
+TABLE_POINTS = 256  # points of the true curve from which the search for tau starts
 SWEEPS = 4  # iterations of Gauss-Newton: the error falls from 1e-2 to rounding in three
-CLEAR = 0.25  # of the largest sin(theta): nearer to a pole, the branch of phi is taken from the neighbours
+CLEAR_OF_POLE = 0.25  # of the largest sin(theta): nearer to a pole, the branch of phi is taken from the neighbours
 LEAST_RATE = 1e-3  # of omega: errors of a slower mean precession are relative to this
 
 
@@ -62,19 +62,19 @@ def _curve(scene: Scene, times: Array) -> tuple[Array, Array, Array, Array, Arra
 
 @functools.lru_cache(maxsize=64)
 def _table(top: SymmetricTop, start: Angles) -> tuple[Array, Array, Array]:
-    """Times over one nutation (TABLE,), the true curve there (2, TABLE), and half the squared norms of its points."""
+    """Times over one nutation (n,), the true curve there (2, n), and half the squared norms of its points."""
     scene = Scene("table", top, start, 1.0)
     period = scene.nutation_period
-    times = period * np.arange(TABLE) / TABLE
+    times = period * np.arange(TABLE_POINTS) / TABLE_POINTS
     u, du, *_ = _curve(scene, times)
     points = np.stack([u, du * period / (2.0 * math.pi)])
     return times, points, 0.5 * np.sum(points * points, axis=0)
 
 
 def nutates(scene: Scene) -> bool:
-    """Does the true motion have a nutation wider than `STEADY` and of finite period?"""
+    """Does the true motion have a nutation wider than `STEADY_WIDTH` and of finite period?"""
     low, high = closed_form(scene).theta_range
-    return high - low > STEADY and math.isfinite(scene.nutation_period)
+    return high - low > STEADY_WIDTH and math.isfinite(scene.nutation_period)
 
 
 def split(scene: Scene, run: Trajectory) -> Split:
@@ -106,7 +106,7 @@ def split_states(scene: Scene, t: Array, u: Array, du: Array, phi: Array) -> Spl
     turn = phi - phi_true - rate * rest - turns * closed_form(scene).phi_per_period
     # next to a pole phi may jump by pi, which would appear in the lag as whole turns
     sine = np.sqrt(np.maximum(1.0 - u_true * u_true, 0.0))
-    clear = sine > CLEAR * np.max(sine)
+    clear = sine > CLEAR_OF_POLE * np.max(sine)
     guide = np.interp(t, t[clear], np.unwrap(turn[clear]))
     turn = turn - 2.0 * math.pi * np.rint((turn - guide) / (2.0 * math.pi))
     return Split(off, lag + turns * period, turn)

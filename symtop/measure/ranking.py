@@ -15,7 +15,7 @@ from pathlib import Path
 SHOWN_AS = {"theta": "axis"}  # quantities without rows of their own, and the quantity whose rows are used
 TABLE = Path(__file__).with_name("candidates.tsv")
 ANY = "any"  # class of needs: every method but those made for the symmetric top only
-MENU = 6  # variants in a row
+MENU_SIZE = 6  # variants in a row
 
 
 @functools.cache
@@ -35,4 +35,4 @@ def cheapest(
     length = min({key[0] for key in rows}, key=lambda value: abs(math.log(value / max(nutations, 1e-3))))
     level = min({key[2] for key in rows}, key=lambda value: abs(math.log(value / accuracy)))
     menus = [rows.get((length, shown, level, need, general), []) for need in needs or (ANY,)]
-    return list(dict.fromkeys(name for place in range(MENU) for menu in menus for name in menu[place : place + 1]))
+    return list(dict.fromkeys(name for place in range(MENU_SIZE) for menu in menus for name in menu[place : place + 1]))

@@ -22,16 +22,16 @@ from symtop.run.simulation import chart_of, likely_step
 
 LEAST_RUN = 6.37  # steps of a run: fewer samples do not show its error; not commensurate with the nutation
 LEAST_STEPS = 4.37  # per nutation, in a search by a constant's error: longer steps may keep it and miss the motion
-LOOSEST = 0.4  # tolerance
+LOOSEST_TOLERANCE = 0.4  # tolerance
 TARGETS = (1e-3, 1e-6, 1e-9, 1e-12)  # axis errors, rad, at which studies compare costs
 ANGLES = ("axis", "attitude", "theta")
 OF_BODY = (*ANGLES, "energy", "p_phi")  # quantities of a body without symmetry
-TEDIOUS = 1e-8  # the least tolerance of an implicit method in Python: radau at 1e-12 takes a minute for ten nutations
-SHORT = 120.37  # nutations of a trial run: in a dozen, the growth of unstable motions is not seen
-LEAST = 0.3  # a search ends at an error between this part of the target and the target
+TEDIOUS_TOLERANCE = 1e-8  # least one of an implicit method in Python: radau at 1e-12 takes a minute for ten nutations
+TRIAL_NUTATIONS = 120.37  # nutations of a trial run: in a dozen, the growth of unstable motions is not seen
+CLOSE_ENOUGH = 0.3  # a search ends at an error between this part of the target and the target
 TRIES = 9  # runs of a search
 MOST_EVALUATIONS = {"compiled": 3e8, "python": 3e5}  # force evaluations of one run
-FLAT, NEAR_ROUNDING = 1.3, 1e-8  # errors below the second have reached rounding if a finer setting gains less than FLAT
+FLAT_GAIN, NEAR_ROUNDING = 1.3, 1e-8  # errors below the second are rounding if a finer setting gains less
 STAIR = 0.1  # a tolerance at which the error did not fall is next multiplied by this or less
 
 STOPPED = "Stopped by rounding or by what the method's settings allow"
@@ -55,7 +55,7 @@ def compared(observe: str) -> list[Integrator]:
 def least_tolerance(method: Integrator) -> float:
     """The least tolerance that an adaptive method is tried with."""
     tedious = method.implementation == "python" and method.explicit is False
-    return max(method.least_tolerance, TEDIOUS * tedious)
+    return max(method.least_tolerance, TEDIOUS_TOLERANCE * tedious)
 
 
 def limits(scene: Scene, method: Integrator, horizon: float, quantity: str = "axis") -> tuple[float, float]:
@@ -68,7 +68,7 @@ def limits(scene: Scene, method: Integrator, horizon: float, quantity: str = "ax
     if method.fixed_step:
         longest = math.inf if quantity in ANGLES else scene.nutation_period / LEAST_STEPS
         return 0.0, min(horizon / LEAST_RUN, longest)
-    return 1.001 * least_tolerance(method), LOOSEST
+    return 1.001 * least_tolerance(method), LOOSEST_TOLERANCE
 
 
 def ladder(method: Integrator, scene: Scene, horizon: float, count: int = 9, most: float = 4e6) -> list[float]:
@@ -101,7 +101,7 @@ def between(fine: float, low: float, coarse: float, high: float, goal: float) ->
 
 def seek(
     run: Callable[[float], tuple[float, float]], guess: float, target: float, ends: tuple[float, float], power: float,
-    *, fixed_step: bool = True, patience: float = math.inf, least: float = LEAST,
+    *, fixed_step: bool = True, patience: float = math.inf, least: float = CLOSE_ENOUGH,
 ) -> tuple[float, str]:  # fmt: skip
     """The coarsest setting found with an error of at most `target`, if possible above `least * target`, and "".
 
@@ -124,7 +124,7 @@ def seek(
             if error >= least * target or setting >= coarsest:
                 break
         else:
-            gains = met is not None or missed is None or not missed[1] < FLAT * error < NEAR_ROUNDING
+            gains = met is not None or missed is None or not missed[1] < FLAT_GAIN * error < NEAR_ROUNDING
             flat, missed = 0 if gains else flat + 1, (setting, error)
             if flat == (1 if fixed_step else 2):  # if the order depends on the tolerance, the error falls in jumps
                 why = STOPPED
@@ -192,7 +192,7 @@ def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
 
 def search(
     scene: Scene, method: Integrator, accuracy: float, quantity: str, horizon: float, guess: float | None = None,
-    patience: float = math.inf, least: float = LEAST, longest: float = math.inf,
+    patience: float = math.inf, least: float = CLOSE_ENOUGH, longest: float = math.inf,
 ) -> Attempt:  # fmt: skip
     """The coarsest setting found that meets the accuracy over the horizon, or `unmet`.
 
@@ -222,7 +222,7 @@ def search(
 
 def at_accuracy(method: Integrator, ratio: float) -> float:
     """The factor from the work of a run, with an error of `ratio` times the accuracy, to the work at the accuracy."""
-    return float(min(max(ratio, LEAST), 1.0) ** (1.0 / (method.order or math.inf)))
+    return float(min(max(ratio, CLOSE_ENOUGH), 1.0) ** (1.0 / (method.order or math.inf)))
 
 
 def rounded(scene: Scene, met: Attempt, accuracy: float, quantity: str) -> Attempt:

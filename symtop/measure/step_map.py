@@ -38,15 +38,15 @@ from symtop.model.charts import Array
 from symtop.model.scenes import Scene, closed_form
 from symtop.model.top import Angles, SymmetricTop
 
-WIDEST = 0.04  # the first differencing width, in radians and units of the momenta
+WIDEST_DIFFERENCE = 0.04  # the first differencing width, in radians and units of the momenta
 WIDTHS = 5  # differencing widths, each half the one before
-COARSE = 3e-3  # the largest step is used that differs from two steps of half its size by less than this
-LOOSE = 1e-3  # tolerance of the runs of an adaptive method, loose enough to show a defect
-UNIT = 1e-12  # |e| = 1 and |q| = 1 within this
+COARSE_GAP = 3e-3  # the largest step is used that differs from two steps of half its size by less than this
+LOOSE_TOLERANCE = 1e-3  # tolerance of the runs of an adaptive method, loose enough to show a defect
+UNIT_LENGTH = 1e-12  # |e| = 1 and |q| = 1 within this
 APART = 0.01  # rad: nearer to a pole a state in angles has an error of 2e-16 over the square of this distance
 UPRIGHT = 1e-15  # rad: nearer to a pole an axis counts as vertical; pi itself is rounded by 1.2e-16
 LEAST_UNIT = 1e-3  # least unit of the momenta, in 2 pi I1 over the nutation period
-SHARE = 0.37  # nutations: the duration of the run of an adaptive method, and the first trial of a fixed step
+RUN_NUTATIONS = 0.37  # nutations: the duration of the run of an adaptive method, and the first trial of a fixed step
 SEVERAL = 8  # steps, more than the starting steps of any multistep method
 
 
@@ -65,7 +65,7 @@ class StepMap:
         if self.method.fixed_step:
             plan = Plan.steps(h, [steps])
         else:
-            loose = max(LOOSE, self.method.least_tolerance) if self.method.adaptive else math.nan
+            loose = max(LOOSE_TOLERANCE, self.method.least_tolerance) if self.method.adaptive else math.nan
             plan = Plan.until([steps * h], loose)
         done = solve(self.method, self.chart, self.top, start, plan)
         if done.outcome != "ok" or not np.isfinite(done.states).all():
@@ -182,18 +182,18 @@ def drawn(scene: Scene, count: int, seed: int, *, same_top: bool) -> Iterator[Sc
 
 def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Angles]:
     """The map of a step large enough to show a defect, and the start to judge it at; SymtopError if there is none."""
-    start, trial = generic_start(scene), one_step(method, chart, scene, SHARE * scene.time_scale())
+    start, trial = generic_start(scene), one_step(method, chart, scene, RUN_NUTATIONS * scene.time_scale())
     return coarsest(trial, start) if method.fixed_step else trial, start
 
 
 def coarsest(trial: StepMap, start: Angles) -> StepMap:
-    """The map of the largest step, from that of `trial` downwards, that two half steps match to within `COARSE`."""
+    """The map of the largest step, from that of `trial` downwards, that two half steps match to within `COARSE_GAP`."""
     refusal = SymtopError(f"{trial.method.name} makes no step in the {trial.chart} chart")
     h = trial.h
     for _ in range(40):
         try:
             halves = trial.shown(trial.run(start, 0.5 * h, 2))
-            if trial.gap(trial.image(trial.point(start), h), halves) < COARSE:
+            if trial.gap(trial.image(trial.point(start), h), halves) < COARSE_GAP:
                 return replace(trial, h=h)
         except SymtopError as error:
             refusal = error
@@ -238,7 +238,7 @@ def symplectic_defect(step: StepMap, start: Angles) -> Defect:
     z = step.point(start)
     middle = step.image(z)
     scale = min(1.0, math.sin(start.theta))  # near a pole the map varies over the distance from the pole
-    widths = np.array([scale * WIDEST / 2.0**k for k in range(WIDTHS)])
+    widths = np.array([scale * WIDEST_DIFFERENCE / 2.0**k for k in range(WIDTHS)])
     table = [[_differences(step, z, middle, width)] for width in widths]
     best, doubt = table[0][0], math.inf
     for k in range(1, WIDTHS):
@@ -290,7 +290,7 @@ def return_miss(step: StepMap, start: Angles) -> float:
         except SymtopError:
             if (there_and_back := step.own("there_and_back")) is not None:
                 return step.gap(step.shown(there_and_back(step.top, start, step.h)), before)
-            if abs(step.length(step.image(step.point(start))) - 1.0) > UNIT:
+            if abs(step.length(step.image(step.point(start))) - 1.0) > UNIT_LENGTH:
                 raise
     arrived = step.restart(step.image(step.point(start)))
     if step.method.fixed_step:
@@ -314,7 +314,7 @@ def restart_gap(step: StepMap, start: Angles) -> float:
         singly = step.shown(onward(step.top, start, (0.25 * step.h,) * SEVERAL))
         return step.gap(step.shown(step.run(start, 0.25 * step.h, SEVERAL)), singly)
     after = step.image(step.point(start))
-    if not step.method.fixed_step or abs(step.length(after) - 1.0) > UNIT:
+    if not step.method.fixed_step or abs(step.length(after) - 1.0) > UNIT_LENGTH:
         return 0.0
     once = step.restart(after)
     return step.gap(step.shown(step.run(start, step.h, 2)), step.shown(step.run(once, step.h)))

@@ -31,9 +31,9 @@ from symtop.run.simulation import chart_of, make_plan
 
 KEEP_EVERY = 5.0  # seconds between two writings of the file
 RAISED = "raised"  # outcome of a run whose integrator raised an exception
-BATCHES, BATCH, PATIENCE = 15, 0.0005, 0.1  # of timings: most samples of a run, seconds of one, seconds of all
+BATCHES, BATCH, PATIENCE = 15, 0.0005, 0.1  # of a run: most samples, of one, of all
 CLOSE = 0.01  # relative difference of the three least samples of each run below which none is timed further
-SPENT = {"seconds": math.nan, "seconds_spread": math.nan}
+NOT_TIMED = {"seconds": math.nan, "seconds_spread": math.nan}
 TIMED = (
     "one call of the method's solver from the start to the horizon, with two samples and nothing around it; the least "
     f"of at most {BATCHES} batches of at least {1e3 * BATCH:g} ms each, in random order among those of the other runs"
@@ -201,7 +201,7 @@ def _cell(
 
 def _table(cell: _Cell) -> xr.Dataset:
     runs = [error_row_or_message(*cell[:2], setting, cell.horizon, cell.observe) for setting in cell.settings]
-    return as_table([run | (SPENT if cell.timed else {}) for run in runs])
+    return as_table([run | (NOT_TIMED if cell.timed else {}) for run in runs])
 
 
 def error_row_or_message(
@@ -220,12 +220,12 @@ def _time(cells: list[_Cell], done: dict[str, xr.Dataset]) -> bool:
     runs: list[tuple[Scene, Integrator, float, list[dict[str, Any]]]] = []
     for cell, table in waiting:
         outcomes = zip(cell.settings, table["outcome"].values, strict=True)
-        rows = [{"setting_value": setting, "outcome": outcome} | SPENT for setting, outcome in outcomes]
+        rows = [{"setting_value": setting, "outcome": outcome} | NOT_TIMED for setting, outcome in outcomes]
         chart = chart_of(cell.method, cell.scene.observes, cell.observe)
         runs.append((cell.scene, cell.method.variant(chart), cell.horizon, rows))
     timed_rows(runs)
     for (cell, table), (*_, rows) in zip(waiting, runs, strict=True):
-        done[cell.made_of] = table.assign({name: ("setting", [run[name] for run in rows]) for name in SPENT})
+        done[cell.made_of] = table.assign({name: ("setting", [run[name] for run in rows]) for name in NOT_TIMED})
     return bool(waiting)
 
 
@@ -249,7 +249,7 @@ def timed_rows(cells: list[tuple[Scene, Integrator, float, list[dict[str, Any]]]
 
 def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:
     """The table of a cell, extended by rows "not_run" to `size` settings; only such rows and no hash if it is None."""
-    blank = as_table([blank_row(cell.method) | {"message": ""} | (SPENT if cell.timed else {})] * size)
+    blank = as_table([blank_row(cell.method) | {"message": ""} | (NOT_TIMED if cell.timed else {})] * size)
     if table is None:
         return blank.assign(made_of=((), ""))
     short = size - table.sizes["setting"]

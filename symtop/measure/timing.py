@@ -1,10 +1,10 @@
 """The time that a function call takes.
 
-The first call (compilation, caches) is stored apart. After it, calls are made in batches that last at least `BATCH`
-seconds, several functions interleaved in random order so that a slow spell of the machine affects all of them; every
-batch is kept. The minimum is the estimate, because noise only adds time; the spread shows how reliable it is.
-Batches come in rounds: one of every function, shuffled, then the next round. Samples of one round are neighbours in
-time, and the ratio of two of them is less noisy than the ratio of two minima.
+The first call (compilation, caches) is stored apart. After it, calls are made in batches that last at least
+`BATCH_SECONDS` seconds, several functions interleaved in random order so that a slow spell of the machine affects all
+of them; every batch is kept. The minimum is the estimate, because noise only adds time; the spread shows how reliable
+it is. Batches come in rounds: one of every function, shuffled, then the next round. Samples of one round are neighbours
+in time, and the ratio of two of them is less noisy than the ratio of two minima.
 """
 
 import math
@@ -21,11 +21,11 @@ from symtop.model.exact import closed_form
 from symtop.model.scenes import Scene, scene
 from symtop.run.simulation import make_plan
 
-BATCH = 0.02  # seconds
-CLEAR = 1e-3  # seconds: from a trial at least that long the number of calls in a batch is estimated
-STRIDE = 16  # largest factor by which the number of calls grows from one trial to the next
+BATCH_SECONDS = 0.02  # seconds
+TRIAL_SECONDS = 1e-3  # seconds: from a trial at least that long the number of calls in a batch is estimated
+MOST_GROWTH = 16  # largest factor by which the number of calls grows from one trial to the next
 LEAST_SAMPLES = 5  # samples needed before the three least are compared with each other
-NOISY = 0.25  # relative spread beyond which a timing is not called reliable
+NOISY_SPREAD = 0.25  # relative spread beyond which a timing is not called reliable
 
 
 class Timing(NamedTuple):
@@ -46,8 +46,8 @@ class Timing(NamedTuple):
 
     @property
     def reliable(self) -> bool:
-        """Is the spread below `NOISY`?"""
-        return self.spread < NOISY
+        """Is the spread below `NOISY_SPREAD`?"""
+        return self.spread < NOISY_SPREAD
 
 
 def _batch(function: Callable[[], object], calls: int) -> float:
@@ -65,11 +65,11 @@ def first_call(function: Callable[[], object]) -> float:
 def _calibrate(function: Callable[[], object], batch: float, once: float) -> tuple[int, list[float]]:
     """How many calls last a little over `batch` seconds; if a single call does, also the times of the trial calls."""
     count, single = 1, [_batch(function, 1)]
-    if min(CLEAR, batch) <= single[0] < once:  # once more: a garbage collection may have disturbed the first
+    if min(TRIAL_SECONDS, batch) <= single[0] < once:  # once more: a garbage collection may have disturbed the first
         single.append(_batch(function, 1))
     elapsed = min(single)
-    while elapsed < min(CLEAR, batch):
-        count *= max(2, min(STRIDE, int(1.2 * CLEAR / max(elapsed, 1e-9))))
+    while elapsed < min(TRIAL_SECONDS, batch):
+        count *= max(2, min(MOST_GROWTH, int(1.2 * TRIAL_SECONDS / max(elapsed, 1e-9))))
         elapsed = _batch(function, count)
     if elapsed < batch:
         return max(1, math.ceil(1.15 * count * batch / elapsed)), []
@@ -77,7 +77,7 @@ def _calibrate(function: Callable[[], object], batch: float, once: float) -> tup
 
 
 def timings(
-    functions: Sequence[Callable[[], object]], batches: int = 5, batch: float = BATCH, *, warm: bool = False,
+    functions: Sequence[Callable[[], object]], batches: int = 5, batch: float = BATCH_SECONDS, *, warm: bool = False,
     patience: float = math.inf, close: float = 0.0, least: int = 2, exact: bool = True,
 ) -> list[Timing]:  # fmt: skip
     """Time several functions against each other.
@@ -127,18 +127,18 @@ def bare_run(
     return lambda: solve(scene.top, scene.start, plan)
 
 
-SPAN = 0.03  # seconds for which a worker repeats the run in one turn
+TURN_SECONDS = 0.03  # seconds for which a worker repeats the run in one turn
 TURNS = 7  # comparisons of one worker alone with all at once
 TRIES = 20  # attempts to have every worker process take one of the calls; at first some may still be starting
-DISTURBED = 1.05  # slowdown beyond which timed cases run one after another
+DISTURBED_RATIO = 1.05  # slowdown beyond which timed cases run one after another
 
 
 def timed_turn() -> tuple[int, float, float, float]:
-    """Process id, begin, end and mean seconds of short runs of a compiled method, repeated for `SPAN` seconds."""
+    """Process id, begin, end and mean seconds of short runs of a compiled method, repeated for `TURN_SECONDS`."""
     run = bare_run(scene("spheroid"), integrator("strang"), "axis", 1e-3, 4.0)
     run()  # its kernel may have to be compiled
     begin, count = time.monotonic(), 0  # all processes share this clock
-    while (end := time.monotonic()) < begin + SPAN:
+    while (end := time.monotonic()) < begin + TURN_SECONDS:
         run()
         count += 1
     return os.getpid(), begin, end, (end - begin) / count
@@ -160,6 +160,6 @@ def slowdown(submit: Callable[..., Future[Any]], size: int) -> float:
     ratios = []
     for _ in range(TURNS):
         alone, together = submit(timed_turn).result(), at_once()
-        if min(end for _, _, end, _ in together) - max(begin for _, begin, _, _ in together) > 0.5 * SPAN:
+        if min(end for _, _, end, _ in together) - max(begin for _, begin, _, _ in together) > 0.5 * TURN_SECONDS:
             ratios.append(max(seconds for *_, seconds in together) / alone[-1])
     return statistics.median(ratios) if ratios else math.inf

@@ -21,24 +21,24 @@ from numpy.typing import NDArray
 from symtop.model.scenes import Scene
 from symtop.run.guard import EXPECTED
 
-ACCURATE = EXPECTED  # rad: largest accurate axis error; the guard warns if it expects more, however narrow the nutation
-OUTSIDE = 0.1  # margin beyond a turning point, in widths of the nutation, or in rad if there is no nutation
-STEADY = 1e-6  # rad; a nutation narrower than this is a steady precession, known to rounding only
-DRIFT = 0.01  # energy error of a drifting run, in units of the energy of the nutation, `Scene.energy_scale`
-GROWING = 1.3  # an energy error grows if its maximum over the second half is this many times that over the first
+ACCURATE_ERROR = EXPECTED  # rad, of the axis; the guard warns if it expects more, however narrow the nutation
+OUTSIDE_MARGIN = 0.1  # margin beyond a turning point, in widths of the nutation, or in rad if there is no nutation
+STEADY_WIDTH = 1e-6  # rad; a nutation narrower than this is a steady precession, known to rounding only
+DRIFT_ERROR = 0.01  # energy error of a drifting run, in units of the energy of the nutation, `Scene.energy_scale`
+GROWING_RATIO = 1.3  # an energy error grows if its maximum over the second half is this many times that over the first
 ROUNDING = 1e-12  # times `Scene.energy_grain`: an energy error below that is rounding and is not said to grow
-FEWEST = 8  # samples of half a run: with fewer, growth of the energy cannot be told from oscillation
+FEWEST_SAMPLES = 8  # samples of half a run: with fewer, growth of the energy cannot be told from oscillation
 NO_GAP = 1e-9  # of the momentum scale: a gap p_phi -+ p_psi below this has no sign to change
 
 
 def barriers(scene: Scene) -> tuple[float, float, float, float]:
     """Least and largest true theta, the margin allowed beyond them, and the largest accurate axis error, all in rad."""
     if scene.of_body:  # the axis may point anywhere
-        return 0.0, math.pi, OUTSIDE, ACCURATE
+        return 0.0, math.pi, OUTSIDE_MARGIN, ACCURATE_ERROR
     low, high = scene.top.turning_cosines(scene.start)
     highest, lowest = math.acos(min(high, 1.0)), math.acos(max(low, -1.0))
-    width = lowest - highest if lowest - highest > STEADY else 1.0
-    return highest, lowest, OUTSIDE * width, min(ACCURATE, OUTSIDE * width)
+    width = lowest - highest if lowest - highest > STEADY_WIDTH else 1.0
+    return highest, lowest, OUTSIDE_MARGIN * width, min(ACCURATE_ERROR, OUTSIDE_MARGIN * width)
 
 
 def pole_passed(scene: Scene, p_phi: Any, p_psi: Any) -> NDArray[np.bool_]:
@@ -79,7 +79,7 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
     beyond = ~((theta >= highest - margin) & (theta <= lowest + margin))
     strays = beyond | pole_passed(scene, run["p_phi"].values, run.get("p_psi", run["p_phi"]).values)
     half = energy.size // 2
-    early, late = np.max(energy[:half] if half >= FEWEST else energy), np.max(energy[half:])
+    early, late = np.max(energy[:half] if half >= FEWEST_SAMPLES else energy), np.max(energy[half:])
     if strays.any():
         first = int(np.argmax(strays))
         word, sentence = "wrong_regime", "the axis had passed a pole on the side that its momenta forbid"
@@ -87,14 +87,14 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
             bounds = f"{highest:.4g} to {lowest:.4g}"
             sentence = f"theta was {theta[first]:.4g} rad, where the true motion never goes ({bounds})"
         sentence = f"at t = {times[first]:.6g}{scene.second} {sentence}"
-    elif not (late <= DRIFT or late <= GROWING * early):
-        word, first = "drifting", int(np.argmax(~(energy <= DRIFT)))
+    elif not (late <= DRIFT_ERROR or late <= GROWING_RATIO * early):
+        word, first = "drifting", int(np.argmax(~(energy <= DRIFT_ERROR)))
         at = f"{times[first]:.6g}{scene.second}"
-        sentence = f"the energy error passed {DRIFT:.0%} at t = {at} and grew on, to {energy.max():.2g}"
+        sentence = f"the energy error passed {DRIFT_ERROR:.0%} at t = {at} and grew on, to {energy.max():.2g}"
     else:
         word, first, energies = "bounded_but_wrong", int(np.argmax(~(axis_error <= accurate))), "stayed within {}"
-        if late > max(GROWING * early, ROUNDING * scene.energy_grain):
-            word, energies = "wrong", f"error grew, to {{}}, below {DRIFT:.0%}"
+        if late > max(GROWING_RATIO * early, ROUNDING * scene.energy_grain):
+            word, energies = "wrong", f"error grew, to {{}}, below {DRIFT_ERROR:.0%}"
         energies = f"while the energy {energies.format(_upwards(energy.max()))}"
         sentence = f"the axis error passed {accurate:.2g} rad at t = {times[first]:.6g}{scene.second} {energies}"
     return Judgement(word, float(times[first]), sentence)

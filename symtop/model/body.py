@@ -25,9 +25,9 @@ import numpy as np
 from symtop.core.errors import SymtopError, entries, finite, positive, row
 from symtop.core.jit_functions import inlined, two_product
 from symtop.core.numbers import EPSILON
-from symtop.model.top import LARGEST, SLACK, bounded, of_kind, unit, vector
+from symtop.model.top import LARGEST, MOMENT_SLACK, bounded, of_kind, unit, vector
 
-SYMMETRIC = 1e-9  # largest difference of a matrix from its transpose, relative to its largest entry
+SYMMETRIC_WITHIN = 1e-9  # largest difference of a matrix from its transpose, relative to its largest entry
 
 
 class Placed(NamedTuple):
@@ -86,7 +86,7 @@ class RigidBody:
         for name in ("I1", "I2", "I3"):
             object.__setattr__(self, name, bounded(name, positive(name, getattr(self, name)), 1.0 / LARGEST))
         least, middle, most = sorted(self.moments)
-        if most > (least + middle) * (1.0 + SLACK):
+        if most > (least + middle) * (1.0 + MOMENT_SLACK):
             name = ("I1", "I2", "I3")[self.moments.index(most)]
             words = f"{least + middle!r}: no rigid body exceeds it, not {most!r}"
             raise SymtopError(f"{name} must be at most the sum of the other moments, {words}", name)
@@ -122,7 +122,7 @@ class RigidBody:
         if len(rows) != 3:
             raise SymtopError(f"matrix must have 3 rows, not {len(rows)}", "matrix")
         inertia = np.array(rows)
-        if np.abs(inertia - inertia.T).max() > SYMMETRIC * np.abs(inertia).max():
+        if np.abs(inertia - inertia.T).max() > SYMMETRIC_WITHIN * np.abs(inertia).max():
             raise SymtopError("matrix must be symmetric", "matrix")
         moments, turn = np.linalg.eigh(inertia)
         towards = np.array(vector("centre", centre, 3))

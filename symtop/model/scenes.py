@@ -44,9 +44,9 @@ TAGS = {  # by which studies choose; a scene without any is in every study
     "near_pole": "passes so close to a pole that the angles chart fails",
     "unstable": "unstable or nearly so: errors grow with the motion",
 }
-STEADY = 1e4  # a nutation with less energy than this many rounding errors of the energy is a steady precession
+STEADY_ENERGY = 1e4  # a nutation with less energy than this many rounding errors of the energy is a steady precession
 SHORTEST = 1e-100  # the least horizon, in units of time; the largest is `LONGEST_TIME`
-LOOSE = 1e-6  # relative: a period beside a pole that is further from the exact one is replaced by it
+LOOSE_PERIOD = 1e-6  # relative: a period beside a pole that is further from the exact one is replaced by it
 NEXT_TO_POLE = 1e-9  # rad; V is not evaluated nearer to a pole, where it has a limit and 0/0
 
 
@@ -158,7 +158,7 @@ class Scene:
             momenta, inertia = self.top.momenta(self.start), self.top.I1
             size, turning = max(abs(momenta.p_phi), abs(momenta.p_psi)), inertia * abs(self.start.theta_dot)
         other = max(turning, math.sqrt(abs(self.top.mgl) * inertia), TINY)
-        return size if size > STEADY * EPSILON * other else other
+        return size if size > STEADY_ENERGY * EPSILON * other else other
 
     def momentum_grain(self, momentum: Any) -> float:
         """How much larger rounding is in relative errors of p_phi where a run has the momenta (n, 3) in space, or None.
@@ -188,7 +188,7 @@ def nutation_period(top: Any, start: Any) -> float:
 
 
 def exact_periods(numbers: Any, periods: Any) -> Array:
-    """Periods (n,) of tops and starts (n, 9), where the closed form's differ by more than `LOOSE` in their place.
+    """Periods (n,) of tops and starts (n, 9), the closed form's where they differ by more than `LOOSE_PERIOD`.
 
     A start for which the closed form takes 40 digits, and seconds, keeps its period.
     """
@@ -198,7 +198,7 @@ def exact_periods(numbers: Any, periods: Any) -> Array:
 
     constants, _ = short_constants(np.array(numbers, dtype=float))
     exact = constants[:, at.PERIOD]
-    better = (constants[:, at.STATUS] == DONE) & ~np.isclose(periods, exact, rtol=LOOSE, atol=0.0)
+    better = (constants[:, at.STATUS] == DONE) & ~np.isclose(periods, exact, rtol=LOOSE_PERIOD, atol=0.0)
     return np.where(better, exact, periods)
 
 
@@ -212,7 +212,7 @@ def _energy_scale(top: SymmetricTop, start: Angles) -> float:
     depth = 0.5 * top.I1 * start.theta_dot**2 + height(start.theta) - height(top.steady_theta(momenta))
     rounding = EPSILON * (abs(top.energy(start)) + abs(top.mgl))
     scales = (depth, 0.5 * top.I1 * top.nutation_frequency(momenta) ** 2, abs(top.mgl))
-    return next((scale for scale in scales if scale > STEADY * rounding), max(*scales, TINY))  # all may be rounding
+    return next((scale for scale in scales if scale > STEADY_ENERGY * rounding), max(*scales, TINY))
 
 
 @functools.lru_cache(maxsize=256)
@@ -474,6 +474,6 @@ def energy_scales(numbers: Array, theta_range: Array) -> Array:
     at_start, least = (effective_potential(theta, north, south, I1, mgl) for theta in (start, lowest))
     depth = 0.5 * I1 * numbers[:, 6] ** 2 + at_start - least
     swing = 0.5 * np.maximum(effective_stiffness(lowest, north, south, I1, mgl), 0.0)
-    rounding = STEADY * EPSILON * (np.abs(start_energies(numbers)) + np.abs(mgl))
+    rounding = STEADY_ENERGY * EPSILON * (np.abs(start_energies(numbers)) + np.abs(mgl))
     scales = np.array([depth, swing, np.abs(mgl)])
     return np.asarray(np.select(list(scales > rounding), list(scales), np.maximum(scales.max(axis=0), TINY)))

@@ -45,7 +45,7 @@ from symtop.core.numbers import EPSILON
 
 Start = TypeVar("Start")
 
-UNIT = 1e-6  # a quaternion or an axis may differ from unit length by this
+UNIT_LENGTH = 1e-6  # a quaternion or an axis may differ from unit length by this
 
 
 def vector(name: str, value: object, size: int) -> list[float]:
@@ -60,7 +60,7 @@ def unit(name: str, value: object, size: int) -> list[float]:
     """A row of numbers of unit length, brought to it exactly."""
     numbers = vector(name, value, size)
     length = math.sqrt(math.fsum(number * number for number in numbers))
-    if abs(length - 1.0) > UNIT:
+    if abs(length - 1.0) > UNIT_LENGTH:
         raise SymtopError(f"{name} must have unit length, not {length:.9g}", name)
     return [number / length for number in numbers]
 
@@ -124,10 +124,10 @@ def effective_potential(theta: Any, north: Any, south: Any, I1: Any, mgl: Any) -
 
 
 NUMBERS = ("I1", "I3", "mgl", "theta", "phi", "psi", "theta_dot", "phi_dot", "psi_dot")  # of a top and a start
-SLACK = 1e-12  # relative tolerance of the inequalities between moments, which are given rounded
+MOMENT_SLACK = 1e-12  # relative tolerance of the inequalities between moments, which are given rounded
 LARGEST = 1e40  # of any parameter or rate, and one over the smallest inertia: squares of squares stay finite
-HEAVY = 128.0  # a larger momentum is counted in another unit by a series
-POLE = 0.999  # a larger cosine is beside a pole
+HEAVY_MOMENTUM = 128.0  # a larger momentum is counted in another unit by a series
+POLE_COSINE = 0.999  # a larger cosine is beside a pole
 BISECTIONS = 60  # of an interval of cosines at most 2 wide: to the last place
 
 
@@ -224,8 +224,8 @@ def flat(top: "SymmetricTop", at: Angles) -> tuple[float, ...]:
 def lightened(plain: Sequence[float]) -> tuple[tuple[float, ...], float]:
     """A top or a body and a start, as `flat` has them, in a unit of mass in which momenta are near 1, and that unit.
 
-    It is a power of two, which changes no digit, and 1 for momenta up to `HEAVY`: a series weighs momenta and a
-    quaternion or an axis of length one in one norm, so that momenta far above 1 would hide the errors of the others.
+    It is a power of two, which changes no digit, and 1 for momenta up to `HEAVY_MOMENTUM`: a series weighs momenta and
+    a quaternion or an axis of length one in one norm, so that momenta far above 1 would hide the errors of the others.
     """
     masses = 3 if len(plain) == len(NUMBERS) else 4
     if masses == 4:
@@ -235,7 +235,7 @@ def lightened(plain: Sequence[float]) -> tuple[tuple[float, ...], float]:
         moments = plain[0], plain[0], plain[1]
         rates = theta_dot, phi_dot * math.sin(theta), psi_dot + phi_dot * math.cos(theta)
     size = math.hypot(*map(operator.mul, moments, rates), math.sqrt(abs(plain[masses - 1]) * max(moments)))
-    unit = 2.0 ** math.frexp(size)[1] if size > HEAVY else 1.0
+    unit = 2.0 ** math.frexp(size)[1] if size > HEAVY_MOMENTUM else 1.0
     return (*(number / unit for number in plain[:masses]), *plain[masses:]), unit
 
 
@@ -270,7 +270,7 @@ class SymmetricTop:
         object.__setattr__(self, "I1", bounded("I1", positive("I1", self.I1), 1.0 / LARGEST))
         object.__setattr__(self, "I3", bounded("I3", positive("I3", self.I3), 1.0 / LARGEST))
         object.__setattr__(self, "mgl", bounded("mgl", self.mgl))
-        if self.I3 > 2.0 * self.I1 * (1.0 + SLACK):
+        if self.I3 > 2.0 * self.I1 * (1.0 + MOMENT_SLACK):
             words = f"not {self.I3!r} with I1 = {self.I1!r}"
             raise SymtopError(f"I3 must be at most 2 I1 (no rigid body exceeds it), {words}")
 
@@ -308,7 +308,7 @@ class SymmetricTop:
         """
         mass, arm = positive("mass", mass), finite("distance", distance)
         across, axial = positive("at_centre", at_centre), positive("axial", axial)
-        if axial > 2.0 * across * (1.0 + SLACK):
+        if axial > 2.0 * across * (1.0 + MOMENT_SLACK):
             raise SymtopError(f"axial must be at most 2 at_centre (no rigid body exceeds it), not {axial!r}")
         return cls(across + mass * arm * arm, axial, mass * finite("gravity", gravity, 0.0) * arm)
 
@@ -468,7 +468,7 @@ def nutation_period(top: Any, at: Any) -> float:
 @inlined
 def beside_pole(low: float, high: float) -> bool:
     """Does a turning cosine lie so near 1 or -1 that the differences in `period_between` lose their digits?"""
-    return low < -POLE or high > POLE
+    return low < -POLE_COSINE or high > POLE_COSINE
 
 
 @shared

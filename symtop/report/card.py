@@ -23,8 +23,8 @@ from symtop.report.figures import SMALLEST
 from symtop.report.style import BLUE, GREEN, GREY, ORANGE, PAPER, VERMILLION, slope_guide
 from symtop.report.template import environment
 
-LETTER = 6.6  # width of a letter of the badge, pixels
-LONGEST = 72  # letters of the text of a badge
+LETTER_WIDTH = 6.6  # width of a letter of the badge, pixels
+LONGEST_TEXT = 72  # letters of the text of a badge
 SIGNS = {"confirmed": "✓", "refuted": "✗", "measured": "=", "undecided": "?", "inapplicable": "–"}
 
 
@@ -123,9 +123,9 @@ def badge(ledger: Ledger) -> str:
     """The badge as SVG: the method's properties in green, or its refuted claims in vermillion."""
     refuted = [claim_name(finding.claim) for finding in ledger.findings if finding.verdict == "refuted"]
     words = f"refuted: {', '.join(refuted)}" if refuted else description(ledger.findings).partition(";")[0]
-    if len(words) > LONGEST:
-        words = words[:LONGEST].rsplit(",", 1)[0]
-    left, right = (round(len(text) * LETTER + 12) for text in ("symtop", words))
+    if len(words) > LONGEST_TEXT:
+        words = words[:LONGEST_TEXT].rsplit(",", 1)[0]
+    left, right = (round(len(text) * LETTER_WIDTH + 12) for text in ("symtop", words))
     template = environment(autoescape=True).get_template("badge.svg")
     return f"{template.render(left=left, right=right, words=words, color=VERMILLION if refuted else GREEN)}\n"
 

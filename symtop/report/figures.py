@@ -13,14 +13,14 @@ from symtop.report.style import LEAST_TEXT, ink
 
 SMALLEST = 1e-17  # where an error of exactly zero is drawn
 LOWEST = 1e-40  # lower edge of the grey band, below every panel
-BELOW = "below the reference's error bound"
+BELOW_BOUND = "below the reference's error bound"
 MOST_NAMED = 9  # variants that a figure labels
 
 
 def error_band(axis: Any, bounds: Any) -> float:
     """Shade all that lies below the median error bound of the reference; returns that bound, or 1e-16 without one."""
     level = float(np.nanmedian(bounds)) if np.isfinite(bounds).any() else 1e-16
-    shape = {"color": "#BBBBBB", "alpha": 0.45, "lw": 0, "label": BELOW, "transform": axis.get_yaxis_transform()}
+    shape = {"color": "#BBBBBB", "alpha": 0.45, "lw": 0, "label": BELOW_BOUND, "transform": axis.get_yaxis_transform()}
     axis.add_artist(Rectangle((0.0, LOWEST), 1.0, level - LOWEST, **shape))  # an artist does not change the limits
     return level
 
@@ -96,10 +96,10 @@ def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: S
             low = spots[k] + point * np.array([dx, dy]) - size * (0.5 - 0.5 * np.sign(dx), 0.5)
             box = Bbox([low, low + size])
             out = box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0 or box.y1 > frame.y1
-            covered = LINE * _inside(marks, box).sum() + WRONG * _inside(foreign, box, BESIDE).sum()
-            covered += WRONG * _inside(np.concatenate(dots), box, 2.0).sum()
+            covered = LINE_COST * _inside(marks, box).sum() + NEAR_COST * _inside(foreign, box, NEAR_OTHER_LINE).sum()
+            covered += NEAR_COST * _inside(np.concatenate(dots), box, 2.0).sum()
             price = 1e3 * (sum(box.overlaps(other) for other in boxes) + out) + covered
-            price += abs(dy) / 2.0 + ELSEWHERE[min(k, 2)] + ASIDE[side]
+            price += abs(dy) / 2.0 + POINT_COSTS[min(k, 2)] + SIDE_COSTS[side]
             candidates.append((price, len(candidates), box, spots[k], (dx, dy), side))
         *_, box, text.xy, shift, side = min(candidates)
         text.xy = axis.transData.inverted().transform(text.xy)
@@ -107,11 +107,11 @@ def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: S
         boxes.append(box)
 
 
-APART = 3.0  # pixels between points that represent a line
+PIXELS_APART = 3.0  # pixels between points that represent a line
 MOST_SPOTS = 40  # points of a line between its ends where its name is tried
-BESIDE = (16.0, 10.0)  # pixels: a name so near to a point of another line seems to belong to that
-LINE, WRONG, ELSEWHERE = 0.8, 8.0, (0.0, 2.0, 6.0)  # costs: a covered point, a near one; last, first, inner point
-ASIDE = {"left": 0.0, "right": 2.0, "center": 14.0}  # cost of the alignment of a name
+NEAR_OTHER_LINE = (16.0, 10.0)  # pixels: a name so near to a point of another line seems to belong to that
+LINE_COST, NEAR_COST, POINT_COSTS = 0.8, 8.0, (0.0, 2.0, 6.0)  # a covered point, a near one; last, first, inner point
+SIDE_COSTS = {"left": 0.0, "right": 2.0, "center": 14.0}  # cost of the alignment of a name
 PLACES = (*((dx, dy, side) for dx, side in ((5, "left"), (-5, "right")) for dy in (0, -5, 5, -9, 9)),
           *((0, dy, "center") for dy in (-11, 11, -15, 15)))  # fmt: skip
 
@@ -122,8 +122,8 @@ def _inside(points: Any, box: Any, margin: Any = 0.0) -> Any:
 
 
 def _dense(axis: Any, x: Any, y: Any) -> Any:
-    """Points (n, 2) along a line in pixels, `APART` from each other."""
+    """Points (n, 2) along a line in pixels, `PIXELS_APART` from each other."""
     ends = axis.transData.transform(np.stack([x, y], axis=1))
     length = np.append(0.0, np.cumsum(np.hypot(*np.diff(ends, axis=0).T)))
-    places = np.arange(0.0, length[-1] + APART, APART)
+    places = np.arange(0.0, length[-1] + PIXELS_APART, PIXELS_APART)
     return np.stack([np.interp(places, length, ends[:, k]) for k in range(2)], axis=1)

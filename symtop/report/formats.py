@@ -6,11 +6,11 @@ from collections.abc import Mapping, Sequence
 from decimal import ROUND_CEILING, ROUND_FLOOR, Context
 from typing import Any
 
-FIRM = "\N{NO-BREAK SPACE}"
-RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+NO_BREAK = "\N{NO-BREAK SPACE}"
+SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 LARGEST_PLAIN = 1e4  # larger numbers are written with a power of ten
 MOST_COUNTED = 1e9  # larger whole numbers are not written as counts
-FEW = 4  # most names in a sentence; the others are counted
+MOST_NAMES = 4  # most names in a sentence; the others are counted
 PRINTED = re.compile(  # matches code, links and comments (kept), numbers such as 1e-06, and "us" after a number
     r"(?P<same>`[^`]*`|\]\([^)]*\)|<!--.*?-->)|(?<![\w.])(?P<mantissa>\d(?:\.\d+)?)e(?P<power>[-+]?\d{1,3})(?!\w)"
     r"|(?:(?<=\d[ \N{NO-BREAK SPACE}])|(?<=\| )|(?<=\())us\b"
@@ -23,7 +23,7 @@ def number(value: float, digits: int = 2, unit: str = "") -> str:
     rounded = float(f"{value:.{digits}g}")
     text = f"{value:.{digits}g}" if not 10.0**digits <= abs(rounded) < LARGEST_PLAIN else f"{value:.0f}"
     printed = typeset(text)
-    return f"{printed}{FIRM}{unit}" if unit else printed
+    return f"{printed}{NO_BREAK}{unit}" if unit else printed
 
 
 def typeset(text: str) -> str:
@@ -32,8 +32,8 @@ def typeset(text: str) -> str:
     def printed(match: re.Match[str]) -> str:
         if match["same"] or not match["power"]:
             return match["same"] or "µs"
-        ten = f"10{str(int(match['power'])).translate(RAISED)}"
-        return ten if match["mantissa"] == "1" else f"{match['mantissa']}{FIRM}×{FIRM}{ten}"
+        ten = f"10{str(int(match['power'])).translate(SUPERSCRIPTS)}"
+        return ten if match["mantissa"] == "1" else f"{match['mantissa']}{NO_BREAK}×{NO_BREAK}{ten}"
 
     return PRINTED.sub(printed, text)
 
@@ -57,17 +57,17 @@ def count(value: float) -> str:
 
 def percent(value: float, digits: int = 0) -> str:
     """A share as a percentage: ``31 %``."""
-    return f"{100.0 * value:.{digits}f}{FIRM}%"
+    return f"{100.0 * value:.{digits}f}{NO_BREAK}%"
 
 
 def power(value: float) -> str:
     """The power of ten nearest to a positive number: ``10⁻⁶``."""
-    return f"10{str(round(math.log10(value))).translate(RAISED)}"
+    return f"10{str(round(math.log10(value))).translate(SUPERSCRIPTS)}"
 
 
 def fixed(value: float, digits: int = 2, unit: str = "") -> str:
     """A number with `digits` digits after the point: ``1.90``."""
-    return f"{value:.{digits}f}{FIRM}{unit}" if unit else f"{value:.{digits}f}"
+    return f"{value:.{digits}f}{NO_BREAK}{unit}" if unit else f"{value:.{digits}f}"
 
 
 def duration(seconds: float, digits: int = 2) -> str:
@@ -125,7 +125,7 @@ def listed(names: Sequence[str]) -> str:
     return f"{', '.join(first)} and {last}" if first else last
 
 
-def abridged(names: Sequence[str], most: int = FEW) -> str:
+def abridged(names: Sequence[str], most: int = MOST_NAMES) -> str:
     """The first `most` names of a list for a sentence, and the number of the others."""
     return listed([*names[:most], f"{len(names) - most} more"] if len(names) > most else names or ["none"])
 

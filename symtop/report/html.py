@@ -15,7 +15,7 @@ from typing import Any
 from markdown_it import MarkdownIt
 from markdown_it.token import Token
 
-LONG = 27  # characters: longer cells may be broken into lines
+LONG_CELL = 27  # characters: longer cells may be broken into lines
 AT_ONCE = 2  # figures that are loaded at once; later ones when they are scrolled to
 MATHML = "http://www.w3.org/1998/Math/MathML"
 PIECES = re.compile(r"^<!-- (?P<kind>chart|table) (?P<name>\S+) -->$|^\$\$(?P<formula>.+?)\$\$$", re.MULTILINE)
@@ -111,7 +111,7 @@ class Writer:
     def _table(self, block: Sequence[Token], title: str) -> str:
         name = self.anchor(slug(title) or "table")
         for cell, content in itertools.pairwise(block):
-            if cell.type == "td_open" and len(content.content) > LONG and " " in content.content:
+            if cell.type == "td_open" and len(content.content) > LONG_CELL and " " in content.content:
                 cell.attrSet("class", "words")
         body = self._rendered(block).replace("<th>", '<th scope="col">')
         body = body.replace("<table>", f'<table data-name="{name}">', 1)

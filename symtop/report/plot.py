@@ -30,7 +30,7 @@ LINES = ("-", "--", "-.", ":")  # line styles of the scenes of a sweep
 AXES = {"seconds": "time of a run, one core (s)", "force_evaluations": "force evaluations of a run"}
 COLORS = {"axis": BLACK, "attitude": GREY, "theta": SKY, "energy": VERMILLION, "p_phi": GREEN, "p_psi": PURPLE}
 BANDS = ((0, 4, 0.18), (1, 3, 0.38))  # bands from 1 to 99 % and 10 to 90 %: indices in `spread.LEVELS`, opacity
-MOST = {"axis": np.pi, "attitude": np.pi, "energy": 1e3}  # larger errors, and those of failed members, are drawn here
+LARGEST_DRAWN = {"axis": np.pi, "attitude": np.pi, "energy": 1e3}  # larger ones, and those of failed members
 
 
 def plot(
@@ -217,9 +217,10 @@ def draw_ensemble(data: xr.Dataset, errors: dict[str, Array], path: str | Path) 
 def _bands(axis: Any, data: xr.Dataset, quantity: str, own: Array) -> None:
     """Draw quantiles over members of an error against time, at the places of `symtop.report.spread.at_places`.
 
-    The median is a line, with two bands about it, labelled at their right ends. Errors beyond `MOST` are drawn there;
-    the label of a quantile says if it is of failed runs. If all members have equally many steps per nutation, a sample
-    at a whole nutation is one for all of them, and periodic energy errors, as of a symplectic method, show a dip there.
+    The median is a line, with two bands about it, labelled at their right ends. Errors beyond `LARGEST_DRAWN` are drawn
+    there; the label of a quantile says if it is of failed runs. If all members have equally many steps per nutation, a
+    sample at a whole nutation is one for all of them, and periodic energy errors, as of a symplectic method, show a dip
+    there.
     """
     horizons = data["horizon"].values
     shared = (horizons == horizons[0]).all()
@@ -229,7 +230,7 @@ def _bands(axis: Any, data: xr.Dataset, quantity: str, own: Array) -> None:
     if not valid.any():
         raise SymtopError("there is nothing to draw: the true motion of no member is known")
     times, errors = (places * (horizons[0] if shared else 1.0))[valid], quantiles[:, valid]
-    most, color = MOST[quantity], style.look(data.attrs["integrator"]).color
+    most, color = LARGEST_DRAWN[quantity], style.look(data.attrs["integrator"]).color
     quantiles = np.clip(errors, SMALLEST, most)
     for low, high, opaque in BANDS:
         axis.fill_between(times, quantiles[low], quantiles[high], color=color, alpha=opaque, lw=0.0)

@@ -19,7 +19,7 @@ from symtop.core.files import replacing, sweep
 
 WIDTH = 6.5  # inches, of a figure: the text block of a page
 LEAST_TEXT = 7.0  # points, of any text at that width
-DPI, SKETCHED = 200, 100  # of figures, and of those of a quick pass
+DPI, QUICK_DPI = 200, 100  # of figures, and of those of a quick pass
 
 BLACK, ORANGE, SKY, GREEN, YELLOW, BLUE, VERMILLION, PURPLE, GREY = (
     "#000000", "#E69F00", "#56B4E9", "#009E73", "#F0E442", "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F",
@@ -140,7 +140,7 @@ def save(figure: Any, target: Path, dpi: float = DPI) -> None:
     plt.close(figure)
 
 
-sketch = functools.partial(save, dpi=SKETCHED)  # for a quick pass, in half the time
+sketch = functools.partial(save, dpi=QUICK_DPI)  # for a quick pass, in half the time
 
 
 def publish(figure: Any, target: Path) -> None:

@@ -11,7 +11,7 @@ from typing import Any
 from symtop.core.errors import SymtopError, shown
 
 PATIENCE = 10  # seconds to wait for a scheduler's answer, or for its first worker
-ABSENT = "scheduler needs the package distributed: pip install 'symtop[distributed]'"
+NO_DISTRIBUTED = "scheduler needs the package distributed: pip install 'symtop[distributed]'"
 
 
 def check_sent(address: object, work: object, name: str) -> None:
@@ -22,7 +22,7 @@ def check_sent(address: object, work: object, name: str) -> None:
     try:
         from distributed.protocol import pickle
     except ImportError:
-        raise SymtopError(ABSENT) from None
+        raise SymtopError(NO_DISTRIBUTED) from None
     try:
         pickle.dumps(work)
     except Exception:  # noqa: BLE001  (what cannot be sent says so in many ways)
@@ -35,7 +35,7 @@ def connect(address: str) -> Any:
     try:
         import distributed
     except ImportError:
-        raise SymtopError(ABSENT) from None
+        raise SymtopError(NO_DISTRIBUTED) from None
     for name in ("client", "batched"):  # a lost scheduler is reported here, not in their logs
         logging.getLogger(f"distributed.{name}").setLevel(logging.CRITICAL)
     client, failure = None, ""

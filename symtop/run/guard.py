@@ -35,42 +35,42 @@ import numpy as np
 
 from symtop.core.numbers import EPSILON, GOLDEN
 from symtop.methods.framework.calling import solve
-from symtop.methods.framework.plan import LENGTH, QUATERNIONS, Plan, sentence
+from symtop.methods.framework.plan import LENGTH_OFF, QUATERNIONS, Plan, sentence
 from symtop.methods.framework.registry import Integrator, integrator, is_built_in
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.run.linear_stability import Growth, nutation_growth, trace
-from symtop.run.motion import MOST_FOLDS, SHEARED, UNSTABLE, Exact, Integrated, Landmarks, Motion
-from symtop.run.reference.sensitivity import SMALL
+from symtop.run.motion import MOST_FOLDS, SHEAR, UNSTABLE_RATIO, Exact, Integrated, Landmarks, Motion
+from symtop.run.reference.sensitivity import SMALL_CHANGE
 
-STEPS = {"compiled": 2000, "python": 50}  # most steps of a probe of two nutations
-AT_LEAST, AT_MOST = 0.25, 10.0  # times `STEPS`: least steps of a probe, and of one where errors grow
-SHARE = 0.1  # of the run: a probe may always be so long, up to `Integrated.longest` nutations and `MOST_PROBED` steps
+PROBE_STEPS = {"compiled": 2000, "python": 50}  # most steps of a probe of two nutations
+LEAST_PROBE, LONGEST_PROBE = 0.25, 10.0  # times `PROBE_STEPS`: least steps of a probe, and of one where errors grow
+PROBE_SHARE = 0.1  # of the run: a probe may be so long, up to `Integrated.longest` nutations and `MOST_PROBED` steps
 MOST_PROBED = 20_000  # steps
-ROUNDED = 1e-13  # rad: a smaller error of a probe is rounding, which grows as n^1.5
-AFFORDED = {"compiled": 12_000, "python": 1200}  # evaluations of a longer probe of an adaptive method
-THROUGH = 20.0  # times `AFFORDED` where the axis passes a pole closer than the tolerance, or a free body turns over
+ROUNDED_ERROR = 1e-13  # rad: a smaller error of a probe is rounding, which grows as n^1.5
+PROBE_EVALUATIONS = {"compiled": 12_000, "python": 1200}  # evaluations of a longer probe of an adaptive method
+POLE_FACTOR = 20.0  # times `PROBE_EVALUATIONS` where the axis passes a pole within the tolerance, or a body turns over
 MOST_WORK = {"compiled": 5e6, "python": 5e5}  # evaluations of any probe: beside a pole steps may become tiny
-LOOSE = 1e-4  # tolerance above which a method in Python is probed for a whole nutation: a few of its steps
+LOOSE_TOLERANCE = 1e-4  # tolerance above which a method in Python is probed for a whole nutation: a few of its steps
 LEAST_GROWTH = 0.02  # of the error of a probe: the least growth assumed from its first half to its second
-COMMITTED = 1e4, 1e7  # tolerances: the occasional large error of an adaptive method, and of one of variable order
-CLOSE, PASSING = 0.2, 100.0  # rad from a pole; tolerances: the occasional error of a step past it in the angles chart
-WORTH = 1e-2  # rad: stability is checked only if quadratic growth leads to a larger error
-RESOLVED = 0.3  # rad of precession in one step at a pole: a probe with more does not show the error of the passage
+OCCASIONAL = 1e4, 1e7  # tolerances: the occasional large error of an adaptive method, and of one of variable order
+CLOSE_TO_POLE, PASSING_ERROR = 0.2, 100.0  # rad from a pole; tolerances, of a step past it in the angles chart
+STABILITY_ERROR = 1e-2  # rad: stability is checked only if quadratic growth leads to a larger error
+RESOLVED_TURN = 0.3  # rad of precession in one step at a pole: a probe with more does not show the error of the passage
 
 EXPECTED = 1e-2  # rad: a larger forecast gives a warning; also the axis error from which a verdict calls a run wrong
-FASTER = 2.5  # times, from quarter to quarter of a probe, faster than t^3; 2 warns of 7 right runs of 2,526, 2.5 of one
+FASTER = 2.5  # from quarter to quarter of a probe, faster than t^3; 2 warns of 7 right runs of 2,526, 2.5 of one
 AIM = 1e-3  # rad: the error that the proposed step or tolerance should have
 SMALL_TURN = 0.3  # h omega up to which every method is stable for small nutations
-GROWS = 1e-3  # a method is unstable if a step multiplies small nutations by more than 1 + GROWS
-NONLINEAR = 0.03  # times the nutation that a method adds: less growth may be a nonlinear effect (8e-6 at 4e-4 rad)
-BESIDE = 1e-2  # rad: nearer to a pole than this, small nutations grow in the tilt of the axis
-NEAR = 0.12  # rad between three or four turns of a step and a whole turn: a resonance
-COARSE = 1.0  # rad of precession in one step at a pole: more is named as the cause
-PRECESSED = 0.1  # rad of precession at a pole in a proposed step
-TRIES, LESS = 8, 0.6  # steps tried for a remedy; the largest ratio of one to the one before
-CURABLE = ("not_converged", "not_finite", "not_normalised")  # outcomes that a shorter step prevents
-SAME = 0.9  # the least ratio of two errors that are taken for the same
+UNSTABLE_GROWTH = 1e-3  # a method is unstable if a step multiplies small nutations by more than 1 + this
+NONLINEAR_SHARE = 0.03  # of the nutation that a method adds: less growth may be nonlinear (8e-6 at 4e-4 rad)
+BESIDE_POLE = 1e-2  # rad: nearer to a pole than this, small nutations grow in the tilt of the axis
+RESONANCE_GAP = 0.12  # rad between three or four turns of a step and a whole turn: a resonance
+COARSE_TURN = 1.0  # rad of precession in one step at a pole: more is named as the cause
+PROPOSED_TURN = 0.1  # rad of precession at a pole in a proposed step
+REMEDY_TRIES, STEP_RATIO = 8, 0.6  # steps tried for a remedy; the largest ratio of one to the one before
+CURABLE_OUTCOMES = ("not_converged", "not_finite", "not_normalised")  # outcomes that a shorter step prevents
+SAME_ERROR = 0.9  # the least ratio of two errors that are taken for the same
 MOST_STEPS = 20_000_000_000  # of a run: ten minutes of the fastest kernel
 NO_ORDER = "it has no order, and smaller steps need not help; take another method, such as strang"
 NO_LENGTHS = np.empty(0)
@@ -109,7 +109,7 @@ def _places(points: int) -> Array:
 
 @functools.lru_cache(maxsize=256)
 def _marks(steps: int, points: int) -> Any:
-    """`_places` for a probe of `steps` steps, rounded to whole steps; few values of `steps` occur (`STEPS`)."""
+    """`_places` for a probe of `steps` steps, rounded to whole steps; few values of `steps` occur (`PROBE_STEPS`)."""
     return np.unique(np.maximum(np.rint(_places(points) * (steps / points)).astype(np.int64), 1))
 
 
@@ -144,7 +144,7 @@ def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
     n = horizon / half
     if n <= 2.0 * (1.0 + 1e-9) or not math.isfinite(whole):
         return whole
-    if whole < ROUNDED:
+    if whole < ROUNDED_ERROR:
         return whole * math.pow(0.5 * n, 1.5)
     first = float(probe.error[probe.times <= half].max(initial=0.0))
     if straight:
@@ -159,13 +159,13 @@ def exponential(probe: Probe, horizon: float) -> float:
     """
     end = float(probe.times[-1])
     half, more, whole = (float(probe.error[probe.times <= part * end].max(initial=0.0)) for part in (0.5, 0.75, 1.0))
-    if not (half > ROUNDED and FASTER * half < more and FASTER * more < whole < math.inf):
+    if not (half > ROUNDED_ERROR and FASTER * half < more and FASTER * more < whole < math.inf):
         return 0.0
     folds = math.log(min(more / half, whole / more)) * 4.0 * (horizon / end - 1.0)
     return whole * math.exp(min(folds, MOST_FOLDS))
 
 
-def _amplifies(motion: Motion, change: float, horizon: float, times: float = UNSTABLE) -> bool:
+def _amplifies(motion: Motion, change: float, horizon: float, times: float = UNSTABLE_RATIO) -> bool:
     """Does the motion amplify a change of its start more than `times` as much as the shear of a stable motion?"""
     return motion.displacement(change, horizon) > change * times * (1.0 + horizon / motion.landmarks.period)
 
@@ -185,10 +185,10 @@ def _fixed(motion: Motion, method: Integrator, probe: Probe, horizon: float) -> 
     expected = max(grown(probe, horizon, straight=straight), _amplified(motion, probe, horizon))
     if not isinstance(motion, Exact):  # of a top `_instability` knows the growth
         expected = max(expected, exponential(probe, horizon))
-    if not straight or not expected < WORTH:
+    if not straight or not expected < STABILITY_ERROR:
         return expected
     bent = grown(probe, horizon, straight=False)
-    return bent if bent > WORTH and _amplifies(motion, SMALL, horizon) else expected
+    return bent if bent > STABILITY_ERROR and _amplifies(motion, SMALL_CHANGE, horizon) else expected
 
 
 def _grown_tolerance(motion: Motion, method: Integrator, plan: Plan) -> float:
@@ -200,7 +200,7 @@ def _grown_tolerance(motion: Motion, method: Integrator, plan: Plan) -> float:
     """
     if not _amplifies(motion, plan.tolerance, plan.horizon):
         return 0.0
-    changes = plan.tolerance, COMMITTED[method.order is None] * plan.tolerance
+    changes = plan.tolerance, OCCASIONAL[method.order is None] * plan.tolerance
     return max(float(np.nan_to_num(motion.displacement(change, plan.horizon))) for change in changes)
 
 
@@ -209,10 +209,10 @@ def _adaptive_forecast(
 ) -> tuple[float, Probe]:
     """`_expected` for an adaptive method, whose work per time is known after a first probe.
 
-    If `AFFORDED` evaluations allow a longer probe, that is made, up to the whole run.
+    If `PROBE_EVALUATIONS` evaluations allow a longer probe, that is made, up to the whole run.
     """
     cheap = method if method.same_steps_as is None else integrator(method.same_steps_as)  # a hundredth of the time
-    least = twice if cheap.implementation == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE else 0.0
+    least = twice if cheap.implementation == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE_TOLERANCE else 0.0
 
     def probed(piece: float) -> tuple[float, Probe]:
         partial = piece < min(period, 0.5 * plan.horizon)
@@ -222,9 +222,9 @@ def _adaptive_forecast(
 
     piece = max(share, least)
     expected, probe = probed(piece)
-    afforded = AFFORDED[cheap.implementation] * min(cheap.speed, 1.0)
+    afforded = PROBE_EVALUATIONS[cheap.implementation] * min(cheap.speed, 1.0)
     if (far or (chart == "angles" and motion.landmarks.gap < plan.tolerance)) and cheap.implementation == "compiled":
-        afforded *= THROUGH
+        afforded *= POLE_FACTOR
     longer = min(plan.horizon, piece * afforded / max(probe.evaluations, 1))
     if longer > 1.5 * piece or longer == plan.horizon > piece:
         return probed(longer)
@@ -234,30 +234,30 @@ def _adaptive_forecast(
 def _expected(motion: Motion, method: Integrator, chart: str, plan: Plan) -> tuple[float, Probe]:
     """The expected largest axis error of a run, and the probe from which it follows."""
     straight, marks = method.keeps_frequencies, motion.landmarks
-    grows = motion.scene.of_body and motion.scene.top.free and _amplifies(motion, SMALL, plan.horizon, SHEARED)
+    grows = motion.scene.of_body and motion.scene.top.free and _amplifies(motion, SMALL_CHANGE, plan.horizon, SHEAR)
     period = marks.period if math.isfinite(marks.period) else plan.horizon
     twice = min(2.0 * period, plan.horizon)
-    long_steps = chart == "angles" and marks.rate * plan.step_size > RESOLVED
-    share = min(SHARE * plan.horizon, (math.inf if long_steps else motion.longest) * period)
+    long_steps = chart == "angles" and marks.rate * plan.step_size > RESOLVED_TURN
+    share = min(PROBE_SHARE * plan.horizon, (math.inf if long_steps else motion.longest) * period)
     if method.adaptive:
         return _adaptive_forecast(motion, method, chart, plan, period, share, twice, grows)
     step = plan.step_size
     share = min(share, MOST_PROBED * step)
-    allowed = max(STEPS[method.implementation] * step, share)
+    allowed = max(PROBE_STEPS[method.implementation] * step, share)
     if twice <= allowed:
-        piece = max(twice, share, min(AT_LEAST * STEPS[method.implementation] * step, motion.reach * period))
+        piece = max(twice, share, min(LEAST_PROBE * PROBE_STEPS[method.implementation] * step, motion.reach * period))
         if grows:
-            piece = max(piece, AT_MOST * STEPS[method.implementation] * step)
+            piece = max(piece, LONGEST_PROBE * PROBE_STEPS[method.implementation] * step)
         probe = _probe(motion, method, chart, plan, min(plan.horizon, piece), step)
         return _fixed(motion, method, probe, plan.horizon), probe
     coarse = twice / round(allowed / step)
     probe, finer = _probe(motion, method, chart, plan, twice, coarse), (step / coarse) ** (method.order or 0)
     if method.order and (off := float(probe.error.max())) > EXPECTED:  # another top's map, or too coarse
         half = _probe(motion, method, chart, plan, twice, 0.5 * coarse)
-        finer = finer if float(half.error.max()) < SAME * off else 1.0
+        finer = finer if float(half.error.max()) < SAME_ERROR * off else 1.0
     probe = probe._replace(evaluations=round(probe.evaluations * coarse / step), stray=probe.stray * finer)
     expected = _fixed(motion, method, probe, plan.horizon) * finer
-    if chart == "angles" and marks.rate * coarse > RESOLVED:
+    if chart == "angles" and marks.rate * coarse > RESOLVED_TURN:
         since = max(0.0, motion.closest() - 0.5 * allowed)
         if since < plan.horizon:
             probe = _probe(motion, method, chart, plan, min(allowed, plan.horizon - since), step, since)
@@ -278,8 +278,8 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: M
         return Forecast(0.0, 0.0, "ok", plan.horizon, marks)
     error, probe = _expected(motion, method, chart, plan)
     partly = method.adaptive and method.implementation == "python" and not probe.times[-1] >= plan.horizon
-    if partly and chart == "angles" and marks.gap < CLOSE:
-        error = max(error, float(np.nan_to_num(motion.displacement(PASSING * plan.tolerance, plan.horizon))))
+    if partly and chart == "angles" and marks.gap < CLOSE_TO_POLE:
+        error = max(error, float(np.nan_to_num(motion.displacement(PASSING_ERROR * plan.tolerance, plan.horizon))))
     unstable = _grown_tolerance(motion, method, plan) if partly else 0.0
     whole = bool(probe.times[-1] >= plan.horizon * (1.0 - 1e-9))
     ended, rounding = (probe.outcome, probe.reached), motion.rounding(plan.horizon, whole=whole)
@@ -297,9 +297,9 @@ def _length_lost(probe: Probe, horizon: float) -> tuple[str, float] | None:
     """Outcome and time of the run's end if the drift of |q| continues as in the probe; None if |q| stays in bounds."""
     half, most = 0.5 * float(probe.times[-1]), float(probe.stray.max())
     drift = (most - float(probe.stray[probe.times <= half].max(initial=0.0))) / half
-    if most + drift * (horizon - 2.0 * half) <= LENGTH:
+    if most + drift * (horizon - 2.0 * half) <= LENGTH_OFF:
         return None
-    return "not_normalised", 2.0 * half + (LENGTH - most) / drift
+    return "not_normalised", 2.0 * half + (LENGTH_OFF - most) / drift
 
 
 class Trouble(NamedTuple):
@@ -330,7 +330,7 @@ def warning(scene: Scene, method: Integrator, chart: str, plan: Plan, *, series:
 def _remedy(motion: Motion, method: Integrator, chart: str, plan: Plan, first: Trouble) -> str:
     """The advice to use a step, of two digits, for which there is no warning: the first try or a smaller one."""
     step, others, words, errors = first.step, f", or {first.otherwise}" if first.otherwise else "", "", []
-    for _ in range(TRIES):
+    for _ in range(REMEDY_TRIES):
         if not plan.horizon / step <= MOST_STEPS:
             words = f"take {first.otherwise or 'another method'}: more than {MOST_STEPS:.0e} steps would be needed"
             break
@@ -340,9 +340,9 @@ def _remedy(motion: Motion, method: Integrator, chart: str, plan: Plan, first: T
         if expected.outcome == "ok" and trouble(motion, method, chart, finer, expected) is None:
             return f"take a step of about {step:.2g}{others}"
         errors.append(expected.axis_error)
-        step = min(LESS * step, _smaller(method, finer, expected))
+        step = min(STEP_RATIO * step, _smaller(method, finer, expected))
     own = method.order and not is_built_in(method.method)  # the order of any other is known to hold
-    if own and len(errors) > 1 and SAME * errors[0] < errors[-1] < math.inf:
+    if own and len(errors) > 1 and SAME_ERROR * errors[0] < errors[-1] < math.inf:
         claim = f"whether it has the order {method.order} that it claims"
         return f"shorter steps do not help: `symtop claims {method.name}` measures {claim}"
     return words or f"try a step of about {step:.2g}{others}"
@@ -368,17 +368,17 @@ def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expec
     if method.adaptive or good_run:
         return None
     growth, steps = _growth(scene, method, chart, step, frequency), plan.horizon / step
-    beside = marks.gap if marks.gap < BESIDE else 0.0  # of a pole, the tilt grows
+    beside = marks.gap if marks.gap < BESIDE_POLE else 0.0  # of a pole, the tilt grows
     size, folds = marks.width + beside + growth.size, steps * math.log(max(growth.factor, 1.0))
-    grows = growth.factor > 1.0 + max(NONLINEAR * growth.size, growth.doubt)
+    grows = growth.factor > 1.0 + max(NONLINEAR_SHARE * growth.size, growth.doubt)
     if not grows or not size * math.expm1(min(folds, MOST_FOLDS)) > EXPECTED:
         return None
     good, bad = SMALL_TURN / frequency, step
 
     def stable(h: float) -> bool:
-        return _growth(scene, method, chart, h, frequency).factor <= 1.0 + GROWS
+        return _growth(scene, method, chart, h, frequency).factor <= 1.0 + UNSTABLE_GROWTH
 
-    if growth.factor > 1.0 + GROWS and good < bad and stable(good):
+    if growth.factor > 1.0 + UNSTABLE_GROWTH and good < bad and stable(good):
         while bad - good > 1e-3 * bad:
             middle = 0.5 * (good + bad)
             good, bad = (middle, bad) if stable(middle) else (good, middle)
@@ -413,7 +413,7 @@ def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected:
     if not limited and (coarse := _coarse(motion, method, chart, plan, expected, size)) is not None:
         return coarse
     if expected.outcome != "ok":
-        curable = expected.outcome in CURABLE and method.fixed_step and method.order is not None
+        curable = expected.outcome in CURABLE_OUTCOMES and method.fixed_step and method.order is not None
         words = sentence(expected.outcome, expected.reached, plan.horizon, second, remedy=not curable)
         return Trouble(f"expect the run to be {words}", _smaller(method, plan, expected) if curable else math.nan)
     if method.adaptive:
@@ -435,10 +435,10 @@ def _coarse(
 ) -> Trouble | None:
     """The trouble of a step that is too long for a pole or for the nutation, or in resonance with it; else None."""
     marks, step, frequency = expected.landmarks, plan.step_size, expected.landmarks.frequency
-    if chart == "angles" and marks.rate * step > COARSE:
+    if chart == "angles" and marks.rate * step > COARSE_TURN:
         return Trouble(
             f"{size}: the axis passes the {marks.pole} pole at {marks.gap:.2g} rad and precesses there by "
-            f"{marks.rate * step:.2g} rad in a step", PRECESSED / marks.rate,
+            f"{marks.rate * step:.2g} rad in a step", PROPOSED_TURN / marks.rate,
             "an integrator whose chart has no poles, such as strang",
         )  # fmt: skip
     if marks.period / step < 2.0:
@@ -447,7 +447,7 @@ def _coarse(
     if step * frequency > SMALL_TURN and isinstance(motion, Exact):
         turn = trace(method, motion.scene, step, chart).turn
         for order in (3, 4):
-            if abs(order * turn - 2.0 * math.pi) < NEAR * order:
+            if abs(order * turn - 2.0 * math.pi) < RESONANCE_GAP * order:
                 return Trouble(
                     f"{size}: a step turns the nutation by {turn:.4g} rad, close to 1/{order} of a turn, a resonance "
                     f"(h omega = {step * frequency:.3f})", _smaller(method, plan, expected),

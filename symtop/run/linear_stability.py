@@ -32,19 +32,19 @@ from symtop.model.top import Angles, Momenta, SymmetricTop
 
 NUDGE = 1e-6  # rad, displacement from the fixed point: nonlinear terms are 1e-6 of the linear ones (of a difference of
 # two sides 1e-12), rounding 1e-10. The trace of Verlet is off by 7e-7 at h omega = 1, by 1e-5 at 2.1.
-BESIDE = 1e-3  # rad: nearer to a pole than this, the motion is that at the pole to 1e-6, except in Euler's angles
-STABLE = 1e-2  # least relative distance of p_psi^2 above the threshold of a stable rotation at the pole
-NEAR, LEAST = 1e-3, 1e-9  # a nudge near a pole: part of the distance (nonlinear terms are 1e-6), and at least, rad
+BESIDE_POLE = 1e-3  # rad: nearer to a pole than this, the motion is that at the pole to 1e-6, except in Euler's angles
+MARGIN = 1e-2  # least relative distance of p_psi^2 above the threshold of a stable rotation at the pole
+NUDGE_SHARE, LEAST_NUDGE = 1e-3, 1e-9  # near a pole: part of the distance (nonlinear terms are 1e-6); rad
 SINGLE_NUDGE, SINGLE_EPSILON = 1e-3, 2.0**-23  # for methods in single precision: rad; machine epsilon
 WARM_UP = 4  # strides before those that are compared: more than the starting steps of a multistep method
 ROUNDING = 32.0 * EPSILON  # of an inclination after some steps, rad
 RESIDUAL, RESIDUAL_WITHOUT_ORDER = 2e-3, 5e-4  # largest relative residual of the recurrence; if a method has no order
 STRIDE = 0.5  # rad of nutation between two terms of the recurrence of `nutation_growth`
-SLOWEST = 1e-6  # least growth per step in the estimate of accumulated rounding
-LONG = 120  # strides over which a difference is followed that obeys no two-term recurrence
+LEAST_GROWTH = 1e-6  # least growth per step in the estimate of accumulated rounding
+LONG_STRIDES = 120  # strides over which a difference is followed that obeys no two-term recurrence
 MOST_STRIDE = {"compiled": 50, "python": 5}  # steps
 STEPS = 4  # of a run
-ROUNDS = 6  # iterations for the fixed point
+FIXED_POINT_ROUNDS = 6  # iterations for the fixed point
 
 
 def few_steps(method: Integrator, chart: str, top: SymmetricTop, start: Angles, h: float, steps: int = STEPS) -> Run:
@@ -88,7 +88,7 @@ def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None) 
     top, momenta = scene.top, scene.top.momenta(scene.start)
     chart = chart or method.chart_for("axis")
     theta, moved = top.steady_theta(momenta), math.inf
-    for _ in range(ROUNDS):
+    for _ in range(FIXED_POINT_ROUNDS):
         if not 1e-3 < theta < math.pi - 1e-3:
             return NO_TRACE
         run = few_steps(method, chart, top, with_momenta(top, theta + NUDGE, momenta), h)
@@ -144,7 +144,7 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
     """
     stride = max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))  # steps
     gap = min(theta := scene.top.steady_theta(scene.top.momenta(scene.start)), math.pi - theta)
-    nudge, rounding = NUDGE if _beside(scene, chart) else min(NUDGE, max(NEAR * gap, LEAST)), EPSILON
+    nudge, rounding = NUDGE if _beside(scene, chart) else min(NUDGE, max(NUDGE_SHARE * gap, LEAST_NUDGE)), EPSILON
     runs, delta, off = _apart(method, scene, h, chart, nudge, stride)
     places = runs[0].states[1:, :3]
     with np.errstate(over="ignore"):  # a run may have blown up
@@ -154,7 +154,7 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
         delta, off = _apart(method, scene, h, chart, nudge, stride)[1], 0.0
     factor = _root(delta, RESIDUAL if method.order else RESIDUAL_WITHOUT_ORDER)
     if math.isnan(factor) and (method.order or single):
-        long = np.abs(_apart(method, scene, h, chart, nudge, stride, LONG)[1])
+        long = np.abs(_apart(method, scene, h, chart, nudge, stride, LONG_STRIDES)[1])
         third = long.size // 3
         with np.errstate(all="ignore"):
             factor = float(np.max(long[-third:]) / np.max(long[:third])) ** (1.0 / (2 * third))
@@ -166,7 +166,7 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
         lost = EPSILON * (abs(top.energy(scene.start)) + abs(top.mgl))
         noise = max(noise, lost / max(top.I1 * frequency**2 * nudge, TINY))
     doubt = noise / nudge / max(min(stride * h * frequency, 1.0) ** 2, TINY) / stride
-    return Growth(factor, off + rounding * math.sqrt(0.5 / max(math.log(max(factor, 1.0)), SLOWEST)), doubt)
+    return Growth(factor, off + rounding * math.sqrt(0.5 / max(math.log(max(factor, 1.0)), LEAST_GROWTH)), doubt)
 
 
 def _beside(scene: Scene, chart: str) -> bool:
@@ -174,7 +174,8 @@ def _beside(scene: Scene, chart: str) -> bool:
     top, momenta = scene.top, scene.top.momenta(scene.start)
     theta, square = top.steady_theta(momenta), momenta.p_psi**2
     weight = 4.0 * top.I1 * (top.mgl if theta < 1.0 else -top.mgl)  # p_psi^2 at the threshold
-    return chart != "angles" and min(theta, math.pi - theta) < BESIDE and square - weight > STABLE * max(square, weight)
+    beside = min(theta, math.pi - theta) < BESIDE_POLE
+    return chart != "angles" and beside and square - weight > MARGIN * max(square, weight)
 
 
 def _apart(

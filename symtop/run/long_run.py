@@ -1,12 +1,12 @@
 """Long runs, of a billion steps and more: stored as statistics of windows, and resumable from a checkpoint.
 
-A run is cut into windows: logarithmic in time, `PER_DECADE` per decade, until they would be longer than `LONGEST`
-steps. In each, `SAMPLES` samples are taken at whole steps that the golden ratio scatters, so that no stride is
-commensurate with the nutation. Of every quantity only the least, the largest and the mean value are stored.
+A run is cut into windows: logarithmic in time, `PER_DECADE` per decade, until they would be longer than
+`LONGEST_WINDOW` steps. In each, `SAMPLES` samples are taken at whole steps that the golden ratio scatters, so that no
+stride is commensurate with the nutation. Of every quantity only the least, the largest and the mean value are stored.
 
 After a window the state of the run, all that its next step depends on, can be written to a checkpoint: atomically, at
-most every `SAVE` seconds, and on an interrupt. Where windows end depends only on the number of steps, so that a resumed
-run has the same bits as one that was never interrupted.
+most every `SAVE_SECONDS` seconds, and on an interrupt. Where windows end depends only on the number of steps, so that a
+resumed run has the same bits as one that was never interrupted.
 """
 
 import contextlib
@@ -42,21 +42,21 @@ from symtop.run.simulation import chart_of as smallest_chart
 Gauge = Callable[..., dict[str, Array]]  # states and momenta of samples -> quantities
 
 PER_NUTATION = 1000.37  # default steps per nutation: not commensurate with the nutation
-FIRST = 10_000  # steps of the first window
+FIRST_WINDOW = 10_000  # steps of the first window
 PER_DECADE = 12  # windows
-LONGEST = 20_000_000  # steps of a window: it takes a second or two, and is lost if the process is killed
+LONGEST_WINDOW = 20_000_000  # steps of a window: it takes a second or two, and is lost if the process is killed
 SAMPLES = 512  # in a window
-SAVE = 2.0  # seconds between two writings of the checkpoint, at least
+SAVE_SECONDS = 2.0  # seconds between two writings of the checkpoint, at least
 QUANTITIES = ("energy", "modified_energy", "p_phi", "p_psi", "theta")
 OF_BODY = ("energy", "p_phi", "momentum", "theta")  # momentum: |L|, constant if the body has no weight
 
 
 def windows(steps: int) -> list[int]:
-    """The steps at which windows end: logarithmic from `FIRST`, then every `LONGEST`, the last at `steps`."""
-    ends = [min(FIRST, steps)]
+    """Steps at which windows end: logarithmic from `FIRST_WINDOW`, then every `LONGEST_WINDOW`, the last at `steps`."""
+    ends = [min(FIRST_WINDOW, steps)]
     while ends[-1] < steps:
-        grown = round(FIRST * 10.0 ** (len(ends) / PER_DECADE))
-        ends.append(min(grown if grown - ends[-1] < LONGEST else ends[-1] + LONGEST, steps))
+        grown = round(FIRST_WINDOW * 10.0 ** (len(ends) / PER_DECADE))
+        ends.append(min(grown if grown - ends[-1] < LONGEST_WINDOW else ends[-1] + LONGEST_WINDOW, steps))
     return ends
 
 
@@ -87,9 +87,9 @@ def presented(solver: FixedStep, par: Any, states: Array) -> Array:
 def gauge_of(scene: Scene, method: Integrator, h: float) -> Gauge:
     """A function from samples of a run to relative changes of energy, modified energy and momenta, and theta.
 
-    The remaining oscillation of the modified energy is fitted on the first `FIRST` steps, which are run here. States
-    are the loop's own, or those of the chart if `shown`. The energy is computed from the momenta of the run, or, if the
-    method conserves them, from those of the start, which have more digits. A body has the quantities `OF_BODY`.
+    The remaining oscillation of the modified energy is fitted on the first `FIRST_WINDOW` steps, which are run here.
+    States are the loop's own, or those of the chart if `shown`. The energy is computed from the momenta of the run, or,
+    if the method conserves them, from those of the start, which have more digits. A body has the quantities `OF_BODY`.
     """
     if scene.of_body:
         return _body_gauge(scene, method)
@@ -104,7 +104,7 @@ def gauge_of(scene: Scene, method: Integrator, h: float) -> Gauge:
         plain = modified.energy(scene, chart, states, used)
         return plain, modified.modified_energy(scene, method, chart, states, h, used)
 
-    head = solver.loop(par, rule, state, h, scattered(0, FIRST, 8 * SAMPLES))
+    head = solver.loop(par, rule, state, h, scattered(0, FIRST_WINDOW, 8 * SAMPLES))
     first, momenta = presented(solver, par, head.states), head.momenta
     ran = np.isfinite(first).all(axis=1) & np.isfinite(momenta).all(axis=1)  # a run may fail in its first steps
     at_start = presented(solver, par, solver.loop(par, rule, state, h, np.array([0])).states)
@@ -219,7 +219,7 @@ def summary(values: dict[str, Array]) -> list[float]:
 def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:
     """A hash of all that determines the bits of a run. It uses compiled code, so that comments do not change it."""
     numbers = [[getattr(record, name) for name in record.__slots__] for record in (scene.top, scene.start)]
-    settings = [numbers, h, steps, compensated, FIRST, PER_DECADE, LONGEST, SAMPLES]
+    settings = [numbers, h, steps, compensated, FIRST_WINDOW, PER_DECADE, LONGEST_WINDOW, SAMPLES]
     made = by_file(code_of((method, gauge_of, windows, scattered, summary)))
     return digest(made | {"numbers": hashed(json.dumps(settings))})
 
@@ -279,9 +279,9 @@ class _Checkpoint(contextlib.AbstractContextManager["_Checkpoint"]):
             return None
 
     def note(self, at: Position, rows: list[list[float]]) -> None:
-        """Record the position after a window, and write the file if the last writing was over `SAVE` seconds ago."""
+        """Record the position after a window, and write the file if the last writing was over `SAVE_SECONDS` ago."""
         self.latest = (at, list(rows))  # a copy: an interrupt may fall between a window and its note
-        if time.monotonic() - self.saved > SAVE:
+        if time.monotonic() - self.saved > SAVE_SECONDS:
             self.save()
 
     def save(self) -> None:

@@ -22,9 +22,9 @@ import numpy as np
 from symtop.core.errors import SymtopError
 from symtop.core.jit import register_jitable
 from symtop.core.numbers import EPSILON
-from symtop.methods.framework.plan import LENGTH, Plan
+from symtop.methods.framework.plan import LENGTH_OFF, Plan
 from symtop.methods.framework.registry import integrator
-from symtop.methods.runge_kutta.pairs import DOP8, two_runs
+from symtop.methods.runge_kutta.pairs import DOP853_PAIR, two_runs
 from symtop.model.body import from_flat
 from symtop.model.charts import BODY, Array, attitude_distance, axes, axis_distance
 from symtop.model.exact.free_body import FreeBody
@@ -33,21 +33,21 @@ from symtop.model.top import Angles, flat
 from symtop.run.reference.sensitivity import displacement
 
 SERIES = {BODY: "series-general-adaptive", "axis": "series-adaptive"}
-FINE, CHECK = 1e-15, 1e-13  # tolerances: of the true motion, and of the integration that checks it
-CHECKED, MULTIPLIED = 10, 1e5  # the check compares each tenth time, or only the first tenth if A is less than 1e5
-CALM = 1e3  # factor on these tolerances if A and the growth law of the guard stay below `MULTIPLIED` to the horizon
+FINE_TOLERANCE, CHECK_TOLERANCE = 1e-15, 1e-13  # tolerances: of the true motion, and of the integration that checks it
+CHECK_EVERY, LARGE_GROWTH = 10, 1e5  # the check compares each tenth time, or only the first tenth if A is less than 1e5
+CALM_FACTOR = 1e3  # on these tolerances if A and the growth law of the guard stay below `LARGE_GROWTH` to the horizon
 PAIR_STEPS = 7  # steps of two motions side by side, per period of the fastest turn: with 5.3, chaos is damped
-SWINGS = 8.0  # times the pull of a weight: twice what one swing adds to 2T
-MOVED, FINELY_MOVED = 1e-10, 1e-13  # change of the start, in natural frequencies, integrated and in closed form
-LEAST_MOVED, SEEN = 1e-16, 1e-13  # a change of the momentum, relative, while a body turns over; rad, above rounding
-FLIPS, TURNED = 1e6, 0.9  # A from which such a change counts; cosine between momenta in body axes, less in a turn
-SATURATED = 0.01  # rad: motions farther apart than this no longer separate at the same rate
-WATCHED = {BODY: 200.0, "axis": 20.0}  # natural periods over which A is computed; less for a top, which is integrable
+SWING_FACTOR = 8.0  # times the pull of a weight: twice what one swing adds to 2T
+CHANGE, FINE_CHANGE = 1e-10, 1e-13  # in natural frequencies, integrated and in closed form
+LEAST_MOMENTUM_CHANGE, ABOVE_ROUNDING = 1e-16, 1e-13  # of the momentum, relative, while a body turns over; rad
+FLIP_GROWTH, FLIP_COSINE = 1e6, 0.9  # A from which such a change counts; cosine between momenta in body axes
+SATURATED_ANGLE = 0.01  # rad: motions farther apart than this no longer separate at the same rate
+WATCHED_PERIODS = {BODY: 200.0, "axis": 20.0}  # over which A is computed; less for a top, which is integrable
 MOST_WATCHED = 6000  # steps over which A is computed
 POINTS = 100  # times at which A is computed
 MOST_POWER = 20.0  # largest power of the time with which A is extrapolated
-UNSTABLE, SHEARED = 50.0, 10.0  # ratio of A to linear growth: more than any stable motion has, more than most have
-LATER = 30.0  # ratio assumed of later errors of a method to those of the probe, in an unstable motion
+UNSTABLE_RATIO, SHEAR = 50.0, 10.0  # ratio of A to linear growth: more than any stable motion has, more than most have
+LATER_RATIO = 30.0  # ratio assumed of later errors of a method to those of the probe, in an unstable motion
 MOST_FOLDS = 100.0  # largest exponent x of a growth by e^x, against overflow
 MOST_WORK = 1e6  # steps of an integration
 
@@ -120,7 +120,7 @@ def _apart(near: Any, far: Any, units: Any) -> Any:
     for m in range(first, len(near)):
         momentum += (far[m] - near[m]) ** 2
     long = max(abs(math.sqrt(near_square) - 1.0), abs(math.sqrt(far_square) - 1.0)) if first == 4 else 0.0
-    sound = place + momentum < math.inf and long <= LENGTH
+    sound = place + momentum < math.inf and long <= LENGTH_OFF
     return max(math.sqrt(place) * units[0], math.sqrt(momentum) * units[1]) if sound else math.nan
 
 
@@ -160,11 +160,12 @@ class Integrated:
     def error(self, times: Array, chart: str, states: Array, _: float, horizon: float, /) -> Array:
         """The error (n,), rad, of states (n, dimension) at `times` (n,), plus the estimated error of the reference."""
         end = float(times[-1])
-        steady = self.amplification(end, horizon) < MULTIPLIED
-        some = slice(max(times.size // CHECKED, 1)) if steady else slice((times.size - 1) % CHECKED, None, CHECKED)
-        calm = max(self.amplification(horizon, horizon), (horizon / end) ** 2) < MULTIPLIED
-        looser = CALM if calm else 1.0
-        true, check = self.states(times, FINE * looser), self.states(times[some], CHECK * looser)
+        steady = self.amplification(end, horizon) < LARGE_GROWTH
+        part = max(times.size // CHECK_EVERY, 1)
+        some = slice(part) if steady else slice((times.size - 1) % CHECK_EVERY, None, CHECK_EVERY)
+        calm = max(self.amplification(horizon, horizon), (horizon / end) ** 2) < LARGE_GROWTH
+        looser = CALM_FACTOR if calm else 1.0
+        true, check = self.states(times, FINE_TOLERANCE * looser), self.states(times[some], CHECK_TOLERANCE * looser)
         gap = np.abs(check - true[some])[:, : 4 if self.chart == BODY else 3].max(initial=0.0)
         if self.chart == BODY:
             return np.asarray(attitude_distance(states[:, :4], true[:, :4]) + gap)
@@ -178,7 +179,7 @@ class Integrated:
         """When the axis first comes closest to a pole, where a step's error is largest; here not known, and 0."""
         return 0.0
 
-    def moved(self, by: float = MOVED) -> Any:
+    def moved(self, by: float = CHANGE) -> Any:
         """The scene's start with its rates changed by `by` times the natural frequency."""
         at, rate = self.scene.start, by * self.landmarks.frequency
         if self.chart == BODY:
@@ -187,32 +188,32 @@ class Integrated:
         return replace(at, theta_dot=at.theta_dot + 0.6 * rate, phi_dot=at.phi_dot + 0.8 * rate)
 
     def growth(self, horizon: float) -> Growth:
-        """A up to the horizon, or as far as `WATCHED` and `MOST_WATCHED` allow; cached.
+        """A up to the horizon, or as far as `WATCHED_PERIODS` and `MOST_WATCHED` allow; cached.
 
         Both motions take the same steps, so that integration errors cancel in their distance. If two motions of a free
         body separate far, A is computed again with the closed form and a smaller change; and with that of a change made
         while the body turns over, which moves it off the separatrix more than one of a start beside the unstable axis.
         """
         step = 2.0 * math.pi / self.fast / PAIR_STEPS
-        until = min(horizon, WATCHED[self.chart] * self.landmarks.period, MOST_WATCHED * step)
+        until = min(horizon, WATCHED_PERIODS[self.chart] * self.landmarks.period, MOST_WATCHED * step)
         if until not in self.growths:
             steps = max(math.ceil(until / step), POINTS)
             h, marks, apart = until / steps, np.arange(1, POINTS + 1) * steps // POINTS, np.empty(POINTS)
             given = (flat(self.scene.top, start) for start in (self.scene.start, self.moved()))
             momentum = self.inertia * self.landmarks.frequency
-            units = (2.0 if self.chart == BODY else 1.0) / MOVED, 1.0 / (MOVED * momentum)
-            two_runs(self.chart, DOP8, _apart)(*given, h, marks, units, apart)
-            times, moved, top, turning = np.multiply(marks, h, dtype=float), MOVED, self.scene.top, np.ones(POINTS)
-            if self.chart == BODY and top.free and not apart.max() < FLIPS:
-                starts = self.scene.start, self.moved(FINELY_MOVED)
+            units = (2.0 if self.chart == BODY else 1.0) / CHANGE, 1.0 / (CHANGE * momentum)
+            two_runs(self.chart, DOP853_PAIR, _apart)(*given, h, marks, units, apart)
+            times, moved, top, turning = np.multiply(marks, h, dtype=float), CHANGE, self.scene.top, np.ones(POINTS)
+            if self.chart == BODY and top.free and not apart.max() < FLIP_GROWTH:
+                starts = self.scene.start, self.moved(FINE_CHANGE)
                 with contextlib.suppress(SymtopError):  # the closed form refuses some momenta
                     forms = [FreeBody(top.moments, a.quaternion, top.momentum(a), top.momentum_lo(a)) for a in starts]
                     near, far = (form.samples(times) for form in forms)
-                    if not apart.max() < SATURATED / MOVED:
-                        apart = attitude_distance(near.quaternion, far.quaternion) / FINELY_MOVED
-                        moved = FINELY_MOVED
+                    if not apart.max() < SATURATED_ANGLE / CHANGE:
+                        apart = attitude_distance(near.quaternion, far.quaternion) / FINE_CHANGE
+                        moved = FINE_CHANGE
                     turning = _changed_later(top.moments, times, near.quaternion, near.momentum)
-            growth = Growth.of(times, apart, SATURATED / moved)
+            growth = Growth.of(times, apart, SATURATED_ANGLE / moved)
             self.growths[until] = growth._replace(size=np.maximum(growth.size, turning))
         return self.growths[until]
 
@@ -229,7 +230,7 @@ class Integrated:
         if since >= horizon:
             return error
         times = self.amplification(horizon, horizon) / self.amplification(since, horizon)
-        return error * times * (LATER if times > UNSTABLE * horizon / since else 1.0)
+        return error * times * (LATER_RATIO if times > UNSTABLE_RATIO * horizon / since else 1.0)
 
     def rounding(self, horizon: float, *, whole: bool) -> float:
         """The error by rounding at the horizon, rad, whatever the method; 0 if a probe of the `whole` run shows it."""
@@ -242,11 +243,11 @@ def _changed_later(moments: Any, times: Array, quaternion: Array, momentum: Arra
     If it never does, A is that of a change at the start.
     """
     length = np.linalg.norm(momentum[0])
-    size, then = np.ones(times.size), int(np.argmax(np.abs(momentum @ momentum[0]) < TURNED * length**2))
-    small = LEAST_MOVED * length * np.array([0.6, -0.48, 0.64])
+    size, then = np.ones(times.size), int(np.argmax(np.abs(momentum @ momentum[0]) < FLIP_COSINE * length**2))
+    small = LEAST_MOMENTUM_CHANGE * length * np.array([0.6, -0.48, 0.64])
     later, start = times[then + 1 :] - times[then], (quaternion[then], momentum[then])
     apart = attitude_distance(*(FreeBody(moments, *start, low).samples(later).quaternion for low in (small, -small)))
-    size[then + 1 :] = np.where(apart > SEEN, apart / (2.0 * LEAST_MOVED), 1.0)
+    size[then + 1 :] = np.where(apart > ABOVE_ROUNDING, apart / (2.0 * LEAST_MOMENTUM_CHANGE), 1.0)
     return np.maximum.accumulate(size)
 
 
@@ -270,7 +271,7 @@ def _frequencies(scene: Scene) -> tuple[float, float, float]:
     pulls = [abs(top.mgl) * math.sqrt(max(1.0 - along * along, 0.0)) for along in top.centre]
     twice = 2.0 * (top.energy(at) + abs(top.mgl))
     parts = zip(top.moments, at.omega_body, pulls, strict=True)
-    part = sum((1.0 - moment / most) * (moment * rate * rate + SWINGS * pull) for moment, rate, pull in parts)
+    part = sum((1.0 - moment / most) * (moment * rate * rate + SWING_FACTOR * pull) for moment, rate, pull in parts)
     turning = max(twice / most, 0.0) + max(min(part, twice * (1.0 - least / most)), 0.0) / least
     swinging = max(pull / moment for moment, pull in zip(top.moments, pulls, strict=True))
     return slow, max(slow, math.sqrt(max(turning, swinging))), middle

@@ -2,11 +2,11 @@
 
 The method makes a piece of the run, which is compared with DOP853 at a tight tolerance, since only f is known. Its
 error is extrapolated by the law of `symtop.run.guard`, linear to quadratic, or by the amplification A(t) of a small
-change (`symtop.run.motion`), whichever is more; A is computed as far as `WATCHED` steps of DOP853 lead. An error that
-fades within the piece, as in a transient, is not extrapolated. The error of a run that departs from the motion grows on
-as in the second half of the piece. Any other forecast is at most twice the extent of the motion, if all of the motion
-is known or it goes back and forth. A run with an error above the extent has lost the motion and may go anywhere:
-the sentence says that no size is known. Causes:
+change (`symtop.run.motion`), whichever is more; A is computed as far as `MOST_FINE_STEPS` steps of DOP853 lead. An
+error that fades within the piece, as in a transient, is not extrapolated. The error of a run that departs from the
+motion grows on as in the second half of the piece. Any other forecast is at most twice the extent of the motion, if all
+of the motion is known or it goes back and forth. A run with an error above the extent has lost the motion and may go
+anywhere: the sentence says that no size is known. Causes:
 
     stiffness      f has rates far above that of the motion, and they limit an explicit step
     instability    steps multiply a small change more than the motion does, or the motion itself is unstable
@@ -32,13 +32,13 @@ from symtop.run.guard import Probe, grown
 from symtop.run.motion import MOST_FOLDS, Growth
 
 SCIPY = {"rk45": ("RK45", 6), "dop853": ("DOP853", 12), "radau": ("Radau", 0), "bdf": ("BDF", 0), "lsoda": ("LSODA", 0)}
-FINE, WATCHED, PROBED = 1e-13, 4000, 5000  # tolerance of DOP853; most steps of it, and of the method on a piece
-PERIODS, TURNS, SHARE, POINTS = 10.0, 4.0, 0.2, 400  # least length of a piece, or as part of a run; compared times
+FINE_TOLERANCE, MOST_FINE_STEPS, MOST_PROBE_STEPS = 1e-13, 4000, 5000  # of DOP853; of it, and of the method on a piece
+PIECE_PERIODS, PIECE_TURNS, PIECE_SHARE, POINTS = 10.0, 4.0, 0.2, 400  # least length of a piece; compared times
 TIGHTEST, LOOSEST = 2.3e-14, 0.1  # tolerances: the least of SciPy's solvers, the largest that is proposed
-MOVED, SATURATED = (1e-7, 1e-10), 1e-2  # of the extent of the motion: first distances of two motions, and the largest
-UNSTABLE, STIFF = 10.0, 20.0  # growth of A in the second half of an unstable run; ratio of rates of a stiff f
-OWN = 10.0  # times: the steps of a piece multiply a change by this much more than the motion; less is a transient
-FIRST, FADED = 1e-7, 0.1  # part of a piece where comparison begins; part of the largest error that has faded
+DISTANCES, MOST_DISTANCE = (1e-7, 1e-10), 1e-2  # of two motions, at first and at most, over their extent
+UNSTABLE_GROWTH, STIFF_RATIO = 10.0, 20.0  # of A in the second half of a run; of rates of a stiff f
+OWN = 10.0  # the steps of a piece multiply a change by this much more than the motion; less is a transient
+COMPARED_FROM, FADED_SHARE = 1e-7, 0.1  # where comparison of a piece begins; part of the largest error that has faded
 
 
 class Outlook(NamedTuple):
@@ -75,7 +75,7 @@ def guard(
     begin, end, accuracy = finite("t0", t0), positive("horizon", horizon), positive("accuracy", accuracy)
     if start.size == 0:
         raise SymtopError("y0 must be at least one number, not none", "y0")
-    if begin + end / PROBED == begin:
+    if begin + end / MOST_PROBE_STEPS == begin:
         raise SymtopError(f"horizon must be longer than what t0 = {begin!r} is rounded by, not {end!r}", "horizon")
     if rule is None and not TIGHTEST <= setting < 1.0:
         raise SymtopError(f"tolerance must be at least {TIGHTEST:g} and below 1, not {setting!r}", "tolerance")
@@ -125,9 +125,9 @@ def _motion(f: Any, y: Array, end: float) -> tuple[Any, float]:
 
     # a start at zero gives no scale for the tolerance; take a negligible part of the expected size of y
     size = float(np.abs(y).max()) or EPSILON * (end * float(np.abs(f(0.0, y)).max()) or 1.0)
-    solver = DOP853(f, 0.0, y, end, rtol=FINE, atol=FINE * size)
+    solver = DOP853(f, 0.0, y, end, rtol=FINE_TOLERANCE, atol=FINE_TOLERANCE * size)
     times, parts = [0.0], list[Any]()
-    while solver.status == "running" and len(parts) < WATCHED and solver.step() is None:
+    while solver.status == "running" and len(parts) < MOST_FINE_STEPS and solver.step() is None:
         times.append(solver.t)
         parts.append(solver.dense_output())
     return OdeSolution(times, parts) if parts else None, times[-1]
@@ -135,9 +135,9 @@ def _motion(f: Any, y: Array, end: float) -> tuple[Any, float]:
 
 def _growth(f: Any, near: Any, y: Array, elapsed: Array, extent: float) -> Growth:
     """The amplification A of a small change of the start; with a smaller change if the two motions separate too far."""
-    for moved in MOVED:
+    for moved in DISTANCES:
         far, reached = _motion(f, y + moved * extent / math.sqrt(y.size), float(elapsed[-1]))
-        times, most = elapsed[elapsed <= reached * (1.0 + EPSILON)], SATURATED / moved
+        times, most = elapsed[elapsed <= reached * (1.0 + EPSILON)], MOST_DISTANCE / moved
         if times.size == 0:
             return Growth(elapsed[:1], np.array([math.inf]))
         apart = np.linalg.norm(far(times) - near(times), axis=0) / (moved * extent)
@@ -153,7 +153,7 @@ def _expected(times: Array, error: Array, end: float, amplified: float, extent: 
         folds = math.log(max(float(error[-1] / error[middle]), 1.0)) / (times[-1] - times[middle])
         return largest * math.exp(min(folds * (end - times[-1]), MOST_FOLDS))
     late = float(error[middle:].max())
-    lasting = np.minimum(error, late) if late < FADED * largest else error
+    lasting = np.minimum(error, late) if late < FADED_SHARE * largest else error
     later = max(grown(Probe(times, lasting, "ok", end, 0), end, straight=False), float(lasting.max()) * amplified)
     return max(largest, min(later, 2.0 * extent))
 
@@ -165,7 +165,7 @@ def _outlook(
 
     safe = _finite(f, t)
     near, watched = _motion(safe, y, end)
-    if near is None or (near.t_max < end and len(near.interpolants) < WATCHED):
+    if near is None or (near.t_max < end and len(near.interpolants) < MOST_FINE_STEPS):
         words = f"below {watched:.6g}, not {end!r}: the motion goes beyond all bounds there, as far as DOP853 can tell"
         raise SymtopError(f"horizon must be {words}", "horizon")
     elapsed = watched * np.arange(1.0, POINTS + 1.0) / POINTS
@@ -177,16 +177,17 @@ def _outlook(
     frequency = float(np.linalg.norm(rates)) / max(float(np.linalg.norm(spread)), TINY)
     whole = watched >= end or turns >= 1.0  # the extent of the motion is known
     slow = min(frequency, 2.0 * math.pi * turns / watched)
-    moved, kind = y + MOVED[0] * extent / math.sqrt(y.size), "step" if rule else "tolerance"
+    moved, kind = y + DISTANCES[0] * extent / math.sqrt(y.size), "step" if rule else "tolerance"
     growth = _growth(safe, near, y, elapsed, extent)
     turn = 2.0 * math.pi / max(slow, TINY)  # longer than a period at `frequency` where a motion is fast now and then
-    piece = min(end, watched, max(SHARE * end, PERIODS * 2.0 * math.pi / max(frequency, TINY), TURNS * turn))
-    places = np.union1d(np.geomspace(FIRST, 1.0, POINTS // 4), elapsed / watched)  # compared times, in pieces
+    period = 2.0 * math.pi / max(frequency, TINY)
+    piece = min(end, watched, max(PIECE_SHARE * end, PIECE_PERIODS * period, PIECE_TURNS * turn))
+    places = np.union1d(np.geomspace(COMPARED_FROM, 1.0, POINTS // 4), elapsed / watched)  # compared times, in pieces
 
     def run_piece(start: Array) -> tuple[Array, Array, float]:
         """Times and states of the piece, and the mean step (0 for an implicit method)."""
         if rule:
-            marks = np.unique(np.rint(min(int(piece / setting * (1.0 + 1e-9)), PROBED) * places).clip(1.0))
+            marks = np.unique(np.rint(min(int(piece / setting * (1.0 + 1e-9)), MOST_PROBE_STEPS) * places).clip(1.0))
             return marks * setting, _stepped(f, rule, start, setting, marks), setting
         (name, cost), shown = SCIPY[method], np.unique(np.minimum(piece * places, piece))
         run = solve_ivp(safe, (0.0, piece), start, name, shown, rtol=setting, atol=setting)
@@ -205,26 +206,26 @@ def _outlook(
     slopes = [(f(0.0, y + change * unit) - rate) / change for unit in np.eye(y.size)]
     modes, cause = np.linalg.eigvals(np.array(slopes)), "step"
     fastest = float(np.abs(modes).max())
-    if rule and fastest > STIFF * slow:  # limit the step by stability
+    if rule and fastest > STIFF_RATIO * slow:  # limit the step by stability
         better = min(better, max(setting, 1.0 / fastest))
     better = float(Context(prec=2, rounding=ROUND_DOWN).create_decimal(better))
     why = f"errors add up over {end * slow / (2.0 * math.pi):.3g} periods; take a {kind} of about {better:.2g}"
     if not expected > accuracy:
         cause, why = "", f"a {kind} of {better:.2g} would do for {accuracy:.1g}"
-    elif mean * fastest > 1.0 and fastest > max(STIFF * slow, 2.0 * float(modes.real.max())):  # no fast mode grows
+    elif mean * fastest > 1.0 and fastest > max(STIFF_RATIO * slow, 2.0 * float(modes.real.max())):  # none grows
         cause, better = "stiffness", math.nan
         why = f"f has rates of {fastest:.1g}, the motion of {slow:.1g}; take an implicit method, such as radau"
-    elif ended or np.linalg.norm(run_piece(moved)[1] - states, axis=1).max() > OWN * since**2 * MOVED[0] * extent:
+    elif ended or np.linalg.norm(run_piece(moved)[1] - states, axis=1).max() > OWN * since**2 * DISTANCES[0] * extent:
         better = min(better, 0.3 * setting)
         cause = "instability"
         why = f"it multiplies a small change more than the motion does; try a {kind} of {better:.2g}"
-    elif total > UNSTABLE * growth.at(0.5 * end):
+    elif total > UNSTABLE_GROWTH * growth.at(0.5 * end):
         lost = total * EPSILON * extent > accuracy
         cause, better = "instability", math.nan if lost else better
         why = f"the motion multiplies a small change {total:.1g} times; " + (
             "rounding alone decides, shorten the horizon" if lost else f"try a {kind} of {better:.2g}"
         )
-    elif float(error.max()) < 10.0 * FINE * float(np.abs(true).max()):
+    elif float(error.max()) < 10.0 * FINE_TOLERANCE * float(np.abs(true).max()):
         cause, better, why = "rounding", math.nan, f"rounding adds up, and no {kind} helps"
     words = ", with the motion lost and no size known" if whole and extent < expected < math.inf else ""
     sentence = f"{method}: expect an error of {expected:.1g} by t = {t + end:.4g}{words}: {why}"

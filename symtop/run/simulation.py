@@ -39,9 +39,9 @@ from symtop.run.trajectory import Trajectory, dataset
 MOST_SAMPLES = 10_000_000
 MOST_SWINGS = 1e8  # periods in an adaptive run: several minutes with the fastest method, taylor
 WIDEST_GAP = 0.125  # of a nutation: samples that leave a wider range of phases empty are dithered
-USUAL = 1e-3  # rad: the error at which an error message proposes a step if none was given
-SAME = 8.0 * EPSILON  # relative: times that differ by less are the same, because products are rounded
-BRIEF = 0.01  # nutations: the length of the run of an adaptive method that is sampled at its start only
+DEFAULT_ERROR = 1e-3  # rad: the error at which an error message proposes a step if none was given
+SAME_TIME = 8.0 * EPSILON  # relative: times that differ by less are the same, because products are rounded
+BRIEF_RUN = 0.01  # nutations: the length of the run of an adaptive method that is sampled at its start only
 Guard = bool | Literal["exact", "series"] | Callable[[str], object]  # the values are those in `simulate`
 STRETCHES = 17  # equal ranges of phase; two of them are less than `WIDEST_GAP`
 
@@ -136,7 +136,7 @@ def make_plan(
     check_control(method, step_size, tolerance)
     if method.fixed_step:
         if step_size is None:
-            words = f"needs step_size, for example {likely_step(scene, method, horizon, USUAL):.1g}"
+            words = f"needs step_size, for example {likely_step(scene, method, horizon, DEFAULT_ERROR):.1g}"
             raise SymtopError(f"{method.name} has a fixed step and {words}", "step_size")
         step = positive("step_size", step_size)
         if step > horizon:
@@ -239,7 +239,7 @@ def _prepared(
     row = None if times is None else _checked_times(times, horizon, samples)
     chosen, method, h = find_scene(scene, bodies=True), find_integrator(integrator), math.nan
     if row is not None:
-        horizon, samples = float(row[-1]) or BRIEF * chosen.time_scale(), 2
+        horizon, samples = float(row[-1]) or BRIEF_RUN * chosen.time_scale(), 2
         if step_size is not None:
             h = positive("step_size", step_size)
             step_size = min(h, horizon)  # it may be longer than the run
@@ -254,7 +254,7 @@ def _prepared(
     if row is not None:
         if method.fixed_step:
             near = np.rint(row / h)
-            marks = np.where(np.abs(row - near * h) <= SAME * row, near, np.floor(row / h)).astype(np.int64)
+            marks = np.where(np.abs(row - near * h) <= SAME_TIME * row, near, np.floor(row / h)).astype(np.int64)
         plan = plan._replace(times=row, horizon=float(row[-1]), step_size=h, marks=marks)
         sampling = "at times"
     return _Prepared(chosen, method, chart, plan, sampling)
@@ -284,7 +284,7 @@ def _guarded(asked: _Prepared, guard: Callable[[str], object] | None, series: bo
         guard(caution)
     if sampling == "at times" and method.fixed_step:
         return Trajectory.of_run(scene, chart, plan, _stepped(scene, method, chart, plan)), caution
-    brief = plan if plan.horizon else Plan.until([0.0, BRIEF * scene.time_scale()], plan.tolerance, plan.budget)
+    brief = plan if plan.horizon else Plan.until([0.0, BRIEF_RUN * scene.time_scale()], plan.tolerance, plan.budget)
     run = solve(method, chart, scene.top, scene.start, brief, f" on {scene.name}")
     run = run if plan.horizon else Run(run.states[:1], run.p_phi[:1], run.p_psi[:1], 0, 0, 0, "ok", 0.0)
     return Trajectory.of_run(scene, chart, plan, run), caution
@@ -300,7 +300,7 @@ def _stepped(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Run:
     states, p_phi, p_psi = (values[place] for values in steps[:3])
     outcome, reached = steps.outcome, plan.horizon if steps.outcome == "ok" else steps.reached
     lost = np.zeros(times.size, dtype=bool)
-    for i in np.flatnonzero(np.abs(times - since) > SAME * times):
+    for i in np.flatnonzero(np.abs(times - since) > SAME_TIME * times):
         lost[i:] = True
         if not np.isfinite(states[i]).all() or (steps.outcome != "ok" and plan.marks[i] >= steps.steps):
             break  # the whole step that contains this time failed

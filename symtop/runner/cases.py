@@ -29,8 +29,8 @@ from symtop.runner.scripts import file_of
 from symtop.runner.study import Case, Study, StudyError, failing
 
 DONE, FAILED, STALE, MISSING = STATES = ("done", "failed", "stale", "missing")
-LONGEST = 1e9  # seconds: largest limit of a case; the timers of a process take up to ten times as many
-SAMPLE = 5  # cases of each study that are checked
+LONGEST_LIMIT = 1e9  # seconds: largest limit of a case; the timers of a process take up to ten times as many
+CHECKED_CASES = 5  # cases of each study that are checked
 
 
 @dataclass
@@ -87,7 +87,7 @@ class StudyCases:
 
     def compute(self, missing: dict[Path, Case], pool: Pool, limit: float, *, fresh: bool, quiet: bool) -> None:
         """Compute cases in a pool, with a progress bar on a terminal."""
-        script, files, most = str(file_of(self.study.name)), plugins.loaded(), min(limit, LONGEST)
+        script, files, most = str(file_of(self.study.name)), plugins.loaded(), min(limit, LONGEST_LIMIT)
         tasks = [Task(script, case, path, files, most, fresh) for path, case in missing.items()]
         before = self.computed + len(self.failures)
         with progress_bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case") as bar:
@@ -168,11 +168,11 @@ def check(
     study: Study, results: Path, pool: Pool, *, quick: bool = False, full: bool = False, everything: bool = False,
     limit: float | None = None,
 ) -> dict[str, Any]:  # fmt: skip
-    """Compute `SAMPLE` stored cases, or all, again, and the dataset; ``stored``, ``compared``, and ``differences``."""
+    """Compute `CHECKED_CASES` cases, or all, again, and the dataset; ``stored``, ``compared``, ``differences``."""
     cases = StudyCases.stored(study, results, quick=quick, full=full)
     # in the order of their digests, so that the sample is spread over the grid
     stored = sorted(cases.data.items(), key=lambda item: store.digest_of(item[0]))
-    sample = {path.name: data for path, data in stored[: None if everything else SAMPLE]}
+    sample = {path.name: data for path, data in stored[: None if everything else CHECKED_CASES]}
     with tempfile.TemporaryDirectory(prefix="symtop-check-") as folder:
         again = StudyCases(study, Path(folder).resolve())
         missing = again.add(case for path, case in cases.cases.items() if path.name in sample)

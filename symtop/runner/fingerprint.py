@@ -15,7 +15,7 @@ from symtop.methods.framework.registry import integrators, split_name
 from symtop.model.scenes import all_scenes, scenes
 from symtop.runner.study import REFERENCE, Case, Study, failing
 
-EVERY = "*"  # in place of an integrator's or a scene's name: all of them
+EVERY_NAME = "*"  # in place of an integrator's or a scene's name: all of them
 # cache of `made_of` by label and id of an object; holding the object keeps its id valid
 _known: dict[tuple[str, int], tuple[object, Reasons]] = {}
 reached = functools.cache(code)  # the search for code, shared by all fingerprints of the process
@@ -34,7 +34,7 @@ def uses(study: Study, case: Case) -> list[str]:
     with failing(study.name, "uses"):
         names = {*(case.integrators if study.uses is None else study.uses(case)), REFERENCE}
     registry = integrators().keys()
-    return sorted(registry if EVERY in names else {split_name(name)[0] for name in names} & registry)
+    return sorted(registry if EVERY_NAME in names else {split_name(name)[0] for name in names} & registry)
 
 
 def settings_key(study: Study, case: Case) -> str:
@@ -46,7 +46,7 @@ def settings_key(study: Study, case: Case) -> str:
 def reasons(study: Study, case: Case) -> Reasons:
     """Everything that a case's numbers depend on: settings, scene, integrators, code, versions."""
     methods, catalogue = integrators(), all_scenes()
-    places = sorted(scenes()) if case.scene == EVERY else {case.scene} & catalogue.keys()
+    places = sorted(scenes()) if case.scene == EVERY_NAME else {case.scene} & catalogue.keys()
     parts = [made_of("measure", study.measure), code_hash.packages(), {"settings": settings_key(study, case)}]
     parts += [made_of(f"scene {name}", catalogue[name]) for name in places]
     parts += [made_of(f"integrator {name}", methods[name]) for name in uses(study, case)]

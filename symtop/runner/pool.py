@@ -31,7 +31,7 @@ from tqdm import tqdm
 from symtop.core import files, netcdf, parallel
 from symtop.core.errors import SymtopError, words_of
 from symtop.core.signals import HANGUP, at_most, is_of_user
-from symtop.measure.timing import DISTURBED, slowdown
+from symtop.measure.timing import DISTURBED_RATIO, slowdown
 from symtop.methods.framework.registry import integrators, split_name
 from symtop.run import cluster, plugins
 from symtop.runner import fingerprint, scripts, store
@@ -39,8 +39,8 @@ from symtop.runner.study import Case, Study
 
 WORTH_WORKERS = 8  # least cases for which workers are started, which takes two seconds each
 MOST_FRUITLESS = 3  # times in a row that the pool may break without a result
-AHEAD = 3  # cases submitted per worker: enough to keep all busy, few enough to stop soon
-BUSY = 0.05  # seconds between two checks of a case that another command computes
+CASES_AHEAD = 3  # cases submitted per worker: enough to keep all busy, few enough to stop soon
+BUSY_SECONDS = 0.05  # seconds between two checks of a case that another command computes
 GRACE = 5.0  # seconds between asking a case to end and ending its process
 ENDED = "its process was ended, by the system (memory) or by the method itself"
 
@@ -205,7 +205,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             while remaining:
                 self.open(min(self.jobs, len(remaining)))
                 together = self.at_once(min(self.size, len(remaining))) if timed else None
-                width = 1 if alone else AHEAD * self.size if together is None else together[0]
+                width = 1 if alone else CASES_AHEAD * self.size if together is None else together[0]
                 try:
                     ahead = [task._replace(timed=together) for task in remaining.values()]
                     _drain(ahead, lambda task: self.submit(execute_case, task, limit=task.limit + GRACE), width, settle)
@@ -218,13 +218,13 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             remaining.update(died)
 
     def at_once(self, width: int) -> tuple[int, float]:
-        """How many timed cases run at once, and the slowdown: `width`, halved until a trial is within `DISTURBED`."""
+        """Timed cases that run at once, and the slowdown: `width`, halved until a trial is within `DISTURBED_RATIO`."""
         ratio = math.nan  # without a trial
         while width > 1:
             if width not in self._trials:
                 self._trials[width] = slowdown(self.submit, width)
             ratio = self._trials[width]
-            if ratio <= DISTURBED:
+            if ratio <= DISTURBED_RATIO:
                 break
             width //= 2
         return width, ratio
@@ -286,7 +286,7 @@ def _drain(tasks: Sequence[Task], submit: Callable[[Task], Future[Result]], widt
             result = _result(future, task)
             if result.state == "busy":
                 ahead.append(task)
-                time.sleep(BUSY)
+                time.sleep(BUSY_SECONDS)
             else:
                 settle(task, result)
 

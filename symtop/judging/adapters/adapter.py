@@ -25,7 +25,7 @@ from symtop.model.top import Angles, SymmetricTop
 
 Marks = NDArray[np.int64]
 A_STEP: Marks = np.array([1])
-LOOK = 64  # steps between two checks whether the state is finite
+CHECKED_STEPS = 64  # steps between two checks whether the state is finite
 PATIENCE, QUICK_PATIENCE = 10.0, 3.0  # seconds for one call
 
 
@@ -117,7 +117,7 @@ def repeat(once: Callable[[int, Any], Any], y: Any, marks: Marks, show: Callable
             y = once(k, y)
         return y
 
-    return in_runs(run, y, marks, LOOK, show)
+    return in_runs(run, y, marks, CHECKED_STEPS, show)
 
 
 def relative_gap(first: Any, second: Any) -> float:

@@ -22,9 +22,9 @@ depend: this is tested once at the beginning.
 
 *diffrax*: a solver such as ``diffrax.Tsit5()``, run with fixed steps in a compiled loop, as by `diffrax.diffeqsolve`
 with a constant step; its internal data (a last slope, a second state) are kept during a run. The stages of an implicit
-solver are solved by Newton's iteration to `SAME`, whatever its root finder, because there is no step control to take
-tolerances from. A library is imported when a step of it is judged, and computes in double precision; JAX does so while
-a file is loaded, too, which may make constants.
+solver are solved by Newton's iteration to `SAME_ROW`, whatever its root finder, because there is no step control to
+take tolerances from. A library is imported when a step of it is judged, and computes in double precision; JAX does so
+while a file is loaded, too, which may make constants.
 """
 
 import contextlib
@@ -54,16 +54,16 @@ from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.plan import QUATERNIONS, Array
 from symtop.model.top import SymmetricTop
 
-MOST = 20_000  # steps of one call, so that a call that hangs can be distinguished from a long run
-GUARD, MARK = 8, -1.2345e-67  # number and value of doubles behind the state that must not be overwritten
+MOST_STEPS = 20_000  # steps of one call, so that a call that hangs can be distinguished from a long run
+GUARD_DOUBLES, GUARD_VALUE = 8, -1.2345e-67  # number and value of doubles behind the state that must not be overwritten
 TEXT = b"0123456789+-.eEinfaINFA, \t\r\n"  # characters of numbers as text
-SHORT = 1e-3  # relative: largest rounding of the numbers that a program writes
-STARTING, CHUNK = 30.0, 65536  # additional seconds for a server's first answer; bytes that are read of it at once
-EMPTY = re.compile(rb"\n[ \t\r]*\n")  # the line that ends a server's answer
-SLACK = 5.0  # limit of the time of a run, in times expected from earlier runs
-COMPILING = 60.0  # additional seconds for the first call, which compiles
-OTHER = 0.7  # ratio of momenta of the second row of a batch to the first
-SAME = 1e-12  # relative: difference of a row alone and in a batch; tolerance of Newton's iteration
+WRITTEN_ROUNDING = 1e-3  # relative: largest rounding of the numbers that a program writes
+STARTING_SECONDS, CHUNK_BYTES = 30.0, 65536  # more for a server's first answer; read of it at once
+EMPTY_LINE = re.compile(rb"\n[ \t\r]*\n")  # the line that ends a server's answer
+TIME_SLACK = 5.0  # limit of the time of a run, in times expected from earlier runs
+COMPILING_SECONDS = 60.0  # additional seconds for the first call, which compiles
+SECOND_ROW = 0.7  # ratio of momenta of the second row of a batch to the first
+SAME_ROW = 1e-12  # relative: difference of a row alone and in a batch; tolerance of Newton's iteration
 CHARTS = ("axis", "attitude")  # their equations need only arithmetic; those in angles need each library's own sine
 
 Doubles = ctypes.POINTER(ctypes.c_double)
@@ -92,7 +92,7 @@ class SharedObject(Stepper):
     def march(self, top: SymmetricTop, _par: Any, y: Array, h: float, marks: Marks) -> Array:
         """The state at the marks; SymtopError if it writes beyond its state or into the parameters."""
         numbers, size = np.array([top.I1, top.I3, top.mgl]), y.size
-        par, room = numbers.copy(), np.full(size + GUARD, MARK)
+        par, room = numbers.copy(), np.full(size + GUARD_DOUBLES, GUARD_VALUE)
         room[:size] = y
 
         def run(_done: int, steps: int, room: Array) -> Array:
@@ -100,8 +100,8 @@ class SharedObject(Stepper):
                 self.function(room.ctypes.data_as(Doubles), h, par.ctypes.data_as(Doubles), steps)
             return room
 
-        states = in_runs(run, room, marks, MOST, lambda room: room[:size])
-        if (room[size:] != MARK).any():
+        states = in_runs(run, room, marks, MOST_STEPS, lambda room: room[:size])
+        if (room[size:] != GUARD_VALUE).any():
             raise SymtopError(f"{self.name} writes beyond the {size} numbers of its state")
         if (par != numbers).any():
             raise SymtopError(f"{self.name} writes into its parameters")
@@ -136,14 +136,14 @@ class Program(Stepper):
             off[:4] = states[0, :4] + y[:4]
         if self.chart == "angles":
             off[:3] = np.sin(0.5 * off[:3])
-        if np.isfinite(states[0]).all() and not (np.abs(off) <= SHORT * np.abs(y).max()).all():
+        if np.isfinite(states[0]).all() and not (np.abs(off) <= WRITTEN_ROUNDING * np.abs(y).max()).all():
             first = ", ".join(f"{value:.4g}" for value in states[0])
             words = f"{self.name} must write the start that it was given as the first of its states, not {first}"
             raise SymtopError(words)
         return states[marks // stride]
 
     def _answer(self, line: str, h: float, steps: int) -> bytes:
-        seconds, began = heartbeat.patience + SLACK * self.seconds_a_step * steps + self.starting, time.monotonic()
+        seconds, began = heartbeat.patience + TIME_SLACK * self.seconds_a_step * steps + self.starting, time.monotonic()
         with heartbeat.call(h, 2.0 * seconds):
             try:
                 answer, code, errors = self._run(line, seconds)
@@ -174,7 +174,7 @@ class Server(Program):
     @property
     def starting(self) -> float:
         """Additional seconds for a call that starts the program."""
-        return STARTING if self._server is None else 0.0
+        return STARTING_SECONDS if self._server is None else 0.0
 
     def _run(self, line: str, seconds: float) -> tuple[bytes, int, bytes]:
         started, end = self._server is None, time.monotonic() + seconds
@@ -182,11 +182,11 @@ class Server(Program):
             self._errors, pipe = tempfile.TemporaryFile(), subprocess.PIPE  # noqa: SIM115  (open as long as it runs)
             self._server = subprocess.Popen(self.words, stdin=pipe, stdout=pipe, stderr=self._errors, bufsize=0)  # noqa: S603
         output = self._server.stdout
-        early = select.select([output], [], [], 0.0)[0] and os.read(output.fileno(), CHUNK).strip()
+        early = select.select([output], [], [], 0.0)[0] and os.read(output.fileno(), CHUNK_BYTES).strip()
         with contextlib.suppress(BrokenPipeError):
             self._server.stdin.write(line.encode())
         try:
-            answer, *after = EMPTY.split(b"" if early else self._read(end), 1)
+            answer, *after = EMPTY_LINE.split(b"" if early else self._read(end), 1)
             if early or b"".join(after).strip():
                 self.close()
                 raise SymtopError(f"{self.name} must write nothing but its answer, which an empty line ends")
@@ -207,10 +207,10 @@ class Server(Program):
     def _read(self, end: float) -> bytes:
         """What it writes, up to an empty line behind something else, or until it ends; TimeoutExpired after `end`."""
         output, answer, part = self._server.stdout, b"", b"\n"
-        while part and not EMPTY.search(answer):
+        while part and not EMPTY_LINE.search(answer):
             if not select.select([output], [], [], max(end - time.monotonic(), 0.0))[0]:
                 raise subprocess.TimeoutExpired(self.words, 0.0)
-            part = os.read(output.fileno(), CHUNK)
+            part = os.read(output.fileno(), CHUNK_BYTES)
             answer = (answer + part).lstrip()
         return answer
 
@@ -252,7 +252,7 @@ class BatchStep(Stepper):
         """The state at the marks: the first row of the batch."""
         with double_precision(self.library) if self.jax else self.library.no_grad():
             step = functools.partial(self._step, par)
-            batch = self._array(np.stack([y, np.concatenate([y[:-3], OTHER * y[-3:]])]))
+            batch = self._array(np.stack([y, np.concatenate([y[:-3], SECOND_ROW * y[-3:]])]))
             if not self._tried:
                 self._try(step, y, batch, h)
             return repeat(
@@ -268,9 +268,9 @@ class BatchStep(Stepper):
 
     def _try(self, step: Callable[..., Any], y: Array, batch: Any, h: float) -> None:
         """Compare a step of the first row alone with one in the batch; SymtopError if they differ."""
-        pair = (_once(step, 0.0, rows, h, COMPILING)[0] for rows in (self._array(y[None]), batch + 0.0))
+        pair = (_once(step, 0.0, rows, h, COMPILING_SECONDS)[0] for rows in (self._array(y[None]), batch + 0.0))
         alone, beside = (state_like(y, np.asarray(row)) for row in pair)
-        if (gap := relative_gap(alone, beside)) > SAME:
+        if (gap := relative_gap(alone, beside)) > SAME_ROW:
             how = f"the same state with another row beside it comes out different by {gap:.1e}"
             raise SymtopError(f"a row of a batch must be stepped by itself: {how}")
         self._tried = True
@@ -360,7 +360,7 @@ class DiffraxSolver(Stepper):
             words = f"{name} steps a system in two parts; form diffrax has one, y' = f(y): judge it with form separable"
             raise SymtopError(words)
         if hasattr(solver, "root_finder"):
-            newton = importlib.import_module("optimistix").Newton(rtol=SAME, atol=SAME)
+            newton = importlib.import_module("optimistix").Newton(rtol=SAME_ROW, atol=SAME_ROW)
             solver = dataclasses.replace(solver, root_finder=newton, root_find_max_steps=MOST_NEWTON)
         self.solver, self.chart, self.form = solver, chart, FORMULATIONS[chart]
         self.name = label_of(name or solver)
@@ -371,17 +371,17 @@ class DiffraxSolver(Stepper):
         """The state at the marks; NaN where the solver says that a step failed."""
 
         def run(done: int, steps: int, at: Any) -> Any:
-            with heartbeat.call(h, COMPILING if self._fresh else 0.0):
+            with heartbeat.call(h, COMPILING_SECONDS if self._fresh else 0.0):
                 after = self._run(par, *at, self.since + done * h, h, steps)
                 self.jax.block_until_ready(after)
             self._fresh = False
             return after
 
         with double_precision(self.jax):
-            with heartbeat.call(h, COMPILING if self._fresh else 0.0):
+            with heartbeat.call(h, COMPILING_SECONDS if self._fresh else 0.0):
                 start = self.jax.numpy.asarray(y)
                 memory = self._begin(par, start, h)
-            return in_runs(run, (start, memory), marks, MOST, lambda at: np.asarray(at[0]))
+            return in_runs(run, (start, memory), marks, MOST_STEPS, lambda at: np.asarray(at[0]))
 
     def _compiled(self) -> tuple[Any, Any]:
         """Two compiled functions: the start of a run, and `count` steps. The top is an argument: no recompilation."""

@@ -25,7 +25,7 @@ and dV the slope of V, both of one number. The chart ends at theta = 0 and pi.
 error make steps of h, so that the formula is judged and not its step control; the end of the interval lies beyond the
 last step, which is never shortened. The stages of an implicit class are still solved accurately: the tolerances of
 Newton's iteration, which SciPy's classes and similar ones have in `newton_tol`, `kappa` and `tiny_err`, are set to
-`SOLVED`, with at most `MOST_NEWTON` iterations. With a tolerance, rtol = atol, the class chooses its steps, as in
+`STAGE_ERROR`, with at most `MOST_NEWTON` iterations. With a tolerance, rtol = atol, the class chooses its steps, as in
 ``solve_ivp``.
 """
 
@@ -52,12 +52,12 @@ from symtop.model.charts import BODY, space_momenta
 from symtop.model.top import Angles, SymmetricTop, effective_force
 
 Field = Callable[[float, Array], Array]
-PROBE = 1e-3  # step of the call that shows whether a rotation is a matrix
+PROBE_STEP = 1e-3  # step of the call that shows whether a rotation is a matrix
 CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
-ANY = 1e300  # a tolerance that every step meets; with infinity, a component of zero would give NaN
-LOOSE = 1e8  # the same for implicit classes, small enough that updates of Newton's iteration do not underflow
-SOLVED, MOST_NEWTON, NEWTON = 1e-14, 50, "NEWTON_MAXITER"  # absolute error of a stage, iterations, their name in SciPy
-SAME = 1e-9  # relative: a step length that differs less from h is h
+ANY_TOLERANCE = 1e300  # a tolerance that every step meets; with infinity, a component of zero would give NaN
+LOOSE_TOLERANCE = 1e8  # the same for implicit classes, small enough that updates of Newton's iteration do not underflow
+STAGE_ERROR, MOST_NEWTON, NEWTON_LIMIT = 1e-14, 50, "NEWTON_MAXITER"  # absolute; iterations; their name in SciPy
+SAME_STEP = 1e-9  # relative: a step length that differs less from h is h
 _patching = threading.RLock()  # `compare` runs variants in threads
 
 
@@ -156,28 +156,28 @@ class ScipySolver(PythonStep):
         end, size = t + (int(marks[-1]) + 2) * h, abs(h)
         with heartbeat.call(h):
             options = {"max_step": size, "first_step": size}
-            solver: Any = self.function(f, t, y, end, **options, rtol=ANY, atol=ANY)
+            solver: Any = self.function(f, t, y, end, **options, rtol=ANY_TOLERANCE, atol=ANY_TOLERANCE)
             if hasattr(solver, "newton_tol") or hasattr(solver, "kappa"):
-                solver = self.function(f, t, y, end, **options, rtol=LOOSE, atol=LOOSE)
+                solver = self.function(f, t, y, end, **options, rtol=LOOSE_TOLERANCE, atol=LOOSE_TOLERANCE)
                 for name in ("newton_tol", "kappa", "tiny_err"):
-                    setattr(solver, name, SOLVED / LOOSE)
+                    setattr(solver, name, STAGE_ERROR / LOOSE_TOLERANCE)
 
         def once(k: int, y: Array) -> Array:
             if solver.status != "running" or not np.isfinite(y).all():
                 return np.full(y.shape, np.nan)
             with heartbeat.call(h):
                 solver.step()
-            if abs(solver.t - (t + (k + 1) * h)) > SAME * size * (k + 1):
+            if abs(solver.t - (t + (k + 1) * h)) > SAME_STEP * size * (k + 1):
                 must = f"steps of max_step = first_step = {size:.3g} where the tolerance accepts any error"
                 raise SymtopError(f"{self.name} must make {must}, and made one of {solver.t - t - k * h:.3g}")
             return state_like(y, solver.y, "a solver")
 
         with contextlib.ExitStack() as undo:  # allow Newton's iteration `MOST_NEWTON` iterations
             modules = {sys.modules.get(base.__module__) for base in self.function.__mro__}  # type: ignore[attr-defined]
-            for module in [module for module in modules if hasattr(module, NEWTON)]:
+            for module in [module for module in modules if hasattr(module, NEWTON_LIMIT)]:
                 undo.enter_context(_patching)
-                undo.callback(setattr, module, NEWTON, getattr(module, NEWTON))
-                setattr(module, NEWTON, MOST_NEWTON)
+                undo.callback(setattr, module, NEWTON_LIMIT, getattr(module, NEWTON_LIMIT))
+                setattr(module, NEWTON_LIMIT, MOST_NEWTON)
             return repeat(once, state_like(y, solver.y, "a solver"), marks)
 
 
@@ -254,9 +254,9 @@ class RotationStep(FunctionStep):
         super().__init__(function, name)
         self.chart = chart  # or `BODY`, of a body without symmetry
         self.of_matrix = ""  # its error message for a matrix, until it has made a step
-        probe = np.eye(3), np.array([0.1, 0.2, 0.3]), PROBE, np.array([1.0, 1.0, 0.5]), lambda _: np.zeros(3)
+        probe = np.eye(3), np.array([0.1, 0.2, 0.3]), PROBE_STEP, np.array([1.0, 1.0, 0.5]), lambda _: np.zeros(3)
         try:
-            with heartbeat.call(PROBE):
+            with heartbeat.call(PROBE_STEP):
                 first = function(*probe)
             with contextlib.suppress(Exception):
                 self.form = MATRIX if np.shape(first[0]) == (3, 3) and np.size(first[1]) == 3 else ROTATION

@@ -21,32 +21,32 @@ import numpy as np
 
 from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import A_STEP, Stepper, relative_gap
-from symtop.judging.adapters.external import MOST
+from symtop.judging.adapters.external import MOST_STEPS
 from symtop.judging.claims.subject import Subject
 from symtop.judging.findings import Finding, Measured, inapplicable
 from symtop.measure.step_map import generic_start, one_step
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
 
-SHARE = 0.0137  # nutations: the step of a call
-SAME = 1e-13  # relative difference of two calls that threads may cause
-AGAIN, NOISY = 16, 0.1  # calls to distinguish noise from kept data; scatter, relative to a difference, that is noise
-REPEATS, SECONDS = 250, 0.3  # calls with the same arguments, up to this time
-NOTHING, STANDS = 1e-8, 1e-6  # ratio of a tiny step to the usual one; largest relative move of a state by it
-DIGITS = 14  # decimal digits of numbers that are not those of doubles, which have 17
-FAR = 200.0  # ratio to the usual step of one with which most methods fail
-PARTS = [(20, 20), (64, 64), (100, 157), (311, 500), (1000, 1000)]  # steps (n, m) of runs in two parts
-REMEMBERED = 1e-9  # of a step: a larger gap shows kept data; a slope kept from the last step causes 1e-10 in 2000 steps
-MISSED = 0.2  # of a step: a larger gap is a miscounted step; the new start of a multistep method causes less
-LATE = {False: (100_000, 3.0), True: (20_000, 0.5)}  # by quick: n of the longest late run, or its seconds
+STEP_SHARE = 0.0137  # nutations: the step of a call
+SAME_CALL = 1e-13  # relative difference of two calls that threads may cause
+NOISE_CALLS, NOISE_SHARE = 16, 0.1  # to distinguish noise from kept data; scatter over a difference that is noise
+REPEATS, REPEAT_SECONDS = 250, 0.3  # calls with the same arguments, up to this time
+TINY_STEP, TINY_MOVE = 1e-8, 1e-6  # ratio of a tiny step to the usual one; largest relative move of a state by it
+FEWEST_DIGITS = 14  # decimal digits of numbers that are not those of doubles, which have 17
+FAILING_STEP = 200.0  # ratio to the usual step of one with which most methods fail
+PART_LENGTHS = [(20, 20), (64, 64), (100, 157), (311, 500), (1000, 1000)]  # steps (n, m) of runs in two parts
+DATA_GAP = 1e-9  # of a step: a larger gap shows kept data; a slope kept from the last step causes 1e-10 in 2000 steps
+COUNT_GAP = 0.2  # of a step: a larger gap is a miscounted step; the new start of a multistep method causes less
+LATE_RUNS = {False: (100_000, 3.0), True: (20_000, 0.5)}  # by quick: n of the longest late run, or its seconds
 # number of late runs; largest m; largest gap, in steps, if the loop is symtop's
-LATER, AFTER, RECALLED = 4, 64, 1e-6
+LATE_CALLS, MOST_AFTER, LATE_GAP = 4, 64, 1e-6
 BLOWN_UP = 1e6  # times the start: a state that has blown up
-GROWN = 10.0  # gaps up to this times the effect of the last bit, as beside a separatrix, do not count
+GAP_GROWTH = 10.0  # gaps up to this times the effect of the last bit, as beside a separatrix, do not count
 # relative changes of the start, of the step, which moves a state by less, and of mgl for calls beside the first one
-CLOSE, LONGER, HEAVIER = 1e-12, 1e-9, 1.3
-NEAR = (f" from a start {CLOSE:g} away", f" with a step {LONGER:g} longer", " on a heavier top", "")
-ELSEWHERE = 0.3  # relative change of the start for a step somewhere else
+CLOSE_START, LONGER_STEP, HEAVIER_TOP = 1e-12, 1e-9, 1.3
+NEARBY_CALLS = (f" from a start {CLOSE_START:g} away", f" with a step {LONGER_STEP:g} longer", " on a heavier top", "")
+OTHER_START = 0.3  # relative change of the start for a step somewhere else
 
 
 def measure(subject: Subject) -> list[Finding]:
@@ -54,44 +54,44 @@ def measure(subject: Subject) -> list[Finding]:
     return [_calls(subject) if subject.method.fixed_step else inapplicable("calls", "it has no step of a given length")]
 
 
-def _refuted(kind: str, why: str, value: float = math.nan, resolution: float = SAME) -> Finding:
+def _refuted(kind: str, why: str, value: float = math.nan, resolution: float = SAME_CALL) -> Finding:
     return Finding("calls", "a function", Measured(kind), "refuted", why, value, resolution)
 
 
 def _calls(subject: Subject) -> Finding:
     stepper, scene = subject.stepper, subject.scene
     flat = {"phi": 0.0, "psi": 0.0}  # a map of (theta, p_theta) has no others
-    h, start = SHARE * scene.time_scale(), replace(generic_start(scene), **(flat if subject.in_plane else {}))
+    h, start = STEP_SHARE * scene.time_scale(), replace(generic_start(scene), **(flat if subject.in_plane else {}))
 
     def once(at: Angles, step: float) -> Any:
         state, run = stepper.from_start(scene.top, at, step)
         return run(state, 1)[0]
 
     stepper.renew()  # timing has called the step before
-    other = Angles(**{name: getattr(start, name) * (1.0 - ELSEWHERE) for name in Angles.__slots__} | flat)
+    other = Angles(**{name: getattr(start, name) * (1.0 - OTHER_START) for name in Angles.__slots__} | flat)
     first = once(start, h)
     if not np.isfinite(first).all():
         kind = f"returns {'NaN' if np.isnan(first).any() else 'infinity'}"
         return _refuted(kind, f"a step of h = {h:.3g} {kind}", resolution=math.nan)
     if refuted := _repeated(stepper, lambda: relative_gap(first, once(start, h)), lambda step: once(other, step), h):
         return refuted
-    step = one_step(subject.method, subject.method.charts()[0], scene, NOTHING * h)
+    step = one_step(subject.method, subject.method.charts()[0], scene, TINY_STEP * h)
     after = step.shown(step.run(start, step.h)), step.image(step.point(other))  # SymtopError if the second is at a pole
     own, gap = (step.gap(shown, step.at(at)) for shown, at in zip(after, (start, other), strict=True))
-    if own > STANDS:
+    if own > TINY_MOVE:
         no_state = _short(first) or "what it returns is no state, or no next one"
         why = f"a step of {step.h:.0e} moves by {own:.1e}: {no_state}"
-        return _refuted("jumps", why, own, STANDS)
-    if gap > STANDS:
+        return _refuted("jumps", why, own, TINY_MOVE)
+    if gap > TINY_MOVE:
         why = f"it keeps something of its first start: from another one, a step of {step.h:.0e} moves by {gap:.1e}"
-        return _refuted("keeps state", why, gap, STANDS)
+        return _refuted("keeps state", why, gap, TINY_MOVE)
     traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # short names, with clauses
     traits |= {"single precision": "it computes in single precision"} if subject.single else {}
     traits |= {"few digits": short} if (short := _short(first)) else {}
     miss, why = _parts(subject, h / 10.0) if stepper.own_loop else (0.0, "")
-    if miss > MISSED:
-        return _refuted("miscounts steps", why, miss, MISSED)
-    traits |= {"remembers": why} if miss > REMEMBERED and "few digits" not in traits else {}
+    if miss > COUNT_GAP:
+        return _refuted("miscounts steps", why, miss, COUNT_GAP)
+    traits |= {"remembers": why} if miss > DATA_GAP and "few digits" not in traits else {}
     traits |= {"stands still": f"a step of {step.h:.0e} moves nothing"} if own == 0.0 and not subject.single else {}
     gap, refuted = _kept(subject, start, h, lambda: relative_gap(first, once(start, h)))
     if refuted:
@@ -101,7 +101,7 @@ def _calls(subject: Subject) -> Finding:
     except SymtopError as error:
         traits["forward only"] = str(error)
     why = "; ".join(["a call gives the same numbers again, and after a step elsewhere", *traits.values()])
-    return Finding("calls", "", Measured(", ".join(traits) or "a function"), "measured", why, gap, SAME)
+    return Finding("calls", "", Measured(", ".join(traits) or "a function"), "measured", why, gap, SAME_CALL)
 
 
 def _repeated(
@@ -109,18 +109,18 @@ def _repeated(
 ) -> Finding | None:
     """A refuting finding if `again`, the relative gap of a repeated first call, is too large; None if it is not."""
     began, most, count, gap = time.monotonic(), 2 if stepper.own_loop else REPEATS, 1, 0.0
-    while count <= most and gap <= SAME and time.monotonic() - began < SECONDS:
+    while count <= most and gap <= SAME_CALL and time.monotonic() - began < REPEAT_SECONDS:
         count, gap = count + 1, again()
     how = f"call {count} with the same arguments"
-    if gap <= SAME:
+    if gap <= SAME_CALL:
         elsewhere(h)
         with contextlib.suppress(SymtopError):
-            elsewhere(FAR * h)  # it may fail, which must not change later calls either
+            elsewhere(FAILING_STEP * h)  # it may fail, which must not change later calls either
         how, gap = "after a step elsewhere the same call", again()
-    if gap <= SAME:
+    if gap <= SAME_CALL:
         return None
-    differences = [again() for _ in range(AGAIN)]
-    if (noise := max(differences) - min(differences)) > NOISY * gap:
+    differences = [again() for _ in range(NOISE_CALLS)]
+    if (noise := max(differences) - min(differences)) > NOISE_SHARE * gap:
         return _refuted("not repeatable", f"calls with the same arguments differ by {noise:.1e}", noise)
     return _refuted("keeps state", f"it keeps something between calls: {how} differs by {gap:.1e}", gap)
 
@@ -131,20 +131,20 @@ def _kept(subject: Subject, start: Angles, h: float, again: Callable[[], float])
     beside = [] if stepper.own_loop else _beside(stepper, top, start, h)
     miss, why = _cut(stepper, subject.scene, h / 1.6, _late(subject))
     keeps = "it keeps something between calls:"
-    if miss > (most := MISSED if stepper.own_loop else RECALLED):
+    if miss > (most := COUNT_GAP if stepper.own_loop else LATE_GAP):
         return miss, _refuted("keeps state", f"{keeps} {why} (seed {subject.seed})", miss, most)
     ends = zip(beside, _beside(stepper, top, start, h) if beside else [], strict=True)
     gaps = [*(relative_gap(*pair) for pair in ends), again()]
-    for how, gap in zip(NEAR[-len(gaps) :], gaps, strict=True):
-        if gap > SAME:
+    for how, gap in zip(NEARBY_CALLS[-len(gaps) :], gaps, strict=True):
+        if gap > SAME_CALL:
             return gap, _refuted("keeps state", f"{keeps} the first one, repeated{how}, differs by {gap:.1e}", gap)
     return gaps[-1], None
 
 
 def _beside(stepper: Stepper, top: SymmetricTop, start: Angles, h: float) -> list[Any]:
-    """The ends of steps that differ from the first one as `NEAR` says; zeros where a step fails."""
-    near = Angles(**{name: getattr(start, name) * (1.0 + CLOSE) for name in Angles.__slots__})
-    trials = (top, near, h), (top, start, h * (1.0 + LONGER)), (replace(top, mgl=HEAVIER * top.mgl), start, h)
+    """The ends of steps that differ from the first one as `NEARBY_CALLS` says; zeros where a step fails."""
+    near = Angles(**{name: getattr(start, name) * (1.0 + CLOSE_START) for name in Angles.__slots__})
+    trials = (top, near, h), (top, start, h * (1.0 + LONGER_STEP)), (replace(top, mgl=HEAVIER_TOP * top.mgl), start, h)
     state, ends = stepper.form.prepare(top, start)[1], []
     for of_top, at, step in trials:
         par, y = stepper.form.prepare(of_top, at)
@@ -156,26 +156,26 @@ def _beside(stepper: Stepper, top: SymmetricTop, start: Angles, h: float) -> lis
 
 
 def _short(state: Any) -> str:
-    """A clause on numbers of at most `DIGITS` decimal digits, as a program writes them; empty if one has more."""
-    short = all(float(f"{number:.{DIGITS}g}") == number for number in state.tolist())
-    return f"its numbers have at most {DIGITS} digits: it must write 17" * short
+    """A clause on numbers of at most `FEWEST_DIGITS` digits, as a program writes them; empty if one has more."""
+    short = all(float(f"{number:.{FEWEST_DIGITS}g}") == number for number in state.tolist())
+    return f"its numbers have at most {FEWEST_DIGITS} digits: it must write 17" * short
 
 
 def _parts(subject: Subject, h: float) -> tuple[float, str]:
     """The gap of short runs in two parts (`_cut`); of two halves of the most steps of one call if these miss a step."""
-    few = _cut(subject.stepper, subject.scene, h, PARTS)
-    half = int(min(MOST, LATE[subject.quick][1] / max(subject.seconds_a_step, 1e-9) / 3.0)) // 2
-    if few[0] > REMEMBERED or half <= PARTS[-1][0]:  # the new start of a multistep method has more effect later
+    few = _cut(subject.stepper, subject.scene, h, PART_LENGTHS)
+    half = int(min(MOST_STEPS, LATE_RUNS[subject.quick][1] / max(subject.seconds_a_step, 1e-9) / 3.0)) // 2
+    if few[0] > DATA_GAP or half <= PART_LENGTHS[-1][0]:  # the new start of a multistep method has more effect later
         return few
     many = _cut(subject.stepper, subject.scene, h, [(half, half)])
-    return many if many[0] > MISSED else few
+    return many if many[0] > COUNT_GAP else few
 
 
 def _cut(stepper: Stepper, scene: Scene, h: float, parts: Sequence[tuple[int, int]]) -> tuple[float, str]:
     """The largest gap, in steps, between the end of a run of n + m steps and m steps made anew, and a clause on it."""
     start, run = stepper.from_start(scene.top, generic_start(scene), h)
     a_step, worst, words = _gap(run(start, 1)[0], start), 0.0, "after few steps"
-    a_step = a_step if a_step > SAME * (size := np.abs(start).max()) else size  # the step does not move
+    a_step = a_step if a_step > SAME_CALL * (size := np.abs(start).max()) else size  # the step does not move
     for k, (n, m) in enumerate(parts):
         middle, end = run(start, n, n + m)
         if stepper.own_loop:
@@ -185,7 +185,7 @@ def _cut(stepper: Stepper, scene: Scene, h: float, parts: Sequence[tuple[int, in
         if not np.abs(middle).max() <= BLOWN_UP * np.abs(start).max():  # or NaN, which SciPy's classes refuse
             continue  # there the change of the last bit has more effect than kept data
         above, below = (run(np.nextafter(middle, side), m)[0] for side in (np.inf, -np.inf))
-        gap = max(_gap(end, above) - GROWN * _gap(above, below), 0.0) / a_step
+        gap = max(_gap(end, above) - GAP_GROWTH * _gap(above, below), 0.0) / a_step
         words = words if np.isfinite(gap) or worst else "after a run that fails"
         if gap > worst:
             worst, words = gap, f"after {n} steps the next {m} are {gap:.1e} of a step from those asked again"
@@ -194,10 +194,10 @@ def _cut(stepper: Stepper, scene: Scene, h: float, parts: Sequence[tuple[int, in
 
 def _late(subject: Subject) -> list[tuple[int, int]]:
     """Random lengths (n, m) of late runs; the last is the longest, so that the next call comes after many steps."""
-    draw, (most, seconds) = np.random.default_rng(subject.seed), LATE[subject.quick]
-    longest = max(min(most, seconds / max(subject.seconds_a_step, 1e-9)), AFTER)
-    shares = *np.sort(draw.uniform(0.2, 1.0, LATER - 1)).tolist(), 1.0
-    return [(round(longest**share * draw.uniform(1.0, 1.1)), int(draw.integers(1, AFTER))) for share in shares]
+    draw, (most, seconds) = np.random.default_rng(subject.seed), LATE_RUNS[subject.quick]
+    longest = max(min(most, seconds / max(subject.seconds_a_step, 1e-9)), MOST_AFTER)
+    shares = *np.sort(draw.uniform(0.2, 1.0, LATE_CALLS - 1)).tolist(), 1.0
+    return [(round(longest**share * draw.uniform(1.0, 1.1)), int(draw.integers(1, MOST_AFTER))) for share in shares]
 
 
 def _gap(first: Any, second: Any) -> float:

@@ -2,13 +2,13 @@
 
 A constant is kept, bounded, a random walk, a drift or just growing by the rule of every study,
 `symtop.measure.conservation.behaviour`. Foreign code may sum without compensation. So a growing change also counts as
-rounding if it is at most `KEPT`, relative, or at most the random walk of the rounding seen in one step, n^1/2 times as
-much, or at most a bias of one epsilon per step, as from products of quaternions that are never normalised. A drift
-below a bounded oscillation shows in the means of 24 equal stretches, and counts if its slope exceeds `SURE` half-widths
-of its interval; a random walk passes a plain test of the slope in one case in three, but not this one. At the size of
-rounding only the size is judged. As long as a constant has changed little, its change from one sample to the next must
-not exceed `SUDDEN` times the sum of as many of the largest changes in one step at the beginning: otherwise the step
-works differently somewhere, and the claim is refuted.
+rounding if it is at most `KEPT_CHANGE`, relative, or at most the random walk of the rounding seen in one step, n^1/2
+times as much, or at most a bias of one epsilon per step, as from products of quaternions that are never normalised. A
+drift below a bounded oscillation shows in the means of 24 equal stretches, and counts if its slope exceeds
+`SURE_WIDTHS` half-widths of its interval; a random walk passes a plain test of the slope in one case in three, but not
+this one. At the size of rounding only the size is judged. As long as a constant has changed little, its change from one
+sample to the next must not exceed `SUDDEN` times the sum of as many of the largest changes in one step at the
+beginning: otherwise the step works differently somewhere, and the claim is refuted.
 
 A run blows up when its energy has risen by more than that of the nutation and all that the weight can give, 2 |mgl|,
 which no friction causes. The constants are then judged over a new run until that time.
@@ -31,7 +31,7 @@ from symtop.core.errors import SymtopError
 from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import Stepper
 from symtop.judging.claims.subject import CONSTANTS, PLANE, QUICK_SHARE, STEPS_A_NUTATION, Subject, declared
-from symtop.judging.findings import NOTHING, Finding, Measured, agreement, inapplicable, undecided, yes_no
+from symtop.judging.findings import UNMEASURED, Finding, Measured, agreement, inapplicable, undecided, yes_no
 from symtop.measure.conservation import Change, Difference, behaviour, constant_of, from_increments, maxima, residuals
 from symtop.measure.step_map import one_step
 from symtop.methods.framework.calling import solve
@@ -44,25 +44,25 @@ from symtop.run.simulation import chart_of, make_plan
 from symtop.run.trajectory import Trajectory
 
 STEPS, QUICK_STEPS = 1_000_000, 50_000  # of a long run; the second if `quick`
-FINER = (1.0, 3.17, 10.03)  # factors on the steps per nutation, tried in turn if a run does not reach its end
+FINER_STEPS = (1.0, 3.17, 10.03)  # factors on the steps per nutation, tried in turn if a run does not reach its end
 STEPS_A_TURN = 8.0  # least steps per turn of a body by L about the axis of its least moment
 SAMPLES = 4001  # of a long run
-PILOT = 400  # steps of the run that is sampled at every step
+PILOT_STEPS = 400  # steps of the run that is sampled at every step
 EVALUATIONS = {"compiled": 2e8, "python": 4e4}  # most force evaluations of a long run
 LEAST_SHARE = 0.25  # least part of the most steps for a run that is repeated with finer steps, if `quick`
 TOLERANCE = 1e-6  # of an adaptive method without a default of its own
-KEPT = 1e-11  # relative: a smaller change is rounding
-REPORTED = 1e-9  # relative difference of reported momenta from those of the states; plain sums in 1e6 steps cause 1e-11
-OTHER = 0.77  # length, as a part of the run, of a second run in which a drift of such a difference must appear again
+KEPT_CHANGE = 1e-11  # relative: a smaller change is rounding
+REPORTED_GAP = 1e-9  # relative, of reported momenta from those of the states; plain sums in 1e6 steps cause 1e-11
+SECOND_LENGTH = 0.77  # as a part of the run: in a second run so long a drift of such a difference must appear again
 ROUNDING_OF_A_STEP = 2e-13  # largest change in one step that may be rounding, if |p| is small beside its terms
-BOUNDED = 0.25  # growth is certain if the exponent less its interval is larger
-SURE = 8.0  # half-widths of its interval that the slope of a drift exceeds
-VISIBLE = 1e-3  # of the largest residual: a smaller trend is ignored
-SUDDEN, LITTLE, FROM = 100.0, 1e-2, "changes as it begins"  # factor of a sudden change; change of a constant before it
+GROWTH_EXPONENT = 0.25  # growth is certain if the exponent less its interval is larger
+SURE_WIDTHS = 8.0  # half-widths of its interval that the slope of a drift exceeds
+VISIBLE_TREND = 1e-3  # of the largest residual: a smaller trend is ignored
+SUDDEN, LITTLE_BEFORE, SUDDEN_WORDS = 100.0, 1e-2, "changes as it begins"  # factor of a change; change before
 OF_A_RUN = (*CONSTANTS, "reported", "invariant", "explicit", "work")  # reported: reported momenta against the states'
 OF_MOTION = (*CONSTANTS, "momentum")  # momentum, of a body: L in space, or L_z of a heavy body
 KINDS = ("kept", "bounded", "random walk", "growing", "drift", "blows up")  # from best to worst
-OWN = "its states'"  # the implied claim that a run reports the momenta of its states
+OWN_STATES = "its states'"  # the implied claim that a run reports the momenta of its states
 BADNESS = ("inapplicable", "measured", "confirmed", "undecided", "refuted")  # verdicts from best to worst
 CUTS, SAME_RUN, OF_RUN = 8, 1e-9, "state"  # short runs compared with longer ones; largest difference; its name
 WINDOWS = 160  # of a long run in a figure, evenly spaced in the logarithm of time
@@ -88,8 +88,8 @@ class Constant(NamedTuple):
             return word
         if not (math.isfinite(change.largest) and math.isfinite(change.exponent)):
             return "unknown"
-        sure = 0.0 < SURE * change.interval < abs(change.slope)
-        return "drift" if sure and abs(change.rise) > VISIBLE * change.largest else word
+        sure = 0.0 < SURE_WIDTHS * change.interval < abs(change.slope)
+        return "drift" if sure and abs(change.rise) > VISIBLE_TREND * change.largest else word
 
     @property
     def grows(self) -> bool | None:
@@ -97,7 +97,7 @@ class Constant(NamedTuple):
         if self.kind in ("kept", "bounded", "unknown"):
             return None if self.kind == "unknown" else False
         least = self.changed.exponent - self.changed.exponent_interval
-        return True if self.kind == "drift" or least > BOUNDED else None
+        return True if self.kind == "drift" or least > GROWTH_EXPONENT else None
 
     def words(self, place: str) -> str:
         """A clause with its largest change, `place`, and the exponent of growth."""
@@ -118,7 +118,7 @@ class Constant(NamedTuple):
         """The finding on the claim."""
         verdict, measured = self.verdict(claimed), Measured(self.kind, self.changed.largest)
         if self.kind == "unknown":
-            why, measured = f"{why}; no law of growth to judge it by", NOTHING
+            why, measured = f"{why}; no law of growth to judge it by", UNMEASURED
         elif verdict == "undecided":
             why += ", which leaves open whether it grows"
         return Finding(claim, claimed, measured, verdict, why, self.changed.largest, self.floor)
@@ -173,23 +173,23 @@ def long_run(
 ) -> LongRun:
     """A run of a million steps of a compiled method in a chart, or of `most`; fewer if that would take minutes."""
     inside, unit = "angles" if chart == PLANE else chart, scene.time_scale()
-    for finer in FINER:  # a motion that passes close to a pole needs shorter steps
+    for finer in FINER_STEPS:  # a motion that passes close to a pole needs shorter steps
         step = unit / (STEPS_A_NUTATION * finer)
         if scene.of_body:  # L turns a needle about its own axis many times in a natural period
             step = min(step, math.tau * min(scene.top.moments) / (STEPS_A_TURN * scene.momentum_scale))
-        pilot, first, _ = _run(method, scene, inside, PILOT, step, PILOT + 1)
-        steps = float(PILOT)  # for a closed form, which has no steps that accumulate errors
+        pilot, first, _ = _run(method, scene, inside, PILOT_STEPS, step, PILOT_STEPS + 1)
+        steps = float(PILOT_STEPS)  # for a closed form, which has no steps that accumulate errors
         if method.control is not None:
-            cost = max(first.force_evaluations / PILOT, 1.0)
+            cost = max(first.force_evaluations / PILOT_STEPS, 1.0)
             share = QUICK_SHARE if quick else 1.0
             limit = share * EVALUATIONS[method.implementation] / cost if most is None else most
-            steps = max(min(QUICK_STEPS if quick else STEPS, limit) * method.speed, PILOT)
+            steps = max(min(QUICK_STEPS if quick else STEPS, limit) * method.speed, PILOT_STEPS)
         trajectory, run, plan = _run(method, scene, inside, steps, step, SAMPLES)
         if run.outcome == "ok" or not method.fixed_step:
             break
         if quick and most is not None:
             most = max(most - run.steps, LEAST_SHARE * most)
-    _, other, _ = _run(method, scene, inside, PILOT, 0.21 * step, PILOT + 1)
+    _, other, _ = _run(method, scene, inside, PILOT_STEPS, 0.21 * step, PILOT_STEPS + 1)
     steady = len({run.force_evaluations / max(run.steps, 1) for run in (first, other)}) == 1
     reported = None
     plain = isinstance(method.solvers[inside], Stepper)
@@ -255,12 +255,12 @@ def _reported(
     if chart == "angles":
         drift = from_increments(method, scene, plan) if method.fixed_step else None
         if drift is not None and drift.size > drift.floor:  # aliasing may give a drift at one length only
-            fewer = Plan.steps(plan.step_size, [0, round(OTHER * int(plan.marks[-1]))])
+            fewer = Plan.steps(plan.step_size, [0, round(SECOND_LENGTH * int(plan.marks[-1]))])
             drift = min(drift, from_increments(method, scene, fewer) or drift, key=lambda found: found.size)
         return drift
     gaps = {name: np.abs(getattr(run, name) - getattr(trajectory, name)) for name in ("p_phi", "p_psi")}
     size, name = max((float(np.max(gap[np.isfinite(gap)], initial=0.0)), name) for name, gap in gaps.items())
-    return Difference(name, size / scene.momentum_scale, REPORTED, f"of the larger momentum in {run.steps} steps")
+    return Difference(name, size / scene.momentum_scale, REPORTED_GAP, f"of the larger momentum in {run.steps} steps")
 
 
 @np.errstate(over="ignore", invalid="ignore")  # a run may blow up
@@ -307,10 +307,10 @@ def change_of(
     a_step = float(np.max(jumps[np.isfinite(jumps)])) if np.isfinite(jumps).any() else math.nan
     rounding = a_step * math.sqrt(steps) if a_step <= ROUNDING_OF_A_STEP * grain else 0.0
     rounding = max(rounding, min(0.5 * a_step, EPSILON * grain) * steps * plain * (rounding > 0.0))
-    floor = max(KEPT * grain, rounding)
+    floor = max(KEPT_CHANGE * grain, rounding)
     with np.errstate(all="ignore"):  # a run may blow up
         ratio = np.abs(np.diff(values)) / max(a_step * steps / (time.size - 1), floor)
-        calm = np.abs(values[1:-1]) < LITTLE
+        calm = np.abs(values[1:-1]) < LITTLE_BEFORE
         jump = np.flatnonzero((ratio[1:] > SUDDEN) & (np.fmax.accumulate(ratio)[:-1] < SUDDEN / 10.0) & calm)
     words = "after t = {:.4g} it changes {:.0e} times as much as by its first steps"
     sudden = words.format(time[jump[0] + 1], ratio[jump[0] + 1]) if even and jump.size else ""
@@ -358,7 +358,7 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
     why = constant.words(f"in {run.span}, {constant.a_step:.0e} in one step at most")
     why += f", drifting by {changed.rise / max(run.steps, 1):.1e} a step" if kind == "drift" else ""
     finding = constant.finding(claim, claimed, why)
-    finding = finding if run.steps and not (ended and run.nutations < 1.0) else finding._replace(measured=NOTHING)
+    finding = finding if run.steps and not (ended and run.nutations < 1.0) else finding._replace(measured=UNMEASURED)
     # an error that is periodic with the nutation cannot exceed the largest change of a step times the steps of one
     most = constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
     if claim == "energy" and run.blown_up > 0.0:
@@ -367,7 +367,7 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
     if run.outcome not in ("ok", "not_finite", "not_normalised") or (ended and kind in ("kept", "bounded")):
         return finding._replace(verdict="undecided", why=f"{why}; but the run {run.message}")
     if method.fixed_step and constant.sudden:
-        return finding._replace(verdict="refuted", declared=claimed or FROM, why=f"{constant.sudden}; {why}")
+        return finding._replace(verdict="refuted", declared=claimed or SUDDEN_WORDS, why=f"{constant.sudden}; {why}")
     if kind == "unknown" and ended:
         return finding._replace(why=f"the run {run.message}")
     returns = ("kept", "unknown", *["bounded"] * (run.chart == BODY))  # a body may have slower periods, too
@@ -382,9 +382,9 @@ def _of_states(run: LongRun) -> Finding:
     other = run.reported
     if other is None:
         return inapplicable("reported", f"the {run.chart} chart shows no momenta beside the reported")
-    declared, verdict, differs = OWN, "refuted", f"differs by {other.size:.1e} {other.how}"
+    declared, verdict, differs = OWN_STATES, "refuted", f"differs by {other.size:.1e} {other.how}"
     if other.size <= other.floor:
-        declared, verdict, kind = "", "measured", OWN
+        declared, verdict, kind = "", "measured", OWN_STATES
         why = f"the momenta that it reports differ from those of its states by {other.size:.1e} at most"
     elif other.name == OF_RUN:
         kind, why = "another run", f"a run contradicts itself, as if the method knew of it: the state {differs}"

@@ -5,7 +5,8 @@ slope (`symtop.measure.order.order_verdict`, as in every study), or by the serie
 
 *Slopes* of the errors of runs are extrapolated to h = 0 by `symtop.measure.order` from a ladder of steps, then again
 with added steps in the decades of error above rounding where a method of high order is asymptotic. If that does not
-decide, longer runs on `FALLBACK` are used, the first that decides. An adaptive method is fitted against its mean step.
+decide, longer runs on `FALLBACK_SCENE` are used, the first that decides. An adaptive method is fitted against its mean
+step.
 
 *The limit.* A method whose coefficients have a sum that is off by 1e-9 has the right slope down to an error of 1e-9,
 which then stays. So the signed error at the end of a short run of many steps is extrapolated to h = 0 (Richardson's,
@@ -42,10 +43,10 @@ from symtop.core.errors import SymtopError
 from symtop.judging.claims.order_conditions import Conditions, conditions, splitting_conditions, triangle
 from symtop.judging.claims.step_series import Series, compared, step_series
 from symtop.judging.claims.structure import ONE_MAP, map_of
-from symtop.judging.claims.subject import FINEST, QUICK_SHARE, Subject, hidden_by_single
-from symtop.judging.findings import NOTHING, Finding, Measured, inapplicable, undecided, yes_no
+from symtop.judging.claims.subject import FINEST_RUN, QUICK_SHARE, Subject, hidden_by_single
+from symtop.judging.findings import UNMEASURED, Finding, Measured, inapplicable, undecided, yes_no
 from symtop.measure.accuracy import error_table
-from symtop.measure.order import BESIDE, CLEARLY, LARGEST_ERROR, Fit, order_verdict, wrong_limit
+from symtop.measure.order import CONFIRMED_BEYOND, LARGEST_ERROR, REFUTED_BEYOND, Fit, order_verdict, wrong_limit
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
 from symtop.measure.step_map import APART, SEVERAL, StepMap, aligned, generic_start, one_step, restart_gap, unit_of
@@ -62,25 +63,25 @@ from symtop.model.top import Angles
 from symtop.run.reference.sensitivity import conditioning
 
 NUTATIONS = 1.37  # length of the runs that the slope is fitted to
-FALLBACK, LONGER = "goldstein", (8.37, 40.0)  # scene and lengths, in nutations, if the first runs do not decide
+FALLBACK_SCENE, LONGER_RUNS = "goldstein", (8.37, 40.0)  # lengths in nutations; if the first runs do not decide
 LARGEST_EXACT = 2.37  # steps per nutation at which a method with exact steps is run, besides the ladder
-SHARE = 0.37  # nutations: length of the runs that are extrapolated to h = 0
-STEPS = {1: 40_000, 2: 20_000, 3: 6_000, 4: 2_000, 5: 1_000, 6: 500}  # of the coarsest of them; 200 beyond order 6
+LIMIT_NUTATIONS = 0.37  # nutations: length of the runs that are extrapolated to h = 0
+LIMIT_STEPS = {1: 40_000, 2: 20_000, 3: 6_000, 4: 2_000, 5: 1_000, 6: 500}  # of the coarsest; 200 beyond order 6
 TRUE_LIMIT = 1e-11  # a limit as close as this is the true motion
-SHOWN = 24  # settings in the traces of the order
-DRAWS, DRAWING = (96, 32), (10.0, 3.0)  # random starts where the order of one step is measured, and seconds for them
-HALVINGS, SHORT = 10, 80.0  # steps from each start, each half of the one before; a short step is 1/80 of a nutation
+SHOWN_SETTINGS = 24  # settings in the traces of the order
+DRAWS, DRAW_SECONDS = (96, 32), (10.0, 3.0)  # random starts where the order of one step is measured
+HALVINGS, SHORT_STEP = 10, 80.0  # steps from each start, each half of the last; a short step is 1/80 of a nutation
 LOWER, JUMP = 0.6, 3.0  # differences by which a measured order is lower than, or jumps above, the declared one
-LARGE, SEEN = 1e-3, 1e-11  # errors of a step above the first follow no power, below the second they are rounding
-TINY = 8.0  # parts of a short step: errors of a smaller one are judged however large they are
-UNITS = 100.0  # single-precision epsilons: smaller errors of a step in single precision are rounding
-UNEVEN, WAVES = 0.6, 0.7  # a, and periods of the clock's speed in a nutation
-BEGIN = 0.23  # nutations: t0
-UNSTABLE = 1e4  # amplification by the motion above which errors of runs follow no power of the step
-CLEAR = 1e-9  # noise of the h^1 term in double precision; rounding of a step to single precision causes 1e-8
-CONVERGES, ROUNDED, FALLS = "converges", 1e-10, (1e4, 10.0)  # converges: an error falls to a tenth over four decades
-SHARPLY, BESIDE_NEXT = 1e-5, 1e-3  # a wrong term with a defect below this, or this part of the next, shows in no slope
-ABOVE, FINEST_RUNS, SPREAD = 10.0, 5, 10.0  # finest errors beyond 10 bounds, and the factor by which they fit h^p
+LARGE_ERROR, ROUNDING_ERROR = 1e-3, 1e-11  # of a step: larger ones follow no power, smaller ones are rounding
+TINY_STEP = 8.0  # parts of a short step: errors of a smaller one are judged however large they are
+SINGLE_EPSILONS = 100.0  # single-precision epsilons: smaller errors of a step in single precision are rounding
+CLOCK_DEPTH, CLOCK_WAVES = 0.6, 0.7  # a, and periods of the clock's speed in a nutation
+CLOCK_START = 0.23  # nutations: t0
+UNSTABLE_GROWTH = 1e4  # amplification by the motion above which errors of runs follow no power of the step
+SINGLE_NOISE = 1e-9  # noise of the h^1 term in double precision; rounding of a step to single precision causes 1e-8
+CONVERGES, ROUNDED_ERROR, FALL = "converges", 1e-10, (1e4, 10.0)  # an error falls to a tenth over four decades
+SHARP_DEFECT, SHARE_OF_NEXT = 1e-5, 1e-3  # a wrong term with a smaller defect, or part of the next, shows in no slope
+ABOVE_BOUND, FINEST_RUNS, FIT_FACTOR = 10.0, 5, 10.0  # finest errors beyond 10 bounds; the factor by which they fit h^p
 
 
 def measure(subject: Subject) -> list[Finding]:
@@ -111,7 +112,7 @@ def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
     if subject.in_plane or not subject.method.fixed_step or subject.method.exact_steps:
         return None
     draw = np.random.default_rng(subject.seed)
-    for name, scene in subject.elsewhere(DRAWS, DRAWING):
+    for name, scene in subject.elsewhere(DRAWS, DRAW_SECONDS):
         scale = scene.time_scale() * math.sin(scene.start.theta)
         sizes: Array = scale / draw.uniform(9.0, 18.0) / 2.0 ** np.arange(float(HALVINGS))
         for chart in subject.charts:
@@ -119,8 +120,8 @@ def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
                 step = one_step(subject.method, chart, scene, float(sizes[0]))
                 if restart_gap(step, scene.start) > ONE_MAP:
                     continue
-                seen = max(SEEN, subject.rounding(UNITS))
-                order, h = _lower(sizes, _misses(step, scene.start, sizes), power, scale / SHORT, seen)
+                seen = max(ROUNDING_ERROR, subject.rounding(SINGLE_EPSILONS))
+                order, h = _lower(sizes, _misses(step, scene.start, sizes), power, scale / SHORT_STEP, seen)
                 if order < power:
                     order = max(order, 0.0)
                     return order, f"a step of h = {h:.2g} from {name} has order {order:.1f}, in the {chart} chart"
@@ -140,7 +141,7 @@ def _lower(sizes: Array, misses: Array, power: int, short: float, seen: float) -
     """An order lower than `power`, or infinity, and its step; errors below `seen` are rounding."""
     with np.errstate(all="ignore"):
         orders = np.log2(misses[:-1] / misses[1:]) - 1.0
-    clear = ((misses[:-1] < LARGE) | (sizes[:-1] <= short / TINY)) & (misses[1:] > seen)
+    clear = ((misses[:-1] < LARGE_ERROR) | (sizes[:-1] <= short / TINY_STEP)) & (misses[1:] > seen)
     fine = np.flatnonzero(clear & (sizes[:-1] <= short))[-2:]
     if fine.size == 2 and (orders[fine] < power - LOWER).all():
         return float(orders[fine].max()), float(sizes[fine[0]])
@@ -163,7 +164,7 @@ def on_body(subject: Subject) -> list[Finding]:
             how = f"however small its step, it goes to a motion that is wrong by {wrong:.1e} rad on {scene.name}"
             return [_wrong_limit(claim, wrong, how)]
         return [undecided("order", yes_no(claim), _hidden(subject, fit.reason))]
-    if verdict == "refuted" and fit.slope - fit.interval > (claim or 0) + CLEARLY:  # as Fasso's method on some bodies
+    if verdict == "refuted" and fit.slope - fit.interval > (claim or 0) + REFUTED_BEYOND:  # as Fasso's on some bodies
         verdict, why = "measured", f"{why}: here the error falls with a higher power"
     return [Finding("order", yes_no(claim), fitted.measured, verdict, why, fit.slope, fit.interval)]
 
@@ -183,10 +184,10 @@ def _terms(series: Series) -> Measured:
 
 
 def series_of(subject: Subject) -> Series | None:
-    """The series of the chart with the lowest order, on `FALLBACK` for a scene beside a pole; None without a map."""
+    """The series of the chart with the lowest order, beside a pole on `FALLBACK_SCENE`; None without a map."""
     candidates = []
     if math.sin(generic_start(subject.scene).theta) <= APART:
-        subject = replace(subject, scene=find_scene(FALLBACK))
+        subject = replace(subject, scene=find_scene(FALLBACK_SCENE))
     for chart in subject.charts if subject.method.fixed_step else ():
         with contextlib.suppress(SymtopError):
             step, start = map_of(subject, chart)
@@ -208,15 +209,15 @@ class Order(NamedTuple):
 
     @property
     def measured(self) -> Measured:
-        """The slope of the main quantity, or `NOTHING` if there is none."""
+        """The slope of the main quantity, or `UNMEASURED` if there is none."""
         fit = self.main
-        return Measured("slope", fit.slope, text=str(fit)) if math.isfinite(fit.slope) else NOTHING
+        return Measured("slope", fit.slope, text=str(fit)) if math.isfinite(fit.slope) else UNMEASURED
 
     def traces(self) -> dict[str, Array]:
-        """Steps, errors and flags of those used in the fit, (SHOWN,) from the finest on, padded with NaN."""
-        rank = np.argsort(self.step_size)[:SHOWN]
+        """Steps, errors and flags of those used in the fit, (SHOWN_SETTINGS,) from the finest on, padded with NaN."""
+        rank = np.argsort(self.step_size)[:SHOWN_SETTINGS]
         columns = {"step_size": self.step_size, "error": self.error, "fitted": self.main.used.astype(float)}
-        padded = np.full(SHOWN - rank.size, math.nan)
+        padded = np.full(SHOWN_SETTINGS - rank.size, math.nan)
         return {name: np.concatenate([values[rank], padded]) for name, values in columns.items()}
 
 
@@ -227,12 +228,12 @@ def measured_order(
     runs, quantity = [(scene, NUTATIONS)], observable(method)
     main = main or quantity
     if finest is not None and method.fixed_step:
-        runs.append((scene, SHARE))  # the same number of steps, and smaller errors
+        runs.append((scene, LIMIT_NUTATIONS))  # the same number of steps, and smaller errors
     has_order = method.fixed_step and method.order is not None and not scene.of_body
     if has_order and not quick and method.implementation == "compiled":
-        runs += [(find_scene(FALLBACK), nutations) for nutations in LONGER]
+        runs += [(find_scene(FALLBACK_SCENE), nutations) for nutations in LONGER_RUNS]
     count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # errors of adaptive methods scatter
-    most = FINEST[method.implementation] * (QUICK_SHARE if quick else 1.0) if finest is None else finest
+    most = FINEST_RUN[method.implementation] * (QUICK_SHARE if quick else 1.0) if finest is None else finest
     orders: list[Order] = []
     for problem, nutations in runs:
         horizon = nutations * problem.time_scale()
@@ -264,10 +265,10 @@ def _by_steps(subject: Subject) -> Finding:
     slopes = f"slopes {slopes} on {fitted.scene}" if slopes else "no slope"
     power = method.order or 1
     # if a step certainly has the motion's terms up to h^power, its runs converge to the motion
-    follows = series and series.order >= power and float(series.noise[1]) < CLEAR
-    settled = measured or conditioning(scene, SHARE * scene.time_scale()) > UNSTABLE
+    follows = series and series.order >= power and float(series.noise[1]) < SINGLE_NOISE
+    settled = measured or conditioning(scene, LIMIT_NUTATIONS * scene.time_scale()) > UNSTABLE_GROWTH
     height = math.sin(generic_start(scene).theta)
-    pole = height if height <= APART else 1.0  # near a pole, a state in angles has an error of 2e-16 over the square
+    pole = height if height <= APART else 1.0  # near a pole, angles have an error of 2e-16 over the square
     if method.fixed_step and not (subject.in_plane or (settled and follows)):
         power = max(1, min(method.order or 99, round(main.slope))) if measured else power
         wrong, doubt = limit(method, scene, power, finest)
@@ -279,7 +280,7 @@ def _by_steps(subject: Subject) -> Finding:
         lowest = min((fit.slope for fit in fitted.fits.values() if math.isfinite(fit.slope)), default=0.0)
         beside = min(height, math.sin(scene.start.theta)) <= APART
         wrong_term = series is not None and series.is_exact and series.order < claim
-        faster = beside and method.fixed_step and lowest > claim - BESIDE and not wrong_term
+        faster = beside and method.fixed_step and lowest > claim - CONFIRMED_BEYOND and not wrong_term
         if finding.verdict == "refuted" and faster:
             finding = finding._replace(verdict="undecided", why=f"beside a pole errors may fall faster: {finding.why}")
         return finding._replace(why=_hidden(subject, finding.why)) if finding.verdict == "undecided" else finding
@@ -305,19 +306,20 @@ def _hidden(subject: Subject, why: str) -> str:
 def _converges(fitted: Order, slopes: str) -> Finding:
     """The finding on whether the error falls with the tolerance, down to rounding."""
     tolerances, errors = fitted.tolerance, fitted.error
-    good, (decades, less) = np.isfinite(errors), FALLS
+    good, (decades, less) = np.isfinite(errors), FALL
     if not good.any():
         return undecided("order", CONVERGES, fitted.main.reason)
     rank = np.flatnonzero(good)[np.argsort(tolerances[good])]
     tolerances, errors = tolerances[rank], errors[rank]
     last, coarser = float(errors[0]), errors[tolerances > 0.99 * decades * tolerances[0]]
     why = f"an error of {last:.1e} at a tolerance of {tolerances[0]:.0e}, from {errors[-1]:.1e} at {tolerances[-1]:.0e}"
-    if last <= ROUNDED or (coarser.size and last < coarser.min() / less):
+    if last <= ROUNDED_ERROR or (coarser.size and last < coarser.min() / less):
         measured = fitted.measured or Measured("converges", last, text="converges as its tolerance falls")
-        return Finding("order", CONVERGES, measured, "confirmed", f"{why}; {slopes}", last, ROUNDED)
+        return Finding("order", CONVERGES, measured, "confirmed", f"{why}; {slopes}", last, ROUNDED_ERROR)
     if not coarser.size:
         return undecided("order", CONVERGES, f"{why}: too few runs ended")
-    return Finding("order", CONVERGES, Measured("wrong limit", last), "refuted", f"it stays at {why}", last, ROUNDED)
+    measured, why = Measured("wrong limit", last), f"it stays at {why}"
+    return Finding("order", CONVERGES, measured, "refuted", why, last, ROUNDED_ERROR)
 
 
 def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | None, slopes: str) -> Finding:
@@ -328,15 +330,15 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
     larger errors. A larger slope that is no whole number is no order, and refutes none.
     """
     main, measured, verdict = fitted.main, fitted.measured, order_verdict(power, fitted.main, fits)
-    value, resolution = main.slope, BESIDE + main.interval
+    value, resolution = main.slope, CONFIRMED_BEYOND + main.interval
     why = f"{slopes}; {series.words(power)}" if series else slopes
     shown = series is not None and series.order == power and series.is_exact
     early, known, following = bool(measured) and main.slope > power, 0.0, 0.0
     if series:
         known = series.least(power + 1) if power + 1 < series.noise.size else math.inf
         following = float(series.defect[power + 2]) if series.is_exact and series.order == power + 1 else 0.0
-    sharply = known <= max(SHARPLY, BESIDE_NEXT * following)
-    lower = any(fit.slope + fit.interval < power - CLEARLY for fit in fits)
+    sharply = known <= max(SHARP_DEFECT, SHARE_OF_NEXT * following)
+    lower = any(fit.slope + fit.interval < power - REFUTED_BEYOND for fit in fits)
     if series is not None and shown and verdict != "confirmed" and not lower and (measured or _agree(fitted, power)):
         why = f"{why} ({main.reason or 'at steps too long for a slope'})"
         defect = series.worst(power), series.least(power)
@@ -359,12 +361,12 @@ def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | 
 
 
 def _agree(fitted: Order, power: int) -> bool:
-    """Do the errors of the finest judgeable runs fall as h^power, within a factor `SPREAD`?"""
+    """Do the errors of the finest judgeable runs fall as h^power, within a factor `FIT_FACTOR`?"""
     h, error, bound = fitted.step_size, fitted.error, fitted.bound
-    good = np.isfinite(error) & (error > ABOVE * bound) & (error < LARGEST_ERROR)
+    good = np.isfinite(error) & (error > ABOVE_BOUND * bound) & (error < LARGEST_ERROR)
     finest = np.argsort(h[good])[:FINEST_RUNS]
     scaled = error[good][finest] / h[good][finest] ** power
-    return scaled.size < 2 or float(np.max(scaled)) < SPREAD * float(np.min(scaled))
+    return scaled.size < 2 or float(np.max(scaled)) < FIT_FACTOR * float(np.min(scaled))
 
 
 def limit(method: Integrator, scene: Scene, power: int, finest: float | None = None) -> tuple[float, float]:
@@ -373,9 +375,9 @@ def limit(method: Integrator, scene: Scene, power: int, finest: float | None = N
     The method has order `power`; runs have at most `finest` steps. The distance is the largest difference of the
     chart's variables, momenta relative to the larger one.
     """
-    fewest = STEPS.get(power, 200) // (1 if method.implementation == "compiled" else 20)
+    fewest = LIMIT_STEPS.get(power, 200) // (1 if method.implementation == "compiled" else 20)
     fewest = fewest if finest is None else min(fewest, int(finest) // 4)
-    step = one_step(method, method.chart_for(observable(method)), scene, SHARE * scene.time_scale() / fewest)
+    step = one_step(method, method.chart_for(observable(method)), scene, LIMIT_NUTATIONS * scene.time_scale() / fewest)
     true = step.motion(scene.start)(step.h * fewest)
 
     def signed_error(steps: int) -> Array:
@@ -394,13 +396,13 @@ def _exactness(subject: Subject) -> Finding:
     """The finding on a method with exact steps, from the errors at steps of all sizes."""
     method, scene = subject.method, subject.scene
     horizon, main = NUTATIONS * scene.time_scale(), observable(method)
-    finer = ladder(method, scene, horizon, 7 if subject.quick else 13, FINEST[method.implementation])
+    finer = ladder(method, scene, horizon, 7 if subject.quick else 13, FINEST_RUN[method.implementation])
     settings = [scene.time_scale() / LARGEST_EXACT, *finer]
     table = error_table(scene, method, settings, horizon, observe=main)
     largest = float(table[main].max())
     why = f"largest error {largest:.1e} at steps from {settings[-1]:.1e} s to {settings[0]:.1e} s on {scene.name}"
     right = largest <= TRUE_LIMIT
-    measured = Measured("exact", largest) if right else NOTHING
+    measured = Measured("exact", largest) if right else UNMEASURED
     return Finding("order", "exact", measured, "confirmed" if right else "refuted", why, largest, TRUE_LIMIT)
 
 
@@ -422,7 +424,7 @@ def time_order(subject: Subject) -> list[Finding]:
         why = "it was written for f(y)" if subject.autonomous else "it takes no right-hand side"
         return [inapplicable("time", why)]
     order = subject.method.order
-    series, calls = series_by_clock(subject, UNEVEN)
+    series, calls = series_by_clock(subject, CLOCK_DEPTH)
     if not calls:
         return [inapplicable("time", "it asks for no right-hand side")]
     if series.order < 0:
@@ -438,7 +440,7 @@ def time_order(subject: Subject) -> list[Finding]:
         why = f"where f depends on t, {series.words(power)}"
     elif subject.knows_top:
         return [inapplicable("time", "it knows equations of the top beside f, which depend on no time")]
-    elif calls == {BEGIN * subject.scene.time_scale()}:  # a step for f(y), which is no fault
+    elif calls == {CLOCK_START * subject.scene.time_scale()}:  # a step for f(y), which is no fault
         declared, measured = "", Measured("f(y) only", lower, text=f"f(y) only, {lower}")
         why = "f is asked at the start of a step alone, which is right for f(y); where f depends on t, "
         why += series.wrong_term()
@@ -446,7 +448,7 @@ def time_order(subject: Subject) -> list[Finding]:
         declared, why = "", f"{series.wrong_term()}, as for f(y)"
     else:
         verdict, why = "refuted", f"where f depends on t, {series.wrong_term()}: f is asked at wrong times"
-        why += ", or a difference quotient is off" * (series.worst(series.order + 1) < SHARPLY)
+        why += ", or a difference quotient is off" * (series.worst(series.order + 1) < SHARP_DEFECT)
     term = min(power, series.order + 1)
     return [Finding("time", declared, measured, verdict, why, series.worst(term), series.least(term))]
 
@@ -469,7 +471,7 @@ class ClockedField:
 def series_by_clock(subject: Subject, uneven: float) -> tuple[Series, set[float]]:
     """The series of a step (or several, if a multistep method) with a clock of a = `uneven`; the times of f's calls."""
     scene, start, scale = subject.scene, generic_start(subject.scene), subject.scene.time_scale()
-    begin, rate, unit = BEGIN * scale, 2.0 * math.pi * WAVES / scale, np.repeat([1.0, unit_of(scene)], 3)
+    begin, rate, unit = CLOCK_START * scale, 2.0 * math.pi * CLOCK_WAVES / scale, np.repeat([1.0, unit_of(scene)], 3)
     par, state = FORMULATIONS["axis"].prepare(scene.top, start)
     true, f = one_step(subject.method, "axis", scene, scale).motion(start), ClockedField(par, uneven, rate, begin)
 

@@ -33,8 +33,8 @@ from numpy.typing import ArrayLike
 
 from symtop.model.charts import Array
 
-MET = 1e-12  # a condition is met if its defect is smaller: coefficients have 15 digits or more
-MOST = 6  # vertices of the largest trees
+MET_DEFECT = 1e-12  # a condition is met if its defect is smaller: coefficients have 15 digits or more
+MOST_VERTICES = 6  # vertices of the largest trees
 LONGEST_WORD = 10  # the highest order of the conditions of a splitting
 RANK = 1e-9  # singular values below this are zero
 
@@ -49,8 +49,8 @@ class Conditions(NamedTuple):
 
     @property
     def order(self) -> int:
-        """The order of the table, at most `MOST`."""
-        return next((k for k, value in enumerate(self.defect) if not value <= MET), len(self.defect))
+        """The order of the table, at most `MOST_VERTICES`."""
+        return next((k for k, value in enumerate(self.defect) if not value <= MET_DEFECT), len(self.defect))
 
     def words(self, power: int) -> str:
         """A clause on whether the conditions up to order `power` are met."""
@@ -86,7 +86,7 @@ def size(tree: Tree) -> int:
     return 1 + sum(size(branch) for branch in tree)
 
 
-def conditions(a: ArrayLike, b: ArrayLike, most: int = MOST) -> Conditions:
+def conditions(a: ArrayLike, b: ArrayLike, most: int = MOST_VERTICES) -> Conditions:
     """The conditions of a table, explicit or implicit: `a` of shape (stages, stages), `b` (stages,)."""
     matrix, weights = np.asarray(a, dtype=float), np.asarray(b, dtype=float)
 

@@ -29,18 +29,18 @@ from symtop.model.charts import Array
 from symtop.model.top import Angles
 
 NODES = 40  # an even number, so that no step has length zero
-WIDEST = 0.16  # nutations: the largest H that is tried
-NARROWER, TRIES = 0.6, 7  # ratio of one H to the one before; number of them
+WIDEST_STEP = 0.16  # nutations: the largest H that is tried
+STEP_RATIO, TRIES = 0.6, 7  # ratio of one H to the one before; number of them
 DEGREES = range(4, 25)  # of the polynomials that are tried
 LEAST_POWER = 6  # least degree of the series
-FURTHER = 2  # higher degrees of a second fit: its difference is an uncertainty of a term, as is the scatter
-NOISE = 1.25  # times the least residual: the polynomial of least degree with a residual below this is taken
-CLEAN = 3e-14  # a residual below this does not improve with a smaller H
-ROUGH, SMOOTH = 1e-12, 0.01  # residual above which [0, H] is tried; used if its residual is less by this factor
+DEGREES_MORE = 2  # higher degrees of a second fit: its difference is an uncertainty of a term, as is the scatter
+RESIDUAL_RATIO = 1.25  # times the least residual: the polynomial of least degree with a residual below this is taken
+CLEAN_RESIDUAL = 3e-14  # a residual below this does not improve with a smaller H
+ROUGH_RESIDUAL, LESS_RESIDUAL = 1e-12, 0.01  # above the first [0, H] is tried; used if less by the second, a factor
 SAMPLE_ROUNDING = 2e-16  # rounding error of a sample
-SURE = 10.0  # times the noise: a larger defect of a term counts
-AGREES = 1e-10  # a smaller defect does not: difference quotients in a step leave 1e-11, coefficients 1e-12
-SHARP = 1e-3  # relative: a term with more noise is not resolved
+SURE_DEFECT = 10.0  # times the noise: a larger defect of a term counts
+SMALL_DEFECT = 1e-10  # a smaller defect does not: difference quotients in a step leave 1e-11, coefficients 1e-12
+SHARP_NOISE = 1e-3  # relative: a term with more noise is not resolved
 
 
 class Series(NamedTuple):
@@ -54,13 +54,13 @@ class Series(NamedTuple):
 
     @property
     def resolved(self) -> int:
-        """The highest power up to which every term is known to better than `SHARP`."""
-        return int(np.argmin([*(self.noise < SHARP), False])) - 1
+        """The highest power up to which every term is known to better than `SHARP_NOISE`."""
+        return int(np.argmin([*(self.noise < SHARP_NOISE), False])) - 1
 
     @property
     def order(self) -> int:
         """The power up to which the terms agree with those of the motion, at most `resolved`."""
-        wrong = self.defect > np.maximum(AGREES, SURE * self.noise)
+        wrong = self.defect > np.maximum(SMALL_DEFECT, SURE_DEFECT * self.noise)
         return min(int(np.argmax([*wrong, True])) - 1, self.resolved)
 
     @property
@@ -74,7 +74,7 @@ class Series(NamedTuple):
 
     def least(self, power: int) -> float:
         """The least defect of the h^power term, or of the last term, that counts."""
-        return max(AGREES, SURE * float(self.noise[min(power, self.noise.size - 1)]))
+        return max(SMALL_DEFECT, SURE_DEFECT * float(self.noise[min(power, self.noise.size - 1)]))
 
     def words(self, power: int) -> str:
         """A clause on whether the series has the order `power`."""
@@ -104,15 +104,15 @@ def compared(
         scatter, series = ahead(backward=True)
     except SymtopError:
         return ahead()[1]
-    if scatter > ROUGH:
+    if scatter > ROUGH_RESIDUAL:
         with contextlib.suppress(SymtopError):
-            series = forward[1] if (forward := ahead())[0] < SMOOTH * scatter else series
+            series = forward[1] if (forward := ahead())[0] < LESS_RESIDUAL * scatter else series
     return series
 
 
 def _narrowed(image: Any, motion: Any, period: float, chart: str, *, backward: bool) -> tuple[float, Series]:
     """The scatter and the series of the fit with least scatter among narrower and narrower intervals."""
-    width, best = WIDEST * period, None
+    width, best = WIDEST_STEP * period, None
     refusal = SymtopError("no step succeeds")
     for _ in range(TRIES):
         try:
@@ -122,9 +122,9 @@ def _narrowed(image: Any, motion: Any, period: float, chart: str, *, backward: b
         else:
             if best is None or fitted[0] < 0.5 * best[0]:
                 best = fitted
-            if best[0] < CLEAN:
+            if best[0] < CLEAN_RESIDUAL:
                 break
-        width *= NARROWER
+        width *= STEP_RATIO
     if best is None:
         raise refusal
     return best
@@ -144,7 +144,7 @@ def _fitted(
         raise SymtopError("a step is not finite")
     scatter, degree = _degree(nodes, error)
     power = max(degree, LEAST_POWER)
-    fits = (chebyshev.chebfit(nodes, error, degree) for degree in (power, power + FURTHER))
+    fits = (chebyshev.chebfit(nodes, error, degree) for degree in (power, power + DEGREES_MORE))
     terms, finer = (_monomials(fit, backward=backward) for fit in fits)
     _, top = _degree(nodes, exact)
     true = _monomials(chebyshev.chebfit(nodes, exact, max(top, power)), backward=backward)[: power + 1]
@@ -165,7 +165,7 @@ def _degree(nodes: Array, values: Array) -> tuple[float, int]:
         rest = values - chebyshev.chebval(nodes, chebyshev.chebfit(nodes, values, degree)).T
         rows.append(float(np.max(np.sqrt(np.sum(rest * rest, axis=0) / (nodes.size - degree - 1)))))
     least = max(min(rows), SAMPLE_ROUNDING)
-    place = next(k for k, row in enumerate(rows) if row <= NOISE * least)
+    place = next(k for k, row in enumerate(rows) if row <= RESIDUAL_RATIO * least)
     return max(rows[place], SAMPLE_ROUNDING), DEGREES[place]
 
 

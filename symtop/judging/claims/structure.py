@@ -33,15 +33,15 @@ from symtop.model.top import Angles, Momenta, SymmetricTop
 from symtop.run.simulation import simulate
 
 SYMPLECTIC = 1e-9  # a smaller defect of the bracket is zero
-MET = 1e-8  # a larger defect counts, if it is above its noise
-STANDS = 0.2  # ratio of raw defects, finest to widest, above which one counts; that of a symplectic map is 1/256
-LOST = 1e-3  # of the noise: a smaller raw defect does not count; near a pole, large slopes in angles leave one
-RETURNED = 1e-10  # a step forth and back that ends nearer to its start is symmetric
-MISSED = 1e-8  # one that ends farther away is not
-GONE = 4096.0  # a defect vanishes if it is so many times smaller at half the step: 2^12, as of order 12
+REAL_DEFECT = 1e-8  # a larger defect counts, if it is above its noise
+PERSISTENT_RATIO = 0.2  # of raw defects, finest to widest, above which one counts; a symplectic map has 1/256
+LOST_IN_NOISE = 1e-3  # of the noise: a smaller raw defect does not count; near a pole, large slopes in angles leave one
+RETURN_GAP = 1e-10  # a step forth and back that ends nearer to its start is symmetric
+NO_RETURN_GAP = 1e-8  # one that ends farther away is not
+VANISHING_RATIO = 4096.0  # a defect vanishes if it is so many times smaller at half the step: 2^12, as of order 12
 BRACKET_UNITS, RETURN_UNITS = 8.0, 64.0  # single-precision epsilons in a difference of two steps, and forth and back
 ONE_MAP = 1e-9  # two steps are twice one step within this
-DRAWS, DRAWING = (8, 4), (10.0, 2.0)  # random starts, and seconds for them; the second if `quick`
+DRAWS, DRAW_SECONDS = (8, 4), (10.0, 2.0)  # random starts, and seconds for them; the second if `quick`
 POLE_STEPS = 400
 POLE_RIGHT = 1e-7  # rad: a smaller error is right, whether or not it falls with the step
 # the axis passes theta = 0 exactly: I1 = I3 = mgl = 1, w3 = 1, p_phi = p_psi, theta' = -1.2 at theta = 1
@@ -64,7 +64,7 @@ def measure(subject: Subject) -> list[Finding]:
             answers.append(_answer_at(_returned, step, start))
             if subject.method.fixed_step and not subject.in_plane:
                 answers = _elsewhere(subject, step, answers)
-            finest = maps.WIDEST / 2.0 ** (maps.WIDTHS - 1)
+            finest = maps.WIDEST_DIFFERENCE / 2.0 ** (maps.WIDTHS - 1)
             hidden = subject.rounding(BRACKET_UNITS) / finest, subject.rounding(RETURN_UNITS)
             for k, (yes, value, _, why) in enumerate(answers):
                 if yes is False and value <= hidden[k]:
@@ -106,7 +106,7 @@ def map_of(subject: Subject, chart: str) -> tuple[maps.StepMap, Angles]:
     if not subject.in_plane:
         return maps.step_map(subject.method, chart, subject.scene)
     scene, start = subject.scene, maps.generic_start(subject.scene)
-    h, momenta = maps.SHARE * scene.time_scale(), scene.top.momenta(start)
+    h, momenta = maps.RUN_NUTATIONS * scene.time_scale(), scene.top.momenta(start)
     return maps.coarsest(Plane(subject.method, "angles", scene.top, maps.unit_of(scene), h, momenta), start), start
 
 
@@ -118,11 +118,11 @@ def _badness(finding: Finding) -> tuple[int, float]:
 def _answer_at(ask: Callable[..., Answer], step: maps.StepMap, start: Angles, *traces: dict[str, Any]) -> Answer:
     """The answer of `ask` at a step, or that at half the step if a defect vanishes there (iteration not converged)."""
     answer = ask(step, start, *traces)
-    falls = step.method.explicit and 2.0 ** (step.method.order or 0) >= GONE  # a true defect falls as fast
+    falls = step.method.explicit and 2.0 ** (step.method.order or 0) >= VANISHING_RATIO  # a true defect falls as fast
     if answer[0] is False and step.method.fixed_step and not falls:
         with contextlib.suppress(SymtopError):
             finer = ask(replace(step, h=0.5 * step.h), start)
-            return finer if finer[0] and GONE * finer[1] < answer[1] else answer
+            return finer if finer[0] and VANISHING_RATIO * finer[1] < answer[1] else answer
     return answer
 
 
@@ -140,24 +140,24 @@ def _bracket(step: maps.StepMap, start: Angles, traces: dict[str, Any] | None = 
             why = f"one number that a run takes from its start explains the defect ({defect.rest:.0e} is left)"
             return True, defect.rest, floor, why
         return None, defect.size, floor, f"a run differs from its steps one by one by {gap:.0e}: no one map"
-    stands = defect.raw[-1] > max(STANDS * defect.raw[0], 100.0 * MET, LOST * defect.noise)
-    bad = stands or defect.size > max(10.0 * defect.noise, MET)
+    stands = defect.raw[-1] > max(PERSISTENT_RATIO * defect.raw[0], 100.0 * REAL_DEFECT, LOST_IN_NOISE * defect.noise)
+    bad = stands or defect.size > max(10.0 * defect.noise, REAL_DEFECT)
     return False if bad else None, defect.size, floor, f"defect of the bracket {defect.size:.1e} (it goes {shrinks})"
 
 
 def _returned(step: maps.StepMap, start: Angles) -> Answer:
     miss = maps.return_miss(step, start)
-    if (miss > RETURNED or step.own("onward") is not None) and (gap := maps.restart_gap(step, start)) > ONE_MAP:
-        return None, miss, RETURNED, f"a run differs from its steps one by one by {gap:.0e}: no one map"
+    if (miss > RETURN_GAP or step.own("onward") is not None) and (gap := maps.restart_gap(step, start)) > ONE_MAP:
+        return None, miss, RETURN_GAP, f"a run differs from its steps one by one by {gap:.0e}: no one map"
     why = f"a step forth and back misses the start by {miss:.1e}"
-    return True if miss <= RETURNED else False if miss > MISSED else None, miss, RETURNED, why
+    return True if miss <= RETURN_GAP else False if miss > NO_RETURN_GAP else None, miss, RETURN_GAP, why
 
 
 def _elsewhere(subject: Subject, step: maps.StepMap, answers: list[Answer]) -> list[Answer]:
     """The answers, with each yes replaced by a no that is measured at a random start."""
-    for name, scene in subject.elsewhere(DRAWS, DRAWING) if answers[0][0] or answers[1][0] else ():
+    for name, scene in subject.elsewhere(DRAWS, DRAW_SECONDS) if answers[0][0] or answers[1][0] else ():
         with contextlib.suppress(SymtopError):
-            trial = maps.one_step(step.method, step.chart, scene, maps.SHARE * scene.time_scale())
+            trial = maps.one_step(step.method, step.chart, scene, maps.RUN_NUTATIONS * scene.time_scale())
             other = maps.coarsest(trial, scene.start)
             for i, ask in enumerate((_bracket, _returned)):
                 if answers[i][0] and (answer := _answer_at(ask, other, scene.start))[0] is False:

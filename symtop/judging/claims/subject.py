@@ -33,21 +33,21 @@ ARGUMENTS = {"ode": "(f, t, y, h)", "separable": "(state, h, dT, dV)", "rotation
 OWN_CHART = {"separable": "", "rotation": "attitude"}  # the only chart of a form
 LIBRARIES = (".so", ".dylib", ".dll")
 CONSTANTS = (*MOTION, "axis_length")
-KEEPING = ("splitting", "discrete-lagrangian", "lie-group")  # families that keep the momentum of a body
+MOMENTUM_FAMILIES = ("splitting", "discrete-lagrangian", "lie-group")  # families that keep the momentum of a body
 PLANE = "nutation"  # the chart of a map of (theta, p_theta)
-LONG, SLOPES = (10.0, 2.5), (6.0, 1.5)  # seconds of a long run and of the runs for the order; the second if `quick`
+LONG_SECONDS, SLOPE_SECONDS = (10.0, 2.5), (6.0, 1.5)  # of a long run, and of runs for the order; the second if `quick`
 STEPS = 1_000_000  # most steps of a long run
 SAMPLES = 4000  # intervals of a long run; its steps are a multiple, for a program writes every `stride` steps
-FINEST = {"compiled": 2e5, "python": 1e4}  # most steps of a run for the order
-FEWEST = 300  # steps of the longest run for the order, however slow a step is
-SINGLE = 1000  # most steps of it in single precision, whose rounding hides smaller errors
-LADDER = 2.5  # ratio of the steps of all runs for the order to those of the longest
-ENOUGH_STEPS, AT_REST = 50.0, 1e-9  # steps per nutation with a constant right-hand side; the largest relative miss
-PUSH, UNITS = 0.01, 4.0  # its largest change of L, relative; epsilons, of single or double, that are rounding of a step
-MOVES = 1e-6  # relative: a number that a step changes by less does not show in what precision
+FINEST_RUN = {"compiled": 2e5, "python": 1e4}  # most steps of a run for the order
+FEWEST_STEPS = 300  # steps of the longest run for the order, however slow a step is
+MOST_SINGLE = 1000  # most steps of it in single precision, whose rounding hides smaller errors
+LADDER_RATIO = 2.5  # ratio of the steps of all runs for the order to those of the longest
+ENOUGH_STEPS, REST_MISS = 50.0, 1e-9  # steps per nutation with a constant right-hand side; the largest relative miss
+PUSH_SIZE, ROUNDING_EPSILONS = 0.01, 4.0  # its largest change of L, relative; rounding of a step, single or double
+LEAST_MOVE = 1e-6  # relative: a number that a step changes by less does not show in what precision
 QUICK_SHARE = 0.25  # of the most steps and evaluations of a registered method, if `quick`; no verdict changes
 STEPS_A_NUTATION = 118.02  # of a long run, and of timed steps, because the cost of an implicit step depends on its size
-TIMED, LEAST = 0.03, 1e-9  # seconds of a run that suffice to time a step; the least time assumed of a step
+TIMED_SECONDS, LEAST_SECONDS = 0.03, 1e-9  # a run so long suffices to time a step; least time assumed of a step
 
 
 def constant(slope: Any, _t: float, _y: Any) -> Any:
@@ -92,11 +92,11 @@ class Subject:
         par, _ = self.stepper.form.prepare(self.scene.top, generic_start(self.scene))
         push, size = np.zeros(y.size), float(np.max(np.abs(y)))
         push[-3:] = self.stepper.form.field(par, y.tolist())[-3:]
-        push *= PUSH * size / h / max(float(np.max(np.abs(push))), LEAST)
+        push *= PUSH_SIZE * size / h / max(float(np.max(np.abs(push))), LEAST_SECONDS)
         try:
             for slope in (0.0 * push, push):
                 end = self.stepper.along(functools.partial(constant, slope), h, y.copy(), h, np.array([1]))[0]
-                if not np.max(np.abs(end - y - h * slope)) <= max(AT_REST, self.rounding(UNITS)) * size:
+                if not np.max(np.abs(end - y - h * slope)) <= max(REST_MISS, self.rounding(ROUNDING_EPSILONS)) * size:
                     return True
         except SymtopError:  # it divides by f
             return True
@@ -128,7 +128,7 @@ class Subject:
         """The most steps of a long run; None for the default of the implementation."""
         if not self.seconds_a_step:
             return None
-        steps = min(LONG[self.quick] / self.seconds_a_step, STEPS)
+        steps = min(LONG_SECONDS[self.quick] / self.seconds_a_step, STEPS)
         return SAMPLES * round(steps / SAMPLES) if steps > SAMPLES else steps
 
     @property
@@ -136,8 +136,9 @@ class Subject:
         """The most steps of a run for the order; None for the default of the implementation."""
         if not self.seconds_a_step:
             return None
-        steps = min(SLOPES[self.quick] / self.seconds_a_step / LADDER, FINEST[self.method.implementation])
-        return max(min(steps, SINGLE) if self.single else steps, FEWEST)
+        finest = FINEST_RUN[self.method.implementation]
+        steps = min(SLOPE_SECONDS[self.quick] / self.seconds_a_step / LADDER_RATIO, finest)
+        return max(min(steps, MOST_SINGLE) if self.single else steps, FEWEST_STEPS)
 
     def declared(self, claim: str) -> str:
         """The value that is declared for a claim; the chart of a bare step declares nothing about the pole."""
@@ -152,12 +153,12 @@ class Subject:
         state, run = self.stepper.from_start(scene.top, generic_start(scene), h)
         end = run(state, 1)[0]
         added, size = end - state, np.abs(end)
-        added, size = (values[np.abs(added) > MOVES * size] for values in (added, size))
+        added, size = (values[np.abs(added) > LEAST_MOVE * size] for values in (added, size))
         with np.errstate(over="ignore"):  # a step may blow up beyond the range of float32
             if (end == end.astype(np.float32)).all():
                 return not (state == state.astype(np.float32)).all()
             off = [np.abs(sums - sums.astype(np.float32)) * unit for sums, unit in ((added, 1.0), (added / h, h))]
-        return added.size > 2 and bool((off <= UNITS * EPSILON * size).all(axis=1).any())
+        return added.size > 2 and bool((off <= ROUNDING_EPSILONS * EPSILON * size).all(axis=1).any())
 
     def rounding(self, steps: float) -> float:
         """The relative rounding error of `steps` steps in single precision, one epsilon each; 0 in double precision."""
@@ -185,11 +186,11 @@ def seconds_a_step(stepper: Stepper, scene: Scene) -> float:
     while True:
         cost, finite = seconds(4 * steps)
         steps *= 4 if finite else 1
-        if not finite or cost - first > max(TIMED, first) or steps > 1e7:  # a start's time scatters by its own size
+        if not finite or cost - first > max(TIMED_SECONDS, first) or steps > 1e7:  # a start's time scatters
             # the median, because other processes disturb, and the count of waiting time may lag behind
             cost = sorted(seconds(steps)[0] for _ in range(3))[1]
             # at least half, because the run that timed the start may have been disturbed
-            return max(cost - first * finite, 0.5 * cost, LEAST * steps) / steps
+            return max(cost - first * finite, 0.5 * cost, LEAST_SECONDS * steps) / steps
 
 
 def declared(method: Integrator, claim: str) -> str:
@@ -208,7 +209,8 @@ def declared(method: Integrator, claim: str) -> str:
     if claim == "energy" and "energy" not in conserves:
         return "bounded" if method.symplectic and method.fixed_step else ""
     if claim == "momentum":
-        return "kept" if method.family in KEEPING or (method.family == ENGINE and "p_phi" in conserves) else ""
+        keeps = method.family in MOMENTUM_FAMILIES or (method.family == ENGINE and "p_phi" in conserves)
+        return "kept" if keeps else ""
     if claim in CONSTANTS:
         return "kept" if claim in conserves else ""
     if claim == "invariant":

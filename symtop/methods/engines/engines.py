@@ -263,7 +263,7 @@ ANGULAR_MOMENTUM = {
 
 
 NONE = (0.0,)  # the rule of a map, which has no numbers; numba cannot type the entries of an empty tuple
-PARTS = 4  # substeps of a step of Rapier
+RAPIER_SUBSTEPS = 4  # substeps of a step of Rapier
 
 
 @register_jitable
@@ -415,14 +415,14 @@ def substepped(par: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
     part = par.half * par.half * h
     pull = scaled(part, velocity(par, e, torque(par, e)))
     p = par.one, par.zero, par.zero, par.zero
-    for _ in range(PARTS):
+    for _ in range(RAPIER_SUBSTEPS):
         w = _rescaled(par, e, plus(w, par.one, pull), part)
         turn = linear(par, w, part)
         e, p = oriented(par, e, turn), product(turn, p)
     return p, w, carry
 
 
-SMALL = 1e-4  # angle below which 1/12 is the coefficient of dexp^-1 to rounding (the next term is a^2/720)
+SMALL_ANGLE = 1e-4  # angle below which 1/12 is the coefficient of dexp^-1 to rounding (the next term is a^2/720)
 
 
 @register_jitable
@@ -472,7 +472,7 @@ def _straightened(turn: Any, b: Any) -> Any:
     """dexp^-1(turn) b = b + turn x b/2 + c turn x (turn x b), c = (1 - (a/2) cot(a/2))/a^2, a = |turn|."""
     square = dot(turn, turn)
     a = np.sqrt(square)
-    c = (1.0 - 0.5 * a / np.tan(0.5 * a)) / square if a > SMALL else 1.0 / 12.0
+    c = (1.0 - 0.5 * a / np.tan(0.5 * a)) / square if a > SMALL_ANGLE else 1.0 / 12.0
     bent = cross(turn, b)
     return plus(plus(b, 0.5, bent), c, cross(turn, bent))
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError, foreign_code
 from symtop.core.signals import at_most
-from symtop.methods.framework.plan import LENGTH, OUTCOMES, QUATERNIONS, Array, Plan, Run, off_length
+from symtop.methods.framework.plan import LENGTH_OFF, OUTCOMES, QUATERNIONS, Array, Plan, Run, off_length
 from symtop.methods.framework.registry import Integrator
 from symtop.model.charts import DIMENSIONS
 
@@ -70,10 +70,10 @@ def _checked(method: Integrator, shape: tuple[int, int], plan: Plan, run: Any, *
 
 
 def _of_length_one(plan: Plan, run: Run, chart: str) -> Run:
-    """The run, ended where the length of its quaternion differs from one by more than `LENGTH`."""
+    """The run, ended where the length of its quaternion differs from one by more than `LENGTH_OFF`."""
     quaternions = run.states[:, :4]
     squares = np.einsum("ij,ij->i", quaternions, quaternions)  # six times as fast as the search that follows
-    if np.abs(squares - 1.0).max(initial=0.0) <= LENGTH:
+    if np.abs(squares - 1.0).max(initial=0.0) <= LENGTH_OFF:
         return run
     lost = off_length(chart, run.states)
     if not lost.any():

@@ -33,10 +33,11 @@ and it uses vectors of full width only if `step` begins with a call of `wide_vec
 calls and that has a loop of its own, which is made into vectors before it is inlined. Whether it does is seen in
 ``kernel.inspect_asm()`` (zmm).
 
-*Order of members.* A block makes as many steps as its longest member; a step takes about as long as `LEAST` members
-alone. Members enter in the order of their numbers of steps, the longest first; `W` successive ones that together make
-fewer steps than `LEAST` times the longest run alone instead (`loop.whole_run`, without Python's lock). A step that
-iterates takes as many passes as its slowest lane: there, members with similar numbers of steps enter in the order of
+*Order of members.* A block makes as many steps as its longest member; a step takes about as long as `LEAST_MEMBERS`
+members alone. Members enter in the order of their numbers of steps, the longest first; `W` successive ones that
+together make fewer steps than `LEAST_MEMBERS` times the longest run alone instead (`loop.whole_run`, without Python's
+lock). A step that iterates takes as many passes as its slowest lane: there, members with similar numbers of steps enter
+in the order of
 
     h sqrt(|L|^2 / I1^2 + |mgl| / I1),    how far the top turns and the pendulum swings in a step, in radians,
 
@@ -65,8 +66,8 @@ from symtop.model.top import NUMBERS, Angles, SymmetricTop
 Ints = NDArray[np.int64]
 
 W = 32  # lanes of a block: four vectors of eight doubles
-NEVER = np.iinfo(np.int64).max  # the next mark of a lane that has none left
-STRETCH = 100  # steps after which lanes are looked at whose members have ended or were given up
+NO_MARK = np.iinfo(np.int64).max  # the next mark of a lane that has none left
+STRETCH_STEPS = 100  # steps after which lanes are looked at whose members have ended or were given up
 
 
 @register_jitable
@@ -204,18 +205,18 @@ def marching(lanes: Lanes, observe: Any, present: Any, write: Any) -> Any:  # no
         rules = prepared[1]
         made, members, samples, ended_at = 0, len(chosen), marks.shape[1], len(block) - W
         while at[1] >= 0 and made < most:
-            k, target = at[1], NEVER
+            k, target = at[1], NO_MARK
             for j in range(W):
-                if nearest[j] == NEVER and (at[0] < members or k == 0):
+                if nearest[j] == NO_MARK and (at[0] < members or k == 0):
                     i = min(at[0], members - 1)  # a block that is not full has copies of its last member
                     fill(block, table, j, i, prepared)
                     if at[0] < members:
                         at[0], member[j], began[j], seen[j], nearest[j] = i + 1, i, k, 0, k + marks[chosen[i], 0]
                 target = min(target, nearest[j])
-            if target == NEVER:
+            if target == NO_MARK:
                 at[1] = -1
                 break
-            stop = min(target, k - k % STRETCH + STRETCH)
+            stop = min(target, k - k % STRETCH_STEPS + STRETCH_STEPS)
             made += W * (stop - k)
             while k < stop:
                 k += 1
@@ -227,15 +228,15 @@ def marching(lanes: Lanes, observe: Any, present: Any, write: Any) -> Any:  # no
             for j in range(W):
                 m, s, spent = chosen[member[j]], seen[j], np.int64(block[(flag + 1) * W + j])
                 lost = block[flag * W + j]
-                if lost < 0.0 and nearest[j] != NEVER:
+                if lost < 0.0 and nearest[j] != NO_MARK:
                     outcomes[m], steps[m], work[m] = np.int64(-lost), np.int64(block[ended_at + j]), spent
                 if lost != 0.0:
-                    nearest[j] = NEVER
+                    nearest[j] = NO_MARK
                 if nearest[j] == k:
                     made_own = k - began[j]
                     show(block, table, before, j, read(rules[member[j]]), made_own, h[m], states[m, s], momenta[m, s])
                     seen[j] = s + 1
-                    nearest[j] = began[j] + marks[m, s + 1] if s + 1 < samples else NEVER
+                    nearest[j] = began[j] + marks[m, s + 1] if s + 1 < samples else NO_MARK
                     if s + 1 == samples:
                         steps[m], work[m] = made_own, spent
 
@@ -305,7 +306,7 @@ def loop_with_rule(advance: Callable[..., Any], rule: Any, *, top: Any, **more: 
     return one_loop(advance_lane, lay, fields, top=top, read=read, **more)
 
 
-GROUP = 200_000  # steps between returns to Python, so that an interrupt is heard: a second of the slowest kernel
+GROUP_STEPS = 200_000  # steps between returns to Python, so that an interrupt is heard: a second of the slowest kernel
 
 
 class Many(NamedTuple):
@@ -358,10 +359,10 @@ def groups(chosen: Ints, steps: Ints, most: int) -> list[Ints]:
     return np.split(chosen, np.flatnonzero(np.diff(ends)) + 1) if chosen.size else []
 
 
-LEAST = 5  # members alone take as long as a block: 32 lanes, each in about a seventh of the time of a member alone
-ALIKE = 1.1  # numbers of steps within this factor of each other are alike, where the step iterates
-BATCH = 128 * W  # members that are prepared at a time: 4 MB for the longest table
-FEW = 5_000_000  # steps, which take members alone 0.2 to 3 s, where kernels in lanes take 1 to 14 s to compile
+LEAST_MEMBERS = 5  # alone take as long as a block: 32 lanes, each in about a seventh of the time of a member alone
+ALIKE_RATIO = 1.1  # numbers of steps within this factor of each other are alike, where the step iterates
+BATCH_MEMBERS = 128 * W  # members that are prepared at a time: 4 MB for the longest table
+FEW_STEPS = 5_000_000  # steps, which take members alone 0.2 to 3 s, where kernels in lanes take 1 to 14 s to compile
 
 
 @dataclass
@@ -374,9 +375,9 @@ class Blocks:
     asked: int = 0  # steps, of all calls of `worth`
 
     def worth(self, steps: int) -> bool:
-        """Are the kernels compiled, or have they, with these, been asked for more than `FEW` steps?"""
+        """Are the kernels compiled, or have they, with these, been asked for more than `FEW_STEPS` steps?"""
         self.asked += steps
-        return self.asked > FEW or is_stored(self.march)
+        return self.asked > FEW_STEPS or is_stored(self.march)
 
     def run(self, members: Ints, numbers: Array, rule: Any, h: Array, marks: Ints, done: Many, most: int) -> Ints:
         """Run members, about `most` steps a call; return those to run alone. `rule`: as it is, and as compiled."""
@@ -385,11 +386,11 @@ class Blocks:
         chosen, left = divided(members, steps, turns(numbers, h) if counts_itself else None)
         tops, fields, dimension, carry = len(lanes.top._fields), lanes.size(rule), lanes.dimension, lanes.carry
         per_lane = 3 * dimension + 2 + carry + lanes.room(rule), tops + fields, dimension
-        room = *(aligned(n * W) for n in per_lane), np.full(W, NEVER), *np.zeros((3, W), dtype=np.int64)
+        room = *(aligned(n * W) for n in per_lane), np.full(W, NO_MARK), *np.zeros((3, W), dtype=np.int64)
         chosen = np.ascontiguousarray(chosen[::-1])  # the longest begin first
         alone = [left]
-        for first in range(0, len(chosen), BATCH):
-            batch = chosen[first : first + BATCH]
+        for first in range(0, len(chosen), BATCH_MEMBERS):
+            batch = chosen[first : first + BATCH_MEMBERS]
             prepared = tuple(np.empty((len(batch), width)) for width in (tops, fields, dimension, carry))
             self.prepare(batch, numbers, coefficients, h, marks, prepared, done.momenta)
             at = np.array([0, 0])
@@ -424,17 +425,17 @@ def turns(numbers: Array, h: Array) -> Array:
 
 
 def divided(members: Ints, steps: Ints, turns: Array | None = None) -> tuple[Ints, Ints]:
-    """The members whose steps fill blocks well, in order (of `turns` where steps are `ALIKE`), and the others."""
+    """The members whose steps fill blocks well, in order (of `turns` where steps are `ALIKE_RATIO`), and the others."""
     if not len(members):
         return members, members
     made = steps[members]
     if turns is None:
         order = np.argsort(made, kind="stable")
     else:
-        order = np.lexsort((turns[members], np.floor(np.log(np.maximum(made, 1)) / np.log(ALIKE))))
+        order = np.lexsort((turns[members], np.floor(np.log(np.maximum(made, 1)) / np.log(ALIKE_RATIO))))
     members, made = members[order], made[order]
     firsts = np.arange(0, len(members), W)
     sizes = np.diff(np.append(firsts, len(members)))
-    worth = np.add.reduceat(made, firsts) >= LEAST * np.maximum.reduceat(made, firsts)
+    worth = np.add.reduceat(made, firsts) >= LEAST_MEMBERS * np.maximum.reduceat(made, firsts)
     in_lanes = np.repeat(worth, sizes)
     return members[in_lanes], members[~in_lanes]

@@ -281,7 +281,7 @@ class FixedStep:
         # writable too: a kernel is compiled again for an array that is not, as a broadcast one
         numbers, h = np.require(numbers, requirements=("C", "W")), np.require(h, requirements=("C", "W"))
         marks = np.require(marks, requirements=("C", "W"))
-        whole, most = self._whole, min(many.GROUP, BLOCK)
+        whole, most = self._whole, min(many.GROUP_STEPS, BLOCK)
         if whole is None:
             raise SymtopError("many needs a solver whose parts all compile")
         run, rule, check, size, *_ = whole.alone

@@ -101,17 +101,17 @@ _CAUSES = {  # and remedies
 }  # fmt: skip
 
 
-LENGTH = 1e-3  # how far from one the length of a quaternion may be
+LENGTH_OFF = 1e-3  # how far from one the length of a quaternion may be
 QUATERNIONS = ("attitude", "body")  # charts that begin with one
 
 
 def off_length(chart: str, states: Array) -> NDArray[np.bool_]:
-    """True from the first finite sample on at which | |q| - 1 | > `LENGTH`; states (..., samples, dimension)."""
+    """True from the first finite sample on at which | |q| - 1 | > `LENGTH_OFF`; states (..., samples, dimension)."""
     if chart not in QUATERNIONS:
         return np.zeros(states.shape[:-1], dtype=bool)
     with np.errstate(all="ignore"):  # a run may have blown up
         length = np.sqrt((states[..., :4] ** 2).sum(axis=-1))
-    return np.logical_or.accumulate(np.isfinite(length) & (np.abs(length - 1.0) > LENGTH), axis=-1)
+    return np.logical_or.accumulate(np.isfinite(length) & (np.abs(length - 1.0) > LENGTH_OFF), axis=-1)
 
 
 def sentence(outcome: str, reached: float, horizon: float, unit: str = "", *, remedy: bool = True) -> str:

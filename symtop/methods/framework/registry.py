@@ -48,7 +48,7 @@ NEEDS = {  # the least that a method needs of a problem, even if its kernel uses
     "this-top": "this top's equations", "solution": "the motion itself",
 }  # fmt: skip
 INNER_LOOPS = ("scalar", "vector registers", "heyoka", "Python", None)
-ALLOWED: dict[str, tuple[Any, ...]] = {
+ALLOWED_VALUES: dict[str, tuple[Any, ...]] = {
     **dict.fromkeys(("explicit", "symplectic", "symmetric"), (True, False, None)), "exact_steps": (True, False),
     "control": ("step_size", "tolerance", None), "energy_error": ENERGY_ERRORS,
     "needs": (*NEEDS, None), "general": (True, False, None), "inner_loop": INNER_LOOPS,
@@ -134,7 +134,7 @@ class Integrator:
             object.__setattr__(self, "conserves", names)
 
     def _check_kinds(self) -> None:
-        for name, allowed in ALLOWED.items():
+        for name, allowed in ALLOWED_VALUES.items():
             value = getattr(self, name)
             if not isinstance(value, str | bool | np.bool_ | None) or value not in allowed:
                 *first, last = map(repr, allowed)

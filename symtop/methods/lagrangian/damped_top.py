@@ -30,7 +30,7 @@ from symtop.methods.library.scipy_ivp import integrated
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 
-NEAR = 0.01  # rad from a pole, nearer to which the friction of precession, rate c_phi/(I1 sin^2 theta), is stiff
+NEAR_POLE = 0.01  # rad from a pole, nearer to which the friction of precession, rate c_phi/(I1 sin^2 theta), is stiff
 Rates = Callable[[float, Any], tuple[float, ...]]
 
 
@@ -68,15 +68,15 @@ def four_equations(scene: Scene, friction: Friction) -> tuple[Rates, tuple[float
 
 
 def _near_pole(_: float, y: Any) -> float:
-    """An event function for `solve_ivp`: becomes negative where the axis comes within `NEAR` of a pole."""
-    return math.sin(y[0]) - math.sin(NEAR)
+    """An event function for `solve_ivp`: becomes negative where the axis comes within `NEAR_POLE` of a pole."""
+    return math.sin(y[0]) - math.sin(NEAR_POLE)
 
 
 _near_pole.terminal, _near_pole.direction = True, -1.0  # type: ignore[attr-defined]
 
 
 def theta_before_pole(scene: Scene, friction: Friction, times: Array, most: int) -> Array:
-    """Theta (rad), to 1e-13, until the axis comes within `NEAR` of a pole; SymtopError beyond `most` evaluations."""
+    """Theta (rad), to 1e-13, until the axis is within `NEAR_POLE` of a pole; SymtopError beyond `most` evaluations."""
     (rates, start), count = four_equations(scene, friction), itertools.count(1)
 
     def counted(t: float, y: Any) -> tuple[float, ...]:

@@ -83,8 +83,8 @@ def quadrature(nodes: Sequence[float], weights: Sequence[float]) -> tuple[Quadra
     return Quadrature(points, shares), symmetric
 
 
-NOTHING = -0.0  # initial value of a sum: the compiler drops an addition to -0, but not to +0, as -0 + 0 = 0
-NONE_OPENED = (NOTHING,) * 6
+NEGATIVE_ZERO = -0.0  # initial value of a sum: the compiler drops an addition to -0, but not to +0, as -0 + 0 = 0
+NONE_OPENED = (NEGATIVE_ZERO,) * 6
 
 
 class Sums(NamedTuple):
@@ -108,7 +108,7 @@ class Sums(NamedTuple):
 @register_jitable
 def opening(par: Any, rule: Any, theta: float) -> Any:
     """The contributions to the sums of nodes at the start of the step, which no iteration changes."""
-    first = high = low = square_sine = sine_start = product_start = NOTHING
+    first = high = low = square_sine = sine_start = product_start = NEGATIVE_ZERO
     if rule.nodes[0] == 0.0:
         sin_x, cos_x = sincos(0.5 * theta)
         sin2_x, cos2_x = sin_x * sin_x, cos_x * cos_x
@@ -129,8 +129,8 @@ def opening(par: Any, rule: Any, theta: float) -> Any:
 def node_sums(rule: Any, theta: float, d: float, opened: Any) -> Any:
     """All sums over the nodes, beginning with the contributions of `opening`."""
     first, high, low, square_sine, sine_start, product_start = opened
-    sine_end = product_end = shift = square = NOTHING
-    sine_start_slope = sine_end_slope = product_start_slope = product_end_slope = NOTHING
+    sine_end = product_end = shift = square = NEGATIVE_ZERO
+    sine_start_slope = sine_end_slope = product_start_slope = product_end_slope = NEGATIVE_ZERO
     for i in range(len(rule.nodes)):
         a, w = rule.nodes[i], rule.weights[i]
         if a > 0.0:

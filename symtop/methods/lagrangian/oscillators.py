@@ -93,11 +93,11 @@ def momentum(par: Any, s: Any) -> Any:
     return k * x, k * y, k * ((b * A - a * B) + (c * D - d * C))
 
 
-SHORTEST = 1e-100  # least length of a step, and of the rest of one that is a whole number of nutations
-STEEPEST = 16.0  # limit on (P - e3)/(P - e2), the factor by which rounding of the constants is amplified
-APART = 1e-5  # least (e1 - e2)^2 (e1 - e3)/(b1^2 + b2^2)^1.5; e1 - e2 and a nutation have errors of rounding over it
+SHORTEST_STEP = 1e-100  # least length of a step, and of the rest of one that is a whole number of nutations
+STEEPEST_RATIO = 16.0  # limit on (P - e3)/(P - e2), the factor by which rounding of the constants is amplified
+LEAST_APART = 1e-5  # least (e1 - e2)^2 (e1 - e3)/(b1^2 + b2^2)^1.5; e1 - e2 and a nutation have rounding over it
 MOST_PARTS = 10_000  # limit on the parts of a step
-TINY = 1e-80  # of e1 - e3, in the place of e1 - b where e1 is a zero of chi: J is zero, too
+TINY_ROOT = 1e-80  # of e1 - e3, in the place of e1 - b where e1 is a zero of chi: J is zero, too
 
 
 class Map(NamedTuple):
@@ -143,7 +143,7 @@ def _whole_turn(e: Any, sigma: float, b: float, J: float) -> float:
     y, z = e.e1 - e.e2, wide
     if rest < b - e.e2:
         y, z = b - e.e2, b - e.e3
-        rest = max(turn * turn / (y * z), TINY * wide)
+        rest = max(turn * turn / (y * z), TINY_ROOT * wide)
         turn = math.copysign(math.sqrt(rest * y * z), turn)
         y, z = y + rest, z + rest
     return 2.0 * turn * r_j(0.0, y, z, rest) / 3.0
@@ -167,15 +167,15 @@ def _mapped(rule: Any, top: Any, at: Any, h: float) -> Any:
     # two roots that are neighbours lose digits: e1 and e2 beside a separatrix, both turning points in a steady motion
     half = half_period(e) if e.e1 - e.e2 > e.e2 - e.e3 else 0.5 * nutation_period(top, at)
     apart, parts = e.e1 - e.e2, 1
-    known = apart * apart * (e.e1 - e.e3) > APART * math.pow(par.b1 * par.b1 + par.b2 * par.b2, 1.5)
+    known = apart * apart * (e.e1 - e.e3) > LEAST_APART * math.pow(par.b1 * par.b1 + par.b2 * par.b2, 1.5)
     while True:
         nutations = np.rint(0.5 * h / parts / half)
         rest = h / parts - 2.0 * nutations * half if nutations != 0.0 else h / parts
-        above = differences(e, max(abs(rest), SHORTEST))
+        above = differences(e, max(abs(rest), SHORTEST_STEP))
         P = (above[0] + above[1] + above[2]) / 3.0
         # P - e2 or a D, which is small at half a nutation of an axis that comes near a pole
         least = min(above[1], P - par.b1, P - par.b2)
-        if ((known or nutations == 0.0) and not above[2] > STEEPEST * least) or parts >= MOST_PARTS:
+        if ((known or nutations == 0.0) and not above[2] > STEEPEST_RATIO * least) or parts >= MOST_PARTS:
             break
         parts += 1
     sign = 1.0 if rest >= 0.0 else -1.0

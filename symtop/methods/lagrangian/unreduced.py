@@ -33,7 +33,7 @@ from symtop.methods.framework.preparation import Preparation, Presentation, cons
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lagrangian.discrete_lagrangian import built_in as reduced_methods, rule_of
 
-NEGLIGIBLE = 0.25 * float(np.finfo(float).eps)  # relative to the rates: a correction that changes nothing
+NEGLIGIBLE_RATE = 0.25 * float(np.finfo(float).eps)  # relative to the rates: a correction that changes nothing
 
 
 class _Sums(NamedTuple):
@@ -140,7 +140,7 @@ def _correct(step: Any, sums: Any, rate: Any) -> Any:
     (par, rule, state, h), (w, v, u) = step, rate
     dw, dv, du = _correction(par, sums, rate, state[3:], h)
     change, size = abs(dw) + abs(dv) + abs(du), abs(w) + abs(v) + abs(u)
-    return Correction((dw, dv, du), (w + dw, v + dv, u + du), change, NEGLIGIBLE * size, rule.tolerance * size)
+    return Correction((dw, dv, du), (w + dw, v + dv, u + du), change, NEGLIGIBLE_RATE * size, rule.tolerance * size)
 
 
 def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:

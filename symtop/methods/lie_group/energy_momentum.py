@@ -28,8 +28,8 @@ from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group.loop import SPUN, cayley, gravity, in_charts, inertia, iterated_loop
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
-MOST = 30  # limit on the iterations of a step; 3 or 4 are usual
-CONVERGED = 1e-9  # a correction of u whose square is below rounding, relative to 1 + |u|
+MOST_SWEEPS = 30  # limit on the iterations of a step; 3 or 4 are usual
+CONVERGED_CORRECTION = 1e-9  # a correction of u whose square is below rounding, relative to 1 + |u|
 
 
 class Midpoint(NamedTuple):
@@ -75,7 +75,7 @@ def _again(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> An
     change = solve3(first, second, third, rest)
     u = plus(u, 1.0, change)
     size = abs(change[0]) + abs(change[1]) + abs(change[2])
-    return u, size <= CONVERGED * (1.0 + abs(u[0]) + abs(u[1]) + abs(u[2])), False
+    return u, size <= CONVERGED_CORRECTION * (1.0 + abs(u[0]) + abs(u[1]) + abs(u[2])), False
 
 
 def _close(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:
@@ -84,7 +84,7 @@ def _close(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> An
     return m, v, scaled(h, gravity(par, _mean(opened[:3], u))), carry
 
 
-march = iterated_loop((_start, _again, _close), MOST, opened=6, unknowns=3)
+march = iterated_loop((_start, _again, _close), MOST_SWEEPS, opened=6, unknowns=3)
 
 
 def built_in() -> list[Integrator]:

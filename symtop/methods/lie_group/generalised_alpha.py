@@ -27,8 +27,8 @@ from symtop.methods.lie_group.loop import SPUN, Parts, gravity, in_charts, inert
 from symtop.methods.splitting.rotor import exact, near
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
-MOST = 50  # limit on the iterations of a step; 4 to 6 are usual
-CONVERGED = 1e-14  # a correction of W', relative to its parts, that is rounding
+MOST_SWEEPS = 50  # limit on the iterations of a step; 4 to 6 are usual
+CONVERGED_CORRECTION = 1e-14  # a correction of W', relative to its parts, that is rounding
 
 
 class Alpha(NamedTuple):
@@ -74,7 +74,7 @@ def _corrected(par: Any, e: Any, w: Any, m: float, v: Any, gain: Any, by: float,
     )
     size = abs(change[0]) + abs(change[1]) + abs(change[2])
     scale = abs(par.mgl) / par.I1 + rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2]
-    ended = size <= CONVERGED * scale or (size >= last and size <= 1e-10 * scale)
+    ended = size <= CONVERGED_CORRECTION * scale or (size >= last and size <= 1e-10 * scale)
     return plus(slope, 1.0, change), size, ended
 
 
@@ -121,7 +121,8 @@ def _parts(rotation: Callable[..., Any], *, alone: bool) -> Parts:
 
 
 march = iterated_loop(
-    _parts(exact, alone=True), MOST, in_lanes=_parts(near, alone=False), begin=_begin, opened=6, unknowns=7, carry=6,
+    _parts(exact, alone=True), MOST_SWEEPS, in_lanes=_parts(near, alone=False), begin=_begin, opened=6, unknowns=7,
+    carry=6,
     count=4, numbers=lambda rule: (rule.m, rule.f, rule.gamma, rule.beta),
 )  # fmt: skip
 

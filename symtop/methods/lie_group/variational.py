@@ -41,8 +41,8 @@ from symtop.methods.lie_group.loop import SPUN, TURNED, cayley, gravity, in_char
 from symtop.methods.splitting.coefficients import SUZUKI_4
 from symtop.methods.vectors import cross, dot, plus, scaled, solve3
 
-MOST = 60  # limit on the iterations of a step; 2 to 5 are usual
-CONVERGED = 1e-10  # a relative correction whose square is below rounding
+MOST_SWEEPS = 60  # limit on the iterations of a step; 2 to 5 are usual
+CONVERGED_CORRECTION = 1e-10  # a relative correction whose square is below rounding
 MOSER_VESELOV, EULER_POINCARE = 0.0, 1.0
 
 
@@ -61,7 +61,7 @@ def _next_n(par: Any, A: float, square: float, x: Any) -> Any:
     gap = 1.0 + along + square * n * n / D - n
     slope = 1.0 - 2.0 * along / n - 2.0 * square * n * par.I1 * par.I1 / (D * D)
     n += gap / slope
-    return (n,), gap <= CONVERGED * slope * n, not slope > 0.0
+    return (n,), gap <= CONVERGED_CORRECTION * slope * n, not slope > 0.0
 
 
 def _next_k(par: Any, A: float, square: float, x: Any) -> Any:
@@ -76,7 +76,7 @@ def _next_k(par: Any, A: float, square: float, x: Any) -> Any:
     low, high = (k, high) if gap > 0.0 else (low, k)
     after = k + gap / slope
     after = after if low <= after <= high else 0.5 * (low + high)
-    return (after, low, high), abs(after - k) <= CONVERGED * j, False
+    return (after, low, high), abs(after - k) <= CONVERGED_CORRECTION * j, False
 
 
 # The equation for one number, in functions of what a holds along the axis and of the square of what lies across:
@@ -116,7 +116,7 @@ def _loop(first: Callable[..., Any], after: Callable[..., Any], rates: Callable[
         kick = scaled(half, gravity(par, e))
         return m, v, plus(kick, half, gravity(par, plus(e, 1.0, moved(m, v, e)))), carry
 
-    return iterated_loop((start, again, close), MOST, opened=8, unknowns=unknowns)
+    return iterated_loop((start, again, close), MOST_SWEEPS, opened=8, unknowns=unknowns)
 
 
 MARCH = {MOSER_VESELOV: _loop(*RIGID_BODY, 1), EULER_POINCARE: _loop(*RETRACTION, 3)}
@@ -150,7 +150,7 @@ def _again(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> An
     third = _image(par, kind, a, u, Ju, (0.0, 0.0, 1.0))
     change = solve3(first, second, third, rest)
     u = plus(u, 1.0, change)
-    ended = dot(change, change) <= CONVERGED * CONVERGED * dot(u, u)
+    ended = dot(change, change) <= CONVERGED_CORRECTION * CONVERGED_CORRECTION * dot(u, u)
     return u, ended, not dot(first, cross(second, third)) > 0.0
 
 
@@ -163,7 +163,7 @@ def _close(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> An
 
 
 march_body = iterated_loop(
-    (_start, _again, _close), MOST, opened=6, unknowns=3, numbers=lambda rule: (rule.kind,), carried=TURNED,
+    (_start, _again, _close), MOST_SWEEPS, opened=6, unknowns=3, numbers=lambda rule: (rule.kind,), carried=TURNED,
     observe=observe_turned,
 )  # fmt: skip
 

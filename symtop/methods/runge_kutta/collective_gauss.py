@@ -30,7 +30,7 @@ from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework.plan import NOT_CONVERGED, OK
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.lie_group.loop import UNSPUN, in_charts, lie_loop
-from symtop.methods.runge_kutta.gauss import ROUND_OFF, RULES, SWEEPS, stage_weights
+from symtop.methods.runge_kutta.gauss import MOST_SWEEPS, ROUND_OFF, RULES, stage_weights
 from symtop.methods.vectors import conjugate
 from symtop.model.body import product
 
@@ -63,7 +63,7 @@ def _swept(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
         for m in range(8):
             work[i, m] = work[i, 8] * slope[m]
     last, effort = np.inf, 0
-    while effort < SWEEPS:
+    while effort < MOST_SWEEPS:
         gap = 0.0
         for i in range(stages):
             place = start

@@ -28,7 +28,7 @@ from symtop.methods.runge_kutta.explicit import add, row_of, store
 from symtop.methods.runge_kutta.pairs import GROW, Method, integrator, nothing_more, rms
 
 LINES = 10  # limit on the lines, so that k is at most 9
-FEWEST = 3  # the least k
+LEAST_K = 3  # the least k
 ORDERS, LAST = LINES + 1, LINES + 2  # rows of the memory: k and the number of lines of the last step; f at its end
 
 
@@ -59,7 +59,7 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
         step, evaluations, most = max(step, least), 0, GROW
         k = int(table[ORDERS, 0])
         if k == 0:  # the first step
-            k = max(FEWEST, min(LINES - 2, int(1.5 - 0.6 * math.log10(tolerance))))
+            k = max(LEAST_K, min(LINES - 2, int(1.5 - 0.6 * math.log10(tolerance))))
         lengths, work = np.full(LINES + 1, 1.0), np.full(LINES + 1, np.inf)  # H_j and A_j/H_j
         while step >= least:
             after = min(t + step, end)
@@ -81,7 +81,7 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
                 best -= 1
             elif error < 1.0 and most > 1.0 and work[best] < 0.9 * work[best - 1]:
                 best += 1
-            best = max(FEWEST, min(LINES - 1, best))
+            best = max(LEAST_K, min(LINES - 1, best))
             step = lengths[min(j, best)]
             if best > j:  # as long as with j lines for the same work
                 step *= (1.0 + best * best) / (1.0 + j * j)

@@ -64,11 +64,11 @@ from symtop.methods.simd import wide_vectors
 from symtop.methods.vectors import accumulate, dot_of, each, total, zero
 from symtop.model.charts import BODY
 
-CONVERGED = 1e-9  # a correction in units of |e| = 1, whose square is below rounding
-NEAR = 0.1  # a correction after which the solution is followed to a longer step
-DIRECT = 12  # limit on the iterations for one length of the step; 2 to 7 where they converge soon
-RUNGS = 28  # lengths from a tenth of the step to the whole, each longer by the factor `LONGER`
-LONGER = 2.0**0.125  # with sqrt 2 one step in ten of `spheroid` fails at h omega = 10, with 2^(1/4) one in a hundred
+CONVERGED_CORRECTION = 1e-9  # a correction in units of |e| = 1, whose square is below rounding
+NEAR_SOLUTION = 0.1  # a correction after which the solution is followed to a longer step
+MOST_DIRECT = 12  # limit on the iterations for one length of the step; 2 to 7 where they converge soon
+RUNGS = 28  # lengths from a tenth of the step to the whole, each longer by the factor `RUNG_RATIO`
+RUNG_RATIO = 2.0**0.125  # with sqrt 2 a tenth of `spheroid`'s steps fails at h omega = 10, with 2^(1/4) a hundredth
 
 
 @register_jitable
@@ -138,7 +138,7 @@ def _iterate(
             slope = field(par, _at_stage(state, work, stages, i))
             for m in range(3, 5):
                 work[i, m] = share * work[i, len(state)] * slope[m]
-        if converged or effort == DIRECT:
+        if converged or effort == MOST_DIRECT:
             return effort, converged
         _linearise(field, par, state, work, stages, share, first, mgl)
         _eliminate(work, base, 3 * stages)
@@ -172,8 +172,8 @@ def solve_stages(field: Any, par: Any, state: Any, work: Any, stages: int) -> An
         for m in range(len(state)):
             work[i, m] = 0.0
     while True:
-        enough = CONVERGED if rung == RUNGS else NEAR
-        more, converged = _iterate(field, par, state, work, stages, LONGER ** (rung - RUNGS), first, mgl, enough)
+        enough = CONVERGED_CORRECTION if rung == RUNGS else NEAR_SOLUTION
+        more, converged = _iterate(field, par, state, work, stages, RUNG_RATIO ** (rung - RUNGS), first, mgl, enough)
         effort += more
         if converged and rung < RUNGS:
             rung += 1
@@ -190,9 +190,9 @@ def solve_stages(field: Any, par: Any, state: Any, work: Any, stages: int) -> An
 
 STAGES = (1, 2, 3, 4, 5, 6)
 DIGITS = 40  # of the multiprecision that coefficients are computed in
-SWEEPS = 100  # limit on the sweeps in a step; a step of usual size takes at most 14
+MOST_SWEEPS = 100  # limit on the sweeps in a step; a step of usual size takes at most 14
 FARTHEST, PACE = 1e3, 0.68  # correction k that does not fall and is above FARTHEST PACE^k: sweeps will not converge
-STILL = 5  # L_z has no slope, so its increments stay zero: left out, they save a sixth of the sums on (e, L)
+STILL_COMPONENT = 5  # L_z has no slope, so its increments stay zero: left out, they save a sixth of the sums on (e, L)
 ROUND_OFF = 1e-14  # a correction that stopped falling above this, in units of |e| = 1 and |L|, has not converged
 
 
@@ -361,7 +361,7 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
             block[last_at * W + j] = np.inf
             block[live_at * W + j] = 1.0 - block[flag * W + j]
         effort = 0
-        while effort < SWEEPS:
+        while effort < MOST_SWEEPS:
             sweep(block, table)
             effort += 1
             largest = farthest(effort)
@@ -397,7 +397,7 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
 
 
 def _loop(  # noqa: C901
-    field: Any, dimension: int, first: int = 3, still: int = STILL, unit: Any = momentum_unit,
+    field: Any, dimension: int, first: int = 3, still: int = STILL_COMPONENT, unit: Any = momentum_unit,
     solve: Any = solve_stages, observe: Any = observe_axis, top: Any = SpaceTop,
 ) -> Loop:  # fmt: skip
     """The loop on states that move by `field`, a momentum from `first` on and, in `still`, a number that has no slope.
@@ -442,7 +442,7 @@ def _loop(  # noqa: C901
             for m in range(dimension):
                 work[i, m] = work[stages + i, m]
         last, effort, outcome = np.inf, 0, NOT_CONVERGED
-        while effort < SWEEPS:
+        while effort < MOST_SWEEPS:
             gap = gap_momentum = 0.0
             for i in range(stages):
                 place = nothing

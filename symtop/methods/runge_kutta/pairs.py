@@ -43,7 +43,7 @@ from symtop.methods.runge_kutta.pair_tables import DOP853, DORMAND_PRINCE, TSIT5
 from symtop.methods.simd import apart, combined, side_by_side
 from symtop.methods.vectors import accumulate, summed, zero
 
-BLOCK = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second
+BLOCK_EVALUATIONS = 5_000_000  # evaluations between returns to Python, so that an interrupt is heard within a second
 EVALUATIONS = 1_000_000_000  # limit of a run: about half a minute
 
 SAFETY, SHRINK, GROW = 0.9, 0.2, 10.0
@@ -179,7 +179,7 @@ def solver(form: Any, method: Any, rows: int, *, light: bool = False) -> Adaptiv
     def compiled() -> AdaptiveLoop:
         return loop(form, method, rows)
 
-    limits = EVALUATIONS, BLOCK
+    limits = EVALUATIONS, BLOCK_EVALUATIONS
     return Adaptive(lambda _: compiled(), shown, clock + 2, clock, *limits, check=form.prepare.check, light=light)
 
 
@@ -394,9 +394,9 @@ def two_runs(chart: str, pair: Pair, compare: Callable[..., float]) -> Callable[
 
 
 RK45 = Pair("rk45-compiled", DORMAND_PRINCE, 5, 4, "Dormand-Prince", "dormand-prince-1980")
-DOP8 = Pair("dop853-compiled", DOP853, 8, 7, "Dormand-Prince 8(5,3)", "hairer-norsett-wanner-1993")
-NINE = Pair("vern9", VERN9, 9, 8, "Verner's most efficient pair 9(8)", "verner-2010")
-PAIRS = Pair("tsit5", TSIT5, 5, 4, "Tsitouras's pair 5(4)", "tsitouras-2011"), DOP8, NINE
+DOP853_PAIR = Pair("dop853-compiled", DOP853, 8, 7, "Dormand-Prince 8(5,3)", "hairer-norsett-wanner-1993")
+VERN9_PAIR = Pair("vern9", VERN9, 9, 8, "Verner's most efficient pair 9(8)", "verner-2010")
+PAIRS = Pair("tsit5", TSIT5, 5, 4, "Tsitouras's pair 5(4)", "tsitouras-2011"), DOP853_PAIR, VERN9_PAIR
 
 
 def built_in() -> list[Integrator]:

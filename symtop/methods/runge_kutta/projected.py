@@ -26,10 +26,10 @@ from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.preparation import Preparation
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import L_at, e_at
-from symtop.methods.runge_kutta.pairs import DOP8, NINE, loop_of
+from symtop.methods.runge_kutta.pairs import DOP853_PAIR, VERN9_PAIR, loop_of
 from symtop.methods.vectors import dot, summed
 
-SMALL = 1e-8  # a gradient depends on those before it if less than this part of its square is normal to them
+SMALL_PART = 1e-8  # a gradient depends on those before it if less than this part of its square is normal to them
 AXIS = FORMS["axis"]
 
 
@@ -68,8 +68,8 @@ def _without(u: Any, part: Any, v: Any) -> Any:
 
 @register_jitable
 def _inverse(own: Any, whole: Any) -> Any:
-    """1/own, of the square of a gradient's own part; 0 where that is below `SMALL` times its square, `whole`."""
-    return 1.0 / own if own > SMALL * whole else 0.0
+    """1/own, of the square of a gradient's own part; 0 where that is below `SMALL_PART` times its square, `whole`."""
+    return 1.0 / own if own > SMALL_PART * whole else 0.0
 
 
 @register_jitable
@@ -102,7 +102,7 @@ def projected(par: Any, state: Any, step: Any) -> Any:
 def built_in() -> list[Integrator]:
     """Two pairs with fixed steps, projected."""
     methods = []
-    for pair, name in ((DOP8, "dop853-projected"), (NINE, "vern9-projected")):
+    for pair, name in ((DOP853_PAIR, "dop853-projected"), (VERN9_PAIR, "vern9-projected")):
         plain = pair.fixed()
         solver: Any = plain.solvers["axis"]
         loop = loop_of(AXIS._replace(prepare=on_levels, top=Levels), pair.table, projected)

@@ -30,7 +30,7 @@ from symtop.methods.framework.plan import OK
 from symtop.methods.simd import times, wide_vectors, with_item
 from symtop.methods.vectors import accumulate, zero
 
-SHORT = 2  # tables of at most so many drifts are tuples in compiled code
+FEW_DRIFTS = 2  # tables of at most so many drifts are tuples in compiled code
 
 
 class Composition(NamedTuple):
@@ -72,7 +72,7 @@ def packed(rule: Any) -> tuple[Callable[[Any], Composition], NDArray[np.float64]
     are rows of the array, so that one kernel is compiled for all of them.
     """
     drift, kick, gradient = rule[:3]
-    opened = _opened(len(drift)) if len(drift) <= SHORT else _of_any_length
+    opened = _opened(len(drift)) if len(drift) <= FEW_DRIFTS else _of_any_length
     return opened, np.array([*drift, *kick, *gradient, *rule[3:]], dtype=float)
 
 

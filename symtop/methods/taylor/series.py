@@ -274,9 +274,9 @@ march_attitude = _loop(attitude_sum, 7, space.observe_attitude)
 spun = Presentation(lambda par, t, state: with_spin(par, state, t), 7)  # with the spin since the start
 
 ORDERS = (8, 12, 16, 20)
-BLOCK = 1_000_000  # series between returns to Python
-SERIES = 200_000_000  # limit on the series of one run: about half a minute
-ACCEPTED, SAFETY, GROW, EARLIER = 4.0, 0.95, 4.0, 0.25
+BLOCK_SERIES = 1_000_000  # series between returns to Python
+MOST_SERIES = 200_000_000  # limit on the series of one run: about half a minute
+ACCEPTED_RATIO, SAFETY, GROW, EARLIER = 4.0, 0.95, 4.0, 0.25
 
 CHARTS: dict[str, tuple[Any, ...]] = {  # preparation, series, sample(par, t, state), axis of a state
     "axis": (space.on_axis, axis_sum, as_it_steps, lambda state: state[:3]),
@@ -321,7 +321,7 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
             dstate, last = terms(state, body, h)
             effort += 1
             change = GROW if last == 0.0 else min(GROW, SAFETY * (tolerance / last) ** (1.0 / order))
-            if last <= ACCEPTED * tolerance:
+            if last <= ACCEPTED_RATIO * tolerance:
                 ahead = t + h
                 after = (rest + (t - ahead)) + h if t > h else (rest + (h - ahead)) + t
                 while seen < len(times) and (times[seen] - ahead) - after <= 0.0:
@@ -358,7 +358,7 @@ def solver(chart: str) -> Adaptive:
     size = CHARTS[chart][0].size
     return Adaptive(
         lambda tolerance: march_adaptive(chart, order_for(tolerance)),
-        size, 2 * size + 3, 2 * size, SERIES, BLOCK, order_for,
+        size, 2 * size + 3, 2 * size, MOST_SERIES, BLOCK_SERIES, order_for,
     )  # fmt: skip
 
 

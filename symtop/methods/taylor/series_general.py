@@ -42,7 +42,7 @@ from symtop.methods.vectors import summed
 from symtop.model.charts import BODY
 
 ORDER = 16  # with a fixed step
-HIGHEST = 24  # of a tolerance: N = 21 at the default, 23 at the least
+HIGHEST_ORDER = 24  # of a tolerance: N = 21 at the default, 23 at the least
 
 
 @register_jitable
@@ -200,7 +200,7 @@ def built_in() -> list[Integrator]:
         "conserves": frozenset({"p_phi"}), "reference": "jorba-zou-2005", "needs": "expression", "general": True,
     }  # fmt: skip
     fixed = {chart: FixedStep(loop(chart), (0.0,), FORMS[chart].prepare, ORDER, implicit=False) for chart in CHARTS}
-    adaptive = {chart: solver(FORMS[chart], method, HIGHEST + 2, light=True) for chart, method in CHARTS.items()}
+    adaptive = {chart: solver(FORMS[chart], method, HIGHEST_ORDER + 2, light=True) for chart, method in CHARTS.items()}
     summary = "Taylor series of the unreduced space-frame equations by recurrence"
     return [
         Integrator("series-general", summary=f"{summary}, order {ORDER}", solvers=fixed, order=ORDER, **same),

@@ -8,8 +8,8 @@ last terms of the series choose the step. Moments, weight, start and times are t
 the quaternion is scaled to length one.
 
 The bound is the distance to a second run with fewer bits, a lower order and a looser tolerance: it is the error of the
-second run, and larger than that of the first by `APART` bits as long as both errors grow alike. Slow (ms a step), for
-references that are made once. Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99, for the steps.
+second run, and larger than that of the first by `BITS_APART` bits as long as both errors grow alike. Slow (ms a step),
+for references that are made once. Source: Jorba and Zou, Experimental Mathematics 14 (2005) 99, for the steps.
 """
 
 from collections.abc import Sequence
@@ -23,8 +23,8 @@ from symtop.core.numbers import context
 from symtop.model.body import Attitude, RigidBody
 
 BITS, ORDER, GOAL = 190, 56, 120  # bits of a number, order of the series, bits of accuracy of the series
-APART = 8  # bits, and orders, by which the second run is less accurate
-LONGEST = 20_000  # limit on the steps: a minute
+BITS_APART = 8  # bits, and orders, by which the second run is less accurate
+MOST_STEPS = 20_000  # limit on the steps: a minute
 
 
 class Digits(NamedTuple):
@@ -36,10 +36,10 @@ class Digits(NamedTuple):
 
 
 def body_digits(body: RigidBody, start: Attitude, times: Sequence[float]) -> Digits:
-    """The motion at increasing times of at least 0; SymtopError for one that takes more than `LONGEST` steps."""
+    """The motion at increasing times of at least 0; SymtopError for one that takes more than `MOST_STEPS` steps."""
     mp = context(BITS * 3 // 10)
     fine = _spatial(mp, _run(body, start, times, BITS, ORDER, GOAL))
-    other = _spatial(mp, _run(body, start, times, BITS - APART, ORDER - APART, GOAL - APART))
+    other = _spatial(mp, _run(body, start, times, BITS - BITS_APART, ORDER - BITS_APART, GOAL - BITS_APART))
     size = max([mp.mpf(2) ** -GOAL, *(mp.norm(L) for _, L in fine)])
     gap = max(
         max(2 * mp.norm(_less(q, p)), mp.norm(_less(L, K)) / size)
@@ -78,7 +78,7 @@ def _run(
     rates = [_whole(1 / moment, one) for moment in moments]
     torque = [_whole(Fraction(part), one) for part in body.torque]
     rows, at, k = list[list[Fraction]](), Fraction(0), 0
-    for _ in range(LONGEST):
+    for _ in range(MOST_STEPS):
         series = _series(state, rates, torque, bits, order)
         sizes = [max(abs(part[n]).bit_length() - bits for part in series) / n for n in (order - 1, order)]
         step = Fraction(2) ** floor(-goal / order - max(sizes))
@@ -89,7 +89,7 @@ def _run(
         if k == len(times):
             return rows
         state, at = [_horner(part, _whole(step, one), bits) for part in series], at + step
-    raise SymtopError(f"times must be within {LONGEST} steps of the series, not reach {times[-1]:g}")
+    raise SymtopError(f"times must be within {MOST_STEPS} steps of the series, not reach {times[-1]:g}")
 
 
 def _whole(value: Fraction, one: int) -> int:

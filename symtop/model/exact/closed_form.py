@@ -41,7 +41,7 @@ from symtop.model.exact import layout as at, samples
 from symtop.model.exact.constants import DONE, OUT_OF_RANGE, UNMET, UNRESOLVED, all_constants
 from symtop.model.exact.digits import Motion, precise_constants
 from symtop.model.lazy_kernel import LazyKernel
-from symtop.model.top import LARGEST, NUMBERS, SLACK, Angles, SymmetricTop, flat
+from symtop.model.top import LARGEST, MOMENT_SLACK, NUMBERS, Angles, SymmetricTop, flat
 
 ARITHMETIC = ("double", "double-double", "quad-double", "40 digits")  # by `layout.EXACTLY`, `layout.DOUBLE_DOUBLE`, ...
 REASONS = {
@@ -298,7 +298,7 @@ def checked_numbers(numbers: ArrayLike, names: Any = None) -> Array:
     inertia, theta = rows[:, :2], rows[:, 3]
     good = ((rows <= LARGEST) & (rows >= -LARGEST)).all(axis=1) & (inertia >= 1.0 / LARGEST).all(axis=1)
     with np.errstate(over="ignore"):  # of rows that are refused anyway
-        fits = rows[:, 1] <= 2.0 * rows[:, 0] * (1.0 + SLACK)
+        fits = rows[:, 1] <= 2.0 * rows[:, 0] * (1.0 + MOMENT_SLACK)
     good &= fits & (theta >= 0.0) & (theta <= np.pi)
     for member in np.flatnonzero(~good).tolist():
         row = rows[member].tolist()

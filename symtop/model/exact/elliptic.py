@@ -323,10 +323,10 @@ def hyperbolic_half(y: DoubleDouble, s: DoubleDouble, c: DoubleDouble, nome: Nom
     return Half(near, near_imag, far, far_imag, sub(growth, mul(bow, div(tilt, lift))), growth)
 
 
-SMALL = 1e-9  # an argument w h below which sn, cn and dn are w h, 1 and 1
-CONVERGED = 1e-9  # relative gap at which the arithmetic-geometric mean ends; its error is the square of this
+SMALL_ARGUMENT = 1e-9  # an argument w h below which sn, cn and dn are w h, 1 and 1
+CONVERGED_GAP = 1e-9  # relative gap at which the arithmetic-geometric mean ends; its error is the square of this
 MOST_MEANS = 12
-NEAR = 0.003  # R_J is a polynomial of order 5 where its arguments differ by less, to 1e-16
+NEAR_EQUAL = 0.003  # R_J is a polynomial of order 5 where its arguments differ by less, to 1e-16
 MOST_HALVINGS = 60
 
 
@@ -355,7 +355,7 @@ def half_period(e: Roots) -> float:
     if b <= 0.0:
         return math.inf
     for _ in range(MOST_MEANS):
-        if abs(a - b) <= CONVERGED * a:
+        if abs(a - b) <= CONVERGED_GAP * a:
             break
         a, b = 0.5 * (a + b), math.sqrt(a * b)
     return math.pi / (a + b)
@@ -369,7 +369,7 @@ def _jacobi(x: float, m: float, m1: float) -> tuple[float, float, float]:
         return math.tanh(x), cosine, cosine
     a, b, c, count = 1.0, math.sqrt(m1), math.sqrt(m), 0
     r1 = r2 = r3 = r4 = r5 = r6 = r7 = r8 = 0.0
-    while abs(c) > CONVERGED * a and count < 8:
+    while abs(c) > CONVERGED_GAP * a and count < 8:
         a, b, c = 0.5 * (a + b), math.sqrt(a * b), 0.5 * (a - b)
         r1, r2, r3, r4, r5, r6, r7, r8 = c / a, r1, r2, r3, r4, r5, r6, r7
         count += 1
@@ -386,7 +386,7 @@ def differences(e: Roots, h: float) -> tuple[float, float, float]:
     """wp(h) - e1, wp(h) - e2, wp(h) - e3 at 0 < h <= T/2."""
     square = e.e1 - e.e3
     x = math.sqrt(square) * h
-    if x < SMALL:
+    if x < SMALL_ARGUMENT:
         pole = 1.0 / (h * h)
         return pole, pole, pole
     sn, cn, dn = _jacobi(x, (e.e2 - e.e3) / square, (e.e1 - e.e2) / square)
@@ -408,7 +408,7 @@ def _r_c(x: float) -> float:
 def r_j(x: float, y: float, z: float, p: float) -> float:
     """Carlson's R_J(x, y, z, p) = 3/2 int_0^inf dt / ((t + p) sqrt((t + x)(t + y)(t + z))); x, y, z >= 0, p > 0."""
     mean = start = 0.2 * (x + y + z + 2.0 * p)
-    widest = max(abs(mean - x), abs(mean - y), abs(mean - z), abs(mean - p)) / NEAR
+    widest = max(abs(mean - x), abs(mean - y), abs(mean - z), abs(mean - p)) / NEAR_EQUAL
     gap = (p - x) * (p - y) * (p - z)
     u, v, w, q, scale, total = x, y, z, p, 1.0, 0.0
     for _ in range(MOST_HALVINGS):

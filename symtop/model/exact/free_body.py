@@ -79,7 +79,7 @@ FRAME, START, TIME_UNIT, UNIT = 43, 52, 56, 57  # canonical to body axes, c abov
 SIZE = 58
 GIVEN = 13  # numbers of a body: moments, quaternion, momentum and its low half
 LEAST, LEAST_MOMENT = 1e-100, 1e-30  # least nonzero component of the momentum, least moment, relative to the largest
-FAR = 300.0  # limit on w: sech 2w is negligible beyond
+FAR_ALONG = 300.0  # limit on w: sech 2w is negligible beyond
 ROUNDING, RATE = 32.0 * 2.0**-53, 2.0**-97  # rad of a sample, twice the largest error; relative, of the rates
 PASSES = 6  # of the error-free summation in `_gap`
 
@@ -221,7 +221,7 @@ def _orbit(c: Constants, phase: float) -> tuple[Vector, float, float, float]:
         m = (m1, c[A2] * odd * even * per, c[A3] * (real - imag) * per)
         return m, cubic(c, REAL, x), sine * cosine * cubic(c, IMAG, x), 0.0
     w = c[PER_PHASE] * phase
-    back, w = math.copysign(1.0, w), min(abs(w), FAR)
+    back, w = math.copysign(1.0, w), min(abs(w), FAR_ALONG)
     grown = math.exp(w)
     shrunk = 1.0 / grown
     p, grown2, shrunk2 = c[NOME], grown * grown, shrunk * shrunk

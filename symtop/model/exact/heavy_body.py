@@ -6,11 +6,11 @@ in body axes, c the weight times the centre of mass. Three different moments, or
 form: this is an integration and is never called exact.
 
 heyoka integrates in long double (64 bits): one run with a tolerance of 1e-5 of the rounding unit, which is returned,
-and two with 1e-2. These two have steps of at most `SHORTER` of the mean step, because runs with equal steps share most
-of their rounding, and the start and 1/I off by one unit, up and down in two patterns, because these are rounded, too.
-The bound at a time is `SAFETY` times the largest distance from these two at the checks up to it and at the next one.
-With `precise`, all three are compared with a run in quadruple precision (113 bits, 5 times as long), whose error is
-smaller by the ratio of the units, 2^-49, as long as the distance is small (`LINEAR`). Where the bound exceeds
+and two with 1e-2. These two have steps of at most `SHORTER_STEPS` of the mean step, because runs with equal steps share
+most of their rounding, and the start and 1/I off by one unit, up and down in two patterns, because these are rounded,
+too. The bound at a time is `SAFETY` times the largest distance from these two at the checks up to it and at the next
+one. With `precise`, all three are compared with a run in quadruple precision (113 bits, 5 times as long), whose error
+is smaller by the ratio of the units, 2^-49, as long as the distance is small (`LINEAR_RANGE`). Where the bound exceeds
 `ACCURACY` the motion is lost (chaos). All runs advance together until then, as far as any call has asked for, by pieces
 whose length depends on the motion alone, so that values and bounds at a time do not depend on the other times. The
 state at the beginning of each piece is kept, and the Taylor polynomials of the last `PIECES` of them (0.2 MB each).
@@ -30,14 +30,14 @@ from symtop.core.numbers import context, real_numbers
 from symtop.model.charts import Array
 from symtop.model.exact.free_body import BodyMotion, checked_body, checked_times
 
-LONG, QUAD = 2.0**-63, 2.0**-112  # rounding units
-TOLERANCES = (1e-2 * LONG, 1e-2 * LONG, 1e-5 * LONG, 1e-2 * QUAD)  # of the runs, the last one in quadruple precision
-SAFETY, LINEAR, CHECKS, SHORTER = 256.0, 1e-4, 8, 0.4  # `CHECKS` of them in each piece
-ACCURACY, PAIR = 1e-9, 2.0**-104  # rad: the largest bound of a known motion, the rounding error of a pair of doubles
+LONG_UNIT, QUAD_UNIT = 2.0**-63, 2.0**-112  # rounding units
+TOLERANCES = (1e-2 * LONG_UNIT, 1e-2 * LONG_UNIT, 1e-5 * LONG_UNIT, 1e-2 * QUAD_UNIT)  # of the runs, the last in quad
+SAFETY, LINEAR_RANGE, CHECKS, SHORTER_STEPS = 256.0, 1e-4, 8, 0.4  # `CHECKS` of them in each piece
+ACCURACY, PAIR_ROUNDING = 1e-9, 2.0**-104  # rad: largest bound of a known motion; rounding error of two doubles
 MOST_STEPS = 1_000_000  # of all runs, half a minute or three; a step in quadruple precision counts as `QUAD_STEP`
 PIECES, QUAD_STEP = 256, 10
-ANGLE = 64.0  # rad: the first piece takes the time of it or of half, at the rate of the start
-FEW, MANY = 16, 128  # steps of a piece: after fewer the next one is twice as long, after more half
+FIRST_TURN = 64.0  # rad: the first piece takes the time of it or of half, at the rate of the start
+FEW_STEPS, MANY_STEPS = 16, 128  # steps of a piece: after fewer the next one is twice as long, after more half
 START_DIGITS = 60
 
 
@@ -99,7 +99,7 @@ class HeavyBody:
         self._digits = lambda value: mp.nstr(value, 50)
         turning, falling = np.divide(row[7:10], row[:3]), np.hypot(np.roll(heavy, 1), np.roll(heavy, 2)) / row[:3]
         rate = float(np.clip(np.linalg.norm(turning) + np.sqrt(falling.max()), 1e-300, 1e300))  # also of a body at rest
-        self._length = 2.0 ** math.floor(math.log2(ANGLE / rate))
+        self._length = 2.0 ** math.floor(math.log2(FIRST_TURN / rate))
         self._ways: dict[tuple[float, bool], _Way] = {}
 
     def samples(self, times: ArrayLike, *, precise: bool = False) -> BodyMotion:
@@ -127,7 +127,7 @@ class HeavyBody:
         """An integrator at the start; of the first two with numbers that are off by one unit."""
         stepper = copy.copy(_stepper(run))
         kind = stepper.state.dtype.type
-        off = [LONG * (-1) ** (i >> run) if run < 2 else 0.0 for i in range(13)]
+        off = [LONG_UNIT * (-1) ** (i >> run) if run < 2 else 0.0 for i in range(13)]
         numbers = [kind(self._digits(value * (1 + e))) for value, e in zip(self._numbers, off, strict=True)]
         stepper.state[:], stepper.pars[:] = numbers[:7], numbers[7:]
         return stepper
@@ -138,9 +138,9 @@ class _Way:
 
     def __init__(self, runs: list[Any], length: float) -> None:
         *self._others, self.main = runs
-        self._length, self._unit, self._work = length, QUAD / LONG if len(runs) == 4 else 1.0, 0
+        self._length, self._unit, self._work = length, QUAD_UNIT / LONG_UNIT if len(runs) == 4 else 1.0, 0
         self.ends, self.states = [0.0], [self.main.state.copy()]  # the times between the pieces, and the states there
-        self._checks, self._bounds = [0.0], [SAFETY * self._unit * LONG + PAIR]  # |t|, rad
+        self._checks, self._bounds = [0.0], [SAFETY * self._unit * LONG_UNIT + PAIR_ROUNDING]  # |t|, rad
 
     def known(self) -> float:
         """The last check, as |t|, before the motion is lost."""
@@ -157,7 +157,7 @@ class _Way:
             began, ended = np.array(self.ends[-2:], np.longdouble)
             points = np.linspace(began, ended, CHECKS + 1)
             solution, steps = _piece(self, len(self.ends) - 2)
-            longest = SHORTER * abs(self._length) / steps
+            longest = SHORTER_STEPS * abs(self._length) / steps
             self._work += steps * (QUAD_STEP if len(self._others) == 3 else 1)
             value, rest = _halves(solution(_row(self.main, points)))
             gaps = []
@@ -168,10 +168,10 @@ class _Way:
                 other, less = _halves(states)
                 gaps.append(((other - value) + (less - rest))[1:, :4])
             apart = 2.0 * np.sqrt(np.square(gaps).sum(axis=2).max(axis=0))
-            bounds = np.where(apart < LINEAR, SAFETY * self._unit * apart + PAIR, math.inf)
+            bounds = np.where(apart < LINEAR_RANGE, SAFETY * self._unit * apart + PAIR_ROUNDING, math.inf)
             self._checks += np.abs(points[1:]).astype(float).tolist()
             self._bounds += np.maximum.accumulate([self._bounds[-1], *bounds])[1:].tolist()
-            self._length *= 2.0 if steps < FEW else 0.5 if steps > MANY else 1.0
+            self._length *= 2.0 if steps < FEW_STEPS else 0.5 if steps > MANY_STEPS else 1.0
 
     def values(self, sizes: Array) -> tuple[Array, Array, Array]:
         """Values, low halves and bounds at times as |t|; NaN and infinity where the motion is lost."""

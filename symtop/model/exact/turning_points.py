@@ -64,7 +64,7 @@ from symtop.model.exact.double_double import (
 
 GRAIN = 1e-31  # relative error of a few operations in double-double
 GRAIN4 = 1e-61  # in quad-double, with three digits to spare
-RATE, VALUE = 1e-28, 1e-18  # limits on relative errors of rates and of values; above them a longer arithmetic is used
+RATE, VALUE = 1e-28, 1e-18  # relative errors above which a longer arithmetic is used
 
 
 class Data(NamedTuple):

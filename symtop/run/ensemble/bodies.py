@@ -11,14 +11,15 @@ rates across it up to 3/2. Attitudes are uniform over all rotations.
     near-symmetric   two moments equal to 2^-20 .. 2^-6, the momentum in any direction
     needle           the smallest moment is 2^-12 .. 2^-5 of the others, and the spin about its axis is fast
     heavy            epsilon from 2^-7 to 1/2, spins from 1/16 to 4 of the sleeping threshold
-    regular          those of heavy whose disturbances grow less than `CHAOS` times in `PERIODS` natural periods
+    regular          those of heavy whose disturbances grow less than `CHAOTIC_GROWTH` times in `HORIZON_PERIODS`
+    natural periods
     chaotic          those of heavy whose disturbances grow more: an exponent above 0.69 per natural period
     lagrange         heavy with epsilon = 0: a symmetric top as a body
 
-The growth is the larger one of two disturbances of size `SMALL`, computed by `series-general-adaptive`; in a stable
-motion it is linear in time and smaller. Drawn numbers are rounded to nine digits, so that sines of another machine
-change nothing; directions are then scaled to length one. Member i is the same for any n, and member i of `heavy` is
-drawn from the same numbers for each epsilon.
+The growth is the larger one of two disturbances of size `SMALL_CHANGE`, computed by `series-general-adaptive`; in a
+stable motion it is linear in time and smaller. Drawn numbers are rounded to nine digits, so that sines of another
+machine change nothing; directions are then scaled to length one. Member i is the same for any n, and member i of
+`heavy` is drawn from the same numbers for each epsilon.
 """
 
 import math
@@ -42,10 +43,10 @@ FREE = ("short-axis", "long-axis", "near-separatrix", "near-symmetric", "needle"
 HEAVY = ("regular", "chaotic", "lagrange")
 STRATA = (*FREE, *HEAVY)
 KINDS = (*STRATA, "heavy", "all", "free")
-DRAWS, MOST, PIECE = 16, 1_000_000, 64  # numbers of a member, most members, members of a piece of work
-PERIODS, CHAOS, SMALL = 10.0, 1000.0, 1e-8
-ACCURATE = 1e-13  # tolerance of the series
-FARTHEST, NEAREST = 0.5, 0.02  # largest epsilon; least of the chaotic kind, as no motion below it is chaotic
+DRAWS, MOST_MEMBERS, PIECE_MEMBERS = 16, 1_000_000, 64  # numbers of a member, most members, members of a piece of work
+HORIZON_PERIODS, CHAOTIC_GROWTH, SMALL_CHANGE = 10.0, 1000.0, 1e-8
+TOLERANCE = 1e-13  # tolerance of the series
+LARGEST_EPSILON, LEAST_CHAOTIC = 0.5, 0.02  # least of the chaotic kind: no motion below it is chaotic
 VECTORS = {"centre": "component", "quaternion": "part", "omega_body": "component"}
 PRINCIPAL = {name: {"long_name": "principal moment of inertia", "units": "1"} for name in ("I1", "I3")}
 SPLIT = np.cumsum([*PARTS.values()])[:-1]  # of the 14 numbers of a member
@@ -61,16 +62,16 @@ def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float 
     the distance of heavy bodies from a Lagrange top, from 0 (with chaotic ones from 0.02) to 1/2; by default it is
     drawn. Member i depends on the seed, not on n. Raises SymtopError for invalid arguments.
     """
-    count, chosen, first = whole("n", n, 1, MOST), one_of("kind", kind, KINDS), whole("seed", seed, 0)
+    count, chosen, first = whole("n", n, 1, MOST_MEMBERS), one_of("kind", kind, KINDS), whole("seed", seed, 0)
     check_memory("n", count)
     kinds = {"all": STRATA, "free": FREE}.get(chosen, (chosen,))
     if epsilon is not None:
         if not {*kinds} - {*FREE, "lagrange"}:
             raise SymtopError(f"epsilon is of heavy bodies, and not of the kind {chosen!r}", "epsilon")
-        least = NEAREST if "chaotic" in kinds else 0.0
+        least = LEAST_CHAOTIC if "chaotic" in kinds else 0.0
         epsilon = finite("epsilon", epsilon)
-        if not least <= epsilon <= FARTHEST:
-            raise SymtopError(f"epsilon must be from {least} to {FARTHEST}, not {epsilon!r}", "epsilon")
+        if not least <= epsilon <= LARGEST_EPSILON:
+            raise SymtopError(f"epsilon must be from {least} to {LARGEST_EPSILON}, not {epsilon!r}", "epsilon")
     rows, strata = np.empty((count, 14)), np.empty(count, dtype=f"U{max(map(len, KINDS))}")
     for place, stratum in enumerate(kinds[:count]):
         rows[place :: len(kinds)] = _members(stratum, first, len(range(place, count, len(kinds))), epsilon)
@@ -85,13 +86,13 @@ def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float 
 
 
 def scenes_of(members: xr.Dataset) -> list[Scene]:
-    """Members as scenes over `PERIODS` natural periods, named by stratum and number within it."""
+    """Members as scenes over `HORIZON_PERIODS` natural periods, named by stratum and number within it."""
     rows = np.column_stack([members[name].values for name in PARTS])
     counts: dict[str, int] = {}
     scenes = list[Scene]()
     for (body, start), kind in zip(members_of(rows), members["stratum"].values.tolist(), strict=True):
         counts[kind] = counts.get(kind, -1) + 1
-        horizon = PERIODS * body.nutation_period(start)
+        horizon = HORIZON_PERIODS * body.nutation_period(start)
         scenes.append(Scene(f"{kind}-{counts[kind]}", body, start, horizon, f"a random body, {kind}"))
     return scenes
 
@@ -105,8 +106,8 @@ def _members(kind: str, seed: int, count: int, epsilon: float | None) -> Array:
         uniform = np.ascontiguousarray((integers * 2.0**-53).reshape(-1, DRAWS).T)
         rows = _free(kind, uniform) if kind in FREE else _heavy(uniform, 0.0 if kind == "lagrange" else epsilon)
         if kind in ("regular", "chaotic"):
-            pieces = np.array_split(rows, -(-len(rows) // PIECE))
-            chaotic = np.concatenate([*in_threads(growth, pieces, cores())]) > CHAOS
+            pieces = np.array_split(rows, -(-len(rows) // PIECE_MEMBERS))
+            chaotic = np.concatenate([*in_threads(growth, pieces, cores())]) > CHAOTIC_GROWTH
             rows = rows[chaotic == (kind == "chaotic")]
         parts.append(rows)
         missing -= len(rows)
@@ -178,19 +179,19 @@ def _heavy(u: Array, epsilon: float | None) -> Array:
 
 
 def growth(rows: Array) -> Array:
-    """The larger factors (n,) by which two disturbances of members (n, 14) grow in attitude over `PERIODS` periods."""
+    """The larger factors (n,) by which two disturbances of members (n, 14) grow in attitude over `HORIZON_PERIODS`."""
     solver, n = integrator("series-general-adaptive").solvers[BODY], len(rows)
     periods = np.array([body.nutation_period(start) for body, start in members_of(rows)])
-    times = periods[:, None] * np.linspace(0.0, PERIODS, 4 * round(PERIODS) + 1)[1:]
+    times = periods[:, None] * np.linspace(0.0, HORIZON_PERIODS, 4 * round(HORIZON_PERIODS) + 1)[1:]
     turned, pushed, (w, x) = rows.copy(), rows.copy(), rows[:, 7:9].T
-    turned[:, 7], turned[:, 8] = w - SMALL * x, x + SMALL * w
-    scale = SMALL * np.array([math.hypot(*rates) for rates in rows[:, 11:].tolist()])
+    turned[:, 7], turned[:, 8] = w - SMALL_CHANGE * x, x + SMALL_CHANGE * w
+    scale = SMALL_CHANGE * np.array([math.hypot(*rates) for rates in rows[:, 11:].tolist()])
     pushed[:, 11:] += np.stack([scale, -scale, scale], axis=1)
 
     def attitudes(numbers: Array) -> Array:
-        done, _ = solver.many(numbers, np.full(n, ACCURATE), times, np.full(n, times.shape[1]))  # type: ignore[attr-defined]
+        done, _ = solver.many(numbers, np.full(n, TOLERANCE), times, np.full(n, times.shape[1]))  # type: ignore[attr-defined]
         return np.asarray(done.states[:, :, :4])
 
     run = attitudes(rows)
     apart = [attitude_distance(attitudes(numbers), run) for numbers in (turned, pushed)]
-    return np.asarray(np.nanmax(apart, axis=(0, 2)) / (2.0 * SMALL))
+    return np.asarray(np.nanmax(apart, axis=(0, 2)) / (2.0 * SMALL_CHANGE))

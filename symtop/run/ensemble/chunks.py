@@ -42,9 +42,9 @@ from symtop.run.trajectory import LABELS
 
 CHUNK = 65_536  # values of one column in a chunk: half a megabyte, which stays in a core's cache
 CHUNK_STEPS = 5_000_000  # most steps in a chunk: 0.01 s in lanes, to 1 s
-SHARES, LEAST_STEPS = 16, 200_000  # an ensemble has at least 16 chunks, unless these had fewer steps (1 ms) than this
+LEAST_CHUNKS, LEAST_STEPS = 16, 200_000  # of an ensemble, unless they had fewer steps (1 ms) than the second
 SLOWER = 25  # how much fewer steps a chunk has of a method that is called from Python: 200 runs of rk45 take 12 s
-HARMLESS = 1e100  # states and momenta below it have a finite energy: no inertia is below 1e-40
+HARMLESS_SIZE = 1e100  # states and momenta below it have a finite energy: no inertia is below 1e-40
 UNKNOWN_STEPS = 1000  # the steps assumed of a member of an adaptive method or of a closed form
 READ_TOGETHER = 4096  # members whose angles a thread makes continuous at a time
 RAISED = "raised"  # outcome of a member on which a solver raised an exception
@@ -105,7 +105,7 @@ def nutation_periods(numbers: Array) -> Array:
     """`Scene.nutation_period` of tops and starts (n, 9), to the bit, or of bodies (n, 14); infinite on a separatrix."""
     if of_bodies(numbers):
         return np.array([body.nutation_period(start) for body, start in members_of(numbers)])
-    if not _periods.ready(A_PERIOD * len(numbers)):
+    if not _periods.ready(PERIOD_SECONDS * len(numbers)):
         return np.array([nutation_period(*top) for top in members_of(numbers)])
     periods = np.empty(len(numbers))
     _periods.compiled(np.ascontiguousarray(numbers), periods)
@@ -135,7 +135,7 @@ def all_periods(numbers: Array, periods: Array) -> None:
             periods[first + j] = -period if beside_pole(low, high) else period
 
 
-A_PERIOD = 5e-5  # seconds of one top, interpreted
+PERIOD_SECONDS = 5e-5  # seconds of one top, interpreted
 # less patience than compiling takes, so that thousands of tops are fast from their second call on
 _periods = LazyKernel(all_periods, "(float64[:, ::1], float64[::1])", patience=0.1)
 
@@ -197,7 +197,8 @@ class Job:
         """
         n, begin, size = len(self.numbers), 0, max(1, CHUNK // self.samples)
         ends = np.cumsum(np.full(n, UNKNOWN_STEPS) if self.steps is None else self.steps)
-        most = min(CHUNK_STEPS, max(LEAST_STEPS, ends[-1] // SHARES)) // (SLOWER if self.execution == IN_PYTHON else 1)
+        most = min(CHUNK_STEPS, max(LEAST_STEPS, ends[-1] // LEAST_CHUNKS))
+        most //= SLOWER if self.execution == IN_PYTHON else 1
         while begin < n:
             done = ends[begin - 1] if begin else 0
             length = min(int(np.searchsorted(ends, done + most, "right")) - begin, size)
@@ -368,7 +369,7 @@ def together(numbers: Array) -> Any:
 
 def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
     """End runs with outcome "ok" before the first sample with a state or energy that is not finite, as `simulate`."""
-    if all(values.min() > -HARMLESS and values.max() < HARMLESS for values in runs[:2]):  # a tenth of the time
+    if all(values.min() > -HARMLESS_SIZE and values.max() < HARMLESS_SIZE for values in runs[:2]):  # takes a tenth
         return runs
     finite = np.isfinite(runs.states).all(axis=2) & np.isfinite(view.energy + view.p_phi) | np.isnan(plan.times)
     return _ended(runs, plan, ~finite & (runs.outcome == OK)[:, None], NOT_FINITE)

@@ -103,7 +103,7 @@ def ensemble(
     if scheduler is not None:
         cluster.check_sent(scheduler, job.of(slice(0, 1)), method.name)
     order = job.order() if path is None else None
-    many = job.steps is not None and int(job.steps.sum()) > lanes.FEW
+    many = job.steps is not None and int(job.steps.sum()) > lanes.FEW_STEPS
     ordered = replace(job if order is None else job.of(order), continuous=path is not None, compiling=many)
     chunks = list(ordered.chunks())
     nouns = ("body", "bodies") if chart == BODY else ("top", "tops")

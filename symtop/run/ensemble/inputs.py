@@ -21,9 +21,9 @@ from symtop.model.top import NUMBERS, flat
 
 TOP = dict.fromkeys(NUMBERS, 1)
 NEEDED = {"nine": NUMBERS[:4], "14": ("I1", "I2", "I3", "omega_body")}  # required variables; others default to 0 or to
-USUAL = {"centre": (0.0, 0.0, 1.0), "quaternion": (1.0, 0.0, 0.0, 0.0)}
-WRITTEN = {*netcdf.VARIABLES, "scene", "member", "period"}  # names that symtop writes, never taken for misspelled ones
-NEAR = 0.8  # similarity of a name that is taken for a misspelled one: thetadot and theta0, not p_phi and theta_max
+DEFAULTS = {"centre": (0.0, 0.0, 1.0), "quaternion": (1.0, 0.0, 0.0, 0.0)}
+KNOWN_NAMES = {*netcdf.VARIABLES, "scene", "member", "period"}  # never taken for misspelled ones
+SIMILARITY = 0.8  # of a name that is taken for a misspelled one: thetadot and theta0, not p_phi and theta_max
 RATE = re.compile(r"(d|v|w|omega)_?(theta|phi|psi)(_?d?t)?|(theta|phi|psi)_?(d|dt|t|prime|rate|speed|vel|velocity)")
 UNNAMED = "dim_0"  # xarray's name for an unnamed dimension
 
@@ -81,7 +81,7 @@ def _from_dataset(data: xr.Dataset) -> Members:
         raise SymtopError("members must be at least one")
     columns = []
     for name, width in parts.items():
-        column = np.broadcast_to(np.reshape(USUAL.get(name, 0.0), (1, -1)), (n, width))
+        column = np.broadcast_to(np.reshape(DEFAULTS.get(name, 0.0), (1, -1)), (n, width))
         if name in data:
             values, vector = data[name], width > 1
             over = values.dims[:-1] if vector else values.dims
@@ -120,8 +120,8 @@ def _checked_bodies(numbers: Array, names: NDArray[Any] | None) -> Array:
 def _check_names(data: xr.Dataset, parts: dict[str, int]) -> None:
     """SymtopError for a variable whose name seems a misspelling of one in `parts`, or another word for a rate."""
     usual = {name.lower(): name for name in parts}
-    for name in (name for name in map(str, data.variables) if name not in parts and name not in WRITTEN):
-        near = [usual[like] for like in difflib.get_close_matches(name.lower(), usual, n=1, cutoff=NEAR)]
+    for name in (name for name in map(str, data.variables) if name not in parts and name not in KNOWN_NAMES):
+        near = [usual[like] for like in difflib.get_close_matches(name.lower(), usual, n=1, cutoff=SIMILARITY)]
         if parts is TOP and (rate := RATE.fullmatch(name.lower())) is not None:
             near = [f"{rate[2] or rate[4]}_dot"]
         if near:

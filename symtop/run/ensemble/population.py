@@ -41,10 +41,10 @@ from symtop.core.errors import SymtopError, one_of, whole
 from symtop.model.charts import Array
 from symtop.model.top import NUMBERS
 
-MOST = 1e9  # members
+MOST_MEMBERS = 1e9  # members
 BYTES = 400  # of memory per member
 DRAWS = 16  # uniform numbers per member, some unused: a new quantity must not change the existing ones
-BLOCK = 1 << 16  # members drawn at a time
+BLOCK_MEMBERS = 1 << 16  # members drawn at a time
 
 # dimensionless: theta, measured from the pole of unstable equilibrium, theta' and phi' in units of g, and a; each (n,)
 Start = tuple[Array, Array, Array, Array]
@@ -208,14 +208,14 @@ def population(n: int, *, seed: int = 0, kind: str = "all") -> xr.Dataset:
 
     Raises SymtopError for invalid arguments.
     """
-    count = whole("n", n, 1, MOST)
+    count = whole("n", n, 1, MOST_MEMBERS)
     check_memory("n", count)
     chosen, start = one_of("kind", kind, KINDS), whole("seed", seed, 0)
     generator = np.random.Philox(start)
     columns: dict[str, Any] = {name: np.empty(count) for name in NUMBERS}
     columns["stratum"] = np.empty(count, dtype=f"U{max(map(len, STRATA))}")
-    for begin in range(0, count, BLOCK):
-        part = {name: values[begin : begin + BLOCK] for name, values in columns.items()}
+    for begin in range(0, count, BLOCK_MEMBERS):
+        part = {name: values[begin : begin + BLOCK_MEMBERS] for name, values in columns.items()}
         integers = generator.random_raw(len(part["I1"]) * DRAWS) >> np.uint64(11)
         uniform = (integers * 2.0**-53).reshape(-1, DRAWS)  # in [0, 1), of 53 bits
         _fill(part, np.ascontiguousarray(uniform.T), chosen)

@@ -18,9 +18,9 @@ from symtop.model.scenes import Scene
 from symtop.model.top import flat
 
 POINTS = 100  # of the motion that are compared
-SMALL = 64.0 * EPSILON  # a change of the start whose effect is ten times the rounding error of the closed form
-LEAST = 2.0 * EPSILON  # the least change that does not vanish by rounding, of any theta in [0, pi] and any rate
-FAR = 0.1  # rad: a larger displacement is no longer proportional to the change; it is at most pi
+SMALL_CHANGE = 64.0 * EPSILON  # a change of the start whose effect is ten times the rounding error of the closed form
+LEAST_CHANGE = 2.0 * EPSILON  # the least change that does not vanish by rounding, of any theta in [0, pi] and any rate
+FAR_APART = 0.1  # rad: a larger displacement is no longer proportional to the change; it is at most pi
 
 
 def displacement(scene: Scene, change: float, horizon: float) -> float:
@@ -46,11 +46,11 @@ def displacement(scene: Scene, change: float, horizon: float) -> float:
 def conditioning(scene: Scene, horizon: float) -> float:
     """The ratio of the displacement of the axis up to the horizon to a change of the start; at least 1, or NaN.
 
-    If a change displaces the axis by more than `FAR`, a smaller one is tried, which rounding changes more: `LEAST` by
-    up to a third. If `LEAST` still displaces it by more, the ratio is a lower bound.
+    If a change displaces the axis by more than `FAR_APART`, a smaller one is tried, which rounding changes more:
+    `LEAST_CHANGE` by up to a third. If `LEAST_CHANGE` still displaces it by more, the ratio is a lower bound.
     """
-    for change in (SMALL, 8.0 * EPSILON, LEAST):
+    for change in (SMALL_CHANGE, 8.0 * EPSILON, LEAST_CHANGE):
         apart = displacement(scene, change, horizon)
-        if not apart > FAR:
+        if not apart > FAR_APART:
             break
     return float(np.maximum(apart / change, 1.0))

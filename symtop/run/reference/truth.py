@@ -11,13 +11,14 @@ By default the values are the closed form in double. Three errors add up at a ti
 
 The third kind is checked for at every requested time: the angles, the axis and the quaternion are evaluated separately
 and must agree on the attitude, and theta' and phi' must reproduce the energy and p_phi. If these differ by more than
-`SUSPICIOUS`, the bound is pi.
+`SUSPICIOUS_GAP`, the bound is pi.
 
 A *certificate* is one comparison of a scene's closed form with independent checks; each kind includes the one before:
 
     digits        its angles, axis and attitude at `CHECKS` times and at the fastest moment before each, up to
-                  `REACH` nutations, against the same formulas in 40 digits: finds errors of rounding
-    discrete-map  its attitude over `OVERLAP` nutations against the iterated discrete map: finds errors of the formulas
+                  `CERTIFIED_NUTATIONS` nutations, against the same formulas in 40 digits: finds errors of rounding
+    discrete-map  its attitude over `OVERLAP_NUTATIONS` nutations against the iterated discrete map: finds errors of the
+    formulas
     integration   the same attitude against heyoka's long double integration of the equations of motion: finds errors
                   that the formulas of the map share
 
@@ -79,19 +80,19 @@ from symtop.run.reference.independent_checks import (
     iterate_map_with_error,
     largest_errors,
 )
-from symtop.run.reference.sensitivity import FAR, LEAST, conditioning
+from symtop.run.reference.sensitivity import FAR_APART, LEAST_CHANGE, conditioning
 from symtop.run.trajectory import dataset
 
 PRECISIONS = ("closed-form", "double", "longdouble", "quad")
 KINDS = ("digits", "discrete-map", "integration")  # of certificates
-REACH, OVERLAP = 1e6, 100.0  # nutations
+CERTIFIED_NUTATIONS, OVERLAP_NUTATIONS = 1e6, 100.0  # nutations
 ROUNDING = {"theta": 2e-15, "axis": 2e-15, "attitude": 4e-15, "phi": 2e-15, "psi": 2e-15}  # rad
-SUSPICIOUS = 1e-12  # a disagreement beyond this is an error, not rounding
-ILL = 1e4  # amplification beyond which ``conditioning`` states the effect of rounding the start
+SUSPICIOUS_GAP = 1e-12  # a disagreement beyond this is an error, not rounding
+ILL_CONDITIONED = 1e4  # amplification beyond which ``conditioning`` states the effect of rounding the start
 UNCERTIFIED = "none; certify='digits', 'discrete-map' or 'integration' makes one"
 MOST_CACHED = 200_000  # times; larger results are not cached on disk
 MOST_BYTES = 500_000_000  # of the folder on disk; a reference at 1000 times takes 200 kB
-OFTEN = 50  # files that a process writes between two checks of the size of the folder
+FILES_A_CHECK = 50  # files that a process writes between two checks of the size of the folder
 COMPILED = tuple(code_hash.PACKAGE / "core" / name for name in ("jit.py", "sines.py"))  # without importing numba
 
 _written = itertools.count()
@@ -225,10 +226,10 @@ def conditioned(scene: Scene, horizon: float) -> str:
     if math.isnan(factor):  # a changed start that comes too close to a pole
         return "unknown"
     change, anew = f"{factor:.2g} times a change of the start", "rounding the start anew moves the axis by"
-    if factor * LEAST > FAR:  # the smallest change already moves the axis by `FAR`, so the factor is a lower bound
+    if factor * LEAST_CHANGE > FAR_APART:  # the smallest change moves the axis so far: the factor is a lower bound
         known = "nothing is known of the axis but from these very doubles"
         return f"at least {change}; {anew} {factor * EPSILON:.2g} rad or more: {known}"
-    return f"{change}; {anew} {factor * EPSILON:.1g} rad" if factor > ILL else change
+    return f"{change}; {anew} {factor * EPSILON:.1g} rad" if factor > ILL_CONDITIONED else change
 
 
 def _dataset(scene: Scene, times: Array, columns: dict[str, Array], bounds: dict[str, Array]) -> xr.Dataset:
@@ -294,7 +295,7 @@ def closed_bounds(scene: Scene, times: Array, values: dict[str, Any]) -> dict[st
     bounds = {name: ROUNDING[name] + drift for name in ("theta", "axis", "attitude")}
     for name in ("phi", "psi"):
         bounds[name] = ROUNDING[name] + 2.0 * EPSILON * np.abs(values[name]) + 2.0 * drift / sine
-    wrong = ~(disagreement(form, times, values) <= SUSPICIOUS)
+    wrong = ~(disagreement(form, times, values) <= SUSPICIOUS_GAP)
     return {name: np.where(wrong, math.pi, bound) for name, bound in bounds.items()}
 
 
@@ -328,7 +329,7 @@ class Certificate(NamedTuple):
     @property
     def doubt(self) -> float:
         """The possible error of the formulas, rad: a distance from an independent check that exceeds rounding."""
-        return max((gap for gap in (self.map_apart, self.apart) if gap > SUSPICIOUS), default=0.0)
+        return max((gap for gap in (self.map_apart, self.apart) if gap > SUSPICIOUS_GAP), default=0.0)
 
     @property
     def factor(self) -> float:
@@ -368,7 +369,7 @@ def _stored(scene: Scene, kind: str) -> Certificate:
 
 
 def _compared(scene: Scene, kind: str) -> xr.Dataset:
-    times = _times(scene, REACH)
+    times = _times(scene, CERTIFIED_NUTATIONS)
     values = closed_values(scene, times)
     checks = largest_errors(scene, times, values["quaternion"], values["phi"], values["psi"])
     bounds = closed_bounds(scene, times, values)
@@ -386,7 +387,7 @@ def _times(scene: Scene, nutations: float) -> Array:
 
 def _against_map(scene: Scene) -> tuple[float, float]:
     """The last time compared with the discrete map, and the distance from the closed form beyond the map's error."""
-    times = _times(scene, OVERLAP)
+    times = _times(scene, OVERLAP_NUTATIONS)
     attitudes, own = iterate_map_with_error(scene, times)
     gap = charts.attitude_distance(closed_form(scene).quaternion(times), attitudes)
     return float(times[-1]), float(max(np.max(gap - own), 0.0))
@@ -394,7 +395,7 @@ def _against_map(scene: Scene) -> tuple[float, float]:
 
 def _against_integration(scene: Scene) -> tuple[float, float]:
     """The last time compared with the integration, and the distance from the closed form beyond its rounding error."""
-    times = _times(scene, OVERLAP)
+    times = _times(scene, OVERLAP_NUTATIONS)
     states, _ = integrate(scene, times, "longdouble")
     gap = charts.attitude_distance(closed_form(scene).quaternion(times), states[:, :4].astype(float))
     _, phi, psi = charts.angles_from_quaternion(states[:, :4])
@@ -436,7 +437,7 @@ def cached(path: Path, compute: Callable[[], xr.Dataset], depth: int | None) -> 
     try:
         make_private(path.parent)
         netcdf.write(data.assign_attrs(content=netcdf.content_hash(data)), path)
-        if next(_written) % OFTEN == 0:
+        if next(_written) % FILES_A_CHECK == 0:
             prune(path.parent, MOST_BYTES)
     except (SymtopError, OSError) as error:
         if depth is not None:
