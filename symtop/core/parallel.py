@@ -32,7 +32,7 @@ def cores() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-def heed() -> None:
+def check_interrupt() -> None:
     """Raise `StoppedError` if the work was interrupted; for long pieces to call between their compiled calls."""
     if (stopped := getattr(_stop, "stopped", None)) is not None and stopped.is_set():
         raise StoppedError
@@ -42,7 +42,7 @@ def in_threads(work: Callable[[Piece], Result], pieces: Iterable[Piece], threads
     """The results of the pieces, in their order.
 
     An exception of one piece, or an interrupt while waiting, drops the pieces that have not begun and is raised at
-    once; pieces that have begun end when they next call `heed`. With one thread the work is done in the caller's.
+    once; pieces that have begun end at their next `check_interrupt`. With one thread the work is done in the caller's.
     """
     if threads == 1:
         yield from map(work, pieces)

@@ -40,7 +40,7 @@ def claim_name(claim: str) -> str:
     return claim if claim.startswith("p_") else claim.replace("_", " ")
 
 
-class Measured(NamedTuple):
+class Reading(NamedTuple):
     """A measured value: a word (yes, drift, wrong limit) and a number."""
 
     kind: str = ""
@@ -57,7 +57,7 @@ class Measured(NamedTuple):
         return bool(str(self))
 
 
-UNMEASURED = Measured()
+UNMEASURED = Reading()
 
 
 class Finding(NamedTuple):
@@ -65,7 +65,7 @@ class Finding(NamedTuple):
 
     claim: str
     declared: str
-    measured: Measured
+    measured: Reading
     verdict: str
     why: str  # a clause that completes "CLAIM is VERDICT: ..."
     value: float = math.nan  # the number that decides
@@ -101,7 +101,7 @@ def agreement(
 ) -> Finding:
     """The finding on a claim that is true or false, from the measured answer `yes`; None is undecided."""
     verdict = "measured" if declared is None else "confirmed" if declared == yes else "refuted"
-    measured, verdict = (UNMEASURED, "undecided") if yes is None else (Measured(yes_no(yes), value), verdict)
+    measured, verdict = (UNMEASURED, "undecided") if yes is None else (Reading(yes_no(yes), value), verdict)
     return Finding(claim, yes_no(declared), measured, verdict, why, value, resolution)
 
 

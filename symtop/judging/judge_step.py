@@ -37,7 +37,7 @@ from symtop.judging.adapters.python_step import CONJUGATE
 from symtop.judging.battery import measure, stages, unmeasured
 from symtop.judging.claims.constants import KEPT_CHANGE, Constant, blow_up_finding, blows_up
 from symtop.judging.claims.subject import Subject, open_target, seconds_a_step
-from symtop.judging.findings import PHRASES, About, Finding, Ledger, Measured, error_units, undecided
+from symtop.judging.findings import PHRASES, About, Finding, Ledger, Reading, error_units, undecided
 from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
 from symtop.measure.conservation import CONSTANTS, constant_of
 from symtop.measure.errors import checked, completed, doubles, errors, refuse_other_order, refuse_other_scene, unpadded
@@ -279,7 +279,7 @@ def _error(name: str, scene: Scene, time: np.ndarray, deviation: xr.Dataset) -> 
     if growth is not None and math.isfinite(growth.exponent):
         why += f", growing as t^{growth.exponent:.2f} +- {growth.exponent_interval:.2f} ({growth.law})"
     law = growth.law if growth is not None and growth.law not in ("undecided", "not judged") else ""
-    measured = Measured(law, largest, text=f"{largest:.0e}{unit}{law and ', '}{law}{gone}")
+    measured = Reading(law, largest, text=f"{largest:.0e}{unit}{law and ', '}{law}{gone}")
     return Finding(f"{name}_error", "", measured, "measured", why, largest, bound)
 
 

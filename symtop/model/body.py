@@ -30,7 +30,7 @@ from symtop.model.top import LARGEST, MOMENT_SLACK, bounded, of_kind, unit, vect
 SYMMETRIC_WITHIN = 1e-9  # largest difference of a matrix from its transpose, relative to its largest entry
 
 
-class Placed(NamedTuple):
+class BodyMomenta(NamedTuple):
     """p_phi, which every body conserves, and M3 = p_psi, which a symmetric body conserves, too."""
 
     p_phi: float
@@ -198,10 +198,10 @@ class RigidBody:
         """Total energy of a start."""
         return self.kinetic(at) + math.fsum(c * g for c, g in zip(self.torque, vertical(*at.quaternion), strict=True))
 
-    def momenta(self, at: Attitude) -> Placed:
+    def momenta(self, at: Attitude) -> BodyMomenta:
         """p_phi, conserved, and M3, which is p_psi of a symmetric body."""
         M = self.momentum(at)
-        return Placed(math.fsum(m * g for m, g in zip(M, vertical(*at.quaternion), strict=True)), M[2])
+        return BodyMomenta(math.fsum(m * g for m, g in zip(M, vertical(*at.quaternion), strict=True)), M[2])
 
     def nutation_period(self, at: Attitude) -> float:
         """The natural period, see the head of `symtop.model.body`; infinite for a free body at rest."""

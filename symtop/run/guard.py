@@ -40,12 +40,12 @@ from symtop.methods.framework.registry import Integrator, integrator, is_built_i
 from symtop.model.charts import Array
 from symtop.model.scenes import Scene
 from symtop.run.linear_stability import Growth, nutation_growth, trace
-from symtop.run.motion import MOST_FOLDS, SHEAR, UNSTABLE_RATIO, Exact, Integrated, Landmarks, Motion
+from symtop.run.motion import MOST_FOLDS, SHEAR, UNSTABLE_RATIO, ExactMotion, IntegratedMotion, Landmarks, Motion
 from symtop.run.reference.sensitivity import SMALL_CHANGE
 
 PROBE_STEPS = {"compiled": 2000, "python": 50}  # most steps of a probe of two nutations
 LEAST_PROBE, LONGEST_PROBE = 0.25, 10.0  # times `PROBE_STEPS`: least steps of a probe, and of one where errors grow
-PROBE_SHARE = 0.1  # of the run: a probe may be so long, up to `Integrated.longest` nutations and `MOST_PROBED` steps
+PROBE_SHARE = 0.1  # of the run: a probe may be so long, up to `IntegratedMotion.longest` and `MOST_PROBED` steps
 MOST_PROBED = 20_000  # steps
 ROUNDED_ERROR = 1e-13  # rad: a smaller error of a probe is rounding, which grows as n^1.5
 PROBE_EVALUATIONS = {"compiled": 12_000, "python": 1200}  # evaluations of a longer probe of an adaptive method
@@ -171,7 +171,7 @@ def _amplifies(motion: Motion, change: float, horizon: float, times: float = UNS
 
 
 def _amplified(motion: Motion, probe: Probe, horizon: float) -> float:
-    """The largest error of a probe as the motion amplifies it by the horizon; 0 if `grown` covers it (`Exact`)."""
+    """The largest error of a probe as the motion amplifies it; 0 if `grown` covers it (`ExactMotion`)."""
     return motion.amplified(float(probe.error.max()), float(probe.times[-1]), horizon)
 
 
@@ -183,7 +183,7 @@ def _fixed(motion: Motion, method: Integrator, probe: Probe, horizon: float) -> 
     """
     straight = method.keeps_frequencies
     expected = max(grown(probe, horizon, straight=straight), _amplified(motion, probe, horizon))
-    if not isinstance(motion, Exact):  # of a top `_instability` knows the growth
+    if not isinstance(motion, ExactMotion):  # of a top `_instability` knows the growth
         expected = max(expected, exponential(probe, horizon))
     if not straight or not expected < STABILITY_ERROR:
         return expected
@@ -272,7 +272,7 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: M
     A method without a step or a tolerance, such as the closed form, is not probed. The default `motion` is the closed
     form for a top and an integration for a body.
     """
-    motion = motion or (Integrated if scene.of_body else Exact)(scene)
+    motion = motion or (IntegratedMotion if scene.of_body else ExactMotion)(scene)
     marks = motion.landmarks
     if method.control is None:
         return Forecast(0.0, 0.0, "ok", plan.horizon, marks)
@@ -318,7 +318,7 @@ def warning(scene: Scene, method: Integrator, chart: str, plan: Plan, *, series:
     """
     if method.control is None:
         return ""
-    motion: Motion = Integrated(scene) if series or scene.of_body else Exact(scene)
+    motion: Motion = IntegratedMotion(scene) if series or scene.of_body else ExactMotion(scene)
     expected = forecast(scene, method, chart, plan, motion)
     problem = trouble(motion, method, chart, plan, expected)
     if problem is None:
@@ -350,7 +350,7 @@ def _remedy(motion: Motion, method: Integrator, chart: str, plan: Plan, first: T
 
 def trouble(motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
     """Why a run is expected to be wrong; None if it is not."""
-    known = isinstance(motion, Exact) and _instability(motion.scene, method, chart, plan, expected)
+    known = isinstance(motion, ExactMotion) and _instability(motion.scene, method, chart, plan, expected)
     return known or _cause(motion, method, chart, plan, expected)
 
 
@@ -394,7 +394,7 @@ def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expec
 def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
     """The first cause that applies, except instability; None if no large error is expected."""
     marks = expected.landmarks
-    if expected.rounding > EXPECTED and not isinstance(motion, Exact):
+    if expected.rounding > EXPECTED and not isinstance(motion, ExactMotion):
         return Trouble(
             f"the motion multiplies a change of its start by {expected.rounding / EPSILON:.1g} by t = "
             f"{plan.horizon:.4g}, so that rounding alone decides; no method and no step help, shorten the horizon"
@@ -444,7 +444,7 @@ def _coarse(
     if marks.period / step < 2.0:
         words = f"a step of {step:.4g} jumps over half a {motion.period_word}, which is {marks.period:.4g} long"
         return Trouble(f"{size}: {words}", marks.period / 20.0)
-    if step * frequency > SMALL_TURN and isinstance(motion, Exact):
+    if step * frequency > SMALL_TURN and isinstance(motion, ExactMotion):
         turn = trace(method, motion.scene, step, chart).turn
         for order in (3, 4):
             if abs(order * turn - 2.0 * math.pi) < RESONANCE_GAP * order:

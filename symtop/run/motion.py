@@ -1,6 +1,6 @@
 """The true motion that the guard compares a probe with: the closed form, or an integration where there is none.
 
-`Exact` evaluates a top's motion at any time. `Integrated`, with the same interface, needs only the equations, and so
+`ExactMotion` evaluates a top at any time. `IntegratedMotion`, with the same interface, needs only the equations, and so
 works for bodies too: a Taylor series with a tolerance near rounding, for a body of order 19, or 15 where errors do not
 grow much. Its error is estimated by the distance from a series of a looser tolerance, for a body of order 16 or 13, at
 the beginning or, where the motion amplifies errors, all the way. The amplification of an error by the motion is
@@ -55,7 +55,7 @@ MOST_WORK = 1e6  # steps of an integration
 class Landmarks(NamedTuple):
     """Constants of a motion that are known before it is computed."""
 
-    period: float  # of the nutation; in `Integrated` the natural period
+    period: float  # of the nutation; in `IntegratedMotion` the natural period
     frequency: float  # of small nutations about the steady precession with the same momenta
     width: float  # of the nutation, rad
     gap: float  # closest approach to a pole, rad; infinite where it is not known
@@ -124,7 +124,7 @@ def _apart(near: Any, far: Any, units: Any) -> Any:
     return max(math.sqrt(place) * units[0], math.sqrt(momentum) * units[1]) if sound else math.nan
 
 
-class Integrated:
+class IntegratedMotion:
     """The motion of a body, or of a top as if it had no closed form, by Taylor series."""
 
     longest, reach = 20.0, 40.0  # natural periods: most of a probe that is a share of the run, and of a minimal one
@@ -277,7 +277,7 @@ def _frequencies(scene: Scene) -> tuple[float, float, float]:
     return slow, max(slow, math.sqrt(max(turning, swinging))), middle
 
 
-class Exact:
+class ExactMotion:
     """The motion of a top by its closed form, at any time."""
 
     watches, longest, reach, points, period_word = "axis", 20.0, math.inf, 300, "nutation"
@@ -286,15 +286,15 @@ class Exact:
         self.scene, self.landmarks, self.form = scene, landmarks(scene), closed_form(scene)
 
     def error(self, times: Array, chart: str, states: Array, since: float, _: float, /) -> Array:
-        """See `Integrated`; the error is that of the axis."""
+        """See `IntegratedMotion`; the error is that of the axis."""
         return self.form.axis_distance(since + times, axes(chart, states))
 
     def start(self, since: float, /) -> Any:
-        """See `Integrated`."""
+        """See `IntegratedMotion`."""
         return Angles(*(float(value) for value in self.form(since))) if since else self.scene.start
 
     def closest(self) -> float:
-        """See `Integrated`."""
+        """See `IntegratedMotion`."""
         width = self.landmarks.period if math.isfinite(self.landmarks.period) else self.scene.horizon
         middle = 0.5 * width
         for _ in range(4):
@@ -311,9 +311,9 @@ class Exact:
         return 0.0
 
     def rounding(self, horizon: float, *, whole: bool) -> float:  # noqa: ARG002
-        """See `Integrated`; not 0 for a `whole` run."""
+        """See `IntegratedMotion`; not 0 for a `whole` run."""
         marks, turns = self.landmarks, horizon / self.landmarks.period
         return marks.shear * 2.0 * math.pi * turns * min(marks.width, 1.0) if turns > 0.5 else 0.0
 
 
-Motion = Exact | Integrated  # one interface for the guard
+Motion = ExactMotion | IntegratedMotion  # one interface for the guard

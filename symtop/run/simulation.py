@@ -195,7 +195,7 @@ def simulate(
     """
     warn = functools.partial(warnings.warn, category=SymtopWarning, stacklevel=3)  # where `simulate` was called
     report = guard if callable(guard) else warn if isinstance(guard, str) or boolean("guard", guard) else None
-    asked = _prepared(scene, integrator, step_size, tolerance, horizon, samples, observe, budget, times)
+    asked = _setup(scene, integrator, step_size, tolerance, horizon, samples, observe, budget, times)
     chosen, method, plan = asked.scene, asked.method, asked.plan
     if isinstance(guard, str) and one_of("guard", guard, ("exact", "series")) == "exact" and chosen.of_body:
         raise SymtopError(f"guard must be series on {chosen.name}, a body without symmetry, not 'exact'", "guard")
@@ -218,10 +218,10 @@ def integrate(
     **settings: Any,
 ) -> Trajectory:  # fmt: skip
     """The run of `simulate` as plain arrays; `guard` is called with the guard's sentence, and None turns it off."""
-    return _guarded(_prepared(scene, integrator, **settings), guard)[0]
+    return _guarded(_setup(scene, integrator, **settings), guard)[0]
 
 
-class _Prepared(NamedTuple):
+class _Setup(NamedTuple):
     """The checked arguments of `simulate`, and the attribute ``sampling``."""
 
     scene: Scene
@@ -231,10 +231,10 @@ class _Prepared(NamedTuple):
     sampling: str
 
 
-def _prepared(
+def _setup(
     scene: Any, integrator: Any, step_size: Any = None, tolerance: object = None, horizon: object = None,
     samples: int = 501, observe: str | None = None, budget: Any = None, times: Any = None,
-) -> _Prepared:  # fmt: skip
+) -> _Setup:  # fmt: skip
     """Check the arguments of `simulate`. With `times`, the marks are the whole steps before each of them."""
     row = None if times is None else _checked_times(times, horizon, samples)
     chosen, method, h = find_scene(scene, bodies=True), find_integrator(integrator), math.nan
@@ -257,7 +257,7 @@ def _prepared(
             marks = np.where(np.abs(row - near * h) <= SAME_TIME * row, near, np.floor(row / h)).astype(np.int64)
         plan = plan._replace(times=row, horizon=float(row[-1]), step_size=h, marks=marks)
         sampling = "at times"
-    return _Prepared(chosen, method, chart, plan, sampling)
+    return _Setup(chosen, method, chart, plan, sampling)
 
 
 def _checked_times(times: ArrayLike, horizon: object, samples: object) -> Array:
@@ -275,7 +275,7 @@ def _checked_times(times: ArrayLike, horizon: object, samples: object) -> Array:
     return row
 
 
-def _guarded(asked: _Prepared, guard: Callable[[str], object] | None, series: bool = False) -> tuple[Trajectory, str]:
+def _guarded(asked: _Setup, guard: Callable[[str], object] | None, series: bool = False) -> tuple[Trajectory, str]:
     """Call `guard` with the guard's sentence, if any, and make the run; the sentence is "off" without a guard."""
     scene, method, chart, plan, sampling = asked
     caution = "off" if guard is None else ""

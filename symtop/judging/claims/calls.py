@@ -23,7 +23,7 @@ from symtop.core.errors import SymtopError
 from symtop.judging.adapters.adapter import A_STEP, Stepper, relative_gap
 from symtop.judging.adapters.external import MOST_STEPS
 from symtop.judging.claims.subject import Subject
-from symtop.judging.findings import Finding, Measured, inapplicable
+from symtop.judging.findings import Finding, Reading, inapplicable
 from symtop.measure.step_map import generic_start, one_step
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop
@@ -55,7 +55,7 @@ def measure(subject: Subject) -> list[Finding]:
 
 
 def _refuted(kind: str, why: str, value: float = math.nan, resolution: float = SAME_CALL) -> Finding:
-    return Finding("calls", "a function", Measured(kind), "refuted", why, value, resolution)
+    return Finding("calls", "a function", Reading(kind), "refuted", why, value, resolution)
 
 
 def _calls(subject: Subject) -> Finding:
@@ -101,7 +101,7 @@ def _calls(subject: Subject) -> Finding:
     except SymtopError as error:
         traits["forward only"] = str(error)
     why = "; ".join(["a call gives the same numbers again, and after a step elsewhere", *traits.values()])
-    return Finding("calls", "", Measured(", ".join(traits) or "a function"), "measured", why, gap, SAME_CALL)
+    return Finding("calls", "", Reading(", ".join(traits) or "a function"), "measured", why, gap, SAME_CALL)
 
 
 def _repeated(

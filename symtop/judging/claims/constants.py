@@ -31,7 +31,7 @@ from symtop.core.errors import SymtopError
 from symtop.core.numbers import EPSILON
 from symtop.judging.adapters.adapter import Stepper
 from symtop.judging.claims.subject import CONSTANTS, PLANE, QUICK_SHARE, STEPS_A_NUTATION, Subject, declared
-from symtop.judging.findings import UNMEASURED, Finding, Measured, agreement, inapplicable, undecided, yes_no
+from symtop.judging.findings import UNMEASURED, Finding, Reading, agreement, inapplicable, undecided, yes_no
 from symtop.measure.conservation import Change, Difference, behaviour, constant_of, from_increments, maxima, residuals
 from symtop.measure.step_map import one_step
 from symtop.methods.framework.calling import solve
@@ -116,7 +116,7 @@ class Constant(NamedTuple):
 
     def finding(self, claim: str, claimed: str, why: str) -> Finding:
         """The finding on the claim."""
-        verdict, measured = self.verdict(claimed), Measured(self.kind, self.changed.largest)
+        verdict, measured = self.verdict(claimed), Reading(self.kind, self.changed.largest)
         if self.kind == "unknown":
             why, measured = f"{why}; no law of growth to judge it by", UNMEASURED
         elif verdict == "undecided":
@@ -225,7 +225,7 @@ def blows_up(scene: Scene, change: Array) -> NDArray[np.int64]:
 
 def blow_up_finding(finding: Finding, time: float, of_body: bool, steps: str = "") -> Finding:
     """The finding on the energy of a run that blows up at `time`."""
-    measured, when = Measured("blows up", finding.value, f"blows up at t = {time:.3g}{steps}"), f"by t = {time:.3g}"
+    measured, when = Reading("blows up", finding.value, f"blows up at t = {time:.3g}{steps}"), f"by t = {time:.3g}"
     most = "the kinetic one of the start and 3 |mgl|" if of_body else "that of the nutation and 2 |mgl|"
     why = f"{when} it rises by more than {most}; before: {finding.why}"
     return finding._replace(measured=measured, verdict="refuted" if finding.declared else "measured", why=why)
@@ -390,7 +390,7 @@ def _of_states(run: LongRun) -> Finding:
         kind, why = "another run", f"a run contradicts itself, as if the method knew of it: the state {differs}"
     else:
         kind, why = "others", f"it reports other momenta than its states have: {other.name} {differs}"
-    return Finding("reported", declared, Measured(kind), verdict, why, other.size, other.floor)
+    return Finding("reported", declared, Reading(kind), verdict, why, other.size, other.floor)
 
 
 def _invariant(method: Integrator, run: LongRun) -> Finding:
@@ -414,7 +414,7 @@ def _costs(method: Integrator, run: LongRun) -> list[Finding]:
     text = f"{run.evaluations:.1f}" + f" ({run.iterations:.1f} it.)" * iterates
     solves = f" and {run.iterations:.2f} iterations" * iterates
     why = f"{run.evaluations:.2f} force evaluations{solves} a step, in {run.span}"
-    work = Finding("work", "", Measured("work", run.evaluations, text=text), "measured", why, run.evaluations, 0.0)
+    work = Finding("work", "", Reading("work", run.evaluations, text=text), "measured", why, run.evaluations, 0.0)
     if not (iterates or run.steady_cost):
         why = "it reports no iterations, but its steps do not all cost the same"
         return [undecided("explicit", claimed, why), work]
@@ -423,4 +423,4 @@ def _costs(method: Integrator, run: LongRun) -> list[Finding]:
     why += "; so does a method that solves linear equations" * (answer is None)
     why = f"it reports {run.iterations:.2f} iterations a step" if iterates else why
     finding = agreement("explicit", method.explicit, answer, why, run.iterations, 0.0)
-    return [finding._replace(measured=Measured(yes_no(answer))), work]
+    return [finding._replace(measured=Reading(yes_no(answer))), work]

@@ -44,7 +44,7 @@ from symtop.judging.claims.order_conditions import Conditions, conditions, split
 from symtop.judging.claims.step_series import Series, compared, step_series
 from symtop.judging.claims.structure import ONE_MAP, map_of
 from symtop.judging.claims.subject import FINEST_RUN, QUICK_SHARE, Subject, hidden_by_single
-from symtop.judging.findings import UNMEASURED, Finding, Measured, inapplicable, undecided, yes_no
+from symtop.judging.findings import UNMEASURED, Finding, Reading, inapplicable, undecided, yes_no
 from symtop.measure.accuracy import error_table
 from symtop.measure.order import CONFIRMED_BEYOND, LARGEST_ERROR, REFUTED_BEYOND, Fit, order_verdict, wrong_limit
 from symtop.measure.order_table import observable, order_fit, order_table
@@ -53,7 +53,7 @@ from symtop.measure.step_map import APART, SEVERAL, StepMap, aligned, generic_st
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import Array
-from symtop.methods.framework.preparation import Scaled
+from symtop.methods.framework.preparation import ScaledRule
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.runge_kutta.explicit import Tableau
 from symtop.methods.splitting.loop import Composition
@@ -98,7 +98,7 @@ def measure(subject: Subject) -> list[Finding]:
     if method.order is not None and finding.verdict == "confirmed":
         lower = _elsewhere(subject, method.order)
         if lower is not None:
-            measured = Measured("order", lower[0], text=f"{lower[0]:.1f} elsewhere")
+            measured = Reading("order", lower[0], text=f"{lower[0]:.1f} elsewhere")
             finding = Finding("order", finding.declared, measured, "refuted", lower[1], lower[0], LOWER)
     return [finding]
 
@@ -171,16 +171,16 @@ def on_body(subject: Subject) -> list[Finding]:
 
 def _wrong_limit(claim: int | None, wrong: float, why: str) -> Finding:
     verdict = "measured" if claim is None else "refuted"
-    return Finding("order", yes_no(claim), Measured("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)
+    return Finding("order", yes_no(claim), Reading("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)
 
 
-def _terms(series: Series) -> Measured:
+def _terms(series: Series) -> Reading:
     order, term = max(series.order, 0), series.order + 1
     text = f"{order} or more"
     if series.is_exact:
         miss = f"{series.defect[term]:.1g} +- {series.noise[term]:.0g} of it"
         text = f"{order}: in one step the term in h^{term} is the first that is wrong, by {miss}"
-    return Measured("by a term", order, text=text)
+    return Reading("by a term", order, text=text)
 
 
 def series_of(subject: Subject) -> Series | None:
@@ -208,10 +208,10 @@ class Order(NamedTuple):
     fits: dict[str, Fit]  # for the main quantity, theta and energy
 
     @property
-    def measured(self) -> Measured:
+    def measured(self) -> Reading:
         """The slope of the main quantity, or `UNMEASURED` if there is none."""
         fit = self.main
-        return Measured("slope", fit.slope, text=str(fit)) if math.isfinite(fit.slope) else UNMEASURED
+        return Reading("slope", fit.slope, text=str(fit)) if math.isfinite(fit.slope) else UNMEASURED
 
     def traces(self) -> dict[str, Array]:
         """Steps, errors and flags of those used in the fit, (SHOWN_SETTINGS,) from the finest on, padded with NaN."""
@@ -314,11 +314,11 @@ def _converges(fitted: Order, slopes: str) -> Finding:
     last, coarser = float(errors[0]), errors[tolerances > 0.99 * decades * tolerances[0]]
     why = f"an error of {last:.1e} at a tolerance of {tolerances[0]:.0e}, from {errors[-1]:.1e} at {tolerances[-1]:.0e}"
     if last <= ROUNDED_ERROR or (coarser.size and last < coarser.min() / less):
-        measured = fitted.measured or Measured("converges", last, text="converges as its tolerance falls")
+        measured = fitted.measured or Reading("converges", last, text="converges as its tolerance falls")
         return Finding("order", CONVERGES, measured, "confirmed", f"{why}; {slopes}", last, ROUNDED_ERROR)
     if not coarser.size:
         return undecided("order", CONVERGES, f"{why}: too few runs ended")
-    measured, why = Measured("wrong limit", last), f"it stays at {why}"
+    measured, why = Reading("wrong limit", last), f"it stays at {why}"
     return Finding("order", CONVERGES, measured, "refuted", why, last, ROUNDED_ERROR)
 
 
@@ -402,7 +402,7 @@ def _exactness(subject: Subject) -> Finding:
     largest = float(table[main].max())
     why = f"largest error {largest:.1e} at steps from {settings[-1]:.1e} s to {settings[0]:.1e} s on {scene.name}"
     right = largest <= TRUE_LIMIT
-    measured = Measured("exact", largest) if right else UNMEASURED
+    measured = Reading("exact", largest) if right else UNMEASURED
     return Finding("order", "exact", measured, "confirmed" if right else "refuted", why, largest, TRUE_LIMIT)
 
 
@@ -410,7 +410,7 @@ def table_of(method: Integrator) -> Conditions | None:
     """The conditions of an explicit Runge-Kutta method of fixed step or of a splitting into two flows; else None."""
     for solver in method.solvers.values():
         rule: Any = solver.rule if isinstance(solver, FixedStep) else None
-        rule = rule.rule if isinstance(rule, Scaled) else rule
+        rule = rule.rule if isinstance(rule, ScaledRule) else rule
         if isinstance(rule, Tableau):
             return conditions(triangle(rule.a, len(rule.b)), rule.b)
         if isinstance(rule, Composition) and rule.turn == EXACT:  # a Cayley map is no exact flow
@@ -431,17 +431,17 @@ def time_order(subject: Subject) -> list[Finding]:
         return [inapplicable("time", "a step of no length moves a state that is not of its chart")]
     power = series.order if order is None else order
     lower = min(series.order, power)
-    declared, measured, verdict = yes_no(order), Measured("order", lower, text=str(lower)), "measured"
+    declared, measured, verdict = yes_no(order), Reading("order", lower, text=str(lower)), "measured"
     if series.order >= min(power, series.resolved):
         if series.order < power:  # no higher term is resolved
-            measured, verdict = Measured("order", lower, text=f"{lower} or more"), "undecided"
+            measured, verdict = Reading("order", lower, text=f"{lower} or more"), "undecided"
         elif order is not None:
             verdict = "confirmed"
         why = f"where f depends on t, {series.words(power)}"
     elif subject.knows_top:
         return [inapplicable("time", "it knows equations of the top beside f, which depend on no time")]
     elif calls == {CLOCK_START * subject.scene.time_scale()}:  # a step for f(y), which is no fault
-        declared, measured = "", Measured("f(y) only", lower, text=f"f(y) only, {lower}")
+        declared, measured = "", Reading("f(y) only", lower, text=f"f(y) only, {lower}")
         why = "f is asked at the start of a step alone, which is right for f(y); where f depends on t, "
         why += series.wrong_term()
     elif series_by_clock(subject, 0.0)[0].order <= series.order:  # the order is wrong, and not the times

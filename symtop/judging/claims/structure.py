@@ -23,7 +23,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError
 from symtop.judging.claims.subject import Subject, hidden_by_single
-from symtop.judging.findings import Finding, Measured, agreement, inapplicable, undecided
+from symtop.judging.findings import Finding, Reading, agreement, inapplicable, undecided
 from symtop.measure import step_map as maps
 from symtop.measure.errors import errors
 from symtop.methods.framework.plan import Array
@@ -215,6 +215,6 @@ def pole(subject: Subject) -> list[Finding]:
     verdict = "measured" if not claim else "confirmed" if all(row.passes for row in relevant) else "refuted"
     if claim and any(row.outcome not in ("ok", "left_chart", "not_finite", "not_normalised") for row in relevant):
         verdict = "undecided"
-    measured = Measured(", ".join(dict.fromkeys(row.word for row in relevant)))
+    measured = Reading(", ".join(dict.fromkeys(row.word for row in relevant)))
     value = max(row.finer for row in relevant)
     return [Finding("pole", claim, measured, verdict, "; ".join(map(str, rows)), value, right)]

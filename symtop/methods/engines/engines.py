@@ -242,7 +242,7 @@ def _momentum_in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     return w, x, y, z, par.I1 * b1, par.I2 * b2, par.I3 * b3
 
 
-class Carried(NamedTuple):
+class MapForm(NamedTuple):
     """The functions of a map's state in a chart: its start, its momenta and its samples."""
 
     prepare: Preparation
@@ -251,14 +251,14 @@ class Carried(NamedTuple):
 
 
 VELOCITY = {
-    "axis": Carried(_top_prepared(e_at, 6, rates=True), _observing("axis"), _presenting("axis")),
-    "attitude": Carried(_top_prepared(q_at, 7, rates=True), _observing("attitude"), _presenting("attitude")),
-    BODY: Carried(_body_prepared(rates=True), _observing(BODY), _momentum_in_body),
+    "axis": MapForm(_top_prepared(e_at, 6, rates=True), _observing("axis"), _presenting("axis")),
+    "attitude": MapForm(_top_prepared(q_at, 7, rates=True), _observing("attitude"), _presenting("attitude")),
+    BODY: MapForm(_body_prepared(rates=True), _observing(BODY), _momentum_in_body),
 }
 ANGULAR_MOMENTUM = {
-    "axis": Carried(_top_prepared(e_at, 6, rates=False), observe_axis),
-    "attitude": Carried(_top_prepared(q_at, 7, rates=False), observe_attitude),
-    BODY: Carried(_body_prepared(rates=False), observe_attitude, _in_body),
+    "axis": MapForm(_top_prepared(e_at, 6, rates=False), observe_axis),
+    "attitude": MapForm(_top_prepared(q_at, 7, rates=False), observe_attitude),
+    BODY: MapForm(_body_prepared(rates=False), observe_attitude, _in_body),
 }
 
 
@@ -287,7 +287,7 @@ moved = by_length((3, _axis_moved), (4, lambda par, q, p, start: _gap(normalised
 
 
 def engine_loop(
-    step: Callable[..., Any], chart: str, carried: Carried, reused: Callable[..., Any] = _nothing,
+    step: Callable[..., Any], chart: str, carried: MapForm, reused: Callable[..., Any] = _nothing,
     number: Any = np.float64,
 ) -> Loop:  # fmt: skip
     """The loop around a map; `reused` gives the first carry; `number` is its type, single only with a quaternion."""
@@ -577,7 +577,7 @@ march_no_squish = Loop(no_carry, _increment_no_squish, observe_attitude)
 
 def _engine(
     name: str, step: Callable[..., Any], order: int | None, summary: str, reference: str, keeps: str = "", *,
-    carried: Mapping[str, Carried] = VELOCITY, reused: Callable[..., Any] = _nothing, forces: int = 1,
+    carried: Mapping[str, MapForm] = VELOCITY, reused: Callable[..., Any] = _nothing, forces: int = 1,
     energy_error: str | None = None, number: Any = np.float64,
 ) -> Integrator:  # fmt: skip
     """A map in every chart (in single precision, those with a quaternion); `keeps` names the momenta it conserves."""

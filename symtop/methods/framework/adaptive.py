@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from symtop.core.parallel import heed
+from symtop.core.parallel import check_interrupt
 from symtop.methods.framework.lanes import Ints, Many, refused
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUT_OF_BUDGET, OUTCOMES, Array, Plan, Run
 from symtop.model.top import Angles, SymmetricTop, flat, lightened
@@ -61,7 +61,7 @@ class Adaptive:
         out, times = refused(self.check, numbers), np.ascontiguousarray(times)
         done.outcome[out] = LEFT_CHART
         for i, plain in enumerate(map(tuple, numbers.tolist())):
-            heed()
+            check_interrupt()
             if not out[i]:
                 samples = times[i, : counts[i]]
                 made = self._run(plain, float(tolerance[i]), samples, budget, done.states[i], done.momenta[i])

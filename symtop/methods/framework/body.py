@@ -49,7 +49,7 @@ class Pose(NamedTuple):
 
 
 @register_jitable
-def opened(plain: Any) -> Any:
+def unpack_body(plain: Any) -> Any:
     """A body and a start, from their 14 numbers."""
     I1, I2, I3, mgl, x, y, z = plain[:7]
     body = General(1.0 / I1, 1.0 / I2, 1.0 / I3, I1, I2, I3, mgl * x, mgl * y, mgl * z)
@@ -81,7 +81,7 @@ of_top, in_space = Preparation(_of_top, 7), Presentation(_in_space, 7)  # a top 
 
 def prepared(numbers: Any) -> Preparation:
     """The preparation of a kernel with seven numbers in its state: ``numbers(body, start)``, `General` and `Pose`."""
-    return Preparation(numbers, 7, opened=opened, momenta=_momenta, given=14)
+    return Preparation(numbers, 7, unpack=unpack_body, momenta=_momenta, given=14)
 
 
 on_body = prepared(lambda body, at: (body, (at.w, at.x, at.y, at.z, at.M1, at.M2, at.M3)))

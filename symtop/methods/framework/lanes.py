@@ -54,7 +54,7 @@ from numpy.typing import NDArray
 
 from symtop.core.errors import SymtopError
 from symtop.core.jit import compile_kernel, is_stored, register_jitable, set_item, to_fixed_tuple
-from symtop.core.parallel import heed
+from symtop.core.parallel import check_interrupt
 from symtop.methods.framework.angles import in_chart, require_chart
 from symtop.methods.framework.plan import OK, Array
 from symtop.methods.framework.preparation import Preparation
@@ -129,13 +129,13 @@ class Lanes:
 def preparing(lanes: Lanes, begin: Any, enter: Any, kind: Any, scale: Any, prepare: Preparation) -> Any:
     """The compiled preparation of many members: the initial numbers of `block` and `table`, one row a member."""
     lay, begin, width = lanes.lay, lanes.begin or begin, prepare.given
-    numbers, opened, momenta_at = prepare.numbers, prepare.opened, prepare.momenta
+    numbers, unpack, momenta_at = prepare.numbers, prepare.unpack, prepare.momenta
 
     def fill(chosen, given, coefficients, h, marks, prepared, momenta):  # type: ignore[no-untyped-def]
         tops, rules, starts, carries = prepared
         for i in range(len(chosen)):
             m = chosen[i]
-            top, start = opened(to_fixed_tuple(given[m], width))
+            top, start = unpack(to_fixed_tuple(given[m], width))
             par, state = numbers(top, start)
             rule = scale(kind(coefficients), top, start, h[m])
             state = enter(par, rule, state, h[m])
@@ -395,7 +395,7 @@ class Blocks:
             self.prepare(batch, numbers, coefficients, h, marks, prepared, done.momenta)
             at = np.array([0, 0])
             while at[1] >= 0:
-                heed()
+                check_interrupt()
                 self.march(at, most, batch, prepared, h, marks, tuple(done), room)
             ended = (done.steps[batch] == marks[batch, -1]) | (done.outcome[batch] != OK)
             done.work[batch[ended]] += done.steps[batch[ended]] * lanes.effort(rule)

@@ -31,7 +31,7 @@ import numpy as np
 
 from symtop.core.errors import SymtopError, shown
 from symtop.core.jit import compile_kernel, register_jitable
-from symtop.core.parallel import heed
+from symtop.core.parallel import check_interrupt
 from symtop.methods.framework import lanes as many, preparation
 from symtop.methods.framework.lanes import Blocks, Ints, Lanes, Many
 from symtop.methods.framework.plan import LEFT_CHART, OK, Array, Plan, Run, ending
@@ -182,10 +182,10 @@ def whole_run(
     ``run(plain, coefficients, h, marks, states, momenta)``, with momenta (2, samples), returns steps, work and outcome.
     """
     begin, enter, march = loop.begin, loop.enter, register_jitable(loop.marching(sample))
-    numbers, opened, momenta_at = prepare.numbers, prepare.opened, prepare.momenta
+    numbers, unpack, momenta_at = prepare.numbers, prepare.unpack, prepare.momenta
 
     def run(plain, coefficients, h, marks, states, momenta):  # type: ignore[no-untyped-def]
-        top, at = opened(plain)
+        top, at = unpack(plain)
         par, state = numbers(top, at)
         rule = scale(kind(coefficients), top, at, h)
         state = enter(par, rule, state, h)
@@ -294,13 +294,13 @@ class FixedStep:
                 left = blocks.run(left, numbers, whole.rule, h, marks, done, most)
         short, momenta = marks[left, -1] <= BLOCK, np.empty((2, marks.shape[1]))
         for chosen in many.groups(left[short], marks[:, -1], most):
-            heed()
+            check_interrupt()
             plain = map(tuple, numbers[chosen].tolist())
             for i, at, step in zip(chosen.tolist(), plain, h[chosen].tolist(), strict=True):
                 done.steps[i], done.work[i], done.outcome[i] = run(at, rule, step, marks[i], done.states[i], momenta)
                 done.momenta[i] = momenta.T
         for i, top in zip(left[~short].tolist(), many.members_of(numbers[left[~short]]), strict=True):
-            heed()
+            check_interrupt()
             alone = self._in_stretches(*top, Plan.steps(float(h[i]), marks[i]))
             done.states[i], done.momenta[i], done.steps[i], done.work[i], done.outcome[i] = alone
         return done
@@ -330,7 +330,7 @@ class FixedStep:
         sample, size = (as_it_steps, prepare.size) if present is None else (present.sample, present.size)
         scale = preparation.as_it_is
         pack = getattr(rule, "pack", preparation.as_fields)
-        if isinstance(rule, preparation.Scaled):
+        if isinstance(rule, preparation.ScaledRule):
             scale, rule = rule.scale, rule.rule
         elif isinstance(rule, preparation.LazyRule):
             rule = rule.make()

@@ -4,7 +4,7 @@
     scale(rule, top, at, h) -> rule          the coefficients of a method times the step
     sample(par, t, state) -> state           a sample at the time t, in the chart that a user sees
 
-A `Preparation`, a `Scaled` rule and a `Presentation` each hold one such function and can be called like it. A run takes
+A `Preparation`, a `ScaledRule` and a `Presentation` each hold one such function and can be called like it. A run takes
 the function itself and compiles it into the loop (`loop.whole_run`): calls from Python cost more than a few steps of a
 kernel, above all if they pass a NamedTuple to compiled code.
 """
@@ -47,7 +47,7 @@ class Start(NamedTuple):
 
 
 @register_jitable
-def opened(plain: Any) -> Any:
+def unpack_top(plain: Any) -> Any:
     """A top and a start, from their nine numbers."""
     return BareTop(*plain[:3]), Start(*plain[3:])
 
@@ -66,7 +66,7 @@ class Preparation:
     numbers: Callable[..., tuple[Any, Numbers]]  # (top, at): the parameters and the state; compiles
     size: int  # of the state
     check: Callable[[Any], None] | None = None  # refuses a start that the kernel cannot step: raises SymtopError
-    opened: Callable[..., Any] = opened  # (plain): the records that `numbers` takes
+    unpack: Callable[..., Any] = unpack_top  # (plain): the records that `numbers` takes
     momenta: Callable[..., Any] = momenta_at  # (top, at): p_phi and p_psi
     given: int = 9  # how many plain numbers a top and a start have
 
@@ -77,7 +77,7 @@ class Preparation:
         """Kernel parameters and state of a start."""
         if self.check is not None:
             self.check(at)
-        return self.numbers(*self.opened(flat(top, at)))
+        return self.numbers(*self.unpack(flat(top, at)))
 
 
 @functools.cache
@@ -92,24 +92,24 @@ def as_fields(rule: Any) -> tuple[Callable[[Any], Any], Any]:
 
 
 @functools.cache
-def _on_numbers(scale: Callable[..., Any], table: Callable[[Any], Any], opened: Callable[[Any], Any]) -> Any:
-    """`scale` by itself, compiled; `table` makes the table from plain numbers, `opened` the top and the start."""
+def _on_numbers(scale: Callable[..., Any], table: Callable[[Any], Any], unpack: Callable[[Any], Any]) -> Any:
+    """`scale` by itself, compiled; `table` makes the table from plain numbers, `unpack` the top and the start."""
 
     def scaled(plain, numbers, h):  # type: ignore[no-untyped-def]
-        top, at = opened(plain)
+        top, at = unpack(plain)
         return scale(table(numbers), top, at, h)
 
     return compile_kernel(scaled)
 
 
 @dataclass(frozen=True)
-class Scaled:
+class ScaledRule:
     """A rule whose numbers depend on the run: ``scale(rule, top, start, h)``, compiled."""
 
     rule: Any  # a NamedTuple
     scale: Callable[..., Any]
     pack: Pack = as_fields
-    opened: Callable[..., Any] = opened  # as `Preparation` has it
+    unpack: Callable[..., Any] = unpack_top  # as `Preparation` has it
 
     def __post_init__(self) -> None:
         register_jitable(self.scale)
@@ -117,7 +117,7 @@ class Scaled:
     def __call__(self, top: SymmetricTop, at: Angles, h: float) -> Any:
         """The rule of one run."""
         made, table = self.pack(self.rule)
-        return _on_numbers(self.scale, made, self.opened)(flat(top, at), table, h)
+        return _on_numbers(self.scale, made, self.unpack)(flat(top, at), table, h)
 
 
 @dataclass(frozen=True)

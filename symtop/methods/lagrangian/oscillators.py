@@ -37,7 +37,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from symtop.core.jit import register_jitable
-from symtop.methods.framework.preparation import Preparation, Scaled
+from symtop.methods.framework.preparation import Preparation, ScaledRule
 from symtop.model.exact.elliptic import differences, half_period, r_j, roots
 from symtop.model.top import nutation_period
 
@@ -186,4 +186,4 @@ def _mapped(rule: Any, top: Any, at: Any, h: float) -> Any:
     return Map(aD1, D1, r1, q1, turn1, aD2, D2, r2, q2, turn2, par.kappa, odd, float(parts))
 
 
-numbers = Scaled(Map(), _mapped)
+numbers = ScaledRule(Map(), _mapped)

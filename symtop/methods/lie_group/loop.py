@@ -46,7 +46,7 @@ def _on_body(top: Any, at: Any) -> Any:
     return BareTop(top.I1, top.I3, top.mgl), _attitude_numbers(top, at)[1]
 
 
-class Carried(NamedTuple):
+class SpinForm(NamedTuple):
     """How the body's spin is stepped: the start of a kernel, and how the attitude is shown."""
 
     prepare: Preparation
@@ -54,9 +54,9 @@ class Carried(NamedTuple):
     top: Any  # the NamedTuple of the numbers of the top
 
 
-UNSPUN = Carried(on_attitude, Presentation(lambda par, t, y: with_spin(par, y, t), 7), SpaceTop)
-SPUN = Carried(Preparation(_on_body, 7), None, BareTop)
-TURNED = Carried(turned, turned_back, General)  # a body without symmetry
+UNSPUN = SpinForm(on_attitude, Presentation(lambda par, t, y: with_spin(par, y, t), 7), SpaceTop)
+SPUN = SpinForm(Preparation(_on_body, 7), None, BareTop)
+TURNED = SpinForm(turned, turned_back, General)  # a body without symmetry
 _AXIS = Presentation(lambda _par, _t, y: (*axis_of(y[0], y[1], y[2], y[3]), y[4], y[5], y[6]), 6)
 STILL = (0.0,) * 7  # no increment
 
@@ -119,7 +119,7 @@ def lie_loop(
 
 
 def in_charts(
-    loop: Loop, rule: Any, carried: Carried, forces: int, *, implicit: bool, of_body: Loop | None = None
+    loop: Loop, rule: Any, carried: SpinForm, forces: int, *, implicit: bool, of_body: Loop | None = None
 ) -> dict[str, FixedStep]:
     """Solvers on the axis and on the attitude, and of a body around a loop on (q*, M) with `observe_turned`.
 
@@ -142,14 +142,14 @@ LOW, STEP, FLAG, WORK, CARRY = SIZE, 2 * SIZE, 3 * SIZE, 3 * SIZE + 1, 3 * SIZE 
 
 
 @register_jitable
-def entered(block: Any, j: int) -> Any:
+def present_state(block: Any, j: int) -> Any:
     """The present quaternion of lane j, within the step, its axis, and the momentum."""
     y = summed(column(block, 0, j, STILL), column(block, STEP, j, STILL))
     return y[:4], axis_of(*y[:4]), y[4:]
 
 
 @register_jitable
-def left(block: Any, j: int, q: Any, m: float, v: Any, dL: Any) -> None:
+def add_rotation(block: Any, j: int, q: Any, m: float, v: Any, dL: Any) -> None:
     """Add the rotation of a share to the step of lane j."""
     put(block, STEP, j, composed(column(block, STEP, j, STILL), q, m, v, dL))
 
@@ -162,7 +162,7 @@ def give_up(block: Any, j: int, when: bool) -> None:
 
 def stepped(
     part: Callable[..., None], lay: Callable[..., None], fields: int, each: int, *,
-    carried: Carried, carry: int = 1, begin: Callable[..., Any] = no_carry, room: int = 0,
+    carried: SpinForm, carry: int = 1, begin: Callable[..., Any] = no_carry, room: int = 0,
     effort: Callable[[Any], int] = lambda _: 0,
 ) -> Lanes:  # fmt: skip
     """A map in lanes: ``part(block, table, row)`` makes one share of all lanes; `row` holds the share's numbers.
@@ -205,7 +205,7 @@ Parts = tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # sta
 def iterated_loop(  # noqa: C901  (the loops of one step, read in one piece)
     parts: Parts, most: int, *, opened: int, unknowns: int, in_lanes: Parts | None = None,
     numbers: Callable[..., Any] = lambda _: (0.0,), count: int = 1, begin: Callable[..., Any] = no_carry,
-    carry: int = 1, carried: Carried = SPUN, observe: Callable[..., Any] = observe_attitude,
+    carry: int = 1, carried: SpinForm = SPUN, observe: Callable[..., Any] = observe_attitude,
 ) -> Loop:  # fmt: skip
     """The loop around an iterated map of a body, for one and in lanes, from its parts; it counts passes as work.
 
@@ -233,7 +233,7 @@ def iterated_loop(  # noqa: C901  (the loops of one step, read in one piece)
         wide_vectors()
         for j in range(W):
             par, rule, carry, h = given(block, table, row, j)
-            _, e, L = entered(block, j)
+            _, e, L = present_state(block, j)
             fixed, x = begin_lane(par, rule, e, L, carry, h)
             put(block, first, j, fixed)
             put(block, x_at, j, x)
@@ -253,7 +253,7 @@ def iterated_loop(  # noqa: C901  (the loops of one step, read in one piece)
         for j in range(W):
             par, rule, carry, h = given(block, table, row, j)
             m, v, dL, newest = close_lane(par, rule, carry, h, opens(block, first, j), unknown(block, x_at, j))
-            left(block, j, entered(block, j)[0], m, v, dL)
+            add_rotation(block, j, present_state(block, j)[0], m, v, dL)
             put(block, CARRY, j, newest)
             give_up(block, j, block[live_at * W + j] != 0.0)
 

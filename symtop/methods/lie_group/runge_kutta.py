@@ -48,13 +48,13 @@ from symtop.methods.framework.space import observe_attitude
 from symtop.methods.lie_group.loop import (
     TURNED,
     UNSPUN,
-    Carried,
-    entered,
+    SpinForm,
+    add_rotation,
     give_up,
     in_charts,
-    left,
     lie_loop,
     moved,
+    present_state,
     stepped,
 )  # fmt: skip
 from symtop.methods.runge_kutta.explicit import add, row_of, store, weighted_in_lanes
@@ -91,7 +91,7 @@ def any_angle(square: float) -> Any:
 
 
 @register_jitable
-def acted(so_far: Any, L: Any, element: Any, turned: Any) -> Any:
+def times_exponential(so_far: Any, L: Any, element: Any, turned: Any) -> Any:
     """A product of exponentials with one more, exp(w, f) of s, m and C: its rotation, the axis and the change of L."""
     (total, v, x, dL), (s, m, cubic), w, f = so_far, turned, element[:3], element[3:]
     u, bent = scaled(s, w), cross(w, f)
@@ -110,7 +110,7 @@ def _bracket(element: Any, other: Any) -> Any:
 
 
 @register_jitable
-def bent_back(element: Any, slope: Any, brackets: Any) -> Any:
+def dexp_inverse(element: Any, slope: Any, brackets: Any) -> Any:
     """dexp^-1 of an element of the algebra, two, four or six nested brackets of it, on another one."""
     once = _bracket(element, slope)
     twice = _bracket(element, once)
@@ -161,7 +161,7 @@ def _product(count: int, terms: int, first: int, stages: int) -> Part:
             so_far, _, far = before(e, L, slopes, row, j)
             element = summed(NO_SLOPE, slopes, row, j)
             square = half_square(element)
-            return acted(so_far, L, element, near(square)), element, far if square < 1.0 else 1.0
+            return times_exponential(so_far, L, element, near(square)), element, far if square < 1.0 else 1.0
 
     return register_jitable(made)
 
@@ -181,14 +181,14 @@ def _stages(field: Part, counts: tuple[int, ...], stages: int, brackets: int) ->
             so_far, element, too_far = made(e, L, known, row, j)
             slope = field(par, plus(L, 1.0, so_far[3]))
             if brackets:
-                slope = bent_back(element, slope, brackets)
+                slope = dexp_inverse(element, slope, brackets)
             return (*known, slope), max(far, too_far)
 
     return register_jitable(slopes)
 
 
 @functools.cache
-def _of_shape(field: Part, carried: Carried, counts: tuple[int, ...], brackets: int) -> Lanes:
+def _of_shape(field: Part, carried: SpinForm, counts: tuple[int, ...], brackets: int) -> Lanes:
     stages, top, top_at = len(counts), carried.top, reading(len(carried.top._fields))
     slopes = _stages(field, counts[:-1], stages, brackets)
     whole = _product(counts[-1], stages, sum(counts[:-1]) * stages, stages)
@@ -196,10 +196,10 @@ def _of_shape(field: Part, carried: Carried, counts: tuple[int, ...], brackets: 
     def part(block, table, row):  # type: ignore[no-untyped-def]
         wide_vectors()
         for j in range(W):
-            par, (q, e, L) = top(*top_at(table, 0, j)), entered(block, j)
+            par, (q, e, L) = top(*top_at(table, 0, j)), present_state(block, j)
             known, far = slopes(par, e, L, row, j)
             (m, v, _, dL), _, too_far = whole(e, L, known, row, j)
-            left(block, j, q, m, v, dL)
+            add_rotation(block, j, q, m, v, dL)
             give_up(block, j, max(far, too_far) != 0.0)
 
     each = sum(counts) * stages
@@ -219,7 +219,7 @@ def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return np.empty((len(rule.counts), 6))
 
 
-def _loop(field: Part, carried: Carried, observe: Callable[..., Any]) -> Loop:
+def _loop(field: Part, carried: SpinForm, observe: Callable[..., Any]) -> Loop:
     """The loop around a step with ``field(par, L)`` in se(3); the work counted is the number of force evaluations."""
 
     def turn(par, rule, e, L, slopes, h):  # type: ignore[no-untyped-def]
@@ -233,10 +233,10 @@ def _loop(field: Part, carried: Carried, observe: Callable[..., Any]) -> Loop:
                 for j in range(i):
                     element = add(element, row_of(slopes, j, NO_SLOPE), h * rule.weights[row + j])
                 row += stages
-                made = acted(made, L, element, any_angle(half_square(element)))
+                made = times_exponential(made, L, element, any_angle(half_square(element)))
             if i < stages:
                 slope = field(par, plus(L, 1.0, made[3]))
-                store(slopes, i, bent_back(element, slope, rule.brackets) if rule.brackets > 0.0 else slope)
+                store(slopes, i, dexp_inverse(element, slope, rule.brackets) if rule.brackets > 0.0 else slope)
         return made[0], made[1], made[3], slopes, stages, OK
 
     def lanes(rule: LieTable) -> Lanes:

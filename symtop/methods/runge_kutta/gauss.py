@@ -206,14 +206,14 @@ class GaussRule(NamedTuple):
 
 
 @register_jitable
-def _opened(rows: Any) -> GaussRule:
+def _unpack(rows: Any) -> GaussRule:
     s = rows.shape[1]
     return GaussRule(rows[:s], rows[s], rows[s + 1 :], (1.0,))
 
 
 def packed(rule: GaussRule) -> tuple[Callable[[Any], GaussRule], Array]:
     """How a rule is passed to compiled code: as one array, a faster argument than three."""
-    return _opened, np.vstack([rule.mu, rule.b, rule.predict])
+    return _unpack, np.vstack([rule.mu, rule.b, rule.predict])
 
 
 def _antiderivative(roots: list[Any], x: Any) -> Any:

@@ -123,14 +123,14 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
     sample lies in.
     """
     field, ended, observe, prepare, size = form.field, form.ended, form.observe, form.prepare.numbers, form.prepare.size
-    opened = form.prepare.opened
+    unpack = form.prepare.unpack
     sample = as_it_steps if form.present is None else form.present.sample
     register_jitable(observe)
     advance, refine, between, last, power = method(field)
     clock = size + rows * size
 
     def march(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]
-        par, state = prepare(*opened(numbers))
+        par, state = prepare(*unpack(numbers))
         memory, nothing, end = np.zeros((rows, size)), zero(state), times[-1]
         kept = place[:clock].reshape(1 + rows, size)  # the state, and the memory, there across lines of the cache
         steps = effort = outcome = 0
@@ -375,12 +375,12 @@ def two_runs(chart: str, pair: Pair, compare: Callable[..., float]) -> Callable[
     has ``compare(state, other state, given)``. An overflow is not reported: the run goes on.
     """
     form: Any = FORMS[chart]
-    field, numbers, opened = form.field, form.prepare.numbers, form.prepare.opened
+    field, numbers, unpack = form.field, form.prepare.numbers, form.prepare.unpack
     stages, total = stages_of(field, pair.table), combination(pair.table.b)
 
     def run(near, far, h, marks, given, seen):  # type: ignore[no-untyped-def]
-        par, first = numbers(*opened(near))
-        nothing, state = zero(first), side_by_side(first, numbers(*opened(far))[1])
+        par, first = numbers(*unpack(near))
+        nothing, state = zero(first), side_by_side(first, numbers(*unpack(far))[1])
         none = low = side_by_side(nothing, nothing)
         k = 0
         for j in range(len(marks)):

@@ -45,7 +45,7 @@ from symtop.core.jit import register_jitable, set_item
 from symtop.methods.framework import body
 from symtop.methods.framework.lanes import Lanes, W, column, put
 from symtop.methods.framework.loop import FixedStep, Loop
-from symtop.methods.framework.preparation import Scaled, opened
+from symtop.methods.framework.preparation import ScaledRule, unpack_top
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import ended_space
 from symtop.methods.simd import wide_vectors
@@ -62,9 +62,9 @@ def _scale(rule: Any, top: Any, at: Any, h: float) -> Any:
     return stages(rule, h, h, 2.0 * h * h * h, 0.0)
 
 
-def scaled(rule: Composition) -> Scaled:
+def scaled(rule: Composition) -> ScaledRule:
     """The table as a rule that is scaled by the step of a run."""
-    return Scaled(rule, _scale, packed, body.opened)
+    return ScaledRule(rule, _scale, packed, body.unpack_body)
 
 
 _TURNS = BLANES_MOAN_6, METHODS["kahan-li-6"].table, METHODS["kahan-li-8"].table
@@ -215,24 +215,24 @@ def _in_lanes(outer: tuple[float, ...], inner: tuple[float, ...]) -> tuple[Any, 
     first, _, third, momentum = TOGETHER
 
     @register_jitable
-    def begun(par, state, step, time):  # type: ignore[no-untyped-def]
+    def begin(par, state, step, time):  # type: ignore[no-untyped-def]
         return third(state, step, outer[0] * (time * (par.a3 - par.a2)))
 
     @register_jitable
-    def opened(block, table, j):  # type: ignore[no-untyped-def]
+    def load(block, table, j):  # type: ignore[no-untyped-def]
         return body.General(*column(table, 0, j, PAR)), column(block, 0, j, STATE), column(block, STEP, j, STATE)
 
     @register_jitable
-    def turned(block, row, table, part, next_part, j):  # type: ignore[no-untyped-def]
-        par, state, step = opened(block, table, j)
+    def turn(block, row, table, part, next_part, j):  # type: ignore[no-untyped-def]
+        par, state, step = load(block, table, j)
         step, first_ok = first(state, step, part * (row[2 * W + j] * (par.a1 - par.a2)))
         step, third_ok = third(state, step, next_part * (row[2 * W + j] * (par.a3 - par.a2)))
         put(block, STEP, j, step)
         block[FLAG * W + j] = block[FLAG * W + j] if first_ok & third_ok else 1.0
 
     @register_jitable
-    def ended(block, row, table, j):  # type: ignore[no-untyped-def]
-        par, state, step = opened(block, table, j)
+    def close(block, row, table, j):  # type: ignore[no-untyped-def]
+        par, state, step = load(block, table, j)
         step, near = momentum(state, step, row[2 * W + j] * par.a2)
         put(block, STEP, j, step)
         put(block, FLAG + 2, j, _force(par, state, step))
@@ -244,11 +244,11 @@ def _in_lanes(outer: tuple[float, ...], inner: tuple[float, ...]) -> tuple[Any, 
         for i in range(len(inner)):
             part, next_part = inner[i], outer[i + 1]  # read here: LLVM copies a tuple of 17 to read one number of it
             for j in range(W):
-                turned(block, row, table, part, next_part, j)
+                turn(block, row, table, part, next_part, j)
         for j in range(W):
-            ended(block, row, table, j)
+            close(block, row, table, j)
 
-    return begun, rest
+    return begin, rest
 
 
 AS_GIVEN, SORTED = range(2)  # the order of the axes of five rotations, in `Composition.turn`
@@ -316,7 +316,7 @@ def five_rotations(order_of_axes: int) -> FixedStep:
 def built_in() -> list[Integrator]:
     """`five-rotations`."""
     on_body = five_rotations(AS_GIVEN)
-    rule = replace(on_body.rule, opened=opened)
+    rule = replace(on_body.rule, unpack=unpack_top)
     on_top = replace(on_body, loop=march_five_of_top, rule=rule, prepare=body.of_top, present=body.in_space)
     return [
         Integrator(

@@ -18,7 +18,7 @@ from symtop.core.errors import SymtopError, finite, one_of, row
 from symtop.methods.framework.angles import on_angles
 from symtop.methods.framework.body import on_body
 from symtop.methods.framework.loop import FixedStep, Loop, Prepare
-from symtop.methods.framework.preparation import Scaled
+from symtop.methods.framework.preparation import ScaledRule
 from symtop.methods.framework.registry import Integrator, ModifiedEnergy
 from symtop.methods.framework.space import on_attitude, on_axis
 from symtop.methods.splitting import angles, body, space
@@ -67,7 +67,7 @@ def composition(
         )
     table = rule._replace(turn=ROTATIONS.index(rotation), processor=boost)
     scale = angles.scale if chart == "angles" else space.tuned if table.turn == TUNED else space.scale
-    stages = Scaled(table, scale, packed)
+    stages = ScaledRule(table, scale, packed)
     kick_drift_kick = bare and rule.drift == (1.0,) and rule.kick == (0.5, 0.5)
     solvers = {
         shown: FixedStep(march, stages, prepare, 1, implicit=False)

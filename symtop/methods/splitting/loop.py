@@ -45,17 +45,17 @@ class Composition(NamedTuple):
 
 
 @functools.cache
-def _opened(n: int) -> Callable[[Any], Composition]:
+def _unpack(n: int) -> Callable[[Any], Composition]:
     """From the numbers in a row to a composition with n drifts, in compiled code."""
     m, end = n + 1, 3 * n + 2
 
     @register_jitable
-    def opened(row: Any) -> Composition:
+    def unpack(row: Any) -> Composition:
         drift, kick = to_fixed_tuple(row[:n], n), to_fixed_tuple(row[n : n + m], m)
         gradient = to_fixed_tuple(row[n + m : end], m)
         return Composition(drift, kick, gradient, int(row[end]), int(row[end + 1]), row[end + 2])
 
-    return opened
+    return unpack
 
 
 @register_jitable
@@ -72,8 +72,8 @@ def packed(rule: Any) -> tuple[Callable[[Any], Composition], NDArray[np.float64]
     are rows of the array, so that one kernel is compiled for all of them.
     """
     drift, kick, gradient = rule[:3]
-    opened = _opened(len(drift)) if len(drift) <= FEW_DRIFTS else _of_any_length
-    return opened, np.array([*drift, *kick, *gradient, *rule[3:]], dtype=float)
+    unpack = _unpack(len(drift)) if len(drift) <= FEW_DRIFTS else _of_any_length
+    return unpack, np.array([*drift, *kick, *gradient, *rule[3:]], dtype=float)
 
 
 class Stages(NamedTuple):

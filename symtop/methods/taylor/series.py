@@ -68,7 +68,7 @@ from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.lanes import Lanes, loop_with_rule
 from symtop.methods.framework.loop import FixedStep, Loop, no_carry
 from symtop.methods.framework.plan import NOT_FINITE, STEP_TOO_SMALL
-from symtop.methods.framework.preparation import BareTop, Presentation, Scaled, Start, as_it_steps
+from symtop.methods.framework.preparation import BareTop, Presentation, ScaledRule, Start, as_it_steps
 from symtop.methods.framework.registry import Integrator
 from symtop.methods.framework.space import SpaceTop, axis_of, finite_outcome, with_spin
 from symtop.methods.runge_kutta.explicit import row_of, store
@@ -370,7 +370,7 @@ def series(name: str, order: int = DEFAULT_ORDER) -> Integrator:
     order = whole("order", order, ORDERS[0])
     if order not in ORDERS:
         raise SymtopError(f"order must be one of {', '.join(map(str, ORDERS))}, not {order!r}")
-    rule = Scaled(Scale(), _scale)
+    rule = ScaledRule(Scale(), _scale)
     return Integrator(
         name=name, family="taylor",
         summary=f"Taylor series on the space-frame equations, order {order}, by products of vectors",

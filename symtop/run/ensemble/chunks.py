@@ -21,13 +21,13 @@ from xarray.core import indexing
 
 from symtop.core.errors import SymtopError, foreign_code
 from symtop.core.jit import to_fixed_tuple
-from symtop.core.parallel import cores, heed, in_threads
+from symtop.core.parallel import check_interrupt, cores, in_threads
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.lanes import Ints, W, column, divided, members_of, of_bodies, put, turns
 from symtop.methods.framework.loop import FixedStep
 from symtop.methods.framework.plan import LEFT_CHART, NOT_FINITE, NOT_NORMALISED, OK, OUTCOMES, Plan, ending, off_length
-from symtop.methods.framework.preparation import opened
+from symtop.methods.framework.preparation import unpack_top
 from symtop.methods.framework.registry import Integrator, integrator as find_integrator
 from symtop.methods.library import exact
 from symtop.methods.simd import wide_vectors
@@ -120,7 +120,7 @@ def all_periods(numbers: Array, periods: Array) -> None:
     n, lanes = len(numbers), np.empty(len(_NONE) * W)
     for first in range(0, n, W):
         for j in range(W):
-            top, start = opened(to_fixed_tuple(numbers[min(first + j, n - 1)], _WIDTH))
+            top, start = unpack_top(to_fixed_tuple(numbers[min(first + j, n - 1)], _WIDTH))
             cosine = math.cos(start.theta)
             put(lanes, 0, j, (*nutation_cubic(top, start), cosine, -1.0, cosine, 1.0, cosine))
         for _ in range(BISECTIONS):
@@ -128,7 +128,7 @@ def all_periods(numbers: Array, periods: Array) -> None:
                 at = column(lanes, 0, j, _NONE)
                 put(lanes, 5, j, bisected(at[:4], at[4], *at[5:]))
         for j in range(min(W, n - first)):
-            top, start = opened(to_fixed_tuple(numbers[first + j], _WIDTH))
+            top, start = unpack_top(to_fixed_tuple(numbers[first + j], _WIDTH))
             low, below, high, above = column(lanes, 5, j, _NONE[:4])
             low, high = 0.5 * (low + below), 0.5 * (high + above)
             period = period_between(top, start, low, high)
@@ -270,7 +270,7 @@ class Job:
         momenta, (steps, work, iterations, outcome) = np.full((n, self.samples, 2), np.nan), np.zeros((4, n), int)
         runs = _Runs(states, momenta, steps, work, iterations, outcome, np.zeros(n))
         for i, (top, start) in enumerate(members_of(self.numbers)):
-            heed()
+            check_interrupt()
             if self.chart == "angles" and not 0.0 < start.theta < np.pi:
                 runs.outcome[i] = LEFT_CHART
                 continue
