@@ -246,7 +246,7 @@ def measured_order(
         decided = problem is scene or order_verdict(method.order, fits[main], fits.values()) != "undecided"
         if orders[-1].measured and decided:
             return orders[-1]
-    return next((finding for finding in orders if finding.measured), orders[-1 if scene.of_body else 0])
+    return next((order for order in orders if order.measured), orders[-1 if scene.of_body else 0])
 
 
 def _by_steps(subject: Subject) -> Finding:
