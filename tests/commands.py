@@ -106,14 +106,14 @@ def contents(results: Path, *, provenance: bool = False) -> dict[str, xr.Dataset
     for path in sorted([*results.rglob("*.nc"), *results.rglob("cases/*/*.npz")]):
         data = netcdf.read(path) if path.suffix == ".nc" else store.load_case(path)
         assert data is not None, path
-        kept = {key: value for key, value in data.attrs.items() if provenance or key not in netcdf.provenance()}
-        datasets[str(path.relative_to(results))] = data.drop_attrs().assign_attrs(kept)
+        attributes = {key: value for key, value in data.attrs.items() if provenance or key not in netcdf.provenance()}
+        datasets[str(path.relative_to(results))] = data.drop_attrs().assign_attrs(attributes)
     return datasets
 
 
-def same(one: Path, other: Path) -> int:
+def same(results: Path, expected: Path) -> int:
     """How many datasets two results folders hold, whose datasets must be the same to the bit."""
-    first, second = contents(one), contents(other)
+    first, second = contents(results), contents(expected)
     assert first.keys() == second.keys()
     assert all(first[name].identical(second[name]) for name in first)
     return len(first)

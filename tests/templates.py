@@ -18,14 +18,14 @@ def checked(name: str, data: object, folder: Path, elsewhere: Collection[str] = 
     assert page is not None
     close = lambda figure, _: plt.close(figure)
     findings = runner.findings_of(study, data, folder, close, failures=[], cases=1, page=page)
-    there = {one["name"] for kind in ("pictures", "tables") for one in findings[kind]}
-    absent = set(re.findall(r"has\(\"([\w-]+)\"\)", findings["page"])) - there
-    assert {first or linked for first, linked in NAMED.findall(findings["page"])} - absent == there - {*elsewhere}, (
+    names = {item["name"] for kind in ("pictures", "tables") for item in findings[kind]}
+    absent = set(re.findall(r"has\(\"([\w-]+)\"\)", findings["page"])) - names
+    assert {first or linked for first, linked in NAMED.findall(findings["page"])} - absent == names - {*elsewhere}, (
         "figures and tables of the template and of the study differ"
     )
     text = template.filled(findings, folder)
     empty = {**findings, "facts": dict.fromkeys(findings["facts"]), "pictures": [], "tables": []}
-    for one in (text, template.filled(empty, folder)):
-        assert not re.search(r"\b(None|nan|inf)\b", one), one
-        assert "{{" not in one
+    for content in (text, template.filled(empty, folder)):
+        assert not re.search(r"\b(None|nan|inf)\b", content), content
+        assert "{{" not in content
     return text

@@ -49,8 +49,8 @@ class Module:
 
     @property
     def room(self) -> str:
-        package, *rest = self.name.split(".")
-        return "studies" if package == "symtop_studies" else rest[0] if rest else "face"
+        package, *parts = self.name.split(".")
+        return "studies" if package == "symtop_studies" else parts[0] if parts else "face"
 
 
 def read(root: Path) -> dict[str, Module]:
@@ -77,8 +77,8 @@ def _arrows(node: ast.AST, package: str, known: set[str], *, typing: bool = Fals
                 inner = f"{source}.{alias.name}"
                 yield Arrow(inner if inner in known else source, child.lineno, typing)
         elif isinstance(child, STATEMENTS):
-            checked = isinstance(child, ast.If) and ast.unparse(child.test).rpartition(".")[2] == "TYPE_CHECKING"
-            yield from _arrows(child, package, known, typing=typing or checked)
+            typing_only = isinstance(child, ast.If) and ast.unparse(child.test).rpartition(".")[2] == "TYPE_CHECKING"
+            yield from _arrows(child, package, known, typing=typing or typing_only)
 
 
 def upward(modules: dict[str, Module]) -> list[str]:
@@ -101,11 +101,11 @@ def circles(modules: dict[str, Module]) -> list[str]:
     """Sets of files that import each other, directly or through others; TYPE_CHECKING imports aside."""
     names = sorted(modules)
     graph = np.zeros((len(names), len(names)), dtype=bool)
-    for place, name in enumerate(names):
+    for row, name in enumerate(names):
         targets = {arrow.target for arrow in modules[name].arrows if not arrow.typing}
-        graph[place] = [other in targets for other in names]
+        graph[row] = [target in targets for target in names]
     count, group = connected_components(graph, connection="strong")
-    sets = ([name for name, one in zip(names, group, strict=True) if one == k] for k in range(count))
+    sets = ([name for name, label in zip(names, group, strict=True) if label == k] for k in range(count))
     return sorted(" <-> ".join(members) for members in sets if len(members) > 1)
 
 

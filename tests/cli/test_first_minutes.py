@@ -43,14 +43,14 @@ def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(tmp_path):
     assert "on-the-axis" in page
     assert "of-a-user" in page
     call("study", "convergence", "--only", "no-such", code=2)
-    nothing = call("study", "truth", "--quick", "--only", "on-the-axis", "--plugin", axis_only, code=2)
-    assert "study truth has no case of on-the-axis" in nothing.stderr
+    result = call("study", "truth", "--quick", "--only", "on-the-axis", "--plugin", axis_only, code=2)
+    assert "study truth has no case of on-the-axis" in result.stderr
     for name in ("on-the-axis", "on-the-axis,exact"):  # exact is the closed form, which stays where others are measured
         words = ["--quick", "--only", name, "--status", "--results", tmp_path, "--plugin", axis_only]
-        several = call("study", "truth", "convergence", *words)
-        assert "study truth has no case of on-the-axis" in several.stderr
-        assert several.stderr.rstrip().endswith("it is left out")
-        assert several.stdout.startswith("convergence: ")
+        result = call("study", "truth", "convergence", *words)
+        assert "study truth has no case of on-the-axis" in result.stderr
+        assert result.stderr.rstrip().endswith("it is left out")
+        assert result.stdout.startswith("convergence: ")
 
 
 def test_a_proposed_step_is_of_use_and_the_guard_warns_of_what_the_verdict_calls_wrong():
@@ -99,9 +99,9 @@ def test_a_cold_ensemble_is_never_silent_for_long_and_a_recording_hears_a_silenc
 
 @pytest.mark.quick
 def test_the_command_of_a_recommendation_holds_the_options_of_the_body():
-    own = ["--body", "2,1.5,1", "--rates=-0.1,0,3"]
-    answer = call("recommend", "body", *own, "--accuracy", "1e-3", "--needs", "derivative", "--horizon", "10").output
-    (command,) = re.findall(r"^Run it: symtop (.*)$", answer, re.MULTILINE)
+    body = ["--body", "2,1.5,1", "--rates=-0.1,0,3"]
+    output = call("recommend", "body", *body, "--accuracy", "1e-3", "--needs", "derivative", "--horizon", "10").output
+    (command,) = re.findall(r"^Run it: symtop (.*)$", output, re.MULTILINE)
     assert " --horizon 10.0 " in command
     assert command.endswith(" --body 2.0,1.5,1.0 --rates -0.1,0.0,3.0")
     assert "accurate to" in call(*shlex.split(command)).output

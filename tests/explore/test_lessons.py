@@ -95,7 +95,7 @@ def test_a_hand_reaches_everything_and_every_text_can_be_read(explorer):
     before = browser.evaluate("document.querySelector('#step_size').value")
     count = browser.evaluate("+document.body.dataset.answers")
     browser.evaluate("document.querySelector('#map').scrollIntoView()")
-    browser.drag("#map", at=(0.3, 0.4))
+    browser.drag("#map", xy=(0.3, 0.4))
     browser.wait_for(f"+document.body.dataset.answers > {count}")
     assert browser.evaluate("document.querySelector('#step_size').value") != before
 
