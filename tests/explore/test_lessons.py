@@ -17,20 +17,20 @@ RANGE = {"step_least": 0.01, "step_most": 0.6, "spin_least": -4.0, "spin_most": 
 
 
 def test_a_cell_of_the_map_is_the_run_that_a_click_asks_for():
-    chosen, steps, spins = answers.grid(fields(**RANGE))
-    errors = unpacked(answers.outcome_map(chosen, steps, spins)["error_rad"]).reshape(answers.ROWS, answers.COLUMNS)
-    early = 0
+    setup, steps, spins = answers.grid(fields(**RANGE))
+    errors = unpacked(answers.outcome_map(setup, steps, spins)["error_rad"]).reshape(answers.ROWS, answers.COLUMNS)
+    failures = 0
     for row, column in ((0, 0), (8, 10), (20, 20), (31, 47), (16, 47)):
-        alone = answers.answer(answers.setup(fields(step_size=steps[column], psi_dot=spins[row])))
-        early += alone["outcome"] != "ok"
-        assert np.isnan(errors[row, column]) == (alone["outcome"] != "ok")
-        if alone["outcome"] == "ok":  # nine samples of the many of a run
-            assert 0.2 * alone["largest"]["axis_error"] < errors[row, column] < 1.001 * alone["largest"]["axis_error"]
-    assert 0 < early < 5
+        run = answers.answer(answers.setup(fields(step_size=steps[column], psi_dot=spins[row])))
+        failures += run["outcome"] != "ok"
+        assert np.isnan(errors[row, column]) == (run["outcome"] != "ok")
+        if run["outcome"] == "ok":  # nine samples of the many of a run
+            assert 0.2 * run["largest"]["axis_error"] < errors[row, column] < 1.001 * run["largest"]["axis_error"]
+    assert 0 < failures < 5
     assert errors[8, 10] != pytest.approx(errors[20, 20], rel=0.01)
-    for wrong, word in (({"integrator": "rk45"}, "one with a step"), ({"step_least": 0.7}, "must not be empty")):
+    for changes, word in (({"integrator": "rk45"}, "one with a step"), ({"step_least": 0.7}, "must not be empty")):
         with pytest.raises(symtop.SymtopError, match=word):
-            answers.grid(fields(**RANGE | wrong))
+            answers.grid(fields(**RANGE | changes))
 
 
 def text(browser, name):
@@ -59,8 +59,8 @@ def test_a_story_a_cell_and_a_link(explorer):
     browser.wait_for(f"document.querySelector('#status').textContent.startsWith({json.dumps(status)})")
     assert browser.evaluate(form) == before
     browser.wait_for("document.querySelector('#map-note').textContent.startsWith('stormer-verlet')")
-    (said,) = re.findall(r"([\d,]+) runs a second$", text(browser, "map-note"))
-    assert int(said.replace(",", "")) > 0
+    (rate,) = re.findall(r"([\d,]+) runs a second$", text(browser, "map-note"))
+    assert int(rate.replace(",", "")) > 0
     spin = browser.evaluate("document.querySelector('#psi_dot').value")
     browser.evaluate("document.querySelector('#map').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowDown'}))")
     assert browser.evaluate("+document.querySelector('#psi_dot').value") < float(spin)
@@ -170,12 +170,12 @@ def test_what_the_story_of_the_tennis_racket_says():
         k = np.flatnonzero(along[:-1] * along[1:] < 0.0)
         return time[k] + (time[k + 1] - time[k]) * along[k] / (along[k] - along[k + 1])
 
-    exact, late = [14.9, 42.4, 69.9, 97.5], [13.3, 37.7, 62.2, 86.7]
-    shown, good = answer_to("tennis-racket"), answer_to("tennis-racket", True)
-    np.testing.assert_allclose(flips(good, "true_middle"), exact, atol=0.1)
-    np.testing.assert_allclose(flips(good), exact, atol=0.1)
-    np.testing.assert_allclose(flips(shown), late, atol=0.1)
-    assert max(shown["largest"]["energy"], good["largest"]["energy"]) < 1e-15
+    exact, times = [14.9, 42.4, 69.9, 97.5], [13.3, 37.7, 62.2, 86.7]
+    reply, true_reply = answer_to("tennis-racket"), answer_to("tennis-racket", True)
+    np.testing.assert_allclose(flips(true_reply, "true_middle"), exact, atol=0.1)
+    np.testing.assert_allclose(flips(true_reply), exact, atol=0.1)
+    np.testing.assert_allclose(flips(reply), times, atol=0.1)
+    assert max(reply["largest"]["energy"], true_reply["largest"]["energy"]) < 1e-15
     assert flips(answer_to("tennis-racket", step_size=0.1))[-1] - exact[-1] == pytest.approx(-0.2, abs=0.1)
     assert symtop.scene("tennis-racket", bodies=True).nutation_period / 0.6 == pytest.approx(10.0, abs=0.6)
 
@@ -187,8 +187,8 @@ def test_a_body_is_two_bricks_side_by_side(explorer):
     answered(browser, "#story", "tennis-racket")
     browser.wait_for("document.querySelector('#status').textContent.startsWith('lie-variational: reached t = 100')")
     visible = "document.querySelector('{}').checkVisibility()"
-    for name, shown in {"#plot-middle": True, "#I2": True, "#w2": True, "#map": False, "#theta": False}.items():
-        assert browser.evaluate(visible.format(name)) is shown, name
+    for name, state in {"#plot-middle": True, "#I2": True, "#w2": True, "#map": False, "#theta": False}.items():
+        assert browser.evaluate(visible.format(name)) is state, name
     before = browser.evaluate("document.querySelector('#sphere').toDataURL().length")
     answered(browser, "#I1-slider", 0.2)  # and the sides of the bricks
     browser.wait_for(f"document.querySelector('#sphere').toDataURL().length !== {before}")

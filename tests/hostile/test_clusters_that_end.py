@@ -63,18 +63,18 @@ def computed(results):
     return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in results.rglob("cases/*/*.npz")}
 
 
-def after(cluster, results, happens):
+def after(cluster, results, event):
     """How a study's command ends to whose cluster something happens midway, and how many seconds later."""
     process = symtop("study", PROBE, "--results", results, "--scheduler", cluster.address)
     try:
-        began = time.monotonic()
+        start = time.monotonic()
         while len(computed(results)) < 3:
             assert process.poll() is None, process.communicate()
-            assert time.monotonic() - began < 120.0
+            assert time.monotonic() - start < 120.0
             time.sleep(0.05)
-        happens()
-        began, result = time.monotonic(), ended(process, 300.0)
-        return *result, time.monotonic() - began
+        event()
+        start, result = time.monotonic(), ended(process, 300.0)
+        return *result, time.monotonic() - start
     finally:
         stop(process)
 
@@ -113,9 +113,9 @@ def test_a_cluster_that_is_gone_before_or_never_answers_is_one_sentence(tmp_path
         if how in ("killed", "stopped"):
             cluster.scheduler.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
         address = f"tcp://{HERE}:{deaf.getsockname()[1]}" if how == "deaf" else cluster.address
-        began = time.monotonic()
+        start = time.monotonic()
         code, _, err = ended(symtop(*words, "--scheduler", address), 300.0)
-        seconds = time.monotonic() - began
+        seconds = time.monotonic() - start
     print(f"{what}, {how}: {code} after {seconds:.1f} s, {err!r}")
     assert (code, [*tmp_path.glob("a.nc*")]) == (2, [])
     assert "scheduler must be the address of a dask scheduler that answers and has workers" in err

@@ -55,8 +55,8 @@ def test_a_python_step_makes_the_steps_of_the_tableau_that_it_is(chart):
     ours, mine = symtop.simulate(SPHEROID, tableau.variant(chart), **plan), run_of(PythonStep(midpoint, chart))
     np.testing.assert_allclose(mine["axis"].values, ours["axis"].values, rtol=0, atol=1e-12)
     np.testing.assert_allclose(mine["p_psi"].values, ours["p_psi"].values, rtol=1e-12)
-    ended = run_of(PythonStep(lambda f, t, y, h: midpoint(f, t, y, h) * (1.0 if t < 0.45 else np.nan), chart))
-    assert [ended.attrs[key] for key in ("outcome", "reached_time", "steps")] == ["not_finite", 0.4, 100]
+    run = run_of(PythonStep(lambda f, t, y, h: midpoint(f, t, y, h) * (1.0 if t < 0.45 else np.nan), chart))
+    assert [run.attrs[key] for key in ("outcome", "reached_time", "steps")] == ["not_finite", 0.4, 100]
     assert run_of(PythonStep(lambda f, t, y, h: -abs(y) if t > 0.3 else y, "angles"))["theta"].count() == 2  # has left
 
 
@@ -66,16 +66,16 @@ def test_a_scipy_class_makes_the_steps_that_it_is_told_to():
     assert run.attrs["steps"] == 200
     assert run.attrs["force_evaluations"] == pytest.approx(600, abs=5)  # it has one in hand at each end
     finer, truth = run_of(open_target(Mine, None, "axis"), 400), symtop.reference(SPHEROID, run["time"].values)
-    misses = [float(np.abs(one["axis"].values - truth["axis"].values).max()) for one in (run, finer)]
+    misses = [float(np.abs(result["axis"].values - truth["axis"].values).max()) for result in (run, finer)]
     assert misses[0] / misses[1] == pytest.approx(8.0, rel=0.1)
 
 
 def test_separable_steps_are_those_of_the_splitting_and_a_rotation_is_that_of_the_top():
     stepper = RotationStep(lambda q, w, h, inertia, torque: (q, w))
     par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
-    shown = stepper.form.present(par, np.zeros(1), np.array([state]))[0]
-    at = symtop.simulate(SPHEROID, "strang[attitude]", step_size=0.1, horizon=0.2, samples=2, guard=False).isel(time=0)
-    np.testing.assert_allclose(np.abs(shown[:4] @ at["quaternion"].values), 1.0, atol=1e-14)
+    values = stepper.form.present(par, np.zeros(1), np.array([state]))[0]
+    run = symtop.simulate(SPHEROID, "strang[attitude]", step_size=0.1, horizon=0.2, samples=2, guard=False).isel(time=0)
+    np.testing.assert_allclose(np.abs(values[:4] @ run["quaternion"].values), 1.0, atol=1e-14)
     p_phi, p_psi = stepper.form.momenta(par, np.array([state]))
     np.testing.assert_allclose([p_phi[0], p_psi[0]], SPHEROID.top.momenta(SPHEROID.start)[:2], rtol=1e-14)
     ours = symtop.simulate(SPHEROID, "stormer-verlet", step_size=0.004, horizon=0.8, samples=2).isel(time=-1)
@@ -123,13 +123,13 @@ FLIPPED = STILL.replace("*numbers[6:12]", "*(-float(x) for x in numbers[6:10]), 
 TURNED = STILL.replace("*numbers[6:12]", "numbers[6], float(numbers[7]) + 6.283185307179586, *numbers[8:]")
 
 
-@pytest.mark.parametrize(("body", "chart", "changed"), [
+@pytest.mark.parametrize(("body", "chart", "change"), [
     (STILL, "axis", lambda y: y), (RAW, "axis", lambda y: y), (FLIPPED, "attitude", lambda y: [*-y[:4], *y[4:]]),
     (TURNED, "angles", lambda y: [y[0], y[1] + 2.0 * np.pi, *y[2:]]),
 ])  # fmt: skip
-def test_a_program_gets_one_line_and_writes_states(tmp_path, body, chart, changed):
+def test_a_program_gets_one_line_and_writes_states(tmp_path, body, chart, change):
     state, states = marched(open_target(program(tmp_path, body), "program", chart), 0.5, [0, 6, 9])
-    np.testing.assert_array_equal(states, [changed(state)] * 3)
+    np.testing.assert_array_equal(states, [change(state)] * 3)
 
 
 def test_text_as_long_as_raw_doubles_is_text(tmp_path):
@@ -186,9 +186,9 @@ for numbers in map(str.split, sys.stdin):
     ("os.close(1); time.sleep(99)", "had not ended its answer with an empty line 2 s after", 2),
 ])  # fmt: skip
 def test_a_server_is_started_once_and_again_only_if_it_fails(tmp_path, body, words, starts, monkeypatch):
-    late = "had not" in words
-    monkeypatch.setattr(heartbeat, "patience", 2.0 if late else 0.0 if "licence" in words else 20.0)
-    monkeypatch.setattr(external, "STARTING", 0.0 if late else 30.0)  # seconds, also of a second start
+    silent = "had not" in words
+    monkeypatch.setattr(heartbeat, "patience", 2.0 if silent else 0.0 if "licence" in words else 20.0)
+    monkeypatch.setattr(external, "STARTING", 0.0 if silent else 30.0)  # seconds, also of a second start
     mark, file = tmp_path / "starts", tmp_path / "engine.py"
     file.write_text(SERVES.format(mark=str(mark), body=body))
     stepper = open_target(f"{sys.executable} {file}", "server", "axis")
@@ -283,8 +283,8 @@ def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, onl
     """Beside a pole angles know a state badly; a pendulum has momenta of zero, which are no unit."""
     only("calls", "order")
     judge = partial(symtop.judge, scene=scene, quick=True)
-    right = judge(rk4, order=4)
-    assert (right.refuted, right["order"].verdict, right["calls"].measured.kind) == ([], "confirmed", "a function")
+    ledger = judge(rk4, order=4)
+    assert (ledger.refuted, ledger["order"].verdict, ledger["calls"].measured.kind) == ([], "confirmed", "a function")
     faults = (midpoint, 3), (lambda f, t, y, h: rk4(f, t, y, h) + 1e-10 * h * (f(t, y) - f(t + h, y + h * f(t, y))), 4)
     verdicts = [judge(step, order=power).refuted for step, power in faults], judge(_keeps_its_slope)["calls"].verdict
     assert verdicts == ([["order"]] * 2, "refuted")
@@ -294,12 +294,12 @@ def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, onl
         assert judge(lambda f, t, y, h: midpoint(f, t, y, 1.001 * h), order=2).refuted == ["order"]
 
 
-@pytest.mark.parametrize("kept", [0.0, 1e-3])
-def test_what_a_run_that_blows_up_makes_of_the_last_bit_is_nothing_that_a_step_keeps(kept):
+@pytest.mark.parametrize("memory", [0.0, 1e-3])
+def test_what_a_run_that_blows_up_makes_of_the_last_bit_is_nothing_that_a_step_keeps(memory):
     scene, calls_made = symtop.scene("separatrix"), itertools.count()
-    stepper = PythonStep(lambda f, t, y, h: midpoint(f, t, y, h) + kept * h * (next(calls_made) % 7), "axis")
+    stepper = PythonStep(lambda f, t, y, h: midpoint(f, t, y, h) + memory * h * (next(calls_made) % 7), "axis")
     missed, _ = calls._cut(stepper, scene, calls.SHARE * scene.time_scale() / 1.6, [(8, 30), (3, 4)])
-    assert (missed > calls.RECALLED) is (kept > 0.0)
+    assert (missed > calls.RECALLED) is (memory > 0.0)
 
 
 def in_single(step):
@@ -314,14 +314,14 @@ def test_single_precision_is_no_other_motion_and_one_of_a_step_in_it_is(scene, o
     options = {"scene": scene, "quick": True}
     assert symtop.judge(in_single(midpoint), order=2, **options)["order"].verdict == "confirmed"
     assert symtop.judge(in_single(midpoint), order=3, **options).refuted == ["order"]
-    with pytest.MonkeyPatch.context() as slowly:  # time for every step that single precision allows, on any machine
-        slowly.setattr(subject, "SLOPES", (600.0, 600.0))
+    with pytest.MonkeyPatch.context() as patch:  # time for every step that single precision allows, on any machine
+        patch.setattr(subject, "SLOPES", (600.0, 600.0))
         added = lambda f, t, y, h: y + (in_single(rk4)(f, t, y, h) - np.float32(y)).astype(float)
-        hidden = [symtop.judge(step, order=4, **options)["order"] for step in (in_single(rk4), added)]
+        findings = [symtop.judge(step, order=4, **options)["order"] for step in (in_single(rk4), added)]
     words = "undecided: single precision hides errors below about 1e-04: "
-    assert all(f"{one.verdict}: {one.why}".startswith(words) for one in hidden)
-    slow = symtop.judge(in_single(lambda f, t, y, h: midpoint(f, t, y, 0.999 * h)), order=2, **options)["order"]
-    assert (slow.verdict, slow.measured.kind) == ("refuted", "wrong limit")
+    assert all(f"{finding.verdict}: {finding.why}".startswith(words) for finding in findings)
+    finding = symtop.judge(in_single(lambda f, t, y, h: midpoint(f, t, y, 0.999 * h)), order=2, **options)["order"]
+    assert (finding.verdict, finding.measured.kind) == ("refuted", "wrong limit")
     assert "single" not in symtop.judge(midpoint, order=2, **options)["order"].why
 
 
@@ -342,7 +342,7 @@ def test_single_precision_refutes_nothing_that_its_rounding_hides(only):
 
     only("symplectic", "symmetric", "energy", "p_psi", "pole")
     claims = {"quick": True, "symplectic": True, "symmetric": True, "energy": "bounded", "form": "separable"}
-    good, bad = symtop.judge(euler, **claims), symtop.judge(lambda *given: euler(*given, share=0.0), **claims)
+    good, bad = symtop.judge(euler, **claims), symtop.judge(lambda *args: euler(*args, share=0.0), **claims)
     verdicts = good["symplectic"].verdict, good["energy"].verdict
     assert (good.refuted, *verdicts) == (["symmetric"], "undecided", "confirmed")
     assert good["symplectic"].why.startswith("single precision hides errors below about 4e-04: ")
@@ -371,11 +371,11 @@ def test_an_axis_that_stays_upright_is_refused_in_a_sentence_and_one_that_hangs_
 @pytest.mark.parametrize("claimed", [*late(2, mark="slow"), *late(12)])
 def test_a_motion_that_is_wrong_is_told_so_whatever_is_claimed(claimed, only):
     only("order")
-    for factor, wrong in ((0.999, 2e-3), (0.0, None)):  # the second stands still
-        slow = lambda f, t, y, h, factor=factor: midpoint(f, t, y, factor * h)
-        finding = symtop.judge(slow, order=claimed, quick=True)["order"]
+    for factor, expected in ((0.999, 2e-3), (0.0, None)):  # the second stands still
+        step = lambda f, t, y, h, factor=factor: midpoint(f, t, y, factor * h)
+        finding = symtop.judge(step, order=claimed, quick=True)["order"]
         assert finding.measured.kind == "wrong limit"
-        assert wrong is None or finding.value == pytest.approx(wrong, rel=0.2)
+        assert expected is None or finding.value == pytest.approx(expected, rel=0.2)
 
 
 def test_a_step_that_returns_nan_or_the_derivative_is_told_so(only):
@@ -384,9 +384,9 @@ def test_a_step_that_returns_nan_or_the_derivative_is_told_so(only):
         ledger = symtop.judge(lambda f, t, y, h, value=value: f(t, y) + value, quick=True)
         assert (ledger["calls"].measured.kind, ledger["calls"].verdict) == (words, "refuted")
         assert ("differ" in ledger["calls"].why, bool(ledger["order"].measured)) == (False, False)
-    nine = lambda *given: np.array([float(f"{x:.9g}") for x in midpoint(*given)])
+    rounded = lambda *args: np.array([float(f"{x:.9g}") for x in midpoint(*args)])
     still = lambda f, t, y, h: midpoint(f, t, y, h) if abs(h) > 1e-6 else y  # too short to be made, it says
-    kinds = [symtop.judge(step, quick=True)["calls"].measured.kind for step in (midpoint, nine, still)]
+    kinds = [symtop.judge(step, quick=True)["calls"].measured.kind for step in (midpoint, rounded, still)]
     assert kinds == ["a function", "few digits", "stands still"]
     pole = symtop.judge(lambda f, t, y, h: rk4(f, t, y, h) if y[3:] @ y[3:] > 9.0 else None, quick=True)["pole"]
     assert (pole.declared, pole.verdict) == ("", "undecided")  # a bare step that fails there has not claimed it
@@ -431,15 +431,15 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset(monkeypat
     events = []
     ledger = symtop.judge(changes_its_input, quick=True, tell=events.append)
     assert (events[0].name, events[1:]) == ("changes_its_input", list(ledger.findings))
-    assert [one.claim for one in ledger.findings] == [claim for stage in stages("step") for claim in stage.claims]
-    assert {one.verdict for one in ledger.findings} <= set(VERDICTS) - {"refuted", "confirmed"}
+    assert [entry.claim for entry in ledger.findings] == [claim for stage in stages("step") for claim in stage.claims]
+    assert {finding.verdict for finding in ledger.findings} <= set(VERDICTS) - {"refuted", "confirmed"}
     assert "writes to its input" in ledger["calls"].why
     data = ledger.dataset()
-    assert data["measured"].values.tolist() == [str(one.measured) for one in ledger.findings]
+    assert data["measured"].values.tolist() == [str(finding.measured) for finding in ledger.findings]
     assert data.attrs["name"] == "changes_its_input"
-    told_of = {line[:15].strip(): line[15:] for line in str(ledger).splitlines()}
+    texts = {line[:15].strip(): line[15:] for line in str(ledger).splitlines()}
     expected = {"order": "1.0", "symplectic": "no, ", "p_phi": "kept, ", "energy": "drifts, ", "work": "2.0 "}
-    assert [name for name, words in expected.items() if not told_of[name].startswith(words)] == []
+    assert [name for name, words in expected.items() if not texts[name].startswith(words)] == []
 
 
 EXAMPLES = ROOT / "studies" / "examples"
@@ -511,7 +511,7 @@ def of_rotation(function, step_size, horizon):
 
 
 def test_a_step_of_rotation_matrices_is_judged_as_one_of_quaternions_until_it_is_no_rotation():
-    matrices, quaternions = (of_rotation(one, 0.01, 2.0) for one in (euler_of_matrices, euler_of_quaternions))
+    matrices, quaternions = (of_rotation(step, 0.01, 2.0) for step in (euler_of_matrices, euler_of_quaternions))
     assert matrices.attrs["outcome"] == quaternions.attrs["outcome"] == "ok"
     np.testing.assert_allclose(matrices["axis"].values, quaternions["axis"].values, atol=1e-11)
     np.testing.assert_allclose(matrices["p_phi"].values, quaternions["p_phi"].values, rtol=1e-10)
@@ -571,7 +571,7 @@ def test_a_step_that_slows_down_is_judged_on_shorter_runs_and_one_that_stops_say
         return symtop.judge(step, quick=True)
 
     slow = slow_from(20.0, 5e-4)
-    monkeypatch.setattr(judge_step, "seconds_a_step", lambda *given: time.sleep(1.0) or subject.seconds_a_step(*given))
+    monkeypatch.setattr(judge_step, "seconds_a_step", lambda *args: time.sleep(1.0) or subject.seconds_a_step(*args))
     stuck = slow_from(0.0, 2.5e-3)
     assert (slow["energy"].measured.kind in ("drift", "growing"), 300 < slow.traces["steps_run"] < 5000) == (True, True)
     assert [stuck[claim].verdict for claim in stuck] == ["undecided"] * 3

@@ -40,11 +40,11 @@ def step_of(name, *modules):
     return next((vars(module)[name] for module in modules if name in vars(module)), None) or getattr(integrate, name)
 
 
-def confirmed(ledger, *claims):
+def check_claims(ledger, *claims):
     """Nothing is refuted, these claims are confirmed, and the order in time is that of the claim if it is."""
     assert ledger.refuted == [], str(ledger)
-    time = [one for one in ledger.findings if one.claim == "time" and one.verdict == "confirmed"]
-    assert all(str(one.measured.number) == one.declared for one in time)
+    time = [finding for finding in ledger.findings if finding.claim == "time" and finding.verdict == "confirmed"]
+    assert all(str(finding.measured.number) == finding.declared for finding in time)
     assert {ledger[claim].verdict for claim in claims} <= {"confirmed"}, str(ledger)
 
 
@@ -56,7 +56,7 @@ def test_a_correct_method_is_not_refuted(name, seconds, monkeypatch):
     claims, options = right.CLAIMS[name]
     ledger = symtop.judge(step_of(name, right), quick=True, **claims, **options)
     explicit = ["explicit"] if claims.get("explicit") else []  # that it is not, nobody sees from outside
-    confirmed(ledger, *(claim for claim in claims if claim in SHOWN), *explicit)
+    check_claims(ledger, *(claim for claim in claims if claim in SHOWN), *explicit)
     assert ledger["pole"].verdict in ("measured", "inapplicable")  # never claimed of a step
 
 
@@ -67,7 +67,7 @@ def test_what_is_claimed_of_a_correct_method_is_confirmed_in_short_runs(name, on
     only(*(claim for stage in battery.TABLE for claim in stage.claims))
     claims, options = right.CLAIMS[name]
     ledger = symtop.judge(step_of(name, right), quick=True, **claims, **options)
-    confirmed(ledger, *(claim for claim in claims if claim in SHOWN))
+    check_claims(ledger, *(claim for claim in claims if claim in SHOWN))
 
 
 @pytest.mark.quick
@@ -77,9 +77,9 @@ def test_classes_of_variable_order_are_judged_at_a_tolerance(name, only):
     only("calls", "order", "pole")
     ledger = symtop.judge(step_of(name, right), quick=True, adaptive=True)
     assert (ledger["calls"].verdict, ledger["pole"].verdict) == ("inapplicable", "measured")
-    for one in (ledger, symtop.judge(step_of(name, right), scene="heavy-brick", quick=True, adaptive=True)):
-        confirmed(one, "order")
-        assert description(one.findings) in ("converges as its tolerance falls", "order 5")
+    for each in (ledger, symtop.judge(step_of(name, right), scene="heavy-brick", quick=True, adaptive=True)):
+        check_claims(each, "order")
+        assert description(each.findings) in ("converges as its tolerance falls", "order 5")
     assert symtop.judge(wrong.WrongSum, scene="heavy-brick", quick=True, adaptive=True).refuted == ["order"]
 
 
@@ -96,7 +96,7 @@ def test_a_symmetric_step_is_symmetric_where_its_iteration_fails_at_long_steps(o
 @pytest.mark.parametrize("name", ["rk4", "dormand_prince"])
 def test_a_correct_method_is_not_refuted_in_another_chart(name, chart):
     order = right.CLAIMS[name][0]["order"]
-    confirmed(symtop.judge(step_of(name, right), chart=chart, quick=True, order=order), "order")
+    check_claims(symtop.judge(step_of(name, right), chart=chart, quick=True, order=order), "order")
 
 
 @needs_compiler
@@ -120,13 +120,13 @@ def test_what_is_written_in_c(tmp_path, source, options, claims, refuted):
         assert refuted in ledger.refuted, str(ledger)
     else:
         constants = ("energy", "p_phi", "p_psi") if "energy" in claims else ()
-        confirmed(ledger, *(claim for claim in claims if claim in SHOWN), *constants)
+        check_claims(ledger, *(claim for claim in claims if claim in SHOWN), *constants)
 
 
 @needs_compiler
 def test_the_order_of_a_correct_program_is_confirmed(tmp_path, only):
     only("calls", "order")
-    confirmed(symtop.judge(compiled(tmp_path, "strang.c", program=True), quick=True, order=2, **PROGRAM), "order")
+    check_claims(symtop.judge(compiled(tmp_path, "strang.c", program=True), quick=True, order=2, **PROGRAM), "order")
 
 
 @pytest.mark.slow
@@ -188,7 +188,7 @@ def test_a_method_of_several_steps_is_not_judged_by_the_steps_that_start_it(chan
 def test_a_small_defect_of_the_bracket_that_stands_out_of_its_noise_is_not_confirmed(only):
     only("symplectic")
     for loss, verdict in ((0.0, "confirmed"), (1e-9, "undecided"), (1e-7, "refuted")):
-        damped = lambda *given, loss=loss: right.own_drift(*given) * np.repeat([1.0, 1.0 - loss], 3)
+        damped = lambda *args, loss=loss: right.own_drift(*args) * np.repeat([1.0, 1.0 - loss], 3)
         assert symtop.judge(damped, quick=True, symplectic=True)["symplectic"].verdict == verdict
 
 
@@ -229,8 +229,8 @@ def test_a_seed_draws_the_same_and_without_a_claim_the_order_is_said_and_not_the
     assert text == "2: in one step the term in h^3 is the first that is wrong, by 1e-07"
     assert 0.0 < float(doubt.removesuffix(" of it")) < 1e-9
     assert description(ledger.findings) == "order 2"
-    first, again = (symtop.judge(wrong.late_euler, quick=True, order=4, seed=7) for _ in range(2))
-    assert (first["order"].why, "of seed 7" in first["order"].why) == (again["order"].why, True)
+    first, second = (symtop.judge(wrong.late_euler, quick=True, order=4, seed=7) for _ in range(2))
+    assert (first["order"].why, "of seed 7" in first["order"].why) == (second["order"].why, True)
     assert (first.refuted, first.about.seed) == (["order"], 7)
 
 

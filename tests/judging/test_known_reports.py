@@ -143,10 +143,10 @@ def page():
 
 
 def test_the_page_has_every_report_and_what_was_foreseen():
-    shown = page()
-    assert {row: foreseen for row, (foreseen, _) in shown.items() if row in RULES} == FORESEEN
-    assert len({row.partition(",")[0] for row in shown}) == 10
-    assert set(shown) - set(RULES) == {"Drake #18816"}
+    rows = page()
+    assert {row: foreseen for row, (foreseen, _) in rows.items() if row in RULES} == FORESEEN
+    assert len({row.partition(",")[0] for row in rows}) == 10
+    assert set(rows) - set(RULES) == {"Drake #18816"}
 
 
 @pytest.mark.parametrize("row", ["OrdinaryDiffEq #577", "GeometricIntegrators #220"])
