@@ -43,7 +43,7 @@ class Page:
         if block.file:
             Path(block.file).write_text(block.code, encoding="utf-8")
         elif block.language == "text":
-            assert self.output is None or words(block.code) in words(self.said)
+            assert self.output is None or words(block.code) in words(self.output)
         elif block.slow and not self.slow:
             self.output = None
         elif block.language == "python":

@@ -115,16 +115,16 @@ def test_a_study_that_is_edited_before_it_is_concluded_is_drawn_again(script, tm
 
 
 @pytest.mark.usefixtures("shared")
-@pytest.mark.parametrize("bad", ["refused", "silent"])
-def test_what_stops_one_study_does_not_stop_the_others(script, tmp_path, bad):
+@pytest.mark.parametrize("kind", ["refused", "silent"])
+def test_what_stops_one_study_does_not_stop_the_others(script, tmp_path, kind):
     """A grid that is refused ends the command after those before it; of findings that fail the next go on."""
-    code, output = studied(tmp_path / "r", script("first"), script(bad), script("second"))
+    code, output = studied(tmp_path / "r", script("first"), script(kind), script("second"))
     assert code == 2
     assert "first: 2 of 2 cases computed" in output
     assert (tmp_path / "r" / "first.json").is_file()
-    assert f"study {bad} has" in output
-    assert ("second: 2 of 2 cases computed" in output) == (bad == "silent")
-    assert (tmp_path / "r" / "second.json").is_file() == (bad == "silent")
+    assert f"study {kind} has" in output
+    assert ("second: 2 of 2 cases computed" in output) == (kind == "silent")
+    assert (tmp_path / "r" / "second.json").is_file() == (kind == "silent")
     assert not leftovers(tmp_path / "r")
 
 
@@ -132,40 +132,40 @@ def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
     study = runner.load(script("first"))
     (tmp_path / "figures").mkdir()
     (tmp_path / "cases" / "first").mkdir(parents=True)
-    own = [tmp_path / name for name in (".first.nc.x.part", ".first.json.y.part", "figures/.first-a.png.z.part.png")]
-    others = [tmp_path / name for name in (".other.nc.x.part", "figures/.other-a.png.z.part.png")]
-    for file in (*own, *others):
+    parts = [tmp_path / name for name in (".first.nc.x.part", ".first.json.y.part", "figures/.first-a.png.z.part.png")]
+    other_parts = [tmp_path / name for name in (".other.nc.x.part", "figures/.other-a.png.z.part.png")]
+    for file in (*parts, *other_parts):
         file.touch()
     with files.locked(tmp_path / "first.nc", wait=True):
         store.tidy(tmp_path, study)
-        assert all(file.is_file() for file in own)  # somebody writes them
+        assert all(file.is_file() for file in parts)  # somebody writes them
     store.tidy(tmp_path, study)
-    assert not any(file.is_file() for file in own)
-    assert all(file.is_file() for file in others)
+    assert not any(file.is_file() for file in parts)
+    assert all(file.is_file() for file in other_parts)
 
 
 def test_a_case_whose_file_is_gone_has_failed_and_timed_cases_wait_for_analyses(script, tmp_path, pool, monkeypatch):
     """The study is not taken for whole without it, and the next run computes it again."""
-    study, results, analyse, gone = runner.load(script("first")), tmp_path / "r", pool.analyse, []
+    study, results, analyse, paths = runner.load(script("first")), tmp_path / "r", pool.analyse, []
 
     def lose(*task):
-        gone.append(min((results / "cases" / "first").glob("*.npz")))
-        gone[0].unlink()
+        paths.append(min((results / "cases" / "first").glob("*.npz")))
+        paths[0].unlink()
         return analyse(*task)
 
     with monkeypatch.context() as patch:
         patch.setattr(pool, "analyse", lose)
         (failure,) = runner.start(study, results, pool, quiet=True, beside=True).result()["failures"]
-    (other,) = (results / "cases" / "first").glob("*.npz")
-    assert gone[0].name in failure
-    assert other.name not in failure
-    again = runner.start(study, results, pool, quiet=True).result()
-    assert (again["failures"], again["computed"]) == ([], 1)
+    (path,) = (results / "cases" / "first").glob("*.npz")
+    assert paths[0].name in failure
+    assert path.name not in failure
+    result = runner.start(study, results, pool, quiet=True).result()
+    assert (result["failures"], result["computed"]) == ([], 1)
     states, future = [], pool.analyse(time.sleep, 0.3)
     measure = lambda _: states.append(future.done()) or xr.Dataset()
     for timed in (False, True):
         study = replace(runner.load(script("first")), timed=timed, measure=measure)
         symtop.register_scene(replace(symtop.scene("spheroid"), name=f"here-{timed}"))  # cases of this process
-        here = replace(study, cases=lambda _, name=f"here-{timed}": [symtop.Case(name, "midpoint")])
-        runner.start(here, tmp_path / "r", pool, quiet=True)
+        study = replace(study, cases=lambda _, name=f"here-{timed}": [symtop.Case(name, "midpoint")])
+        runner.start(study, tmp_path / "r", pool, quiet=True)
     assert states == [False, True]

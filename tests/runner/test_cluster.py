@@ -40,11 +40,11 @@ def test_an_ensemble_computed_there_is_the_one_computed_here(cluster, tmp_path, 
     members, options = population(90, seed=4), {"per_nutation": 20, "nutations": 2, "samples": 11, "quiet": True}
     monkeypatch.setattr(chunks, "CHUNK", 11 * 20)
     for name in ("strang", "cayley-tuned[axis]"):
-        here = ensemble(members, name, **options)
-        assert ensemble(members, name, scheduler=cluster.scheduler_address, **options).identical(here)
+        expected = ensemble(members, name, **options)
+        assert ensemble(members, name, scheduler=cluster.scheduler_address, **options).identical(expected)
     path = tmp_path / "runs.nc"
     with ensemble(members, name, scheduler=cluster.scheduler_address, path=path, **options) as data:
-        assert data.load().identical(here)
+        assert data.load().identical(expected)
 
 
 def test_without_the_package_it_says_how_to_get_it(monkeypatch):

@@ -38,10 +38,10 @@ def pool():
         yield workers
 
 
-def study(folder, some="range(12)"):
+def study(folder, expression="range(12)"):
     """Eight ordinary cases and four timed ones, or what `some` of them are."""
     (folder / "crew").mkdir(parents=True)
-    (folder / "slept.py").write_text(SCRIPT.replace("range(12)", some))
+    (folder / "slept.py").write_text(SCRIPT.replace("range(12)", expression))
     return runner.load(str(folder / "slept.py"))
 
 
@@ -59,7 +59,7 @@ def crew(cases):
 
 def at_once(cases):
     """How many pairs of neighbours overlap."""
-    return sum(float(one["end"]) > float(other["begin"]) for one, other in itertools.pairwise(cases))
+    return sum(float(first["end"]) > float(second["begin"]) for first, second in itertools.pairwise(cases))
 
 
 @pytest.mark.slow
