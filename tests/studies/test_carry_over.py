@@ -67,14 +67,14 @@ def test_the_truth_is_within_its_bound_and_another_body_is_not(family):
         exact = symtop.reference(scene, bodies.times[k])
         known = bounds[k] + exact["attitude_error_bound"].values
         assert (attitude_distance(states[k], exact["quaternion"].values) <= known)[np.isfinite(known)].all()
-    other = [symtop.Scene("other", symtop.RigidBody(one.top.I1 * (1.0 + 1e-6), *one.top.moments[1:], one.top.mgl,
-             one.top.centre), one.start, one.horizon) for one in bodies.scenes]  # fmt: skip
+    scenes = [symtop.Scene("other", symtop.RigidBody(scene.top.I1 * (1.0 + 1e-6), *scene.top.moments[1:],
+              scene.top.mgl, scene.top.centre), scene.start, scene.horizon) for scene in bodies.scenes]  # fmt: skip
     if family != FREE:
         motion = Integrated(bodies.scenes[0])
         fine, check = (drawing.unit(motion.states(bodies.times[0], tolerance)[:, :4]) for tolerance in (FINE, CHECK))
         assert bounds[0] == 4.0 * attitude_distance(check, fine).max() + drawing.FLOOR
     assert bodies.asked([1e-3, 1e-6, 1e-9, 1e-12])["axis"].any(axis=1).tolist() == [True, True, True, False]
-    moved = Bodies(other, bodies.strata, PERIODS).truth[0]
+    moved = Bodies(scenes, bodies.strata, PERIODS).truth[0]
     assert all((attitude_distance(moved[k], states[k]).max() > 10.0 * bounds[k]) for k in range(COUNT))
 
 
