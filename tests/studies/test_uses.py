@@ -57,8 +57,8 @@ def undeclared(study, looked_up):
         declared = case.integrators if study.uses is None else study.uses(case)
         looked_up.clear()
         study.measure(case)
-        if more := looked_up - {split_name(name)[0] for name in declared} - {REFERENCE}:
-            missing[case.label] = more
+        if names := looked_up - {split_name(name)[0] for name in declared} - {REFERENCE}:
+            missing[case.label] = names
     return missing
 
 
