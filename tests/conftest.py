@@ -136,7 +136,7 @@ def truth() -> dict:
     return {name: entry for name, entry in json.loads(path.read_text()).items() if not name.startswith("_")}
 
 
-def late(*sets, mark="quick"):
+def defer(*sets, mark="quick"):
     """Parameters of a test with a mark: `quick` waits for `make quick`, as it compiles much; `slow` takes long."""
     return [pytest.param(*(row if isinstance(row, tuple) else [row]), marks=getattr(pytest.mark, mark)) for row in sets]
 

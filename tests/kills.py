@@ -21,7 +21,7 @@ from tqdm import tqdm
 from symtop.core import netcdf
 from symtop.measure.datasets import differences
 from symtop.runner import run as runner, store
-from tests.commands import leftovers, succeeded, symtop
+from tests.commands import leftovers, stdout_of, symtop
 
 PATIENCE = 2400.0  # seconds for an undisturbed run
 
@@ -46,7 +46,7 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
     for script in (str(word) for word in words if str(word).endswith(".py")):
         runner.load(script)  # from here on it is known by its name
     command = ["study", *words, "--jobs", 2, "--results"]
-    succeeded(symtop(*command, calm), PATIENCE)
+    stdout_of(symtop(*command, calm), PATIENCE)
     count = lost = most_lost = rounds = 0
     bar = tqdm(total=kills, desc="kills", disable=None)  # on a terminal
     cases_before: dict[Path, tuple[int, int]] = {}  # finished cases: the identity of their file and when it was written
@@ -66,7 +66,7 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
         assert process.returncode in (0, -signal.SIGKILL), errors
         time.sleep(1.5)  # workers whose parent was killed have ended by then
         files = {path: path.stat() for path in results.rglob("cases/*/*.npz")}
-        cases = {path: (about.st_ino, about.st_mtime_ns) for path, about in files.items()}
+        cases = {path: (stat.st_ino, stat.st_mtime_ns) for path, stat in files.items()}
         assert cases_before.items() <= cases.items()  # not one was written a second time
         cost = sum(lock.stat().st_mtime >= start for lock in _locks(results))
         assert cost <= 2  # what a kill costs: one case a worker
@@ -77,7 +77,7 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
             shutil.rmtree(results)
             cases_before = {}
     bar.close()
-    succeeded(symtop(*command, results), PATIENCE)
+    stdout_of(symtop(*command, results), PATIENCE)
     assert_same(results, calm)
     assert not leftovers(results)
     return Survived(count, lost, most_lost, rounds + 1)

@@ -18,7 +18,7 @@ from symtop.model.exact import closed_form
 from tests.commands import call
 
 
-def measured(scene, advice, quantity="axis"):
+def true_error(scene, advice, quantity="axis"):
     """Error of the recommended run at other times than those it was judged by."""
     run = symtop.simulate(scene, advice.integrator, step_size=advice.step_size, tolerance=advice.tolerance,
                           horizon=advice.horizon, samples=1009,
@@ -30,7 +30,7 @@ def measured(scene, advice, quantity="axis"):
 def test_what_is_recommended_meets_the_accuracy(quantity, accuracy):
     advice = symtop.recommend("spheroid", accuracy=accuracy, quantity=quantity, horizon=30.0)
     assert advice.confidence == "checked"
-    assert measured(symtop.scene("spheroid"), advice, quantity) <= accuracy
+    assert true_error(symtop.scene("spheroid"), advice, quantity) <= accuracy
     assert 0.05 * accuracy < advice.expected_error <= accuracy  # and does not waste a step
     assert 0.0 < advice.seconds < 1.0
 
@@ -39,7 +39,7 @@ def test_a_longer_horizon_than_can_be_run_is_extrapolated(monkeypatch):
     monkeypatch.setattr(settings, "MOST_EVALUATIONS", {"compiled": 3e4, "python": 3e4})
     advice = symtop.recommend("spheroid", accuracy=1e-3, horizon=2000.0)
     assert advice.confidence == "extrapolated"
-    assert measured(symtop.scene("spheroid"), advice) <= 5e-3
+    assert true_error(symtop.scene("spheroid"), advice) <= 5e-3
 
 
 def test_a_method_that_cannot_start_at_a_pole_is_left_out(monkeypatch):
@@ -49,7 +49,7 @@ def test_a_method_that_cannot_start_at_a_pole_is_left_out(monkeypatch):
     monkeypatch.setattr(advise, "_menu", lambda _: ["rk4[angles]", "strang", "vern9-fixed[axis]"])
     advice = symtop.recommend(scene, accuracy=1e-6)
     assert advice.confidence == "checked"
-    assert measured(scene, advice) <= 1e-6
+    assert true_error(scene, advice) <= 1e-6
     (sentence,) = (words for words in advice.fails if words.startswith("Not run, as theta must lie inside"))
     assert "rk4[angles]" in sentence
     tilted = symtop.recommend(symtop.Scene("tilted", top, symtop.Angles(0.5, psi_dot=9.0), 5.0), accuracy=1e-6)
@@ -100,7 +100,7 @@ def test_what_nobody_reaches_is_said_and_an_accuracy_beyond_pi_is_of_what_is_no_
     assert (advice.integrator, advice.confidence) == (None, "none")
     assert "least error that the reference can judge" in advice.reason
     assert not advice.fails  # nobody was run
-    few(monkeypatch, 1)
+    limit_candidates(monkeypatch, 1)
     advice = symtop.recommend("spheroid", accuracy=5.0, quantity="energy", horizon=20.0)
     assert advice.integrator == "strang"
     assert advice.expected_error < 5.0
@@ -112,7 +112,7 @@ def test_what_nobody_reaches_is_said_and_an_accuracy_beyond_pi_is_of_what_is_no_
 @pytest.mark.parametrize("horizon", [20.0, 12.3456789])
 def test_the_advised_lines_are_the_run_that_was_checked(horizon, monkeypatch, clean_registry):
     """The same step and horizon to the last digit in the command, in Python and in the run whose error is told."""
-    few(monkeypatch, 1)
+    limit_candidates(monkeypatch, 1)
     calls, original = [], settings.attempt
     monkeypatch.setattr(settings, "attempt", lambda *arguments: calls.append(arguments) or original(*arguments))
     symtop.register(symtop.Integrator("mine", "other", "plain", {"axis": print}, implementation="python"))
@@ -135,19 +135,19 @@ def test_the_advised_lines_are_the_run_that_was_checked(horizon, monkeypatch, cl
     assert symtop.recommend(scene, accuracy=1e-3).command == ""
 
 
-def few(monkeypatch, count):
+def limit_candidates(monkeypatch, count):
     """Only the first of some cheap methods are candidates."""
     names = ("strang", "takahashi-imada[axis]", "srkn-6-4", "kahan-li-6", "gauss-6")[:count]
     monkeypatch.setattr(advise, "_candidates", lambda *_: (dict.fromkeys(names), "of a few"))
     monkeypatch.setattr(advise, "_menu", lambda _: [])
 
 
-def usable(quantity, needs=()):
+def usable_methods(quantity, needs=()):
     return advise._usable(advise._Question(symtop.scene("spheroid"), 1e-3, quantity, 20.0, needs))
 
 
 def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_with_it():
-    axis, attitude = usable("axis"), usable("attitude")
+    axis, attitude = usable_methods("axis"), usable_methods("attitude")
     assert {"rk4[axis]", "rk4[angles]", "strang[axis]", "stormer-verlet"} <= set(axis)
     assert not {"strang[attitude]", "rk45", "exact", "strang"} & set(axis)
     assert ("strang[attitude]" in attitude, "strang[axis]" in attitude) == (True, False)
@@ -158,7 +158,7 @@ def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_wi
 
 
 def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch):
-    few(monkeypatch, 5)
+    limit_candidates(monkeypatch, 5)
     monkeypatch.setattr(settings, "SHORT", 12.37)  # trials end before the horizon
     original, names = settings.search, []
 
@@ -235,7 +235,7 @@ def test_the_closed_form_is_not_compiled_to_print_its_price(monkeypatch):
         monkeypatch.setattr(kernel, "compiled", None)
         monkeypatch.setattr(kernel, "_worth", lambda: math.inf)
         monkeypatch.setattr(kernel, "compile", lambda: pytest.fail("compiled"))
-    few(monkeypatch, 1)
+    limit_candidates(monkeypatch, 1)
     words = symtop.recommend("spheroid", accuracy=1e-3, horizon=3.0).closed_form
     assert "takes no step" in words
     assert " us" not in words  # a time that is interpreted says nothing
@@ -259,7 +259,7 @@ def test_advice_on_drawn_scenes_costs_little_more_than_the_best_and_meets_it_on_
         scene = random_scene(rng, number)
         for accuracy in (1e-3, 1e-6, 1e-9):
             advice = symtop.recommend(scene, accuracy=accuracy)
-            successes.append(advice.integrator is not None and measured(scene, advice) <= accuracy)
+            successes.append(advice.integrator is not None and true_error(scene, advice) <= accuracy)
             assert successes[-1] or advice.confidence != "checked", advice
     assert np.mean(successes) >= 0.97
     monkeypatch.setitem(settings.MOST_EVALUATIONS, "compiled", candidates.LONGEST)
@@ -271,9 +271,9 @@ def test_advice_on_drawn_scenes_costs_little_more_than_the_best_and_meets_it_on_
 
 @pytest.mark.quick
 def test_needs_leave_out_what_needs_more_and_every_advice_says_what_it_needs():
-    serving = usable("axis", ("derivative", "kicks"))
+    serving = usable_methods("axis", ("derivative", "kicks"))
     assert {symtop.integrator(name).needs for name in serving} == {"derivative", "kicks"}
-    assert set(serving) < set(usable("axis"))
+    assert set(serving) < set(usable_methods("axis"))
     advice = symtop.recommend("spheroid", accuracy=1e-6, horizon=4.0, needs="expression")
     assert symtop.integrator(advice.integrator).needs == "expression"
     with pytest.raises(symtop.SymtopError, match="needs 'luck' is unknown"):
@@ -297,12 +297,12 @@ def test_what_is_made_for_this_top_is_named_beside_the_answer():
 def test_at_the_step_that_a_user_has_it_says_what_is_good_enough(monkeypatch):
     methods = ["midpoint", "trapezoidal", "stormer-verlet", "strang[axis]", "cayley[axis]", "rk4[axis]", "kahan[axis]",
                "takahashi-imada[axis]", "srkn-6-4[axis]", "gauss-6[axis]"]  # fmt: skip
-    assert {*methods} < {*usable("axis")}
+    assert {*methods} < {*usable_methods("axis")}
     monkeypatch.setattr(advise, "_usable", lambda _: methods)
     scene, step = symtop.scene("spheroid"), 0.004
     advice = symtop.recommend(scene, accuracy=1e-4, step_size=step)
     assert advice.step_size == step
-    assert measured(scene, advice) <= 1e-4
+    assert true_error(scene, advice) <= 1e-4
     line = next(words for words in advice.fails if words.startswith("Not accurate enough at this step"))
     names = dict(words.split() for words in line.partition(": ")[2].rstrip(".").split(", "))
     assert "midpoint" in names
@@ -312,7 +312,7 @@ def test_at_the_step_that_a_user_has_it_says_what_is_good_enough(monkeypatch):
         assert error > 1e-4
         assert f"{error:.2e}" == names[name]
     advice = symtop.recommend(scene, accuracy=1e-9, step_size=0.2)
-    assert advice.integrator is None or measured(scene, advice) <= 1e-9
+    assert advice.integrator is None or true_error(scene, advice) <= 1e-9
     for step, words in ((10.0, "below the horizon"), (0.2, "at most max_step 0.1")):
         with pytest.raises(symtop.SymtopError, match=f"step_size must be {words}"):
             symtop.recommend(scene, accuracy=1e-4, step_size=step, max_step=0.1)
@@ -368,7 +368,7 @@ def test_a_step_that_takes_too_long_stays_named_when_another_does_later(monkeypa
 
 
 def test_a_quantity_that_the_motion_has_not_is_refused(monkeypatch):
-    few(monkeypatch, 1)
+    limit_candidates(monkeypatch, 1)
     ask = functools.partial(symtop.recommend, accuracy=1e-2, quantity="nutation_period", horizon=20.0)
     assert ask("goldstein").integrator is not None
     with pytest.raises(symtop.SymtopError, match="must be one that the motion of steady has, not 'nutation_period'"):
@@ -405,17 +405,17 @@ def test_a_body_is_answered_with_a_method_of_its_chart():
     scene = symtop.scene("tennis-racket", bodies=True)
     advice = symtop.recommend(scene, accuracy=1e-6)
     assert (advice.quantity, advice.confidence) == ("attitude", "checked")
-    assert measured(scene, advice, "attitude") <= 1e-6
+    assert true_error(scene, advice, "attitude") <= 1e-6
     assert advice.command.startswith(f"symtop run tennis-racket {advice.integrator} --")
     heavy = symtop.recommend("heavy-brick", accuracy=1e-6, needs="kicks", keeps="energy", step_size=0.02)
     assert (symtop.integrator(heavy.integrator).needs, (heavy.step_size, heavy.closed_form)) == ("kicks", (0.02, ""))
     assert symtop.recommend("tennis-racket", accuracy=1e-3, needs="this-top").integrator is None
-    for wrong, words in (
+    for options, words in (
         ({"horizon": 72.0}, "horizon must be at most 47"), ({"quantity": "p_psi"}, "quantity 'p_psi' is unknown"),
         ({"keeps": "momenta"}, "keeps 'momenta' is unknown"), ({"accuracy": 4.0}, "accuracy must be below pi"),
     ):  # fmt: skip
         with pytest.raises(symtop.SymtopError, match=words):
-            symtop.recommend("heavy-chaotic", **{"accuracy": 1e-6} | wrong)
+            symtop.recommend("heavy-chaotic", **{"accuracy": 1e-6} | options)
 
 
 @pytest.mark.slow

@@ -23,9 +23,9 @@ EXACT = {
 
 def test_the_motion_has_the_digits_of_two_independent_ways() -> None:
     quaternion, rates = truth(np.array([*EXACT]))
-    angles, wanted = zip(*EXACT.values(), strict=True)
+    angles, expected = zip(*EXACT.values(), strict=True)
     np.testing.assert_allclose(yaw_pitch_roll(quaternion), angles, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(rates, wanted, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(rates, expected, rtol=0.0, atol=1e-13)
     brick = symtop.RigidBody.from_brick(2.26796, (0.2032, 0.1016, 0.05715))  # 5 pounds, 8 x 4 x 2.25 inches
     np.testing.assert_allclose(symtop.scene("check-case-2", bodies=True).top.moments, brick.moments, rtol=1e-6)
 

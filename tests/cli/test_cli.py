@@ -360,8 +360,8 @@ def test_a_cache_that_cannot_be_written_and_a_wrong_number_are_seen(tmp_path, mo
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "file" / "cache"))
     assert "SYMTOP_CACHE" in faults(doctor._caches(Path()))["cache"].advice
     assert set(faults(doctor._results(Path("/proc/none")))) == {"results"}
-    wrong = published.KnownValue("somebody", "something", 1.0, 1.1, 1e-3, "printed")
-    monkeypatch.setattr(published, "published_values", lambda: [wrong])
+    value = published.KnownValue("somebody", "something", 1.0, 1.1, 1e-3, "printed")
+    monkeypatch.setattr(published, "published_values", lambda: [value])
     findings = faults(doctor._self_check(Path()))
     assert "not somebody, something" in findings["published values"].result
     assert set(findings) == {"published values"}

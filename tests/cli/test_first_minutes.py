@@ -55,12 +55,12 @@ def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(tmp_path):
 
 def test_a_proposed_step_is_of_use_and_the_guard_warns_of_what_the_verdict_calls_wrong():
     assert EXPECTED == ACCURATE
-    wrong = call("run", "spheroid", "midpoint", "--step-size", "0.01")
-    assert "expect an axis error" in wrong.stderr
-    assert "judged against the truth: bounded but wrong, the axis error passed 0.01 rad" in wrong.stdout
-    right = call("run", "spheroid", "midpoint", "--step-size", "0.002")
-    assert right.stderr == ""
-    assert "judged against the truth: accurate to" in right.stdout
+    coarse = call("run", "spheroid", "midpoint", "--step-size", "0.01")
+    assert "expect an axis error" in coarse.stderr
+    assert "judged against the truth: bounded but wrong, the axis error passed 0.01 rad" in coarse.stdout
+    fine = call("run", "spheroid", "midpoint", "--step-size", "0.002")
+    assert fine.stderr == ""
+    assert "judged against the truth: accurate to" in fine.stdout
     # The error that it leads to is between a tenth and ten times the 1e-3 rad that it is proposed for.
     for name in ("midpoint", "strang", "rk4", "gauss-4"):
         step = float(call("run", "spheroid", name, code=2).stderr.split("for example ")[1])

@@ -15,7 +15,7 @@ import pytest
 from symtop import __version__
 from symtop.cli.main import main
 from symtop.run.ensemble.population import population
-from tests.commands import call, succeeded, symtop
+from tests.commands import call, stdout_of, symtop
 from tests.judging.conftest import shorten
 from tests.pages import LANGUAGES, ROOT, Block, blocks, pages
 
@@ -75,7 +75,7 @@ class Page:
             return result.stdout
         assert program == "symtop"
         if apart:
-            return succeeded(symtop(*args), seconds=900.0)
+            return stdout_of(symtop(*args), seconds=900.0)
         return call(*args).output
 
 
@@ -101,14 +101,14 @@ def test_a_page_runs(page, slow, tmp_path, monkeypatch):
 
 def test_a_page_that_is_wrong_fails(tmp_path, monkeypatch):
     """Negative control: a wrong output, a wrong command and a raise are seen, and each is right when mended."""
-    wrong = {
+    pages = {
         "```python\nprint(1 + 1)\n```\n```text\n3\n```\n": ("3\n", "2\n"),
         "```sh\nsymtop scenes sphreoid\n```\n": ("sphreoid", "spheroid"),
         "```console\n$ symtop --version\nsymtop, version 0.0\n```\n": ("0.0", __version__),
         "```python\nimport symtop\nsymtop.scene('no such')\n```\n": ("no such", "spheroid"),
         "```python\n# a.py\nx = 1\n```\n```sh\npython b.py\n```\n": ("b.py", "a.py"),
     }
-    for text, (before, after) in wrong.items():
+    for text, (before, after) in pages.items():
         monkeypatch.setitem(PAGES, "page", blocks(text.replace(before, after)))
         follow("page", False, tmp_path, monkeypatch)
         monkeypatch.setitem(PAGES, "page", blocks(text))
@@ -132,8 +132,8 @@ def test_a_command_that_is_not_run_is_one(block: Block):
         program, *args = shlex.split(line, comments=True)
         if program == "symtop":
             name, command, args = main.resolve_command(main.make_context("symtop", [], resilient_parsing=True), args)
-            wanted = [word for word in args if word != "--plugin" and not word.startswith("my_methods")]
-            command.make_context(str(name), wanted, resilient_parsing=True)
+            known_args = [word for word in args if word != "--plugin" and not word.startswith("my_methods")]
+            command.make_context(str(name), known_args, resilient_parsing=True)
             for option in (word for word in args if word.startswith("--")):
                 assert any(option in parameter.opts for parameter in command.params), (line, option)
         elif program == "make":

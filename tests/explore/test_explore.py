@@ -25,7 +25,7 @@ from symtop.model import charts
 from symtop.model.scenes import closed_form
 from symtop.run.simulation import integrate
 from tests.commands import call
-from tests.conftest import late
+from tests.conftest import defer
 
 
 def fields(name="spheroid", integrator="midpoint", **changes):
@@ -44,7 +44,7 @@ def unpacked(text):
     return np.frombuffer(base64.b64decode(text), dtype="<f4")
 
 
-@pytest.mark.parametrize("method", ["midpoint", "exact", *late("gauss-4", "rk45")])
+@pytest.mark.parametrize("method", ["midpoint", "exact", *defer("gauss-4", "rk45")])
 def test_an_answer_is_the_run_beside_the_truth(method):
     setup = answers.setup(fields(integrator=method))
     answer, run = answers.answer(setup), answers.dataset(setup, str)

@@ -235,14 +235,14 @@ def summary(runs: list[Outcome]) -> str:
     """The figures of so many runs, and each run that should not be."""
     wrong, right = [run for run in runs if run.wrong], [run for run in runs if run.right]
     silent, false = [run for run in wrong if not run.warning], [run for run in right if run.warning]
-    ended = [run for run in runs if run.outcome not in ("ok", "refused", "endless", "crashed")]
-    sudden = [run for run in ended if not run.warning]
+    failures = [run for run in runs if run.outcome not in ("ok", "refused", "endless", "crashed")]
+    sudden = [run for run in failures if not run.warning]
     odd = [run for run in runs if run.outcome in ("endless", "crashed") or run.seconds >= LONGEST]
     lines = [
         f"{len(runs)} runs: {dict(collections.Counter(run.outcome for run in runs))}",
         f"{len(wrong)} wrong by more than {WRONG} rad, of them silent: {len(silent)}",
         f"{len(right)} right to {RIGHT} rad, of them warned of: {len(false)}",
-        f"{len(ended)} ended early, of them not announced: {len(sudden)}",
+        f"{len(failures)} ended early, of them not announced: {len(sudden)}",
     ]
     return "\n".join([*lines, *map(repr, silent), *map(repr, sudden), *map(repr, odd)])
 

@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from tests.commands import PROBE, ended, leftovers, same, stop, succeeded, symtop
+from tests.commands import PROBE, assert_identical, finish, leftovers, stdout_of, stop, symtop
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("processes_with_dask")]
 
@@ -73,7 +73,7 @@ def after(cluster, results, event):
             assert time.monotonic() - start < 120.0
             time.sleep(0.05)
         event()
-        start, result = time.monotonic(), ended(process, 300.0)
+        start, result = time.monotonic(), finish(process, 300.0)
         return *result, time.monotonic() - start
     finally:
         stop(process)
@@ -81,7 +81,7 @@ def after(cluster, results, event):
 
 def here(results):
     """What the command prints without a cluster."""
-    return succeeded(symtop("study", PROBE, "--results", results, "--jobs", 1))
+    return stdout_of(symtop("study", PROBE, "--results", results, "--jobs", 1))
 
 
 def test_a_worker_that_dies_costs_nothing(cluster, tmp_path):
@@ -96,7 +96,7 @@ def test_a_worker_that_dies_costs_nothing(cluster, tmp_path):
     assert calls >= 12
     assert 0 <= calls - count <= 1
     here(tmp_path / "here")
-    same(tmp_path / "here", tmp_path / "r")
+    assert_identical(tmp_path / "here", tmp_path / "r")
     assert "0 of 12 cases computed" in here(tmp_path / "r")
     assert before.items() <= computed(tmp_path / "r").items()
     assert not leftovers(tmp_path / "r")
@@ -114,7 +114,7 @@ def test_a_cluster_that_is_gone_before_or_never_answers_is_one_sentence(tmp_path
             cluster.scheduler.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
         address = f"tcp://{HERE}:{deaf.getsockname()[1]}" if how == "deaf" else cluster.address
         start = time.monotonic()
-        code, _, err = ended(symtop(*words, "--scheduler", address), 300.0)
+        code, _, err = finish(symtop(*words, "--scheduler", address), 300.0)
         seconds = time.monotonic() - start
     print(f"{what}, {how}: {code} after {seconds:.1f} s, {err!r}")
     assert (code, [*tmp_path.glob("a.nc*")]) == (2, [])

@@ -97,7 +97,7 @@ def test_every_bad_command_line_is_one_sentence(name, folder, monkeypatch):
     monkeypatch.setattr("symtop.cli.common.showing_work", contextlib.nullcontext)  # a process for each line
     monkeypatch.setattr("socketserver.BaseServer.serve_forever", lambda *_: pytest.fail("it serves"))
     before = sorted(path.name for path in folder.iterdir())
-    above, faults = sorted(path.name for path in folder.parent.iterdir()), []
+    names, faults = sorted(path.name for path in folder.parent.iterdir()), []
     for words in lines(name):
         with warnings.catch_warnings(action="ignore"):
             result = call(*words, code=None)
@@ -113,6 +113,6 @@ def test_every_bad_command_line_is_one_sentence(name, folder, monkeypatch):
             for path in folder.iterdir():
                 if path.name not in before:
                     os.system(f"rm -rf '{path}'")
-    if sorted(path.name for path in folder.parent.iterdir()) != above:
+    if sorted(path.name for path in folder.parent.iterdir()) != names:
         faults.append("wrote beside the folder")
     assert not faults, "\n".join(repr(fault).replace("a" * 290, "aaa").replace("x" * 4990, "xxx") for fault in faults)

@@ -13,7 +13,7 @@ import symtop
 from symtop.core.signals import InterruptedByUser, told_apart
 from symtop.methods.framework.calling import solve
 from symtop.run import plugins
-from tests.commands import answer, ended, symtop as command
+from tests.commands import code_and_output, finish, symtop as command
 
 PLUGIN = Path(__file__).with_name("plugin.py")
 RUN = ["--step-size", "0.01", "--horizon", "2"]
@@ -29,7 +29,7 @@ def misbehaving():
 def output_of(words):
     """Exit code and the lines of a command that must not end in a traceback, and must leave the scene as it was."""
     with warnings.catch_warnings():
-        code, output = answer(*words)
+        code, output = code_and_output(*words)
     assert repr(symtop.scene("spheroid")) == BEFORE
     return code, output.splitlines()
 
@@ -150,7 +150,7 @@ def test_a_solver_that_expects_steps_forwards_is_ended(misbehaving, monkeypatch)
 @pytest.mark.slow
 def test_in_processes_of_their_own():
     for name, code in (("raises-system-exit", 2), ("raises-interrupt", 2), ("raises-base", 2), ("signals-itself", 130)):
-        result = ended(command("run", "spheroid", name, *RUN, "--plugin", PLUGIN))
+        result = finish(command("run", "spheroid", name, *RUN, "--plugin", PLUGIN))
         assert result[0] == code, result
         assert result[2] == "symtop: interrupted\n" if code == 130 else result[2].count("\n") == 1
 

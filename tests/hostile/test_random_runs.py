@@ -18,7 +18,7 @@ from symtop.run.linear_stability import nutation_growth, trace
 from symtop.run.motion import landmarks
 from symtop.run.reference.sensitivity import conditioning, displacement
 from symtop.run.simulation import make_plan
-from tests.conftest import late
+from tests.conftest import defer
 from tests.hostile.random_runs import LONGEST, NEWER, draw_run, outcome_of, run_all, summary
 from tests.run.test_guard import nutating
 
@@ -31,7 +31,7 @@ SILENT = [
 FALSE = [74, 511, 780, 990, 1929, 2413, 4178, 5013]  # right runs that were warned of growth that was none
 
 
-@pytest.mark.parametrize(("k", "seed"), [*SILENT[::3], *late(*SILENT[1::3], *SILENT[2::3])])
+@pytest.mark.parametrize(("k", "seed"), [*SILENT[::3], *defer(*SILENT[1::3], *SILENT[2::3])])
 def test_what_was_wrong_in_silence_is_warned_of(k, seed):
     run = outcome_of(k, seed)
     assert run.wrong
@@ -195,7 +195,7 @@ def test_where_a_small_change_departs_far_a_smaller_one_shows_the_growth(time):
     scene, change = symtop.scene("separatrix"), Fraction(1, 10**25)
     start = [Fraction(value) for value in flat(scene.top, scene.start)[3:]]
     neighbour = start[:3] + [rate * (1 + change) for rate in start[3:]]
-    first, second = (PreciseForm(scene.top, at, 50).axis(time) for at in (start, neighbour))
+    first, second = (PreciseForm(scene.top, numbers, 50).axis(time) for numbers in (start, neighbour))
     growth = math.hypot(*(float((a - b) * 10**25) for a, b in zip(first, second, strict=True)))
     assert conditioning(scene, time) == pytest.approx(growth, rel=0.1)
 

@@ -22,7 +22,7 @@ def shorten(monkeypatch):
 
 
 @pytest.fixture
-def only(monkeypatch):
+def keep_claims(monkeypatch):
     """A function that leaves the claims of these names in the table of the battery, with an eighth of the time."""
 
     def choose(*names):

@@ -28,8 +28,8 @@ from symtop.judging.claims import calls, subject
 from symtop.judging.claims.subject import open_target
 from symtop.judging.findings import VERDICTS
 from symtop.judging.remote import clock
-from tests.commands import ROOT, answer
-from tests.conftest import late
+from tests.commands import ROOT, code_and_output
+from tests.conftest import defer
 from tests.judging.blind.right import midpoint, product, rates, rk4, turn, verlet
 from tests.judging.conftest import shorten
 
@@ -200,8 +200,8 @@ def test_a_server_is_started_once_and_again_only_if_it_fails(tmp_path, body, wor
     assert mark.read_text().count("started") == starts
 
 
-def test_a_server_ends_with_the_judging_that_is_not_forked_too(tmp_path, only, monkeypatch):
-    only("calls")
+def test_a_server_ends_with_the_judging_that_is_not_forked_too(tmp_path, keep_claims, monkeypatch):
+    keep_claims("calls")
     monkeypatch.setitem(sys.modules, "jax", None)
     mark, file = tmp_path / "process", tmp_path / "engine.py"
     start = f"import os\nopen({str(mark)!r}, 'w').write(str(os.getpid()))\n"
@@ -262,9 +262,9 @@ def test_a_file_beside_others_one_that_fails_and_a_name_that_is_not_there(tmp_pa
 
 
 @pytest.mark.parametrize("claimed", [1000, *(pytest.param(claim, marks=pytest.mark.slow) for claim in (3, 10))])
-def test_the_order_that_is_there_is_found_whatever_is_claimed(claimed, only):
+def test_the_order_that_is_there_is_found_whatever_is_claimed(claimed, keep_claims):
     """Long steps, as a method of order 10 may take, show no slope of one of order 2."""
-    only("order")
+    keep_claims("order")
     finding = symtop.judge(midpoint, order=claimed, quick=True)["order"]
     assert (finding.verdict, finding.declared) == ("refuted", str(claimed))
     assert finding.value == pytest.approx(2.0, abs=0.02)
@@ -278,10 +278,10 @@ def _keeps_its_slope(f, t, y, h, memory=[np.zeros(6)]):  # noqa: B006, B008  (wh
 PENDULUM = symtop.Scene("pendulum", symtop.SymmetricTop(1.0, 0.5, 1.0), symtop.Angles(theta=2.0), 20.0)
 
 
-@pytest.mark.parametrize("scene", [*late("sleeping"), *late("separatrix", PENDULUM, mark="slow")])
-def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, only, monkeypatch):
+@pytest.mark.parametrize("scene", [*defer("sleeping"), *defer("separatrix", PENDULUM, mark="slow")])
+def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, keep_claims, monkeypatch):
     """Beside a pole angles know a state badly; a pendulum has momenta of zero, which are no unit."""
-    only("calls", "order")
+    keep_claims("calls", "order")
     judge = partial(symtop.judge, scene=scene, quick=True)
     ledger = judge(rk4, order=4)
     assert (ledger.refuted, ledger["order"].verdict, ledger["calls"].measured.kind) == ([], "confirmed", "a function")
@@ -308,9 +308,9 @@ def in_single(step):
 
 
 @pytest.mark.parametrize("scene", [pytest.param("spheroid", marks=pytest.mark.slow), "heavy-brick"])
-def test_single_precision_is_no_other_motion_and_one_of_a_step_in_it_is(scene, only):
+def test_single_precision_is_no_other_motion_and_one_of_a_step_in_it_is(scene, keep_claims):
     """Runs of more steps than their rounding lets be judged end 1e-6 away; an order that it hides is undecided."""
-    only("order")
+    keep_claims("order")
     options = {"scene": scene, "quick": True}
     assert symtop.judge(in_single(midpoint), order=2, **options)["order"].verdict == "confirmed"
     assert symtop.judge(in_single(midpoint), order=3, **options).refuted == ["order"]
@@ -326,7 +326,7 @@ def test_single_precision_is_no_other_motion_and_one_of_a_step_in_it_is(scene, o
 
 
 @pytest.mark.quick
-def test_single_precision_refutes_nothing_that_its_rounding_hides(only):
+def test_single_precision_refutes_nothing_that_its_rounding_hides(keep_claims):
     """It moves a step forth and back by 1e-8, and a bracket from differences by 1e-6."""
 
     def euler(state, h, dT, dV, share=1.0):
@@ -340,7 +340,7 @@ def test_single_precision_refutes_nothing_that_its_rounding_hides(only):
             slope = f(t + h / 2, y + h / 2 * slope)
         return y + h * slope
 
-    only("symplectic", "symmetric", "energy", "p_psi", "pole")
+    keep_claims("symplectic", "symmetric", "energy", "p_psi", "pole")
     claims = {"quick": True, "symplectic": True, "symmetric": True, "energy": "bounded", "form": "separable"}
     good, bad = symtop.judge(euler, **claims), symtop.judge(lambda *args: euler(*args, share=0.0), **claims)
     verdicts = good["symplectic"].verdict, good["energy"].verdict
@@ -356,21 +356,21 @@ def test_single_precision_refutes_nothing_that_its_rounding_hides(only):
 
 
 @pytest.mark.slow
-def test_an_axis_that_stays_upright_is_refused_in_a_sentence_and_one_that_hangs_is_judged(only):
+def test_an_axis_that_stays_upright_is_refused_in_a_sentence_and_one_that_hangs_is_judged(keep_claims):
     upright, hanging = (
         symtop.Scene("still", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(theta=theta, psi_dot=5.0), 20.0)
         for theta in (0.0, np.pi)
     )
-    only("calls")
+    keep_claims("calls")
     assert symtop.judge(midpoint, scene=hanging, quick=True)["calls"].measured.kind == "a function"
     assert symtop.judge(_keeps_its_slope, scene=hanging, quick=True)["calls"].verdict == "refuted"
     with pytest.raises(symtop.SymtopError, match="its axis stays upright"):
         symtop.judge(midpoint, scene=upright, quick=True)
 
 
-@pytest.mark.parametrize("claimed", [*late(2, mark="slow"), *late(12)])
-def test_a_motion_that_is_wrong_is_told_so_whatever_is_claimed(claimed, only):
-    only("order")
+@pytest.mark.parametrize("claimed", [*defer(2, mark="slow"), *defer(12)])
+def test_a_motion_that_is_wrong_is_told_so_whatever_is_claimed(claimed, keep_claims):
+    keep_claims("order")
     for factor, expected in ((0.999, 2e-3), (0.0, None)):  # the second stands still
         step = lambda f, t, y, h, factor=factor: midpoint(f, t, y, factor * h)
         finding = symtop.judge(step, order=claimed, quick=True)["order"]
@@ -378,8 +378,8 @@ def test_a_motion_that_is_wrong_is_told_so_whatever_is_claimed(claimed, only):
         assert expected is None or finding.value == pytest.approx(expected, rel=0.2)
 
 
-def test_a_step_that_returns_nan_or_the_derivative_is_told_so(only):
-    only("calls", "order", "pole")
+def test_a_step_that_returns_nan_or_the_derivative_is_told_so(keep_claims):
+    keep_claims("calls", "order", "pole")
     for value, words in ((np.nan, "returns NaN"), (np.inf, "returns infinity"), (0.0, "jumps")):
         ledger = symtop.judge(lambda f, t, y, h, value=value: f(t, y) + value, quick=True)
         assert (ledger["calls"].measured.kind, ledger["calls"].verdict) == (words, "refuted")
@@ -413,8 +413,8 @@ def test_waiting_for_a_processor_takes_none_of_the_time_that_judging_has():
 
 
 @pytest.mark.slow
-def test_a_step_that_hangs_backwards_is_judged_forwards(impatient, only):
-    only("calls", "order", "symplectic")
+def test_a_step_that_hangs_backwards_is_judged_forwards(impatient, keep_claims):
+    keep_claims("calls", "order", "symplectic")
     ledger = symtop.judge(lambda f, t, y, h: (hangs if h < 0 else midpoint)(f, t, y, h), quick=True, order=2)
     assert (ledger["calls"].measured.kind, ledger["order"].verdict) == ("forward only", "confirmed")
     assert (ledger["symplectic"].measured.kind, heartbeat.inside) == ("no", False)
@@ -444,11 +444,11 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset(monkeypat
 
 EXAMPLES = ROOT / "studies" / "examples"
 STEPS = EXAMPLES / "judged_steps.py"
-run_judge = partial(answer, "judge", "--quick")
+run_judge = partial(code_and_output, "judge", "--quick")
 
 
-def test_a_file_with_a_step_says_what_it_is_and_writes_it(tmp_path, monkeypatch, only):
-    only("order", "symplectic", "symmetric", "energy", "p_phi")
+def test_a_file_with_a_step_says_what_it_is_and_writes_it(tmp_path, monkeypatch, keep_claims):
+    keep_claims("order", "symplectic", "symmetric", "energy", "p_phi")
     shutil.copy(STEPS, tmp_path / "mine.py")
     monkeypatch.setenv("HOME", str(tmp_path))
     files = ("--output=~/found.nc", "--card=~/card.html", "--badge", "~/badge.svg")
@@ -462,8 +462,8 @@ def test_a_file_with_a_step_says_what_it_is_and_writes_it(tmp_path, monkeypatch,
 
 
 @pytest.mark.slow
-def test_a_claim_is_implied_if_it_follows_from_those_that_are_made(only):
-    only("order", "time", "energy")
+def test_a_claim_is_implied_if_it_follows_from_those_that_are_made(keep_claims):
+    keep_claims("order", "time", "energy")
     for words, end in (((), "(time): 1 confirmed."), (("--symplectic",), "(energy and time): 1 confirmed, 1 refuted.")):
         assert run_judge(f"{STEPS}:heun", "--order", "2", *words)[1].endswith(f"Implied by them {end}\n")
 
@@ -477,14 +477,14 @@ def test_a_claim_is_implied_if_it_follows_from_those_that_are_made(only):
         *((f"{sys.executable} {EXAMPLES / 'judged_program.py'}", "--form", form, "--order", "2")
           for form in ("program", "server")))),
 ])  # fmt: skip
-def test_the_example_of_a_form_is_what_it_says(arguments, words, only):
-    only("order", "symplectic", "symmetric", *(["energy"] if "energy" in words else []))
+def test_the_example_of_a_form_is_what_it_says(arguments, words, keep_claims):
+    keep_claims("order", "symplectic", "symmetric", *(["energy"] if "energy" in words else []))
     code, output = run_judge(*arguments)
     assert (code, words in output) == (0, True), output
 
 
-def test_a_path_with_a_space_is_a_path_and_a_program_must_be_named(tmp_path, only):
-    only("calls")
+def test_a_path_with_a_space_is_a_path_and_a_program_must_be_named(tmp_path, keep_claims):
+    keep_claims("calls")
     mark, folder = tmp_path / "touched", tmp_path / "a folder"
     folder.mkdir()
     shutil.copy(STEPS, folder / "my steps.py")
@@ -515,7 +515,7 @@ def test_a_step_of_rotation_matrices_is_judged_as_one_of_quaternions_until_it_is
     assert matrices.attrs["outcome"] == quaternions.attrs["outcome"] == "ok"
     np.testing.assert_allclose(matrices["axis"].values, quaternions["axis"].values, atol=1e-11)
     np.testing.assert_allclose(matrices["p_phi"].values, quaternions["p_phi"].values, rtol=1e-10)
-    longer = lambda q, w, h, inertia, torque: euler_of_quaternions(q, w, h, inertia, lambda at: torque(2.0 * at))
+    longer = lambda q, w, h, inertia, torque: euler_of_quaternions(q, w, h, inertia, lambda pose: torque(2.0 * pose))
     np.testing.assert_allclose(of_rotation(longer, 0.01, 2.0)["axis"], quaternions["axis"], atol=1e-11)
     errors = [float(symtop.errors(of_rotation(euler_of_matrices, h, 0.5))["axis"].max()) for h in (2e-3, 1e-3)]
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)  # order 1
@@ -557,9 +557,9 @@ def _lives(pid: int) -> bool:
 
 
 @pytest.mark.slow
-def test_a_step_that_slows_down_is_judged_on_shorter_runs_and_one_that_stops_says_why_once(only, monkeypatch):
+def test_a_step_that_slows_down_is_judged_on_shorter_runs_and_one_that_stops_says_why_once(keep_claims, monkeypatch):
     """A step takes 0.5 ms from t = 20 on, which its first ones do not tell; or 2.5 ms, always, after 1 s to open it."""
-    only("energy", "p_phi", "p_psi")
+    keep_claims("energy", "p_phi", "p_psi")
     monkeypatch.setattr(judge_step, "QUICK_VERDICT", (1.0, 2.5, 1.0))
 
     def slow_from(since, seconds):

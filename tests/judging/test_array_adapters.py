@@ -13,7 +13,7 @@ import symtop
 from symtop.judging.adapters.external import field_of
 from symtop.judging.claims.subject import open_target
 from symtop.methods.framework.equations import FORMULATIONS
-from tests.commands import ROOT, ended, printed_by, symtop as command
+from tests.commands import ROOT, finish, printed_by, symtop as command
 from tests.judging.blind.right import midpoint
 
 SPHEROID = symtop.scene("spheroid")
@@ -25,7 +25,7 @@ def needs(package):
 
 def judge(*arguments):
     """The exit code, and the findings by claim, or what is said of the refusal."""
-    code, out, err = ended(command("judge", *arguments, "--quick", "--json", PYTHONPATH=ROOT))
+    code, out, err = finish(command("judge", *arguments, "--quick", "--json", PYTHONPATH=ROOT))
     return code, err if code == 2 else {finding["claim"]: finding for finding in json.loads(out)}
 
 

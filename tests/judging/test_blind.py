@@ -16,7 +16,7 @@ from symtop.judging import battery, judge_step
 from symtop.judging.claims import calls, subject
 from symtop.judging.findings import description
 from symtop.judging.remote import Remote
-from tests.conftest import late
+from tests.conftest import defer
 from tests.judging.blind import right, wrong
 
 BLIND, EXAMPLES = Path(__file__).parent / "blind", Path(__file__).parents[2] / "studies" / "examples"
@@ -61,10 +61,10 @@ def test_a_correct_method_is_not_refuted(name, seconds, monkeypatch):
 
 
 @pytest.mark.parametrize("name", [
-    "AdamsBashforth", "separable_forest_ruth", "rotation_guarded", "own_energy", *late("rotation_strang", mark="slow")
+    "AdamsBashforth", "separable_forest_ruth", "rotation_guarded", "own_energy", *defer("rotation_strang", mark="slow")
 ])  # fmt: skip
-def test_what_is_claimed_of_a_correct_method_is_confirmed_in_short_runs(name, only):
-    only(*(claim for stage in battery.TABLE for claim in stage.claims))
+def test_what_is_claimed_of_a_correct_method_is_confirmed_in_short_runs(name, keep_claims):
+    keep_claims(*(claim for stage in battery.TABLE for claim in stage.claims))
     claims, options = right.CLAIMS[name]
     ledger = symtop.judge(step_of(name, right), quick=True, **claims, **options)
     check_claims(ledger, *(claim for claim in claims if claim in SHOWN))
@@ -72,9 +72,9 @@ def test_what_is_claimed_of_a_correct_method_is_confirmed_in_short_runs(name, on
 
 @pytest.mark.quick
 @pytest.mark.parametrize("name", ["BDF", "LSODA", "DOP853"])
-def test_classes_of_variable_order_are_judged_at_a_tolerance(name, only):
+def test_classes_of_variable_order_are_judged_at_a_tolerance(name, keep_claims):
     """They claim no order; that their error falls with the tolerance is confirmed, and refuted of `WrongSum`."""
-    only("calls", "order", "pole")
+    keep_claims("calls", "order", "pole")
     ledger = symtop.judge(step_of(name, right), quick=True, adaptive=True)
     assert (ledger["calls"].verdict, ledger["pole"].verdict) == ("inapplicable", "measured")
     for each in (ledger, symtop.judge(step_of(name, right), scene="heavy-brick", quick=True, adaptive=True)):
@@ -83,9 +83,9 @@ def test_classes_of_variable_order_are_judged_at_a_tolerance(name, only):
     assert symtop.judge(wrong.WrongSum, scene="heavy-brick", quick=True, adaptive=True).refuted == ["order"]
 
 
-def test_a_symmetric_step_is_symmetric_where_its_iteration_fails_at_long_steps(only):
+def test_a_symmetric_step_is_symmetric_where_its_iteration_fails_at_long_steps(keep_claims):
     """At a start that this seed draws the iteration of the substep of -1.7 h does not converge; at h/2 it does."""
-    only("symmetric")
+    keep_claims("symmetric")
     for name, verdict in (("triple_jump", "confirmed"), ("half_symmetric", "refuted")):
         ledger = symtop.judge(step_of(name, right, wrong), quick=True, symmetric=True, seed=754319425)
         assert ledger["symmetric"].verdict == verdict, str(ledger)
@@ -101,7 +101,7 @@ def test_a_correct_method_is_not_refuted_in_another_chart(name, chart):
 
 @needs_compiler
 @pytest.mark.parametrize(("source", "options", "claims", "refuted"), [
-    ("strang.c", (), {"order": 2, **SPLIT}, ""), ("wrong.c", ("-DKIND=0",), {"order": 3}, "order"), *late(
+    ("strang.c", (), {"order": 2, **SPLIT}, ""), ("wrong.c", ("-DKIND=0",), {"order": 3}, "order"), *defer(
         (EXAMPLES / "judged.c", (), {"order": 1, "symplectic": True, "conserves": ["p_phi", "p_psi"]}, ""),
         ("strang.c", ("-DYOSHIDA",), {"order": 4, **SPLIT}, ""),
         ("strang.c", ("-DMCLACHLAN",), {"order": 4, **SPLIT}, ""),
@@ -124,8 +124,8 @@ def test_what_is_written_in_c(tmp_path, source, options, claims, refuted):
 
 
 @needs_compiler
-def test_the_order_of_a_correct_program_is_confirmed(tmp_path, only):
-    only("calls", "order")
+def test_the_order_of_a_correct_program_is_confirmed(tmp_path, keep_claims):
+    keep_claims("calls", "order")
     check_claims(symtop.judge(compiled(tmp_path, "strang.c", program=True), quick=True, order=2, **PROGRAM), "order")
 
 
@@ -141,10 +141,10 @@ def test_a_program_in_another_language():
 
 
 @pytest.mark.slow
-def test_the_stages_of_an_implicit_class_are_solved_and_newton_is_left_as_it_was(only):
+def test_the_stages_of_an_implicit_class_are_solved_and_newton_is_left_as_it_was(keep_claims):
     from scipy.integrate._ivp import radau
 
-    only("order")
+    keep_claims("order")
     assert radau.NEWTON_MAXITER == 6
     ledger = symtop.judge(integrate.Radau, quick=True, order=5)
     assert ledger.refuted == [], str(ledger)
@@ -161,9 +161,9 @@ QUICKLY = (
 
 
 @pytest.mark.parametrize("name", QUICKLY)
-def test_the_line_that_names_a_defect_refutes_it(name, only):
+def test_the_line_that_names_a_defect_refutes_it(name, keep_claims):
     claims, line, options = wrong.CLAIMS[name]
-    only(line)
+    keep_claims(line)
     ledger = symtop.judge(step_of(name, wrong, right), quick=True, **claims, **options)
     assert ledger.refuted == [line], str(ledger)
 
@@ -177,16 +177,16 @@ def test_a_wrong_method_is_caught_by_the_line_that_names_its_defect(name):
 
 
 @pytest.mark.parametrize(("change", "line"), [({"late": 1.0}, "time"), ({"off": 1e-6}, "order"), ({}, "")])
-def test_a_method_of_several_steps_is_not_judged_by_the_steps_that_start_it(change, line, only):
+def test_a_method_of_several_steps_is_not_judged_by_the_steps_that_start_it(change, line, keep_claims):
     """Of order 4 and symmetric, which three-step Adams is not."""
-    only("order", "time", "symmetric")
+    keep_claims("order", "time", "symmetric")
     kind = type("Three", (wrong.AdamsBashforth3,), {"start": staticmethod(right.gauss_4)} | change)
     ledger = symtop.judge(kind, quick=True, order=3, symmetric=True, scene="simo-wong")
     assert (ledger.refuted, ledger["symmetric"].verdict) == ([line] * bool(line), "undecided"), str(ledger)
 
 
-def test_a_small_defect_of_the_bracket_that_stands_out_of_its_noise_is_not_confirmed(only):
-    only("symplectic")
+def test_a_small_defect_of_the_bracket_that_stands_out_of_its_noise_is_not_confirmed(keep_claims):
+    keep_claims("symplectic")
     for loss, verdict in ((0.0, "confirmed"), (1e-9, "undecided"), (1e-7, "refuted")):
         damped = lambda *args, loss=loss: right.own_drift(*args) * np.repeat([1.0, 1.0 - loss], 3)
         assert symtop.judge(damped, quick=True, symplectic=True)["symplectic"].verdict == verdict
@@ -201,12 +201,12 @@ def test_a_step_that_tires_after_a_hundred_thousand_is_found_in_full(monkeypatch
 
 
 @pytest.mark.parametrize("name", ["noisy", "sometimes_noisy"])
-def test_random_noise_is_no_memory(name, only):
-    only("calls")
+def test_random_noise_is_no_memory(name, keep_claims):
+    keep_claims("calls")
     assert symtop.judge(step_of(name, wrong, right), quick=True)["calls"].measured.kind == "not repeatable"
 
 
-def test_what_knows_every_state_again_is_caught_by_its_last_bit(only, monkeypatch):
+def test_what_knows_every_state_again_is_caught_by_its_last_bit(keep_claims, monkeypatch):
     """Two-step Adams, where the process that remembers is not made anew."""
     slopes = {}
 
@@ -215,14 +215,14 @@ def test_what_knows_every_state_again_is_caught_by_its_last_bit(only, monkeypatc
         slopes[after.tobytes()] = slope
         return after
 
-    only("calls")
+    keep_claims("calls")
     monkeypatch.setattr(Remote, "renew", lambda _: None)
     assert symtop.judge(remembers, quick=True, order=2).refuted == ["calls"]
 
 
 @pytest.mark.quick
-def test_a_seed_draws_the_same_and_without_a_claim_the_order_is_said_and_not_the_slope(only):
-    only("order")
+def test_a_seed_draws_the_same_and_without_a_claim_the_order_is_said_and_not_the_slope(keep_claims):
+    keep_claims("order")
     ledger = symtop.judge(wrong.rounded_triple, quick=True)
     assert ledger.refuted == []
     text, _, doubt = str(ledger["order"].measured).partition(" +- ")
@@ -235,16 +235,16 @@ def test_a_seed_draws_the_same_and_without_a_claim_the_order_is_said_and_not_the
 
 
 @pytest.mark.quick
-def test_no_order_is_below_zero(only):
-    only("order")
+def test_no_order_is_below_zero(keep_claims):
+    keep_claims("order")
     for claim in ({}, {"order": 4}):
         ledger = symtop.judge(lambda f, t, y, h: right.rk4(f, t, y, h) + 1e-6, quick=True, seed=1, **claim)
         assert str(ledger["order"].measured).startswith("0: in one step the term in h^0 is the first that is wrong")
         assert "It is: order 0" in str(ledger)
 
 
-def test_a_step_written_for_f_of_y_may_say_so(only):
+def test_a_step_written_for_f_of_y_may_say_so(keep_claims):
     wrong_times = lambda f, t, y, h: y + h * f(t, y + h / 2 * f(t + 0.3 * h, y))
-    only("time")
+    keep_claims("time")
     assert symtop.judge(wrong_times, quick=True, order=2).refuted == ["time"]
     assert symtop.judge(wrong_times, quick=True, order=2, autonomous=True)["time"].verdict == "inapplicable"

@@ -32,8 +32,8 @@ from symtop.model import charts
 from symtop.model.scenes import body_scenes, scene
 from symtop.run.ensemble.bodies import body_population, scenes_of
 from symtop.run.simulation import integrate
-from tests.commands import answer, call, ended, symtop as command
-from tests.conftest import late, random_scenes
+from tests.commands import call, code_and_output, finish, symtop as command
+from tests.conftest import defer, random_scenes
 from tests.judging.blind import right
 from tests.judging.blind.right import euler, implicit_euler
 
@@ -136,9 +136,9 @@ def test_jumps_short_runs_and_noise_are_told_from_growth():
 
 
 @pytest.mark.quick
-def test_an_energy_that_leaves_its_scale_is_said_to_blow_up_and_the_rest_judged_until_then(only, monkeypatch):
+def test_an_energy_that_leaves_its_scale_is_said_to_blow_up_and_the_rest_judged_until_then(keep_claims, monkeypatch):
     """Euler's method gains energy, and keeps p_phi; the implicit one loses all that it can, which is no blow-up."""
-    only("energy", "p_phi")
+    keep_claims("energy", "p_phi")
     monkeypatch.setattr("symtop.judging.claims.subject.LONG", (10.0, 60.0))  # time for its 39,288 steps on any machine
     ledger = symtop.judge(euler, quick=True, energy="bounded")
     assert [ledger[claim].measured.kind for claim in (*ledger.refuted, "p_phi")] == ["blows up", "kept"]
@@ -354,7 +354,7 @@ def test_every_file_of_false_claims_is_tested():
 @pytest.mark.parametrize("liar", [pytest.param(n, marks=pytest.mark.slow if n in OWN_KERNEL else []) for n in CAUGHT])
 def test_a_liar_is_caught_for_the_right_reason(liar, clean_registry):
     quick = [] if liar in OWN_KERNEL else ["--quick"]
-    code, output = answer("claims", "--plugin", str(planted.LIARS / f"{liar}.py"), "--json", *quick)
+    code, output = code_and_output("claims", "--plugin", str(planted.LIARS / f"{liar}.py"), "--json", *quick)
     claim, why = CAUGHT[liar]
     findings = {row.pop("claim"): row for row in json.loads(output)}
     assert (code, findings[claim]["verdict"]) == (1, "refuted")
@@ -427,7 +427,7 @@ FREE, HEAVY = (body_scenes()[name] for name in ("check-case-2", "heavy-brick"))
 
 @pytest.mark.parametrize(("name", "energy", "momentum"), [
     ("strang", "bounded", "kept"), ("commutator-free-4", "drift", "kept"), ("gauss-4", "kept", "bounded"),
-    *late(("lammps-rigid", "drift", "kept")),
+    *defer(("lammps-rigid", "drift", "kept")),
 ])  # fmt: skip
 def test_what_methods_claim_on_a_body_holds(name, energy, momentum):
     for free_or_heavy in (FREE, HEAVY):
@@ -461,9 +461,9 @@ def rotation_swapped(q, w, h, inertia, torque):
     (right.rotation_lie_midpoint, 2, []), (rotation_swapped, 2, ["order"]),
     (right.rotation_strang, 2, ["order"]), (right.rk4, 4, []),
 ])  # fmt: skip
-def test_a_step_of_ones_own_is_judged_on_a_body(step, order, refuted, only):
+def test_a_step_of_ones_own_is_judged_on_a_body(step, order, refuted, keep_claims):
     """One that turns by the rates of other moments is wrong, as is an exact motion that symmetric bodies alone have."""
-    only("order")
+    keep_claims("order")
     form = "rotation" if "rotation" in step.__name__ else "ode"
     ledger = symtop.judge(step, form=form, scene=HEAVY, order=order, quick=True)
     assert (ledger.refuted, ledger["order"].verdict) == (refuted, "refuted" if refuted else "confirmed")
@@ -499,17 +499,17 @@ def test_a_run_that_ends_in_its_first_nutation_shows_no_constant(scene):
     assert {ledger[claim].measured.kind for claim in ("energy", "order")} == {""}
 
 
-def test_the_card_of_a_body_shows_the_errors_that_its_order_was_found_from(only):
-    only("order")
+def test_the_card_of_a_body_shows_the_errors_that_its_order_was_found_from(keep_claims):
+    keep_claims("order")
     ledger = symtop.judge(right.rk4, scene=HEAVY, order=4, quick=True)
     steps, errors = (ledger.traces[name][ledger.traces["fitted"] == 1.0] for name in ("step_size", "error"))
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(4.0, abs=0.2)
     assert " steps a natural period for the order" in " ".join(str(ledger).split())
 
 
-def test_a_right_step_is_not_refuted_where_a_body_turns_over(only):
+def test_a_right_step_is_not_refuted_where_a_body_turns_over(keep_claims):
     """After a calm beginning."""
-    only("order", "energy", "momentum")
+    keep_claims("order", "energy", "momentum")
     ledger = symtop.judge(right.midpoint, scene="tennis-racket", order=2, quick=True)
     assert (ledger.refuted, ledger["order"].verdict) == ([], "confirmed")
     assert ledger["energy"].measured.kind in ("growing", "drift")  # the length of its runs follows from its speed
@@ -542,7 +542,7 @@ def test_a_plug_in_that_fails_is_told_of(tmp_path):
     expected = {"nothing": "must return a Run", "leaves": "ended with code 0", "crashes": "was ended by SIGSEGV"}
     names = [f"{name}-at-once" for name in expected]
     # in another process, which this one would end with if it called the plug-in
-    code, out, _ = ended(command("claims", *names, "--plugin", tmp_path / "plugin.py", "--quick"))
+    code, out, _ = finish(command("claims", *names, "--plugin", tmp_path / "plugin.py", "--quick"))
     assert code == 1
     for name, words in zip(names, expected.values(), strict=True):
         lines = [line for line in out.splitlines() if line.startswith(f"{name}, ")]
@@ -551,7 +551,7 @@ def test_a_plug_in_that_fails_is_told_of(tmp_path):
 
 def test_a_plug_in_that_ends_its_process_when_it_is_loaded_is_told_of(tmp_path):
     (tmp_path / "plugin.py").write_text("import os\nos._exit(0)\n")
-    code, _, err = ended(command("claims", "--plugin", tmp_path / "plugin.py", "--quick"))
+    code, _, err = finish(command("claims", "--plugin", tmp_path / "plugin.py", "--quick"))
     assert (code, "plugin plugin.py cannot be loaded: its process ended with code 0" in err) == (2, True)
 
 
@@ -571,7 +571,7 @@ def test_a_run_that_is_returned_is_one_of_numbers():
 
 def test_a_name_that_is_unknown_is_told_before_anything_is_measured_and_all_are_those_that_step_the_scene(monkeypatch):
     methods, empty = [], SimpleNamespace(findings=())
-    monkeypatch.setattr("symtop.judging.judge_step.judge_separately", lambda one, _, **__: methods.append(one) or empty)
+    monkeypatch.setattr("symtop.judging.judge_step.judge_separately", lambda row, _, **__: methods.append(row) or empty)
     result = call("claims", "midpoint", "midpont", code=2)
     assert ("integrator 'midpont' is unknown" in result.output, methods) == (True, [])
     call("claims", "--scene", "tennis-racket", code=1)
@@ -643,8 +643,8 @@ def test_limits_are_extrapolated_falls_are_seen_and_a_cayley_map_keeps_its_own_e
         assert (distance == pytest.approx(offset, rel=1e-6), distance < doubt) == (offset > 0.0, offset == 0.0)
     errors = np.array([1e-6, 5e-6, 1.0, 1.0])  # no better than at a tolerance ten thousand times as large
     fit = Fit(2.0, 0.1, 1.0, errors > 0.0)
-    fitted = order.Order("", 10.0 ** -np.array([10.0, 6.0, 4.0, 2.0]), errors, errors, errors, fit, {})
-    assert order._converges(fitted, "").verdict == "refuted"
+    data = order.Order("", 10.0 ** -np.array([10.0, 6.0, 4.0, 2.0]), errors, errors, errors, fit, {})
+    assert order._converges(data, "").verdict == "refuted"
     assert not structure.Passage("axis", "ok", 1e-3, 9e-4).passes
     assert Series(1.0, np.full(5, 1e-12), np.array([1e-15] * 3 + [1.0] * 2), True, "axis").order == 2  # noise hides two
     half = lambda step, _: (True, 5e-10, 1e-9, "") if step.h < 0.1 else (False, 1e-6, 1e-9, "")

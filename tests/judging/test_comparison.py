@@ -29,7 +29,7 @@ def data():
     return symtop.compare("goldstein", METHODS, nutations=2.0, cost="evaluations", budget=BUDGET, quiet=True)
 
 
-def least(data, target, variable="force_evaluations"):
+def least_costs(data, target, variable="force_evaluations"):
     places = cheapest(data, target)
     return {str(name): float(data[variable].values[k, place]) if place >= 0 else math.inf
             for k, (name, place) in enumerate(zip(data["variant"].values, places, strict=True))}  # fmt: skip
@@ -54,17 +54,17 @@ def test_each_run_is_that_of_simulate_and_every_variable_has_words_and_units(dat
 
 
 def test_what_theory_says_of_the_costs_and_why_some_are_not_reached(data):
-    coarse, fine = least(data, 1e-3), least(data, 1e-6)
+    coarse, fine = least_costs(data, 1e-3), least_costs(data, 1e-6)
     assert fine["taylor[axis]"] < fine["rk4[axis]"] < fine["stormer-verlet[angles]"] < fine["midpoint[angles]"]
     assert all(coarse[name] <= fine[name] for name in coarse)
     for name, order in (("stormer-verlet[angles]", 2), ("rk4[axis]", 4)):
-        steps = [least(data, target, "steps_per_nutation")[name] for target in (1e-6, 1e-3)]
+        steps = [least_costs(data, target, "steps_per_nutation")[name] for target in (1e-6, 1e-3)]
         assert math.log10(steps[0] / steps[1]) == pytest.approx(3.0 / order, rel=0.2)
     for name in ("rk4[axis]", "taylor[axis]"):
         cell = data.sel(variant=name)
         assert (np.diff(cell["force_evaluations"].values[cell["outcome"].values == "ok"]) >= 0.0).all()
-    reached = data["reached"].sel(variant="midpoint[angles]").values.tolist()
-    assert (reached[0], reached[-1]) == ("met", "budget")
+    reasons = data["reached"].sel(variant="midpoint[angles]").values.tolist()
+    assert (reasons[0], reasons[-1]) == ("met", "budget")
     assert data["force_evaluations"].max() <= 1.3 * BUDGET
     largest = data["force_evaluations"].sel(variant=["midpoint[angles]", "stormer-verlet[angles]"]).max("setting")
     assert (largest > 0.8 * BUDGET).all()  # the last run that could be afforded was made
@@ -155,7 +155,7 @@ def test_the_command_prints_a_line_for_each_variant(tmp_path, clean_registry):
     runs = {(row["variant"], row["target"]): row for row in report["cheapest"]}
     expected = {"variant": "midpoint[angles]", "target": 1e-9, "reached": False, "reason": "budget"}
     assert runs["midpoint[angles]", 1e-9] == expected
-    assert runs["rk4[axis]", 1e-6]["force_evaluations"] == least(data, 1e-6)["rk4[axis]"]
+    assert runs["rk4[axis]", 1e-6]["force_evaluations"] == least_costs(data, 1e-6)["rk4[axis]"]
     assert [report[name] for name in ("scene", "cost")] == ["spheroid", "evaluations"]
     plugin, arguments = tmp_path / "still.py", "symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(theta=1.0)"
     plugin.write_text(f"import symtop\nsymtop.register_scene(symtop.Scene('still', {arguments}, 5.0))\n")

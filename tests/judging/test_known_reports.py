@@ -150,9 +150,9 @@ def test_the_page_has_every_report_and_what_was_foreseen():
 
 
 @pytest.mark.parametrize("row", ["OrdinaryDiffEq #577", "GeometricIntegrators #220"])
-def test_the_faulty_rule_is_refuted_and_the_mended_one_is_not(row, only):
+def test_the_faulty_rule_is_refuted_and_the_mended_one_is_not(row, keep_claims):
     line = FORESEEN[row]
-    only(line)
+    keep_claims(line)
     assert ledger_of(row, faulty=True).refuted == [line]
     assert line in page()[row][1].split(", ")
     assert ledger_of(row, faulty=False).refuted == []

@@ -130,8 +130,8 @@ def test_a_function_is_asked_no_more_once_it_took_long_or_its_least_samples_agre
     uneven, clock[0] = taking(clock, (6e-3 * 1.02**k for k in itertools.count())), 0.0
     together = [timing.best for timing in timings([*[work] * 10, uneven], 10, 5e-3, warm=True, close=0.01, exact=False)]
     clock[0] = 0.0
-    alone = [timings([work], 10, 5e-3, warm=True, exact=False)[0].best for _ in range(10)]
-    assert (together[:-1], alone) == (pytest.approx([0.01] * 10), pytest.approx([0.02] * 5 + [0.01] * 5))
+    separate = [timings([work], 10, 5e-3, warm=True, exact=False)[0].best for _ in range(10)]
+    assert (together[:-1], separate) == (pytest.approx([0.01] * 10), pytest.approx([0.02] * 5 + [0.01] * 5))
 
 
 def test_timings_know_when_they_are_noisy_and_errors_are_relative_to_their_scales():
@@ -149,9 +149,9 @@ def test_timings_know_when_they_are_noisy_and_errors_are_relative_to_their_scale
 def test_every_published_value_is_reproduced_and_one_off_by_its_last_digit_is_not():
     values = published_values()
     assert [(value.source, value.quantity) for value in values if not value.reproduced] == []
-    printed = [value.tests for value in values if value.kind == "printed"]
-    assert [printed.count(what) for what in (TRAJECTORY, START, OTHER_BODY)] == [3, 1, 3]
-    assert len(values) - len(printed) == 6
+    kinds = [value.tests for value in values if value.kind == "printed"]
+    assert [kinds.count(kind) for kind in (TRAJECTORY, START, OTHER_BODY)] == [3, 1, 3]
+    assert len(values) - len(kinds) == 6
     for value in values:
         assert not value._replace(ours=value.published + 0.52 * value.unit).reproduced
 

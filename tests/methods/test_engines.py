@@ -13,7 +13,7 @@ from symtop.methods.framework import registry
 from symtop.methods.framework.calling import solve
 from symtop.model import charts
 from symtop.model.top import flat
-from tests.conftest import late, random_scenes
+from tests.conftest import defer, random_scenes
 from tests.methods import engine_formulas
 from tests.methods.test_lanes import assert_runs_alone
 
@@ -86,7 +86,7 @@ def test_without_the_gyroscopic_term_an_engine_follows_the_spherical_top_and_con
     assert wobble == pytest.approx(0.10, abs=0.01)  # L_z alone shows it, and nobody looks
 
 
-@pytest.mark.parametrize("name", [*ROUNDED, *late(*(name for name in registry.engines() if name not in ROUNDED))])
+@pytest.mark.parametrize("name", [*ROUNDED, *defer(*(name for name in registry.engines() if name not in ROUNDED))])
 def test_a_top_that_starts_at_rest_falls_and_a_free_one_stays(name):
     """Jolt, PhysX and rapier rescale a momentum to its length, and each asks first whether it has one."""
     for mgl in (1.0, 0.0):

@@ -20,7 +20,7 @@ from symtop.methods.lagrangian.discrete_lagrangian import Quadrature, forces, ma
 from symtop.methods.lagrangian.galerkin_gauss import gauss_rule
 from symtop.methods.lagrangian.unreduced import unreduced
 from symtop.model.top import Angles, SymmetricTop
-from tests.conftest import late, random_scenes
+from tests.conftest import defer, random_scenes
 
 
 def fitted(scene_name, method, coarsest, column):
@@ -165,7 +165,7 @@ def test_one_step_is_that_of_the_stationary_polynomial(name, scene):
 
 
 @pytest.mark.parametrize(
-    "name", ["galerkin-gauss-4", *late(*(name for name in GALERKIN if name != "galerkin-gauss-4"), "galerkin-gauss-12")]
+    "name", ["galerkin-gauss-4", *defer(*(key for key in GALERKIN if key != "galerkin-gauss-4"), "galerkin-gauss-12")]
 )
 def test_momenta_are_those_of_the_steps_made_however_long(name):
     """Of slow tops, whose steps are too long for one solution alone: a second solution would show other momenta."""

@@ -18,7 +18,7 @@ from symtop.methods.lie_group.variational import EULER_POINCARE, Variational, li
 from symtop.methods.splitting.coefficients import SUZUKI_4
 from symtop.methods.splitting.space import march_axis
 from symtop.model.top import flat
-from tests.conftest import late
+from tests.conftest import defer
 
 pytestmark = pytest.mark.usefixtures("in_lanes")
 SOLVERS = {row.name: solver for row in variants() for solver in filter(None, map(inside, row.solvers.values()))}
@@ -161,7 +161,7 @@ def test_lanes_finish_what_needs_no_branch_and_a_member_does_not_see_its_neighbo
 
 
 @pytest.mark.parametrize(("name", "longer"), [
-    ("midpoint[angles]", 40.0), *late(*((f"{name}[attitude]", 20.0) for name in ITERATED))])  # fmt: skip
+    ("midpoint[angles]", 40.0), *defer(*((f"{name}[attitude]", 20.0) for name in ITERATED))])  # fmt: skip
 def test_a_lane_that_takes_more_iterations_changes_no_other(name, longer):
     """A step so large that one lane takes more passes; the others keep bits and counts, and that one does not."""
     draw, scene, solver = np.random.default_rng(0), symtop.scene("spheroid"), SOLVERS[name]
@@ -191,9 +191,9 @@ def test_runs_of_a_few_steps_at_a_time_are_the_same(monkeypatch, name, steps):
 
 def test_members_stand_in_the_order_of_their_steps_and_of_their_turns_and_uneven_blocks_are_left():
     steps = np.concatenate([np.full(40, 100), [1000, 10_000], np.arange(1, 30)])
-    chosen, leftovers = divided(np.arange(len(steps)), steps)
-    assert sorted((*chosen, *leftovers)) == list(range(len(steps)))
-    assert (np.diff(steps[chosen]) >= 0).all()
+    in_order, leftovers = divided(np.arange(len(steps)), steps)
+    assert sorted((*in_order, *leftovers)) == list(range(len(steps)))
+    assert (np.diff(steps[in_order]) >= 0).all()
     assert {40, 41} <= set(leftovers)  # beside the others they would keep a block waiting
     assert [part.size for part in divided(np.arange(0), steps)] == [0, 0]
     assert [divided(np.arange(LEAST - k), np.full(9, 7))[1 - k].size for k in (0, 1)] == [0, 0]
@@ -201,15 +201,15 @@ def test_members_stand_in_the_order_of_their_steps_and_of_their_turns_and_uneven
     count, draw = 8 * W, np.random.default_rng(0)
     turn, indices = draw.uniform(size=count), np.arange(count)
     turn[7] = np.nan  # a member whose step overflows: beside the largest
-    chosen, leftovers = divided(indices, np.full(count, 100), turn)
+    in_order, leftovers = divided(indices, np.full(count, 100), turn)
     assert leftovers.size == 0
-    np.testing.assert_array_equal(chosen, np.argsort(turn))
+    np.testing.assert_array_equal(in_order, np.argsort(turn))
     np.testing.assert_array_equal(divided(indices, np.full(count, 100))[0], indices)
     steps = draw.choice([100, 103, 1000], count)
-    chosen, leftovers = divided(indices, steps, turn)
-    assert sorted((*chosen, *leftovers)) == list(indices)
-    short = chosen[steps[chosen] < 1000]
-    np.testing.assert_array_equal(short, chosen[: len(short)])
+    in_order, leftovers = divided(indices, steps, turn)
+    assert sorted((*in_order, *leftovers)) == list(indices)
+    short = in_order[steps[in_order] < 1000]
+    np.testing.assert_array_equal(short, in_order[: len(short)])
     assert (np.diff(turn[short[turn[short] >= 0]]) > 0).all()
     assert max(100, 103) / 100 < ALIKE < 1000 / 103
     assert divided(np.arange(LEAST), np.zeros(9, dtype=int), turn)[0].size == LEAST  # no step at all
@@ -217,11 +217,11 @@ def test_members_stand_in_the_order_of_their_steps_and_of_their_turns_and_uneven
 
 def test_groups_hold_every_member_once_and_turns_are_those_of_the_motion():
     steps = np.random.default_rng(1).integers(1, 50, 200)
-    chosen = np.flatnonzero(steps != 7)
-    parts = groups(chosen, steps, 300)
-    np.testing.assert_array_equal(np.concatenate(parts), chosen)
+    indices = np.flatnonzero(steps != 7)
+    parts = groups(indices, steps, 300)
+    np.testing.assert_array_equal(np.concatenate(parts), indices)
     assert (max(int(steps[part].sum()) for part in parts) < 350, len(parts) > 10) == (True, True)
-    assert groups(chosen[:0], steps, 300) == []
+    assert groups(indices[:0], steps, 300) == []
     still, spinning, far = np.zeros((3, 9))
     still[:3], spinning[:3], far[:3] = (2.0, 1.0, 18.0), (2.0, 1.0, 0.0), (2.0, 1.0, 1.0)
     spinning[8], far[6] = 4.0, 1e200
@@ -312,7 +312,7 @@ def test_tables_and_compositions_of_ones_own_have_the_bits_of_runs_alone(solver)
     assert_runs_alone(solver, *arguments, solver.many(*arguments))
 
 
-@pytest.mark.parametrize("name", ["commutator-free-4", *late(*(name for name in ITERATED if "suzuki" not in name))])
+@pytest.mark.parametrize("name", ["commutator-free-4", *defer(*(name for name in ITERATED if "suzuki" not in name))])
 def test_lanes_whose_exponential_turns_too_far_for_its_series_run_alone_and_cayleys_turns_as_far_as_it_likes(name):
     """Of Cayley's only members whose equation cannot be solved, or takes half of the passes or more, are left."""
     solver, arguments, far = SOLVERS[f"{name}[axis]"], members(400, seed=11), set(range(400)[FAR])

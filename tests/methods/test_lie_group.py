@@ -18,7 +18,7 @@ from symtop.methods.framework.space import SpaceTop, field_axis, on_axis
 from symtop.methods.lie_group import variational
 from symtop.methods.lie_group.generalised_alpha import generalised_alpha
 from symtop.model import charts
-from tests.conftest import late, random_scenes
+from tests.conftest import defer, random_scenes
 from tests.judging.blind.right import product
 from tests.methods.engine_formulas import hat
 
@@ -53,7 +53,7 @@ def energies(scene, rows):
     return 0.5 * np.sum(rows[:, 3:] ** 2, axis=1) / scene.top.I1 + scene.top.mgl * rows[:, 2]
 
 
-@pytest.mark.parametrize("name", [*LIE_TABLES, *VARIATIONAL[::2], *late(VARIATIONAL[1], *COLLECTIVE)])
+@pytest.mark.parametrize("name", [*LIE_TABLES, *VARIATIONAL[::2], *defer(VARIATIONAL[1], *COLLECTIVE)])
 def test_casimirs_are_exact_where_rk4_loses_them(name):
     scene = symtop.scene("spheroid")
     for method, exact in ((name, True), ("rk4", False)):
@@ -280,6 +280,6 @@ def test_two_steps_are_those_of_the_generalised_alpha_method(radius, scene):
 @pytest.mark.parametrize(("name", "steps", "band"), [("simo-wong", 128000, 1e-5), ("collective-gauss-6", 2000, 6e-6)])
 def test_the_benchmark_of_bruls_cardona_and_arnold(name, steps, band):
     """The displacement of the centre at t = 1 to the printed five digits: (0.17334, -0.35991, -0.74849)."""
-    printed = [value.published for value in published_values() if value.source.startswith("Bruls")]
+    published = [value.published for value in published_values() if value.source.startswith("Bruls")]
     run = symtop.simulate("bruls-cardona-arnold", name, step_size=1.0 / steps, horizon=1.0, samples=2, observe="axis")
-    np.testing.assert_allclose(run["axis"].values[-1] - [0.0, 1.0, 0.0], printed, atol=band)
+    np.testing.assert_allclose(run["axis"].values[-1] - [0.0, 1.0, 0.0], published, atol=band)

@@ -207,10 +207,10 @@ def kernel(name):
     return compile_kernel(sample if name == "sample" else refine)
 
 
-def compiled(name, scene, h, **changed):
+def compiled(name, scene, h, **fields):
     """What `sample` returns for a step of h from the start of a scene, or `refine` leaves in the last row."""
     par, state = REDUCED.prepare(scene.top, scene.start)
-    par, memory = par._replace(**changed), np.zeros((3, 4))
+    par, memory = par._replace(**fields), np.zeros((3, 4))
     memory[0] = REDUCED.field(par, state)
     return par, kernel(name)(par, state, memory, h), memory[-1]
 

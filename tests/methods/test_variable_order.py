@@ -19,7 +19,7 @@ from symtop.methods.runge_kutta.adams import ALPHA, BETA, GAMMA, HIGHEST, LAST, 
 from symtop.model.scenes import closed_form
 from symtop.run.ensemble.chunks import nutation_periods
 from symtop.run.ensemble.inputs import read_members
-from tests.conftest import late
+from tests.conftest import defer
 
 
 def prepared(steps, h, k):
@@ -96,7 +96,7 @@ def test_it_needs_no_more_evaluations_than_scipys_adams_codes_and_errs_no_more(n
         assert error < 1.1 * np.linalg.norm(axis - truth, axis=1).max()
 
 
-@pytest.mark.parametrize("chart", ["angles", "axis", *late("attitude")])
+@pytest.mark.parametrize("chart", ["angles", "axis", *defer("attitude")])
 @pytest.mark.parametrize(("name", "tolerances"), [
     ("adams", (1e-5, 1e-8, 1e-12)),  # at 1e-4 a quaternion is longer than one by more than 0.1 %, an outcome
     ("extrapolation", (1e-4, 1e-8, 1e-12)),
@@ -188,17 +188,17 @@ def test_members_have_the_bits_of_runs_alone(name, budget):
     numbers, tolerance, times, counts = members()
     if "angles" in name:
         numbers[5, 3] = 0.0  # on a pole
-    results, reached = SOLVERS[name].many(numbers, tolerance, times, counts, budget)
+    results, end_times = SOLVERS[name].many(numbers, tolerance, times, counts, budget)
     for i, (top, start) in enumerate(members_of(numbers)):
         if "angles" in name and i == 5:
-            assert (OUTCOMES[results.outcome[i]], results.steps[i], reached[i]) == ("left_chart", 0, 0.0)
+            assert (OUTCOMES[results.outcome[i]], results.steps[i], end_times[i]) == ("left_chart", 0, 0.0)
             assert np.isnan(results.states[i]).all()
             continue
         run = SOLVERS[name](top, start, Plan.until(times[i, : counts[i]], tolerance[i], budget))
         np.testing.assert_array_equal(results.states[i, : counts[i]], run.states)
         np.testing.assert_array_equal(results.momenta[i, : counts[i]].T, (run.p_phi, run.p_psi))
         assert np.isnan(results.states[i, counts[i] :]).all()
-        assert (results.steps[i], results.work[i], OUTCOMES[results.outcome[i]], reached[i]) == (*run[3:5], *run[6:])
+        assert (results.steps[i], results.work[i], OUTCOMES[results.outcome[i]], end_times[i]) == (*run[3:5], *run[6:])
     outcomes = {OUTCOMES[k] for k in results.outcome}
     assert ("ok" in outcomes, "out_of_budget" in outcomes) == (True, budget is not None)
 
@@ -218,11 +218,11 @@ def test_an_infinite_budget_ends_no_run(row):
 @pytest.mark.parametrize("name", SOLVERS)
 def test_a_budget_is_passed_by_less_than_a_step(name):
     numbers, tolerance, times, _ = members(20)
-    results, reached = SOLVERS[name].many(numbers, tolerance, times, np.full(20, COUNTS), BUDGET)
+    results, end_times = SOLVERS[name].many(numbers, tolerance, times, np.full(20, COUNTS), BUDGET)
     mask = results.outcome == OUTCOMES.index("out_of_budget")
     assert mask.any()
     assert (results.work[mask] < BUDGET + LARGEST.get(name.split("[")[0], 48.0)).all()
-    assert (reached[mask] < times[mask, -1]).all()
+    assert (end_times[mask] < times[mask, -1]).all()
 
 
 @pytest.mark.quick
@@ -235,7 +235,7 @@ def test_a_run_in_pieces_has_the_bits_of_a_run_in_one():
         np.testing.assert_array_equal(whole.work, parts.work)
 
 
-@pytest.mark.parametrize("name", ["rk45", *OWN[:-2], *late(*OWN[-2:])])  # tsit5, vern9
+@pytest.mark.parametrize("name", ["rk45", *OWN[:-2], *defer(*OWN[-2:])])  # tsit5, vern9
 def test_a_pole_ends_a_run_in_angles_alone(name):
     """Falling through the pole exactly: without rotation theta' only changes sign in the angles chart."""
     top, start = symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0, theta_dot=-2.0)

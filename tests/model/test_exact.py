@@ -48,10 +48,10 @@ def test_thirty_digits_of_the_published_states(name):
     if "axis_xyz" in entry:
         pairs += zip(form.axis(entry["t"]), entry["axis_xyz"], strict=True)
         pairs += zip(form.quaternion(entry["t"]), entry["quaternion_wxyz"], strict=True)
-    printed = [(x, y) for x, y in pairs if len(y) > 20]
-    assert len(printed) >= 9
-    last = [mp.mpf(10) ** Decimal(y).as_tuple().exponent for _, y in printed]  # units of the last digits
-    assert all(abs(x - mp.mpf(y)) <= unit for (x, y), unit in zip(printed, last, strict=True))
+    long_values = [(x, y) for x, y in pairs if len(y) > 20]
+    assert len(long_values) >= 9
+    last = [mp.mpf(10) ** Decimal(y).as_tuple().exponent for _, y in long_values]  # units of the last digits
+    assert all(abs(x - mp.mpf(y)) <= unit for (x, y), unit in zip(long_values, last, strict=True))
     assert all(abs(x - mp.mpf(y)) < 1e-12 for x, y in pairs)
 
 

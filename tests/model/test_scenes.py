@@ -92,8 +92,8 @@ def test_a_steady_precession_measures_energies_by_a_nutation_of_one_radian(spin)
     scene = steady(spin)
     top, amplitude = scene.top, 1e-3
     momenta = top.momenta(scene.start)
-    raised = top.potential(scene.start.theta + amplitude, momenta) - top.potential(scene.start.theta, momenta)
-    assert raised / scene.energy_scale == pytest.approx(amplitude**2, rel=0.01)
+    gain = top.potential(scene.start.theta + amplitude, momenta) - top.potential(scene.start.theta, momenta)
+    assert gain / scene.energy_scale == pytest.approx(amplitude**2, rel=0.01)
 
 
 @pytest.mark.parametrize("start", [{"theta": 0.0, "psi_dot": 3.0}, {"theta": 0.0, "psi_dot": 1.0}, {"theta": 1.0},

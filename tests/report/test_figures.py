@@ -128,8 +128,8 @@ def test_orders_beside_the_lines_of_oscillators_are_those_of_the_table(quick_res
     tables, axes = tables_and_axes("oscillators", quick_results)
     orders = tables["damped"].set_index(["b", "rule"])
     for axis in axes["orders"]:
-        what, _, damping = axis.get_title().partition("\nb = ")
-        column = "order of x" if what.startswith("position") else "order of the rate of decay"
+        title, _, damping = axis.get_title().partition("\nb = ")
+        column = "order of x" if title.startswith("position") else "order of the rate of decay"
         for rule, _, order in (text.get_text().partition(": order ") for text in axis.texts):
             key = float(damping.partition(",")[0]), rule.replace(" ", "-")
             assert float(order) == round(orders.loc[key, column], 1)

@@ -114,7 +114,7 @@ def bodies(tmp_path_factory):
         return test_set.write(tmp_path_factory.mktemp("set") / "bodies", scenes), scenes
 
 
-def checked(folder, mine, reference="states-17.csv"):
+def run_checker(folder, mine, reference="states-17.csv"):
     """Of each problem the largest errors of attitude and momentum and the number beyond the bound."""
     words = [sys.executable, str(folder / "check.py"), str(mine), str(folder / reference)]
     result = subprocess.run(words, capture_output=True, text=True, check=True)
@@ -140,17 +140,17 @@ def own_file(path, scenes, times, change=lambda body: body):
 def test_the_reference_has_nothing_beyond_its_bounds_and_what_is_printed_is_what_is_meant(bodies):
     folder, scenes = bodies
     for reference in ("states-17.csv", "states-30.csv"):
-        rows, _ = checked(folder, folder / reference, reference)
+        rows, _ = run_checker(folder, folder / reference, reference)
         assert [*rows] == [scene.name for scene in scenes]
         assert all(beyond == 0 and attitude == momentum == 0.0 for attitude, momentum, beyond in rows.values())
-    rows, _ = checked(folder, folder / "states-30.csv")  # rounding to 17 digits is within the bound
+    rows, _ = run_checker(folder, folder / "states-30.csv")  # rounding to 17 digits is within the bound
     assert all(beyond == 0 and 0.0 < attitude < 2e-16 for attitude, _, beyond in rows.values())
     with pytest.raises(subprocess.CalledProcessError):
-        checked(folder, folder / "problems.csv")
+        run_checker(folder, folder / "problems.csv")
     data, rows = (netcdf.read(folder / "states.nc"), rows_of(folder / "states-30.csv"))
     for scene, problem in zip(scenes, rows_of(folder / "problems.csv"), strict=True):
-        printed = [float(row["time"]) for row in rows if row["name"] == scene.name]
-        assert printed == data["time"].sel(problem=scene.name).values.tolist()
+        times = [float(row["time"]) for row in rows if row["name"] == scene.name]
+        assert times == data["time"].sel(problem=scene.name).values.tolist()
         assert [float(problem[name]) for name in test_set.GIVEN] == list(scene.top.flat(scene.start))
     text = " ".join((folder / "README.md").read_text(encoding="utf-8").split())
     assert "a number that is given, of a problem or a time, is the double nearest to what is printed" in text
@@ -161,8 +161,8 @@ def test_a_sign_in_the_inertia_is_found_by_both_checkers(bodies, tmp_path):
     times = rows_of(folder / "states-17.csv")
     right = own_file(tmp_path / "right.csv", scenes, times)
     wrong = own_file(tmp_path / "wrong.csv", scenes, times, lambda b: RigidBody(*b.moments[::-1], b.mgl, b.centre))
-    errors, _ = checked(folder, right)
-    control, output = checked(folder, wrong)
+    errors, _ = run_checker(folder, right)
+    control, output = run_checker(folder, wrong)
     assert max(attitude for attitude, _, _ in errors.values()) < 1e-5  # of the lines between its samples
     assert all(attitude > 0.01 and beyond == test_set.TIMES for attitude, _, beyond in control.values())
     if (compiler := shutil.which("cc")) is None:
@@ -184,7 +184,7 @@ def test_a_number_that_is_lost_is_beyond_the_bound(column, bodies, tmp_path):
         writer = csv.DictWriter(file, rows[0])
         writer.writeheader()
         writer.writerows(rows)
-    beyond = [row[2] for row in checked(folder, tmp_path / "lost.csv")[0].values()]
+    beyond = [row[2] for row in run_checker(folder, tmp_path / "lost.csv")[0].values()]
     assert beyond == [test_set.TIMES] + [0] * (len(scenes) - 1)
     result = subprocess.run([sys.executable, str(folder / "check.py")], capture_output=True, text=True, check=False)
     assert (result.returncode, result.stderr) == (1, "usage: python check.py MINE.csv states-17.csv\n")

@@ -98,8 +98,8 @@ def test_a_damaged_file_is_named_and_one_of_another_kind_is_left_out(name, remed
         gather(tmp_path)
     (tmp_path / "quick").mkdir()
     (tmp_path / "mine.json").rename(tmp_path / "quick" / "mine.json")
-    about = {"measured": "Then.", "command": "python -m benchmarks.guard", "pictures": [{"file": "none.png"}]}
-    (tmp_path / f"{name}.json").write_text(json.dumps(findings | about), encoding="utf-8")
+    extra = {"measured": "Then.", "command": "python -m benchmarks.guard", "pictures": [{"file": "none.png"}]}
+    (tmp_path / f"{name}.json").write_text(json.dumps(findings | extra), encoding="utf-8")
     with pytest.raises(symtop.SymtopError, match=r"run it again: python -m benchmarks\.guard$"):
         gather(tmp_path)
     assert "the report is made of those in" in call("report", "--results", tmp_path, code=None).output

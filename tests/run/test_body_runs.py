@@ -21,7 +21,7 @@ from symtop.model.exact import heavy_body
 from symtop.run.ensemble import chunks
 from symtop.run.ensemble.bodies import scenes_of
 from tests.commands import call
-from tests.conftest import late
+from tests.conftest import defer
 from tests.run.test_ensemble import assert_alone
 
 pytestmark = pytest.mark.usefixtures("in_lanes")
@@ -70,7 +70,7 @@ def slope(scene: symtop.Scene, method: str, order: int, true: symtop.Scene | Non
 
 @pytest.mark.parametrize("name", BODIES)
 @pytest.mark.parametrize(("method", "order"), [
-    *((name, FIXED[name]) for name in CONSERVED), *late(*(row for row in FIXED.items() if row[0] not in CONSERVED)),
+    *((name, FIXED[name]) for name in CONSERVED), *defer(*(row for row in FIXED.items() if row[0] not in CONSERVED)),
 ])  # fmt: skip
 def test_the_error_falls_by_the_order(name: str, method: str, order: int) -> None:
     steep = 6.0 if order in (9, 16) else 1.6  # there the long steps fall as powers of h over a radius
@@ -96,7 +96,7 @@ def test_a_tight_tolerance_comes_to_the_true_motion(name: str, method: str) -> N
 
 @pytest.mark.parametrize("name", BODIES)
 @pytest.mark.parametrize(("order", "method"), [
-    (2, "strang"), (4, "gauss-4"), *late(*{order: method for method, order in FIXED.items()}.items())])  # fmt: skip
+    (2, "strang"), (4, "gauss-4"), *defer(*{order: method for method, order in FIXED.items()}.items())])  # fmt: skip
 def test_a_wrong_sign_in_the_inertia_is_caught(name: str, method: str, order: int) -> None:
     """The same momentum of the mirrored body: I1 and I3 exchanged turn the gyroscopic torque around."""
     scene = symtop.body_scenes()[name]
@@ -332,7 +332,7 @@ def test_a_body_stored_or_of_plain_numbers_is_read_back_to_the_bit(tmp_path):  #
 @pytest.mark.parametrize(("name", "execution"), [
     *((name, chunks.IN_LANES) for name in (
         "rk4", "strang", "chin-4a", "five-rotations", "vern9-fixed", "gauss-6", "rkmk-se3-4", "lie-variational")),
-    *late(*((name, chunks.IN_LANES) for name in ("gauss-12", "srkn-19-8", "crouch-grossman-3")), mark="slow"),
+    *defer(*((name, chunks.IN_LANES) for name in ("gauss-12", "srkn-19-8", "crouch-grossman-3")), mark="slow"),
     ("series-general", chunks.IN_TURN),
 ])  # fmt: skip
 @pytest.mark.parametrize("per_nutation", [4, 30])  # a turn of more than a radian leaves its lane

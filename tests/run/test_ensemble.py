@@ -16,7 +16,7 @@ from symtop.model.scenes import nutation_period
 from symtop.run.ensemble import chunks
 from symtop.run.ensemble.chunks import nutation_periods, schedule
 from symtop.run.simulation import sample_times
-from tests.conftest import late
+from tests.conftest import defer
 
 pytestmark = pytest.mark.usefixtures("in_lanes")
 SOME = symtop.population(36, seed=5)
@@ -55,7 +55,7 @@ def assert_alone(members, name, data, samples, **setting):
     ("strang[axis]", {"step_size": 0.02, "horizon": 2.0}, 60),
     ("midpoint[angles]", {"per_nutation": 12, "nutations": 20}, 45),
     ("cayley-tuned[axis]", {"per_nutation": 12, "nutations": 3}, 20),
-    *late(("gauss-4[attitude]", {"per_nutation": 12, "nutations": 5.5}, 50)),
+    *defer(("gauss-4[attitude]", {"per_nutation": 12, "nutations": 5.5}, 50)),
 ])  # fmt: skip
 def test_a_member_is_the_run_of_simulate_to_the_last_bit(name, settings, samples):
     data = symtop.ensemble(SOME, name, samples=samples, quiet=True, **settings)

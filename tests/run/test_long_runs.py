@@ -19,7 +19,7 @@ from symtop.methods.framework import loop as drive
 from symtop.run import long_run as longrun
 from symtop.run.long_run import chart_of, leaves, long_run, regrown, scattered, windows
 from tests.commands import ROOT, call, printed_by
-from tests.conftest import late
+from tests.conftest import defer
 
 SCENE = symtop.scene("spheroid")
 H = SCENE.nutation_period / 400.37
@@ -130,8 +130,8 @@ def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
             child.kill()  # it is waited for even if the machine was too slow for the minute
     assert code == (-signal.SIGKILL if blow == signal.SIGKILL else 128 + signal.SIGTERM)
     monkeypatch.setattr(longrun, "LONGEST", 200_000)
-    reached, steps = longrun.netcdf.read(file)["steps_done"].item(), 4_000_000
-    assert 10_000 <= reached < steps
+    steps_done, steps = longrun.netcdf.read(file)["steps_done"].item(), 4_000_000
+    assert 10_000 <= steps_done < steps
     positions, resume = [], longrun._Checkpoint.resumed
 
     def noting(self, start):
@@ -141,7 +141,7 @@ def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
 
     monkeypatch.setattr(longrun._Checkpoint, "resumed", noting)  # a checkpoint holds a hash of the loop itself
     resumed = long_run(SCENE, "midpoint", steps=steps, step_size=H, checkpoint=file, quiet=True)
-    assert reached in positions  # it did go on from there
+    assert steps_done in positions  # it did go on from there
     assert not file.exists()
     assert resumed.identical(long_run(SCENE, "midpoint", steps=steps, step_size=H, quiet=True))
 
@@ -216,7 +216,7 @@ def test_checkpoints_of_other_runs_are_refused_and_a_failed_run_shows_the_window
     assert data.attrs["outcome"] == "left_chart"
 
 
-@pytest.mark.parametrize("name", ["midpoint", "strang", "cayley", *late("stormer-verlet")])
+@pytest.mark.parametrize("name", ["midpoint", "strang", "cayley", *defer("stormer-verlet")])
 def test_compensated_sums_drift_less_than_plain_ones(name):
     data = rounding(SCENE, symtop.integrator(name), 300_000, 1000.37, 3)
     assert float(data["end"]) < 2e-15
@@ -252,7 +252,7 @@ def test_the_command_runs_and_says_what_changed(tmp_path):
     assert "rk45 has no compiled loop of fixed steps, as strang has, to be run" in result.stderr
 
 
-@pytest.mark.parametrize("name", ["strang", *late("gauss-4")])  # the latter turns back what it steps, to show it
+@pytest.mark.parametrize("name", ["strang", *defer("gauss-4")])  # the latter turns back what it steps, to show it
 def test_a_body_is_watched_as_simulate_shows_it(name):
     scene = symtop.scene("heavy-brick", bodies=True)
     steps, h = 10_000, scene.nutation_period / 50.37

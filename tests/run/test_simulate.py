@@ -123,8 +123,8 @@ def test_two_datasets_share_nothing_and_a_trajectory_has_the_numbers_of_its_data
     data = symtop.simulate("spheroid", "midpoint", guard=False, **settings)
     trajectory = integrate("spheroid", "midpoint", **settings)
     np.testing.assert_equal(Trajectory.of_data(data)._asdict(), trajectory._asdict())
-    stored = {name: data[name].values.tobytes() for name in data.data_vars}
-    assert stored == {name: values.tobytes() for name, values in trajectory.columns.items()}
+    contents = {name: data[name].values.tobytes() for name in data.data_vars}
+    assert contents == {name: values.tobytes() for name, values in trajectory.columns.items()}
 
 
 def test_files_are_whole_and_a_failed_write_leaves_the_old_one(tmp_path, monkeypatch):
@@ -253,12 +253,12 @@ HUGE = symtop.Scene("huge", symtop.SymmetricTop(1.0, 1.0, 1e30), symtop.Angles(t
 ])  # fmt: skip
 def test_every_outcome_is_produced_said_and_timed(scene, name, controls, outcome):
     run = symtop.simulate(scene, name, guard=False, **{"samples": 201, **controls})
-    reached, unit = run.attrs["reached_time"], symtop.scene(scene).second
+    end, unit = run.attrs["reached_time"], symtop.scene(scene).second
     assert run.attrs["outcome"] == outcome
-    assert re.fullmatch(rf"stopped at t = {reached:.6g} of [\d.e+-]+{unit}: .+; .+", run.attrs["outcome_message"])
-    assert 0.0 <= reached < run.attrs["horizon"]
-    assert reached > 0.0 or outcome != "out_of_budget"
-    mask, after = np.isfinite(run["axis"].values).all(axis=1), run["time"].values > reached * (1.0 + 1e-9)
+    assert re.fullmatch(rf"stopped at t = {end:.6g} of [\d.e+-]+{unit}: .+; .+", run.attrs["outcome_message"])
+    assert 0.0 <= end < run.attrs["horizon"]
+    assert end > 0.0 or outcome != "out_of_budget"
+    mask, after = np.isfinite(run["axis"].values).all(axis=1), run["time"].values > end * (1.0 + 1e-9)
     assert mask[0]
     assert not mask[after].any()  # nothing is made up
 
@@ -269,8 +269,8 @@ def test_an_early_end_is_announced_and_a_budget_that_was_kept_is_no_failure():
         run = symtop.simulate(grazing(gap), "radau", tolerance=tolerance, guard=sentences.append, **controls)
         assert run.attrs["outcome"] == outcome
         assert len(sentences) == (outcome != "ok")
-        reached = f"expect the run to be stopped at t = {run.attrs['reached_time']:.6g} "
-        assert all(reached in sentence and "step size fell below" in sentence for sentence in sentences)
+        words = f"expect the run to be stopped at t = {run.attrs['reached_time']:.6g} "
+        assert all(words in sentence and "step size fell below" in sentence for sentence in sentences)
     run = symtop.simulate("spheroid", "rk45-compiled", tolerance=1e-6)
     count = run.attrs["force_evaluations"]
     assert symtop.simulate("spheroid", "rk45-compiled", tolerance=1e-6, budget=count).equals(run)

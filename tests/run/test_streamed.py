@@ -17,7 +17,7 @@ import symtop
 from symtop.core import files
 from symtop.run.ensemble import chunks, ensemble, ensemble as ensembles
 from tests.commands import printed_by
-from tests.conftest import late
+from tests.conftest import defer
 
 SOME = symtop.population(60, seed=5)
 SETTINGS = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
@@ -43,7 +43,7 @@ def assert_refused(words, path, name="strang[axis]", **changes):
 
 @pytest.mark.parametrize(("name", "settings"), [
     ("stormer-verlet", {}), ("strang[axis]", {"variables": ["energy", "p_phi"]}),
-    ("exact", {"per_nutation": None, "nutations": None, "horizon": 2.0}), *late(("strang[attitude]", {}),
+    ("exact", {"per_nutation": None, "nutations": None, "horizon": 2.0}), *defer(("strang[attitude]", {}),
           ("midpoint", {"nutations": None, "horizon": 0.7, "per_nutation": None, "step_size": 0.01})),
 ])  # fmt: skip
 def test_the_file_holds_the_ensemble_in_memory(tmp_path, small_pieces, name, settings):
@@ -122,9 +122,9 @@ def test_one_process_at_a_time_writes_a_file(tmp_path, small_pieces, monkeypatch
 def test_a_piece_that_was_removed_is_not_called_damaged(tmp_path, small_pieces, monkeypatch):
     path, finish = tmp_path / "runs.nc", ensemble.Stream.finish
 
-    def robbed(stream, some, added):
+    def robbed(stream, pieces, added):
         (tmp_path / "runs.nc.parts" / "7-14.npz").unlink()
-        return finish(stream, some, added)
+        return finish(stream, pieces, added)
 
     with monkeypatch.context() as patch:
         patch.setattr(ensemble.Stream, "finish", robbed)
@@ -258,7 +258,7 @@ except KeyboardInterrupt:
 def test_an_interrupt_is_heard_within_a_second(name, setting, long, threads):
     code = INTERRUPTED.replace("NAME", repr(name)).replace("THREADS", str(threads))
     code = code.replace("SETTING", setting).replace("LONG", str(long))
-    raised, ended = map(float, printed_by(code).split())
-    print(f"{name}: heard after {raised:.2f} s, ended after {ended:.2f} s")
-    assert raised < 1.0
-    assert ended < 4.0
+    raise_time, end_time = map(float, printed_by(code).split())
+    print(f"{name}: heard after {raise_time:.2f} s, ended after {end_time:.2f} s")
+    assert raise_time < 1.0
+    assert end_time < 4.0

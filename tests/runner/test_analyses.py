@@ -15,7 +15,7 @@ from symtop.runner import run as runner, store
 from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool
 from symtop.runner.run import analyse_stored, drawing_digest
-from tests.commands import answer, leftovers, same
+from tests.commands import assert_identical, code_and_output, leftovers
 
 SCRIPT = """
 import os, signal
@@ -69,7 +69,7 @@ def shared(pool, monkeypatch):
 
 def studied(results, *files):
     """Exit code and output of one command for several studies."""
-    return answer("study", *files, "--results", results, "--jobs", 2)
+    return code_and_output("study", *files, "--results", results, "--jobs", 2)
 
 
 def process_of(results, name):
@@ -86,7 +86,7 @@ def test_each_of_several_is_concluded_by_another_process_to_the_same_files(scrip
     for file in files:
         assert studied(tmp_path / "alone", file)[0] == 0  # the control: one by itself has nothing to run beside
     assert {process_of(tmp_path / "alone", name) for name in ("first", "second")} == {os.getpid()}
-    assert same(tmp_path / "together", tmp_path / "alone") == 6
+    assert assert_identical(tmp_path / "together", tmp_path / "alone") == 6
     assert "0 of 2 cases computed" in studied(tmp_path / "together", *files)[1]
     assert not leftovers(tmp_path / "together")
 

@@ -9,7 +9,7 @@ from symtop.run.ensemble import chunks
 from symtop.run.ensemble.ensemble import ensemble
 from symtop.run.ensemble.population import population
 from symtop.runner.pool import Pool
-from tests.commands import PROBE, ended, symtop
+from tests.commands import PROBE, finish, symtop
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("processes_with_dask"),
               pytest.mark.filterwarnings("ignore")]  # fmt: skip  # of the cluster's own making
@@ -31,7 +31,7 @@ def test_a_case_that_fails_there_is_recorded_here(cluster, tmp_path):
         "symtop.register(symtop.Integrator(name='bad-raises', family='other', summary='', solvers={'angles': solve}))\n"
     )
     words = ["study", PROBE, "--results", tmp_path / "r", "--plugin", plugin, "--scheduler", cluster.scheduler_address]
-    code, out, err = ended(symtop(*words))
+    code, out, err = finish(symtop(*words))
     assert (code, err.count("RuntimeError: no luck")) == (1, 2)
     assert "of 14 cases computed" in out
 

@@ -21,7 +21,7 @@ from symtop.core import files, netcdf
 from symtop.core.errors import SymtopError
 from symtop.core.signals import at_most
 from symtop.runner import pool as work, run as runner, store
-from tests.commands import PROBE, contents, ended, leftovers, probed as probe, same, stop, succeeded, symtop
+from tests.commands import PROBE, assert_identical, contents, finish, leftovers, probe, stdout_of, stop, symtop
 from tests.kills import survive
 
 
@@ -71,7 +71,7 @@ def sentences(err):
 @pytest.mark.slow
 def test_a_real_limit_on_the_size_of_files(tmp_path):
     """The kernel refuses to let files grow beyond 8 kB: every write fails as on a full disk, in workers too."""
-    succeeded(symtop("study", PROBE, "--results", tmp_path / "warm"))  # kernels are cached now
+    stdout_of(symtop("study", PROBE, "--results", tmp_path / "warm"))  # kernels are cached now
     code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192)); "
     code += "from symtop.cli.main import main; sys.argv[0] = 'symtop'; main()"
     command = [sys.executable, "-c", code, "study", str(PROBE), "--results", str(tmp_path / "small")]
@@ -123,8 +123,8 @@ def test_truncated_damaged_and_foreign_files_are_computed_again(tmp_path):
     after = contents(tmp_path)
     assert all(before[name].identical(after[name]) for name in before)
     assert "0 of 4 cases computed" in probe(tmp_path)
-    about = str(arrays["about"]).replace('"made_of": {', '"made_of": {"code nothing.py": "0", ')
-    np.savez(cases[1], **arrays | {"about": about})  # the numbers are right, and what is said of them is not
+    record = str(arrays["about"]).replace('"made_of": {', '"made_of": {"code nothing.py": "0", ')
+    np.savez(cases[1], **arrays | {"about": record})  # the numbers are right, and what is said of them is not
     assert "1 of 4 cases computed" in probe(tmp_path)
 
 
@@ -156,11 +156,11 @@ def test_two_runs_at_once_share_the_work_and_agree(tmp_path):
     log, words = tmp_path / "log", ["study", PROBE, "--results", tmp_path / "shared", "--jobs", 2]
     runs = [symtop(*words, PROBE_LOG=log, PROBE_PAUSE=0.3) for _ in range(2)]
     for run in runs:
-        assert "of 12 cases computed" in succeeded(run)
+        assert "of 12 cases computed" in stdout_of(run)
     names = log.read_text().split()
     assert len(names) == len(set(names)) == 12
-    succeeded(symtop("study", PROBE, "--results", tmp_path / "alone"))
-    same(tmp_path / "shared", tmp_path / "alone")
+    stdout_of(symtop("study", PROBE, "--results", tmp_path / "alone"))
+    assert_identical(tmp_path / "shared", tmp_path / "alone")
     assert not leftovers(tmp_path / "shared")
 
 
@@ -203,7 +203,7 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, quick):
     wait_for_cases(log, 3 if quick else 5, process)
     os.killpg(process.pid, number) if number == signal.SIGHUP else process.send_signal(number)  # as a terminal does
     start = time.monotonic()
-    status, _, err = ended(process)
+    status, _, err = finish(process)
     assert time.monotonic() - start < 10.0
     assert status == code
     word = "interrupted" if number == signal.SIGINT else "terminated"
@@ -211,7 +211,7 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, quick):
     assert not leftovers(tmp_path / "r")
     count = len(list((tmp_path / "r").rglob("cases/probe/*.npz")))
     assert count >= 1, [path.read_text() for path in (tmp_path / "r").rglob("*.failed.json")]
-    assert f"{(4 if quick else 12) - count} of" in succeeded(symtop(*words, PROBE_LOG=log))
+    assert f"{(4 if quick else 12) - count} of" in stdout_of(symtop(*words, PROBE_LOG=log))
     assert not leftovers(tmp_path / "r")
 
 
@@ -233,7 +233,7 @@ def test_a_worker_that_is_killed_costs_no_more_than_what_it_was_computing(tmp_pa
     workers = [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
     spawned = [pid for pid in workers if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
     os.kill(spawned[0], signal.SIGKILL)
-    assert "12 of 12 cases computed" in succeeded(process)
+    assert "12 of 12 cases computed" in stdout_of(process)
     names = log.read_text().split()
     assert len(names) - len(set(names)) <= 2  # one case a worker
 
@@ -276,8 +276,8 @@ def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
     plugin.write_text(BAD)
     results = tmp_path / "r"
     words = ["study", PROBE, "--results", results, "--jobs", 2]
-    succeeded(symtop(*words))  # the good ones have compiled their kernels
-    code, out, err = ended(symtop(*words, "--plugin", plugin, "--limit", 3))
+    stdout_of(symtop(*words))  # the good ones have compiled their kernels
+    code, out, err = finish(symtop(*words, "--plugin", plugin, "--limit", 3))
     assert code == 1
     assert "2 of 24 cases computed" in out  # those that return NaN: a result like any other
     expected = {
@@ -300,7 +300,7 @@ def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
     assert any("raise RuntimeError" in line for r in records for line in r["traceback"])
     assert any("in deaf" in line for r in records for line in r["traceback"])
     assert not leftovers(results)
-    code, out, _ = ended(symtop("study", PROBE, "--results", results, "--plugin", plugin, "--status", "--json"))
+    code, out, _ = finish(symtop("study", PROBE, "--results", results, "--plugin", plugin, "--status", "--json"))
     assert code == 1
     states = [row["state"] for row in json.loads(out)["probe"]]
     assert (states.count("failed"), states.count("done")) == (10, 14)
@@ -332,7 +332,7 @@ def test_a_clock_that_jumps(tmp_path, monkeypatch):
     monkeypatch.setattr(time, "time", lambda: draw.uniform(-1e9, 4e9))
     probe(tmp_path / "r")
     monkeypatch.undo()
-    same(tmp_path / "calm", tmp_path / "r")
+    assert_identical(tmp_path / "calm", tmp_path / "r")
 
 
 @pytest.mark.slow

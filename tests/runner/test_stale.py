@@ -19,7 +19,7 @@ from symtop.report import style
 from symtop.runner import fingerprint, run as runner
 from symtop.runner.cases import status
 from symtop.runner.run import drawing_digest
-from tests.commands import PROBE, probed, succeeded, symtop as symtop_command
+from tests.commands import PROBE, probe, stdout_of, symtop as symtop_command
 
 
 @contextlib.contextmanager
@@ -192,7 +192,7 @@ def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
 
 def test_a_missing_case_is_told_by_its_settings_and_by_what_was_edited(tmp_path):
     study = runner.load(str(PROBE))
-    probed(tmp_path)
+    probe(tmp_path)
     coarser = dataclasses.replace(study, cases=lambda quick: [symtop.Case("loop", "midpoint", {"step_size": 0.02})])
     for place, causes in (("cli.common:as_text", []), ("model.top:SymmetricTop.energy", ["code symtop/model/top.py"])):
         with edited(f"symtop.{place}"):
@@ -221,7 +221,7 @@ def test_an_edit_of_each_family_is_named_by_status_and_is_all_that_is_computed(t
     words = ["study", tmp_path / "probe.py", "--plugin", tmp_path / "plug.py", "--results", tmp_path / "r"]
 
     def command(*options):
-        return succeeded(symtop_command(*words, *options, cwd=tmp_path, PYTHONPATH=tmp_path))
+        return stdout_of(symtop_command(*words, *options, cwd=tmp_path, PYTHONPATH=tmp_path))
 
     assert "14 of 14 cases computed" in command()
     edits = [

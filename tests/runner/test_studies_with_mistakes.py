@@ -143,9 +143,9 @@ def test_a_step_that_is_nan_is_no_option_and_a_limit_holds_for_checked_cases_too
     first, second, sentence = run_study(tmp_path, change + combining, code=2).splitlines()  # which may be why
     assert first == second == "  rk4 on spheroid failed: AssertionError: so"
     assert "two cases of strang on spheroid measure err" in sentence
-    slow = "import os, time\ndef measure(case):\n    time.sleep(float(os.environ.get('LATE', '0')))\n"
-    slow += "    return xr.Dataset({'err': 1.0})"
-    run_study(tmp_path, slow)
-    assert "2 of 2 cases computed again, the same" in run_study(tmp_path, slow, "--check", "--limit", 30)
+    script = "import os, time\ndef measure(case):\n    time.sleep(float(os.environ.get('LATE', '0')))\n"
+    script += "    return xr.Dataset({'err': 1.0})"
+    run_study(tmp_path, script)
+    assert "2 of 2 cases computed again, the same" in run_study(tmp_path, script, "--check", "--limit", 30)
     monkeypatch.setenv("LATE", "3")
-    assert run_study(tmp_path, slow, "--check", "--limit", 0.2, code=1).count("it was not done after 0.2 s") == 2
+    assert run_study(tmp_path, script, "--check", "--limit", 0.2, code=1).count("it was not done after 0.2 s") == 2

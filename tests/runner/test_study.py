@@ -18,20 +18,20 @@ from symtop.model import scenes as catalogue
 from symtop.model.scenes import TAGS
 from symtop.runner import run as runner, store
 from symtop.runner.study import Case
-from tests.commands import PROBE, call, contents, probed as probe
+from tests.commands import PROBE, call, contents, probe
 
 
 def test_every_study_leaves_figures_and_findings_that_follow_from_its_dataset(quick_results, tmp_path):
     """Nothing is said that the dataset on disk does not say again; `seconds` aside, nothing else is asked."""
     for name in runner.names():
-        study, stored = runner.load(name), netcdf.read_any(quick_results / f"{name}.nc")
-        assert all({"scene", "variant"} <= {*data.dims} for data in netcdf.groups(stored).values() if data.variables)
+        study, tree = runner.load(name), netcdf.read_any(quick_results / f"{name}.nc")
+        assert all({"scene", "variant"} <= {*data.dims} for data in netcdf.groups(tree).values() if data.variables)
         findings = json.loads((quick_results / f"{name}.json").read_text(encoding="utf-8"))
         assert findings["failures"] == []
         assert findings["pictures"] or findings["facts"]["busy"]  # times of a busy machine are not drawn
         for picture in findings["pictures"]:
             assert (quick_results / "figures" / picture["file"]).stat().st_size > 5000
-        repeat = runner.findings_of(study, stored, tmp_path, None, failures=[], cases=findings["cases"])
+        repeat = runner.findings_of(study, tree, tmp_path, None, failures=[], cases=findings["cases"])
         assert json.loads(json.dumps(repeat["facts"])) == findings["facts"], name
         assert any(type(value) in (int, float) for value in findings["facts"].values()), name
         assert repeat["tables"] == findings["tables"], name

@@ -309,11 +309,11 @@ def test_facts_are_those_of_the_mechanisms_and_the_page_says_them_but_none_of_wh
             if case.scene == study.FAMILY:
                 settings |= {key: settings[key][::4] for key in ("parameters", "ladder")}
             cases.append(dataclasses.replace(case, settings=settings))
-    measured = datasets.combine([(case, study.measure(case)) for case in cases])
-    answers = facts.facts(measured)
+    data = datasets.combine([(case, study.measure(case)) for case in cases])
+    answers = facts.facts(data)
     assert answers.keys() >= set(facts.NAMES)
     assert {name for name in facts.NAMES if answers[name] is None} == {"cayley_sleeps", "outlasting"}
-    resonances = mechanisms.resonant(measured.sel(scene="steady-fast"))
+    resonances = mechanisms.resonant(data.sel(scene="steady-fast"))
     assert resonances["stormer-verlet[angles]"] == pytest.approx(math.sqrt(3.0), abs=1e-4)
     assert resonances["midpoint[angles]"] == pytest.approx(2.0 * math.sqrt(3.0), abs=1e-4)
     assert answers["limit_variant"] == "stormer-verlet[angles]"
@@ -321,11 +321,11 @@ def test_facts_are_those_of_the_mechanisms_and_the_page_says_them_but_none_of_wh
     assert answers["sleep_miss"] < 1e-8 < abs(answers["strang_sleeps"] - 2.0)
     assert answers["one_iteration"] > 10.0 * answers["solved"]
     assert (answers["angles"], answers["others"], answers["others_halved"]) == (2, 1, 0)
-    shares = {name: entry.accurate for name, entry in atlas.maps(measured, study.FAMILY).items()}
-    table = facts.tables(measured)["atlas"]
+    shares = {name: entry.accurate for name, entry in atlas.maps(data, study.FAMILY).items()}
+    table = facts.tables(data)["atlas"]
     assert dict(zip(table["variant"], table["accurate (%)"] / 100.0, strict=True)) == pytest.approx(shares)
     assert table["accurate (%)"].is_monotonic_decreasing
-    assert f"{answers['angles_halved']} of 2 variants in Euler's angles" in checked("stability", measured, tmp_path)
+    assert f"{answers['angles_halved']} of 2 variants in Euler's angles" in checked("stability", data, tmp_path)
     answers = facts.facts(hand_made([[A, B, L]] * 4))
     assert (answers["settled"], answers["cells"], answers["resonant"], answers["others"]) == (0.0, 12, None, None)
     assert facts.tables(hand_made([[A, B, L]] * 4))["limits"].empty

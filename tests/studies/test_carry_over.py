@@ -129,7 +129,7 @@ def test_wrong_runs_are_told_by_what_shows_them_and_orders_and_exponents_read_of
 
 
 def test_a_median_error_is_the_largest_of_the_last_half_and_a_refuted_truth_is_over_both_bounds(monkeypatch):
-    fall = lambda self, _, known: dict.fromkeys(("attitude", "energy"), np.tile(1e-3 / self.marks, (known.size, 1)))
+    fall = lambda self, _, index: dict.fromkeys(("attitude", "energy"), np.tile(1e-3 / self.marks, (index.size, 1)))
     monkeypatch.setattr(Bodies, "errors_at", fall)
     data = growth_table(integrator("gauss-4[body]"), 2, 3, 1)
     error = data["error_energy"].sel(family=SYMMETRIC).values
@@ -200,11 +200,11 @@ def test_tau_is_kendalls_with_ties_and_verdicts_follow_limits_fixed_before():
     for _ in range(20):
         first, second = (generator.integers(0, 8, 15).astype(float) for _ in range(2))
         assert by.tau_of(first, second) == pytest.approx(kendalltau(first, second).statistic)
-    reached = np.array([1.0, 2.0, 3.0, 1e300, 1e300])
-    assert by.tau_of(reached, reached) == 1.0  # those that nobody reaches say nothing
+    work = np.array([1.0, 2.0, 3.0, 1e300, 1e300])
+    assert by.tau_of(work, work) == 1.0  # those that nobody reaches say nothing
     assert by.tau_of(np.arange(1.0, 5.0), np.array([1e300, 1.0, 2.0, 3.0])) == 0.0  # what one alone reaches
     assert by.medians(np.array([[1.0, 2.0, 9.0], [1.0, np.inf, np.inf]])).tolist() == [2.0, 1e300]
-    assert np.isnan(by.tau_of(reached[3:], reached[3:]))
+    assert np.isnan(by.tau_of(work[3:], work[3:]))
     for ends, verdict in (((0.91, 0.99), by.YES), ((0.7, 0.95), by.PARTLY), ((0.6, 0.79), by.NO)):
         assert by.ranking_verdict(by.Interval(0.85, *ends)) == verdict
     words = [by.factor_verdict(ratio) for ratio in (1.05, 1.0 / 1.05, 1.8, 0.6, 2.5, 0.3)]

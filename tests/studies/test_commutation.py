@@ -112,21 +112,21 @@ def test_facts_and_page_are_those_of_the_rules_and_charts(tmp_path):
         if case.scene == "spheroid" and (case.settings["part"] != "charts" or case.integrator == "euler-poincare"):
             settings = {key: overrides.get(key, value) for key, value in case.settings.items()}
             parts.append((case, study.measure(dataclasses.replace(case, settings=settings))))
-    measured = datasets.combine(parts)
-    answers = facts.facts(measured)
+    data = datasets.combine(parts)
+    answers = facts.facts(data)
     assert answers["commuting_gap"] < 1e-13
     assert answers["others"] == "trapezoidal, simpson-linear, galerkin-simpson"
     assert (answers["power_least"], answers["power_most"]) == pytest.approx((2.0, 4.0), abs=0.2)
     assert (answers["commuting"], answers["rules"]) == ("midpoint", "midpoint, trapezoidal")
     assert 0.0 < answers["twins_gap"] < 1e-11  # rounding over 10 000 steps without compensation
-    assert answers["attitude_count"] == len(facts.tables(measured)["charts"])
-    assert not (measured[["p_phi_drift", "p_psi_drift"]].to_dataarray() < 0.0).any()
-    assert 1.0 <= measured["iterations_per_step"].min() <= measured["iterations_per_step"].max() < 10.0
-    part = measured.isel(commutation_step=slice(2))  # too few for an order, and no less apart
+    assert answers["attitude_count"] == len(facts.tables(data)["charts"])
+    assert not (data[["p_phi_drift", "p_psi_drift"]].to_dataarray() < 0.0).any()
+    assert 1.0 <= data["iterations_per_step"].min() <= data["iterations_per_step"].max() < 10.0
+    part = data.isel(commutation_step=slice(2))  # too few for an order, and no less apart
     assert facts.facts(part)["others"] == answers["others"]
     assert np.isnan(facts.facts(part)["power_least"])
     assert len(figures.pictures(part)) == 1
-    checked("reduction", measured, tmp_path)
+    checked("reduction", data, tmp_path)
 
 
 @pytest.mark.parametrize(("failed", "ratio"), [(np.nan, 2.0), (0.1, 1.75)])

@@ -60,16 +60,16 @@ def test_verdicts_are_those_of_the_one_rule_and_a_wrong_declaration_is_refuted(d
 
 def test_a_median_over_few_scenes_is_not_ranked(data, monkeypatch):
     scenes = ["goldstein", "spheroid", "loop"]
-    three = xr.concat([data.assign_coords(scene=[name]) for name in scenes], "scene")
+    stack = xr.concat([data.assign_coords(scene=[name]) for name in scenes], "scene")
     works = {(scene, "rk4[axis]"): measures.Efficiency(100.0, False) for scene in scenes}
     works["loop", "strang[axis]"] = measures.Efficiency(1.0, True)
     monkeypatch.setattr(facts, "efficiencies", lambda *_: works)
-    table = facts.cheapest(three)
+    table = facts.cheapest(stack)
     extra = {"midpoint[angles]": 10.0, "stormer-verlet[angles]": 20.0, "trapezoidal[angles]": 80.0}
     extra = {(scene, name): measures.Efficiency(work * (part if work == 80.0 else 1.0), False)
              for name, work in extra.items() for scene, part in zip(scenes, (1.0, 1.0, 9.0), strict=True)}  # fmt: skip
     monkeypatch.setattr(facts, "efficiencies", lambda *_: works | extra)
-    answers, count = facts.facts(three), measures.stepping(data).sizes["variant"]
+    answers, count = facts.facts(stack), measures.stepping(data).sizes["variant"]
     assert (answers["span"], answers["span_order"], answers["unknown"]) == (8.0, 2, count - 5)
     monkeypatch.setattr(facts, "efficiencies", lambda *_: works)
     assert table["variant"].tolist() == ["rk4[axis]", "strang[axis, attitude]"]
@@ -143,14 +143,14 @@ def test_rows_show_the_axis_the_attitude_where_they_can_and_work_a_nutation_and_
 
 
 def test_the_page_says_what_was_measured_and_adaptive_errors_follow_their_tolerance(data, tmp_path):
-    fitted = measures.tolerance_fits(data)
+    fits = measures.tolerance_fits(data)
     tolerance = 10.0 ** -np.arange(2.0, 10.0)  # errors near the bound are the reference's: they follow no tolerance
     columns = {"tolerance": tolerance, "axis": np.maximum(0.1 * tolerance, 5e-8), "axis_bound": np.full(8, 1e-8)}
     rows = {name: (("scene", "variant", "setting"), column[None, None]) for name, column in columns.items()}
     (fit,) = measures.tolerance_fits(xr.Dataset(rows, {"scene": ["goldstein"], "variant": ["rk45[angles]"]})).values()
     assert (fit.slope, fit.used.sum()) == (pytest.approx(1.0), 4)
-    assert {name for _, name in fitted} == {name for name in ROWS if integrator(name).adaptive}
-    assert fitted["goldstein", "rk45[angles]"].slope == pytest.approx(1.0, abs=0.15)
+    assert {name for _, name in fits} == {name for name in ROWS if integrator(name).adaptive}
+    assert fits["goldstein", "rk45[angles]"].slope == pytest.approx(1.0, abs=0.15)
     checked("convergence", data, tmp_path)
     answers = facts.facts(data)
     assert answers["pairs"] == answers["confirmed"] + answers["refuted"] + answers["undecided"]

@@ -28,7 +28,7 @@ from symtop.report.formats import number
 from symtop.report.template import PARTIAL
 from symtop.runner.run import load
 from symtop.runner.study import Case
-from tests.conftest import late
+from tests.conftest import defer
 from tests.templates import checked
 
 INF, NAN = math.inf, math.nan
@@ -59,8 +59,8 @@ def test_what_counts_as_a_hit(errors, cost):
 def test_a_cost_lies_between_miss_and_hit_and_slowdowns_wins_and_run_lengths_follow():
     work = np.array([[10.0], [20.0], [40.0]])
     errors = np.array([[1e-2], [1e-4], [1e-6]])  # two decades for each doubling
-    reached = cost_to_reach(work, errors, [1e-2, 1e-3, 1e-4, 1e-5, 1e-7])
-    assert reached[:, 0] == pytest.approx([10.0, 10.0 * math.sqrt(2.0), 20.0, 20.0 * math.sqrt(2.0), INF])
+    costs = cost_to_reach(work, errors, [1e-2, 1e-3, 1e-4, 1e-5, 1e-7])
+    assert costs[:, 0] == pytest.approx([10.0, 10.0 * math.sqrt(2.0), 20.0, 20.0 * math.sqrt(2.0), INF])
     table = np.array([[1.0, 4.0, INF], [2.0, 2.0, INF]])
     assert np.array_equal(slowdowns(table), [[1.0, 2.0, NAN], [2.0, 1.0, NAN]], equal_nan=True)
     won, level = wins(np.array([[1.0, 1.0, 1.0], [1.05, 2.0, 0.5], [3.0, 1.1, INF]]))
@@ -129,8 +129,8 @@ def test_a_lead_is_called_if_neither_tops_nor_prices_can_turn_it_and_hindsight_m
     fair, ahead = draw.random((2, 2000)), draw.random((2, 2000)) * [[0.7], [1.0]]
     assert not hindsight("ab", fair, QUIET).called
     assert [hindsight("ab", ahead[:, :count], QUIET).called for count in (2000, 12)] == [True, False]  # too few tops
-    alone, many = (hindsight("ab", np.ones((2, tops)) * [[1.0], [2.0]], QUIET) for tops in (1, 200))  # a wins on all
-    assert (alone.called, *alone.first[1:4]) == (False, 1.0, 0.0, 1.0)
+    single, many = (hindsight("ab", np.ones((2, tops)) * [[1.0], [2.0]], QUIET) for tops in (1, 200))  # a wins on all
+    assert (single.called, *single.first[1:4]) == (False, 1.0, 0.0, 1.0)
     assert (many.called, many.first.low) == (True, pytest.approx(1.0 - 3.0 / 201.0, abs=0.006))
     assert not hindsight("ab", ahead, QUIET * 40.0).called  # the same tops, with prices that are hardly known
     assert not hindsight("ab", ahead, QUIET, marked=["a"]).called
@@ -313,7 +313,7 @@ def test_errors_of_many_runs_are_those_of_each(tops, name):
         assert errors[MOMENTA][k] <= max(expected["p_phi"], expected["p_psi"]) * 1.001 + 1e-14
 
 
-@pytest.mark.parametrize("name", ["rk4[attitude]", "strang[attitude]", *late("tsit5-fixed[attitude]")])
+@pytest.mark.parametrize("name", ["rk4[attitude]", "strang[attitude]", *defer("tsit5-fixed[attitude]")])
 def test_coarse_runs_end_in_the_ladder_as_they_end_alone(in_lanes, tops, name):
     row, indices = integrator(name), np.flatnonzero(tops.known)
     result = ladder.run_level(row, tops, indices, 0, 1e6)
@@ -466,8 +466,8 @@ def test_facts_and_tables_are_those_of_the_cells(small):
     (choice,) = (choice for choice in cells.safest(small, cell)[0] if choice.name == "taylor[axis]")
     taylor, share = parts["short"].isel(scene=0).sel(variant="taylor[axis]"), np.bincount(kinds) / kinds.size
     mean = taylor["work"].transpose("level", "kind").values[:, : share.size] @ share  # of all that are asked
-    x, good = -np.log(taylor["setting"].values), np.isfinite(mean) & np.isfinite(taylor["setting"].values)
-    typical = math.exp(np.interp(-math.log(choice.setting), x[good], np.log(1.4e-8 * mean[good] + 2e-6)))
+    x, mask = -np.log(taylor["setting"].values), np.isfinite(mean) & np.isfinite(taylor["setting"].values)
+    typical = math.exp(np.interp(-math.log(choice.setting), x[mask], np.log(1.4e-8 * mean[mask] + 2e-6)))
     assert choice.seconds == pytest.approx(typical)
     price, name = parts["prices"]["price"], parts["prices"]["variant"] == "taylor[axis]"
     fine, dear = (xr.DataTree.from_dict({**parts, "prices": parts["prices"].assign(price=each)}) for each in
@@ -543,8 +543,8 @@ def test_an_advised_setting_was_run_on_other_tops_and_serves_them(small):
     table = facts.tables(small)["confirmed"].set_index(["variant", "error"])
     for (name, error), row in table.iterrows():
         choices = cells.safest(small, Cell("short", "axis", error, NATURAL, integrator(name).needs))[0]
-        printed = facts.setting_words(name, next(choice for choice in choices if choice.name == name).setting)
-        assert printed in (facts.setting_words(name, row["served"]), "inf steps")
+        text = facts.setting_words(name, next(choice for choice in choices if choice.name == name).setting)
+        assert text in (facts.setting_words(name, row["served"]), "inf steps")
     row = table.loc["rk4[axis]", 1e-3]
     variant, tops = integrator("rk4[axis]"), natural(60, 2)
     shares = [share_served(variant, tops, 10.0, part * row["served"], 1e-3) for part in (0.5, 1.0)]

@@ -177,19 +177,19 @@ def test_costs_rise_with_horizon_and_accuracy_and_cells_within_reach_are_measure
 def test_a_run_is_counted_by_whether_it_meets_the_error_as_predicted(errors, count):
     # half of the tops meet 1e-6 at the finer setting in both, but in the second they are not those that were predicted
     predicted = np.array([[1e-2] * 4, [1e-7, 1e-4, 1e-7, np.inf]])[:, np.newaxis]  # settings, horizon, members
-    names, over = ["rk4[axis]", "strang[axis]"], ("scene", "variant", "quantity", "setting", "horizon", "member")
+    names, dims = ["rk4[axis]", "strang[axis]"], ("scene", "variant", "quantity", "setting", "horizon", "member")
     far = xr.Dataset({
-        "error": (over, np.broadcast_to(predicted, (1, 2, 1, 2, 1, 4))),
-        "setting_value": (over[:2] + over[3:4], np.broadcast_to([4.0, 8.0], (1, 2, 2))),
-        "reach": (over[:2] + over[3:4], np.ones((1, 2, 2))),
-        "work": (over[:2] + over[3:4] + over[5:], np.ones((1, 2, 2, 4))),
+        "error": (dims, np.broadcast_to(predicted, (1, 2, 1, 2, 1, 4))),
+        "setting_value": (dims[:2] + dims[3:4], np.broadcast_to([4.0, 8.0], (1, 2, 2))),
+        "reach": (dims[:2] + dims[3:4], np.ones((1, 2, 2))),
+        "work": (dims[:2] + dims[3:4] + dims[5:], np.ones((1, 2, 2, 4))),
     }, {"variant": names, "quantity": ["axis"], "horizon": [1e5]})  # fmt: skip
     values = np.broadcast_to(np.array([[1e-2] * 4, errors]), (1, 1, 2, 2, 4))
     checks = xr.Dataset({
-        "errors": ((*over[:2], "rank", "side", "member"), values),
-        "setting_value": ((*over[:2], "rank", "side"), np.broadcast_to([4.0, 8.0], (1, 1, 2, 2))),
-        "contender": ((*over[:2], "rank"), np.array([[names]])),
-        "quantity": (over[:2], [["axis"]]), "target": (over[:2], [[1e-6]]), "checked_horizon": (over[:2], [[1e5]]),
+        "errors": ((*dims[:2], "rank", "side", "member"), values),
+        "setting_value": ((*dims[:2], "rank", "side"), np.broadcast_to([4.0, 8.0], (1, 1, 2, 2))),
+        "contender": ((*dims[:2], "rank"), np.array([[names]])),
+        "quantity": (dims[:2], [["axis"]]), "target": (dims[:2], [[1e-6]]), "checked_horizon": (dims[:2], [[1e5]]),
     }, {"variant": ["check-00"]})  # fmt: skip
     tree = xr.DataTree.from_dict({"/far": far, "/checks": checks})
     assert runs.checks(tree)["told"].sum() == 2 * (4 + count)
@@ -209,28 +209,28 @@ def test_what_is_checked_was_predicted_and_a_prediction_that_fails_is_told(data)
 
 
 def test_the_map_goes_by_the_median_top_and_its_shares_are_of_the_cells_that_are_reached(monkeypatch):
-    names, over = ["rk4[axis]", "strang[axis]"], ("scene", "variant", "setting", "member")
+    names, dims = ["rk4[axis]", "strang[axis]"], ("scene", "variant", "setting", "member")
     error = np.full((1, 2, 3, 2, 2, 4), 1e-4)
     error[..., 0, :, 2:] = 1.0  # two of four tops need the finer setting, which was not run so far
     # less in the median, and more in the mean, than that of runs of which two failed in the end
     work = np.array([[[[1.0, 1.0, 1.0, 100.0]] * 2, [[np.nan, np.nan, 10.0, 10.0], [20.0] * 4]]])
     far = xr.Dataset({
-        "error": (("scene", "variant", "quantity", "setting", "horizon", "member"), error), "work": (over, work),
-        "setting_value": (over[:3], [[[4.0, 8.0]] * 2]), "reach": (over[:3], [[[1e5, 10.0]] * 2]),
-        "conserves_energy": (over[:2], [[0.0, 0.0]]),
+        "error": (("scene", "variant", "quantity", "setting", "horizon", "member"), error), "work": (dims, work),
+        "setting_value": (dims[:3], [[[4.0, 8.0]] * 2]), "reach": (dims[:3], [[[1e5, 10.0]] * 2]),
+        "conserves_energy": (dims[:2], [[0.0, 0.0]]),
     }, {"variant": names, "quantity": list(runs.QUANTITIES), "horizon": [10.0, 1e5]})  # fmt: skip
     prices = priced(np.full((5, 2), 1e-8), names, call=0.0)
     tree = xr.DataTree.from_dict({"far": far, "prices": prices})
     panel = diagram(tree, "axis")
-    reached = np.array(runs.TARGETS)[:, np.newaxis] >= 1e-4 * (1.0 - 1e-9) * np.ones(2)
-    np.testing.assert_array_equal(panel.winner, np.where(reached, 0, -1))
+    mask = np.array(runs.TARGETS)[:, np.newaxis] >= 1e-4 * (1.0 - 1e-9) * np.ones(2)
+    np.testing.assert_array_equal(panel.winner, np.where(mask, 0, -1))
     assert panel.costs[1, 0, 0] == pytest.approx(0.5e-7 * (1.0 + math.sqrt(2.0)))  # of 10 for two tops, and 10 sqrt 2
     of_tolerances = runs.work_of(np.array([[np.nan, 2.0, 4.0], [9.0, 3.0, 6.0]]), np.ones(2), False)
     np.testing.assert_allclose(of_tolerances, [[4.5, 2.0, 4.0], [9.0, 3.0, 6.0]])
     assert not panel.predicted.any()  # half of the tops are not most
     error[..., 0, :, 1:] = 1.0  # three of four need it
     control = xr.DataTree.from_dict({"far": far.assign(error=(far["error"].dims, error)), "prices": prices})
-    np.testing.assert_array_equal(diagram(control, "axis").predicted, reached & np.array([False, True]))
+    np.testing.assert_array_equal(diagram(control, "axis").predicted, mask & np.array([False, True]))
     columns = {"quantity": "axis", "target": 1e-3, "horizon": np.arange(11), "told": True, "ratio": np.arange(11.0)}
     monkeypatch.setattr(runs, "checks", lambda _: pd.DataFrame(columns))
     answers = facts.far_facts(tree)

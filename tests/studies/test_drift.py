@@ -55,8 +55,8 @@ def test_a_history_says_with_what_it_ran_and_has_one_behaviour_in_every_study():
     assert float(control["p_phi_largest"]) > 1e-9
     # kahan-li-6 changes the energy by 9e-13 of the spin's and has an exponent of 0: an error of the step, bounded.
     for size, exponent, interval in ((9e-12, 0.0, 0.001), (1e-15, 0.9, 0.1), (1e-4, 1.0, 0.1), (1e-4, 0.0, 0.01)):
-        measured = {"energy_largest": size, "energy_exponent": exponent, "energy_exponent_interval": interval}
-        columns = {"outcome": ("scene", ["ok"]), **{name: ("scene", [value]) for name, value in measured.items()}}
+        growth = {"energy_largest": size, "energy_exponent": exponent, "energy_exponent_interval": interval}
+        columns = {"outcome": ("scene", ["ok"]), **{name: ("scene", [value]) for name, value in growth.items()}}
         cell = xr.Dataset(columns, coords={"scene": ["spheroid"]})
         grain = symtop.scene("spheroid").energy_grain
         ledger = Constant(Change(size, 0.0, 1.0, 0.0, exponent, interval, ""), 0.0, KEPT * grain, grain)
@@ -82,8 +82,8 @@ def histories():
     columns |= {"tolerance": np.full((5, 2), np.nan), "own_tolerance": np.zeros((5, 2))}
     data = xr.Dataset({key: (("variant", "scene"), values) for key, values in columns.items()},
                       coords={"variant": NAMES, "scene": ["spheroid", "goldstein"]})  # fmt: skip
-    over, times = ("variant", "scene"), np.broadcast_to(np.linspace(0.0, 1.0, 3), (5, 2, 3))
-    return data.assign(outcome=(over, np.full((5, 2), "ok")), sample_time=((*over, "sample"), times))
+    dims, times = ("variant", "scene"), np.broadcast_to(np.linspace(0.0, 1.0, 3), (5, 2, 3))
+    return data.assign(outcome=(dims, np.full((5, 2), "ok")), sample_time=((*dims, "sample"), times))
 
 
 def test_a_constant_is_kept_bounded_or_lost_on_the_worst_scene(histories):
@@ -288,13 +288,13 @@ def test_a_horizon_is_the_first_crossing_and_a_phase_that_is_not_lost_has_none()
 
 @pytest.mark.parametrize("name", ["spheroid", "goldstein", "cusp", "fast", "hairer-lubich-wanner"])
 def test_the_truth_is_never_late_and_a_shift_is_measured(name):
-    where = symtop.scene(name)
-    exact = symtop.ClosedForm(where.top, where.start)
-    times = np.linspace(0.0, 300.7 * where.nutation_period, 3001)
+    case = symtop.scene(name)
+    exact = symtop.ClosedForm(case.top, case.start)
+    times = np.linspace(0.0, 300.7 * case.nutation_period, 3001)
     motion = exact(times)
-    assert np.max(np.abs(nutation_phase(where, times, motion.theta, motion.theta_dot))) < 1e-9
-    ahead, expected = exact(times * (1.0 + 1e-4)), 2.0 * np.pi * 1e-4 * times / where.nutation_period
-    assert nutation_phase(where, times, ahead.theta, ahead.theta_dot) == pytest.approx(expected, abs=1e-9)
+    assert np.max(np.abs(nutation_phase(case, times, motion.theta, motion.theta_dot))) < 1e-9
+    ahead, expected = exact(times * (1.0 + 1e-4)), 2.0 * np.pi * 1e-4 * times / case.nutation_period
+    assert nutation_phase(case, times, ahead.theta, ahead.theta_dot) == pytest.approx(expected, abs=1e-9)
 
 
 def test_a_steady_precession_and_a_failed_sample_have_no_phase():

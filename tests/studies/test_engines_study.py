@@ -25,7 +25,7 @@ def bodies():
 
 
 @pytest.fixture(scope="module")
-def measured(bodies):
+def tree(bodies):
     """Two maps and a method of the catalogue on both tops and on twenty tops of the population."""
     names = ("mujoco-euler[axis]", "rapier-float32[attitude]", "no-gyro[axis]", "strang[axis]")
     settings = {"steps": 1e4, "long": 20.0}
@@ -53,18 +53,18 @@ def test_every_map_has_a_row_whose_error_energy_and_spin_are_those_of_simulate()
     assert not math.isfinite(row["energy"])
 
 
-def test_what_was_not_measured_is_none(measured):
+def test_what_was_not_measured_is_none(tree):
     """On the fast top alone there is no error against steps; on the population no scene."""
-    subset = xr.DataTree.from_dict({"tops": measured["tops"].to_dataset().sel(scene=["fast"])})
+    subset = xr.DataTree.from_dict({"tops": tree["tops"].to_dataset().sel(scene=["fast"])})
     answers = facts.facts(subset)
     assert answers["members"] is answers["energy_lost"] is None
     assert np.isnan([answers["wall"], answers["share_most"]]).all()
     assert [picture.name for picture in study.STUDY.pictures(subset)] == ["cost"]
-    part = xr.DataTree.from_dict({"tops": measured["tops"].to_dataset().sel(variant=["no-gyro[axis]"])})
-    for data, count in ((measured, 5), (part, 1)):  # entries of the key: what is drawn, and no more
+    part = xr.DataTree.from_dict({"tops": tree["tops"].to_dataset().sel(variant=["no-gyro[axis]"])})
+    for data, count in ((tree, 5), (part, 1)):  # entries of the key: what is drawn, and no more
         assert len(next(iter(study.STUDY.pictures(data))).figure.legends[0].get_texts()) == count
-    population = xr.DataTree.from_dict({"population": measured["population"].to_dataset()})
-    assert facts.facts(population)["share_most"] == facts.facts(measured)["share_most"]
+    population = xr.DataTree.from_dict({"population": tree["population"].to_dataset()})
+    assert facts.facts(population)["share_most"] == facts.facts(tree)["share_most"]
     assert list(study.STUDY.pictures(population)) == []
 
 
@@ -113,27 +113,27 @@ def test_a_fast_top_precesses_as_a_spherical_one_without_the_term_and_four_evalu
     assert implicit["level_axis"].values.tolist() == implicit["frame_axis"].values.tolist()
 
 
-def test_orders_walls_and_floors_are_read_off_and_shares_count_tops_within_five_degrees(measured):
+def test_orders_walls_and_floors_are_read_off_and_shares_count_tops_within_five_degrees(tree):
     """A method whose error is rounding alone has no order; one without the term is counted to order 0."""
-    lines = facts.lines(measured)
+    lines = facts.lines(tree)
     assert lines["order"]["mujoco-euler[axis]"] == pytest.approx(1.0, abs=0.15)
     assert lines["order"]["strang[axis]"] == pytest.approx(2.0, abs=0.05)
     assert abs(lines["order"]["no-gyro[axis]"]) < 0.05
     assert dict(lines["group"]) == {
         "mujoco-euler[axis]": 1.0, "rapier-float32[attitude]": 1.0, "no-gyro[axis]": 0.0, "strang[axis]": 2.0,
     }  # fmt: skip
-    tops = measured["tops"].to_dataset()
+    tops = tree["tops"].to_dataset()
     rounded = xr.DataTree.from_dict({"tops": tops.assign(axis=tops["axis"].where(tops["axis"].isnull(), 1e-15))})
     assert facts.lines(rounded)["order"].isna().all()
-    by_order = facts.tables(measured)["orders"].set_index("measured order")["maps"]
+    by_order = facts.tables(tree)["orders"].set_index("measured order")["maps"]
     assert [*by_order.items()] == [(0.0, 1), (1.0, 1)]  # in double
-    angles = measured["population"]["off"].sel(scene="population", variant="strang[axis]").values
+    angles = tree["population"]["off"].sel(scene="population", variant="strang[axis]").values
     assert lines["share"]["strang[axis]"] == np.mean(np.degrees(angles) <= 5.0) > lines["share"]["no-gyro[axis]"]
 
 
-def test_facts_are_those_of_the_runs_and_the_page_has_them(measured, tmp_path):
+def test_facts_are_those_of_the_runs_and_the_page_has_them(tree, tmp_path):
     """The wall of a map without the term, its distance from the spherical top, and the ends of the field."""
-    answers, lines, tops = facts.facts(measured), facts.lines(measured), measured["tops"].to_dataset()
+    answers, lines, tops = facts.facts(tree), facts.lines(tree), tree["tops"].to_dataset()
     axis, row = tops["axis"].sel(scene="goldstein"), tops.sel(scene="goldstein", rate=240.0, horizon=10.0)
     assert answers["wall"] == float(axis.sel(variant="no-gyro[axis]").min()) > 1.5
     assert answers["spherical"] == float(row["frame_spherical"].sel(variant="no-gyro[axis]")) < 0.01
@@ -153,4 +153,4 @@ def test_facts_are_those_of_the_runs_and_the_page_has_them(measured, tmp_path):
     data = xr.concat([tops, worse.assign_coords(variant=["no-gyro-linear[axis]"])], "variant")
     assert facts.facts(xr.DataTree.from_dict({"tops": data}))["wall"] == answers["wall"]
     assert answers["single_best"] > 1e-3
-    assert PARTIAL not in checked("engines", measured, tmp_path)
+    assert PARTIAL not in checked("engines", tree, tmp_path)

@@ -25,7 +25,7 @@ SHORT = Goal(3.0, 1e-5, LANGUAGES, CALLS)
 
 
 @pytest.fixture(scope="module")
-def measured():
+def dataset():
     """A small factorial as the study's functions see it; the second process is this one, which has started."""
     functions = iter([fresh_process.call, operator.call])
 
@@ -40,14 +40,14 @@ def measured():
 
 
 @pytest.fixture(scope="module")
-def quiet(measured):
+def quiet(dataset):
     """The same with times that agree from process to process."""
-    return measured.assign({"spread": measured["spread"].where(~np.isfinite(measured["spread"]), 0.01)})
+    return dataset.assign({"spread": dataset["spread"].where(~np.isfinite(dataset["spread"]), 0.01)})
 
 
 @pytest.fixture(scope="module")
-def rows(measured):
-    return timed(measured)
+def rows(dataset):
+    return timed(dataset)
 
 
 @pytest.mark.parametrize(("plain", "name"), [(plain_numpy.RK4, "rk4"), (plain_numpy.STRANG, "strang")])
@@ -88,12 +88,12 @@ def test_a_cell_is_named_once_and_taylor_in_angles_solves_the_same_equations():
 
 
 @pytest.mark.quick
-def test_the_search_ends_closer_if_asked_and_languages_of_one_method_have_the_same_setting_and_work(measured):
+def test_the_search_ends_closer_if_asked_and_languages_of_one_method_have_the_same_setting_and_work(dataset):
     horizon = 10.0 * SCENE.nutation_period
     for name in ("rk4[axis]", "rk4[attitude]", "strang[axis]"):
         answers = settings.search(SCENE, symtop.integrator(name), 1e-5, "axis", horizon, least=LEAST)
         assert LEAST * 1e-5 <= answers.error <= 1e-5
-    part = measured.isel(scene=0, horizon=0, target=0)
+    part = dataset.isel(scene=0, horizon=0, target=0)
     for chart in ("angles", "axis", "attitude"):
         trio = [part.sel(variant=f"{name}[{chart}]") for name in ("rk45-compiled", "rk45", "rk45-numba")]
         assert len({float(row["setting"]) for row in trio}) == 1
@@ -113,7 +113,7 @@ def test_what_is_not_within_the_budget_has_a_reason_and_no_time(monkeypatch):
     assert (str(fast["reason"].values), bool(np.isnan(fast["seconds"]))) == ("", False)
 
 
-def test_every_timed_run_meets_its_target_and_its_time_is_the_median_of_its_processes(rows, measured):
+def test_every_timed_run_meets_its_target_and_its_time_is_the_median_of_its_processes(rows, dataset):
     by_name = {cell.name: cell for cell in cells()}
     assert ((rows["axis"] > 0.0) & (rows["axis"] <= SHORT.target)).all()
     for name in ("rk45-compiled[attitude]", "takahashi-imada[axis]", "rk45-numba[axis]"):
@@ -123,13 +123,13 @@ def test_every_timed_run_meets_its_target_and_its_time_is_the_median_of_its_proc
         assert attempt.error <= SHORT.target
         if by_name[name].language == COMPILED:  # it was searched for by itself
             assert (attempt.error, attempt.evaluations) == row
-    samples, seconds = measured["seconds_samples"], measured["seconds"]
+    samples, seconds = dataset["seconds_samples"], dataset["seconds"]
     assert samples.sizes["process"] == 2
     assert np.array_equal(np.isfinite(seconds), np.isfinite(samples).all("process"))
     np.testing.assert_array_equal(seconds, np.median(samples, axis=samples.get_axis_num("process")))
     times = samples.values[np.isfinite(seconds.values)]
     assert (np.ptp(times, axis=-1) > 0.0).all()  # each process measures for itself
-    gap = measured["spread"].values[np.isfinite(seconds.values)]
+    gap = dataset["spread"].values[np.isfinite(seconds.values)]
     np.testing.assert_allclose(gap, 0.5 * np.ptp(times, axis=-1) / np.median(times, axis=-1))
     assert set(rows["call"]) == set(CALLS)
     assert set(rows["language"][rows["call"] == grid.SOLVE_IVP]) == {SCIPY_PYTHON}

@@ -96,15 +96,15 @@ def test_the_notebooks_update_is_the_midpoint_rule_its_guess_is_not_and_a_wrong_
     assert tail.mean() == pytest.approx(1.0, abs=0.1)  # about x = b
     assert np.ptp(tail) > 0.9  # and no smaller than at the start
     _, position, _ = discrete_path(Oscillator(damping=0.5), RULES["midpoint"], 1.0, 0.0, 25.0, 250, 251)
-    good, bad = (damped_oscillator.notebook_positions(b, 0.1, *position[:2], 250)[0] for b in (0.5, 0.5 + 1e-6))
-    assert np.max(np.abs(good - position)) < 1e-12
-    assert np.max(np.abs(bad - position)) > 1e-8
+    exact, control = (damped_oscillator.notebook_positions(b, 0.1, *position[:2], 250)[0] for b in (0.5, 0.5 + 1e-6))
+    assert np.max(np.abs(exact - position)) < 1e-12
+    assert np.max(np.abs(control - position)) > 1e-8
 
 
 def test_the_midpoint_rule_conserves_the_undamped_energy_the_trapezoidal_bounds_it_and_rk45_drifts():
     free = Oscillator()
-    kept, error = (np.abs(decay(free, rule, 0.1, 1e4)["energy_error"]) for rule in ("midpoint", "trapezoidal"))
-    assert kept.max() < 1e-11  # a quadratic invariant is kept
+    drift, error = (np.abs(decay(free, rule, 0.1, 1e4)["energy_error"]) for rule in ("midpoint", "trapezoidal"))
+    assert drift.max() < 1e-11  # a quadratic invariant is kept
     assert 1e-3 < error.max() < 3e-3  # bounded by h^2/4
     assert error[error.size // 2 :].max() < 1.01 * error[: error.size // 2].max()
     rk45 = decay(free, "rk45", 0.05, 250.0)

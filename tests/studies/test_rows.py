@@ -29,8 +29,8 @@ def without_a_chart(data: xr.Dataset) -> list[str]:
 
 @pytest.mark.parametrize("study", STUDIES)
 def test_every_stored_dataset_says_in_which_chart_a_method_ran(study, quick_results):
-    stored = netcdf.groups(netcdf.read_any(quick_results / f"{study}.nc"))
-    groups = [group for group in stored.values() if group.variables]
+    tree = netcdf.groups(netcdf.read_any(quick_results / f"{study}.nc"))
+    groups = [group for group in tree.values() if group.variables]
     assert groups
     assert [name for group in groups for name in without_a_chart(group)] == []
 

@@ -71,5 +71,5 @@ def test_a_study_declares_the_integrators_that_its_cases_run(name, looked_up):
 def test_a_lookup_that_is_not_declared_is_found(looked_up):
     study = scripts.load("convergence")
     case = dataclasses.replace(study.grid(quick=True)[0], settings={})
-    hidden = dataclasses.replace(study, cases=lambda _: [case], measure=lambda _: registry.integrator("rk4[axis]"))
-    assert undeclared(hidden, looked_up) == {case.label: {"rk4"}}
+    variant = dataclasses.replace(study, cases=lambda _: [case], measure=lambda _: registry.integrator("rk4[axis]"))
+    assert undeclared(variant, looked_up) == {case.label: {"rk4"}}
