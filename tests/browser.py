@@ -32,8 +32,8 @@ FLAGS = (
 PATIENCE = 30.0  # seconds; a first start on a busy machine takes five
 FAINT = """(() => {  // texts whose contrast with what is behind them is below that of WCAG 2 AA
     const parts = (color) => color.match(/[\\d.]+/g).map(Number);
-    const light = ([r, g, b]) => [r, g, b].map((one) => one / 255).map((one) => one <= 0.04045 ? one / 12.92
-        : ((one + 0.055) / 1.055) ** 2.4).reduce((sum, one, k) => sum + one * [0.2126, 0.7152, 0.0722][k], 0);
+    const light = ([r, g, b]) => [r, g, b].map((value) => value / 255).map((value) => value <= 0.04045 ? value / 12.92
+        : ((value + 0.055) / 1.055) ** 2.4).reduce((sum, value, k) => sum + value * [0.2126, 0.7152, 0.0722][k], 0);
     const behind = (node) => {
         for (; node; node = node.parentElement) {
             const color = parts(getComputedStyle(node).backgroundColor);
@@ -41,16 +41,16 @@ FAINT = """(() => {  // texts whose contrast with what is behind them is below t
         }
         return [255, 255, 255];
     };
-    const found = new Set();
+    const faint = new Set();
     for (const node of document.querySelectorAll('body *')) {
-        const own = [...node.childNodes].some((one) => one.nodeType === 3 && one.textContent.trim());
-        if (!own || !node.checkVisibility() || node.closest('script, style')) continue;
-        const style = getComputedStyle(node), drawn = node.namespaceURI.endsWith('svg') ? style.fill : style.color;
-        const [a, b] = [light(parts(drawn)), light(behind(node))].sort((x, y) => y - x);
+        const text = [...node.childNodes].some((child) => child.nodeType === 3 && child.textContent.trim());
+        if (!text || !node.checkVisibility() || node.closest('script, style')) continue;
+        const style = getComputedStyle(node), color = node.namespaceURI.endsWith('svg') ? style.fill : style.color;
+        const [a, b] = [light(parts(color)), light(behind(node))].sort((x, y) => y - x);
         const ratio = (a + 0.05) / (b + 0.05);
-        if (ratio < 4.5) found.add(`${node.localName}.${node.className.baseVal ?? node.className} ${ratio.toFixed(2)}`);
+        if (ratio < 4.5) faint.add(`${node.localName}.${node.className.baseVal ?? node.className} ${ratio.toFixed(2)}`);
     }
-    return [...found];
+    return [...faint];
 })()"""
 
 

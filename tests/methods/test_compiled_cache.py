@@ -34,17 +34,17 @@ if way == "numba alone":
 if way in ("stored", "bitcode"):
     jit.on_cold[:] = [lambda: sys.exit("compiled")]
 lanes.FEW = -1
-every = [f"{one.name}[{chart}]" for one in symtop.integrators().values() if one.implementation == "compiled"
-         for chart in one.charts()]
+rows = [f"{entry.name}[{chart}]" for entry in symtop.integrators().values() if entry.implementation == "compiled"
+        for chart in entry.charts()]
 for k in range(count):
-    one = symtop.integrator(every[k * (len(every) - 1) // (count - 1)])
-    setting = one.given(0.02 if one.fixed_step else 1e-7)
-    runs = [symtop.simulate("spheroid", one, **setting, samples=30, guard=False)]
+    row = symtop.integrator(rows[k * (len(rows) - 1) // (count - 1)])
+    setting = row.given(0.02 if row.fixed_step else 1e-7)
+    runs = [symtop.simulate("spheroid", row, **setting, samples=30, guard=False)]
     if k % 3 == 0:
-        runs.append(symtop.ensemble(["spheroid", "goldstein"] * 20, one, **setting, horizon=3.0, threads=1, quiet=True))
+        runs.append(symtop.ensemble(["spheroid", "goldstein"] * 20, row, **setting, horizon=3.0, threads=1, quiet=True))
     for run in runs:
         values = [run[name].values for name in sorted(run.data_vars) if run[name].dtype.kind == "f" and run[name].ndim]
-        print(one.name, hashlib.sha256(b"".join(value.tobytes() for value in values)).hexdigest())
+        print(row.name, hashlib.sha256(b"".join(value.tobytes() for value in values)).hexdigest())
 """
 
 

@@ -68,9 +68,9 @@ def scheme(browser, request):
 def test_nothing_overflows_and_every_figure_is_there(browser, scheme, width):
     browser.resize(width, 900)
     assert browser.too_wide == 0
-    browser.evaluate("[...document.images].forEach(one => { one.loading = 'eager'; })")
-    browser.wait_for("[...document.images].every(one => one.complete)")
-    assert browser.evaluate("[...document.images].every(one => one.naturalWidth > 100 && one.alt)")
+    browser.evaluate("[...document.images].forEach(image => { image.loading = 'eager'; })")
+    browser.wait_for("[...document.images].every(image => image.complete)")
+    assert browser.evaluate("[...document.images].every(image => image.naturalWidth > 100 && image.alt)")
     assert browser.evaluate("document.images.length") == 4
     height = "Math.min(...[...document.querySelectorAll('.chart svg text')].map(t => t.getBoundingClientRect().height))"
     assert browser.evaluate(height) >= 10.0  # pixels: legible
@@ -102,10 +102,10 @@ def test_the_reader_chooses_the_colours(browser):
 
 def test_headings_figures_and_tables_have_addresses_and_the_contents_follow_the_reader(browser):
     titles = "[...document.querySelectorAll('main h2, main h3, figcaption')]"
-    assert browser.evaluate(f"{titles}.filter(one => !one.querySelector('a.anchor')).length") <= 1  # of the registry
-    ids = browser.evaluate("[...document.querySelectorAll('[id]')].map(one => one.id)")
+    assert browser.evaluate(f"{titles}.filter(box => !box.querySelector('a.anchor')).length") <= 1  # of the registry
+    ids = browser.evaluate("[...document.querySelectorAll('[id]')].map(node => node.id)")
     assert len(ids) == len(set(ids))
-    local = browser.evaluate("[...document.querySelectorAll('a[href^=\"#\"]')].map(one => one.hash.slice(1))")
+    local = browser.evaluate("[...document.querySelectorAll('a[href^=\"#\"]')].map(link => link.hash.slice(1))")
     assert set(local) <= set(ids)
     assert len(local) > 10
     browser.resize(1280, 900)
@@ -150,7 +150,7 @@ def test_a_table_in_full_is_opened_searched_sorted_and_saved(browser):
         document.querySelector("table[data-name='scenes']").rows[1].cells[1].textContent = "2\u00a0×\u00a010⁻⁴";
         let blob; const link = HTMLAnchorElement.prototype.click, make = URL.createObjectURL;
         HTMLAnchorElement.prototype.click = function () { this.dataset.saved = this.download; };
-        URL.createObjectURL = (one) => { blob = one; return make(one); };
+        URL.createObjectURL = (file) => { blob = file; return make(file); };
         document.querySelector(".tools:has(+ .scroll table[data-name='scenes']) button").click();
         HTMLAnchorElement.prototype.click = link; URL.createObjectURL = make;
         return blob.text();
@@ -169,7 +169,7 @@ def test_the_keyboard_reaches_content_tables_and_points(browser):
     assert browser.evaluate("document.activeElement.getBoundingClientRect().left") >= 0.0
     browser.press("Enter")
     browser.wait_for("document.activeElement.id === 'content'")
-    reachable = "[...document.querySelectorAll('.scroll, .chart svg')].filter(one => one.tabIndex || !one.ariaLabel)"
+    reachable = "[...document.querySelectorAll('.scroll, .chart svg')].filter(box => box.tabIndex || !box.ariaLabel)"
     assert browser.evaluate(f"{reachable}.length") == 0
     browser.evaluate("document.querySelector('.chart svg').focus()")
     tips = []
@@ -222,7 +222,7 @@ def test_methods_cost_error_and_run_length_are_chosen(browser, results):
     assert 0 < browser.evaluate(marks) < count
     browser.click(".chart input[value='rk4']")
     assert browser.evaluate(marks) == count
-    labels = "[...document.querySelectorAll('.chart svg text')].map(one => one.textContent)"
+    labels = "[...document.querySelectorAll('.chart svg text')].map(text => text.textContent)"
     assert "rk4[axis]" in browser.evaluate(labels)
     key = "document.querySelector('.chart .key').checkVisibility() && document.querySelector('.chart .key').textContent"
     assert "exact motion, no integrator" in browser.evaluate(key)
@@ -276,8 +276,8 @@ def test_lines_to_names_do_not_cross_and_each_name_has_the_colour_of_its_line(br
     series = [(f"line {k}", [(1.0, 1.0, ""), (*10.0**end, "")]) for k, end in enumerate(ends)]
     browser.resize(1280, 900)
     open_with({"title": "", "x": "x", "y": "y", "panels": {"": series}}, browser, results, tmp_path / "ends.html")
-    lines = browser.evaluate("""[...document.querySelectorAll('.chart svg path[stroke-width="0.5"]')].map(one =>
-        [one.getAttribute('d'), one.getAttribute('stroke'), getComputedStyle(one.nextSibling).fill])""")
+    lines = browser.evaluate("""[...document.querySelectorAll('.chart svg path[stroke-width="0.5"]')].map(path =>
+        [path.getAttribute('d'), path.getAttribute('stroke'), getComputedStyle(path.nextSibling).fill])""")
     ends = [[*map(float, re.findall(r"[-\d.]+", path))] for path, *_ in lines]
     assert len(ends) == 12
     for (x, y, right, end), (x2, y2, _, end2) in itertools.combinations(ends, 2):
@@ -297,9 +297,9 @@ def test_each_of_more_than_thirty_lines_has_its_name_beside_or_below_and_zeros_a
         browser.resize(width, 900)
         boxes = browser.evaluate("""(() => {
             const svg = document.querySelector('.chart svg'), all = svg.getBoundingClientRect();
-            return [...svg.querySelectorAll('text')].filter(one => one.textContent.endsWith(']')).map(one => {
-                const box = one.getBoundingClientRect();
-                return [one.textContent, box.top - all.top, all.right - box.right, all.bottom - box.bottom];
+            return [...svg.querySelectorAll('text')].filter(text => text.textContent.endsWith(']')).map(text => {
+                const box = text.getBoundingClientRect();
+                return [text.textContent, box.top - all.top, all.right - box.right, all.bottom - box.bottom];
             });
         })()""")
         assert sorted(box[0] for box in boxes) == sorted(set(names) - {"exact"})
