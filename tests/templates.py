@@ -12,7 +12,7 @@ from symtop.runner import run as runner
 NAMED = re.compile(r"\b(?:figure|table)\(\"([\w-]+)\"|\(tables/\w+?-([\w-]+)\.csv\)")
 
 
-def checked(name: str, data: object, folder: Path, elsewhere: Collection[str] = ()) -> str:
+def checked_page(name: str, data: object, folder: Path, elsewhere: Collection[str] = ()) -> str:
     """The page of a study with what a dataset shows and its template names; what is `elsewhere` is on the first."""
     study, page = runner.load(name), runner.file_beside(name, "page.md")
     assert page is not None

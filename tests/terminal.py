@@ -27,7 +27,7 @@ class Recording(NamedTuple):
         return max(len(line) for line in re.split(r"[\r\n]+", text))
 
 
-def recorded(words: list[str], limit: float = 300.0, code: str | None = None, **environment: str) -> Recording:
+def record(words: list[str], limit: float = 300.0, code: str | None = None, **environment: str) -> Recording:
     """Run a command of symtop, or Python code, on a pseudo-terminal; it is killed after so many seconds."""
     ours, theirs = pty.openpty()
     fcntl.ioctl(theirs, termios.TIOCSWINSZ, struct.pack("HHHH", 24, 80, 0, 0))

@@ -31,7 +31,7 @@ def test_the_motion_has_the_digits_of_two_independent_ways() -> None:
 
 
 def history(folder: Path, offset: float = 0.0, earth: float = EARTH) -> Path:
-    """Writes the exact motion as a history, in axes that turn with the Earth; `off` degrees are added to the yaw."""
+    """Writes the exact motion as a history, in axes that turn with the Earth; `offset` degrees on the yaw."""
     times = np.arange(0.0, 31.0)
     quaternion, rates = truth(times)
     half = -0.5 * earth * times

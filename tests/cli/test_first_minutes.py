@@ -5,7 +5,7 @@ import shlex
 import time
 
 import pytest
-from terminal import recorded
+from terminal import record
 
 import symtop
 from symtop.core import netcdf, progress
@@ -86,13 +86,13 @@ def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
 @pytest.mark.slow  # half a minute: lanes of one method are compiled
 def test_a_cold_ensemble_is_never_silent_for_long_and_a_recording_hears_a_silence(tmp_path):
     words = "ensemble strang --members 2000 --per-nutation 50 --nutations 2"
-    recording = recorded(words.split(), SYMTOP_CACHE=str(tmp_path))
+    recording = record(words.split(), SYMTOP_CACHE=str(tmp_path))
     assert recording.code == 0, recording.text
     assert recording.silence < 2.0
     assert recording.widest <= 80
     # Negative control: a plug-in that sleeps while it is loaded, and a table of every column.
     (tmp_path / "sleeps.py").write_text("import time\ntime.sleep(2.1)\n")
-    recording = recorded(["scenes", "--wide", "--plugin", str(tmp_path / "sleeps.py")])
+    recording = record(["scenes", "--wide", "--plugin", str(tmp_path / "sleeps.py")])
     assert recording.silence > 2.0
     assert recording.widest > 80
 

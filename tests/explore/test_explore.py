@@ -40,7 +40,7 @@ def fields(name="spheroid", integrator="midpoint", **changes):
     return numbers | changes
 
 
-def unpacked(text):
+def unpack(text):
     return np.frombuffer(base64.b64decode(text), dtype="<f4")
 
 
@@ -48,7 +48,7 @@ def unpacked(text):
 def test_an_answer_is_the_run_beside_the_truth(method):
     setup = answers.setup(fields(integrator=method))
     answer, run = answers.answer(setup), answers.dataset(setup, str)
-    arrays = {name: unpacked(text) for name, text in answer["arrays"].items()}
+    arrays = {name: unpack(text) for name, text in answer["arrays"].items()}
     assert np.array_equal(arrays["time"], run["time"].values.astype(np.float32))
     assert np.array_equal(arrays["theta"], run["theta"].values.astype(np.float32))
     truth = closed_form(setup.scene).quaternion(run["time"].values)
@@ -72,11 +72,11 @@ def test_an_answer_on_a_body_is_the_run_beside_its_truth():
     answer, run = answers.answer(setup), answers.dataset(setup, str)
     errors, truth = symtop.errors(run), symtop.reference(setup.scene, run["time"].values)
     assert answer["largest"]["attitude_error"] == pytest.approx(float(errors["attitude"].max()), rel=1e-6)
-    assert np.array_equal(unpacked(answer["arrays"]["truth"]).reshape(-1, 4), truth["quaternion"].astype(np.float32))
+    assert np.array_equal(unpack(answer["arrays"]["truth"]).reshape(-1, 4), truth["quaternion"].astype(np.float32))
     moment = run["momentum"].values[7] / np.linalg.norm(run["momentum"].values[7])
     w, x, y, z = run["quaternion"].values[7]  # of the middle moment, I1, is the first axis
     first = [1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y + w * z), 2.0 * (x * z - w * y)]
-    assert unpacked(answer["arrays"]["middle"])[7] == pytest.approx(moment @ first, abs=1e-6)
+    assert unpack(answer["arrays"]["middle"])[7] == pytest.approx(moment @ first, abs=1e-6)
     assert not {"p_psi", "p_theta"} & {*answer["arrays"]}
     long_step, blank = {"horizon": 200.0, "step_size": 100.0}, {"I2": None, "theta": None}
     large = {"I2": 9.0}, "sum of the other"
@@ -94,7 +94,7 @@ def test_an_answer_on_a_body_is_the_run_beside_its_truth():
 def test_a_failing_run_is_an_answer_with_its_sentence():
     answer = answers.answer(answers.setup(fields(step_size=0.6)))
     assert (answer["outcome"], "theta left (0, pi)" in answer["message"]) == ("left_chart", True)
-    assert np.isnan(unpacked(answer["arrays"]["theta"])[-1])
+    assert np.isnan(unpack(answer["arrays"]["theta"])[-1])
     assert answer["steps"] < 5  # of 13 to the horizon
     assert answer["steps_per_nutation"] == pytest.approx(answer["period"] / 0.6, rel=0.05)
     assert answers.answer(answers.setup(fields()))["steps_per_nutation"] == pytest.approx(answer["period"] / 0.02)
@@ -246,7 +246,7 @@ PLOT = "document.querySelector('#plot-{}').toDataURL()"
 STATUS = "document.querySelector('#status').textContent"
 
 
-def answered(browser, selector, value):
+def set_control(browser, selector, value):
     """Set a control of the page and wait for its answer."""
     count = browser.evaluate("+(document.body.dataset.answers || 0)")
     browser.set(selector, value)
@@ -262,7 +262,7 @@ def test_a_person_can_use_it(explorer, tmp_path):
     names = ("theta", "axis_error", "energy", "p_phi", "p_psi")
     before = {name: browser.evaluate(PLOT.format(name)) for name in names}
     assert len(set(before.values())) == len(names)
-    answered(browser, "#theta-slider", 0.9)  # a slider moves, the plots change
+    set_control(browser, "#theta-slider", 0.9)  # a slider moves, the plots change
     assert browser.evaluate("document.querySelector('#theta').value") == "0.9"
     option = "document.querySelector('#scene').selectedOptions[0].text"
     assert browser.evaluate(option) == "spheroid (edited)"  # and so does the name
@@ -278,7 +278,7 @@ def test_a_person_can_use_it(explorer, tmp_path):
     for button, file in (("#script", "explored.py"), ("#netcdf", "explored.nc")):
         browser.click(button)
         browser.wait_for(f"window.saved === {file!r}")
-    answered(browser, "#step_size", 0.6)  # a failing run shows its sentence
+    set_control(browser, "#step_size", 0.6)  # a failing run shows its sentence
     browser.wait_for("document.body.dataset.answer === 'left_chart'")
     assert browser.evaluate("document.querySelector('#status').className") == "failed"
     browser.set("#I3", 30)  # and so does a top that cannot be, without the run before
@@ -289,8 +289,8 @@ def test_a_person_can_use_it(explorer, tmp_path):
     browser.wait_for("document.body.dataset.answer === 'ok'")
     assert browser.evaluate(option) == "spheroid"
     assert browser.evaluate("['I3', 'theta'].map((id) => document.getElementById(id).value)") == ["1", "0.4"]
-    answered(browser, "#scene", "goldstein")
-    answered(browser, "#integrator", "rk45")
+    set_control(browser, "#scene", "goldstein")
+    set_control(browser, "#integrator", "rk45")
     browser.wait_for(f"{STATUS}.startsWith('rk45: reached t = 70')")
     expression = "['step_size', 'tolerance'].map((name) => document.querySelector(`#${name}`).offsetParent === null)"
     assert browser.evaluate(expression) == [True, False]
@@ -334,10 +334,10 @@ def test_an_answer_of_another_scene_or_method_than_the_pages_is_not_shown(explor
 def test_the_page_counts_and_labels_what_can_be_told_apart(explorer):
     browser = explorer("#base=spheroid&scene=spheroid&integrator=strang&step_size=8")
     browser.wait_for(f"{STATUS}.includes('; 1 step, 0.15 a nutation, 1 force evaluation, ')")
-    answered(browser, "#step_size", 0.02)
+    set_control(browser, "#step_size", 0.02)
     browser.wait_for(f"{STATUS}.includes('; 400 steps, 59 a nutation, 400 force evaluations, ')")
     for scene, words in (("spheroid", (True, "I1 (kg m²)")), ("steady-fast", (False, "I1"))):  # nodding, or hardly so
-        answered(browser, "#scene", scene)
+        set_control(browser, "#scene", scene)
         labels = browser.evaluate(LABELS)
         assert len(set(labels)) == len(labels) > 5, labels
         assert ("s" in labels, browser.evaluate("document.querySelector('[for=I1]').textContent")) == words
@@ -435,7 +435,7 @@ def test_the_oscillator_of_the_page_is_the_notebooks():
     """Order two with either rule."""
     coarse, fine = (answers.oscillator(0.1, step)["largest"] for step in (0.1, 0.05))
     assert [coarse[rule] / fine[rule] for rule in answers.RULES] == pytest.approx([4.0] * 2, rel=0.05)
-    arrays = {name: unpacked(text) for name, text in answers.oscillator(0.3, 0.5)["arrays"].items()}
+    arrays = {name: unpack(text) for name, text in answers.oscillator(0.3, 0.5)["arrays"].items()}
     decay, turn = np.exp(-0.15 * arrays["exact_time"]), np.sqrt(1.0 - 0.15**2) * arrays["exact_time"]
     exact = decay * (np.cos(turn) + 0.15 / np.sqrt(1.0 - 0.15**2) * np.sin(turn))
     np.testing.assert_allclose(arrays["exact"], exact, atol=1e-6)
@@ -449,7 +449,7 @@ def test_the_oscillator_of_the_page_is_the_notebooks():
 def damped_run(friction, name="spheroid", **changes):
     """The page's damped top: the answer with its arrays."""
     answer = answers.inclination(*answers.damped_top(fields(name, friction=friction, **changes)))
-    return answer, {name: unpacked(text) for name, text in answer["arrays"].items()}
+    return answer, {name: unpack(text) for name, text in answer["arrays"].items()}
 
 
 @pytest.mark.quick
@@ -485,15 +485,15 @@ def test_the_chart_of_costs_and_the_oscillator_are_on_the_page(explorer):
     browser = explorer()
     chart = "document.querySelector('#cost').dataset"
     browser.wait_for(f"{chart}.missing === '0' && {chart}.points === '1'")
-    answered(browser, "#second", "strang")
+    set_control(browser, "#second", "strang")
     browser.wait_for(f"{chart}.points === '2'")
     image = browser.evaluate("document.querySelector('#cost').toDataURL()")
     lines = browser.evaluate(f"{chart}.lines")
-    answered(browser, "#step_size", 0.05)  # the points move along their lines
+    set_control(browser, "#step_size", 0.05)  # the points move along their lines
     assert browser.evaluate(f"{chart}.lines") == lines != "0"
     change = f"document.querySelector('#cost').toDataURL() !== {json.dumps(image)}"
     browser.wait_for(f"{chart}.points === '2' && {change}")
-    answered(browser, "#step_size", 0.6)  # midpoint fails, strang does not
+    set_control(browser, "#step_size", 0.6)  # midpoint fails, strang does not
     browser.wait_for(f"{chart}.points === '1'")
     maps, names = browser.evaluate("document.body.dataset.maps"), ("oscillator", "damped-top")
     answer_count = "+document.querySelector('#{}-key').dataset.answers".format
@@ -510,5 +510,5 @@ def test_the_chart_of_costs_and_the_oscillator_are_on_the_page(explorer):
         browser.wait_for(f"document.querySelector('#{name}-key').textContent.includes('at least 0')")
     browser.evaluate("window.went = fetch; window.never = new Promise(() => {}); 0")
     browser.evaluate("window.fetch = (path, ...rest) => (path === 'cost' ? never : went(path, ...rest)); 0")
-    answered(browser, "#theta", 0.5)
+    set_control(browser, "#theta", 0.5)
     browser.wait_for(f"{chart}.lines === '0'")  # lines of another motion are not shown

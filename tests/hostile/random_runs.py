@@ -2,7 +2,7 @@
 
 python -m tests.hostile.random_runs 20000 [--seed 3]
 
-Run k is drawn from a seed of its own and can be run again alone (`one`). A run is wrong if it ends `ok` and its axis
+Run k is drawn from a seed of its own and can be run alone (`outcome_of`). A run is wrong if it ends `ok` and its axis
 was ever further than `WRONG` from the closed form; it is silent if the guard had said nothing. A run is right below
 `RIGHT`, and takes too long from `LONGEST` on.
 """

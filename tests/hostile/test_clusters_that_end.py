@@ -63,7 +63,7 @@ def computed(results):
     return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in results.rglob("cases/*/*.npz")}
 
 
-def after(cluster, results, event):
+def outcome_after(cluster, results, event):
     """How a study's command ends to whose cluster something happens midway, and how many seconds later."""
     process = symtop("study", PROBE, "--results", results, "--scheduler", cluster.address)
     try:
@@ -79,13 +79,13 @@ def after(cluster, results, event):
         stop(process)
 
 
-def here(results):
+def run_alone(results):
     """What the command prints without a cluster."""
     return stdout_of(symtop("study", PROBE, "--results", results, "--jobs", 1))
 
 
 def test_a_worker_that_dies_costs_nothing(cluster, tmp_path):
-    code, out, err, seconds = after(cluster, tmp_path / "r", cluster.workers[0].kill)
+    code, out, err, seconds = outcome_after(cluster, tmp_path / "r", cluster.workers[0].kill)
     print(f"a worker: {code} after {seconds:.1f} s, {err!r}")
     assert code == 0, err
     before = computed(tmp_path / "r")
@@ -95,9 +95,9 @@ def test_a_worker_that_dies_costs_nothing(cluster, tmp_path):
     # one at most is made twice, which the killed worker was computing, or found, which it had written and not told of
     assert calls >= 12
     assert 0 <= calls - count <= 1
-    here(tmp_path / "here")
+    run_alone(tmp_path / "here")
     assert_identical(tmp_path / "here", tmp_path / "r")
-    assert "0 of 12 cases computed" in here(tmp_path / "r")
+    assert "0 of 12 cases computed" in run_alone(tmp_path / "r")
     assert before.items() <= computed(tmp_path / "r").items()
     assert not leftovers(tmp_path / "r")
 

@@ -15,7 +15,7 @@ from symtop.run import long_run as longrun
 FLIPS = [pytest.param(12, id="few"), pytest.param(200, id="many", marks=pytest.mark.slow)]
 
 
-def flipped(path, draw):
+def flip_bit(path, draw):
     """Flip a random bit of a random byte of a file; returns what it held."""
     content = path.read_bytes()
     buffer = bytearray(content)
@@ -40,13 +40,13 @@ def test_a_damaged_kernel_is_compiled_again(tmp_path, monkeypatch, flips):
     assert jit._read(code, entry)  # the control
     for file, key in ((code, entry), (bitcode, jit._name(bitcode))):
         for _ in range(flips):
-            content = flipped(file, draw)
+            content = flip_bit(file, draw)
             with pytest.raises(ValueError, match="damaged"):
                 jit._read(file, key)
             file.write_bytes(content)
     for files in ([code], [bitcode], [code, bitcode]):
         for file in files:
-            flipped(file, draw)
+            flip_bit(file, draw)
         kernel = compile_kernel(_tripled)
         assert is_cached(kernel, signature)  # as far as one can tell without reading
         assert kernel(2.0) == 6.0
@@ -67,7 +67,7 @@ def test_a_damaged_file_is_data_or_one_sentence(tmp_path, flips):
     for data, read in ((_MADE, netcdf.read), (tree, netcdf.read_any)):
         netcdf.write(data, path)
         for _ in range(flips):
-            content = flipped(path, draw)
+            content = flip_bit(path, draw)
             try:
                 read(path)
             except symtop.SymtopError:
@@ -94,7 +94,7 @@ def test_a_damaged_checkpoint_is_not_gone_on_from(tmp_path, monkeypatch, flips):
         assert (expected[0].k, expected[1]) == (7, [[0.5] * 15] * 3)
         restarts = refusals = 0
         for _ in range(flips):
-            content = flipped(book.file, draw)
+            content = flip_bit(book.file, draw)
             with warnings.catch_warnings(record=True, action="always") as record:
                 try:
                     read_state, rows = book.resumed(start)

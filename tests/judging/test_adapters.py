@@ -37,7 +37,7 @@ SPHEROID = symtop.scene("spheroid")
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no C compiler")
 
 
-def marched(stepper, h, marks):
+def march(stepper, h, marks):
     """The state that a stepper begins with, and what it makes of so many steps of h."""
     par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
     return np.array(state), stepper.march(SPHEROID.top, par, np.array(state), h, np.array(marks))
@@ -79,7 +79,7 @@ def test_separable_steps_are_those_of_the_splitting_and_a_rotation_is_that_of_th
     p_phi, p_psi = stepper.form.momenta(par, np.array([state]))
     np.testing.assert_allclose([p_phi[0], p_psi[0]], SPHEROID.top.momenta(SPHEROID.start)[:2], rtol=1e-14)
     ours = symtop.simulate(SPHEROID, "stormer-verlet", step_size=0.004, horizon=0.8, samples=2).isel(time=-1)
-    _, states = marched(stepper := SeparableStep(verlet), 0.004, [200])
+    _, states = march(stepper := SeparableStep(verlet), 0.004, [200])
     np.testing.assert_allclose(states[0], [float(ours["theta"]), float(ours["p_theta"])], rtol=1e-12)
     assert stepper.evaluations == 400
 
@@ -105,7 +105,7 @@ def test_a_library_is_asked_for_so_many_steps_and_told_where_it_must_not_write(t
         (tmp_path / words).mkdir()
         with pytest.raises(symtop.SymtopError, match=words):
             run_of(open_target(library(tmp_path / words, body), None, "axis"))
-    state, states = marched(open_target(library(tmp_path), None, "axis"), 0.5, [0, 1, 4])
+    state, states = march(open_target(library(tmp_path), None, "axis"), 0.5, [0, 1, 4])
     np.testing.assert_array_equal(states[0], state)
     np.testing.assert_allclose(states[:, 4] - state[4], np.array([0, 1, 4]) * 0.5 * SPHEROID.top.mgl * state[0])
     assert open_target(f"{tmp_path / 'my.so'}:other", None, "axis").name == "my-other"
@@ -128,7 +128,7 @@ TURNED = STILL.replace("*numbers[6:12]", "numbers[6], float(numbers[7]) + 6.2831
     (TURNED, "angles", lambda y: [y[0], y[1] + 2.0 * np.pi, *y[2:]]),
 ])  # fmt: skip
 def test_a_program_gets_one_line_and_writes_states(tmp_path, body, chart, change):
-    state, states = marched(open_target(program(tmp_path, body), "program", chart), 0.5, [0, 6, 9])
+    state, states = march(open_target(program(tmp_path, body), "program", chart), 0.5, [0, 6, 9])
     np.testing.assert_array_equal(states, [change(state)] * 3)
 
 

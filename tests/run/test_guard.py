@@ -133,7 +133,7 @@ def test_a_remedy_is_a_remedy(scene, name, control, horizon):
     assert 1e-5 < float(symtop.errors(run)["axis"].max()) < EXPECTED
 
 
-def advised(draw, methods):
+def advice_errors(draw, methods):
     """A random run of a scene that the guard warns of, with a step: axis errors of the run and of the one advised."""
     scene, row = symtop.scene(draw.choice(REMEDIED)), symtop.integrator(draw.choice(methods))
     chart, period = row.charts()[0], scene.nutation_period
@@ -156,7 +156,7 @@ def test_the_step_that_is_advised_works_whatever_the_cause():
     """Poles, resonances, steps beyond the stability limit and errors that add up; 2 of 600 were wrong, by 0.0125."""
     draw = random.Random(5)
     names = ("midpoint", "stormer-verlet", "strang", "rk4[axis]", "gauss-4", "generalised-alpha")
-    pairs = [pair for _ in range(120) if (pair := advised(draw, names)) is not None]
+    pairs = [pair for _ in range(120) if (pair := advice_errors(draw, names)) is not None]
     assert len(pairs) > 55
     before, after = np.array(pairs).T
     assert np.mean(after > EXPECTED) <= 0.02

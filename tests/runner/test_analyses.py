@@ -67,7 +67,7 @@ def shared(pool, monkeypatch):
     monkeypatch.setattr("symtop.runner.pool.Pool", lambda *_: contextlib.nullcontext(pool))
 
 
-def studied(results, *files):
+def run_studies(results, *files):
     """Exit code and output of one command for several studies."""
     return code_and_output("study", *files, "--results", results, "--jobs", 2)
 
@@ -79,22 +79,22 @@ def process_of(results, name):
 @pytest.mark.usefixtures("shared")
 def test_each_of_several_is_concluded_by_another_process_to_the_same_files(script, tmp_path):
     files = [script("first"), script("second")]
-    code, output = studied(tmp_path / "together", *files)
+    code, output = run_studies(tmp_path / "together", *files)
     assert code == 0, output
     assert output.index("first: 2 of 2") < output.index("second: 2 of 2")
     assert {process_of(tmp_path / "together", name) == os.getpid() for name in ("first", "second")} == {False}
     for file in files:
-        assert studied(tmp_path / "alone", file)[0] == 0  # the control: one by itself has nothing to run beside
+        assert run_studies(tmp_path / "alone", file)[0] == 0  # the control: one by itself has nothing to run beside
     assert {process_of(tmp_path / "alone", name) for name in ("first", "second")} == {os.getpid()}
     assert assert_identical(tmp_path / "together", tmp_path / "alone") == 6
-    assert "0 of 2 cases computed" in studied(tmp_path / "together", *files)[1]
+    assert "0 of 2 cases computed" in run_studies(tmp_path / "together", *files)[1]
     assert not leftovers(tmp_path / "together")
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("shared")
 def test_a_process_that_is_killed_is_done_without(script, tmp_path):
-    code, output = studied(tmp_path / "r", script("killed"), script("second"))
+    code, output = run_studies(tmp_path / "r", script("killed"), script("second"))
     assert code == 0, output
     assert process_of(tmp_path / "r", "killed") == os.getpid()
     assert "second: 2 of 2 cases computed" in output  # by whichever process was left
@@ -118,7 +118,7 @@ def test_a_study_that_is_edited_before_it_is_concluded_is_drawn_again(script, tm
 @pytest.mark.parametrize("kind", ["refused", "silent"])
 def test_what_stops_one_study_does_not_stop_the_others(script, tmp_path, kind):
     """A grid that is refused ends the command after those before it; of findings that fail the next go on."""
-    code, output = studied(tmp_path / "r", script("first"), script(kind), script("second"))
+    code, output = run_studies(tmp_path / "r", script("first"), script(kind), script("second"))
     assert code == 2
     assert "first: 2 of 2 cases computed" in output
     assert (tmp_path / "r" / "first.json").is_file()

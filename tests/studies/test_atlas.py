@@ -20,7 +20,7 @@ from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import closed_form, scene
 from symtop.model.top import flat
 from symtop.runner.study import Case
-from tests.templates import checked
+from tests.templates import checked_page
 
 STEPS = [0.011, 0.053, 0.17, 0.31, 0.83]
 
@@ -46,7 +46,7 @@ def test_a_map_says_what_single_runs_say(name):
                 assert runs.axis_error[place, column] >= 0.3 * error.max()
 
 
-def together_in(plan, n, alone=()):
+def column_groups(plan, n, alone=()):
     """The settings of each call of a map of n scenes, from the last to the first."""
     pieces, end = [], len(plan.settings)
     while end:
@@ -65,14 +65,14 @@ def test_columns_that_are_run_together_have_the_bits_of_runs_one_by_one(in_lanes
     singles = [outcome_maps.one_by_one(plan, chart, scene_) for scene_ in tops]
     numbers = np.array([flat(scene_.top, scene_.start) for scene_ in tops])
     periods = np.array([scene_.nutation_period for scene_ in tops])
-    for columns in together_in(plan, len(tops)):
+    for columns in column_groups(plan, len(tops)):
         result = outcome_maps.together(plan, method.solvers[chart], columns, numbers, periods)
         for single, part in zip(singles, zip(result.states, result.momenta, result.outcome, strict=True), strict=True):
             for values, batch in zip(single, part, strict=True):
                 row = values[0, columns][:, : result.states.shape[2]] if batch.ndim > 1 else values[0, columns]
                 np.testing.assert_array_equal(row, batch)
     monkeypatch.setattr(outcome_maps, "MOST", plan.phases.size)  # other columns together
-    assert len(together_in(plan, len(tops))) == len(steps)
+    assert len(column_groups(plan, len(tops))) == len(steps)
     for values, second in zip(expected, outcome_map("cusp", spins, method, steps, 2.0), strict=True):
         np.testing.assert_array_equal(values, second)
 
@@ -135,10 +135,10 @@ def test_rows_share_phases_and_errors_are_followed_where_they_are_asked_for():
     assert [marks[-1] for marks in runs.marks] == [1200, 48, 6]
     assert np.isnan(runs.phases[2]).sum() == 49 - 7
     assert np.max(np.diff(np.sort(np.mod(runs.phases[0], 1.0)))) < 0.125
-    assert [piece.stop - piece.start for piece in together_in(runs, 1)] == [1, 1, 1]  # too far apart
+    assert [piece.stop - piece.start for piece in column_groups(runs, 1)] == [1, 1, 1]  # too far apart
     plan = row_plan(integrator("strang"), [0.01, 0.0105, 0.1, 0.105, 0.25, 1.9, 1.91], 12.0)
-    assert [piece.stop - piece.start for piece in together_in(plan, 1)] == [2, 1, 2, 2]
-    assert [piece.stop - piece.start for piece in together_in(plan, 1, alone={1, 2})] == [2, 1, 1, 1, 1, 1]
+    assert [piece.stop - piece.start for piece in column_groups(plan, 1)] == [2, 1, 2, 2]
+    assert [piece.stop - piece.start for piece in column_groups(plan, 1, alone={1, 2})] == [2, 1, 1, 1, 1, 1]
 
 
 def test_the_families_are_what_they_say_and_limits_end_at_verlets_and_rk4s():
@@ -181,7 +181,7 @@ def hand_made(words, control=(0.01, 0.1, 1.0), parameter=(0.3, 0.6, 5.0, 10.0), 
 A, B, L = "accurate", "bounded_but_wrong", "left_chart"
 
 
-def failing(*shares, starts=20, word="drifting"):
+def failure_step(*shares, starts=20, word="drifting"):
     """From which step on a map fails of which these shares of the starts do, step by step."""
     columns = [[word] * round(share * starts) + [A] * (starts - round(share * starts)) for share in shares]
     control, parameter = np.geomspace(0.01, 1.0, len(shares)), np.geomspace(0.1, 30.0, starts)
@@ -202,10 +202,10 @@ def test_thresholds_hold_at_every_larger_step_and_reach_and_failures_are_read_of
     assert row["fails mostly by"] == "ended early: left chart"
     assert row["accurate (%)"] == pytest.approx(35.0)
     # Five steps from 0.01 to 1: 0.01, 0.032, 0.1, 0.32, 1.
-    assert failing(0.0, 0.9, 0.5, 0.7, 1.0) == pytest.approx(10.0**-1.5)
-    assert failing(0.7, 0.4, 0.6, 0.7, 1.0) == pytest.approx(0.1)
+    assert failure_step(0.0, 0.9, 0.5, 0.7, 1.0) == pytest.approx(10.0**-1.5)
+    assert failure_step(0.7, 0.4, 0.6, 0.7, 1.0) == pytest.approx(0.1)
     for shares in ((0.05, 0.0, 0.0), (0.6, 0.0, 0.2), (0.0, 0.1, 0.2, 0.4, 0.6), (0.0, 0.0, 0.0)):
-        assert math.isnan(failing(*shares))
+        assert math.isnan(failure_step(*shares))
 
 
 def test_bytes_stay_bytes_in_a_combined_dataset(tmp_path):
@@ -325,7 +325,7 @@ def test_facts_are_those_of_the_mechanisms_and_the_page_says_them_but_none_of_wh
     table = facts.tables(data)["atlas"]
     assert dict(zip(table["variant"], table["accurate (%)"] / 100.0, strict=True)) == pytest.approx(shares)
     assert table["accurate (%)"].is_monotonic_decreasing
-    assert f"{answers['angles_halved']} of 2 variants in Euler's angles" in checked("stability", data, tmp_path)
+    assert f"{answers['angles_halved']} of 2 variants in Euler's angles" in checked_page("stability", data, tmp_path)
     answers = facts.facts(hand_made([[A, B, L]] * 4))
     assert (answers["settled"], answers["cells"], answers["resonant"], answers["others"]) == (0.0, 12, None, None)
     assert facts.tables(hand_made([[A, B, L]] * 4))["limits"].empty

@@ -27,13 +27,13 @@ COUNT, PERIODS = 4, 5.0
 EVERYONE = np.arange(COUNT)
 
 
-def drawn(family):
+def bodies_for(family):
     return bodies_of(family, COUNT, 2, PERIODS)
 
 
 @pytest.mark.parametrize("family", [SYMMETRIC, "0.3", FREE])
 def test_errors_of_many_runs_are_those_of_each(family):
-    bodies = drawn(family)
+    bodies = bodies_for(family)
     errors = bodies.errors("body", run_level(integrator("rk4[body]"), bodies, EVERYONE, 7, 1e6), EVERYONE)
     for k, scene in enumerate(bodies.scenes):
         run = symtop.simulate(scene, "rk4", step_size=bodies.period[k] / FIRST / 128, horizon=bodies.times[k, -1],
@@ -50,7 +50,7 @@ def test_errors_of_many_runs_are_those_of_each(family):
     ("strang", 0, {OK}), ("rk4", 1, {NOT_NORMALISED}), ("rk4", 7, {OK}), ("gauss-4", 1, {OK, NOT_CONVERGED}),
 ])  # fmt: skip
 def test_bodies_in_lanes_run_and_end_as_one_by_one(in_lanes, name, level, ends):
-    variant, bodies = integrator(f"{name}[body]"), drawn("0.3")
+    variant, bodies = integrator(f"{name}[body]"), bodies_for("0.3")
     plans = [Plan.steps(float(period) / FIRST * 0.5**level, bodies.marks << level) for period in bodies.period]
     lanes = run_level(variant, bodies, EVERYONE, level, 1e6)
     singles = one_by_one(variant, bodies.members(EVERYONE), plans)
@@ -61,7 +61,7 @@ def test_bodies_in_lanes_run_and_end_as_one_by_one(in_lanes, name, level, ends):
 
 @pytest.mark.parametrize("family", [SYMMETRIC, "0.1", "chaotic", FREE])
 def test_the_truth_is_within_its_bound_and_another_body_is_not(family):
-    bodies = drawn(family)
+    bodies = bodies_for(family)
     states, bounds = bodies.truth
     for k, scene in enumerate(bodies.scenes):
         exact = symtop.reference(scene, bodies.times[k])
@@ -79,16 +79,16 @@ def test_the_truth_is_within_its_bound_and_another_body_is_not(family):
 
 
 def test_a_body_of_epsilon_zero_moves_as_the_top_that_it_is():
-    bodies = drawn(SYMMETRIC)
+    bodies = bodies_for(SYMMETRIC)
     tops = as_tops(bodies)
     np.testing.assert_array_equal(tops.times, bodies.times)
     assert (attitude_distance(tops.truth[1], bodies.truth[0]).max(axis=1) < bodies.truth[1] + 1e-13).all()
-    control = as_tops(drawn("0.1"))
-    assert (attitude_distance(control.truth[1], drawn("0.1").truth[0]).max(axis=1) > 1e-4).all()  # the negative control
+    control = as_tops(bodies_for("0.1"))
+    assert (attitude_distance(control.truth[1], bodies_for("0.1").truth[0]).max(axis=1) > 1e-4).all()  # the control
 
 
 def test_a_setting_that_meets_a_target_meets_it():
-    variant, bodies = integrator("rk4[body]"), {name: drawn(name) for name in (SYMMETRIC, FREE)}
+    variant, bodies = integrator("rk4[body]"), {name: bodies_for(name) for name in (SYMMETRIC, FREE)}
     data = table(variant, bodies, 2e4)
     assert 3.8 < data["order"].values.min() <= data["order"].values.max() < 4.3
     met = data["met_at"].sel(family=SYMMETRIC, quantity="axis").sel(target=1e-3, method="nearest").values
@@ -134,7 +134,7 @@ def test_a_median_error_is_the_largest_of_the_last_half_and_a_refuted_truth_is_o
     data = growth_table(integrator("gauss-4[body]"), 2, 3, 1)
     error = data["error_energy"].sel(family=SYMMETRIC).values
     assert by.exponent(data["time"].values, error, "energy") == pytest.approx(-1.0, abs=0.05)
-    bodies = drawn("0.3")
+    bodies = bodies_for("0.3")
     turned = bodies.truth[0][0] + 1.5e-10 * np.roll(bodies.truth[0][0], 2, axis=1) * np.array([1.0, 1.0, -1.0, -1.0])
     result = SimpleNamespace(quaternion=turned, bound=np.full(len(turned), 2e-10))  # off by 3e-10
     monkeypatch.setattr(measures, "HeavyBody", lambda *_: SimpleNamespace(samples=lambda _: result))
@@ -215,7 +215,7 @@ def test_tau_is_kendalls_with_ties_and_verdicts_follow_limits_fixed_before():
     assert facts.over(0.06, 0.02) == pytest.approx(3.0)
 
 
-def planted(factor):
+def planted_data(factor):
     """A dataset of three methods whose steps and silent wrong runs on free bodies are `factor` times those of tops."""
     variants, families, members = ["rk4[body]", "strang[body]", "gauss-4[body]"], [*FAMILIES], 40
     steps = np.array([20.0, 40.0, 10.0])[:, None, None, None] * 2.0 ** np.arange(3)[None, None, :, None]
@@ -265,7 +265,7 @@ def test_a_run_of_some_methods_has_every_fact_of_the_page(quick_results):
 
 def test_the_least_tau_over_long_runs_is_told_with_the_bodies_it_is_of():
     """Free bodies are judged at 1e-3 alone, four of them, and two of three methods have changed places."""
-    data = planted(1.0)
+    data = planted_data(1.0)
     cost, index = data["short"]["cost"].copy(), {"family": [*FAMILIES].index(FREE)}
     cost[index] = cost[index].values[:, [1, 0, 2]]
     cost[{**index, "target": [1, 2]}] = cost[{**index, "target": 0, "member": slice(4, None)}] = np.nan
@@ -275,7 +275,7 @@ def test_the_least_tau_over_long_runs_is_told_with_the_bodies_it_is_of():
 
 def test_planted_factors_of_steps_and_of_silent_runs_are_found():
     for factor in (1.0, 3.0):
-        data = planted(factor)
+        data = planted_data(factor)
         for target in (1e-3, 1e-9):
             assert [*by.step_factors(data, FREE, target).values()] == pytest.approx([factor] * 3)
             assert [*by.step_factors(data, "0.1", target).values()] == pytest.approx([1.0] * 3)
@@ -286,7 +286,7 @@ def test_planted_factors_of_steps_and_of_silent_runs_are_found():
         assert (by.winner(data, FREE, 1e-6), by.winner(data, FREE, 1e-6, "kicks")) == ("gauss-4[body]", "strang[body]")
         assert by.transferred(data, FREE, 1e-6).value == pytest.approx(1.0)
     scatter = np.random.default_rng(1).lognormal(10.0, 0.5, (3, 1, 1, 1, 40))  # the same of each family
-    tree = planted(1.0)
+    tree = planted_data(1.0)
     tree["short"] = tree["short"].to_dataset().assign(cost=0.0 * tree["short"]["cost"] + scatter)
     paired, apart = (by.tau(tree, family, 1e-3) for family in ("0.1", FREE))
     assert (paired, apart.value) == ((1.0, 1.0, 1.0), 1.0)
@@ -315,7 +315,7 @@ def test_planted_factors_of_steps_and_of_silent_runs_are_found():
     (0, "median 3, 95\xa0% below 3"), (3, "median 3, 95\xa0% below 3, 1 of 9 cases over budget"),
 ])  # fmt: skip
 def test_a_method_that_no_step_within_the_budget_makes_safe_is_counted(unserved, words):
-    data = planted(3.0)
+    data = planted_data(3.0)
     met = data["short"]["met_at"].copy()
     index = {"variant": 1, "family": [*FAMILIES].index(FREE), "target": 0}
     met[{**index, "member": slice(unserved)}] = np.inf  # 3 of 40 are more than 5 %
@@ -329,7 +329,7 @@ def test_a_method_that_no_step_within_the_budget_makes_safe_is_counted(unserved,
 GRID = 0.1
 
 
-def stretched(name, factor):
+def stretched_method(name, factor):
     """A method whose steps are longer than it says: a planted lower limit."""
     solver = integrator(f"{name}[{BODY}]").solvers[BODY]
     many = lambda rows, h, marks: solver.many(rows, factor * h, marks)
@@ -352,7 +352,7 @@ def test_a_body_that_is_a_top_has_the_limit_that_the_study_of_stability_finds(sp
     omega = of.reach(bodies, tilted(1))[0]
     ends = sign_changes(lambda h: sleep_margin(integrator("strang"), spin, h), np.linspace(0.05, 8.0 / spin, 300))
     assert limit(integrator("strang[body]"), bodies) / omega == pytest.approx(ends[:1], rel=1e-5)
-    assert limit(stretched("strang", 1.05), bodies) / omega == pytest.approx([ends[0] / 1.05], rel=1e-5)
+    assert limit(stretched_method("strang", 1.05), bodies) / omega == pytest.approx([ends[0] / 1.05], rel=1e-5)
 
 
 def test_a_body_that_hangs_has_the_limits_of_the_oscillator_and_a_planted_one_is_seen():
@@ -360,7 +360,7 @@ def test_a_body_that_hangs_has_the_limits_of_the_oscillator_and_a_planted_one_is
     bodies = of.Upright(np.array([[1.0, 1.3, 0.5], [1.0, 1.0, 0.5]]), -np.ones(2), np.zeros(2))
     for name, expected in (("rk4", np.sqrt(8.0)), ("strang", 2.0)):
         assert limit(integrator(f"{name}[{BODY}]"), bodies) == pytest.approx([expected] * 2, rel=1e-4)
-        assert limit(stretched(name, 1.25), bodies) == pytest.approx([expected / 1.25] * 2, rel=1e-4)
+        assert limit(stretched_method(name, 1.25), bodies) == pytest.approx([expected / 1.25] * 2, rel=1e-4)
 
 
 @pytest.mark.parametrize("family", ["0.3", FREE])

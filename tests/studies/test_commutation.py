@@ -16,7 +16,7 @@ from symtop.measure.order import power_law
 from symtop.methods.framework import registry
 from symtop.methods.lagrangian.discrete_lagrangian import Quadrature
 from tests.conftest import random_scenes
-from tests.templates import checked
+from tests.templates import checked_page
 
 SCENES = ("spheroid", "goldstein")
 
@@ -126,7 +126,7 @@ def test_facts_and_page_are_those_of_the_rules_and_charts(tmp_path):
     assert facts.facts(part)["others"] == answers["others"]
     assert np.isnan(facts.facts(part)["power_least"])
     assert len(figures.pictures(part)) == 1
-    checked("reduction", data, tmp_path)
+    checked_page("reduction", data, tmp_path)
 
 
 @pytest.mark.parametrize(("failed", "ratio"), [(np.nan, 2.0), (0.1, 1.75)])

@@ -11,7 +11,7 @@ import symtop
 from symtop.measure import datasets
 from symtop.measure.order import BESIDE, Fit, order_verdict
 from symtop.methods.framework.registry import integrator, methods, split_name, variants
-from tests.templates import checked
+from tests.templates import checked_page
 
 ROWS = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "strang[axis]", "strang[attitude]",
         "rk4[angles]", "rk4[axis]", "gauss-12[attitude]", "rk45[angles]", "rk45-compiled[angles]", "radau[angles]",
@@ -151,7 +151,7 @@ def test_the_page_says_what_was_measured_and_adaptive_errors_follow_their_tolera
     assert (fit.slope, fit.used.sum()) == (pytest.approx(1.0), 4)
     assert {name for _, name in fits} == {name for name in ROWS if integrator(name).adaptive}
     assert fits["goldstein", "rk45[angles]"].slope == pytest.approx(1.0, abs=0.15)
-    checked("convergence", data, tmp_path)
+    checked_page("convergence", data, tmp_path)
     answers = facts.facts(data)
     assert answers["pairs"] == answers["confirmed"] + answers["refuted"] + answers["undecided"]
     assert answers["ratio_runs"] == sum(map(len, measures.ratios(data).values())) < answers["ratio_asked"]

@@ -29,7 +29,7 @@ from symtop.report.template import PARTIAL
 from symtop.runner.run import load
 from symtop.runner.study import Case
 from tests.conftest import defer
-from tests.templates import checked
+from tests.templates import checked_page
 
 INF, NAN = math.inf, math.nan
 QUIET = np.array([0.01, 0.01])
@@ -561,7 +561,7 @@ def test_the_page_says_what_was_measured_and_shares_of_silent_runs_are_of_their_
     health, kind = cells.health(small, "rk4[axis]"), KINDS.index("near-separatrix")
     indices = [int(np.argmin(np.abs(health.setting - steps))) for steps in facts.STEPS]
     assert np.array_equal(counts.loc["rk4[axis]", "near-separatrix"], health.wrong[indices, kind] / health.drawn[kind])
-    assert PARTIAL in checked("cost", small, tmp_path, elsewhere={"use", "have"})  # there are no long runs
+    assert PARTIAL in checked_page("cost", small, tmp_path, elsewhere={"use", "have"})  # there are no long runs
     labels = {text.get_text() for text in figures.draw_accuracy(small).axes[0].texts}
     assert {"takahashi-imada (symmetric)", "rk4"} <= labels
 

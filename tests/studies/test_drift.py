@@ -22,7 +22,7 @@ from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import scene
 from symtop.run import modified_energy as shadow
 from symtop.run.long_run import QUANTITIES, chart_of, gauge_of, long_run, scattered
-from tests.templates import checked
+from tests.templates import checked_page
 
 
 @pytest.mark.parametrize(("sizes", "exponents", "interval", "word"), [
@@ -113,7 +113,7 @@ def data():
 
 
 def test_the_page_says_what_every_group_shows(data, tmp_path):
-    checked("drift", data, tmp_path)
+    checked_page("drift", data, tmp_path)
     answers = facts.facts(data)
     assert None not in set(answers.values())
     assert (answers["variants"], answers["own"], answers["tolerance"]) == (6, 1, TOLERANCE)

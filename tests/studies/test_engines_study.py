@@ -10,7 +10,7 @@ from symtop_studies.engines import facts, measures, study
 import symtop
 from symtop.methods.framework.registry import engines, integrator
 from symtop.report.template import PARTIAL
-from tests.templates import checked
+from tests.templates import checked_page
 
 GOLDSTEIN = symtop.scene("goldstein")
 
@@ -153,4 +153,4 @@ def test_facts_are_those_of_the_runs_and_the_page_has_them(tree, tmp_path):
     data = xr.concat([tops, worse.assign_coords(variant=["no-gyro-linear[axis]"])], "variant")
     assert facts.facts(xr.DataTree.from_dict({"tops": data}))["wall"] == answers["wall"]
     assert answers["single_best"] > 1e-3
-    assert PARTIAL not in checked("engines", tree, tmp_path)
+    assert PARTIAL not in checked_page("engines", tree, tmp_path)

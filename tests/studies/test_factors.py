@@ -18,7 +18,7 @@ from symtop.measure import settings
 from symtop.measure.datasets import combine
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.report.formats import number
-from tests.templates import checked
+from tests.templates import checked_page
 
 SCENE = symtop.scene("spheroid")
 SHORT = Goal(3.0, 1e-5, LANGUAGES, CALLS)
@@ -172,7 +172,7 @@ def test_where_nothing_was_timed_nothing_is_said_and_the_page_has_numbers_and_no
     assert answers["times"] == 0
     assert np.isnan(answers["near_share"])
     assert list(figures.pictures(data)) == []
-    text = checked("factors", quiet, tmp_path)
+    text = checked_page("factors", quiet, tmp_path)
     assert f"becomes {number(facts.facts(quiet)['called'], 2)} times faster" in text
     assert "busy" not in text
 

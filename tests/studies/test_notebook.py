@@ -16,7 +16,7 @@ from symtop.measure import datasets
 from symtop.methods.framework.angles import accelerations, momenta
 from symtop.methods.lagrangian.discrete_lagrangian import RULES
 from symtop.run.modified_energy import modified_energy
-from tests.templates import checked
+from tests.templates import checked_page
 
 FIRST = symtop.scene("spheroid").top
 NUMBERS = (FIRST.I1, FIRST.I3, FIRST.mgl)
@@ -176,7 +176,7 @@ def data():
 
 
 def test_the_page_says_what_the_notebook_and_the_discrete_methods_keep(data, tmp_path):
-    checked("notebook", data, tmp_path)
+    checked_page("notebook", data, tmp_path)
     answers = facts.facts(data)
     assert (answers["compared"], answers["discrete"], answers["momenta_kept"]) == (5, 5, 5)
     assert answers["momenta"] < 1e-14

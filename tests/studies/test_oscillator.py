@@ -20,7 +20,7 @@ from symtop.methods.lagrangian.damped_oscillator import ONE_SIDED, Oscillator, d
 from symtop.methods.lagrangian.damped_top import Friction, damped_run, four_equations
 from symtop.methods.library.scipy_ivp import integrated
 from symtop.runner.study import Case
-from tests.templates import checked
+from tests.templates import checked_page
 
 
 def step_matrix(oscillator, rule, h):
@@ -172,7 +172,7 @@ def data():
 
 
 def test_the_page_says_what_friction_does_and_what_is_exact(data, tmp_path):
-    checked("oscillators", data, tmp_path)
+    checked_page("oscillators", data, tmp_path)
     answers = facts.facts(data)
     assert None not in answers.values()
     assert (answers["order_least"], answers["order_most"]) == pytest.approx((2.0, 2.0), abs=0.05)

@@ -5,7 +5,7 @@ import pytest
 from symtop_studies.pitfalls import study
 
 from symtop.measure import datasets
-from tests.templates import checked
+from tests.templates import checked_page
 
 
 def test_the_pitfalls_are_there_and_the_page_says_what_was_measured(tmp_path):
@@ -24,4 +24,4 @@ def test_the_pitfalls_are_there_and_the_page_says_what_was_measured(tmp_path):
     assert float(run["axis"].max()) < 1e-3
     assert float(run["time"].max()) == pytest.approx(2.0)
     assert (np.isfinite(run["axis"]) == np.isfinite(run["time"])).all()  # the rest is padding
-    assert "left_chart" in checked("pitfalls", data, tmp_path, elsewhere={"three"})
+    assert "left_chart" in checked_page("pitfalls", data, tmp_path, elsewhere={"three"})

@@ -9,7 +9,7 @@ from symtop_studies.speed import facts, study
 
 import symtop
 from symtop.measure import datasets
-from tests.templates import checked
+from tests.templates import checked_page
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +56,7 @@ def test_a_run_is_that_of_its_setting_and_the_page_says_what_was_measured(data, 
     assert not np.isfinite(attitude[["attitude", "seconds"]].isel(setting=0).to_array()).any()
     assert np.isfinite(attitude[["attitude", "seconds"]].isel(setting=slice(1, None)).to_array()).all()
     assert not np.isfinite(facts.shown(data)["axis"].sel(variant="rk4[attitude]")).any()
-    assert "`takahashi" not in checked("speed", data, tmp_path, elsewhere={"error-against-time"})
+    assert "`takahashi" not in checked_page("speed", data, tmp_path, elsewhere={"error-against-time"})
     assert facts.facts(data)["scipy"] is None
 
 
