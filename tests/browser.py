@@ -32,8 +32,8 @@ FLAGS = (
 PATIENCE = 30.0  # seconds; a first start on a busy machine takes five
 FAINT = """(() => {  // texts whose contrast with what is behind them is below that of WCAG 2 AA
     const parts = (color) => color.match(/[\\d.]+/g).map(Number);
-    const light = ([r, g, b]) => [r, g, b].map((one) => one / 255).map((one) => one <= 0.04045 ? one / 12.92
-        : ((one + 0.055) / 1.055) ** 2.4).reduce((sum, one, k) => sum + one * [0.2126, 0.7152, 0.0722][k], 0);
+    const light = ([r, g, b]) => [r, g, b].map((value) => value / 255).map((value) => value <= 0.04045 ? value / 12.92
+        : ((value + 0.055) / 1.055) ** 2.4).reduce((sum, value, k) => sum + value * [0.2126, 0.7152, 0.0722][k], 0);
     const behind = (node) => {
         for (; node; node = node.parentElement) {
             const color = parts(getComputedStyle(node).backgroundColor);
@@ -41,16 +41,16 @@ FAINT = """(() => {  // texts whose contrast with what is behind them is below t
         }
         return [255, 255, 255];
     };
-    const found = new Set();
+    const faint = new Set();
     for (const node of document.querySelectorAll('body *')) {
-        const own = [...node.childNodes].some((one) => one.nodeType === 3 && one.textContent.trim());
-        if (!own || !node.checkVisibility() || node.closest('script, style')) continue;
-        const style = getComputedStyle(node), drawn = node.namespaceURI.endsWith('svg') ? style.fill : style.color;
-        const [a, b] = [light(parts(drawn)), light(behind(node))].sort((x, y) => y - x);
+        const text = [...node.childNodes].some((child) => child.nodeType === 3 && child.textContent.trim());
+        if (!text || !node.checkVisibility() || node.closest('script, style')) continue;
+        const style = getComputedStyle(node), color = node.namespaceURI.endsWith('svg') ? style.fill : style.color;
+        const [a, b] = [light(parts(color)), light(behind(node))].sort((x, y) => y - x);
         const ratio = (a + 0.05) / (b + 0.05);
-        if (ratio < 4.5) found.add(`${node.localName}.${node.className.baseVal ?? node.className} ${ratio.toFixed(2)}`);
+        if (ratio < 4.5) faint.add(`${node.localName}.${node.className.baseVal ?? node.className} ${ratio.toFixed(2)}`);
     }
-    return [...found];
+    return [...faint];
 })()"""
 
 
@@ -115,16 +115,16 @@ class Browser:
         message: dict[str, Any] = {"id": self._count, "method": method, "params": params}
         if self._session:
             message["sessionId"] = self._session
-        data = json.dumps(message).encode() + b"\0"
-        while data:
-            data = data[os.write(self._write, data) :]
+        payload = json.dumps(message).encode() + b"\0"
+        while payload:
+            payload = payload[os.write(self._write, payload) :]
         deadline = time.monotonic() + PATIENCE
         while True:
-            answer = self._receive(deadline - time.monotonic(), method)
-            if answer.get("id") == self._count:
-                if "error" in answer:
-                    raise BrowserError(f"{method}: {answer['error']['message']}")
-                return answer["result"]
+            reply = self._receive(deadline - time.monotonic(), method)
+            if reply.get("id") == self._count:
+                if "error" in reply:
+                    raise BrowserError(f"{method}: {reply['error']['message']}")
+                return reply["result"]
 
     def _receive(self, patience: float, awaited: str) -> dict[str, Any]:
         while b"\0" not in self._buffer:
@@ -160,18 +160,18 @@ class Browser:
 
     def open(self, address: str) -> None:
         """Go to an address and wait until the page has loaded."""
-        answer = self._send("Page.navigate", url=address)
-        if "errorText" in answer:
-            raise BrowserError(f"{address}: {answer['errorText']}")
+        reply = self._send("Page.navigate", url=address)
+        if "errorText" in reply:
+            raise BrowserError(f"{address}: {reply['errorText']}")
         self.wait_for("document.readyState === 'complete' && location.href !== 'about:blank'")
 
     def evaluate(self, expression: str) -> Any:
         """The value of a JavaScript expression; a promise is awaited."""
-        answer = self._send("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
-        if "exceptionDetails" in answer:
-            details = answer["exceptionDetails"]
+        reply = self._send("Runtime.evaluate", expression=expression, returnByValue=True, awaitPromise=True)
+        if "exceptionDetails" in reply:
+            details = reply["exceptionDetails"]
             raise BrowserError(details.get("exception", {}).get("description") or details["text"])
-        return answer["result"].get("value")
+        return reply["result"].get("value")
 
     def wait_for(self, condition: str, patience: float = PATIENCE) -> Any:
         """Wait until a JavaScript expression is true, and return it."""
@@ -207,14 +207,14 @@ class Browser:
 
     def pdf(self, path: Path) -> Path:
         """Print the page."""
-        answer = self._send("Page.printToPDF", printBackground=False, preferCSSPageSize=True)
-        path.write_bytes(base64.b64decode(answer["data"]))
+        reply = self._send("Page.printToPDF", printBackground=False, preferCSSPageSize=True)
+        path.write_bytes(base64.b64decode(reply["data"]))
         return path
 
-    def drag(self, selector: str, right: float = 0.0, down: float = 0.0, at: tuple[float, float] = (0.5, 0.5)) -> None:
+    def drag(self, selector: str, right: float = 0.0, down: float = 0.0, xy: tuple[float, float] = (0.5, 0.5)) -> None:
         """Press the mouse at two shares of an element's width and height, move it by so many pixels, and let go."""
         box = self.evaluate(f"document.querySelector({selector!r}).getBoundingClientRect().toJSON()")
-        x, y = box["x"] + at[0] * box["width"], box["y"] + at[1] * box["height"]
+        x, y = box["x"] + xy[0] * box["width"], box["y"] + xy[1] * box["height"]
         for kind, share in (("mousePressed", 0.0), ("mouseMoved", 0.5), ("mouseMoved", 1.0), ("mouseReleased", 1.0)):
             place = {"x": x + share * right, "y": y + share * down}
             self._send("Input.dispatchMouseEvent", type=kind, button="left", buttons=1, clickCount=1, **place)
@@ -223,14 +223,14 @@ class Browser:
         """Save what is in the window, or the whole page, as a PNG."""
         size = self._send("Page.getLayoutMetrics")["cssContentSize"] if whole else {}
         clip = {"clip": {"x": 0, "y": 0, "width": size["width"], "height": size["height"], "scale": 1}} if size else {}
-        answer = self._send("Page.captureScreenshot", format="png", captureBeyondViewport=whole, **clip)
-        path.write_bytes(base64.b64decode(answer["data"]))
+        reply = self._send("Page.captureScreenshot", format="png", captureBeyondViewport=whole, **clip)
+        path.write_bytes(base64.b64decode(reply["data"]))
         return path
 
     def outside(self) -> list[str]:
         """What the page asked of other machines: anything but files, data and this one."""
-        near = ("file:", "data:", "blob:", "about:", "http://127.0.0.1", "http://localhost")
-        return [address for address in self.requests if not address.startswith(near)]
+        prefixes = ("file:", "data:", "blob:", "about:", "http://127.0.0.1", "http://localhost")
+        return [address for address in self.requests if not address.startswith(prefixes)]
 
     @property
     def too_wide(self) -> int:

@@ -26,14 +26,14 @@ def call(*words: object, code: int | None = 0, **environment: str) -> Result:
     return result
 
 
-def probed(results: Path, *words: object, code: int = 0) -> str:
+def probe(results: Path, *words: object, code: int = 0) -> str:
     """What the quick probe prints in this process; it must end with that exit code, and without a traceback."""
-    ended_with, output = answer("study", PROBE, "--quick", "--results", results, *words)
-    assert ended_with == code, output
+    status, output = code_and_output("study", PROBE, "--quick", "--results", results, *words)
+    assert status == code, output
     return output
 
 
-def answer(*words: object) -> tuple[int, str]:
+def code_and_output(*words: object) -> tuple[int, str]:
     """Exit code and output of a command in this process, which raises nothing and prints no traceback."""
     result = call(*words, code=None)
     assert "Traceback" not in result.output, result.output
@@ -51,7 +51,7 @@ def printed_by(code: str, *words: object, cwd: Path | None = None, **environment
 
 
 def symtop(*words: object, cwd: Path | None = None, **environment: object) -> subprocess.Popen:
-    """Start a command; its output is read by `ended`."""
+    """Start a command; its output is read by `finish`."""
     return subprocess.Popen(
         [sys.executable, "-m", "symtop.cli", *map(str, words)], text=True, cwd=cwd, start_new_session=True,
         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE,
@@ -81,7 +81,7 @@ def stop(process: subprocess.Popen) -> None:
     process.communicate()
 
 
-def ended(process: subprocess.Popen, seconds: float = 240.0) -> tuple[int, str, str]:
+def finish(process: subprocess.Popen, seconds: float = 240.0) -> tuple[int, str, str]:
     """Exit code, output and errors of a command; none of them may hold a traceback or a leak."""
     try:
         out, err = process.communicate(timeout=seconds)
@@ -93,9 +93,9 @@ def ended(process: subprocess.Popen, seconds: float = 240.0) -> tuple[int, str, 
     return process.returncode, out, err
 
 
-def succeeded(process: subprocess.Popen, seconds: float = 240.0) -> str:
+def stdout_of(process: subprocess.Popen, seconds: float = 240.0) -> str:
     """What a command prints that must end with exit code 0."""
-    code, out, err = ended(process, seconds)
+    code, out, err = finish(process, seconds)
     assert code == 0, err
     return out
 
@@ -106,14 +106,14 @@ def contents(results: Path, *, provenance: bool = False) -> dict[str, xr.Dataset
     for path in sorted([*results.rglob("*.nc"), *results.rglob("cases/*/*.npz")]):
         data = netcdf.read(path) if path.suffix == ".nc" else store.load_case(path)
         assert data is not None, path
-        kept = {key: value for key, value in data.attrs.items() if provenance or key not in netcdf.provenance()}
-        datasets[str(path.relative_to(results))] = data.drop_attrs().assign_attrs(kept)
+        attributes = {key: value for key, value in data.attrs.items() if provenance or key not in netcdf.provenance()}
+        datasets[str(path.relative_to(results))] = data.drop_attrs().assign_attrs(attributes)
     return datasets
 
 
-def same(one: Path, other: Path) -> int:
+def assert_identical(results: Path, expected: Path) -> int:
     """How many datasets two results folders hold, whose datasets must be the same to the bit."""
-    first, second = contents(one), contents(other)
+    first, second = contents(results), contents(expected)
     assert first.keys() == second.keys()
     assert all(first[name].identical(second[name]) for name in first)
     return len(first)

@@ -118,14 +118,14 @@ def quick_results(tmp_path_factory) -> Path:
     """Results of every study, quickly, to read: made once for all processes of a run of the tests."""
     base = tmp_path_factory.getbasetemp()
     folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "results-of-all"
-    done = folder / "done"
+    marker = folder / "done"
     with files.locked(folder / "making", wait=True):
-        if not done.is_file():
+        if not marker.is_file():
             if STORED.is_dir():  # after `make quick`: what is up to date need not be computed twice
                 shutil.copytree(STORED, folder / "quick", dirs_exist_ok=True)
             with _registered_for_a_while():
                 call("study", "--all", "--quick", "--results", folder)
-            done.touch()
+            marker.touch()
     return folder / "quick"
 
 
@@ -136,9 +136,9 @@ def truth() -> dict:
     return {name: entry for name, entry in json.loads(path.read_text()).items() if not name.startswith("_")}
 
 
-def late(*sets, mark="quick"):
+def defer(*sets, mark="quick"):
     """Parameters of a test with a mark: `quick` waits for `make quick`, as it compiles much; `slow` takes long."""
-    return [pytest.param(*(one if isinstance(one, tuple) else [one]), marks=getattr(pytest.mark, mark)) for one in sets]
+    return [pytest.param(*(row if isinstance(row, tuple) else [row]), marks=getattr(pytest.mark, mark)) for row in sets]
 
 
 def random_scenes(count: int, seed: int) -> list[Scene]:

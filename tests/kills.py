@@ -21,7 +21,7 @@ from tqdm import tqdm
 from symtop.core import netcdf
 from symtop.measure.datasets import differences
 from symtop.runner import run as runner, store
-from tests.commands import leftovers, succeeded, symtop
+from tests.commands import leftovers, stdout_of, symtop
 
 PATIENCE = 2400.0  # seconds for an undisturbed run
 
@@ -31,7 +31,7 @@ class Survived(NamedTuple):
 
     kills: int
     lost: int  # cases that were begun when a kill came
-    most: int  # by one kill
+    most_lost: int  # by one kill
     rounds: int  # times that the command was through
 
 
@@ -46,8 +46,8 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
     for script in (str(word) for word in words if str(word).endswith(".py")):
         runner.load(script)  # from here on it is known by its name
     command = ["study", *words, "--jobs", 2, "--results"]
-    succeeded(symtop(*command, calm), PATIENCE)
-    count = lost = most = rounds = 0
+    stdout_of(symtop(*command, calm), PATIENCE)
+    count = lost = most_lost = rounds = 0
     bar = tqdm(total=kills, desc="kills", disable=None)  # on a terminal
     cases_before: dict[Path, tuple[int, int]] = {}  # finished cases: the identity of their file and when it was written
     while count < kills:
@@ -66,21 +66,21 @@ def survive(words: list[object], folder: Path, longest: float, kills: int = 30, 
         assert process.returncode in (0, -signal.SIGKILL), errors
         time.sleep(1.5)  # workers whose parent was killed have ended by then
         files = {path: path.stat() for path in results.rglob("cases/*/*.npz")}
-        now = {path: (about.st_ino, about.st_mtime_ns) for path, about in files.items()}
-        assert cases_before.items() <= now.items()  # not one was written a second time
+        cases = {path: (stat.st_ino, stat.st_mtime_ns) for path, stat in files.items()}
+        assert cases_before.items() <= cases.items()  # not one was written a second time
         cost = sum(lock.stat().st_mtime >= start for lock in _locks(results))
         assert cost <= 2  # what a kill costs: one case a worker
-        lost, most, cases_before = lost + cost, max(most, cost), now
+        lost, most_lost, cases_before = lost + cost, max(most_lost, cost), cases
         if process.returncode == 0:
             assert_same(results, calm)
             rounds += 1
             shutil.rmtree(results)
             cases_before = {}
     bar.close()
-    succeeded(symtop(*command, results), PATIENCE)
+    stdout_of(symtop(*command, results), PATIENCE)
     assert_same(results, calm)
     assert not leftovers(results)
-    return Survived(count, lost, most, rounds + 1)
+    return Survived(count, lost, most_lost, rounds + 1)
 
 
 def _locks(results: Path) -> set[Path]:

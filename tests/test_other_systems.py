@@ -54,9 +54,9 @@ os.kill(os.getpid(), signal.SIGKILL)
 
 
 def test_a_worker_ends_with_its_parent(tmp_path):
-    began = time.monotonic()
+    start = time.monotonic()
     assert customized(tmp_path, POORER)(python=ORPHAN).returncode == -signal.SIGKILL  # and its output has ended
-    assert time.monotonic() < began + 15.0
+    assert time.monotonic() < start + 15.0
 
 
 COMMANDS = """

@@ -49,8 +49,8 @@ class Module:
 
     @property
     def room(self) -> str:
-        package, *rest = self.name.split(".")
-        return "studies" if package == "symtop_studies" else rest[0] if rest else "face"
+        package, *parts = self.name.split(".")
+        return "studies" if package == "symtop_studies" else parts[0] if parts else "face"
 
 
 def read(root: Path) -> dict[str, Module]:
@@ -77,11 +77,11 @@ def _arrows(node: ast.AST, package: str, known: set[str], *, typing: bool = Fals
                 inner = f"{source}.{alias.name}"
                 yield Arrow(inner if inner in known else source, child.lineno, typing)
         elif isinstance(child, STATEMENTS):
-            checked = isinstance(child, ast.If) and ast.unparse(child.test).rpartition(".")[2] == "TYPE_CHECKING"
-            yield from _arrows(child, package, known, typing=typing or checked)
+            typing_only = isinstance(child, ast.If) and ast.unparse(child.test).rpartition(".")[2] == "TYPE_CHECKING"
+            yield from _arrows(child, package, known, typing=typing or typing_only)
 
 
-def upward(modules: dict[str, Module]) -> list[str]:
+def upward_imports(modules: dict[str, Module]) -> list[str]:
     """Imports of a room that is not the importer's own and not below it."""
     complaints = []
     for module in modules.values():
@@ -97,19 +97,19 @@ def upward(modules: dict[str, Module]) -> list[str]:
     return sorted(set(complaints))
 
 
-def circles(modules: dict[str, Module]) -> list[str]:
+def import_cycles(modules: dict[str, Module]) -> list[str]:
     """Sets of files that import each other, directly or through others; TYPE_CHECKING imports aside."""
     names = sorted(modules)
     graph = np.zeros((len(names), len(names)), dtype=bool)
-    for place, name in enumerate(names):
+    for row, name in enumerate(names):
         targets = {arrow.target for arrow in modules[name].arrows if not arrow.typing}
-        graph[place] = [other in targets for other in names]
+        graph[row] = [target in targets for target in names]
     count, group = connected_components(graph, connection="strong")
-    sets = ([name for name, one in zip(names, group, strict=True) if one == k] for k in range(count))
+    sets = ([name for name, label in zip(names, group, strict=True) if label == k] for k in range(count))
     return sorted(" <-> ".join(members) for members in sets if len(members) > 1)
 
 
-def strangers(modules: dict[str, Module]) -> list[str]:
+def strange_imports(modules: dict[str, Module]) -> list[str]:
     """Imports of packages that a room does without."""
     arrows = [(module, arrow) for module in modules.values() for arrow in module.arrows]
     return [f"{module.name}:{arrow.line} imports {arrow.target}" for module, arrow in arrows
@@ -122,7 +122,7 @@ def house() -> dict[str, Module]:
     return read(ROOT)
 
 
-@pytest.mark.parametrize("rule", [upward, circles, strangers])
+@pytest.mark.parametrize("rule", [upward_imports, import_cycles, strange_imports])
 def test_the_package_holds_the_rule(rule):
     assert rule(house()) == []
 
@@ -157,11 +157,11 @@ def test_imports_upward_circles_and_strangers_are_reported(tmp_path):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text(text)
     small = read(tmp_path)
-    assert upward(small) == [
+    assert upward_imports(small) == [
         *(f"symtop.core.{line} imports symtop.model.good" for line in ("progress:2", "typed:3", "up:1")),
         "symtop.extra lies in no room of ORDER", "symtop.report.page:1 imports symtop_studies.drift.study",
         "symtop.runner.beside:1 imports symtop.judging",
     ]  # fmt: skip
     neighbours, study = "symtop.model.left <-> symtop.model.right", "symtop.report.page <-> symtop_studies.drift.study"
-    assert circles(small) == [neighbours, study]
-    assert strangers(small) == ["symtop.methods.kernel:2 imports matplotlib.pyplot"]
+    assert import_cycles(small) == [neighbours, study]
+    assert strange_imports(small) == ["symtop.methods.kernel:2 imports matplotlib.pyplot"]

@@ -49,7 +49,7 @@ def test_a_script_is_typed_throughout_and_mistakes_are_reported_where_they_are(t
     words = [sys.executable, "-m", "mypy", "--no-error-summary", str(tmp_path / "good.py"), str(tmp_path / "bad.py")]
     result = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
     assert result.stdout, result.stderr
-    good, bad = ([one for one in result.stdout.splitlines() if f"{name}.py:" in one] for name in ("good", "bad"))
+    good, bad = ([line for line in result.stdout.splitlines() if f"{name}.py:" in line] for name in ("good", "bad"))
     revealed = [line.split('"')[1] for line in good if "Revealed type" in line]
     assert not [line for line in good if ": error:" in line]
     assert [kind.replace("builtins.", "").replace("Union[int, None]", "int | None") for kind in revealed] == SEEN

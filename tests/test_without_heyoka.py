@@ -38,16 +38,16 @@ def test_taylor_alone_is_missing_and_refused_and_a_run_a_certificate_in_40_digit
     assert result.returncode == 0, result.stderr
     report = json.loads(result.stdout)
     assert report["spec"] is None
-    (refused,) = report["refused"].splitlines()
-    assert "taylor needs the package heyoka" in refused
+    (error,) = report["refused"].splitlines()
+    assert "taylor needs the package heyoka" in error
     assert 1e-9 < report["error"] < 1e-4
     assert report["bound"] < 1e-12
     assert report["advice"]["integrator"]
     assert not report["advice"]["integrator"].startswith("taylor")
-    without, with_it = set(report["known"]), set(symtop.integrators())
-    assert not without - with_it
+    names, all_names = set(report["known"]), set(symtop.integrators())
+    assert not names - all_names
     missing = {"taylor"} if importlib.util.find_spec("heyoka") else set()  # without it both lists are the same
-    assert {name.split("-")[0] for name in with_it - without} == missing
+    assert {name.split("-")[0] for name in all_names - names} == missing
 
 
 @pytest.mark.slow

@@ -40,12 +40,12 @@ def test_a_kernel_that_leaves_its_chart_is_timed_up_to_there(monkeypatch):
 
 @needs_gcc
 def test_the_comparison_sees_one_wrong_rounding_and_a_twin_that_leaves_the_chart():
-    one = kernels.kernel(("strang", "axis"))  # with one kick, which begins the step: its force is for the next one
-    assert twin.difference(one._replace(rule=one.rule._replace(kick=(one.h, 0.0))), STEPS) == 0.0
+    kernel = kernels.kernel(("strang", "axis"))  # with one kick, which begins the step: its force is for the next one
+    assert twin.difference(kernel._replace(rule=kernel.rule._replace(kick=(kernel.h, 0.0))), STEPS) == 0.0
     kernel = kernels.kernel(("stormer-verlet", "angles"))
     nudged = np.nextafter(kernel.rule.drift[0], 1.0)
-    other = twin.Twin(kernel._replace(rule=kernel.rule._replace(drift=(nudged,))), twin.EXACT)
-    assert np.any(other.shown(STEPS)[0] != twin.ours(kernel, STEPS)[0])
+    nudged_twin = twin.Twin(kernel._replace(rule=kernel.rule._replace(drift=(nudged,))), twin.EXACT)
+    assert np.any(nudged_twin.shown(STEPS)[0] != twin.ours(kernel, STEPS)[0])
     with pytest.raises(RuntimeError, match="stopped after"):
         twin.Twin(kernel._replace(state=(0.01, -9.0, 0.0, 0.0)), twin.EXACT)(STEPS)
 
@@ -59,19 +59,19 @@ def test_the_comparison_sees_one_wrong_rounding_and_a_twin_that_leaves_the_chart
 def test_a_kernel_takes_at_most_a_quarter_more_than_its_twin(key):
     kernel, steps = kernels.kernel(key), 8000
     twins = [twin.Twin(kernel, flags) for flags in (twin.FAST, twin.EXACT)]
-    calls = [lambda: twin.ours(kernel, steps), *(lambda other=other: other(steps) for other in twins)]
-    ours, fused, same = timings(calls, batches=60, batch=1e-3)
-    assert ours.best < kernels.LIMIT * min(fused.best, same.best)
+    calls = [lambda: twin.ours(kernel, steps), *(lambda run=run: run(steps) for run in twins)]
+    ours, fused, exact = timings(calls, batches=60, batch=1e-3)
+    assert ours.best < kernels.LIMIT * min(fused.best, exact.best)
 
 
 def test_the_tops_that_lanes_are_timed_on_stay_in_lanes_and_reach_the_error():
     """A member that is given up would be timed alone; the closed form says how far the others are off."""
     solver, numbers, steps = lanes.solver_of(*lanes.RIVAL), lanes.members(), 45
     h, marks = np.full(lanes.MEMBERS, lanes.HORIZON / steps), np.full((lanes.MEMBERS, 1), steps)
-    done, whole = Many.empty(lanes.MEMBERS, 1, 6), solver._whole
-    assert whole.blocks().run(np.arange(lanes.MEMBERS), numbers, whole.rule, h, marks, done, loops.BLOCK).size == 0
+    results, whole = Many.empty(lanes.MEMBERS, 1, 6), solver._whole
+    assert whole.blocks().run(np.arange(lanes.MEMBERS), numbers, whole.rule, h, marks, results, loops.BLOCK).size == 0
     true = ClosedForms(numbers).axis(np.full((lanes.MEMBERS, 1), lanes.HORIZON))[:, 0]
-    assert 1e-8 < charts.axis_distance(done.states[:, 0, :3], true).max() < 2e-6
+    assert 1e-8 < charts.axis_distance(results.states[:, 0, :3], true).max() < 2e-6
     assert len(np.unique(true, axis=0)) == lanes.MEMBERS  # neighbours, not copies
 
 
@@ -86,19 +86,19 @@ def test_an_ensemble_costs_little_around_its_steps_and_a_closed_form_ten_microse
     # take a thousand times as long. Tests beside this one slow both down, alike: then that ratio alone counts.
     verlet = twin.Twin(kernels.kernel(("stormer-verlet", "angles")))
     slower = timings([lambda: verlet(8000)], batches=60, batch=1e-3)[0].best / 8000 / 30e-9
-    short, long, digits, *others = truth.measure()
+    short, long, digits, *rows = truth.measure()
     for row in (short, long):
         assert row.median < 1e-3 * digits.median
         if "PYTEST_XDIST_WORKER" not in os.environ:
             assert row.median < 10e-6 * slower
             assert row.slow < 30e-6 * slower
     assert digits.median > 1e-3
-    samples = [row for row in others if row.name.startswith("one sample")]
+    samples = [row for row in rows if row.name.startswith("one sample")]
     assert len(samples) == 6
     assert all(row.median < 1e-6 for row in samples)
-    constants, again, of_body = (row for row in others if row not in samples)
+    constants, repeat, of_body = (row for row in rows if row not in samples)
     assert max(constants.median, of_body.median) < 10e-6 * slower  # of one among many
-    assert again.median < 10e-3  # a reference at 1001 times, asked for again
+    assert repeat.median < 10e-3  # a reference at 1001 times, asked for again
 
 
 @needs_gcc
@@ -132,13 +132,13 @@ def test_what_one_processor_chooses_is_priced_on_another():
     def row(called=True, **seconds):
         return [{"needs": "derivative", "keeping": False, "target": 1e-3, "called": called, "seconds": seconds}]
 
-    there = row(b=1.0, a=1.5, called=False)
-    pairs = [machines.compare(row(**one), there) for one in ({"a": 2.0, "b": 3.2}, {"b": 2.0}, {"c": 1.0})]
+    reference = row(b=1.0, a=1.5, called=False)
+    pairs = [machines.compare(row(**seconds), reference) for seconds in ({"a": 2.0, "b": 3.2}, {"b": 2.0}, {"c": 1.0})]
     nan = pytest.approx(math.nan, nan_ok=True)
     assert [tuple(pair[:5]) for pair in pairs[:2]] == [(1, 0, 1, 0, 1.6), (1, 1, 1, 1, nan)]
     assert pairs[0].differing == [["f(t, y), to 10\N{SUPERSCRIPT MINUS}³ rad", "a", "b", "1.5", "1.6"]]
     assert pairs[2].differing[0][3:] == ["over 10", "not kept"]
-    assert machines.compare([], there).cells == 0
+    assert machines.compare([], reference).cells == 0
 
 
 def test_the_ablation_of_the_guard_misses_a_run_whose_error_adds_up_beyond_its_probe(monkeypatch):

@@ -23,15 +23,15 @@ EXACT = {
 
 def test_the_motion_has_the_digits_of_two_independent_ways() -> None:
     quaternion, rates = truth(np.array([*EXACT]))
-    angles, wanted = zip(*EXACT.values(), strict=True)
+    angles, expected = zip(*EXACT.values(), strict=True)
     np.testing.assert_allclose(yaw_pitch_roll(quaternion), angles, rtol=0.0, atol=1e-12)
-    np.testing.assert_allclose(rates, wanted, rtol=0.0, atol=1e-13)
+    np.testing.assert_allclose(rates, expected, rtol=0.0, atol=1e-13)
     brick = symtop.RigidBody.from_brick(2.26796, (0.2032, 0.1016, 0.05715))  # 5 pounds, 8 x 4 x 2.25 inches
     np.testing.assert_allclose(symtop.scene("check-case-2", bodies=True).top.moments, brick.moments, rtol=1e-6)
 
 
-def history(folder: Path, off: float = 0.0, earth: float = EARTH) -> Path:
-    """Writes the exact motion as a history, in axes that turn with the Earth; `off` degrees are added to the yaw."""
+def history(folder: Path, offset: float = 0.0, earth: float = EARTH) -> Path:
+    """Writes the exact motion as a history, in axes that turn with the Earth; `offset` degrees on the yaw."""
     times = np.arange(0.0, 31.0)
     quaternion, rates = truth(times)
     half = -0.5 * earth * times
@@ -40,7 +40,7 @@ def history(folder: Path, off: float = 0.0, earth: float = EARTH) -> Path:
     table = pd.DataFrame({"time": times, "longitude_deg": 0.0})
     table[ANGLES] = yaw_pitch_roll(np.stack([c * w - s * x, c * x + s * w, c * y - s * z, c * z + s * y], axis=1))
     table[RATES] = rates
-    table[ANGLES[0]] += off
+    table[ANGLES[0]] += offset
     table.to_csv(folder / "history.csv", index=False, float_format="%.17g")
     return folder / "history.csv"
 
@@ -49,7 +49,7 @@ def test_a_history_is_judged_and_another_table_refused(tmp_path):
     attitude, rate = largest_errors(history(tmp_path))
     assert attitude < 1e-12
     assert rate < 1e-13
-    assert largest_errors(history(tmp_path, off=0.01))[0] == pytest.approx(0.01, rel=1e-9)
+    assert largest_errors(history(tmp_path, offset=0.01))[0] == pytest.approx(0.01, rel=1e-9)
     # without the Earth's rotation it is off by what that is in 30 s
     assert largest_errors(history(tmp_path, earth=0.0))[0] == pytest.approx(np.degrees(30.0 * EARTH), rel=1e-9)
     (tmp_path / "other.csv").write_text("time,yaw\n0,0\n")

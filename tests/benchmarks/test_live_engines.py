@@ -20,28 +20,28 @@ def engine(method, stepped, name="setting"):
     return engines.Setting("Engine", "1", name, engines.FREE, method, run)
 
 
-@pytest.mark.parametrize(("method", "stepped", "same"), [
+@pytest.mark.parametrize(("method", "stepped", "expected"), [
     ("bullet", "bullet", True), ("bullet", "mujoco-implicit", False), ("rkmk4", "mujoco3-rk4", False),
     ("jolt-float32", "jolt-float32", True), ("jolt-float32", "jolt", True), ("jolt", "jolt-float32", False),
     ("no-squish", "no-squish", True),
 ])  # fmt: skip
-def test_a_map_is_an_engines_own_if_one_step_agrees(method, stepped, same):
-    assert measure.agrees(measure.row(engine(method, stepped))) is same
+def test_a_map_is_an_engines_own_if_one_step_agrees(method, stepped, expected):
+    assert measure.agrees(measure.row(engine(method, stepped))) is expected
 
 
 def test_the_axis_error_is_that_of_the_catalogue_and_an_engine_that_raises_a_row_with_its_reason():
-    made = measure.row(engine("mujoco-euler", "mujoco-euler"))
-    assert made["goldstein_axis"] == pytest.approx(0.61079, rel=1e-4)
-    assert made["goldstein_steps"] == 0.0
+    row = measure.row(engine("mujoco-euler", "mujoco-euler"))
+    assert row["goldstein_axis"] == pytest.approx(0.61079, rel=1e-4)
+    assert row["goldstein_steps"] == 0.0
     raises = Mock(side_effect=RuntimeError("no such body"))
-    made = measure.row(engines.Setting("Engine", "1", "bad", engines.FREE, "ode", raises))
-    assert made["failed"] == "RuntimeError: no such body"
-    assert not measure.agrees(made)
-    unknown = {**made, "method": "", "goldstein_step": 0.0, "fast_step": 0.0}
+    row = measure.row(engines.Setting("Engine", "1", "bad", engines.FREE, "ode", raises))
+    assert row["failed"] == "RuntimeError: no such body"
+    assert not measure.agrees(row)
+    unknown = {**row, "method": "", "goldstein_step": 0.0, "fast_step": 0.0}
     assert not measure.agrees(unknown)  # a map that the catalogue does not have
     assert "1 setting of Engine ran without a map" in study.findings([unknown], [], {"measured": "today"})["page"]
-    found = study.findings([made], ["Other is not installed here and was skipped: reason."], {"measured": "today"})
-    assert found["failures"] == [*found["missing"], "Engine (bad): RuntimeError: no such body"]
+    findings = study.findings([row], ["Other is not installed here and was skipped: reason."], {"measured": "today"})
+    assert findings["failures"] == [*findings["missing"], "Engine (bad): RuntimeError: no such body"]
 
 
 ECHO = """

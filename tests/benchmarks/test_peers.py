@@ -55,8 +55,8 @@ def test_all_right_hand_sides_are_the_kernels_own_and_split_halves_add_up():
     callbacks.ode_field(top).ctypes(None, *(row.ctypes.data_as(DOUBLES) for row in (through_c, y)), 0.0)
     through_vectors = _vector_field(callbacks.vector_field(top, Core()), y)
     returned = [field(top)(0.0, y) for field in (common.python_field, common.compiled_field)]
-    for found in (*returned, filled, through_c, through_vectors):
-        assert np.allclose(found, expected, rtol=1e-15, atol=0.0)
+    for derivative in (*returned, filled, through_c, through_vectors):
+        assert np.allclose(derivative, expected, rtol=1e-15, atol=0.0)
     par, state = with_rates(top, start)
     expected = field_angles(par, state)
     for field in (common.python_angles, common.compiled_angles):
@@ -67,8 +67,8 @@ def test_all_right_hand_sides_are_the_kernels_own_and_split_halves_add_up():
     halves = [_vector_field(half, y) for half in callbacks.split_field(top, start, Core())]
     assert np.allclose(sum(halves), expected, rtol=1e-13, atol=0.0)
     assert not any(np.allclose(half, expected) for half in halves)
-    moved = _vector_field(callbacks.split_field(top, start, Core())[0], y + np.array([0.0, 1.0, 1.0, 1.0]))
-    assert np.array_equal(moved, halves[0])  # the force depends on theta alone: H is separable
+    force = _vector_field(callbacks.split_field(top, start, Core())[0], y + np.array([0.0, 1.0, 1.0, 1.0]))
+    assert np.array_equal(force, halves[0])  # the force depends on theta alone: H is separable
 
 
 def test_the_axis_as_a_particle_has_the_acceleration_of_the_axis():
@@ -88,13 +88,13 @@ def test_the_axis_as_a_particle_has_the_acceleration_of_the_axis():
     ("vern9-fixed", 0.1), ("rk4", 0.005), ("taylor", 1e-12), ("rk45-compiled", 1e-10)])  # fmt: skip
 def test_the_kernel_alone_ends_where_simulate_ends(name, setting):
     peer = peers.Peer(measure.OURS, symtop.integrator(name), own.LANGUAGE)
-    whole, loop = measure.ready(SPHEROID, peer, setting)
-    data = whole()
+    call, loop = measure.ready(SPHEROID, peer, setting)
+    data = call()
     dense = measure.shown_by(peer) == common.DENSE
     assert data["time"].size == (measure.SHOWN if dense else min(data.attrs["steps"] + 1, measure.SHOWN))
     truth = symtop.reference(SPHEROID, data["time"].values[-1:])["axis"].values
-    there = float(common.charts.axis_distance(data["axis"].values[-1:], truth)[0])
-    assert measure.end_error(SPHEROID, peer, loop) == pytest.approx(there, rel=0.3, abs=1e-13)
+    distance = float(common.charts.axis_distance(data["axis"].values[-1:], truth)[0])
+    assert measure.end_error(SPHEROID, peer, loop) == pytest.approx(distance, rel=0.3, abs=1e-13)
 
 
 def _scipy(row):
@@ -106,8 +106,8 @@ def _scipy(row):
 ])  # fmt: skip
 def test_both_calls_of_scipy_end_at_the_truth(row):
     peer = _scipy(row)
-    whole, loop = measure.ready(SPHEROID, peer, 1e-11)
-    assert len(whole().states) == measure.SHOWN
+    call, loop = measure.ready(SPHEROID, peer, 1e-11)
+    assert len(call().states) == measure.SHOWN
     assert measure.end_error(SPHEROID, peer, loop) < 1e-7
 
 
@@ -128,8 +128,8 @@ def test_an_inner_loop_that_does_not_start_anew_is_seen():
 def test_the_search_finds_the_loosest_setting_and_an_absent_peer_is_skipped(monkeypatch):
     for module in ("diffrax", "mujoco"):
         monkeypatch.setitem(sys.modules, module, None)  # an import of it fails
-    found, missing = peers.load(("diffrax", "scipy", "mujoco"))
-    assert {peer.package for peer in found} == {"scipy"}
+    available, missing = peers.load(("diffrax", "scipy", "mujoco"))
+    assert {peer.package for peer in available} == {"scipy"}
     assert [sentence.split()[0] for sentence in missing] == ["diffrax", "mujoco"]
     assert all("skipped" in sentence for sentence in missing)
     scene, method = symtop.scene("goldstein"), symtop.integrator("takahashi-imada")
@@ -145,7 +145,7 @@ def _stored(times, spread=0.01):
     wobble = 1.0 + spread * np.arange(batches) / batches
     samples = np.array([[[[pair[k] * wobble] for pair in times.values()]] for k in range(2)])
     flat = samples.min(axis=-1)
-    one, each = ("scene", "variant", "setting"), ("call", "scene", "variant", "setting")
+    dims, axes = ("scene", "variant", "setting"), ("call", "scene", "variant", "setting")
     words = {
         "package": ["rebound" if name == "rebound" else "scipy" if "scipy" in name else measure.OURS for name in names],
         "version": ["1"] * len(names),
@@ -154,9 +154,9 @@ def _stored(times, spread=0.01):
         "implementation": ["compiled"] * len(names), "formulation": ["as it is"] * len(names),
     }  # fmt: skip
     data = xr.Dataset({
-        "axis": (one, np.full_like(flat[0], 1e-10)), "steps": (one, np.full_like(flat[0], 54.0)),
-        **dict.fromkeys(("seconds", "first_call", "reliable"), (each, flat)),
-        "seconds_samples": ((*each, "batch"), samples), **{key: ("variant", column) for key, column in words.items()},
+        "axis": (dims, np.full_like(flat[0], 1e-10)), "steps": (dims, np.full_like(flat[0], 54.0)),
+        **dict.fromkeys(("seconds", "first_call", "reliable"), (axes, flat)),
+        "seconds_samples": ((*axes, "batch"), samples), **{key: ("variant", column) for key, column in words.items()},
     }, coords={"call": list(measure.CALLS), "scene": ["spheroid"], "variant": names})  # fmt: skip
     facts = measured.circumstances() | {"measured": "2001-02-03", "processor": "an abacus"}
     return netcdf.describe(data, "peers").assign_attrs(facts)
@@ -165,11 +165,11 @@ def _stored(times, spread=0.01):
 def test_a_win_is_one_of_every_batch_and_the_first_numbers_are_over_methods_on_f_alone():
     data = _stored({"vern9-fixed[axis]": (1e-4, 1e-4), "rebound": (1.02e-4, 0.98e-4)})
     places = " and ".join(f"rebound (1.02 times, inner loop, spheroid at {error})" for error in ("10⁻⁶", "10⁻⁹"))
-    said = "are faster than symtop's fastest methods on f(t, y) alone (vern9-fixed[axis]); symtop is faster in "
-    won = f"{places} {said}2 of 2 and 0 of 2 comparisons (public call and inner loop), level in 0 and 0."
+    clause = "are faster than symtop's fastest methods on f(t, y) alone (vern9-fixed[axis]); symtop is faster in "
+    won = f"{places} {clause}2 of 2 and 0 of 2 comparisons (public call and inner loop), level in 0 and 0."
     assert summary.verdict(data)[0] == won
-    assert "of 4 comparisons with symtop's fastest" in (answer := summary.answer(data))
-    assert "is faster in 2 and slower in 2. You lose the exact motion" in answer
+    assert "of 4 comparisons with symtop's fastest" in (sentence := summary.answer(data))
+    assert "is faster in 2 and slower in 2. You lose the exact motion" in sentence
     data["seconds_samples"].values[:, 0, :, 0, 4] *= 1.03  # one batch of each was slow
     assert "0 of 2 and 0 of 2 comparisons (public call and inner loop), level in 2 and 2." in summary.verdict(data)[0]
     scipys = {f"scipy[axis] {language}": (8e-4, 9e-4) for language in ("numba", "Python")}
@@ -182,9 +182,9 @@ def test_a_win_is_one_of_every_batch_and_the_first_numbers_are_over_methods_on_f
 
 def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_path, quick_results):
     data = _stored({"rk4[axis]": (1e-3, 2e-5), "scipy[axis]": (6e-3, 4e-3)})
-    found = study.findings(data, [], tmp_path, ["drake was skipped."])
-    found["provenance"] = {**found["provenance"], "processor": "an abacus"}
-    netcdf.write_json(tmp_path / "peers.json", found)
+    findings = study.findings(data, [], tmp_path, ["drake was skipped."])
+    findings["provenance"] = {**findings["provenance"], "processor": "an abacus"}
+    netcdf.write_json(tmp_path / "peers.json", findings)
     shutil.copytree(quick_results / "cases" / "truth", tmp_path / "cases" / "truth")  # it only has to be drawn
     (tmp_path / "report.md").write_text("what an earlier run left")
     truth = runner.load("truth")
@@ -202,11 +202,11 @@ def test_the_section_outlives_a_rerun_of_a_study_and_keeps_its_own_machine(tmp_p
 def test_cleaning_spares_what_the_studies_do_not_make(tmp_path):
     shutil.copy(ROOT / "Makefile", tmp_path)
     (tmp_path / "results").mkdir()
-    kept = {"report.md", *re.findall(r"^!results/([^/\n]+)$", (ROOT / ".gitignore").read_text(), re.MULTILINE)}
-    for name in kept | {"claims.nc", "claims.json"}:
+    names = {"report.md", *re.findall(r"^!results/([^/\n]+)$", (ROOT / ".gitignore").read_text(), re.MULTILINE)}
+    for name in names | {"claims.nc", "claims.json"}:
         (tmp_path / "results" / name).touch()
     subprocess.run(["make", "clean"], cwd=tmp_path, check=True, capture_output=True)
-    assert {path.name for path in (tmp_path / "results").iterdir()} == kept > {"peers.nc", "guard.json"}
+    assert {path.name for path in (tmp_path / "results").iterdir()} == names > {"peers.nc", "guard.json"}
 
 
 def test_the_stored_measurement_is_whole_and_its_inner_loops_did_the_work():
@@ -214,15 +214,15 @@ def test_the_stored_measurement_is_whole_and_its_inner_loops_did_the_work():
     timed = np.isfinite(data["axis"].values)
     assert timed.sum() > 100
     assert np.isfinite(data["seconds"].values[:, timed]).all()  # both calls of every run
-    good = timed & (data["axis"].values < 1e-3)
-    error, bound, end = (data[name].values[good] for name in ("axis", "axis_bound", "end_error"))
+    mask = timed & (data["axis"].values < 1e-3)
+    error, bound, end = (data[name].values[mask] for name in ("axis", "axis_bound", "end_error"))
     assert np.all(end <= 3.0 * error + bound)  # CVODE's first step depends on the first time that is asked for
     assert {"spheroid", "goldstein"} <= set(data["scene"].values.tolist())
     assert set(data["shows"].sel(variant=summary.groups(data)["symtop"]).values) == {common.FIXED_STEPS}
     names = ("symtop", "scipy[axis], numba", "scipy[angles], Python", "cvode", "rebound", "arkode-sprk")
-    for asked in itertools.product(summary.NAMES, ("spheroid", "goldstein"), names, summary.JUDGED):
-        call, scene, name, target = asked
-        assert summary.best_of(data, call, scene, summary.groups(data)[name], target) is not None, asked
+    for cell in itertools.product(summary.NAMES, ("spheroid", "goldstein"), names, summary.JUDGED):
+        call, scene, name, target = cell
+        assert summary.best_of(data, call, scene, summary.groups(data)[name], target) is not None, cell
 
 
 def test_all_ways_of_running_many_tops_end_at_the_same_axes():
@@ -232,6 +232,6 @@ def test_all_ways_of_running_many_tops_end_at_the_same_axes():
     assert together.worst(batch, numbers) < 1e-8
     assert batch()[1] > 10.0
     assert together.worst(together.fixed("srkn-14-6", "axis", numbers, 400), numbers) < 1e-8
-    few, many = (together.coarsest("rk4", "axis", numbers, error) for error in (1e-2, 1e-4))
-    assert few < many
+    coarse, fine = (together.coarsest("rk4", "axis", numbers, error) for error in (1e-2, 1e-4))
+    assert coarse < fine
     assert together.coarsest("rk4", "axis", numbers, 1e-15) is None

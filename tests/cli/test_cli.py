@@ -187,14 +187,14 @@ def ending(before="", code="3"):
     return subprocess.run(words, capture_output=True, text=True, timeout=60, check=False)
 
 
-@pytest.mark.parametrize(("line", "code", "says"), [
+@pytest.mark.parametrize(("line", "code", "message"), [
     ("symtop scenes 1>&-", 0, ""), ("symtop run nowhere 0<&- 1>&- 2>&-", 2, ""), ("symtop integrators | true", 141, ""),
     ("symtop integrators | cat", 0, ""), ("symtop run nowhere | true", 2, ""),
     pytest.param("symtop scenes > /dev/full", 2, "symtop: cannot write what there is to say: No space left on device\n",
                  marks=pytest.mark.skipif(not Path("/dev/full").exists(), reason="a device of Linux")),
     ("mkdir gone; cd gone; rmdir ../gone; symtop run spheroid exact -o run.nc", 2, ".*no longer there.*\n"),
 ])  # fmt: skip
-def test_a_stream_or_a_folder_that_is_gone_or_a_full_disk_is_no_case_that_has_failed(line, code, says, tmp_path):
+def test_a_stream_or_a_folder_that_is_gone_or_a_full_disk_is_no_case_that_has_failed(line, code, message, tmp_path):
     """Python has None in the place of a stream that was closed; a refusal (the control) is one all the same."""
     shell = ["/bin/bash", "-o", "pipefail"] if "|" in line else ["/bin/sh"]
     if not Path(shell[0]).exists():
@@ -203,7 +203,7 @@ def test_a_stream_or_a_folder_that_is_gone_or_a_full_disk_is_no_case_that_has_fa
     result = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False)
     assert result.returncode == code, result.stderr
     assert "Traceback" not in result.stderr
-    assert not says or re.fullmatch(says, result.stderr), result.stderr
+    assert not message or re.fullmatch(message, result.stderr), result.stderr
 
 
 def test_a_command_ends_with_its_code_takes_nothing_apart_and_waits_for_threads():
@@ -302,27 +302,27 @@ def test_the_lines_end_with_a_command_that_is_killed():
 
 def test_a_run_of_many_steps_says_how_long_it_takes(capsys, monkeypatch):
     """Steps of a microsecond: a million are not timed, five million take five seconds, a billion a quarter hour."""
-    few, now, step = [], [0.0], 1e-6
+    counts, now, step = [], [0.0], 1e-6
     monkeypatch.setattr(timing, "time", SimpleNamespace(perf_counter=lambda: now[0]))
 
     def run(steps):
-        few.append(steps)
+        counts.append(steps)
         now[0] += 0.3 + step * steps  # whatever the steps, as the set-up of a long run does
 
     runs.estimate(1e6, run)
-    assert not few
+    assert not counts
     runs.estimate(5e6, run)
     assert capsys.readouterr().err == ""
     runs.estimate(1e9, run)
     assert 15 <= int(re.fullmatch(r"symtop: 1e\+09 steps take about (\d+) min\n", capsys.readouterr().err)[1]) <= 25
     runs.estimate(9e9, run)  # and so many two and a half hours
     assert re.fullmatch(r"symtop: 9e\+09 steps take about 2.\d h\n", capsys.readouterr().err)
-    assert max(few) < 1.1e6
-    few.clear()
+    assert max(counts) < 1.1e6
+    counts.clear()
     step = 1e-4  # in plain Python
     runs.estimate(3e6, run)
     assert "take about 5" in capsys.readouterr().err
-    assert sum(few) < 40_000
+    assert sum(counts) < 40_000
 
 
 def test_members_that_do_not_fit_into_memory_are_refused_before_they_are_drawn(monkeypatch):
@@ -360,8 +360,8 @@ def test_a_cache_that_cannot_be_written_and_a_wrong_number_are_seen(tmp_path, mo
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path / "file" / "cache"))
     assert "SYMTOP_CACHE" in faults(doctor._caches(Path()))["cache"].advice
     assert set(faults(doctor._results(Path("/proc/none")))) == {"results"}
-    wrong = published.KnownValue("somebody", "something", 1.0, 1.1, 1e-3, "printed")
-    monkeypatch.setattr(published, "published_values", lambda: [wrong])
+    value = published.KnownValue("somebody", "something", 1.0, 1.1, 1e-3, "printed")
+    monkeypatch.setattr(published, "published_values", lambda: [value])
     findings = faults(doctor._self_check(Path()))
     assert "not somebody, something" in findings["published values"].result
     assert set(findings) == {"published values"}
@@ -406,7 +406,7 @@ def test_all_of_them_are_compiled_once(monkeypatch, tmp_path):
     assert doctor.kernels() > 100
     assert "not run" not in result.output
     assert "kernels compiled: 0;" in call("doctor", "--warm", "--results", tmp_path / "r").output
-    solvers = [inside(solver) for one in symtop.integrators().values() for solver in one.solvers.values()]
+    solvers = [inside(solver) for method in symtop.integrators().values() for solver in method.solvers.values()]
     blocks = [solver._whole.blocks() for solver in solvers if solver and solver.in_lanes]
     folders = {kernel._cache.cache_path.name for block in blocks for kernel in (block.prepare, block.march)}
     assert len(folders) > 50

@@ -21,11 +21,11 @@ def test_the_file_and_the_figure_are_those_of_the_ensemble(tmp_path, monkeypatch
     path, figure = tmp_path / "runs.nc", tmp_path / "spread.png"
     words = ("--members", 50, "--seed", 3, "strang", *STEPS, "--samples", 21, "-o", path)
     call(*words)
-    whole = path.read_bytes()
+    content = path.read_bytes()
     with monkeypatch.context() as patch:
         patch.setattr(xr.Dataset, "to_netcdf", Mock(side_effect=KeyboardInterrupt))
         call(*words, code=130)
-    assert path.read_bytes() == whole  # nothing is added to what is in its place
+    assert path.read_bytes() == content  # nothing is added to what is in its place
     result = call(*words, "--figure", figure)  # runs them again, into the same file
     assert "strang on 50 tops: 50 reached the horizon" in result.output
     tops = symtop.population(50, seed=3)
@@ -66,16 +66,16 @@ def test_bodies_are_run_compared_and_written(tmp_path):
     assert [kernels, *(data.attrs[name] for name in ("seed", "kind", "epsilon"))] == [5, 3, "heavy", 0.1]
     np.testing.assert_array_equal(data["I2"], bodies["I2"])
     np.testing.assert_array_equal(data["start_omega_body"], bodies["omega_body"])
-    wrong = symtop.errors(expected, bodies)
-    np.testing.assert_array_equal(data["attitude_error"], wrong["attitude"].max("time"))
-    np.testing.assert_allclose(data["energy_error"], wrong["energy"].max("time"), rtol=1e-6, atol=1e-15)
+    errors = symtop.errors(expected, bodies)
+    np.testing.assert_array_equal(data["attitude_error"], errors["attitude"].max("time"))
+    np.testing.assert_allclose(data["energy_error"], errors["energy"].max("time"), rtol=1e-6, atol=1e-15)
     finer = ("strang", "--per-nutation", 300, "--nutations", 2, "--samples", 21, "--json")
-    fine, others = (json.loads(call(*words, *finer).output) for words in (kind, kind[:3] + kind[5:]))
-    assert 0.005 < fine["largest_errors"]["attitude"]["0.5"] / float(wrong["attitude"].max("time").median()) < 0.02
-    assert fine["largest_errors"] != others["largest_errors"]
+    fine, default = (json.loads(call(*words, *finer).output) for words in (kind, kind[:3] + kind[5:]))
+    assert 0.005 < fine["largest_errors"]["attitude"]["0.5"] / float(errors["attitude"].max("time").median()) < 0.02
+    assert fine["largest_errors"] != default["largest_errors"]
 
 
-@pytest.mark.parametrize(("words", "says"), [
+@pytest.mark.parametrize(("words", "message"), [
     (["strang"], "needs --step-size or --per-nutation"),
     (["strang", "--step-size", 0.1], "give --horizon or --nutations: these members have no"),
     (["strang", *STEPS, "--budget", 10], "member 0 asks for 60 steps; the limit is 10 (see --budget)"),
@@ -85,8 +85,8 @@ def test_bodies_are_run_compared_and_written(tmp_path):
      "needs quaternion or energy among"),
     (["midpoint[attitude]", *STEPS], "known: angles"),
 ])  # fmt: skip
-def test_bad_input_is_one_sentence_and_code_2(words, says):
-    assert says in call(*words, code=2).output
+def test_bad_input_is_one_sentence_and_code_2(words, message):
+    assert message in call(*words, code=2).output
 
 
 def test_bodies_whose_motion_is_lost_in_chaos_are_counted_and_the_others_compared():

@@ -5,7 +5,7 @@ import shlex
 import time
 
 import pytest
-from terminal import recorded
+from terminal import record
 
 import symtop
 from symtop.core import netcdf, progress
@@ -43,24 +43,24 @@ def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(tmp_path):
     assert "on-the-axis" in page
     assert "of-a-user" in page
     call("study", "convergence", "--only", "no-such", code=2)
-    nothing = call("study", "truth", "--quick", "--only", "on-the-axis", "--plugin", axis_only, code=2)
-    assert "study truth has no case of on-the-axis" in nothing.stderr
+    result = call("study", "truth", "--quick", "--only", "on-the-axis", "--plugin", axis_only, code=2)
+    assert "study truth has no case of on-the-axis" in result.stderr
     for name in ("on-the-axis", "on-the-axis,exact"):  # exact is the closed form, which stays where others are measured
         words = ["--quick", "--only", name, "--status", "--results", tmp_path, "--plugin", axis_only]
-        several = call("study", "truth", "convergence", *words)
-        assert "study truth has no case of on-the-axis" in several.stderr
-        assert several.stderr.rstrip().endswith("it is left out")
-        assert several.stdout.startswith("convergence: ")
+        result = call("study", "truth", "convergence", *words)
+        assert "study truth has no case of on-the-axis" in result.stderr
+        assert result.stderr.rstrip().endswith("it is left out")
+        assert result.stdout.startswith("convergence: ")
 
 
 def test_a_proposed_step_is_of_use_and_the_guard_warns_of_what_the_verdict_calls_wrong():
     assert EXPECTED == ACCURATE
-    wrong = call("run", "spheroid", "midpoint", "--step-size", "0.01")
-    assert "expect an axis error" in wrong.stderr
-    assert "judged against the truth: bounded but wrong, the axis error passed 0.01 rad" in wrong.stdout
-    right = call("run", "spheroid", "midpoint", "--step-size", "0.002")
-    assert right.stderr == ""
-    assert "judged against the truth: accurate to" in right.stdout
+    coarse = call("run", "spheroid", "midpoint", "--step-size", "0.01")
+    assert "expect an axis error" in coarse.stderr
+    assert "judged against the truth: bounded but wrong, the axis error passed 0.01 rad" in coarse.stdout
+    fine = call("run", "spheroid", "midpoint", "--step-size", "0.002")
+    assert fine.stderr == ""
+    assert "judged against the truth: accurate to" in fine.stdout
     # The error that it leads to is between a tenth and ten times the 1e-3 rad that it is proposed for.
     for name in ("midpoint", "strang", "rk4", "gauss-4"):
         step = float(call("run", "spheroid", name, code=2).stderr.split("for example ")[1])
@@ -86,22 +86,22 @@ def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
 @pytest.mark.slow  # half a minute: lanes of one method are compiled
 def test_a_cold_ensemble_is_never_silent_for_long_and_a_recording_hears_a_silence(tmp_path):
     words = "ensemble strang --members 2000 --per-nutation 50 --nutations 2"
-    recording = recorded(words.split(), SYMTOP_CACHE=str(tmp_path))
+    recording = record(words.split(), SYMTOP_CACHE=str(tmp_path))
     assert recording.code == 0, recording.text
     assert recording.silence < 2.0
     assert recording.widest <= 80
     # Negative control: a plug-in that sleeps while it is loaded, and a table of every column.
     (tmp_path / "sleeps.py").write_text("import time\ntime.sleep(2.1)\n")
-    recording = recorded(["scenes", "--wide", "--plugin", str(tmp_path / "sleeps.py")])
+    recording = record(["scenes", "--wide", "--plugin", str(tmp_path / "sleeps.py")])
     assert recording.silence > 2.0
     assert recording.widest > 80
 
 
 @pytest.mark.quick
 def test_the_command_of_a_recommendation_holds_the_options_of_the_body():
-    own = ["--body", "2,1.5,1", "--rates=-0.1,0,3"]
-    answer = call("recommend", "body", *own, "--accuracy", "1e-3", "--needs", "derivative", "--horizon", "10").output
-    (command,) = re.findall(r"^Run it: symtop (.*)$", answer, re.MULTILINE)
+    body = ["--body", "2,1.5,1", "--rates=-0.1,0,3"]
+    output = call("recommend", "body", *body, "--accuracy", "1e-3", "--needs", "derivative", "--horizon", "10").output
+    (command,) = re.findall(r"^Run it: symtop (.*)$", output, re.MULTILINE)
     assert " --horizon 10.0 " in command
     assert command.endswith(" --body 2.0,1.5,1.0 --rates -0.1,0.0,3.0")
     assert "accurate to" in call(*shlex.split(command)).output

@@ -26,8 +26,8 @@ def test_a_notebook_runs_and_prints_what_it_shows(book, tmp_path, monkeypatch):
     cells = [cell for cell in pages["cells"] if cell["cell_type"] == "code"]
     assert any("image/png" in output.get("data", {}) for cell in cells for output in cell["outputs"])
     for cell in cells:
-        printed = io.StringIO()
-        with contextlib.redirect_stdout(printed):
+        stdout = io.StringIO()
+        with contextlib.redirect_stdout(stdout):
             exec(compile("".join(cell["source"]), book.name, "exec"), names)
-        shown = "".join("".join(part["text"]) for part in cell["outputs"] if part["output_type"] == "stream")
-        assert printed.getvalue() == shown
+        expected = "".join("".join(part["text"]) for part in cell["outputs"] if part["output_type"] == "stream")
+        assert stdout.getvalue() == expected

@@ -31,8 +31,8 @@ def test_a_wheel_in_an_empty_folder(tmp_path):
         (home / "studies" / name).write_text(TRAP)
     environment = {**os.environ, "SYMTOP_CACHE": str(tmp_path / "cache"), "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
     environment.pop("PYTHONPATH", None)
-    here = functools.partial(run, cwd=home, env=environment)
-    here(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", tmp_path, ROOT)
+    run_here = functools.partial(run, cwd=home, env=environment)
+    run_here(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", tmp_path, ROOT)
     (wheel,) = tmp_path.glob("symtop-*.whl")
     names = set(zipfile.ZipFile(wheel).namelist())
     folders = {"symtop": "symtop", "studies": "symtop_studies"}.items()
@@ -41,16 +41,16 @@ def test_a_wheel_in_an_empty_folder(tmp_path):
     assert {name for name in names if ".dist-info/" not in name} == ours
     assert ours >= {"symtop/report/templates/report.html", "symtop/explore/static/page.html", "symtop/py.typed"}
     assert "symtop_studies/convergence/study.py" in ours
-    here(sys.executable, "-m", "venv", tmp_path / "venv")
+    run_here(sys.executable, "-m", "venv", tmp_path / "venv")
     python, symtop = (tmp_path / "venv" / "bin" / name for name in ("python", "symtop"))
-    here(python, "-m", "pip", "install", "--quiet", "--constraint", ROOT / "constraints.txt", wheel)
-    assert str(tmp_path / "venv") in here(python, "-c", "import symtop; print(symtop.__file__)")
-    assert "cases computed" in here(symtop, "study", "reduction", "--quick")
-    assert "report.html" in here(symtop, "report")
+    run_here(python, "-m", "pip", "install", "--quiet", "--constraint", ROOT / "constraints.txt", wheel)
+    assert str(tmp_path / "venv") in run_here(python, "-c", "import symtop; print(symtop.__file__)")
+    assert "cases computed" in run_here(symtop, "study", "reduction", "--quick")
+    assert "report.html" in run_here(symtop, "report")
     assert "Reduction" in (home / "results" / "quick" / "report.html").read_text(encoding="utf-8")
-    assert "midpoint" in here(symtop, "claims", "midpoint")
-    assert "@article" in here(symtop, "integrators", "midpoint")
-    assert "BAD" not in here(symtop, "doctor")
+    assert "midpoint" in run_here(symtop, "claims", "midpoint")
+    assert "@article" in run_here(symtop, "integrators", "midpoint")
+    assert "BAD" not in run_here(symtop, "doctor")
     assert {path.name for path in home.iterdir()} == {"studies", "results"}
 
 
@@ -67,29 +67,29 @@ def test_a_wheel_brings_the_kernels_of_first_runs(tmp_path):
     """The commands of the README compile nothing with an empty cache; bits are those of kernels compiled here."""
     wheels, site = tmp_path / "made", tmp_path / "site"
     environment = {**os.environ, "SYMTOP_COMPILE_WITH": sys.executable, "PIP_DISABLE_PIP_VERSION_CHECK": "1"}
-    here = lambda *command, **more: run(*command, cwd=tmp_path, env={**environment, **more})
-    here(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", wheels, ROOT)
+    run_here = lambda *command, **variables: run(*command, cwd=tmp_path, env={**environment, **variables})
+    run_here(sys.executable, "-m", "pip", "wheel", "--quiet", "--no-deps", "--wheel-dir", wheels, ROOT)
     (wheel,) = wheels.glob("symtop-*.whl")
     zipfile.ZipFile(wheel).extractall(site)
     kernels = list((site / "symtop" / "kernels").rglob("*.bitcode"))
     assert len(kernels) >= 25
     assert sum(path.stat().st_size for path in kernels) < 2e6
     environment["PYTHONPATH"] = str(site)
-    assert str(site) in here(sys.executable, "-c", "import symtop; print(symtop.__file__)")
+    assert str(site) in run_here(sys.executable, "-c", "import symtop; print(symtop.__file__)")
     lines = re.findall(r"(?m)^(?:\$ )?symtop ((?:run|compare|recommend|ensemble|long) .*?)(?: +#.*)?$", README)
     assert len(lines) == 5
     cache = tmp_path / "cache"
     for line in lines:
         words = line.replace("--steps 1e9", "--steps 1e6").replace('"', "").split()
-        here(sys.executable, "-m", "symtop", *words, SYMTOP_CACHE=str(cache))
+        run_here(sys.executable, "-m", "symtop", *words, SYMTOP_CACHE=str(cache))
     assert list(cache.rglob("*.code"))
     assert not list(cache.rglob("*.bitcode"))  # nothing was compiled
-    plain = {"SYMTOP_CACHE": str(tmp_path / "x86-64"), "NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": ""}
+    baseline = {"SYMTOP_CACHE": str(tmp_path / "x86-64"), "NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": ""}
     for name in ("strang[axis]", "series[axis]", "rk4[angles]", "vern9-fixed[axis]"):  # fused products, and vectors
         words = (sys.executable, "-c", RUN, name, "0.01")
-        compiled = here(*words, PYTHONPATH=str(ROOT), SYMTOP_CACHE=str(tmp_path / "own"))
-        assert here(*words, SYMTOP_CACHE=str(cache)) == compiled
-        assert here(*words, **plain) == compiled  # for a processor without the instructions of this one
+        compiled = run_here(*words, PYTHONPATH=str(ROOT), SYMTOP_CACHE=str(tmp_path / "own"))
+        assert run_here(*words, SYMTOP_CACHE=str(cache)) == compiled
+        assert run_here(*words, **baseline) == compiled  # for a processor without the instructions of this one
     assert not list((tmp_path / "x86-64").rglob("*.bitcode"))
-    here(sys.executable, "-c", RUN, "yoshida-4[attitude]", "0.01", SYMTOP_CACHE=str(cache))
+    run_here(sys.executable, "-c", RUN, "yoshida-4[attitude]", "0.01", SYMTOP_CACHE=str(cache))
     assert list(cache.rglob("*.bitcode"))  # the control: a kernel that the wheel has not

@@ -56,7 +56,7 @@ def test_a_script_counts_by_the_functions_and_globals_that_are_reached(tmp_path)
 
 
 def test_words_do_not_count_and_numbers_do():
-    reasons_of = lambda thing: Code().reasons("thing", thing)
+    reasons_of = lambda value: Code().reasons("thing", value)
     scene = symtop.scene("spheroid")
     assert reasons_of(dataclasses.replace(scene, purpose="said otherwise", units="")) == reasons_of(scene)
     assert reasons_of(dataclasses.replace(scene, horizon=9.0)) != reasons_of(scene)
@@ -66,12 +66,12 @@ def test_words_do_not_count_and_numbers_do():
 
 
 def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again(clean_registry):
-    study, plain = runner.load(str(PROBE)), symtop.integrator("midpoint")
+    study, method = runner.load(str(PROBE)), symtop.integrator("midpoint")
     case, digests = next(case for case in study.cases(True) if case.integrator == "midpoint"), []
     for order in range(2, 12):
-        symtop.register(dataclasses.replace(plain, order=order), replace=True)
+        symtop.register(dataclasses.replace(method, order=order), replace=True)
         digests.append(fingerprint.digest(study, case))
-    symtop.register(plain, replace=True)
+    symtop.register(method, replace=True)
     assert len(set(digests)) == 10
     assert digests[0] == fingerprint.digest(study, case)
 
@@ -99,10 +99,10 @@ def test_an_import_inside_a_function_is_followed_and_a_script_counts_by_code_wit
         exec(text, space)
         return Code().reasons("measure", space["measure"])
 
-    plain = reasons_of(2, 1, "words", "comment")
-    assert reasons_of(2, 1, "other words", "another comment") == plain
-    assert changes(plain, reasons_of(2, 3, "words", "comment")) == ["code <string>"]
-    assert reasons_of(4, 1, "words", "comment") != plain
+    expected = reasons_of(2, 1, "words", "comment")
+    assert reasons_of(2, 1, "other words", "another comment") == expected
+    assert changes(expected, reasons_of(2, 3, "words", "comment")) == ["code <string>"]
+    assert reasons_of(4, 1, "words", "comment") != expected
     space = {"__name__": "symtop.measure.made", "__package__": "symtop.measure"}
     exec(
         "def measure():\n    from . import errors\n    from ..methods.runge_kutta.gauss import farthest\n"
@@ -166,10 +166,10 @@ def test_a_kernel_is_told_by_what_it_calls():
         exec(source, space)
         return jit.register_jitable(space["part"])
 
-    plain = kernel_of(part_of("def part(x):\n    return 2.0 * x\n"))
-    assert kernel_of(part_of("\n\n# moved\ndef part(x):\n    # said\n    return 2.0 * x\n")) == plain
-    assert kernel_of(part_of("def part(x):\n    'Documented.'\n    return 2.0 * x\n")) == plain
-    assert kernel_of(part_of("def part(x):\n    return 3.0 * x\n")) != plain
+    expected = kernel_of(part_of("def part(x):\n    return 2.0 * x\n"))
+    assert kernel_of(part_of("\n\n# moved\ndef part(x):\n    # said\n    return 2.0 * x\n")) == expected
+    assert kernel_of(part_of("def part(x):\n    'Documented.'\n    return 2.0 * x\n")) == expected
+    assert kernel_of(part_of("def part(x):\n    return 3.0 * x\n")) != expected
     constant = "K = {}\ndef part(x):\n    return K * x\n"
     assert kernel_of(part_of(constant.format(2.0))) != kernel_of(part_of(constant.format(3.0)))
     deep = "def deep(x):\n    return {}x\ndef part(x):\n    return deep(x)\n"
@@ -178,8 +178,8 @@ def test_a_kernel_is_told_by_what_it_calls():
 
 def test_what_numba_compiles_in_place_of_a_function_counts():
     assert {"fused", "_fused", "_fma"} <= {part.label.rpartition(":")[2] for part in jit.code_of(jit.fused)}
-    plain = {part.label.rpartition(":")[2] for part in Code().reached("kernel", jit.fused)}
-    assert plain == {"kernel", "fused"}  # the control
+    labels = {part.label.rpartition(":")[2] for part in Code().reached("kernel", jit.fused)}
+    assert labels == {"kernel", "fused"}  # the control
 
 
 def test_a_kernel_is_the_same_to_a_profiler():
@@ -189,7 +189,7 @@ def test_a_kernel_is_the_same_to_a_profiler():
 
         return kernel
 
-    plain, watching = digest(by_file(jit.code_of(kernel_with(1.0)))), cProfile.Profile()
+    before, watching = digest(by_file(jit.code_of(kernel_with(1.0)))), cProfile.Profile()
     watching.enable()
     try:
         numba.njit(kernel_with(2.0))(1.0)
@@ -197,15 +197,15 @@ def test_a_kernel_is_the_same_to_a_profiler():
         watching.disable()
     cleared = not kernel_with(1.0).__code__.co_flags & inspect.CO_OPTIMIZED  # by numba, for all that share the code
     assert cleared is (sys.version_info < (3, 12))
-    assert digest(by_file(jit.code_of(kernel_with(1.0)))) == plain
+    assert digest(by_file(jit.code_of(kernel_with(1.0)))) == before
 
 
 def test_a_value_counts_where_it_stands_and_not_by_its_identity():
     """A symmetric composition names its first table again at its end."""
-    of, a, b, loop = lambda *things: digest(Code().reasons("values", things)), (1.5, 0.25), np.ones(2), [1.0]
+    key, a, b, loop = lambda *values: digest(Code().reasons("values", values)), (1.5, 0.25), np.ones(2), [1.0]
     loop.append(loop)
-    assert len({of((a, b)), of((a, b, a)), of((a, b, b)), of(((1.0,), 2.0)), of(((1.0, 2.0),)), of(loop)}) == 6
-    assert of((a, a), (b, b)) == of((a, (1.5, 0.25)), (b, b.copy()))
+    assert len({key((a, b)), key((a, b, a)), key((a, b, b)), key(((1.0,), 2.0)), key(((1.0, 2.0),)), key(loop)}) == 6
+    assert key((a, a), (b, b)) == key((a, (1.5, 0.25)), (b, b.copy()))
 
 
 def test_no_method_hangs_on_how_many_types_numba_has_made(monkeypatch):
@@ -214,8 +214,8 @@ def test_no_method_hangs_on_how_many_types_numba_has_made(monkeypatch):
 
     noted = set[str]()
     monkeypatch.setattr(Code, "_note", lambda self, *values: (noted.update(values), self._at.values.extend(values)))
-    reached = jit.code().reached("methods", symtop.integrators())
-    assert any("symtop/methods/simd.py" in part.file for part in reached)
+    parts = jit.code().reached("methods", symtop.integrators())
+    assert any("symtop/methods/simd.py" in part.file for part in parts)
     assert "'_code'" not in noted
     jit.code().reached("kind", Kind("of a test"))
     assert "'_code'" in noted
@@ -236,11 +236,11 @@ def test_the_cache_keeps_what_was_used_last(tmp_path):
 
 
 def test_changes_name_what_differs_and_versions_of_packages_are_reasons():
-    before, now = {"file a": "1", "file b": "2", "scene x": "3"}, {"file a": "1", "file b": "9", "package n": "4"}
-    assert changes(before, now) == ["file b", "scene x (no longer counts)", "package n (did not count before)"]
-    assert changes(now, now) == []
+    before, after = {"file a": "1", "file b": "2", "scene x": "3"}, {"file a": "1", "file b": "9", "package n": "4"}
+    assert changes(before, after) == ["file b", "scene x (no longer counts)", "package n (did not count before)"]
+    assert changes(after, after) == []
     assert "code symtop/core/jit.py" in Code().reasons("a file by its path", code_hash.PACKAGE / "core" / "jit.py")
-    assert digest(before) == digest(dict(reversed(before.items()))) != digest(now)
+    assert digest(before) == digest(dict(reversed(before.items()))) != digest(after)
     assert merged([{"a": "1"}, {"a": "1", "b": "2"}]) == {"a": "1", "b": "2"}
     assert merged([{"a": "1"}, {"a": "2"}])["a"] not in ("1", "2")
     numpy = importlib.metadata.version("numpy")

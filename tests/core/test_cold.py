@@ -72,21 +72,21 @@ def test_nothing_is_said_of_kernels_that_are_on_disk(tmp_path):
 def _kernels():
     """Kernels of all modules of the package and of its studies, by name."""
     for package in (symtop, studies):
-        for one in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
-            if one.name.endswith("__main__"):
+        for module in pkgutil.walk_packages(package.__path__, f"{package.__name__}."):
+            if module.name.endswith("__main__"):
                 continue
-            for name, value in vars(importlib.import_module(one.name)).items():
+            for name, value in vars(importlib.import_module(module.name)).items():
                 parts = [value.prepare, value.march] if isinstance(value, Loop) else [value]
-                yield from ((f"{one.name}.{name}", part) for part in parts if isinstance(part, Dispatcher))
+                yield from ((f"{module.name}.{name}", part) for part in parts if isinstance(part, Dispatcher))
 
 
 def test_every_kernel_is_kept_on_disk():
-    kernels, some = list(_kernels()), ("runge_kutta.collective_gauss", "lagrangian.damped_top")
-    assert {f"symtop.methods.{name}.march" for name in some} <= {name for name, _ in kernels}
+    kernels, names = list(_kernels()), ("runge_kutta.collective_gauss", "lagrangian.damped_top")
+    assert {f"symtop.methods.{name}.march" for name in names} <= {name for name, _ in kernels}
     assert {name for name, kernel in kernels if not isinstance(kernel._cache, jit._Cache)} == set()
-    unkept = {"__name__": "prompt"}
-    exec("def typed(x): return x", unkept)  # the control: a function without a file
-    assert not isinstance(compile_kernel(unkept["typed"])._cache, jit._Cache)
+    namespace = {"__name__": "prompt"}
+    exec("def typed(x): return x", namespace)  # the control: a function without a file
+    assert not isinstance(compile_kernel(namespace["typed"])._cache, jit._Cache)
 
 
 def test_a_loop_makes_a_kernel_when_it_is_used(monkeypatch):
@@ -106,14 +106,14 @@ def test_garbage_is_collected_and_calls_of_llvm_noted_again_after_a_kernel_is_co
     def refused(x):
         return x.no_such_thing
 
-    now = lambda: (gc.isenabled(), len(jit.ffi.lib._lock._cblist))
-    before, during, compiled = now(), [], compile_kernel(kernel)
-    jit._once(compiled, lambda _: during.append(now()))((types.float64,))
+    state = lambda: (gc.isenabled(), len(jit.ffi.lib._lock._cblist))
+    before, during, compiled = state(), [], compile_kernel(kernel)
+    jit._once(compiled, lambda _: during.append(state()))((types.float64,))
     assert (before, during) == ((True, 1), [(False, 0)])
-    assert now() == before
+    assert state() == before
     with pytest.raises(TypingError):
         compile_kernel(refused)(1.0)
-    assert now() == before
+    assert state() == before
 
 
 def test_numba_without_its_compiler_is_refused(monkeypatch):
@@ -142,11 +142,11 @@ def test_inner_functions_get_no_machine_code_and_kernels_the_same_bits(monkeypat
         return total + np.sum(rows)
 
     rows, generated, generate = np.linspace(0.0, 3.0, 17), [], JITCodeLibrary._finalize_specific
-    whole, optimise = [], JITCodeLibrary._optimize_final_module
+    final, optimise = [], JITCodeLibrary._optimize_final_module
     expected = sum((tenth(x) for x in rows.tolist()), 0.1) + rows.sum()
     jit.register_jitable(tenth, jit.OPTIONS | jit.WITHIN)
-    monkeypatch.setattr(JITCodeLibrary, "_finalize_specific", lambda one: (generated.append(one.name), generate(one)))
-    monkeypatch.setattr(JITCodeLibrary, "_optimize_final_module", lambda one: (whole.append(one.name), optimise(one)))
+    monkeypatch.setattr(JITCodeLibrary, "_finalize_specific", lambda lib: (generated.append(lib.name), generate(lib)))
+    monkeypatch.setattr(JITCodeLibrary, "_optimize_final_module", lambda lib: (final.append(lib.name), optimise(lib)))
     kernel.__code__ = kernel.__code__.replace(co_filename=f"<{way}>")  # no file, and so no cache on disk
     compiled = compile_kernel(kernel)
     if way in PRIVATE:
@@ -155,7 +155,7 @@ def test_inner_functions_get_no_machine_code_and_kernels_the_same_bits(monkeypat
     if way == "numba alone":
         monkeypatch.setattr(compiled, "compile", compiled.compile.__wrapped__)
     assert compiled(rows) == pytest.approx(expected, rel=1e-15)
-    for names in (generated, whole):  # optimised with the kernel alone
+    for names in (generated, final):  # optimised with the kernel alone
         assert sum(name.endswith(".tenth") for name in names) == (0 if way == "lean" else 1)
     with pytest.raises(ValueError, match="too large"):
         compiled(1e7 * rows)

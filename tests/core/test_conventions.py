@@ -60,14 +60,14 @@ def test_what_lacks_a_name_a_unit_or_a_title_is_found(run):
 def test_units_are_those_of_the_scene():
     scenes = {name: symtop.scene(name).units for name in symtop.scenes()}
     SI = {"time": "s", "energy": "kg m2 s-2", "p_phi": "kg m2 s-1", "theta": "rad"}
-    none = dict.fromkeys(SI, "1") | {"theta": "rad"}
-    for name, body, units in (("SI", "check-case-2", SI), ("", "heavy-brick", none)):
-        scene = next(key for key, own in scenes.items() if own == name)
+    plain = dict.fromkeys(SI, "1") | {"theta": "rad"}
+    for name, body, units in (("SI", "check-case-2", SI), ("", "heavy-brick", plain)):
+        scene = next(key for key, unit in scenes.items() if unit == name)
         run = symtop.simulate(scene, "strang", step_size=0.001, horizon=0.01)
         for data in (run, symtop.reference(scene, [0.0, 1.0]), symtop.reference(body, [0.0, 1.0])):
             assert {key: data[key].attrs["units"] for key in units} == units
-        wrong = symtop.errors({"time": run["time"], "theta": run["theta"]}, scene)
-        assert wrong["time"].attrs["units"] == units["time"]
+        errors = symtop.errors({"time": run["time"], "theta": run["theta"]}, scene)
+        assert errors["time"].attrs["units"] == units["time"]
     with pytest.raises(symtop.SymtopError, match="units 'imperial' is unknown; known: '', SI"):
         dataclasses.replace(symtop.scene("spheroid"), units="imperial")
 

@@ -50,11 +50,11 @@ def _a_minute():
     def out(*_):
         raise AssertionError("the write waits for a lock")
 
-    usual = signal.signal(signal.SIGALRM, out)
+    original = signal.signal(signal.SIGALRM, out)
     signal.alarm(60)
     yield
     signal.alarm(0)
-    signal.signal(signal.SIGALRM, usual)
+    signal.signal(signal.SIGALRM, original)
 
 
 @pytest.mark.slow

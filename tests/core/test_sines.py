@@ -40,9 +40,9 @@ def errors(x, values, relative=True):
 def quarter(n, seed=1):
     """Angles between 0 and pi/2: evenly, close to either end, and the last doubles of both."""
     draw = np.random.default_rng(seed)
-    near = 10.0 ** draw.uniform(-16.0, -1.0, n)
+    offsets = 10.0 ** draw.uniform(-16.0, -1.0, n)
     last = [5e-324, 1e-160, np.nextafter(0.25 * math.pi, 0.0), 0.25 * math.pi, 0.5 * math.pi]
-    return np.concatenate([draw.uniform(0.0, 0.5 * math.pi, 2 * n), near, 0.5 * math.pi - near, last])
+    return np.concatenate([draw.uniform(0.0, 0.5 * math.pi, 2 * n), offsets, 0.5 * math.pi - offsets, last])
 
 
 @pytest.mark.parametrize(("n", "seed"), [(3000, 1), pytest.param(100_000, 2, marks=pytest.mark.slow)])
@@ -92,11 +92,11 @@ def test_any_angle_has_its_quadrant(size):
 def test_compiled_code_calls_no_library():
     """A call would keep LLVM from vectorising a loop over many."""
 
-    def kernel(both):
+    def kernel(sincos):
         @njit(error_model="numpy")
         def loop(x, out):
             for i in range(x.size):
-                out[0, i], out[1, i] = both(x[i])
+                out[0, i], out[1, i] = sincos(x[i])
 
         loop(np.ones(4), np.empty((2, 4)))
         words = {word.strip("$,*").partition("@")[0] for code in loop.inspect_asm().values() for word in code.split()}

@@ -15,7 +15,7 @@ import pytest
 from symtop import __version__
 from symtop.cli.main import main
 from symtop.run.ensemble.population import population
-from tests.commands import call, succeeded, symtop
+from tests.commands import call, stdout_of, symtop
 from tests.judging.conftest import shorten
 from tests.pages import LANGUAGES, ROOT, Block, blocks, pages
 
@@ -36,47 +36,47 @@ class Page:
         self.slow = slow
         self.name = re.sub(r"\W", "_", f"{name}_{slow}")
         self.names = {}
-        self.said = None  # by the last block that was run
+        self.output = None  # by the last block that was run
 
     def follow(self, block):
         """Do what the language of a block asks for."""
         if block.file:
             Path(block.file).write_text(block.code, encoding="utf-8")
         elif block.language == "text":
-            assert self.said is None or words(block.code) in words(self.said)
+            assert self.output is None or words(block.code) in words(self.output)
         elif block.slow and not self.slow:
-            self.said = None
+            self.output = None
         elif block.language == "python":
-            self.said = self.python(block.code)
+            self.output = self.python(block.code)
         elif block.language == "sh":
-            self.said = "".join(self.command(line, apart=block.slow) for line in block.code.splitlines())
+            self.output = "".join(self.command(line, apart=block.slow) for line in block.code.splitlines())
         elif block.language == "console":
-            line, _, shown = block.code.partition("\n")
-            self.said = self.command(line.removeprefix("$ "))
-            assert words(shown) in words(self.said)
+            line, _, expected = block.code.partition("\n")
+            self.output = self.command(line.removeprefix("$ "))
+            assert words(expected) in words(self.output)
 
     def python(self, code):
         """What a block prints. A function that `judge` is given is sent to its process by the file it stands in."""
-        said = io.StringIO()
-        with contextlib.redirect_stdout(said):
+        output = io.StringIO()
+        with contextlib.redirect_stdout(output):
             if re.search(r"symtop\.judge\([a-z]", code):
                 Path(f"{self.name}.py").write_text(code, encoding="utf-8")
                 importlib.import_module(self.name)
             else:
                 exec(compile(code, self.name, "exec"), self.names)
         plt.close("all")
-        return said.getvalue()
+        return output.getvalue()
 
     def command(self, line, *, apart=False):
         """What a command prints; it must end with exit code 0. Those of slow blocks are processes of their own."""
-        program, *rest = shlex.split(line, comments=True)
+        program, *args = shlex.split(line, comments=True)
         if program == "python":
-            done = subprocess.run([sys.executable, *rest], capture_output=True, text=True, timeout=240, check=True)
-            return done.stdout
+            result = subprocess.run([sys.executable, *args], capture_output=True, text=True, timeout=240, check=True)
+            return result.stdout
         assert program == "symtop"
         if apart:
-            return succeeded(symtop(*rest), seconds=900.0)
-        return call(*rest).output
+            return stdout_of(symtop(*args), seconds=900.0)
+        return call(*args).output
 
 
 def follow(page, slow, folder, monkeypatch):
@@ -92,8 +92,8 @@ def follow(page, slow, folder, monkeypatch):
 
 
 @pytest.mark.parametrize(("page", "slow"), [
-    *(pytest.param(at, False, marks=[pytest.mark.quick][at == "README.md" :]) for at, found in PAGES.items() if found),
-    *(pytest.param(page, True, marks=pytest.mark.slow) for page, found in PAGES.items() if any(b.slow for b in found)),
+    *(pytest.param(page, False, marks=[pytest.mark.quick][page == "README.md" :]) for page in PAGES if PAGES[page]),
+    *(pytest.param(page, True, marks=pytest.mark.slow) for page in PAGES if any(block.slow for block in PAGES[page])),
 ])  # fmt: skip
 def test_a_page_runs(page, slow, tmp_path, monkeypatch):
     follow(page, slow, tmp_path, monkeypatch)
@@ -101,14 +101,14 @@ def test_a_page_runs(page, slow, tmp_path, monkeypatch):
 
 def test_a_page_that_is_wrong_fails(tmp_path, monkeypatch):
     """Negative control: a wrong output, a wrong command and a raise are seen, and each is right when mended."""
-    wrong = {
+    pages = {
         "```python\nprint(1 + 1)\n```\n```text\n3\n```\n": ("3\n", "2\n"),
         "```sh\nsymtop scenes sphreoid\n```\n": ("sphreoid", "spheroid"),
         "```console\n$ symtop --version\nsymtop, version 0.0\n```\n": ("0.0", __version__),
         "```python\nimport symtop\nsymtop.scene('no such')\n```\n": ("no such", "spheroid"),
         "```python\n# a.py\nx = 1\n```\n```sh\npython b.py\n```\n": ("b.py", "a.py"),
     }
-    for text, (before, after) in wrong.items():
+    for text, (before, after) in pages.items():
         monkeypatch.setitem(PAGES, "page", blocks(text.replace(before, after)))
         follow("page", False, tmp_path, monkeypatch)
         monkeypatch.setitem(PAGES, "page", blocks(text))
@@ -119,27 +119,27 @@ def test_a_page_that_is_wrong_fails(tmp_path, monkeypatch):
 @pytest.mark.parametrize("page", PAGES)
 def test_every_block_has_a_language_that_says_what_to_do_with_it(page):
     assert {block.language for block in PAGES[page]} <= LANGUAGES
-    for place, block in enumerate(PAGES[page]):
+    for index, block in enumerate(PAGES[page]):
         if block.file:  # is run by a later block that names it
-            later = [other.code for other in PAGES[page][place + 1 :] if other.language in {"sh", "python"}]
-            assert any(block.file in code for code in later)
+            codes = [entry.code for entry in PAGES[page][index + 1 :] if entry.language in {"sh", "python"}]
+            assert any(block.file in code for code in codes)
 
 
-@pytest.mark.parametrize("block", [block for found in PAGES.values() for block in found if block.language == "bash"])
+@pytest.mark.parametrize("block", [block for blocks in PAGES.values() for block in blocks if block.language == "bash"])
 def test_a_command_that_is_not_run_is_one(block: Block):
     """Negative control: an option that is not there is refused by the same reading."""
     for line in block.code.splitlines():
-        program, *rest = shlex.split(line, comments=True)
+        program, *args = shlex.split(line, comments=True)
         if program == "symtop":
-            name, command, rest = main.resolve_command(main.make_context("symtop", [], resilient_parsing=True), rest)
-            wanted = [word for word in rest if word != "--plugin" and not word.startswith("my_methods")]
-            command.make_context(str(name), wanted, resilient_parsing=True)
-            for option in (word for word in rest if word.startswith("--")):
+            name, command, args = main.resolve_command(main.make_context("symtop", [], resilient_parsing=True), args)
+            known_args = [word for word in args if word != "--plugin" and not word.startswith("my_methods")]
+            command.make_context(str(name), known_args, resilient_parsing=True)
+            for option in (word for word in args if word.startswith("--")):
                 assert any(option in parameter.opts for parameter in command.params), (line, option)
         elif program == "make":
-            assert rest[0] in TARGETS
+            assert args[0] in TARGETS
         else:
-            assert rest[0] in OTHERS[program]
+            assert args[0] in OTHERS[program]
     assert not any("--no-such" in parameter.opts for parameter in main.commands["run"].params)
 
 

@@ -53,11 +53,11 @@ class Assets(HTMLParser):
         self.fetched, self.links = [], []
 
     def handle_starttag(self, tag, attributes):
-        given = dict(attributes)
-        if (address := given.get(FETCHED.get(tag, ""))) and given.get("rel") != "canonical":
+        values = dict(attributes)
+        if (address := values.get(FETCHED.get(tag, ""))) and values.get("rel") != "canonical":
             self.fetched.append(address)
-        if tag == "a" and given.get("href"):
-            self.links.append(given["href"])
+        if tag == "a" and values.get("href"):
+            self.links.append(values["href"])
 
 
 def assets(text):
@@ -71,9 +71,9 @@ def site(tmp_path_factory):
     """The site, built as `make docs` builds it."""
     out = tmp_path_factory.mktemp("site")
     words = ["-W", "--keep-going", "-q", "-b", "html", "-d", out / "doctrees", ROOT / "docs", out / "html"]
-    done = subprocess.run([sys.executable, "-m", "sphinx", *map(str, words)], capture_output=True, text=True,
-                          timeout=500, check=False, env={**os.environ, "PYTHONPATH": str(ROOT)})  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    result = subprocess.run([sys.executable, "-m", "sphinx", *map(str, words)], capture_output=True, text=True,
+                            timeout=500, check=False, env={**os.environ, "PYTHONPATH": str(ROOT)})  # fmt: skip
+    assert result.returncode == 0, result.stderr
     return out / "html"
 
 
@@ -82,8 +82,8 @@ def test_nothing_is_fetched_from_elsewhere_and_every_link_leads_somewhere(site):
     pages = sorted(site.rglob("*.html"))
     assert len(pages) > 30
     for page in pages:
-        found = assets(page.read_text(encoding="utf-8"))
-        for address in [*found.fetched, *(link for link in found.links if not urlsplit(link).scheme)]:
+        content = assets(page.read_text(encoding="utf-8"))
+        for address in [*content.fetched, *(link for link in content.links if not urlsplit(link).scheme)]:
             parts = urlsplit(address)
             assert not parts.netloc, (page, address)
             assert not parts.path or (page.parent / parts.path).is_file(), (page, address)
@@ -156,11 +156,11 @@ def test_a_docstring_says_the_same_in_restructured_text():
 
     text = "Of |a x b|, u_.\n\nWith `code`, ``more``,\na* b* and *this*:\n\n    x_1 = |L| *a\n\n    y\n\nThe end <h>."
     tree = publish_doctree("\n".join(docstrings.restructured(text)), settings_overrides={"report_level": 1})
-    shown = lambda kind: [node.astext() for node in tree.findall(lambda node: node.tagname == kind)]
-    assert not shown("system_message")
-    assert not shown("problematic")
-    assert shown("literal") == ["code", "more"]
-    assert shown("emphasis") == ["this"]
-    assert shown("literal_block") == ["x_1 = |L| *a\n\ny"]
-    paragraphs = [" ".join(words.split()) for words in shown("paragraph")]
+    texts = lambda kind: [node.astext() for node in tree.findall(lambda node: node.tagname == kind)]
+    assert not texts("system_message")
+    assert not texts("problematic")
+    assert texts("literal") == ["code", "more"]
+    assert texts("emphasis") == ["this"]
+    assert texts("literal_block") == ["x_1 = |L| *a\n\ny"]
+    paragraphs = [" ".join(words.split()) for words in texts("paragraph")]
     assert paragraphs == ["Of |a x b|, u_.", "With code, more, a* b* and this:", "The end <h>."]

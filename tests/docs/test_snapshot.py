@@ -68,9 +68,9 @@ def test_each_question_becomes_a_page_and_links_lead_there(tmp_path):
     assert pages["a-few.md"] == f"# Why?\n\nW {links}\n\n## Sub\n\n[All questions](report.md)\n"
     for file, text in pages.items():
         (tmp_path / file).write_text(text)
-    again = taker.whole(tmp_path)
-    assert re.findall("^##+ .+", again, re.MULTILINE) == ["## Trust", "## Why?", "### Sub", "## How?"]
-    assert "W [how](#how)" in again
+    report = taker.whole(tmp_path)
+    assert re.findall("^##+ .+", report, re.MULTILINE) == ["## Trust", "## Why?", "### Sub", "## How?"]
+    assert "W [how](#how)" in report
 
 
 def test_a_whole_report_is_taken_without_links_to_what_is_not_tracked(results, tmp_path):
@@ -91,37 +91,37 @@ def test_the_stored_snapshot_is_whole_and_pages_quote_what_it_says():
     folder = ROOT / "docs" / "snapshot"
     report = taker.whole(folder)
     assert set(taker.SHOWN.findall(report)) == {path.name for path in (folder / "figures").iterdir()}
-    for (name, begin), said in taker.quoted(report).items():
+    for (name, begin), quote in taker.quoted(report).items():
         page = (ROOT / name).read_text(encoding="utf-8")
-        assert taker.quote(said, page, begin) == page, name
+        assert taker.quote(quote, page, begin) == page, name
 
 
 @pytest.mark.parametrize("name", ["bench", "peers"])
 def test_what_a_page_says_of_a_benchmark_is_what_that_has_stored(name, tmp_path):
     page = (ROOT / "docs" / "results.md").read_text(encoding="utf-8")
-    said = taker.benchmark(name, ROOT / "results")
-    assert taker.quote(said, page, taker.STORED_BY[name]) == page
-    stored = (ROOT / "results" / f"{name}.json").read_text(encoding="utf-8")
-    (tmp_path / f"{name}.json").write_text(stored.replace("0.3.0", "9.9.9").replace('"version": "0', '"version": "9'))
-    assert taker.benchmark(name, tmp_path) != said
+    quote = taker.benchmark(name, ROOT / "results")
+    assert taker.quote(quote, page, taker.STORED_BY[name]) == page
+    text = (ROOT / "results" / f"{name}.json").read_text(encoding="utf-8")
+    (tmp_path / f"{name}.json").write_text(text.replace("0.3.0", "9.9.9").replace('"version": "0', '"version": "9'))
+    assert taker.benchmark(name, tmp_path) != quote
 
 
 @pytest.mark.skipif(not (ROOT / ".git").exists(), reason="this is no checkout")
 def test_what_a_run_of_the_studies_writes_is_not_tracked():
-    written = "convergence.nc convergence.json report.md report.html figures/x.png tables/x.csv cases/x/y.npz"
-    paths = [f"results/{name}" for name in written.split()]
-    done = subprocess.run(["git", "check-ignore", *paths], cwd=ROOT, capture_output=True, text=True, check=False)
-    assert done.stdout.split() == paths
-    kept = subprocess.run(["git", "ls-files", "results"], cwd=ROOT, capture_output=True, text=True, check=True)
+    names = "convergence.nc convergence.json report.md report.html figures/x.png tables/x.csv cases/x/y.npz"
+    paths = [f"results/{name}" for name in names.split()]
+    result = subprocess.run(["git", "check-ignore", *paths], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert result.stdout.split() == paths
+    index = subprocess.run(["git", "ls-files", "results"], cwd=ROOT, capture_output=True, text=True, check=True)
     benchmarks = (
         "bench.json", "live-engines.json", "peers.json", "horizon.json", "repeat.json", "guard.json", "peers.nc",
         "machines.json", "figures/guard-curves.png", "figures/peers-fronts.png",
     )  # fmt: skip
-    files = {name for name in kept.stdout.split() if not name.startswith("results/machines/")}
+    files = {name for name in index.stdout.split() if not name.startswith("results/machines/")}
     assert files == {f"results/{name}" for name in benchmarks}
     findings = (json.loads((ROOT / "results" / name).read_text(encoding="utf-8")) for name in benchmarks[:3])
-    shown = [f"results/figures/{picture['file']}" for one in findings for picture in one.get("pictures", [])]
-    assert set() < {*shown} <= set(kept.stdout.split())  # without, `make studies` on a fresh checkout has no report
+    figures = [f"results/figures/{picture['file']}" for finding in findings for picture in finding.get("pictures", [])]
+    assert set() < {*figures} <= set(index.stdout.split())  # else `make studies` on a fresh checkout has no report
 
 
 PAGES = {path.relative_to(ROOT).as_posix(): path.read_text(encoding="utf-8") for path in pages()}

@@ -10,27 +10,27 @@ import symtop
 from symtop.explore import answers
 from symtop.explore.server import STATIC
 from tests.browser import FAINT
-from tests.explore.test_explore import STATUS, answered, fields, unpacked
+from tests.explore.test_explore import STATUS, fields, set_control, unpack
 
 SOURCE = (STATIC / "stories.js").read_text(encoding="utf-8")
 RANGE = {"step_least": 0.01, "step_most": 0.6, "spin_least": -4.0, "spin_most": 4.0}
 
 
 def test_a_cell_of_the_map_is_the_run_that_a_click_asks_for():
-    chosen, steps, spins = answers.grid(fields(**RANGE))
-    errors = unpacked(answers.outcome_map(chosen, steps, spins)["error_rad"]).reshape(answers.ROWS, answers.COLUMNS)
-    early = 0
+    setup, steps, spins = answers.grid(fields(**RANGE))
+    errors = unpack(answers.outcome_map(setup, steps, spins)["error_rad"]).reshape(answers.ROWS, answers.COLUMNS)
+    failures = 0
     for row, column in ((0, 0), (8, 10), (20, 20), (31, 47), (16, 47)):
-        alone = answers.answer(answers.setup(fields(step_size=steps[column], psi_dot=spins[row])))
-        early += alone["outcome"] != "ok"
-        assert np.isnan(errors[row, column]) == (alone["outcome"] != "ok")
-        if alone["outcome"] == "ok":  # nine samples of the many of a run
-            assert 0.2 * alone["largest"]["axis_error"] < errors[row, column] < 1.001 * alone["largest"]["axis_error"]
-    assert 0 < early < 5
+        run = answers.answer(answers.setup(fields(step_size=steps[column], psi_dot=spins[row])))
+        failures += run["outcome"] != "ok"
+        assert np.isnan(errors[row, column]) == (run["outcome"] != "ok")
+        if run["outcome"] == "ok":  # nine samples of the many of a run
+            assert 0.2 * run["largest"]["axis_error"] < errors[row, column] < 1.001 * run["largest"]["axis_error"]
+    assert 0 < failures < 5
     assert errors[8, 10] != pytest.approx(errors[20, 20], rel=0.01)
-    for wrong, word in (({"integrator": "rk45"}, "one with a step"), ({"step_least": 0.7}, "must not be empty")):
+    for changes, word in (({"integrator": "rk45"}, "one with a step"), ({"step_least": 0.7}, "must not be empty")):
         with pytest.raises(symtop.SymtopError, match=word):
-            answers.grid(fields(**RANGE | wrong))
+            answers.grid(fields(**RANGE | changes))
 
 
 def text(browser, name):
@@ -41,26 +41,26 @@ def text(browser, name):
 def test_a_story_a_cell_and_a_link(explorer):
     browser = explorer()
     browser.wait_for("+document.body.dataset.maps > 0")
-    answered(browser, "#story", "resonance")
+    set_control(browser, "#story", "resonance")
     browser.wait_for("document.querySelector('#status').textContent.startsWith('stormer-verlet: reached t = 20')")
-    answered(browser, "#step_size", 0.21)  # the step that the story names crosses the failure
+    set_control(browser, "#step_size", 0.21)  # the step that the story names crosses the failure
     browser.wait_for("document.querySelector('#status').className === 'failed'")
     assert text(browser, "other").startswith("strang: reached t = 20")
     state = browser.evaluate("location.href")
     form = "[...document.querySelectorAll('input[type=number], #scene, #integrator, #second')].map((c) => c.value)"
     before, status = browser.evaluate(form), text(browser, "status").split(";")[0]
-    answered(browser, "#story", "pole jump")
+    set_control(browser, "#story", "pole jump")
     cut = "[...document.querySelectorAll('input[type=number]')].filter((c) => c.scrollWidth > c.clientWidth)"
     assert browser.evaluate("document.querySelector('#phi_dot').value") == "0.650635"
     assert browser.evaluate(f"{cut}.map((c) => c.value)") == []
-    answered(browser, "#story", "loop")
+    set_control(browser, "#story", "loop")
     assert browser.evaluate(form) != before
     browser.evaluate(f"location.href = {json.dumps(state)}")
     browser.wait_for(f"document.querySelector('#status').textContent.startsWith({json.dumps(status)})")
     assert browser.evaluate(form) == before
     browser.wait_for("document.querySelector('#map-note').textContent.startsWith('stormer-verlet')")
-    (said,) = re.findall(r"([\d,]+) runs a second$", text(browser, "map-note"))
-    assert int(said.replace(",", "")) > 0
+    (rate,) = re.findall(r"([\d,]+) runs a second$", text(browser, "map-note"))
+    assert int(rate.replace(",", "")) > 0
     spin = browser.evaluate("document.querySelector('#psi_dot').value")
     browser.evaluate("document.querySelector('#map').dispatchEvent(new KeyboardEvent('keydown', {key: 'ArrowDown'}))")
     assert browser.evaluate("+document.querySelector('#psi_dot').value") < float(spin)
@@ -77,7 +77,7 @@ def test_a_hand_reaches_everything_and_every_text_can_be_read(explorer):
     browser = explorer()
     browser.resize(1280, 1400)
     browser.wait_for("+document.body.dataset.maps > 0")
-    answered(browser, "#second", "strang")
+    set_control(browser, "#second", "strang")
     for scheme in ("light", "dark"):
         browser.prefer(scheme)
         assert browser.evaluate(FAINT) == []
@@ -95,7 +95,7 @@ def test_a_hand_reaches_everything_and_every_text_can_be_read(explorer):
     before = browser.evaluate("document.querySelector('#step_size').value")
     count = browser.evaluate("+document.body.dataset.answers")
     browser.evaluate("document.querySelector('#map').scrollIntoView()")
-    browser.drag("#map", at=(0.3, 0.4))
+    browser.drag("#map", xy=(0.3, 0.4))
     browser.wait_for(f"+document.body.dataset.answers > {count}")
     assert browser.evaluate("document.querySelector('#step_size').value") != before
 
@@ -103,14 +103,14 @@ def test_a_hand_reaches_everything_and_every_text_can_be_read(explorer):
 def test_a_link_shows_what_it_changes_and_says_what_is_not_known(explorer):
     browser = explorer("#base=goldstein&scene=goldstein&integrator=rk45&tolerance=1e-9&theta=0.9")
     browser.wait_for(f"{STATUS}.startsWith('rk45: reached t = 70')")
-    answered(browser, "#second", "midpoint")
+    set_control(browser, "#second", "midpoint")
     controls = "[...document.querySelectorAll('#story, #scene option:checked, #step_size, #tolerance')].map((c) => "
     controls += "c.localName === 'option' ? c.text : c.value)"
     assert browser.evaluate(controls)[1::2] == ["goldstein (edited)", "1e-9"]  # a second method leaves the tolerance
     browser.set("#I3", 30)
     browser.wait_for(f"document.querySelector('#other').hidden && {STATUS}.includes('no rigid body')")
-    answered(browser, "#story", "cusp")
-    answered(browser, "#theta", 0.9)
+    set_control(browser, "#story", "cusp")
+    set_control(browser, "#theta", 0.9)
     browser.click("#reset")
     assert browser.evaluate(controls)[:3] == ["cusp", "cusp", "0.33"]  # of the story
     browser.evaluate("location.hash = 'base=nowhere', history.replaceState(null, '', '#')")  # by an answer, meanwhile
@@ -155,9 +155,9 @@ def test_what_stories_say_in_numbers():
     assert conserving["energy"] < 1e-11
     assert conserving["axis_error"] == pytest.approx(0.02, abs=0.005)
     fallen = answer_to("sleeping")
-    assert min(np.nanmax(unpacked(fallen["arrays"]["theta"])), fallen["largest"]["axis_error"]) > 0.5
+    assert min(np.nanmax(unpack(fallen["arrays"]["theta"])), fallen["largest"]["axis_error"]) > 0.5
     for second in (False, True):
-        assert np.nanmax(unpacked(answer_to("sleeping", second, psi_dot=2.5)["arrays"]["theta"])) < 0.05
+        assert np.nanmax(unpack(answer_to("sleeping", second, psi_dot=2.5)["arrays"]["theta"])) < 0.05
     pole = symtop.ClosedForm(scenes["pole jump"].top, scenes["pole jump"].start)
     assert np.degrees(pole.theta_range[0]) == pytest.approx(0.06, abs=0.005)
     assert scenes["resonance"].nutation_period / np.pi == pytest.approx(0.202, abs=5e-4)
@@ -166,16 +166,16 @@ def test_what_stories_say_in_numbers():
 
 def test_what_the_story_of_the_tennis_racket_says():
     def flips(answer, name="middle"):
-        time, along = (unpacked(answer["arrays"][key]) for key in ("time", name))
+        time, along = (unpack(answer["arrays"][key]) for key in ("time", name))
         k = np.flatnonzero(along[:-1] * along[1:] < 0.0)
         return time[k] + (time[k + 1] - time[k]) * along[k] / (along[k] - along[k + 1])
 
-    exact, late = [14.9, 42.4, 69.9, 97.5], [13.3, 37.7, 62.2, 86.7]
-    shown, good = answer_to("tennis-racket"), answer_to("tennis-racket", True)
-    np.testing.assert_allclose(flips(good, "true_middle"), exact, atol=0.1)
-    np.testing.assert_allclose(flips(good), exact, atol=0.1)
-    np.testing.assert_allclose(flips(shown), late, atol=0.1)
-    assert max(shown["largest"]["energy"], good["largest"]["energy"]) < 1e-15
+    exact, times = [14.9, 42.4, 69.9, 97.5], [13.3, 37.7, 62.2, 86.7]
+    reply, true_reply = answer_to("tennis-racket"), answer_to("tennis-racket", True)
+    np.testing.assert_allclose(flips(true_reply, "true_middle"), exact, atol=0.1)
+    np.testing.assert_allclose(flips(true_reply), exact, atol=0.1)
+    np.testing.assert_allclose(flips(reply), times, atol=0.1)
+    assert max(reply["largest"]["energy"], true_reply["largest"]["energy"]) < 1e-15
     assert flips(answer_to("tennis-racket", step_size=0.1))[-1] - exact[-1] == pytest.approx(-0.2, abs=0.1)
     assert symtop.scene("tennis-racket", bodies=True).nutation_period / 0.6 == pytest.approx(10.0, abs=0.6)
 
@@ -184,18 +184,18 @@ def test_a_body_is_two_bricks_side_by_side(explorer):
     browser = explorer()
     browser.wait_for("document.body.dataset.answer === 'ok'")
     browser.click("#play")
-    answered(browser, "#story", "tennis-racket")
+    set_control(browser, "#story", "tennis-racket")
     browser.wait_for("document.querySelector('#status').textContent.startsWith('lie-variational: reached t = 100')")
     visible = "document.querySelector('{}').checkVisibility()"
-    for name, shown in {"#plot-middle": True, "#I2": True, "#w2": True, "#map": False, "#theta": False}.items():
-        assert browser.evaluate(visible.format(name)) is shown, name
+    for name, state in {"#plot-middle": True, "#I2": True, "#w2": True, "#map": False, "#theta": False}.items():
+        assert browser.evaluate(visible.format(name)) is state, name
     before = browser.evaluate("document.querySelector('#sphere').toDataURL().length")
-    answered(browser, "#I1-slider", 0.2)  # and the sides of the bricks
+    set_control(browser, "#I1-slider", 0.2)  # and the sides of the bricks
     browser.wait_for(f"document.querySelector('#sphere').toDataURL().length !== {before}")
     assert browser.evaluate("document.querySelector('#scene').selectedOptions[0].text") == "tennis-racket (edited)"
     options = "[...document.querySelector('#integrator').options]"
     assert browser.evaluate(f"{options}.find((o) => o.value === 'midpoint').disabled")
-    answered(browser, "#scene", "goldstein")
+    set_control(browser, "#scene", "goldstein")
     assert browser.evaluate(visible.format("#map"))
     assert not browser.evaluate(visible.format("#I2"))
     assert browser.evaluate("document.querySelector('#watch').textContent") == ""

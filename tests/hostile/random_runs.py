@@ -2,7 +2,7 @@
 
 python -m tests.hostile.random_runs 20000 [--seed 3]
 
-Run k is drawn from a seed of its own and can be run again alone (`one`). A run is wrong if it ends `ok` and its axis
+Run k is drawn from a seed of its own and can be run alone (`outcome_of`). A run is wrong if it ends `ok` and its axis
 was ever further than `WRONG` from the closed form; it is silent if the guard had said nothing. A run is right below
 `RIGHT`, and takes too long from `LONGEST` on.
 """
@@ -94,9 +94,9 @@ def _any_start(draw, top):
     return top, Angles(draw.uniform(0.05, 3.05), *_turns(draw), *_rates(draw, top))
 
 
-def _fast(draw, least, most):
+def _fast(draw, low, high):
     top = _top(draw)
-    spin = _swing(top) * 10.0 ** draw.uniform(least, most)
+    spin = _swing(top) * 10.0 ** draw.uniform(low, high)
     return top, Angles(draw.uniform(0.05, 3.0), *_turns(draw), psi_dot=spin)
 
 
@@ -113,12 +113,12 @@ def _through_upright(draw, spin, energy):
     turn = p / (top.I1 * (1.0 + math.cos(theta)))
     height = p * turn * (1.0 - math.cos(theta)) / 2.0 + top.mgl * math.cos(theta)
     theta_dot = math.sqrt(max(2.0 * (top.mgl * (1.0 + energy) - height) / top.I1, 0.0))
-    at = Angles(theta, *_turns(draw), draw.choice([-1.0, 1.0]) * theta_dot, turn, p / top.I3 - turn * math.cos(theta))
-    return top, at
+    init = Angles(theta, *_turns(draw), draw.choice([-1.0, 1.0]) * theta_dot, turn, p / top.I3 - turn * math.cos(theta))
+    return top, init
 
 
-def _excess(draw, most):
-    return draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-12.0, most)
+def _excess(draw, high):
+    return draw.choice([-1.0, 1.0]) * 10.0 ** draw.uniform(-12.0, high)
 
 
 def _aimed(draw):
@@ -142,11 +142,11 @@ def _steady(draw):
 
 def _scaled(draw, decades):
     """Any motion in units of inertia and of time, each up to so many decades larger or smaller."""
-    top, at = _any_start(draw, _top(draw))
+    top, start = _any_start(draw, _top(draw))
     mass, clock = 10.0 ** draw.uniform(-decades, decades), 10.0 ** draw.uniform(-decades, decades)
-    rates = (rate / clock for rate in (at.theta_dot, at.phi_dot, at.psi_dot))
-    other = SymmetricTop(top.I1 * mass, top.I3 * mass, top.mgl * mass / clock**2)
-    return other, Angles(at.theta, at.phi, at.psi, *rates)
+    rates = (rate / clock for rate in (start.theta_dot, start.phi_dot, start.psi_dot))
+    scaled_top = SymmetricTop(top.I1 * mass, top.I3 * mass, top.mgl * mass / clock**2)
+    return scaled_top, Angles(start.theta, start.phi, start.psi, *rates)
 
 
 KINDS = {
@@ -169,9 +169,9 @@ KINDS = {
 
 def _at_pole(draw):
     """From a pole itself, mostly with a rate that leaves it."""
-    top, at = _any_start(draw, _top(draw))
-    rate = draw.choice([0.0, 1.0, 1.0, 1.0]) * at.theta_dot
-    return top, Angles(draw.choice([0.0, math.pi]), at.phi, at.psi, rate, at.phi_dot, at.psi_dot)
+    top, start = _any_start(draw, _top(draw))
+    rate = draw.choice([0.0, 1.0, 1.0, 1.0]) * start.theta_dot
+    return top, Angles(draw.choice([0.0, math.pi]), start.phi, start.psi, rate, start.phi_dot, start.psi_dot)
 
 
 HOSTILE = {  # drawn from by seeds below zero
@@ -186,17 +186,17 @@ def draw_run(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> O
     draw = random.Random(f"{seed}/{k}")
     kinds = KINDS if seed >= 0 else HOSTILE
     kind = draw.choice([*kinds])
-    top, at = kinds[kind](draw)
-    known = [entry for entry in integrators().values() if entry.control is not None and entry.name not in without]
-    method, period = draw.choice(known), Scene("drawn", top, at, 1.0).nutation_period
+    top, start = kinds[kind](draw)
+    methods = [entry for entry in integrators().values() if entry.control is not None and entry.name not in without]
+    method, period = draw.choice(methods), Scene("drawn", top, start, 1.0).nutation_period
     if not math.isfinite(period):
         period = 10.0 / _swing(top)
     nutations, steps = 10.0 ** draw.uniform(0.0, 3.0), 10.0 ** draw.uniform(0.0, 2.7)
     tolerance = 10.0 ** draw.uniform(-13.0, -1.0)
     if method.control == "step_size":
         control = {"step_size": period / steps}
-        most = MOST_STEPS if method.implementation == "compiled" else MOST_STEPS / 300.0
-        nutations = max(min(nutations, most / steps), 3.0 / steps)
+        limit = MOST_STEPS if method.implementation == "compiled" else MOST_STEPS / 300.0
+        nutations = max(min(nutations, limit / steps), 3.0 / steps)
     else:
         control = {"tolerance": max(tolerance, method.least_tolerance)}
         if method.implementation == "python" and draw.random() < 0.98:
@@ -204,15 +204,15 @@ def draw_run(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> O
         if method.name in ("radau", "taylor-quad"):
             nutations = min(nutations, 10.0 ** draw.uniform(0.0, 1.0))
     numbers = top.I1, top.I3, top.mgl
-    start = at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot
+    angles = start.theta, start.phi, start.psi, start.theta_dot, start.phi_dot, start.psi_dot
     observe, horizon = draw.choice(["nutation", "axis", "attitude"]), nutations * period
-    return Outcome(k, kind, numbers, start, method.name, observe, control, horizon, nutations, "", "", math.nan, 0.0)
+    return Outcome(k, kind, numbers, angles, method.name, observe, control, horizon, nutations, "", "", math.nan, 0.0)
 
 
-def one(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outcome:
+def outcome_of(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outcome:
     """Draw run k and do it; a run that is refused has the outcome `refused` and the sentence for a warning."""
     draft, messages = draw_run(k, seed, without=without), []
-    began = time.process_time()
+    start = time.process_time()
     try:
         scene, controls = draft.scene(), {**draft.control, "observe": draft.observe, "samples": 501}
         try:
@@ -222,27 +222,27 @@ def one(k: int, seed: int = SEED, *, without: tuple[str, ...] = LATER) -> Outcom
                 raise
             run = symtop.simulate(scene, draft.integrator, guard=messages.append, **{**controls, "observe": "axis"})
     except symtop.SymtopError as error:
-        return draft._replace(outcome="refused", warning=str(error), seconds=time.process_time() - began)
-    seconds = time.process_time() - began
+        return draft._replace(outcome="refused", warning=str(error), seconds=time.process_time() - start)
+    seconds = time.process_time() - start
     with np.errstate(all="ignore"):
         error = charts.axis_distance(run["axis"].values, closed_form(scene).axis(run["time"].values))
-    ended = run.attrs["outcome"]
-    largest = float(np.max(error)) if ended == "ok" else math.inf
-    return draft._replace(warning=" ".join(messages), outcome=ended, error=largest, seconds=seconds)
+    outcome = run.attrs["outcome"]
+    largest = float(np.max(error)) if outcome == "ok" else math.inf
+    return draft._replace(warning=" ".join(messages), outcome=outcome, error=largest, seconds=seconds)
 
 
 def summary(runs: list[Outcome]) -> str:
     """The figures of so many runs, and each run that should not be."""
     wrong, right = [run for run in runs if run.wrong], [run for run in runs if run.right]
     silent, false = [run for run in wrong if not run.warning], [run for run in right if run.warning]
-    ended = [run for run in runs if run.outcome not in ("ok", "refused", "endless", "crashed")]
-    sudden = [run for run in ended if not run.warning]
+    failures = [run for run in runs if run.outcome not in ("ok", "refused", "endless", "crashed")]
+    sudden = [run for run in failures if not run.warning]
     odd = [run for run in runs if run.outcome in ("endless", "crashed") or run.seconds >= LONGEST]
     lines = [
         f"{len(runs)} runs: {dict(collections.Counter(run.outcome for run in runs))}",
         f"{len(wrong)} wrong by more than {WRONG} rad, of them silent: {len(silent)}",
         f"{len(right)} right to {RIGHT} rad, of them warned of: {len(false)}",
-        f"{len(ended)} ended early, of them not announced: {len(sudden)}",
+        f"{len(failures)} ended early, of them not announced: {len(sudden)}",
     ]
     return "\n".join([*lines, *map(repr, silent), *map(repr, sudden), *map(repr, odd)])
 
@@ -250,15 +250,15 @@ def summary(runs: list[Outcome]) -> str:
 def run_all(count: int, seed: int = SEED, without: tuple[str, ...] = ()) -> list[Outcome]:
     """Do the first `count` runs in a process apart, and in a new one after a run that does not end or that ends it."""
     outcomes, spawn = [], multiprocessing.get_context("spawn")
-    ignored = "ignore", symtop.SymtopWarning
-    with ProcessPool(1, context=spawn, initializer=warnings.simplefilter, initargs=ignored) as pool:
-        tasks = [pool.schedule(one, (k, seed), {"without": without}, timeout=PATIENCE) for k in range(count)]
+    initargs = "ignore", symtop.SymtopWarning
+    with ProcessPool(1, context=spawn, initializer=warnings.simplefilter, initargs=initargs) as pool:
+        tasks = [pool.schedule(outcome_of, (k, seed), {"without": without}, timeout=PATIENCE) for k in range(count)]
         for k, task in enumerate(tasks):
             try:
                 outcomes.append(task.result())
             except Exception as error:  # noqa: BLE001
-                ended = "endless" if isinstance(error, TimeoutError) else "crashed"
-                outcomes.append(draw_run(k, seed, without=without)._replace(outcome=ended, warning=repr(error)))
+                outcome = "endless" if isinstance(error, TimeoutError) else "crashed"
+                outcomes.append(draw_run(k, seed, without=without)._replace(outcome=outcome, warning=repr(error)))
     return outcomes
 
 

@@ -38,10 +38,10 @@ def cache(tmp_path_factory):
         kernel = compile_kernel(_planted)
         patch.setattr(kernel, "_cache", jit._Cache(root / "kernels" / "aside"))
         assert kernel(2.0) == 8.0
-    (other,) = (root / "kernels" / "aside").glob("*.bitcode")
-    jit._write(file, jit._read(other, jit._name(other)), jit._name(file))
+    (source,) = (root / "kernels" / "aside").glob("*.bitcode")
+    jit._write(file, jit._read(source, jit._name(source)), jit._name(file))
     code.unlink()
-    shutil.rmtree(other.parent)
+    shutil.rmtree(source.parent)
     return root.parent
 
 
@@ -68,11 +68,11 @@ def test_what_is_made_is_the_users_alone_no_pickle_and_ours_to_run(planted):
     assert (compile_kernel(_doubled)(2.0), code.stat().st_mtime_ns) == (8.0, before)
 
 
-@pytest.mark.parametrize("at", ["root", "kernels", "kernel", "file"])
+@pytest.mark.parametrize("level", ["root", "kernels", "kernel", "file"])
 @pytest.mark.parametrize("fault", ["group", "anybody", "owner"])
-def test_what_others_may_write_is_not_read(planted, monkeypatch, at, fault):
+def test_what_others_may_write_is_not_read(planted, monkeypatch, level, fault):
     root, file = planted
-    path = {"root": root, "kernels": root / "kernels", "kernel": file.parent, "file": file}[at]
+    path = {"root": root, "kernels": root / "kernels", "kernel": file.parent, "file": file}[level]
     if fault == "owner":
         if os.geteuid() != 0:
             pytest.skip("only the administrator gives files away")
@@ -80,9 +80,9 @@ def test_what_others_may_write_is_not_read(planted, monkeypatch, at, fault):
     else:
         path.chmod(path.stat().st_mode | {"group": 0o020, "anybody": 0o002}[fault])
     words = "belongs to user 12345; set SYMTOP_CACHE" if fault == "owner" else "chmod -R go-w"
-    (doubt,) = [finding for finding in doctor._caches(root) if not finding.healthy]
-    assert doubt.topic == "compiled code"
-    assert str(path) in doubt.result
+    (finding,) = [finding for finding in doctor._caches(root) if not finding.healthy]
+    assert finding.topic == "compiled code"
+    assert str(path) in finding.result
     with pytest.warns(symtop.SymtopWarning, match=words) as record:
         assert [compile_kernel(_doubled)(2.0) for _ in range(2)] == [4.0, 4.0]
     assert len(record) == 1

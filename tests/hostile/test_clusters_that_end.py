@@ -11,7 +11,7 @@ import time
 
 import pytest
 
-from tests.commands import PROBE, ended, leftovers, same, stop, succeeded, symtop
+from tests.commands import PROBE, assert_identical, finish, leftovers, stdout_of, stop, symtop
 
 pytestmark = [pytest.mark.slow, pytest.mark.usefixtures("processes_with_dask")]
 
@@ -63,29 +63,29 @@ def computed(results):
     return {path: (path.stat().st_ino, path.stat().st_mtime_ns) for path in results.rglob("cases/*/*.npz")}
 
 
-def after(cluster, results, happens):
+def outcome_after(cluster, results, event):
     """How a study's command ends to whose cluster something happens midway, and how many seconds later."""
     process = symtop("study", PROBE, "--results", results, "--scheduler", cluster.address)
     try:
-        began = time.monotonic()
+        start = time.monotonic()
         while len(computed(results)) < 3:
             assert process.poll() is None, process.communicate()
-            assert time.monotonic() - began < 120.0
+            assert time.monotonic() - start < 120.0
             time.sleep(0.05)
-        happens()
-        began, result = time.monotonic(), ended(process, 300.0)
-        return *result, time.monotonic() - began
+        event()
+        start, result = time.monotonic(), finish(process, 300.0)
+        return *result, time.monotonic() - start
     finally:
         stop(process)
 
 
-def here(results):
+def run_alone(results):
     """What the command prints without a cluster."""
-    return succeeded(symtop("study", PROBE, "--results", results, "--jobs", 1))
+    return stdout_of(symtop("study", PROBE, "--results", results, "--jobs", 1))
 
 
 def test_a_worker_that_dies_costs_nothing(cluster, tmp_path):
-    code, out, err, seconds = after(cluster, tmp_path / "r", cluster.workers[0].kill)
+    code, out, err, seconds = outcome_after(cluster, tmp_path / "r", cluster.workers[0].kill)
     print(f"a worker: {code} after {seconds:.1f} s, {err!r}")
     assert code == 0, err
     before = computed(tmp_path / "r")
@@ -95,9 +95,9 @@ def test_a_worker_that_dies_costs_nothing(cluster, tmp_path):
     # one at most is made twice, which the killed worker was computing, or found, which it had written and not told of
     assert calls >= 12
     assert 0 <= calls - count <= 1
-    here(tmp_path / "here")
-    same(tmp_path / "here", tmp_path / "r")
-    assert "0 of 12 cases computed" in here(tmp_path / "r")
+    run_alone(tmp_path / "here")
+    assert_identical(tmp_path / "here", tmp_path / "r")
+    assert "0 of 12 cases computed" in run_alone(tmp_path / "r")
     assert before.items() <= computed(tmp_path / "r").items()
     assert not leftovers(tmp_path / "r")
 
@@ -113,9 +113,9 @@ def test_a_cluster_that_is_gone_before_or_never_answers_is_one_sentence(tmp_path
         if how in ("killed", "stopped"):
             cluster.scheduler.send_signal(signal.SIGKILL if how == "killed" else signal.SIGSTOP)
         address = f"tcp://{HERE}:{deaf.getsockname()[1]}" if how == "deaf" else cluster.address
-        began = time.monotonic()
-        code, _, err = ended(symtop(*words, "--scheduler", address), 300.0)
-        seconds = time.monotonic() - began
+        start = time.monotonic()
+        code, _, err = finish(symtop(*words, "--scheduler", address), 300.0)
+        seconds = time.monotonic() - start
     print(f"{what}, {how}: {code} after {seconds:.1f} s, {err!r}")
     assert (code, [*tmp_path.glob("a.nc*")]) == (2, [])
     assert "scheduler must be the address of a dask scheduler that answers and has workers" in err

@@ -59,22 +59,22 @@ FINE = {
 
 def lines(name):
     """Every bad line of a command."""
-    command, good = main.get_command(click.Context(main), name), [name, *GOOD[name]]
-    yield from ([*good, word] for word in ("--no-such-option", "-q", "--no-such=1"))
+    command, base = main.get_command(click.Context(main), name), [name, *GOOD[name]]
+    yield from ([*base, word] for word in ("--no-such-option", "-q", "--no-such=1"))
     if name not in ("cite", "claims", "study"):
-        yield [*good, "one", "too", "many"]
+        yield [*base, "one", "too", "many"]
     for part in command.params:
         option = part.opts[0]
         if not isinstance(part, click.Option):
-            place = 1 + [one for one in command.params if not isinstance(one, click.Option)].index(part)
-            yield from ([*good[:place], value, *good[place + 1 :]] for value in NAMES if part.nargs == 1)
+            place = 1 + [param for param in command.params if not isinstance(param, click.Option)].index(part)
+            yield from ([*base[:place], value, *base[place + 1 :]] for value in NAMES if part.nargs == 1)
         elif part.is_flag:
-            yield from ([*good, f"{option}{value}"] for value in ["=1", "=", "=no"])
+            yield from ([*base, f"{option}{value}"] for value in ["=1", "=", "=no"])
         else:
             if option != "--guard":  # which has a default
-                yield [*good, option]
+                yield [*base, option]
             assert option in BAD, f"{name} {option} is not tried"
-            yield from ([*good, f"{option}={value}"] for value in BAD[option])
+            yield from ([*base, f"{option}={value}"] for value in BAD[option])
 
 
 @pytest.fixture(scope="module")
@@ -97,7 +97,7 @@ def test_every_bad_command_line_is_one_sentence(name, folder, monkeypatch):
     monkeypatch.setattr("symtop.cli.common.showing_work", contextlib.nullcontext)  # a process for each line
     monkeypatch.setattr("socketserver.BaseServer.serve_forever", lambda *_: pytest.fail("it serves"))
     before = sorted(path.name for path in folder.iterdir())
-    above, faults = sorted(path.name for path in folder.parent.iterdir()), []
+    names, faults = sorted(path.name for path in folder.parent.iterdir()), []
     for words in lines(name):
         with warnings.catch_warnings(action="ignore"):
             result = call(*words, code=None)
@@ -113,6 +113,6 @@ def test_every_bad_command_line_is_one_sentence(name, folder, monkeypatch):
             for path in folder.iterdir():
                 if path.name not in before:
                     os.system(f"rm -rf '{path}'")
-    if sorted(path.name for path in folder.parent.iterdir()) != above:
+    if sorted(path.name for path in folder.parent.iterdir()) != names:
         faults.append("wrote beside the folder")
     assert not faults, "\n".join(repr(fault).replace("a" * 290, "aaa").replace("x" * 4990, "xxx") for fault in faults)

@@ -82,7 +82,7 @@ def test_three_thousand_connections_are_refused_and_forgotten(crowd):
     """Idle ones beyond the limit get 503, which is reported; those within it, some unfinished, keep nobody waiting."""
     port, log, memory, _ = crowd
     assert first_line(port, b"/run", QUESTION) == GOOD
-    before, began = int(memory.read_text().split()[1]), time.monotonic()
+    before, start = int(memory.read_text().split()[1]), time.monotonic()
     resource = pytest.importorskip("resource")
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     resource.setrlimit(resource.RLIMIT_NOFILE, (min(hard, 4096) if hard > 0 else 4096, hard))
@@ -94,20 +94,20 @@ def test_three_thousand_connections_are_refused_and_forgotten(crowd):
         idle += [socket.create_connection(("127.0.0.1", port), timeout=10.0) for _ in range(2900)]
     finally:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft, hard))
-    refused = 0
+    count = 0
     for link in idle:
         link.settimeout(0.0)
         with contextlib.suppress(OSError):
-            refused += link.recv(64).startswith(b"HTTP/1.1 503 ")
-    assert refused > 2000
+            count += link.recv(64).startswith(b"HTTP/1.1 503 ")
+    assert count > 2000
     assert "connections are open, and others are refused (503)" in log.read_text()
-    assert len(log.read_text().splitlines()) < 2.0 + time.monotonic() - began
-    end, answer = time.monotonic() + 5.0, b""
-    while answer != GOOD and time.monotonic() < end:
+    assert len(log.read_text().splitlines()) < 2.0 + time.monotonic() - start
+    end, line = time.monotonic() + 5.0, b""
+    while line != GOOD and time.monotonic() < end:
         with contextlib.suppress(OSError):
-            answer = first_line(port, b"/run", QUESTION, patience=5.0)
+            line = first_line(port, b"/run", QUESTION, patience=5.0)
         time.sleep(0.1)
-    assert answer == GOOD
+    assert line == GOOD
     for link in idle:
         link.close()
     assert int(memory.read_text().split()[1]) < 1.2 * before
@@ -115,7 +115,7 @@ def test_three_thousand_connections_are_refused_and_forgotten(crowd):
 
 def test_the_command_serves_until_it_is_ended(crowd):
     port, _, _, process = crowd
-    with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=60) as answer:
-        assert b"symtop explore" in answer.read()
+    with urllib.request.urlopen(f"http://127.0.0.1:{port}/", timeout=60) as response:
+        assert b"symtop explore" in response.read()
     process.send_signal(signal.SIGTERM)
     assert process.wait(30) == 0

@@ -15,13 +15,13 @@ from symtop.run import long_run as longrun
 FLIPS = [pytest.param(12, id="few"), pytest.param(200, id="many", marks=pytest.mark.slow)]
 
 
-def flipped(path, draw):
+def flip_bit(path, draw):
     """Flip a random bit of a random byte of a file; returns what it held."""
-    whole = path.read_bytes()
-    damaged = bytearray(whole)
-    damaged[draw.randrange(len(whole))] ^= 1 << draw.randrange(8)
-    path.write_bytes(bytes(damaged))
-    return whole
+    content = path.read_bytes()
+    buffer = bytearray(content)
+    buffer[draw.randrange(len(content))] ^= 1 << draw.randrange(8)
+    path.write_bytes(bytes(buffer))
+    return content
 
 
 def _tripled(x):
@@ -38,21 +38,21 @@ def test_a_damaged_kernel_is_compiled_again(tmp_path, monkeypatch, flips):
     code, bitcode, _ = kernel._cache.files(signature, kernel.targetctx.codegen())
     entry = jit._read(bitcode, jit._name(bitcode))
     assert jit._read(code, entry)  # the control
-    for file, of in ((code, entry), (bitcode, jit._name(bitcode))):
+    for file, key in ((code, entry), (bitcode, jit._name(bitcode))):
         for _ in range(flips):
-            whole = flipped(file, draw)
+            content = flip_bit(file, draw)
             with pytest.raises(ValueError, match="damaged"):
-                jit._read(file, of)
-            file.write_bytes(whole)
-    for damaged in ([code], [bitcode], [code, bitcode]):
-        for file in damaged:
-            flipped(file, draw)
-        again = compile_kernel(_tripled)
-        assert is_cached(again, signature)  # as far as one can tell without reading
-        assert again(2.0) == 6.0
+                jit._read(file, key)
+            file.write_bytes(content)
+    for files in ([code], [bitcode], [code, bitcode]):
+        for file in files:
+            flip_bit(file, draw)
+        kernel = compile_kernel(_tripled)
+        assert is_cached(kernel, signature)  # as far as one can tell without reading
+        assert kernel(2.0) == 6.0
         assert jit._read(code, jit._read(bitcode, jit._name(bitcode)))  # they are whole on disk again
     for length in (0, 10, 40):
-        bitcode.write_bytes(whole[:length])
+        bitcode.write_bytes(content[:length])
         assert compile_kernel(_tripled)(2.0) == 6.0
 
 
@@ -62,18 +62,18 @@ _MADE = xr.Dataset({"theta": ("time", np.linspace(0.0, 1.0, 40))}, coords={"time
 @pytest.mark.parametrize("flips", FLIPS)
 def test_a_damaged_file_is_data_or_one_sentence(tmp_path, flips):
     """Whoever reads it, in a runner or not: no error but SymtopError."""
-    draw, path, refused = random.Random(7), tmp_path / "case.nc", 0
+    draw, path, count = random.Random(7), tmp_path / "case.nc", 0
     tree = xr.DataTree.from_dict({"one": _MADE.assign_attrs(title="x"), "two": _MADE})
     for data, read in ((_MADE, netcdf.read), (tree, netcdf.read_any)):
         netcdf.write(data, path)
         for _ in range(flips):
-            whole = flipped(path, draw)
+            content = flip_bit(path, draw)
             try:
                 read(path)
             except symtop.SymtopError:
-                refused += 1
-            path.write_bytes(whole)
-    assert refused
+                count += 1
+            path.write_bytes(content)
+    assert count
 
 
 H = 0.002
@@ -90,22 +90,22 @@ def test_a_damaged_checkpoint_is_not_gone_on_from(tmp_path, monkeypatch, flips):
         book = longrun._Checkpoint(file, "an identity")
         book.latest = start._replace(k=7), [[0.5] * 15] * 3
         book.save()
-        good = book.resumed(start)
-        assert (good[0].k, good[1]) == (7, [[0.5] * 15] * 3)
-        restarts = refused = 0
+        expected = book.resumed(start)
+        assert (expected[0].k, expected[1]) == (7, [[0.5] * 15] * 3)
+        restarts = refusals = 0
         for _ in range(flips):
-            whole = flipped(book.file, draw)
+            content = flip_bit(book.file, draw)
             with warnings.catch_warnings(record=True, action="always") as record:
                 try:
-                    at, rows = book.resumed(start)
+                    read_state, rows = book.resumed(start)
                 except symtop.SymtopError as error:
                     assert "remove it" in str(error)  # noqa: PT017
                     assert file is not True
-                    refused += 1
+                    refusals += 1
                 else:
-                    restarts += at.k == 0
-                    assert at in (good[0], start)
-                    assert rows in (good[1], [])
-                    assert (at.k == 0) == any("damaged" in str(one.message) for one in record)
-            book.file.write_bytes(whole)
-        assert restarts if file is True else refused
+                    restarts += read_state.k == 0
+                    assert read_state in (expected[0], start)
+                    assert rows in (expected[1], [])
+                    assert (read_state.k == 0) == any("damaged" in str(warning.message) for warning in record)
+            book.file.write_bytes(content)
+        assert restarts if file is True else refusals

@@ -13,7 +13,7 @@ import symtop
 from symtop.core.signals import InterruptedByUser, told_apart
 from symtop.methods.framework.calling import solve
 from symtop.run import plugins
-from tests.commands import answer, ended, symtop as command
+from tests.commands import code_and_output, finish, symtop as command
 
 PLUGIN = Path(__file__).with_name("plugin.py")
 RUN = ["--step-size", "0.01", "--horizon", "2"]
@@ -23,13 +23,13 @@ BEFORE = repr(symtop.scene("spheroid"))
 @pytest.fixture(scope="module", autouse=True)
 def misbehaving():
     plugins.load(PLUGIN)
-    return next(one for one in [*sys.modules.values()] if getattr(one, "__file__", None) == str(PLUGIN))
+    return next(module for module in [*sys.modules.values()] if getattr(module, "__file__", None) == str(PLUGIN))
 
 
 def output_of(words):
     """Exit code and the lines of a command that must not end in a traceback, and must leave the scene as it was."""
     with warnings.catch_warnings():
-        code, output = answer(*words)
+        code, output = code_and_output(*words)
     assert repr(symtop.scene("spheroid")) == BEFORE
     return code, output.splitlines()
 
@@ -45,8 +45,8 @@ def test_every_refused_run_is_one_sentence_and_what_can_be_used_is_used(misbehav
         code, (_, *lines) = output_of(["run", "spheroid", name, *RUN, guard])
         assert code == 0, name
         if "float32" not in name:
-            ends, wanted = ([line.split("largest")[-1] for line in part[-5:]] for part in (lines, expected))
-            assert ends == wanted, name
+            ends, expected_ends = ([line.split("largest")[-1] for line in part[-5:]] for part in (lines, expected))
+            assert ends == expected_ends, name
     for name in misbehaving.BROKEN:
         assert output_of(["run", "spheroid", name, *RUN, guard])[0] == 3, name
 
@@ -96,7 +96,7 @@ symtop.register(method, replace=True)
 """
 
 
-@pytest.mark.parametrize(("returns", "says"), [
+@pytest.mark.parametrize(("returns", "message"), [
     ("(0.0,) * 4, carry, 1, 0", None),
     ("(0.0, 0.0), carry, 1, 0", "Cannot unify UniTuple(float64 x 4) and UniTuple(float64 x 2) for 'dstate.N'"),
     ("plain(state)", "a function that a kernel calls is decorated with numba.extending.register_jitable"),
@@ -104,7 +104,7 @@ symtop.register(method, replace=True)
     ("(0.0,) * 4, carry, 1, 9", "must return an outcome from 0 to 6, not 9"),
     ("(0.0,) * 4, carry, 1, -1", "must return an outcome from 0 to 6, not -1"),
 ])  # fmt: skip
-def test_a_kernel_that_does_not_compile_or_returns_no_outcome_is_one_sentence(returns, says, tmp_path):
+def test_a_kernel_that_does_not_compile_or_returns_no_outcome_is_one_sentence(returns, message, tmp_path):
     file = tmp_path / "own.py"
     file.write_text(KERNEL.format(returns=returns))
     (tmp_path / "beside_own.py").write_text("ZERO = 0.0\ndef plain(x):\n    return x\n")
@@ -112,28 +112,28 @@ def test_a_kernel_that_does_not_compile_or_returns_no_outcome_is_one_sentence(re
     for words in (["run", *run], ["long", *run, "--steps", "10"], ["ensemble", "own-kernel", "--members", "3"]):
         horizon = [] if words[0] == "long" else ["--horizon", "1"]
         code, lines = output_of([*words, "--step-size", "0.1", *horizon, "--plugin", file])
-        if says is None:
+        if message is None:
             assert code == 0, lines
         else:
             assert (code, len(lines)) == (2, 1), lines
             assert lines[0].startswith("symtop: "), lines
             # numba counts the assignments to a variable in the bytecode, which differs between versions of Python
-            assert re.sub(r"(?<='dstate\.)\d+", "N", lines[0]).endswith(says), lines
+            assert re.sub(r"(?<='dstate\.)\d+", "N", lines[0]).endswith(message), lines
 
 
 @pytest.mark.parametrize("count", [math.nan, math.inf, 1e30])
 def test_a_number_of_steps_that_is_none_is_refused(count, misbehaving):
     solver = misbehaving.changed(steps=lambda _: count)
-    counted = symtop.Integrator(name="counted", family="other", summary="", solvers={"angles": solver})
-    for run, on in ((symtop.simulate, "spheroid"), (symtop.ensemble, symtop.population(3))):
+    method = symtop.Integrator(name="counted", family="other", summary="", solvers={"angles": solver})
+    for run, target in ((symtop.simulate, "spheroid"), (symtop.ensemble, symtop.population(3))):
         with pytest.raises(symtop.SymtopError, match="must return a finite number of steps, not"):
-            run(on, counted, step_size=0.01, horizon=0.5)
+            run(target, method, step_size=0.01, horizon=0.5)
 
 
 def test_counts_of_numpy_are_numbers_in_a_dataset(misbehaving):
     solver = misbehaving.changed(steps=np.int64, force_evaluations=lambda _: np.int64(100), reached=np.float32)
-    counted = symtop.Integrator(name="counted", family="other", summary="", solvers={"angles": solver})
-    run = symtop.simulate("spheroid", counted, step_size=0.01, horizon=0.5, guard=False)
+    method = symtop.Integrator(name="counted", family="other", summary="", solvers={"angles": solver})
+    run = symtop.simulate("spheroid", method, step_size=0.01, horizon=0.5, guard=False)
     counts = [run.attrs[name] for name in ("steps", "force_evaluations", "reached_time")]
     assert (counts, [type(count) for count in counts]) == ([50, 100, 0.5], [int, int, float])
 
@@ -150,7 +150,7 @@ def test_a_solver_that_expects_steps_forwards_is_ended(misbehaving, monkeypatch)
 @pytest.mark.slow
 def test_in_processes_of_their_own():
     for name, code in (("raises-system-exit", 2), ("raises-interrupt", 2), ("raises-base", 2), ("signals-itself", 130)):
-        result = ended(command("run", "spheroid", name, *RUN, "--plugin", PLUGIN))
+        result = finish(command("run", "spheroid", name, *RUN, "--plugin", PLUGIN))
         assert result[0] == code, result
         assert result[2] == "symtop: interrupted\n" if code == 130 else result[2].count("\n") == 1
 

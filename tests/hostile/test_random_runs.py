@@ -18,8 +18,8 @@ from symtop.run.linear_stability import nutation_growth, trace
 from symtop.run.motion import landmarks
 from symtop.run.reference.sensitivity import conditioning, displacement
 from symtop.run.simulation import make_plan
-from tests.conftest import late
-from tests.hostile.random_runs import LONGEST, NEWER, draw_run, one, run_all, summary
+from tests.conftest import defer
+from tests.hostile.random_runs import LONGEST, NEWER, draw_run, outcome_of, run_all, summary
 from tests.run.test_guard import nutating
 
 # runs of the first 20,000 that were wrong in silence, and of the next 40,000
@@ -31,16 +31,16 @@ SILENT = [
 FALSE = [74, 511, 780, 990, 1929, 2413, 4178, 5013]  # right runs that were warned of growth that was none
 
 
-@pytest.mark.parametrize(("k", "seed"), [*SILENT[::3], *late(*SILENT[1::3], *SILENT[2::3])])
+@pytest.mark.parametrize(("k", "seed"), [*SILENT[::3], *defer(*SILENT[1::3], *SILENT[2::3])])
 def test_what_was_wrong_in_silence_is_warned_of(k, seed):
-    run = one(k, seed)
+    run = outcome_of(k, seed)
     assert run.wrong
     assert run.warning
 
 
 @pytest.mark.parametrize("k", FALSE)
 def test_what_is_right_is_not_warned_of(k):
-    run = one(k)
+    run = outcome_of(k)
     assert run.right
     assert run.warning == ""
 
@@ -53,7 +53,7 @@ OLDER = tuple(name for name in symtop.integrators() if name not in NEWER)
     (28, NEWER), (40, OLDER), pytest.param(1500, NEWER, marks=pytest.mark.slow)])  # fmt: skip
 def test_random_runs_are_not_wrong_in_silence(count, without):
     """Many in a process apart, which may end or not; a few here."""
-    runs = run_all(count, 3, without) if count > 40 else [one(k, 3, without=without) for k in range(count)]
+    runs = run_all(count, 3, without) if count > 40 else [outcome_of(k, 3, without=without) for k in range(count)]
     assert not {run.integrator for run in runs} & {*without}
     assert sum(run.wrong for run in runs) > 2
     assert not [run for run in runs if run.wrong and not run.warning], summary(runs)
@@ -94,14 +94,14 @@ def test_growth_does_not_see_what_two_runs_share():
 def test_a_probe_ends_where_a_solver_takes_ever_smaller_steps(monkeypatch):
     """Beside a pole in the angles chart a solver takes ever smaller steps: the probe took as long as the run, 29 s."""
     assert guard.MOST_WORK == {"compiled": 5e6, "python": 5e5}
-    for implementation, most in guard.MOST_WORK.items():  # a tenth of the work and less than a tenth of the time
-        monkeypatch.setitem(guard.MOST_WORK, implementation, most / 10.0)
+    for implementation, limit in guard.MOST_WORK.items():  # a tenth of the work and less than a tenth of the time
+        monkeypatch.setitem(guard.MOST_WORK, implementation, limit / 10.0)
     run = draw_run(620, 2)
     scene, method = run.scene(), symtop.integrator(run.integrator)
     plan, _ = make_plan(scene, method, tolerance=run.control["tolerance"], horizon=run.horizon, samples=11)
-    began = time.process_time()
+    start = time.process_time()
     assert guard.forecast(scene, method, "angles", plan).outcome == "out_of_budget"
-    assert time.process_time() - began < 1.5
+    assert time.process_time() - start < 1.5
 
 
 # I1, I3, mgl, theta, theta', psi', method, observed, tolerance, horizon: of random runs, those that nobody warned of
@@ -151,8 +151,8 @@ def test_what_two_integrations_differ_by_is_the_start_and_not_the_closed_form(ti
     distances = charts.axis_distance(charts.axis_from_quaternion(quad[:, :4].astype(float)), truth["axis"].values)
     assert (distances <= truth["axis_error_bound"]).all()
     rounding = np.finfo(float).eps * scene.top.I3 * scene.start.psi_dot / scene.top.I1
-    other = symtop.ClosedForm(scene.top, dataclasses.replace(scene.start, theta_dot=rounding)).axis(times)
-    shift = charts.axis_distance(other, truth["axis"].values).max()
+    axes = symtop.ClosedForm(scene.top, dataclasses.replace(scene.start, theta_dot=rounding)).axis(times)
+    shift = charts.axis_distance(axes, truth["axis"].values).max()
     assert shift < 10.0 * conditioning(scene, float(times[-1])) * np.finfo(float).eps
     if tilt <= 1e-5:
         assert shift > 1e2 * truth["axis_error_bound"].max()
@@ -175,16 +175,16 @@ def test_it_is_silent_where_the_motion_is_stable_and_conditioning_is_its_growth(
 @pytest.mark.parametrize(("name", "time"), [("separatrix", 100.0), ("spheroid", 1e15), ("spheroid", 1e25)])
 def test_where_one_rounding_moves_the_axis_anywhere_the_answer_says_so(name, time):
     """A distance ends at pi: divided by a change that departs as far it is far below the growth."""
-    chosen = symtop.scene(name)
-    words, factor = symtop.reference(chosen, [time]).attrs["conditioning"], conditioning(chosen, time)
+    scene = symtop.scene(name)
+    words, factor = symtop.reference(scene, [time]).attrs["conditioning"], conditioning(scene, time)
     assert words.startswith("at least ")
     assert "or more: nothing is known of the axis" in words
-    times, starts = np.linspace(0.0, time, 101)[1:], [chosen.start]
+    times, starts = np.linspace(0.0, time, 101)[1:], [scene.start]
     for rate in ("phi_dot", "psi_dot"):
-        ulp_more = math.nextafter(getattr(chosen.start, rate), math.inf)
-        starts.append(dataclasses.replace(chosen.start, **{rate: ulp_more}))
-    true, *others = (symtop.ClosedForm(chosen.top, start).axis(times) for start in starts)
-    shift = max(charts.axis_distance(other, true).max() for other in others)
+        ulp_more = math.nextafter(getattr(scene.start, rate), math.inf)
+        starts.append(dataclasses.replace(scene.start, **{rate: ulp_more}))
+    true, *paths = (symtop.ClosedForm(scene.top, start).axis(times) for start in starts)
+    shift = max(charts.axis_distance(path, true).max() for path in paths)
     assert shift > 0.3
     assert factor * np.finfo(float).eps > shift / 10.0
 
@@ -192,18 +192,18 @@ def test_where_one_rounding_moves_the_axis_anywhere_the_answer_says_so(name, tim
 @pytest.mark.parametrize("time", [64.0, 68.0])
 def test_where_a_small_change_departs_far_a_smaller_one_shows_the_growth(time):
     """Against a change of 1e-25 in 50 digits: that of 64 roundings shows 0.78 and 0.12 of its growth."""
-    chosen, change = symtop.scene("separatrix"), Fraction(1, 10**25)
-    start = [Fraction(value) for value in flat(chosen.top, chosen.start)[3:]]
-    other = start[:3] + [rate * (1 + change) for rate in start[3:]]
-    here, there = (PreciseForm(chosen.top, at, 50).axis(time) for at in (start, other))
-    growth = math.hypot(*(float((a - b) * 10**25) for a, b in zip(here, there, strict=True)))
-    assert conditioning(chosen, time) == pytest.approx(growth, rel=0.1)
+    scene, change = symtop.scene("separatrix"), Fraction(1, 10**25)
+    start = [Fraction(value) for value in flat(scene.top, scene.start)[3:]]
+    neighbour = start[:3] + [rate * (1 + change) for rate in start[3:]]
+    first, second = (PreciseForm(scene.top, numbers, 50).axis(time) for numbers in (start, neighbour))
+    growth = math.hypot(*(float((a - b) * 10**25) for a, b in zip(first, second, strict=True)))
+    assert conditioning(scene, time) == pytest.approx(growth, rel=0.1)
 
 
 @pytest.mark.parametrize("I3", [1e-30, *(pytest.param(I3, marks=pytest.mark.slow) for I3 in (1e-6, 1e-18, 1e-40))])
 def test_exact_is_right_for_a_top_without_inertia_about_its_axis(I3):
     for start in (symtop.Angles(1.0, psi_dot=2.0), symtop.Angles(2.5, 0.1, 0.2, -1.0, 0.0, -3.0)):
         scene = symtop.Scene("needle", symtop.SymmetricTop(1.0, I3, 1.0), start, 20.0)
-        run, precise = symtop.simulate(scene, "exact", samples=11), PreciseForm(scene.top, scene.start, 40)
-        true = np.array([[float(part) for part in precise.quaternion(float(t))] for t in run["time"].values])
+        run, form = symtop.simulate(scene, "exact", samples=11), PreciseForm(scene.top, scene.start, 40)
+        true = np.array([[float(part) for part in form.quaternion(float(t))] for t in run["time"].values])
         assert charts.attitude_distance(run["quaternion"].values, true).max() < 4e-15

@@ -118,9 +118,9 @@ CALLS = {  # a function, good arguments, names of those of which the usual value
         "quaternion omega_body", {"quaternion": [[1.0, 0.0], [2.0, 0.0, 0.0, 0.0], [0.0] * 4], "omega_body": [[1.0]]}),
     "from_axis": (symtop.Angles.from_axis, {"top": TOP, "axis": [0.6, 0.0, 0.8], "angular_momentum": [0.3, 0.0, 0.4]},
         "top axis angular_momentum", {}),
-    **{f"{name} of {type(at).__name__}": (getattr(of, name), {"at": at}, "at", {}) for of, at in (
+    **{f"{name} of {type(start).__name__}": (getattr(top, name), {"at": start}, "at", {}) for top, start in (
        (TOP, START), (symtop.RigidBody(1.0, 1.2, 1.5, mgl=1.0), symtop.Attitude(omega_body=(1.0, 0.0, 0.0))))
-       for name in ("momenta", "energy", "turning_cosines", "nutation_period", "in_principal") if hasattr(of, name)},
+       for name in ("momenta", "energy", "turning_cosines", "nutation_period", "in_principal") if hasattr(top, name)},
     "kernel_loop": (symtop.kernel_loop, dict.fromkeys(("begin", "increment", "observe"), len), "begin", {}),
     "body_population": (symtop.body_population, {"n": 2, "kind": "heavy", "epsilon": 0.1}, "n", {"epsilon": ODD[1:]}),
     "from_inertia": (symtop.SymmetricTop.from_inertia,
@@ -160,23 +160,23 @@ CALLS = {  # a function, good arguments, names of those of which the usual value
 }  # fmt: skip
 
 
-def refused(function, usual, own):
+def refused_values(function, names, extra):
     """The values of each argument that a function must refuse."""
-    values = {name: [*own.get(name, ())] for name in {**dict.fromkeys(usual.split()), **own}}
-    for name in usual.split():
+    values = {name: [*extra.get(name, ())] for name in {**dict.fromkeys(names.split()), **extra}}
+    for name in names.split():
         optional = inspect.signature(function).parameters[name].default is None
         values[name] += [value for value in USUAL[name] if value is not None or not optional]
     return values
 
 
-REFUSED = {name: refused(function, usual, own) for name, (function, _, usual, own) in CALLS.items()}
+REFUSED = {name: refused_values(function, names, extra) for name, (function, _, names, extra) in CALLS.items()}
 BAD = [(name, argument) for name, arguments in REFUSED.items() for argument in arguments]
 COST = {"judge", "recommend", "compare"}  # seconds for every value that is taken: their bad ones only
 
 
-def came(function, arguments):
+def outcome_of(function, arguments):
     """What a call ends in: "" if it returns, the sentence of a SymtopError, or an assertion."""
-    began = time.process_time()
+    start = time.process_time()
     with warnings.catch_warnings(action="ignore", category=symtop.SymtopWarning):
         try:
             function(**arguments)
@@ -188,13 +188,13 @@ def came(function, arguments):
             assert len(sentence) < 6000
             return sentence
         finally:
-            assert time.process_time() - began < SECONDS
+            assert time.process_time() - start < SECONDS
 
 
 @pytest.mark.parametrize(("name", "argument"), BAD)
 def test_bad_values_are_refused(name, argument):
-    function, good, *_ = CALLS[name]
-    assert not [value for value in REFUSED[name][argument] if not came(function, {**good, argument: value})]
+    function, arguments, *_ = CALLS[name]
+    assert not [value for value in REFUSED[name][argument] if not outcome_of(function, {**arguments, argument: value})]
 
 
 @pytest.mark.parametrize("stride", [19, pytest.param(1, marks=pytest.mark.slow)])
@@ -203,10 +203,10 @@ def test_anything_is_used_or_refused(stride):
     places = [(name, key) for name in CALLS if name not in COST for key in sorted({*CALLS[name][1], *REFUSED[name]})]
     faults = []
     for k, (name, argument) in enumerate(places):
-        function, good, *_ = CALLS[name]
+        function, arguments, *_ = CALLS[name]
         for value in ANY[k % stride :: stride] if (name, argument) != ("register", "entry") else ():
             try:
-                came(function, {**good, argument: value})
+                outcome_of(function, {**arguments, argument: value})
             except Exception as error:  # noqa: BLE001
                 faults.append((name, argument, type(value).__name__, type(error).__name__, str(error)[:200]))
     assert not faults
@@ -214,9 +214,9 @@ def test_anything_is_used_or_refused(stride):
 
 def test_the_same_calls_with_good_input_are_fine(monkeypatch):
     shorten(monkeypatch)
-    for name, (function, good, *_) in CALLS.items():
+    for name, (function, arguments, *_) in CALLS.items():
         if name not in ("register", "register_scene", "judge of nothing"):
-            assert came(function, good) == "", name
+            assert outcome_of(function, arguments) == "", name
 
 
 ODD_TIMES = [

@@ -9,7 +9,7 @@ from symtop.judging.claims import calls, order, structure, subject
 @pytest.fixture(autouse=True)
 def one_seed(monkeypatch):
     """What a judging draws is the same each time; other seeds are tried where a test names them."""
-    monkeypatch.setattr(judge_step.secrets, "randbelow", lambda most: 20_261_123 % most)
+    monkeypatch.setattr(judge_step.secrets, "randbelow", lambda n: 20_261_123 % n)
 
 
 def shorten(monkeypatch):
@@ -22,11 +22,11 @@ def shorten(monkeypatch):
 
 
 @pytest.fixture
-def only(monkeypatch):
+def keep_claims(monkeypatch):
     """A function that leaves the claims of these names in the table of the battery, with an eighth of the time."""
 
     def choose(*names):
-        stages = [one._replace(claims=tuple(claim for claim in one.claims if claim in names)) for one in battery.TABLE]
+        stages = [row._replace(claims=tuple(claim for claim in row.claims if claim in names)) for row in battery.TABLE]
         assert {claim for stage in stages for claim in stage.claims} == {*names}
         monkeypatch.setattr(battery, "TABLE", tuple(stage for stage in stages if stage.claims))
         shorten(monkeypatch)

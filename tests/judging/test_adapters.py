@@ -28,8 +28,8 @@ from symtop.judging.claims import calls, subject
 from symtop.judging.claims.subject import open_target
 from symtop.judging.findings import VERDICTS
 from symtop.judging.remote import clock
-from tests.commands import ROOT, answer
-from tests.conftest import late
+from tests.commands import ROOT, code_and_output
+from tests.conftest import defer
 from tests.judging.blind.right import midpoint, product, rates, rk4, turn, verlet
 from tests.judging.conftest import shorten
 
@@ -37,7 +37,7 @@ SPHEROID = symtop.scene("spheroid")
 needs_compiler = pytest.mark.skipif(shutil.which("gcc") is None, reason="there is no C compiler")
 
 
-def marched(stepper, h, marks):
+def march(stepper, h, marks):
     """The state that a stepper begins with, and what it makes of so many steps of h."""
     par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
     return np.array(state), stepper.march(SPHEROID.top, par, np.array(state), h, np.array(marks))
@@ -55,8 +55,8 @@ def test_a_python_step_makes_the_steps_of_the_tableau_that_it_is(chart):
     ours, mine = symtop.simulate(SPHEROID, tableau.variant(chart), **plan), run_of(PythonStep(midpoint, chart))
     np.testing.assert_allclose(mine["axis"].values, ours["axis"].values, rtol=0, atol=1e-12)
     np.testing.assert_allclose(mine["p_psi"].values, ours["p_psi"].values, rtol=1e-12)
-    ended = run_of(PythonStep(lambda f, t, y, h: midpoint(f, t, y, h) * (1.0 if t < 0.45 else np.nan), chart))
-    assert [ended.attrs[key] for key in ("outcome", "reached_time", "steps")] == ["not_finite", 0.4, 100]
+    run = run_of(PythonStep(lambda f, t, y, h: midpoint(f, t, y, h) * (1.0 if t < 0.45 else np.nan), chart))
+    assert [run.attrs[key] for key in ("outcome", "reached_time", "steps")] == ["not_finite", 0.4, 100]
     assert run_of(PythonStep(lambda f, t, y, h: -abs(y) if t > 0.3 else y, "angles"))["theta"].count() == 2  # has left
 
 
@@ -66,20 +66,20 @@ def test_a_scipy_class_makes_the_steps_that_it_is_told_to():
     assert run.attrs["steps"] == 200
     assert run.attrs["force_evaluations"] == pytest.approx(600, abs=5)  # it has one in hand at each end
     finer, truth = run_of(open_target(Mine, None, "axis"), 400), symtop.reference(SPHEROID, run["time"].values)
-    misses = [float(np.abs(one["axis"].values - truth["axis"].values).max()) for one in (run, finer)]
+    misses = [float(np.abs(result["axis"].values - truth["axis"].values).max()) for result in (run, finer)]
     assert misses[0] / misses[1] == pytest.approx(8.0, rel=0.1)
 
 
 def test_separable_steps_are_those_of_the_splitting_and_a_rotation_is_that_of_the_top():
     stepper = RotationStep(lambda q, w, h, inertia, torque: (q, w))
     par, state = stepper.form.prepare(SPHEROID.top, SPHEROID.start)
-    shown = stepper.form.present(par, np.zeros(1), np.array([state]))[0]
-    at = symtop.simulate(SPHEROID, "strang[attitude]", step_size=0.1, horizon=0.2, samples=2, guard=False).isel(time=0)
-    np.testing.assert_allclose(np.abs(shown[:4] @ at["quaternion"].values), 1.0, atol=1e-14)
+    values = stepper.form.present(par, np.zeros(1), np.array([state]))[0]
+    run = symtop.simulate(SPHEROID, "strang[attitude]", step_size=0.1, horizon=0.2, samples=2, guard=False).isel(time=0)
+    np.testing.assert_allclose(np.abs(values[:4] @ run["quaternion"].values), 1.0, atol=1e-14)
     p_phi, p_psi = stepper.form.momenta(par, np.array([state]))
     np.testing.assert_allclose([p_phi[0], p_psi[0]], SPHEROID.top.momenta(SPHEROID.start)[:2], rtol=1e-14)
     ours = symtop.simulate(SPHEROID, "stormer-verlet", step_size=0.004, horizon=0.8, samples=2).isel(time=-1)
-    _, states = marched(stepper := SeparableStep(verlet), 0.004, [200])
+    _, states = march(stepper := SeparableStep(verlet), 0.004, [200])
     np.testing.assert_allclose(states[0], [float(ours["theta"]), float(ours["p_theta"])], rtol=1e-12)
     assert stepper.evaluations == 400
 
@@ -105,7 +105,7 @@ def test_a_library_is_asked_for_so_many_steps_and_told_where_it_must_not_write(t
         (tmp_path / words).mkdir()
         with pytest.raises(symtop.SymtopError, match=words):
             run_of(open_target(library(tmp_path / words, body), None, "axis"))
-    state, states = marched(open_target(library(tmp_path), None, "axis"), 0.5, [0, 1, 4])
+    state, states = march(open_target(library(tmp_path), None, "axis"), 0.5, [0, 1, 4])
     np.testing.assert_array_equal(states[0], state)
     np.testing.assert_allclose(states[:, 4] - state[4], np.array([0, 1, 4]) * 0.5 * SPHEROID.top.mgl * state[0])
     assert open_target(f"{tmp_path / 'my.so'}:other", None, "axis").name == "my-other"
@@ -123,13 +123,13 @@ FLIPPED = STILL.replace("*numbers[6:12]", "*(-float(x) for x in numbers[6:10]), 
 TURNED = STILL.replace("*numbers[6:12]", "numbers[6], float(numbers[7]) + 6.283185307179586, *numbers[8:]")
 
 
-@pytest.mark.parametrize(("body", "chart", "changed"), [
+@pytest.mark.parametrize(("body", "chart", "change"), [
     (STILL, "axis", lambda y: y), (RAW, "axis", lambda y: y), (FLIPPED, "attitude", lambda y: [*-y[:4], *y[4:]]),
     (TURNED, "angles", lambda y: [y[0], y[1] + 2.0 * np.pi, *y[2:]]),
 ])  # fmt: skip
-def test_a_program_gets_one_line_and_writes_states(tmp_path, body, chart, changed):
-    state, states = marched(open_target(program(tmp_path, body), "program", chart), 0.5, [0, 6, 9])
-    np.testing.assert_array_equal(states, [changed(state)] * 3)
+def test_a_program_gets_one_line_and_writes_states(tmp_path, body, chart, change):
+    state, states = march(open_target(program(tmp_path, body), "program", chart), 0.5, [0, 6, 9])
+    np.testing.assert_array_equal(states, [change(state)] * 3)
 
 
 def test_text_as_long_as_raw_doubles_is_text(tmp_path):
@@ -186,9 +186,9 @@ for numbers in map(str.split, sys.stdin):
     ("os.close(1); time.sleep(99)", "had not ended its answer with an empty line 2 s after", 2),
 ])  # fmt: skip
 def test_a_server_is_started_once_and_again_only_if_it_fails(tmp_path, body, words, starts, monkeypatch):
-    late = "had not" in words
-    monkeypatch.setattr(heartbeat, "patience", 2.0 if late else 0.0 if "licence" in words else 20.0)
-    monkeypatch.setattr(external, "STARTING", 0.0 if late else 30.0)  # seconds, also of a second start
+    silent = "had not" in words
+    monkeypatch.setattr(heartbeat, "patience", 2.0 if silent else 0.0 if "licence" in words else 20.0)
+    monkeypatch.setattr(external, "STARTING", 0.0 if silent else 30.0)  # seconds, also of a second start
     mark, file = tmp_path / "starts", tmp_path / "engine.py"
     file.write_text(SERVES.format(mark=str(mark), body=body))
     stepper = open_target(f"{sys.executable} {file}", "server", "axis")
@@ -200,8 +200,8 @@ def test_a_server_is_started_once_and_again_only_if_it_fails(tmp_path, body, wor
     assert mark.read_text().count("started") == starts
 
 
-def test_a_server_ends_with_the_judging_that_is_not_forked_too(tmp_path, only, monkeypatch):
-    only("calls")
+def test_a_server_ends_with_the_judging_that_is_not_forked_too(tmp_path, keep_claims, monkeypatch):
+    keep_claims("calls")
     monkeypatch.setitem(sys.modules, "jax", None)
     mark, file = tmp_path / "process", tmp_path / "engine.py"
     start = f"import os\nopen({str(mark)!r}, 'w').write(str(os.getpid()))\n"
@@ -262,9 +262,9 @@ def test_a_file_beside_others_one_that_fails_and_a_name_that_is_not_there(tmp_pa
 
 
 @pytest.mark.parametrize("claimed", [1000, *(pytest.param(claim, marks=pytest.mark.slow) for claim in (3, 10))])
-def test_the_order_that_is_there_is_found_whatever_is_claimed(claimed, only):
+def test_the_order_that_is_there_is_found_whatever_is_claimed(claimed, keep_claims):
     """Long steps, as a method of order 10 may take, show no slope of one of order 2."""
-    only("order")
+    keep_claims("order")
     finding = symtop.judge(midpoint, order=claimed, quick=True)["order"]
     assert (finding.verdict, finding.declared) == ("refuted", str(claimed))
     assert finding.value == pytest.approx(2.0, abs=0.02)
@@ -278,13 +278,13 @@ def _keeps_its_slope(f, t, y, h, memory=[np.zeros(6)]):  # noqa: B006, B008  (wh
 PENDULUM = symtop.Scene("pendulum", symtop.SymmetricTop(1.0, 0.5, 1.0), symtop.Angles(theta=2.0), 20.0)
 
 
-@pytest.mark.parametrize("scene", [*late("sleeping"), *late("separatrix", PENDULUM, mark="slow")])
-def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, only, monkeypatch):
+@pytest.mark.parametrize("scene", [*defer("sleeping"), *defer("separatrix", PENDULUM, mark="slow")])
+def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, keep_claims, monkeypatch):
     """Beside a pole angles know a state badly; a pendulum has momenta of zero, which are no unit."""
-    only("calls", "order")
+    keep_claims("calls", "order")
     judge = partial(symtop.judge, scene=scene, quick=True)
-    right = judge(rk4, order=4)
-    assert (right.refuted, right["order"].verdict, right["calls"].measured.kind) == ([], "confirmed", "a function")
+    ledger = judge(rk4, order=4)
+    assert (ledger.refuted, ledger["order"].verdict, ledger["calls"].measured.kind) == ([], "confirmed", "a function")
     faults = (midpoint, 3), (lambda f, t, y, h: rk4(f, t, y, h) + 1e-10 * h * (f(t, y) - f(t + h, y + h * f(t, y))), 4)
     verdicts = [judge(step, order=power).refuted for step, power in faults], judge(_keeps_its_slope)["calls"].verdict
     assert verdicts == ([["order"]] * 2, "refuted")
@@ -294,12 +294,12 @@ def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, onl
         assert judge(lambda f, t, y, h: midpoint(f, t, y, 1.001 * h), order=2).refuted == ["order"]
 
 
-@pytest.mark.parametrize("kept", [0.0, 1e-3])
-def test_what_a_run_that_blows_up_makes_of_the_last_bit_is_nothing_that_a_step_keeps(kept):
+@pytest.mark.parametrize("memory", [0.0, 1e-3])
+def test_what_a_run_that_blows_up_makes_of_the_last_bit_is_nothing_that_a_step_keeps(memory):
     scene, calls_made = symtop.scene("separatrix"), itertools.count()
-    stepper = PythonStep(lambda f, t, y, h: midpoint(f, t, y, h) + kept * h * (next(calls_made) % 7), "axis")
+    stepper = PythonStep(lambda f, t, y, h: midpoint(f, t, y, h) + memory * h * (next(calls_made) % 7), "axis")
     missed, _ = calls._cut(stepper, scene, calls.SHARE * scene.time_scale() / 1.6, [(8, 30), (3, 4)])
-    assert (missed > calls.RECALLED) is (kept > 0.0)
+    assert (missed > calls.RECALLED) is (memory > 0.0)
 
 
 def in_single(step):
@@ -308,25 +308,25 @@ def in_single(step):
 
 
 @pytest.mark.parametrize("scene", [pytest.param("spheroid", marks=pytest.mark.slow), "heavy-brick"])
-def test_single_precision_is_no_other_motion_and_one_of_a_step_in_it_is(scene, only):
+def test_single_precision_is_no_other_motion_and_one_of_a_step_in_it_is(scene, keep_claims):
     """Runs of more steps than their rounding lets be judged end 1e-6 away; an order that it hides is undecided."""
-    only("order")
+    keep_claims("order")
     options = {"scene": scene, "quick": True}
     assert symtop.judge(in_single(midpoint), order=2, **options)["order"].verdict == "confirmed"
     assert symtop.judge(in_single(midpoint), order=3, **options).refuted == ["order"]
-    with pytest.MonkeyPatch.context() as slowly:  # time for every step that single precision allows, on any machine
-        slowly.setattr(subject, "SLOPES", (600.0, 600.0))
+    with pytest.MonkeyPatch.context() as patch:  # time for every step that single precision allows, on any machine
+        patch.setattr(subject, "SLOPES", (600.0, 600.0))
         added = lambda f, t, y, h: y + (in_single(rk4)(f, t, y, h) - np.float32(y)).astype(float)
-        hidden = [symtop.judge(step, order=4, **options)["order"] for step in (in_single(rk4), added)]
+        findings = [symtop.judge(step, order=4, **options)["order"] for step in (in_single(rk4), added)]
     words = "undecided: single precision hides errors below about 1e-04: "
-    assert all(f"{one.verdict}: {one.why}".startswith(words) for one in hidden)
-    slow = symtop.judge(in_single(lambda f, t, y, h: midpoint(f, t, y, 0.999 * h)), order=2, **options)["order"]
-    assert (slow.verdict, slow.measured.kind) == ("refuted", "wrong limit")
+    assert all(f"{finding.verdict}: {finding.why}".startswith(words) for finding in findings)
+    finding = symtop.judge(in_single(lambda f, t, y, h: midpoint(f, t, y, 0.999 * h)), order=2, **options)["order"]
+    assert (finding.verdict, finding.measured.kind) == ("refuted", "wrong limit")
     assert "single" not in symtop.judge(midpoint, order=2, **options)["order"].why
 
 
 @pytest.mark.quick
-def test_single_precision_refutes_nothing_that_its_rounding_hides(only):
+def test_single_precision_refutes_nothing_that_its_rounding_hides(keep_claims):
     """It moves a step forth and back by 1e-8, and a bracket from differences by 1e-6."""
 
     def euler(state, h, dT, dV, share=1.0):
@@ -340,9 +340,9 @@ def test_single_precision_refutes_nothing_that_its_rounding_hides(only):
             slope = f(t + h / 2, y + h / 2 * slope)
         return y + h * slope
 
-    only("symplectic", "symmetric", "energy", "p_psi", "pole")
+    keep_claims("symplectic", "symmetric", "energy", "p_psi", "pole")
     claims = {"quick": True, "symplectic": True, "symmetric": True, "energy": "bounded", "form": "separable"}
-    good, bad = symtop.judge(euler, **claims), symtop.judge(lambda *given: euler(*given, share=0.0), **claims)
+    good, bad = symtop.judge(euler, **claims), symtop.judge(lambda *args: euler(*args, share=0.0), **claims)
     verdicts = good["symplectic"].verdict, good["energy"].verdict
     assert (good.refuted, *verdicts) == (["symmetric"], "undecided", "confirmed")
     assert good["symplectic"].why.startswith("single precision hides errors below about 4e-04: ")
@@ -356,37 +356,37 @@ def test_single_precision_refutes_nothing_that_its_rounding_hides(only):
 
 
 @pytest.mark.slow
-def test_an_axis_that_stays_upright_is_refused_in_a_sentence_and_one_that_hangs_is_judged(only):
+def test_an_axis_that_stays_upright_is_refused_in_a_sentence_and_one_that_hangs_is_judged(keep_claims):
     upright, hanging = (
         symtop.Scene("still", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(theta=theta, psi_dot=5.0), 20.0)
         for theta in (0.0, np.pi)
     )
-    only("calls")
+    keep_claims("calls")
     assert symtop.judge(midpoint, scene=hanging, quick=True)["calls"].measured.kind == "a function"
     assert symtop.judge(_keeps_its_slope, scene=hanging, quick=True)["calls"].verdict == "refuted"
     with pytest.raises(symtop.SymtopError, match="its axis stays upright"):
         symtop.judge(midpoint, scene=upright, quick=True)
 
 
-@pytest.mark.parametrize("claimed", [*late(2, mark="slow"), *late(12)])
-def test_a_motion_that_is_wrong_is_told_so_whatever_is_claimed(claimed, only):
-    only("order")
-    for factor, wrong in ((0.999, 2e-3), (0.0, None)):  # the second stands still
-        slow = lambda f, t, y, h, factor=factor: midpoint(f, t, y, factor * h)
-        finding = symtop.judge(slow, order=claimed, quick=True)["order"]
+@pytest.mark.parametrize("claimed", [*defer(2, mark="slow"), *defer(12)])
+def test_a_motion_that_is_wrong_is_told_so_whatever_is_claimed(claimed, keep_claims):
+    keep_claims("order")
+    for factor, expected in ((0.999, 2e-3), (0.0, None)):  # the second stands still
+        step = lambda f, t, y, h, factor=factor: midpoint(f, t, y, factor * h)
+        finding = symtop.judge(step, order=claimed, quick=True)["order"]
         assert finding.measured.kind == "wrong limit"
-        assert wrong is None or finding.value == pytest.approx(wrong, rel=0.2)
+        assert expected is None or finding.value == pytest.approx(expected, rel=0.2)
 
 
-def test_a_step_that_returns_nan_or_the_derivative_is_told_so(only):
-    only("calls", "order", "pole")
+def test_a_step_that_returns_nan_or_the_derivative_is_told_so(keep_claims):
+    keep_claims("calls", "order", "pole")
     for value, words in ((np.nan, "returns NaN"), (np.inf, "returns infinity"), (0.0, "jumps")):
         ledger = symtop.judge(lambda f, t, y, h, value=value: f(t, y) + value, quick=True)
         assert (ledger["calls"].measured.kind, ledger["calls"].verdict) == (words, "refuted")
         assert ("differ" in ledger["calls"].why, bool(ledger["order"].measured)) == (False, False)
-    nine = lambda *given: np.array([float(f"{x:.9g}") for x in midpoint(*given)])
+    rounded = lambda *args: np.array([float(f"{x:.9g}") for x in midpoint(*args)])
     still = lambda f, t, y, h: midpoint(f, t, y, h) if abs(h) > 1e-6 else y  # too short to be made, it says
-    kinds = [symtop.judge(step, quick=True)["calls"].measured.kind for step in (midpoint, nine, still)]
+    kinds = [symtop.judge(step, quick=True)["calls"].measured.kind for step in (midpoint, rounded, still)]
     assert kinds == ["a function", "few digits", "stands still"]
     pole = symtop.judge(lambda f, t, y, h: rk4(f, t, y, h) if y[3:] @ y[3:] > 9.0 else None, quick=True)["pole"]
     assert (pole.declared, pole.verdict) == ("", "undecided")  # a bare step that fails there has not claimed it
@@ -413,8 +413,8 @@ def test_waiting_for_a_processor_takes_none_of_the_time_that_judging_has():
 
 
 @pytest.mark.slow
-def test_a_step_that_hangs_backwards_is_judged_forwards(impatient, only):
-    only("calls", "order", "symplectic")
+def test_a_step_that_hangs_backwards_is_judged_forwards(impatient, keep_claims):
+    keep_claims("calls", "order", "symplectic")
     ledger = symtop.judge(lambda f, t, y, h: (hangs if h < 0 else midpoint)(f, t, y, h), quick=True, order=2)
     assert (ledger["calls"].measured.kind, ledger["order"].verdict) == ("forward only", "confirmed")
     assert (ledger["symplectic"].measured.kind, heartbeat.inside) == ("no", False)
@@ -431,24 +431,24 @@ def test_findings_come_as_they_are_made_and_are_a_screen_and_a_dataset(monkeypat
     events = []
     ledger = symtop.judge(changes_its_input, quick=True, tell=events.append)
     assert (events[0].name, events[1:]) == ("changes_its_input", list(ledger.findings))
-    assert [one.claim for one in ledger.findings] == [claim for stage in stages("step") for claim in stage.claims]
-    assert {one.verdict for one in ledger.findings} <= set(VERDICTS) - {"refuted", "confirmed"}
+    assert [entry.claim for entry in ledger.findings] == [claim for stage in stages("step") for claim in stage.claims]
+    assert {finding.verdict for finding in ledger.findings} <= set(VERDICTS) - {"refuted", "confirmed"}
     assert "writes to its input" in ledger["calls"].why
     data = ledger.dataset()
-    assert data["measured"].values.tolist() == [str(one.measured) for one in ledger.findings]
+    assert data["measured"].values.tolist() == [str(finding.measured) for finding in ledger.findings]
     assert data.attrs["name"] == "changes_its_input"
-    told_of = {line[:15].strip(): line[15:] for line in str(ledger).splitlines()}
+    texts = {line[:15].strip(): line[15:] for line in str(ledger).splitlines()}
     expected = {"order": "1.0", "symplectic": "no, ", "p_phi": "kept, ", "energy": "drifts, ", "work": "2.0 "}
-    assert [name for name, words in expected.items() if not told_of[name].startswith(words)] == []
+    assert [name for name, words in expected.items() if not texts[name].startswith(words)] == []
 
 
 EXAMPLES = ROOT / "studies" / "examples"
 STEPS = EXAMPLES / "judged_steps.py"
-run_judge = partial(answer, "judge", "--quick")
+run_judge = partial(code_and_output, "judge", "--quick")
 
 
-def test_a_file_with_a_step_says_what_it_is_and_writes_it(tmp_path, monkeypatch, only):
-    only("order", "symplectic", "symmetric", "energy", "p_phi")
+def test_a_file_with_a_step_says_what_it_is_and_writes_it(tmp_path, monkeypatch, keep_claims):
+    keep_claims("order", "symplectic", "symmetric", "energy", "p_phi")
     shutil.copy(STEPS, tmp_path / "mine.py")
     monkeypatch.setenv("HOME", str(tmp_path))
     files = ("--output=~/found.nc", "--card=~/card.html", "--badge", "~/badge.svg")
@@ -462,8 +462,8 @@ def test_a_file_with_a_step_says_what_it_is_and_writes_it(tmp_path, monkeypatch,
 
 
 @pytest.mark.slow
-def test_a_claim_is_implied_if_it_follows_from_those_that_are_made(only):
-    only("order", "time", "energy")
+def test_a_claim_is_implied_if_it_follows_from_those_that_are_made(keep_claims):
+    keep_claims("order", "time", "energy")
     for words, end in (((), "(time): 1 confirmed."), (("--symplectic",), "(energy and time): 1 confirmed, 1 refuted.")):
         assert run_judge(f"{STEPS}:heun", "--order", "2", *words)[1].endswith(f"Implied by them {end}\n")
 
@@ -477,14 +477,14 @@ def test_a_claim_is_implied_if_it_follows_from_those_that_are_made(only):
         *((f"{sys.executable} {EXAMPLES / 'judged_program.py'}", "--form", form, "--order", "2")
           for form in ("program", "server")))),
 ])  # fmt: skip
-def test_the_example_of_a_form_is_what_it_says(arguments, words, only):
-    only("order", "symplectic", "symmetric", *(["energy"] if "energy" in words else []))
+def test_the_example_of_a_form_is_what_it_says(arguments, words, keep_claims):
+    keep_claims("order", "symplectic", "symmetric", *(["energy"] if "energy" in words else []))
     code, output = run_judge(*arguments)
     assert (code, words in output) == (0, True), output
 
 
-def test_a_path_with_a_space_is_a_path_and_a_program_must_be_named(tmp_path, only):
-    only("calls")
+def test_a_path_with_a_space_is_a_path_and_a_program_must_be_named(tmp_path, keep_claims):
+    keep_claims("calls")
     mark, folder = tmp_path / "touched", tmp_path / "a folder"
     folder.mkdir()
     shutil.copy(STEPS, folder / "my steps.py")
@@ -511,11 +511,11 @@ def of_rotation(function, step_size, horizon):
 
 
 def test_a_step_of_rotation_matrices_is_judged_as_one_of_quaternions_until_it_is_no_rotation():
-    matrices, quaternions = (of_rotation(one, 0.01, 2.0) for one in (euler_of_matrices, euler_of_quaternions))
+    matrices, quaternions = (of_rotation(step, 0.01, 2.0) for step in (euler_of_matrices, euler_of_quaternions))
     assert matrices.attrs["outcome"] == quaternions.attrs["outcome"] == "ok"
     np.testing.assert_allclose(matrices["axis"].values, quaternions["axis"].values, atol=1e-11)
     np.testing.assert_allclose(matrices["p_phi"].values, quaternions["p_phi"].values, rtol=1e-10)
-    longer = lambda q, w, h, inertia, torque: euler_of_quaternions(q, w, h, inertia, lambda at: torque(2.0 * at))
+    longer = lambda q, w, h, inertia, torque: euler_of_quaternions(q, w, h, inertia, lambda pose: torque(2.0 * pose))
     np.testing.assert_allclose(of_rotation(longer, 0.01, 2.0)["axis"], quaternions["axis"], atol=1e-11)
     errors = [float(symtop.errors(of_rotation(euler_of_matrices, h, 0.5))["axis"].max()) for h in (2e-3, 1e-3)]
     assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.1)  # order 1
@@ -557,9 +557,9 @@ def _lives(pid: int) -> bool:
 
 
 @pytest.mark.slow
-def test_a_step_that_slows_down_is_judged_on_shorter_runs_and_one_that_stops_says_why_once(only, monkeypatch):
+def test_a_step_that_slows_down_is_judged_on_shorter_runs_and_one_that_stops_says_why_once(keep_claims, monkeypatch):
     """A step takes 0.5 ms from t = 20 on, which its first ones do not tell; or 2.5 ms, always, after 1 s to open it."""
-    only("energy", "p_phi", "p_psi")
+    keep_claims("energy", "p_phi", "p_psi")
     monkeypatch.setattr(judge_step, "QUICK_VERDICT", (1.0, 2.5, 1.0))
 
     def slow_from(since, seconds):
@@ -571,7 +571,7 @@ def test_a_step_that_slows_down_is_judged_on_shorter_runs_and_one_that_stops_say
         return symtop.judge(step, quick=True)
 
     slow = slow_from(20.0, 5e-4)
-    monkeypatch.setattr(judge_step, "seconds_a_step", lambda *given: time.sleep(1.0) or subject.seconds_a_step(*given))
+    monkeypatch.setattr(judge_step, "seconds_a_step", lambda *args: time.sleep(1.0) or subject.seconds_a_step(*args))
     stuck = slow_from(0.0, 2.5e-3)
     assert (slow["energy"].measured.kind in ("drift", "growing"), 300 < slow.traces["steps_run"] < 5000) == (True, True)
     assert [stuck[claim].verdict for claim in stuck] == ["undecided"] * 3

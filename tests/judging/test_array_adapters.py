@@ -13,7 +13,7 @@ import symtop
 from symtop.judging.adapters.external import field_of
 from symtop.judging.claims.subject import open_target
 from symtop.methods.framework.equations import FORMULATIONS
-from tests.commands import ROOT, ended, printed_by, symtop as command
+from tests.commands import ROOT, finish, printed_by, symtop as command
 from tests.judging.blind.right import midpoint
 
 SPHEROID = symtop.scene("spheroid")
@@ -25,8 +25,8 @@ def needs(package):
 
 def judge(*arguments):
     """The exit code, and the findings by claim, or what is said of the refusal."""
-    code, out, err = ended(command("judge", *arguments, "--quick", "--json", PYTHONPATH=ROOT))
-    return code, err if code == 2 else {one["claim"]: one for one in json.loads(out)}
+    code, out, err = finish(command("judge", *arguments, "--quick", "--json", PYTHONPATH=ROOT))
+    return code, err if code == 2 else {finding["claim"]: finding for finding in json.loads(out)}
 
 
 @pytest.mark.parametrize("chart", ["axis", "attitude"])
@@ -61,8 +61,8 @@ def test_a_solver_in_a_session_that_has_imported_jax(tmp_path):
     first = "import symtop\nsymtop.compare('spheroid', 'my.py:ralston', cost='evaluations', budget=99, quiet=True)\n"
     code = "ledger = symtop.judge(midpoint, order=2, quick=True)\nprint(ledger['order'].verdict)\n"
     mode = "import jax\nprint(jax.config.jax_enable_x64)\n"
-    printed = printed_by(first + mode + SOLVERS + code + mode, cwd=tmp_path, PYTHONPATH=ROOT)
-    assert printed.split() == ["False", "confirmed", "False"]
+    output = printed_by(first + mode + SOLVERS + code + mode, cwd=tmp_path, PYTHONPATH=ROOT)
+    assert output.split() == ["False", "confirmed", "False"]
 
 
 BATCHES = """
@@ -116,6 +116,6 @@ def test_what_does_not_fit_is_told_so(tmp_path, form):
 @pytest.mark.parametrize("form", ["torch", "jax"])
 def test_what_is_not_installed_is_named_and_the_angles_are_refused(form):
     words = f"form {form} needs the package {form}, which", f"be axis or attitude for the form {form}, not 'angles'"
-    there = importlib.util.find_spec(form) is not None
-    with pytest.raises(symtop.SymtopError, match=words[there]):
-        open_target(midpoint, form, ("axis", "angles")[there])
+    installed = importlib.util.find_spec(form) is not None
+    with pytest.raises(symtop.SymtopError, match=words[installed]):
+        open_target(midpoint, form, ("axis", "angles")[installed])

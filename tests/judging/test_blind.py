@@ -16,7 +16,7 @@ from symtop.judging import battery, judge_step
 from symtop.judging.claims import calls, subject
 from symtop.judging.findings import description
 from symtop.judging.remote import Remote
-from tests.conftest import late
+from tests.conftest import defer
 from tests.judging.blind import right, wrong
 
 BLIND, EXAMPLES = Path(__file__).parent / "blind", Path(__file__).parents[2] / "studies" / "examples"
@@ -40,11 +40,11 @@ def step_of(name, *modules):
     return next((vars(module)[name] for module in modules if name in vars(module)), None) or getattr(integrate, name)
 
 
-def confirmed(ledger, *claims):
+def check_claims(ledger, *claims):
     """Nothing is refuted, these claims are confirmed, and the order in time is that of the claim if it is."""
     assert ledger.refuted == [], str(ledger)
-    time = [one for one in ledger.findings if one.claim == "time" and one.verdict == "confirmed"]
-    assert all(str(one.measured.number) == one.declared for one in time)
+    time = [finding for finding in ledger.findings if finding.claim == "time" and finding.verdict == "confirmed"]
+    assert all(str(finding.measured.number) == finding.declared for finding in time)
     assert {ledger[claim].verdict for claim in claims} <= {"confirmed"}, str(ledger)
 
 
@@ -56,36 +56,36 @@ def test_a_correct_method_is_not_refuted(name, seconds, monkeypatch):
     claims, options = right.CLAIMS[name]
     ledger = symtop.judge(step_of(name, right), quick=True, **claims, **options)
     explicit = ["explicit"] if claims.get("explicit") else []  # that it is not, nobody sees from outside
-    confirmed(ledger, *(claim for claim in claims if claim in SHOWN), *explicit)
+    check_claims(ledger, *(claim for claim in claims if claim in SHOWN), *explicit)
     assert ledger["pole"].verdict in ("measured", "inapplicable")  # never claimed of a step
 
 
 @pytest.mark.parametrize("name", [
-    "AdamsBashforth", "separable_forest_ruth", "rotation_guarded", "own_energy", *late("rotation_strang", mark="slow")
+    "AdamsBashforth", "separable_forest_ruth", "rotation_guarded", "own_energy", *defer("rotation_strang", mark="slow")
 ])  # fmt: skip
-def test_what_is_claimed_of_a_correct_method_is_confirmed_in_short_runs(name, only):
-    only(*(claim for stage in battery.TABLE for claim in stage.claims))
+def test_what_is_claimed_of_a_correct_method_is_confirmed_in_short_runs(name, keep_claims):
+    keep_claims(*(claim for stage in battery.TABLE for claim in stage.claims))
     claims, options = right.CLAIMS[name]
     ledger = symtop.judge(step_of(name, right), quick=True, **claims, **options)
-    confirmed(ledger, *(claim for claim in claims if claim in SHOWN))
+    check_claims(ledger, *(claim for claim in claims if claim in SHOWN))
 
 
 @pytest.mark.quick
 @pytest.mark.parametrize("name", ["BDF", "LSODA", "DOP853"])
-def test_classes_of_variable_order_are_judged_at_a_tolerance(name, only):
+def test_classes_of_variable_order_are_judged_at_a_tolerance(name, keep_claims):
     """They claim no order; that their error falls with the tolerance is confirmed, and refuted of `WrongSum`."""
-    only("calls", "order", "pole")
+    keep_claims("calls", "order", "pole")
     ledger = symtop.judge(step_of(name, right), quick=True, adaptive=True)
     assert (ledger["calls"].verdict, ledger["pole"].verdict) == ("inapplicable", "measured")
-    for one in (ledger, symtop.judge(step_of(name, right), scene="heavy-brick", quick=True, adaptive=True)):
-        confirmed(one, "order")
-        assert description(one.findings) in ("converges as its tolerance falls", "order 5")
+    for each in (ledger, symtop.judge(step_of(name, right), scene="heavy-brick", quick=True, adaptive=True)):
+        check_claims(each, "order")
+        assert description(each.findings) in ("converges as its tolerance falls", "order 5")
     assert symtop.judge(wrong.WrongSum, scene="heavy-brick", quick=True, adaptive=True).refuted == ["order"]
 
 
-def test_a_symmetric_step_is_symmetric_where_its_iteration_fails_at_long_steps(only):
+def test_a_symmetric_step_is_symmetric_where_its_iteration_fails_at_long_steps(keep_claims):
     """At a start that this seed draws the iteration of the substep of -1.7 h does not converge; at h/2 it does."""
-    only("symmetric")
+    keep_claims("symmetric")
     for name, verdict in (("triple_jump", "confirmed"), ("half_symmetric", "refuted")):
         ledger = symtop.judge(step_of(name, right, wrong), quick=True, symmetric=True, seed=754319425)
         assert ledger["symmetric"].verdict == verdict, str(ledger)
@@ -96,12 +96,12 @@ def test_a_symmetric_step_is_symmetric_where_its_iteration_fails_at_long_steps(o
 @pytest.mark.parametrize("name", ["rk4", "dormand_prince"])
 def test_a_correct_method_is_not_refuted_in_another_chart(name, chart):
     order = right.CLAIMS[name][0]["order"]
-    confirmed(symtop.judge(step_of(name, right), chart=chart, quick=True, order=order), "order")
+    check_claims(symtop.judge(step_of(name, right), chart=chart, quick=True, order=order), "order")
 
 
 @needs_compiler
 @pytest.mark.parametrize(("source", "options", "claims", "refuted"), [
-    ("strang.c", (), {"order": 2, **SPLIT}, ""), ("wrong.c", ("-DKIND=0",), {"order": 3}, "order"), *late(
+    ("strang.c", (), {"order": 2, **SPLIT}, ""), ("wrong.c", ("-DKIND=0",), {"order": 3}, "order"), *defer(
         (EXAMPLES / "judged.c", (), {"order": 1, "symplectic": True, "conserves": ["p_phi", "p_psi"]}, ""),
         ("strang.c", ("-DYOSHIDA",), {"order": 4, **SPLIT}, ""),
         ("strang.c", ("-DMCLACHLAN",), {"order": 4, **SPLIT}, ""),
@@ -120,13 +120,13 @@ def test_what_is_written_in_c(tmp_path, source, options, claims, refuted):
         assert refuted in ledger.refuted, str(ledger)
     else:
         constants = ("energy", "p_phi", "p_psi") if "energy" in claims else ()
-        confirmed(ledger, *(claim for claim in claims if claim in SHOWN), *constants)
+        check_claims(ledger, *(claim for claim in claims if claim in SHOWN), *constants)
 
 
 @needs_compiler
-def test_the_order_of_a_correct_program_is_confirmed(tmp_path, only):
-    only("calls", "order")
-    confirmed(symtop.judge(compiled(tmp_path, "strang.c", program=True), quick=True, order=2, **PROGRAM), "order")
+def test_the_order_of_a_correct_program_is_confirmed(tmp_path, keep_claims):
+    keep_claims("calls", "order")
+    check_claims(symtop.judge(compiled(tmp_path, "strang.c", program=True), quick=True, order=2, **PROGRAM), "order")
 
 
 @pytest.mark.slow
@@ -141,10 +141,10 @@ def test_a_program_in_another_language():
 
 
 @pytest.mark.slow
-def test_the_stages_of_an_implicit_class_are_solved_and_newton_is_left_as_it_was(only):
+def test_the_stages_of_an_implicit_class_are_solved_and_newton_is_left_as_it_was(keep_claims):
     from scipy.integrate._ivp import radau
 
-    only("order")
+    keep_claims("order")
     assert radau.NEWTON_MAXITER == 6
     ledger = symtop.judge(integrate.Radau, quick=True, order=5)
     assert ledger.refuted == [], str(ledger)
@@ -161,9 +161,9 @@ QUICKLY = (
 
 
 @pytest.mark.parametrize("name", QUICKLY)
-def test_the_line_that_names_a_defect_refutes_it(name, only):
+def test_the_line_that_names_a_defect_refutes_it(name, keep_claims):
     claims, line, options = wrong.CLAIMS[name]
-    only(line)
+    keep_claims(line)
     ledger = symtop.judge(step_of(name, wrong, right), quick=True, **claims, **options)
     assert ledger.refuted == [line], str(ledger)
 
@@ -177,18 +177,18 @@ def test_a_wrong_method_is_caught_by_the_line_that_names_its_defect(name):
 
 
 @pytest.mark.parametrize(("change", "line"), [({"late": 1.0}, "time"), ({"off": 1e-6}, "order"), ({}, "")])
-def test_a_method_of_several_steps_is_not_judged_by_the_steps_that_start_it(change, line, only):
+def test_a_method_of_several_steps_is_not_judged_by_the_steps_that_start_it(change, line, keep_claims):
     """Of order 4 and symmetric, which three-step Adams is not."""
-    only("order", "time", "symmetric")
+    keep_claims("order", "time", "symmetric")
     kind = type("Three", (wrong.AdamsBashforth3,), {"start": staticmethod(right.gauss_4)} | change)
     ledger = symtop.judge(kind, quick=True, order=3, symmetric=True, scene="simo-wong")
     assert (ledger.refuted, ledger["symmetric"].verdict) == ([line] * bool(line), "undecided"), str(ledger)
 
 
-def test_a_small_defect_of_the_bracket_that_stands_out_of_its_noise_is_not_confirmed(only):
-    only("symplectic")
+def test_a_small_defect_of_the_bracket_that_stands_out_of_its_noise_is_not_confirmed(keep_claims):
+    keep_claims("symplectic")
     for loss, verdict in ((0.0, "confirmed"), (1e-9, "undecided"), (1e-7, "refuted")):
-        damped = lambda *given, loss=loss: right.own_drift(*given) * np.repeat([1.0, 1.0 - loss], 3)
+        damped = lambda *args, loss=loss: right.own_drift(*args) * np.repeat([1.0, 1.0 - loss], 3)
         assert symtop.judge(damped, quick=True, symplectic=True)["symplectic"].verdict == verdict
 
 
@@ -201,12 +201,12 @@ def test_a_step_that_tires_after_a_hundred_thousand_is_found_in_full(monkeypatch
 
 
 @pytest.mark.parametrize("name", ["noisy", "sometimes_noisy"])
-def test_random_noise_is_no_memory(name, only):
-    only("calls")
+def test_random_noise_is_no_memory(name, keep_claims):
+    keep_claims("calls")
     assert symtop.judge(step_of(name, wrong, right), quick=True)["calls"].measured.kind == "not repeatable"
 
 
-def test_what_knows_every_state_again_is_caught_by_its_last_bit(only, monkeypatch):
+def test_what_knows_every_state_again_is_caught_by_its_last_bit(keep_claims, monkeypatch):
     """Two-step Adams, where the process that remembers is not made anew."""
     slopes = {}
 
@@ -215,36 +215,36 @@ def test_what_knows_every_state_again_is_caught_by_its_last_bit(only, monkeypatc
         slopes[after.tobytes()] = slope
         return after
 
-    only("calls")
+    keep_claims("calls")
     monkeypatch.setattr(Remote, "renew", lambda _: None)
     assert symtop.judge(remembers, quick=True, order=2).refuted == ["calls"]
 
 
 @pytest.mark.quick
-def test_a_seed_draws_the_same_and_without_a_claim_the_order_is_said_and_not_the_slope(only):
-    only("order")
+def test_a_seed_draws_the_same_and_without_a_claim_the_order_is_said_and_not_the_slope(keep_claims):
+    keep_claims("order")
     ledger = symtop.judge(wrong.rounded_triple, quick=True)
     assert ledger.refuted == []
     text, _, doubt = str(ledger["order"].measured).partition(" +- ")
     assert text == "2: in one step the term in h^3 is the first that is wrong, by 1e-07"
     assert 0.0 < float(doubt.removesuffix(" of it")) < 1e-9
     assert description(ledger.findings) == "order 2"
-    first, again = (symtop.judge(wrong.late_euler, quick=True, order=4, seed=7) for _ in range(2))
-    assert (first["order"].why, "of seed 7" in first["order"].why) == (again["order"].why, True)
+    first, second = (symtop.judge(wrong.late_euler, quick=True, order=4, seed=7) for _ in range(2))
+    assert (first["order"].why, "of seed 7" in first["order"].why) == (second["order"].why, True)
     assert (first.refuted, first.about.seed) == (["order"], 7)
 
 
 @pytest.mark.quick
-def test_no_order_is_below_zero(only):
-    only("order")
+def test_no_order_is_below_zero(keep_claims):
+    keep_claims("order")
     for claim in ({}, {"order": 4}):
         ledger = symtop.judge(lambda f, t, y, h: right.rk4(f, t, y, h) + 1e-6, quick=True, seed=1, **claim)
         assert str(ledger["order"].measured).startswith("0: in one step the term in h^0 is the first that is wrong")
         assert "It is: order 0" in str(ledger)
 
 
-def test_a_step_written_for_f_of_y_may_say_so(only):
+def test_a_step_written_for_f_of_y_may_say_so(keep_claims):
     wrong_times = lambda f, t, y, h: y + h * f(t, y + h / 2 * f(t + 0.3 * h, y))
-    only("time")
+    keep_claims("time")
     assert symtop.judge(wrong_times, quick=True, order=2).refuted == ["time"]
     assert symtop.judge(wrong_times, quick=True, order=2, autonomous=True)["time"].verdict == "inapplicable"

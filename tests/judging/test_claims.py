@@ -32,17 +32,17 @@ from symtop.model import charts
 from symtop.model.scenes import body_scenes, scene
 from symtop.run.ensemble.bodies import body_population, scenes_of
 from symtop.run.simulation import integrate
-from tests.commands import answer, call, ended, symtop as command
-from tests.conftest import late, random_scenes
+from tests.commands import call, code_and_output, finish, symtop as command
+from tests.conftest import defer, random_scenes
 from tests.judging.blind import right
 from tests.judging.blind.right import euler, implicit_euler
 
 SPHEROID = symtop.scene("spheroid")
 
 
-def one_finding(subject, method, claim):
+def finding_of(subject, method, claim):
     """What a module of claims finds of one of them."""
-    return {one.claim: one for one in subject.measure(Subject(method, SPHEROID, quick=True))}[claim]
+    return {finding.claim: finding for finding in subject.measure(Subject(method, SPHEROID, quick=True))}[claim]
 
 
 def still(chart, change=lambda y: y):
@@ -62,10 +62,10 @@ def still(chart, change=lambda y: y):
 
 @pytest.mark.parametrize("chart", ["angles", "axis", "attitude"])
 def test_the_brackets_of_every_chart_are_those_of_its_variables_and_see_growth_by_a_millionth_a_step(chart):
-    for chosen in random_scenes(3, seed=41):
-        step = one_step(still(chart), chart, chosen, 0.1)
-        assert symplectic_defect(step, chosen.start).size < 1e-11
-        tables = bracket(chart, step.at(chosen.start))
+    for case in random_scenes(3, seed=41):
+        step = one_step(still(chart), chart, case, 0.1)
+        assert symplectic_defect(step, case.start).size < 1e-11
+        tables = bracket(chart, step.at(case.start))
         np.testing.assert_array_equal(tables, -tables.T)
 
     def swell(state):
@@ -125,30 +125,30 @@ def test_jumps_short_runs_and_noise_are_told_from_growth():
     jump = np.where(TIME > 4000.0, 1e-6, 0.0) + 1e-12 * np.sin(TIME)
     assert long.change_of(TIME, jump, WAVE[:9] * 1e-10, 1000).sudden.startswith("after t = 4000 it changes ")
     swell = 1e-13 * np.exp(TIME / 400.0) * np.sin(TIME / 3.0)  # which stands still at each turn
-    assert {long.change_of(TIME, one, WAVE[:9] * 1e-10, 1000).sudden for one in (WAVE, swell)} == {""}
-    short = long.change_of(TIME, np.where(TIME < 4.0, WAVE + 1e-6, np.nan), WAVE[:2], 2000)  # ends before two decades
-    assert (math.isnan(short.changed.exponent), short.kind, short.grows) == (True, "unknown", None)
+    assert {long.change_of(TIME, values, WAVE[:9] * 1e-10, 1000).sudden for values in (WAVE, swell)} == {""}
+    change = long.change_of(TIME, np.where(TIME < 4.0, WAVE + 1e-6, np.nan), WAVE[:2], 2000)  # ends before two decades
+    assert (math.isnan(change.changed.exponent), change.kind, change.grows) == (True, "unknown", None)
     wave = 1e-3 * (1.0 - np.cos(TIME / 374.5))  # 3.4 periods; the first begins with growth
-    assert [long.change_of(TIME, wave, wave[:9], 400, period=one).grows for one in (0.0, 2353.0)] == [True, None]
+    assert [long.change_of(TIME, wave, wave[:9], 400, period=period).grows for period in (0.0, 2353.0)] == [True, None]
     draw = np.random.default_rng(5)
     kinds = [long.change_of(TIME, WAVE + 1e-6 * draw.standard_normal(TIME.size), WAVE, 1).kind for _ in range(200)]
     assert set(kinds) == {"bounded"}
 
 
 @pytest.mark.quick
-def test_an_energy_that_leaves_its_scale_is_said_to_blow_up_and_the_rest_judged_until_then(only, monkeypatch):
+def test_an_energy_that_leaves_its_scale_is_said_to_blow_up_and_the_rest_judged_until_then(keep_claims, monkeypatch):
     """Euler's method gains energy, and keeps p_phi; the implicit one loses all that it can, which is no blow-up."""
-    only("energy", "p_phi")
+    keep_claims("energy", "p_phi")
     monkeypatch.setattr("symtop.judging.claims.subject.LONG", (10.0, 60.0))  # time for its 39,288 steps on any machine
     ledger = symtop.judge(euler, quick=True, energy="bounded")
-    assert [ledger[one].measured.kind for one in (*ledger.refuted, "p_phi")] == ["blows up", "kept"]
+    assert [ledger[claim].measured.kind for claim in (*ledger.refuted, "p_phi")] == ["blows up", "kept"]
     assert 1.0 < ledger["energy"].value / (1.0 + 2.0 * SPHEROID.top.mgl / SPHEROID.energy_scale) < 2.0
     monkeypatch.setattr("symtop.judging.claims.subject.LONG", (10.0, 2.5))
     assert symtop.judge(implicit_euler, quick=True)["energy"].measured.kind in ("drift", "growing", "bounded")
-    growing = symtop.judge(lambda q, w, h, inertia, torque: (q, w + h * w), form="rotation", scene=HEAVY, quick=True)
-    assert growing["energy"].measured.kind == "blows up"
-    stopped = symtop.judge(euler, scene=HEAVY, quick=True).traces  # its quaternion leaves the chart
-    assert stopped["steps_run"] == pytest.approx(118 * 10.03 * stopped["nutations_run"], rel=0.02)
+    ledger = symtop.judge(lambda q, w, h, inertia, torque: (q, w + h * w), form="rotation", scene=HEAVY, quick=True)
+    assert ledger["energy"].measured.kind == "blows up"
+    traces = symtop.judge(euler, scene=HEAVY, quick=True).traces  # its quaternion leaves the chart
+    assert traces["steps_run"] == pytest.approx(118 * 10.03 * traces["nutations_run"], rel=0.02)
 
 
 @pytest.mark.parametrize(("largest", "verdict"), [(0.9, "confirmed"), (3.2, "refuted")])
@@ -167,7 +167,7 @@ def test_a_claim_about_several_charts_is_judged_in_the_worst_of_them():
     runs = {chart: long.long_run(rk4, SPHEROID, chart, quick=True) for chart in rk4.charts()}
     kinds = {chart: run.constants["p_phi"].kind for chart, run in runs.items()}
     assert kinds == {"angles": "drift", "axis": "kept", "attitude": "kept"}
-    finding = one_finding(constants, rk4, "p_phi")
+    finding = finding_of(constants, rk4, "p_phi")
     assert finding.measured.kind == "drift"
     assert finding.why.endswith("in the angles chart")
 
@@ -177,13 +177,13 @@ def test_the_limit_of_an_honest_method_is_the_true_motion_and_of_one_whose_step_
     for name in ("midpoint", "strang", "gauss-4", "rk4"):
         method = symtop.integrator(name)
         assert max(order.limit(method, SPHEROID, method.order)) < 1e-12
-    good = symtop.integrator("strang")
+    strang = symtop.integrator("strang")
 
     def slow(top, start, plan):
-        return good.solvers["attitude"](top, start, plan._replace(step_size=plan.step_size * (1.0 - 1e-9)))
+        return strang.solvers["attitude"](top, start, plan._replace(step_size=plan.step_size * (1.0 - 1e-9)))
 
-    wrong = dataclasses.replace(good, name="slow", solvers={"attitude": slow})
-    assert 1e-10 < order.limit(wrong, SPHEROID, 2)[0] < 1e-7
+    variant = dataclasses.replace(strang, name="slow", solvers={"attitude": slow})
+    assert 1e-10 < order.limit(variant, SPHEROID, 2)[0] < 1e-7
 
 
 CLASSICAL = ((), (0.5,), (0.0, 0.5), (0.0, 0.0, 1.0)), (1 / 6, 1 / 3, 1 / 3, 1 / 6)
@@ -208,7 +208,7 @@ def triple(shift):
     (triple(1e-11), "refuted", "misses a condition of order 3 by 1.1e-11"),
 ])  # fmt: skip
 def test_a_table_that_is_off_is_refuted_before_any_run(method, verdict, why):
-    finding = one_finding(order, method, "order")
+    finding = finding_of(order, method, "order")
     assert (finding.verdict, finding.why.startswith(f"its table {why}")) == (verdict, True), finding.why
 
 
@@ -225,13 +225,13 @@ def test_every_splitting_of_the_catalogue_has_the_order_that_it_claims():
     ("radau", True, "undecided"), ("rk4", True, "confirmed"), ("rk4", None, "measured"), ("midpoint", True, "refuted"),
 ])  # fmt: skip
 def test_a_method_is_not_explicit_because_it_says_so(name, declared, verdict):
-    claiming = dataclasses.replace(symtop.integrator(name), explicit=declared)
-    run = long.long_run(claiming, SPHEROID, "angles", quick=True)
-    assert {one.claim: one for one in constants.of_run(claiming, run)}["explicit"].verdict == verdict
+    method = dataclasses.replace(symtop.integrator(name), explicit=declared)
+    run = long.long_run(method, SPHEROID, "angles", quick=True)
+    assert {finding.claim: finding for finding in constants.of_run(method, run)}["explicit"].verdict == verdict
 
 
 def test_the_angles_end_at_a_pole_and_the_space_frame_does_not():
-    ends = [(one.chart, one.outcome, one.passes) for one in structure.passages(symtop.integrator("rk4"))]
+    ends = [(entry.chart, entry.outcome, entry.passes) for entry in structure.passages(symtop.integrator("rk4"))]
     assert ends == [("angles", "left_chart", False), ("axis", "ok", True), ("attitude", "ok", True)]
 
 
@@ -253,17 +253,17 @@ def test_an_order_that_is_claimed_too_low_is_refuted_and_a_right_one_of_which_li
     assert "the h^9 term of a step is known only to 1e+00 of itself" in right.why
 
 
-@pytest.mark.parametrize(("main", "other", "doubt", "verdicts"), [
+@pytest.mark.parametrize(("main", "second", "doubt", "verdicts"), [
     (5.5, 4.0, 0.01, "confirmed" + 3 * " undecided"), (5.0, 4.0, 0.01, "confirmed refuted undecided refuted"),
     (5.5, 3.0, 0.01, "refuted " * 4), (3.0, 4.0, 0.01, "refuted " * 4), (4.0, 3.0, 0.01, "refuted " * 4),
     (5.5, 3.55, 0.01, "refuted " * 4), (3.55, 5.5, 0.01, "refuted " * 4),
     *[(*slopes, 0.01, "confirmed" + 3 * " undecided") for slopes in ((5.5, 3.9), (3.9, 4.0))]])  # fmt: skip
-def test_a_slope_yields_to_the_terms_of_a_step_but_for_one_that_is_clearly_lower(main, other, doubt, verdicts):
+def test_a_slope_yields_to_the_terms_of_a_step_but_for_one_that_is_clearly_lower(main, second, doubt, verdicts):
     terms = Series(1.0, np.array([0.0] * 5 + [1e-3]), np.full(6, 1e-14), True, "axis")  # of order 4
-    hidden, five = (terms._replace(defect=np.zeros(7), noise=np.full(7, noise)) for noise in (1e-5, 1e-14))
-    fits = [Fit(slope, doubt, 1.0, np.ones(1, dtype=bool)) for slope in (main, other)]
-    fitted = order.Order("", *[np.ones(1)] * 4, fits[0], {})
-    assert [order._claimed(4, fitted, fits, one, "").verdict for one in (terms, None, hidden, five)] == verdicts.split()
+    noisy, five = (terms._replace(defect=np.zeros(7), noise=np.full(7, noise)) for noise in (1e-5, 1e-14))
+    fits = [Fit(slope, doubt, 1.0, np.ones(1, dtype=bool)) for slope in (main, second)]
+    data = order.Order("", *[np.ones(1)] * 4, fits[0], {})
+    assert [order._claimed(4, data, fits, term, "").verdict for term in (terms, None, noisy, five)] == verdicts.split()
 
 
 @pytest.mark.parametrize(("lengths", "verdict"), [((8.37, 40.0), "confirmed"), ((8.37,), "undecided")])
@@ -282,17 +282,17 @@ def test_an_order_that_is_lower_at_the_finest_steps_or_jumps_below_one_that_is_l
 
 
 def test_what_nobody_claimed_is_measured_and_a_claim_that_denies_what_the_method_has_is_refuted():
-    none = dict.fromkeys(("order", "explicit", "symplectic", "symmetric", "conserves"))
-    verlet = dataclasses.replace(symtop.integrator("stormer-verlet"), **none)
+    claims = dict.fromkeys(("order", "explicit", "symplectic", "symmetric", "conserves"))
+    verlet = dataclasses.replace(symtop.integrator("stormer-verlet"), **claims)
     ledger = judge(verlet, SPHEROID, quick=True)
-    shown = {(finding.verdict, bool(finding.declared)) for finding in ledger.findings}
-    assert shown == {("measured", False), ("inapplicable", False)}
-    assert [ledger[one].measured.kind for one in ("symplectic", "symmetric", "energy")] == ["yes", "yes", "bounded"]
+    kinds = {(finding.verdict, bool(finding.declared)) for finding in ledger.findings}
+    assert kinds == {("measured", False), ("inapplicable", False)}
+    assert [ledger[claim].measured.kind for claim in ("symplectic", "symmetric", "energy")] == ["yes", "yes", "bounded"]
     assert abs(ledger["order"].value - 2.0) < 0.05
-    modest = dataclasses.replace(verlet, symmetric=False, symplectic=False)
-    assert [one_finding(structure, modest, name).verdict for name in ("symmetric", "symplectic")] == ["refuted"] * 2
-    fast = Subject(integrator("series"), random_scenes(2, seed=5)[1], quick=True)  # 2^16 times better at half a step
-    assert structure.measure(fast)[1].verdict == "confirmed"
+    variant = dataclasses.replace(verlet, symmetric=False, symplectic=False)
+    assert [finding_of(structure, variant, name).verdict for name in ("symmetric", "symplectic")] == ["refuted"] * 2
+    subject = Subject(integrator("series"), random_scenes(2, seed=5)[1], quick=True)  # 2^16 times better at half a step
+    assert structure.measure(subject)[1].verdict == "confirmed"
 
 
 def test_what_cannot_be_judged_says_why():
@@ -310,9 +310,9 @@ def test_what_cannot_be_judged_says_why():
 
 @pytest.mark.quick
 def test_a_method_whose_every_step_is_exact_is_judged_by_its_errors():
-    finding = one_finding(order, symtop.integrator("exact-discrete"), "order")
+    finding = finding_of(order, symtop.integrator("exact-discrete"), "order")
     assert (finding.declared, finding.verdict, finding.value < 1e-12) == ("exact", "confirmed", True)
-    finding = one_finding(order, dataclasses.replace(integrator("srkn-14-6"), order=None, exact_steps=True), "order")
+    finding = finding_of(order, dataclasses.replace(integrator("srkn-14-6"), order=None, exact_steps=True), "order")
     assert (finding.verdict, finding.value > 1e-5) == ("refuted", True)
     with pytest.raises(symtop.SymtopError, match="exact_steps"):
         dataclasses.replace(symtop.integrator("rk4"), exact_steps=True)
@@ -354,7 +354,7 @@ def test_every_file_of_false_claims_is_tested():
 @pytest.mark.parametrize("liar", [pytest.param(n, marks=pytest.mark.slow if n in OWN_KERNEL else []) for n in CAUGHT])
 def test_a_liar_is_caught_for_the_right_reason(liar, clean_registry):
     quick = [] if liar in OWN_KERNEL else ["--quick"]
-    code, output = answer("claims", "--plugin", str(planted.LIARS / f"{liar}.py"), "--json", *quick)
+    code, output = code_and_output("claims", "--plugin", str(planted.LIARS / f"{liar}.py"), "--json", *quick)
     claim, why = CAUGHT[liar]
     findings = {row.pop("claim"): row for row in json.loads(output)}
     assert (code, findings[claim]["verdict"]) == (1, "refuted")
@@ -388,14 +388,14 @@ def test_no_registered_integrator_is_refuted_and_few_claims_stay_open():
     relevant = [(name, finding) for name, finding in findings if finding.verdict != "inapplicable"]
     assert [finding.sentence(name) for name, finding in relevant if finding.verdict == "refuted"] == []
     assert sum(finding.verdict == "undecided" for _, finding in relevant) <= len(relevant) / 10
-    assert all(one.why and (one.verdict != "confirmed" or math.isfinite(one.resolution)) for _, one in relevant)
+    assert all(entry.why and (entry.verdict != "confirmed" or math.isfinite(entry.resolution)) for _, entry in relevant)
 
 
 def test_the_series_of_a_step_beside_a_pole_is_taken_on_another_top():
     """There angles know a state badly: without the rule this step of order 2 has a series of order 12."""
-    near = symtop.Angles(0.001389, 0.966212, 0.842727, 0.000981, -26.156396, -1323.792023)
-    upright = symtop.Scene("upright", symtop.SymmetricTop(0.1146, 0.0043, 65.3957), near, 20.0)
-    subjects = (Subject(integrator("strang"), one, quick=True) for one in (upright, scene("spheroid")))
+    start = symtop.Angles(0.001389, 0.966212, 0.842727, 0.000981, -26.156396, -1323.792023)
+    upright = symtop.Scene("upright", symtop.SymmetricTop(0.1146, 0.0043, 65.3957), start, 20.0)
+    subjects = (Subject(integrator("strang"), place, quick=True) for place in (upright, scene("spheroid")))
     assert [series and series.order for series in map(order.series_of, subjects)] == [2, 2]
 
 
@@ -404,11 +404,11 @@ def test_no_right_method_is_refuted_beside_a_pole():
     """Slopes in angles are 5e5 there, and cancel to 3e-9 of their square; errors of some fall with a higher power."""
     names = ("trapezoidal-unreduced", "tsit5-fixed", "yade", "stormer-verlet")
     subjects = [Subject(integrator(name), scene("sleeping"), quick=True) for name in names]
-    assert {order.measure(one)[0].verdict for one in subjects} == {"confirmed"}
+    assert {order.measure(subject)[0].verdict for subject in subjects} == {"confirmed"}
     unstable = Subject(integrator("yade"), scene("sleeping-unstable"), quick=True)
     assert [order.measure(unstable)[0].verdict, structure.measure(subjects[-1])[0].verdict] == ["undecided"] * 2
     rising = Subject(integrator("stormer-verlet"), scene("goldstein-rising"), quick=True)  # 50,000 steps beat with it
-    assert {one.claim: one.verdict for one in long.measure(rising)}["reported"] == "measured"
+    assert {finding.claim: finding.verdict for finding in long.measure(rising)}["reported"] == "measured"
 
 
 def test_a_time_has_the_unit_that_suits_what_is_printed_and_a_least_order_is_said_to_be_one():
@@ -417,8 +417,8 @@ def test_a_time_has_the_unit_that_suits_what_is_printed_and_a_least_order_is_sai
         assert description([Finding("order", "", Measured("", 2 if text else 2.4, text), "measured", "")]) == words
     walks = Finding("p_psi", "", Measured("random walk", 1e-11), "measured", "", math.inf)
     runs = {"step_size": np.array([1.0, 0.5, 0.25]), "error": np.array([np.nan, np.nan, 1e-3])}
-    told = str(Ledger("mine", "any", (walks,), runs, About(nutation=8.0)))
-    assert re.search(r" 8 to 32 steps .* order \(16 and fewer fail\)(.|\n)*It is: does not keep p_psi\.", told)
+    screen = str(Ledger("mine", "any", (walks,), runs, About(nutation=8.0)))
+    assert re.search(r" 8 to 32 steps .* order \(16 and fewer fail\)(.|\n)*It is: does not keep p_psi\.", screen)
     assert walks.plain()["value"] is None
 
 
@@ -427,7 +427,7 @@ FREE, HEAVY = (body_scenes()[name] for name in ("check-case-2", "heavy-brick"))
 
 @pytest.mark.parametrize(("name", "energy", "momentum"), [
     ("strang", "bounded", "kept"), ("commutator-free-4", "drift", "kept"), ("gauss-4", "kept", "bounded"),
-    *late(("lammps-rigid", "drift", "kept")),
+    *defer(("lammps-rigid", "drift", "kept")),
 ])  # fmt: skip
 def test_what_methods_claim_on_a_body_holds(name, energy, momentum):
     for free_or_heavy in (FREE, HEAVY):
@@ -437,9 +437,9 @@ def test_what_methods_claim_on_a_body_holds(name, energy, momentum):
 
 
 def test_a_needle_is_stepped_by_its_turns_and_a_slow_part_of_a_motion_is_no_growth():
-    drawn = {one.name: one for one in scenes_of(body_population(8, seed=3))}
-    for name, on in (("strang", "needle-0"), ("euler-poincare", "near-symmetric-0")):
-        assert judge(integrator(name), drawn[on], quick=True)["energy"].verdict == "confirmed"
+    drawn = {scene.name: scene for scene in scenes_of(body_population(8, seed=3))}
+    for name, body in (("strang", "needle-0"), ("euler-poincare", "near-symmetric-0")):
+        assert judge(integrator(name), drawn[body], quick=True)["energy"].verdict == "confirmed"
 
 
 def test_false_claims_on_a_body_are_refuted():
@@ -461,9 +461,9 @@ def rotation_swapped(q, w, h, inertia, torque):
     (right.rotation_lie_midpoint, 2, []), (rotation_swapped, 2, ["order"]),
     (right.rotation_strang, 2, ["order"]), (right.rk4, 4, []),
 ])  # fmt: skip
-def test_a_step_of_ones_own_is_judged_on_a_body(step, order, refuted, only):
+def test_a_step_of_ones_own_is_judged_on_a_body(step, order, refuted, keep_claims):
     """One that turns by the rates of other moments is wrong, as is an exact motion that symmetric bodies alone have."""
-    only("order")
+    keep_claims("order")
     form = "rotation" if "rotation" in step.__name__ else "ode"
     ledger = symtop.judge(step, form=form, scene=HEAVY, order=order, quick=True)
     assert (ledger.refuted, ledger["order"].verdict) == (refuted, "refuted" if refuted else "confirmed")
@@ -488,8 +488,8 @@ def test_a_step_is_drawn_beside_methods_on_a_body(tmp_path):
     assert (tmp_path / "a.png").stat().st_size > 0
     data = symtop.compare(HEAVY, [right.rk4, "rk4"], cost="evaluations", nutations=1.0, budget=4000, quiet=True)
     assert data["variant"].values.tolist() == ["step[body]", "rk4[body]"]
-    one, other = (data["error"].sel(variant=name).min() for name in data["variant"].values)
-    assert one == pytest.approx(other, rel=0.5)
+    ours, theirs = (data["error"].sel(variant=name).min() for name in data["variant"].values)
+    assert ours == pytest.approx(theirs, rel=0.5)
 
 
 @pytest.mark.parametrize("scene", ["spheroid", "heavy-brick"])
@@ -499,26 +499,26 @@ def test_a_run_that_ends_in_its_first_nutation_shows_no_constant(scene):
     assert {ledger[claim].measured.kind for claim in ("energy", "order")} == {""}
 
 
-def test_the_card_of_a_body_shows_the_errors_that_its_order_was_found_from(only):
-    only("order")
+def test_the_card_of_a_body_shows_the_errors_that_its_order_was_found_from(keep_claims):
+    keep_claims("order")
     ledger = symtop.judge(right.rk4, scene=HEAVY, order=4, quick=True)
     steps, errors = (ledger.traces[name][ledger.traces["fitted"] == 1.0] for name in ("step_size", "error"))
     assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(4.0, abs=0.2)
     assert " steps a natural period for the order" in " ".join(str(ledger).split())
 
 
-def test_a_right_step_is_not_refuted_where_a_body_turns_over(only):
+def test_a_right_step_is_not_refuted_where_a_body_turns_over(keep_claims):
     """After a calm beginning."""
-    only("order", "energy", "momentum")
+    keep_claims("order", "energy", "momentum")
     ledger = symtop.judge(right.midpoint, scene="tennis-racket", order=2, quick=True)
     assert (ledger.refuted, ledger["order"].verdict) == ([], "confirmed")
     assert ledger["energy"].measured.kind in ("growing", "drift")  # the length of its runs follows from its speed
 
 
 def test_a_solver_that_sees_its_plan_contradicts_itself():
-    few, many = (symtop.integrator(name).solvers["axis"] for name in ("rk4", "gauss-4"))
-    for below in (300, 5000, 20_000):
-        seeing = lambda top, start, plan, below=below: (few if plan.marks[-1] < below else many)(top, start, plan)
+    rk4, gauss = (symtop.integrator(name).solvers["axis"] for name in ("rk4", "gauss-4"))
+    for limit in (300, 5000, 20_000):
+        seeing = lambda top, start, plan, limit=limit: (rk4 if plan.marks[-1] < limit else gauss)(top, start, plan)
         method = symtop.Integrator("seeing", "other", "sees its plan", {"axis": seeing}, order=4)
         ledger = judge(method, SPHEROID, quick=True)
         assert ledger.refuted == ["reported"]
@@ -542,16 +542,16 @@ def test_a_plug_in_that_fails_is_told_of(tmp_path):
     expected = {"nothing": "must return a Run", "leaves": "ended with code 0", "crashes": "was ended by SIGSEGV"}
     names = [f"{name}-at-once" for name in expected]
     # in another process, which this one would end with if it called the plug-in
-    code, out, _ = ended(command("claims", *names, "--plugin", tmp_path / "plugin.py", "--quick"))
+    code, out, _ = finish(command("claims", *names, "--plugin", tmp_path / "plugin.py", "--quick"))
     assert code == 1
     for name, words in zip(names, expected.values(), strict=True):
-        own = [line for line in out.splitlines() if line.startswith(f"{name}, ")]
-        assert any(words in line for line in own), own
+        lines = [line for line in out.splitlines() if line.startswith(f"{name}, ")]
+        assert any(words in line for line in lines), lines
 
 
 def test_a_plug_in_that_ends_its_process_when_it_is_loaded_is_told_of(tmp_path):
     (tmp_path / "plugin.py").write_text("import os\nos._exit(0)\n")
-    code, _, err = ended(command("claims", "--plugin", tmp_path / "plugin.py", "--quick"))
+    code, _, err = finish(command("claims", "--plugin", tmp_path / "plugin.py", "--quick"))
     assert (code, "plugin plugin.py cannot be loaded: its process ended with code 0" in err) == (2, True)
 
 
@@ -571,11 +571,11 @@ def test_a_run_that_is_returned_is_one_of_numbers():
 
 def test_a_name_that_is_unknown_is_told_before_anything_is_measured_and_all_are_those_that_step_the_scene(monkeypatch):
     methods, empty = [], SimpleNamespace(findings=())
-    monkeypatch.setattr("symtop.judging.judge_step.judge_separately", lambda one, _, **__: methods.append(one) or empty)
+    monkeypatch.setattr("symtop.judging.judge_step.judge_separately", lambda row, _, **__: methods.append(row) or empty)
     result = call("claims", "midpoint", "midpont", code=2)
     assert ("integrator 'midpont' is unknown" in result.output, methods) == (True, [])
     call("claims", "--scene", "tennis-racket", code=1)
-    assert methods == [one for one in symtop.integrators().values() if "body" in one.solvers]
+    assert methods == [method for method in symtop.integrators().values() if "body" in method.solvers]
 
 
 STEP = SPHEROID.nutation_period / 118.02
@@ -583,12 +583,12 @@ STEP = SPHEROID.nutation_period / 118.02
 
 def bytes_a_step(method: Integrator) -> float:
     """Bytes that a run keeps for each further step, by Python's own count of what NumPy and Python allocate."""
-    few = 4000 if method.implementation == "compiled" else 200
+    base = 4000 if method.implementation == "compiled" else 200
     control = {"step_size": STEP, "tolerance": method.default_tolerance or 1e-6}[method.control]
     plan = {"samples": 11, "observe": "axis", "guard": False, method.control: control}
     symtop.simulate(SPHEROID, method, horizon=STEP, **plan)  # numba takes five times as long where memory is traced
     peaks, steps = [], []
-    for count in (few, 6 * few, few, 6 * few):  # what is made once, or by another thread, is not in both
+    for count in (base, 6 * base, base, 6 * base):  # what is made once, or by another thread, is not in both
         tracemalloc.start()
         try:
             run = symtop.simulate(SPHEROID, method, horizon=count * STEP, **plan)
@@ -606,13 +606,13 @@ def test_the_memory_of_a_run_does_not_grow_with_its_steps(name):
 
 
 def test_memory_that_grows_with_the_steps_is_seen():
-    good, store = symtop.integrator("stormer-verlet"), []
+    verlet, store = symtop.integrator("stormer-verlet"), []
 
     def hoard(top, start, plan):
         store[:] = [np.zeros(4 * round(plan.horizon / plan.step_size))]
-        return good.solvers["angles"](top, start, plan)
+        return verlet.solvers["angles"](top, start, plan)
 
-    assert 16.0 < bytes_a_step(dataclasses.replace(good, solvers={"angles": hoard})) < 48.0
+    assert 16.0 < bytes_a_step(dataclasses.replace(verlet, solvers={"angles": hoard})) < 48.0
 
 
 def test_a_step_that_blows_up_has_the_time_of_its_finite_steps():
@@ -635,21 +635,21 @@ def test_finer_runs_after_one_that_fails_late_share_its_steps(quick):
 
 
 def test_limits_are_extrapolated_falls_are_seen_and_a_cayley_map_keeps_its_own_energy(monkeypatch):
-    for rest, power in ((1e-3, 3), (0.0, 4)):  # to a wrong motion, or to the true one with even powers
-        run = lambda _, h, __, rest=rest, power=power: np.array([rest + h**2 + h**power])
+    for offset, power in ((1e-3, 3), (0.0, 4)):  # to a wrong motion, or to the true one with even powers
+        run = lambda _, h, __, offset=offset, power=power: np.array([offset + h**2 + h**power])
         step = SimpleNamespace(h=0.1, chart="axis", motion=lambda _: lambda _: np.zeros(1), run=run, shown=np.array)
         monkeypatch.setattr(order, "one_step", lambda *_, step=step: step)
         distance, doubt = order.limit(integrator("strang"), scene("spheroid"), 2)
-        assert (distance == pytest.approx(rest, rel=1e-6), distance < doubt) == (rest > 0.0, rest == 0.0)
+        assert (distance == pytest.approx(offset, rel=1e-6), distance < doubt) == (offset > 0.0, offset == 0.0)
     errors = np.array([1e-6, 5e-6, 1.0, 1.0])  # no better than at a tolerance ten thousand times as large
     fit = Fit(2.0, 0.1, 1.0, errors > 0.0)
-    fitted = order.Order("", 10.0 ** -np.array([10.0, 6.0, 4.0, 2.0]), errors, errors, errors, fit, {})
-    assert order._converges(fitted, "").verdict == "refuted"
+    data = order.Order("", 10.0 ** -np.array([10.0, 6.0, 4.0, 2.0]), errors, errors, errors, fit, {})
+    assert order._converges(data, "").verdict == "refuted"
     assert not structure.Passage("axis", "ok", 1e-3, 9e-4).passes
     assert Series(1.0, np.full(5, 1e-12), np.array([1e-15] * 3 + [1.0] * 2), True, "axis").order == 2  # noise hides two
-    half = lambda at, _: (True, 5e-10, 1e-9, "") if at.h < 0.1 else (False, 1e-6, 1e-9, "")
-    one = one_step(integrator("strang"), "axis", scene("spheroid"), 0.1)  # smaller, but by no power of the step
-    assert structure._answer_at(half, one, scene("spheroid").start)[0] is False
-    for name, kept in (("cayley", True), ("strang", False)):
+    half = lambda step, _: (True, 5e-10, 1e-9, "") if step.h < 0.1 else (False, 1e-6, 1e-9, "")
+    step = one_step(integrator("strang"), "axis", scene("spheroid"), 0.1)  # smaller, but by no power of the step
+    assert structure._answer_at(half, step, scene("spheroid").start)[0] is False
+    for name, bounded in (("cayley", True), ("strang", False)):
         path = integrate(scene("spheroid"), name, step_size=0.05, samples=161, observe="axis")
-        assert (np.abs(constants.constants(scene("spheroid"), path)["cayley_energy"]).max() < 1e-12) == kept
+        assert (np.abs(constants.constants(scene("spheroid"), path)["cayley_energy"]).max() < 1e-12) == bounded

@@ -29,7 +29,7 @@ def data():
     return symtop.compare("goldstein", METHODS, nutations=2.0, cost="evaluations", budget=BUDGET, quiet=True)
 
 
-def least(data, target, variable="force_evaluations"):
+def least_costs(data, target, variable="force_evaluations"):
     places = cheapest(data, target)
     return {str(name): float(data[variable].values[k, place]) if place >= 0 else math.inf
             for k, (name, place) in enumerate(zip(data["variant"].values, places, strict=True))}  # fmt: skip
@@ -47,27 +47,27 @@ def test_each_run_is_that_of_simulate_and_every_variable_has_words_and_units(dat
     cell, place = data.sel(variant="rk4[axis]"), cheapest(data, 1e-3)[2]
     step = cell["step_size"].values[place]
     row = error_row(scene, symtop.integrator("rk4[axis]"), step, data.attrs["horizon"], "axis")
-    for name, own in (("axis", "error"), ("axis_bound", "error_bound"), ("energy", "energy"), ("p_psi", "p_psi")):
-        assert cell[own].values[place] == row[name]
+    for name, column in (("axis", "error"), ("axis_bound", "error_bound"), ("energy", "energy"), ("p_psi", "p_psi")):
+        assert cell[column].values[place] == row[name]
     assert cell["force_evaluations"].values[place] == row["force_evaluations"]
     assert cell["steps_per_nutation"].values[place] == pytest.approx(scene.nutation_period / row["step_size"])
 
 
 def test_what_theory_says_of_the_costs_and_why_some_are_not_reached(data):
-    coarse, fine = least(data, 1e-3), least(data, 1e-6)
+    coarse, fine = least_costs(data, 1e-3), least_costs(data, 1e-6)
     assert fine["taylor[axis]"] < fine["rk4[axis]"] < fine["stormer-verlet[angles]"] < fine["midpoint[angles]"]
     assert all(coarse[name] <= fine[name] for name in coarse)
     for name, order in (("stormer-verlet[angles]", 2), ("rk4[axis]", 4)):
-        steps = [least(data, target, "steps_per_nutation")[name] for target in (1e-6, 1e-3)]
+        steps = [least_costs(data, target, "steps_per_nutation")[name] for target in (1e-6, 1e-3)]
         assert math.log10(steps[0] / steps[1]) == pytest.approx(3.0 / order, rel=0.2)
     for name in ("rk4[axis]", "taylor[axis]"):
         cell = data.sel(variant=name)
         assert (np.diff(cell["force_evaluations"].values[cell["outcome"].values == "ok"]) >= 0.0).all()
-    reached = data["reached"].sel(variant="midpoint[angles]").values.tolist()
-    assert (reached[0], reached[-1]) == ("met", "budget")
+    reasons = data["reached"].sel(variant="midpoint[angles]").values.tolist()
+    assert (reasons[0], reasons[-1]) == ("met", "budget")
     assert data["force_evaluations"].max() <= 1.3 * BUDGET
-    most = data["force_evaluations"].sel(variant=["midpoint[angles]", "stormer-verlet[angles]"]).max("setting")
-    assert (most > 0.8 * BUDGET).all()  # the last run that could be afforded was made
+    largest = data["force_evaluations"].sel(variant=["midpoint[angles]", "stormer-verlet[angles]"]).max("setting")
+    assert (largest > 0.8 * BUDGET).all()  # the last run that could be afforded was made
     assert data["reached"].sel(variant="rk4[axis]", target=1e-6).item() == "met"
 
 
@@ -82,7 +82,7 @@ def test_failed_settings_stay_with_their_outcome_and_are_drawn(data):
     assert failed_setting(cell).startswith(words)
     assert failed_setting(data.sel(variant="taylor[axis]")) == ""
     ax = symtop.plot(data)
-    crosses = np.vstack([one.get_offsets() for one in ax.collections])
+    crosses = np.vstack([collection.get_offsets() for collection in ax.collections])
     np.testing.assert_array_equal(crosses[:, 0], cell["force_evaluations"].values[failed])
     np.testing.assert_array_equal([text.xy[1] for text in ax.texts], data["error"].min("setting"))
     labels = [text.get_text() for text in ax.texts]
@@ -91,8 +91,8 @@ def test_failed_settings_stay_with_their_outcome_and_are_drawn(data):
 
 
 def test_own_scenes_and_methods_engines_and_scipy_take_part(clean_registry, tmp_path):
-    refusing = Mock(side_effect=RuntimeError("no"))
-    for name, solver in (("on-the-axis", symtop.integrator("rk4").solvers["axis"]), ("refusing", refusing)):
+    mock = Mock(side_effect=RuntimeError("no"))
+    for name, solver in (("on-the-axis", symtop.integrator("rk4").solvers["axis"]), ("refusing", mock)):
         symtop.register(symtop.Integrator(name, "other", "", {"axis": solver}, implementation="python", order=4))
     top = symtop.SymmetricTop.from_spheroid(mass=1, polar_radius=0.2, equatorial_radius=0.1, pivot_distance=0.25)
     scene = symtop.Scene("mine", top, symtop.Angles(theta=0.4, psi_dot=60.0), horizon=0.2)
@@ -101,22 +101,22 @@ def test_own_scenes_and_methods_engines_and_scipy_take_part(clean_registry, tmp_
     symtop.compare(scene, [type(f"Radau{k}", (radau.Radau,), {}) for k in range(3)], quiet=True, budget=1e3)
     assert rounds == radau.NEWTON_MAXITER  # though threads change it
     data = symtop.compare(scene, names, quiet=True, budget=1e4)
-    own, refused, engine, *_ = data["variant"].values.tolist()
-    assert [own, refused] == ["on-the-axis[axis]", "refusing[axis]"]
-    np.testing.assert_array_equal(*(data["error"].sel(variant=name).values[:3] for name in (own, "rk4[axis]")))
-    assert data["outcome"].sel(variant=refused).values[0] == "raised"
-    assert "RuntimeError: no" in data["message"].sel(variant=refused).values[0]
-    good = data["outcome"].values == "ok"
-    assert good[[0, 2, 3, 4, 5, 6]].any(axis=1).all()
-    assert (data["seconds"].values[good] > 0.0).all()
-    assert (data["seconds_spread"].values[good] >= 0.0).all()
+    first, second, engine, *_ = data["variant"].values.tolist()
+    assert [first, second] == ["on-the-axis[axis]", "refusing[axis]"]
+    np.testing.assert_array_equal(*(data["error"].sel(variant=name).values[:3] for name in (first, "rk4[axis]")))
+    assert data["outcome"].sel(variant=second).values[0] == "raised"
+    assert "RuntimeError: no" in data["message"].sel(variant=second).values[0]
+    ok = data["outcome"].values == "ok"
+    assert ok[[0, 2, 3, 4, 5, 6]].any(axis=1).all()
+    assert (data["seconds"].values[ok] > 0.0).all()
+    assert (data["seconds_spread"].values[ok] >= 0.0).all()
     assert 0.0 < data["exact_seconds"].item() < data["seconds"].sel(variant="rk45[axis]").min()
     assert engine.startswith("mujoco-euler[")
     netcdf.write(data, tmp_path / "c.nc")
     ax = symtop.plot(netcdf.read(tmp_path / "c.nc"))
     names = ["refusing[axis] (Python): no run ended well", "rk45[axis] (SciPy)", "rk4[axis]"]
     assert set(names) <= {text.get_text() for text in ax.texts}
-    assert data["exact_seconds"].item() in [one.get_xdata()[0] for one in ax.get_lines() if len(one.get_xdata())]
+    assert data["exact_seconds"].item() in [line.get_xdata()[0] for line in ax.get_lines() if len(line.get_xdata())]
 
 
 @pytest.mark.parametrize("quantity", ["attitude", "energy"])
@@ -151,18 +151,18 @@ def test_the_command_prints_a_line_for_each_variant(tmp_path, clean_registry):
     assert re.search(r" \d\d steps 8.8e\+01 +\d{3} steps 5.1e\+02 +\d{3} steps 2.8e\+03$", lines["rk4[axis]"])
     assert re.search(r"^midpoint\[angles\]: .*its least error was", result.stdout, re.MULTILINE)
     assert figure.stat().st_size > 1000
-    stored, report = netcdf.read(output), json.loads(call("compare", *words, "--json").stdout)
-    runs = {(one["variant"], one["target"]): one for one in report["cheapest"]}
-    spent = {"variant": "midpoint[angles]", "target": 1e-9, "reached": False, "reason": "budget"}
-    assert runs["midpoint[angles]", 1e-9] == spent
-    assert runs["rk4[axis]", 1e-6]["force_evaluations"] == least(stored, 1e-6)["rk4[axis]"]
+    data, report = netcdf.read(output), json.loads(call("compare", *words, "--json").stdout)
+    runs = {(row["variant"], row["target"]): row for row in report["cheapest"]}
+    expected = {"variant": "midpoint[angles]", "target": 1e-9, "reached": False, "reason": "budget"}
+    assert runs["midpoint[angles]", 1e-9] == expected
+    assert runs["rk4[axis]", 1e-6]["force_evaluations"] == least_costs(data, 1e-6)["rk4[axis]"]
     assert [report[name] for name in ("scene", "cost")] == ["spheroid", "evaluations"]
-    plugin, still = tmp_path / "still.py", "symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(theta=1.0)"
-    plugin.write_text(f"import symtop\nsymtop.register_scene(symtop.Scene('still', {still}, 5.0))\n")
-    still = call("compare", "still", "exact", "--cost", "evaluations", "--plugin", plugin).stdout
-    assert still.startswith("still to t = 5: the cheapest run by evaluations\n")
-    for bad in (["rk5"], [], ["rk4", "--figure", "c.doc"]):
-        call("compare", "spheroid", *bad, code=2)
+    plugin, arguments = tmp_path / "still.py", "symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(theta=1.0)"
+    plugin.write_text(f"import symtop\nsymtop.register_scene(symtop.Scene('still', {arguments}, 5.0))\n")
+    output = call("compare", "still", "exact", "--cost", "evaluations", "--plugin", plugin).stdout
+    assert output.startswith("still to t = 5: the cheapest run by evaluations\n")
+    for options in (["rk5"], [], ["rk4", "--figure", "c.doc"]):
+        call("compare", "spheroid", *options, code=2)
 
 
 @pytest.mark.slow
@@ -191,8 +191,8 @@ def test_a_step_called_as_a_method_of_ours_is_told_apart_and_a_library_needs_no_
     assert data["variant"].values.tolist() == ["own-rk4[axis]", "rk4[axis]", "mine[axis]"]
     error = data["error"].isel(setting=-1).values
     assert error[0] == error[2] != error[1]
-    none = symtop.compare("spheroid", lambda f, t, y, h: 0.0 * y, **words)  # no axis has no error of zero
-    assert {*none["outcome"].values.flat} == {"not_finite"}
+    data = symtop.compare("spheroid", lambda f, t, y, h: 0.0 * y, **words)  # no axis has no error of zero
+    assert {*data["outcome"].values.flat} == {"not_finite"}
     for target in ("my.so", "my.so:other", "./my.so"):
         with pytest.raises(symtop.SymtopError, match="a shared object must be a file that is there"):
             symtop.compare("spheroid", target, quiet=True)

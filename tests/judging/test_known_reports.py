@@ -143,16 +143,16 @@ def page():
 
 
 def test_the_page_has_every_report_and_what_was_foreseen():
-    shown = page()
-    assert {row: foreseen for row, (foreseen, _) in shown.items() if row in RULES} == FORESEEN
-    assert len({row.partition(",")[0] for row in shown}) == 10
-    assert set(shown) - set(RULES) == {"Drake #18816"}
+    rows = page()
+    assert {row: foreseen for row, (foreseen, _) in rows.items() if row in RULES} == FORESEEN
+    assert len({row.partition(",")[0] for row in rows}) == 10
+    assert set(rows) - set(RULES) == {"Drake #18816"}
 
 
 @pytest.mark.parametrize("row", ["OrdinaryDiffEq #577", "GeometricIntegrators #220"])
-def test_the_faulty_rule_is_refuted_and_the_mended_one_is_not(row, only):
+def test_the_faulty_rule_is_refuted_and_the_mended_one_is_not(row, keep_claims):
     line = FORESEEN[row]
-    only(line)
+    keep_claims(line)
     assert ledger_of(row, faulty=True).refuted == [line]
     assert line in page()[row][1].split(", ")
     assert ledger_of(row, faulty=False).refuted == []

@@ -55,11 +55,11 @@ def test_a_claim_that_the_samples_do_not_show_is_undecided_and_not_lost(table, t
     file, columns = tmp_path / "run.csv", {"time": table[:, 0], "axis": table[:, 1:4]}
     claims = ["p_phi", "axis_length"]
     ledger = symtop.judge(columns, conserves=claims, energy="bounded")
-    undecided = {one.claim: one.declared for one in ledger.findings if one.verdict == "undecided"}
+    undecided = {finding.claim: finding.declared for finding in ledger.findings if finding.verdict == "undecided"}
     assert undecided == {"energy": "bounded", "p_phi": "kept", "axis_length": "kept"}
     assert "p_psi" not in ledger  # nobody claims it
-    whole = symtop.judge(columns | {"momentum": table[:, 4:]}, conserves=claims, energy="bounded")
-    assert (whole["p_phi"].verdict, whole["energy"].verdict) == ("confirmed", "refuted")
+    ledger = symtop.judge(columns | {"momentum": table[:, 4:]}, conserves=claims, energy="bounded")
+    assert (ledger["p_phi"].verdict, ledger["energy"].verdict) == ("confirmed", "refuted")
     file.write_text(text(table[:, :4], "time,ex,ey,ez"), encoding="utf-8")
     assert "Claims: 2 undecided." in call("judge", file, "--conserves", "p_phi", "--energy", "kept").output
 
@@ -125,13 +125,13 @@ def test_csv_netcdf_mappings_and_blanks_are_the_same_and_utf_16_is_told(table, t
     assert ledger["energy"].measured.kind == "drift"
     assert (ledger["p_phi"].verdict, ledger["energy"].verdict) == ("confirmed", "refuted")
     columns = {"time": table[:, 0], "axis": table[:, 1:4], "momentum": table[:, 4:]}
-    plain = symtop.judge(columns)
+    expected = symtop.judge(columns)
     (tmp_path / "run.txt").write_text("# " + text(table).replace(",", "  "), encoding="utf-8")
     rows = {name: (("time", "component"), columns[name]) for name in ("axis", "momentum")}
     netcdf.write(xr.Dataset(rows, {"time": columns["time"]}), tmp_path / "run.nc")
     for name in ("run.txt", "run.nc"):
         ledger = symtop.judge(str(tmp_path / name))
-        assert [one.value for one in ledger.findings] == [one.value for one in plain.findings]
+        assert [finding.value for finding in ledger.findings] == [finding.value for finding in expected.findings]
     file.write_text(text(table), encoding="utf-8-sig")
     assert symtop.judge(file)["axis_error"].value > 0.0
     file.write_text(text(table), encoding="utf-16")
@@ -140,13 +140,13 @@ def test_csv_netcdf_mappings_and_blanks_are_the_same_and_utf_16_is_told(table, t
 
 def test_columns_are_read_by_their_labels_and_lost_samples_are_said_to_be_lost(table):
     time = table[:, 0]
-    plain = symtop.judge({"time": time, "axis": table[:, 1:4]})["axis_error"]
+    error = symtop.judge({"time": time, "axis": table[:, 1:4]})["axis_error"]
     data = xr.Dataset({"axis": (("time", "component"), table[:, 3:0:-1])}, {"time": time, "component": ["z", "y", "x"]})
-    assert symtop.judge(data)["axis_error"].value == symtop.judge(data.transpose())["axis_error"].value == plain.value
-    lost = np.ma.masked_greater(np.where(np.arange(time.size) == 7, 1e20, 1.0), 1.0)
-    given = {"time": time, "axis": np.where(time[:, None] > 4.0, np.nan, table[:, 1:4]), "energy": lost}
+    assert symtop.judge(data)["axis_error"].value == symtop.judge(data.transpose())["axis_error"].value == error.value
+    energy = np.ma.masked_greater(np.where(np.arange(time.size) == 7, 1e20, 1.0), 1.0)
+    columns = {"time": time, "axis": np.where(time[:, None] > 4.0, np.nan, table[:, 1:4]), "energy": energy}
     with pytest.warns(symtop.SymtopWarning, match="is not a number from"):
-        ledger = symtop.judge(given, conserves=["energy"])
+        ledger = symtop.judge(columns, conserves=["energy"])
     assert ledger["energy"].verdict == "confirmed"
     assert f"{(time > 4.0).sum()} of {time.size} samples lost" in str(ledger["axis_error"].measured)
 
@@ -162,12 +162,12 @@ def test_an_axis_that_contradicts_its_quaternion_is_refused_and_one_of_few_digit
     with pytest.warns(symtop.SymtopWarning, match="not a number from t = 0.7"):
         assert symtop.judge(file)["axis_error"].value < 1e-3
     turned, swapped = columns.copy(), columns[:, [0, 2, 1, 3, 4, 5, 6, 7]]
-    across = np.cross(turned[40, 1:4], [0.0, 0.0, 1.0])
-    turned[40, 1:4] += 2e-3 * across / np.linalg.norm(across)
-    for wrong, words in ((swapped, r"at t = .* the axis is \d.* rad"), (turned, r"at t = 4 the axis is 0\.002 rad")):
-        file.write_text(text(wrong, head), encoding="utf-8")
-        answer = " ".join(call("judge", file, code=2).stderr.split())
-        assert re.search(f"axis and quaternion must show one attitude within 0.001 rad, but {words}", answer)
+    direction = np.cross(turned[40, 1:4], [0.0, 0.0, 1.0])
+    turned[40, 1:4] += 2e-3 * direction / np.linalg.norm(direction)
+    for rows, words in ((swapped, r"at t = .* the axis is \d.* rad"), (turned, r"at t = 4 the axis is 0\.002 rad")):
+        file.write_text(text(rows, head), encoding="utf-8")
+        message = " ".join(call("judge", file, code=2).stderr.split())
+        assert re.search(f"axis and quaternion must show one attitude within 0.001 rad, but {words}", message)
     assert symtop.judge({"time": turned[:, 0], "axis": turned[:, 1:4]})["axis_error"].value > 1e-3  # it is alone
     turned[:, 1:] = columns[:, 1:] * [1.0, 1.0, 1.0, 1.0, -1.0, -1.0, -1.0]
     file.write_text(text(turned, head), encoding="utf-8")
@@ -193,14 +193,14 @@ def test_a_body_is_judged_by_attitudes_and_rates(scene, tmp_path):
     ledger = symtop.judge(file, scene=scene, conserves=["p_phi"], energy="kept")
     assert {"attitude_error", "momentum_error", "rates_error", "energy", "p_phi"} <= {*ledger}
     assert "p_psi" not in ledger
-    assert max(one.value for one in ledger.findings if one.claim.endswith("_error")) < 1e-13
+    assert max(finding.value for finding in ledger.findings if finding.claim.endswith("_error")) < 1e-13
     assert [ledger[name].verdict for name in ("energy", "p_phi")] == ["confirmed"] * 2
     turned = true.copy()  # an attitude that creeps, and rates that are right
     turned[:, 1:5] = [product(rows[1:5], (1.0, 1e-4 * rows[0], 0.0, 0.0)) for rows in true]
     file.write_text(text(turned, OF_BODY), encoding="utf-8")
-    other = symtop.judge(file, scene=scene)
-    assert other["attitude_error"].value == pytest.approx(2.0 * np.arctan(1e-4 * true[-1, 0]), rel=1e-9)
-    assert (other["rates_error"].value < 1e-13, other["momentum_error"].value > 1e-5) == (True, True)
+    ledger = symtop.judge(file, scene=scene)
+    assert ledger["attitude_error"].value == pytest.approx(2.0 * np.arctan(1e-4 * true[-1, 0]), rel=1e-9)
+    assert (ledger["rates_error"].value < 1e-13, ledger["momentum_error"].value > 1e-5) == (True, True)
     file.write_text(text(of_body(scene, 1.001), OF_BODY), encoding="utf-8")
     expected = 1e-3 * np.linalg.norm(true[:, 5:], axis=1).max()
     assert symtop.judge(file, scene=scene)["rates_error"].value == pytest.approx(expected, rel=1e-9)
@@ -208,17 +208,17 @@ def test_a_body_is_judged_by_attitudes_and_rates(scene, tmp_path):
 
 def test_a_conjugate_attitude_of_a_body_is_refused_although_it_starts_right(tmp_path):
     """The scene starts where body and space axes agree."""
-    file, wrong = tmp_path / "run.csv", of_body("check-case-2")
-    wrong[:, 1:5] *= CONJUGATE
-    file.write_text(text(wrong, OF_BODY), encoding="utf-8")
+    file, table = tmp_path / "run.csv", of_body("check-case-2")
+    table[:, 1:5] *= CONJUGATE
+    file.write_text(text(table, OF_BODY), encoding="utf-8")
     result = call("judge", file, "--scene", "check-case-2", code=2)
     assert "its sample at t = 0.2 is the true one if it is read as from space to body" in result.stderr
-    axis, late = text(wrong[:, [0, 5, 6, 7]], "time,wx,wy,wz"), np.copy(wrong[:, :5])
+    axis, part = text(table[:, [0, 5, 6, 7]], "time,wx,wy,wz"), np.copy(table[:, :5])
     for content, words in [
         (axis, "one of axis, quaternion, theta"),
-        (text(late[::-1], OF_BODY[:16]), "at least 0 and increase, but sample 1 is at"),
-        (text(late * [1.0, 2.0, 2.0, 2.0, 2.0], OF_BODY[:16]), "quaternion must be of length 1, at first within 0.5"),
-        (text(wrong[:, [0, 3, 5, 6, 7]], "time,theta,wx,wy,wz").replace(",-0.", ",0."), "rows of 3 beside an attitude"),
+        (text(part[::-1], OF_BODY[:16]), "at least 0 and increase, but sample 1 is at"),
+        (text(part * [1.0, 2.0, 2.0, 2.0, 2.0], OF_BODY[:16]), "quaternion must be of length 1, at first within 0.5"),
+        (text(table[:, [0, 3, 5, 6, 7]], "time,theta,wx,wy,wz").replace(",-0.", ",0."), "rows of 3 beside an attitude"),
     ]:
         file.write_text(content, encoding="utf-8")
         with pytest.raises(symtop.SymtopError, match=words):

@@ -74,9 +74,9 @@ def test_a_run_that_shows_its_quaternion_is_judged_without_the_rounding_of_its_a
     angles, attitude = (integrate(scene, name, step_size=0.01, samples=101, observe="attitude")
                         for name in ("stormer-verlet", "gauss-12"))  # fmt: skip
     truth = symtop.reference(scene, angles.time, "closed-form")
-    turned = float(np.max(np.abs(truth["phi"].values) + np.abs(truth["psi"].values)))
+    turn = float(np.max(np.abs(truth["phi"].values) + np.abs(truth["psi"].values)))
     wide, narrow = (float(error_bound(scene, run, truth, "attitude").max()) for run in (angles, attitude))
-    assert wide - narrow == pytest.approx(0.5 * EPSILON * turned, rel=0.05)
+    assert wide - narrow == pytest.approx(0.5 * EPSILON * turn, rel=0.05)
     table = error_table(scene, symtop.integrator("stormer-verlet"), [0.01], 8.0, observe="attitude")
     assert float(table["attitude_bound"][0]) > 0.9 * wide  # the largest of the run
     assert errors_against(scene, attitude, truth)["attitude"][1] < 3.0 * narrow
@@ -94,17 +94,17 @@ def test_a_composition_in_long_double_has_its_order_where_double_runs_out(name):
     omega = 2.0 * np.pi / scene.nutation_period
     fit = order(*extended_order_data(data), omega, 10, symmetric=True)
     assert abs(fit.slope - 10.0) <= fit.interval < 0.15
-    above = error > 1e-13  # what double can judge
-    double = order(*(values[above] for values in extended_order_data(data)), omega, 10, symmetric=True)
+    mask = error > 1e-13  # what double can judge
+    double = order(*(values[mask] for values in extended_order_data(data)), omega, 10, symmetric=True)
     assert not double.interval < 0.15  # NaN, or wide
 
 
-def alone(scene, stages, horizon, count):
+def axis_after(scene, stages, horizon, count):
     """The axis after `count` steps of a composition, by vectors, one step at a time."""
-    top, at = scene.top, scene.start
-    angles = [np.longdouble(value) for value in (at.theta, at.phi)]
+    top, start = scene.top, scene.start
+    angles = [np.longdouble(value) for value in (start.theta, start.phi)]
     e = axis_from_angles(*angles)
-    L = np.array(momentum_parts(np, top, *angles, at.theta_dot, at.phi_dot, at.psi_dot))
+    L = np.array(momentum_parts(np, top, *angles, start.theta_dot, start.phi_dot, start.psi_dot))
     h, up = np.longdouble(horizon) / count, np.array([0.0, 0.0, 1.0], np.longdouble)
     kicks, drifts = (np.array(row, np.longdouble) / sum(map(np.longdouble, row)) for row in (stages.kick, stages.drift))
     for _ in range(count):
@@ -123,17 +123,17 @@ def test_runs_side_by_side_in_long_double_are_those_alone(name):
     stages = order_table._composition(scene, symtop.integrator(name))
     for count, end in zip(counts, order_table._ends(scene, stages, horizon, counts), strict=True):
         assert np.array_equal(end, order_table._ends(scene, stages, horizon, np.array([count]))[0])
-        assert np.abs(end - alone(scene, stages, horizon, count)).max() < 1e-15
-        assert np.abs(end - alone(scene, stages, horizon, count + 1)).max() > 1e-12  # the control
+        assert np.abs(end - axis_after(scene, stages, horizon, count)).max() < 1e-15
+        assert np.abs(end - axis_after(scene, stages, horizon, count + 1)).max() > 1e-12  # the control
 
 
 @pytest.mark.filterwarnings("error")
 @pytest.mark.parametrize("psi_dot", [0.0, 3.0])
 def test_a_free_top_is_run_in_long_double_without_a_warning(psi_dot):
     """Its kicks are zero, and so is its momentum if it rests."""
-    free = symtop.Scene("free", symtop.SymmetricTop(1.0, 0.5, 0.0), symtop.Angles(1.0, phi_dot=psi_dot / 3.0), 5.0)
-    ends = order_table._ends(free, order_table._composition(free, symtop.integrator("strang")), 2.0, np.array([7, 8]))
-    assert np.abs(ends.astype(float) - symtop.ClosedForm(free.top, free.start).axis([2.0])[0]).max() < 1e-14
+    scene = symtop.Scene("free", symtop.SymmetricTop(1.0, 0.5, 0.0), symtop.Angles(1.0, phi_dot=psi_dot / 3.0), 5.0)
+    ends = order_table._ends(scene, order_table._composition(scene, symtop.integrator("strang")), 2.0, np.array([7, 8]))
+    assert np.abs(ends.astype(float) - symtop.ClosedForm(scene.top, scene.start).axis([2.0])[0]).max() < 1e-14
 
 
 def test_added_steps_lie_where_the_error_is_a_power_and_only_plain_compositions_run_in_long_double():

@@ -22,19 +22,19 @@ def table_of(**attributes: dict[str, str]) -> xr.Dataset:
     """A small error table with other columns beside."""
     values = dict.fromkeys(("axis", "axis_end", "axis_bound", "energy", "outcome", "gap"), ("setting", np.zeros(2)))
     data = xr.Dataset(values, {"scene": "spheroid"})
-    for name, given in attributes.items():
-        data[name].attrs = given
+    for name, attrs in attributes.items():
+        data[name].attrs = attrs
     return data
 
 
 def test_a_study_of_ones_own_keeps_its_names_or_declares_them_beside_it(tmp_path):
-    given = {"long_name": "a gap", "units": "m"}
-    data = netcdf.describe(columns.described(table_of(gap=given, energy=given)), "Mine")
-    assert data["gap"].attrs == data["energy"].attrs == given
+    attrs = {"long_name": "a gap", "units": "m"}
+    data = netcdf.describe(columns.described(table_of(gap=attrs, energy=attrs)), "Mine")
+    assert data["gap"].attrs == data["energy"].attrs == attrs
     file = tmp_path / "columns.tsv"
     file.write_text("variable\tunits\twithout_units\tflags\tlong_name\naxis\tm\t\t\tlength of the axle\n")
-    mine = columns.described(table_of(axis=given), "SI", netcdf.read_columns(file))
-    assert mine["axis"].attrs == {"long_name": "length of the axle", "units": "m"}
+    data = columns.described(table_of(axis=attrs), "SI", netcdf.read_columns(file))
+    assert data["axis"].attrs == {"long_name": "length of the axle", "units": "m"}
     assert netcdf.read_columns(None) == {}
 
 
@@ -73,18 +73,18 @@ def test_units_of_a_problem_without_any(units):
     assert data["history_time"].attrs["long_name"].endswith("in units of the scene") is not bool(units)
 
 
-def assert_declared(data: xr.Dataset | xr.DataTree, own: dict[str, netcdf.Column]) -> None:
+def assert_declared(data: xr.Dataset | xr.DataTree, entries: dict[str, netcdf.Column]) -> None:
     """Every variable has its name and units, none of which comes from elsewhere, and no line is left over."""
     groups = netcdf.groups(data).items()
     bare = xr.DataTree.from_dict({path or "/": group.drop_attrs() for path, group in groups})
     assert (lacking(data), len(lacking(bare)) > 4) == ([], True)
-    left = {name for name in own if name.partition("/")[0] == CHECKS and CHECKS not in dict(groups)}
-    there = {name for path, group in groups for one in group.variables for name in (one, f"{path}/{one}")}
-    assert own.keys() - left <= there
+    absent = {name for name in entries if name.partition("/")[0] == CHECKS and CHECKS not in dict(groups)}
+    names = {name for path, group in groups for key in group.variables for name in (key, f"{path}/{key}")}
+    assert entries.keys() - absent <= names
     for path, group in groups:
         for name, variable in group.variables.items():
             errors = columns.ERROR_TABLE if "axis_bound" in group else {}
-            column = own.get(f"{path}/{name}", own.get(name))
+            column = entries.get(f"{path}/{name}", entries.get(name))
             entry = column.entry if column else errors.get(name, netcdf.VARIABLES.get(name, ("",)))
             assert variable.attrs["long_name"].startswith(entry[0]), name
             assert ("flag_values" in variable.attrs) is bool(column and column.flags), name

@@ -52,7 +52,7 @@ def test_what_is_not_a_power_of_the_step_is_not_judged_and_says_why(error, reaso
 
 def test_false_alarms_of_the_trend_are_as_rare_as_it_says():
     rng, t = np.random.default_rng(3), np.linspace(0.0, 1000.0, 2001)
-    rises = lambda values: abs((one := trend(t, values)).slope) > one.interval
+    rises = lambda values: abs((fit := trend(t, values)).slope) > fit.interval
     assert np.mean([rises(rng.normal(size=t.size)) for _ in range(200)]) < 0.09
     walks = [np.cumsum(rng.normal(size=t.size)) for _ in range(200)]
     assert np.mean([rises(walk) for walk in walks]) < 0.45
@@ -87,22 +87,22 @@ def test_combining_refuses_cases_with_different_coordinates():
 
 
 def test_combined_values_are_those_of_each_case_whatever_its_type_and_another_order_of_dimensions_is_refused():
-    of = lambda name, dims, values: (symtop.Case("spheroid", name), xr.Dataset({"value": (dims, values)}))
+    case = lambda name, dims, values: (symtop.Case("spheroid", name), xr.Dataset({"value": (dims, values)}))
     pairs = [(np.array([3, 4], np.uint8), np.array([300.0, -1.5])), (np.float32([1.0, 2.0]), np.array([1e300, 0.1])),
              (np.array([3, 4], np.uint8), np.array([300, 7], np.uint16))]  # fmt: skip
-    for two in pairs:
-        both = datasets.combine([of(name, ("n",), values) for name, values in zip("ab", two, strict=True)])["value"]
-        np.testing.assert_array_equal(both.sel(scene="spheroid"), [*two])
+    for pair in pairs:
+        data = datasets.combine([case(name, ("n",), values) for name, values in zip("ab", pair, strict=True)])["value"]
+        np.testing.assert_array_equal(data.sel(scene="spheroid"), [*pair])
     with pytest.raises(symtop.SymtopError, match=r"value of b on spheroid must be over \('n', 'm'\)"):
-        datasets.combine([of("a", ("n", "m"), np.eye(2)), of("b", ("m", "n"), np.eye(2))])
+        datasets.combine([case("a", ("n", "m"), np.eye(2)), case("b", ("m", "n"), np.eye(2))])
 
 
-def taking(clock, each):
+def taking(clock, seconds):
     """A function whose calls take these seconds."""
-    left = iter(each)
+    times = iter(seconds)
 
     def call():
-        clock[0] += next(left)
+        clock[0] += next(times)
 
     return call
 
@@ -121,7 +121,7 @@ def test_a_function_is_asked_no_more_once_it_took_long_or_its_least_samples_agre
         (timing,) = timings([calls], 8, 2e-3, warm=True, close=close, exact=False)
         assert len(timing.samples) == count
     samples = [[1.0, 3.0, 1.005, 3.0, last] for last in (1.009, 1.02)]
-    assert [agree(one, 0.01) for one in (*samples, 4 * [1.0])] == [True, False, False]
+    assert [agree(times, 0.01) for times in (*samples, 4 * [1.0])] == [True, False, False]
 
     # The machine is half as fast in its first second: one by one, the first look so; beside an uneven one, none does.
     def work():
@@ -130,8 +130,8 @@ def test_a_function_is_asked_no_more_once_it_took_long_or_its_least_samples_agre
     uneven, clock[0] = taking(clock, (6e-3 * 1.02**k for k in itertools.count())), 0.0
     together = [timing.best for timing in timings([*[work] * 10, uneven], 10, 5e-3, warm=True, close=0.01, exact=False)]
     clock[0] = 0.0
-    alone = [timings([work], 10, 5e-3, warm=True, exact=False)[0].best for _ in range(10)]
-    assert (together[:-1], alone) == (pytest.approx([0.01] * 10), pytest.approx([0.02] * 5 + [0.01] * 5))
+    separate = [timings([work], 10, 5e-3, warm=True, exact=False)[0].best for _ in range(10)]
+    assert (together[:-1], separate) == (pytest.approx([0.01] * 10), pytest.approx([0.02] * 5 + [0.01] * 5))
 
 
 def test_timings_know_when_they_are_noisy_and_errors_are_relative_to_their_scales():
@@ -148,12 +148,12 @@ def test_timings_know_when_they_are_noisy_and_errors_are_relative_to_their_scale
 
 def test_every_published_value_is_reproduced_and_one_off_by_its_last_digit_is_not():
     values = published_values()
-    assert [(one.source, one.quantity) for one in values if not one.reproduced] == []
-    printed = [one.tests for one in values if one.kind == "printed"]
-    assert [printed.count(what) for what in (TRAJECTORY, START, OTHER_BODY)] == [3, 1, 3]
-    assert len(values) - len(printed) == 6
-    for one in values:
-        assert not one._replace(ours=one.published + 0.52 * one.unit).reproduced
+    assert [(value.source, value.quantity) for value in values if not value.reproduced] == []
+    kinds = [value.tests for value in values if value.kind == "printed"]
+    assert [kinds.count(kind) for kind in (TRAJECTORY, START, OTHER_BODY)] == [3, 1, 3]
+    assert len(values) - len(kinds) == 6
+    for value in values:
+        assert not value._replace(ours=value.published + 0.52 * value.unit).reproduced
 
 
 SPHEROID = symtop.scene("spheroid")
@@ -166,7 +166,7 @@ def test_a_million_steps_keep_recomputed_momenta_and_bound_the_energy_without_a_
     assert run.steps == 1_000_000
     changes = residuals(SPHEROID, run)
     trends = [trend(run.time, changes[quantity]) for quantity in ("p_phi", "p_psi", "energy")]
-    assert not any(abs(one.slope) > one.interval for one in trends)
+    assert not any(abs(fit.slope) > fit.interval for fit in trends)
     assert max(np.max(np.abs(changes[quantity])) for quantity in ("p_phi", "p_psi")) < DISCRETE[name]
     assert abs(growth(run.time, changes["energy"]).slope) < 0.05
     # of second order in the step: bounded, not small; or of fourth
@@ -180,10 +180,10 @@ def test_momenta_are_recomputed_and_not_copied(family, rule):
     """A phi that moves 1e-10 too far shows in p_phi."""
     par, state = symtop.on_angles(SPHEROID.top, SPHEROID.start)
     step, *_ = family.march.increment(par, rule, state, family.begin(par, rule, state, 0.01), 0.01)
-    right = family.observe(par, rule, state, step, 0.01)
-    assert right == pytest.approx(SPHEROID.top.momenta(SPHEROID.start)[:2], rel=1e-14)
-    moved = (step[0], step[1], step[2] + 1e-10, step[3])
-    assert abs(family.observe(par, rule, state, moved, 0.01)[0] - right[0]) > 1e-9
+    expected = family.observe(par, rule, state, step, 0.01)
+    assert expected == pytest.approx(SPHEROID.top.momenta(SPHEROID.start)[:2], rel=1e-14)
+    next_state = (step[0], step[1], step[2] + 1e-10, step[3])
+    assert abs(family.observe(par, rule, state, next_state, 0.01)[0] - expected[0]) > 1e-9
 
 
 PLAN = symtop.Plan.steps(SPHEROID.nutation_period / 118.02, [0, 40_000])
@@ -194,8 +194,8 @@ def test_nine_states_of_the_motion_have_its_momenta(scene):
     h = scene.time_scale() / 118.0
     motion = closed_form(scene)(np.arange(9) * h)
     states = np.stack([motion.theta, scene.top.I1 * motion.theta_dot, motion.phi, motion.psi], axis=-1)
-    found, true = np.ravel(momenta_of(scene.top, states[None], h)), scene.top.momenta(scene.start)[:2]
-    assert found == pytest.approx(true, rel=0.0, abs=1e-7 * scene.momentum_scale)
+    momenta, true = np.ravel(momenta_of(scene.top, states[None], h)), scene.top.momenta(scene.start)[:2]
+    assert momenta == pytest.approx(true, rel=0.0, abs=1e-7 * scene.momentum_scale)
 
 
 @pytest.mark.parametrize("name", ["midpoint", "stormer-verlet", "rk4", "trapezoidal"])
@@ -208,8 +208,8 @@ def test_a_run_that_hides_its_drift_is_seen_and_one_of_few_steps_says_nothing():
 
     def solve(top, start, plan):
         run, momenta = rk4.solvers["angles"](top, start, plan), top.momenta(start)
-        same = np.ones(plan.times.size)
-        return run._replace(p_phi=momenta.p_phi * same, p_psi=momenta.p_psi * same)
+        ones = np.ones(plan.times.size)
+        return run._replace(p_phi=momenta.p_phi * ones, p_psi=momenta.p_psi * ones)
 
     difference = from_increments(dataclasses.replace(rk4, name="copied", solvers={"angles": solve}), SPHEROID, PLAN)
     assert difference.size > 100.0 * difference.floor

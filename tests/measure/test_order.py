@@ -85,8 +85,8 @@ def test_no_slope_confirms_two_orders_and_a_step_taken_twice_is_one_point():
     errors = 1e-11 * steps**10.0 * (1.0 + 0.3 * steps**2) * np.exp(0.01 * rng.standard_normal(6))
     once = order(steps, errors, 1e-16, 1.0, 10, symmetric=True)
     thrice = order(np.tile(steps, 3), np.tile(errors, 3), 1e-16, 1.0, 10, symmetric=True)
-    known = math.isfinite(once.slope) or math.isfinite(thrice.slope)
-    assert (once.slope, once.interval) == (thrice.slope, thrice.interval) or not known
+    finite = math.isfinite(once.slope) or math.isfinite(thrice.slope)
+    assert (once.slope, once.interval) == (thrice.slope, thrice.interval) or not finite
     dense = np.geomspace(0.02, 0.4, 20)
     fits = [order(np.repeat(dense, n), np.repeat(dense**2.0, n), 1e-16, 1.0, 2, symmetric=True) for n in (1, 2)]
     assert fits[0].slope == fits[1].slope == pytest.approx(2.0, abs=1e-3)
@@ -100,15 +100,15 @@ def series(method, chart, scene=SPHEROID):
     return step_series(one_step(method, chart, scene, 0.01), generic_start(scene), scene.time_scale())
 
 
-@pytest.mark.parametrize("off", [3e-8, 1e-9])
-def test_a_coefficient_that_is_slightly_off_shows_in_the_term_that_it_spoils(off):
-    outer = 1.3512071919596577 + off
+@pytest.mark.parametrize("shift", [3e-8, 1e-9])
+def test_a_coefficient_that_is_slightly_off_shows_in_the_term_that_it_spoils(shift):
+    outer = 1.3512071919596577 + shift
     inner = 1.0 - 2.0 * outer
     kick = (outer / 2, (outer + inner) / 2, (outer + inner) / 2, outer / 2)
     result = series(symtop.composition("off", (outer, inner, outer), kick, chart="space", order=4), "axis")
     assert result.order == 2
-    assert 0.05 * off < result.defect[3] < 20.0 * off
-    assert result.noise[3] < 0.01 * off
+    assert 0.05 * shift < result.defect[3] < 20.0 * shift
+    assert result.noise[3] < 0.01 * shift
 
 
 def test_the_terms_of_known_functions_are_found():
@@ -153,12 +153,12 @@ def test_there_are_as_many_trees_as_there_are_and_known_tables_have_their_orders
     assert oc.conditions([[0.0]], [0.9]).order == 0
 
 
-@pytest.mark.parametrize(("off", "order"), [(1e-9, 2), (1e-13, 4)])
-def test_a_coefficient_that_is_off_shows_beyond_rounding(off, order):
+@pytest.mark.parametrize(("shift", "order"), [(1e-9, 2), (1e-13, 4)])
+def test_a_coefficient_that_is_off_shows_beyond_rounding(shift, order):
     # the same nodes; b4 off c3 = off/12 in the tall tree of order 3
-    table = oc.conditions(square(((), (0.5,), (0.0, 0.5), (off, 0.0, 1.0 - off))), CLASSICAL[1])
+    table = oc.conditions(square(((), (0.5,), (0.0, 0.5), (shift, 0.0, 1.0 - shift))), CLASSICAL[1])
     assert table.order == order
-    assert table.defect[2] == pytest.approx(off / 12, rel=0.01, abs=1e-16)
+    assert table.defect[2] == pytest.approx(shift / 12, rel=0.01, abs=1e-16)
 
 
 FREE = [2, 1, 2, 3, 6, 9, 18, 30, 56, 99]  # dimensions of the free Lie algebra of two letters: Witt's formula
@@ -167,7 +167,7 @@ FREE = [2, 1, 2, 3, 6, 9, 18, 30, 56, 99]  # dimensions of the free Lie algebra 
 @pytest.mark.parametrize("longest", [9, pytest.param(10, marks=pytest.mark.slow)])
 def test_there_are_as_many_conditions_as_there_are(longest):
     """McLachlan and Quispel, Acta Numerica 11 (2002) 341, of Runge-Kutta-Nystrom methods."""
-    count = [free - oc.vanishing(length).shape[1] for length, free in enumerate(FREE[:longest], start=1)]
+    count = [dimension - oc.vanishing(length).shape[1] for length, dimension in enumerate(FREE[:longest], start=1)]
     assert count == [2, 1, 2, 2, 4, 5, 10, 14, 25, 39][:longest]
 
 

@@ -14,7 +14,7 @@ from symtop.run.simulation import integrate
 from symtop.run.trajectory import Trajectory
 
 
-def moved(name, periods=20.0, early=0.0, faster=0.0, turned=0.0, turning=0.0, lifted=0.0, samples=301):
+def shift(name, periods=20.0, early=0.0, faster=0.0, turned=0.0, turning=0.0, lifted=0.0, samples=301):
     """The true motion, early, too fast, turned about the vertical, turning, or lifted: a run whose errors are known."""
     scene = symtop.scene(name)
     times = np.linspace(0.0, periods * scene.nutation_period, samples)
@@ -32,7 +32,7 @@ def largest_turn(run, parts):
 
 @pytest.mark.parametrize("name", ["spheroid", "cusp", "hairer-lubich-wanner", "bruls-cardona-arnold"])
 def test_a_motion_that_is_early_and_turned_has_the_right_shape(name):
-    scene, run, truth = moved(name, early=0.013, turned=-0.2)
+    scene, run, truth = shift(name, early=0.013, turned=-0.2)
     parts, rates = split(scene, run), phase(scene, run, truth)
     assert parts.shape.max() < 1e-13
     assert np.abs(parts.lag).max() == pytest.approx(0.013, rel=1e-9)
@@ -42,26 +42,26 @@ def test_a_motion_that_is_early_and_turned_has_the_right_shape(name):
 
 
 def test_lags_of_more_than_a_turn_and_wrong_frequencies_are_found():
-    scene, run, _ = moved("goldstein", early=0.3, faster=0.1, turned=9.0)
+    scene, run, _ = shift("goldstein", early=0.3, faster=0.1, turned=9.0)
     parts = split(scene, run)
     assert np.max(np.abs(parts.lag - (0.3 + 0.1 * run.time))) < 1e-11
     assert np.max(np.abs(parts.turn - 9.0)) < 1e-10
     assert parts.shape.max() < 1e-12
-    parts = phase(*moved("spheroid", faster=1e-5))
+    parts = phase(*shift("spheroid", faster=1e-5))
     assert parts["nutation_period"] == pytest.approx(1e-5, rel=1e-4)
     assert parts["precession_rate"] == pytest.approx(1e-5, rel=1e-4)  # it turns faster by as much
-    parts = phase(*moved("spheroid", faster=0.01))
+    parts = phase(*shift("spheroid", faster=0.01))
     assert parts["nutation_period"] == pytest.approx(1.0 - 1.0 / 1.01, rel=1e-6)  # of the period
     form = closed_form(symtop.scene("spheroid"))
     turning = -1e-5 * form.phi_per_period / form.nutation_period
-    assert phase(*moved("spheroid", faster=1e-5, turning=turning))["precession_rate"] < 1e-8  # turned back by as much
-    parts = phase(*moved("spheroid", turning=1e-5))
+    assert phase(*shift("spheroid", faster=1e-5, turning=turning))["precession_rate"] < 1e-8  # turned back by as much
+    parts = phase(*shift("spheroid", turning=1e-5))
     assert parts["nutation_period"] < 1e-14
     assert parts["precession_rate"] == pytest.approx(1e-5 * form.nutation_period / form.phi_per_period, rel=1e-9)
 
 
 def test_another_shape_a_pole_passed_otherwise_and_a_steady_precession_are_not_late():
-    scene, run, truth = moved("spheroid", lifted=1e-4)
+    scene, run, truth = shift("spheroid", lifted=1e-4)
     parts = split(scene, run)
     lag = np.abs(parts.lag).max()
     assert 3e-5 < parts.shape.max() < 2e-4
@@ -72,7 +72,7 @@ def test_another_shape_a_pole_passed_otherwise_and_a_steady_precession_are_not_l
     run = integrate(scene, "strang", step_size=period / 40.37, horizon=400.0 * period, samples=331, observe="axis")
     truth = reference(scene, run.time, precision="closed-form")
     assert largest_turn(run, split(scene, run)) < 2.0 * charts.axis_distance(run.axis, truth["axis"].values).max()
-    scene, run, truth = moved("steady", turned=1e-6)
+    scene, run, truth = shift("steady", turned=1e-6)
     parts = split(scene, run)
     assert np.isnan(parts.lag).all()
     assert math.isnan(phase(scene, run, truth)["nutation_period"])

@@ -44,37 +44,37 @@ def test_each_entry_is_that_of_one_run_whose_settings_are_its_own(data):
 def test_one_thread_and_many_and_a_file_give_the_same(data, tmp_path):
     file = tmp_path / "sweep.nc"
     for options in ({"threads": 1}, {"path": file}):
-        again = symtop.sweep(["spheroid", "goldstein"], METHODS, **ARGUMENTS, **options)
-        xr.testing.assert_identical(again.drop_attrs(), data.drop_attrs())
+        result = symtop.sweep(["spheroid", "goldstein"], METHODS, **ARGUMENTS, **options)
+        xr.testing.assert_identical(result.drop_attrs(), data.drop_attrs())
     xr.testing.assert_identical(netcdf.read(file).drop_attrs(), data.drop_attrs())
 
 
 def test_a_sweep_that_was_stopped_goes_on_from_its_file(tmp_path, monkeypatch):
     """Killed after three cells of eight, it computes the other five; a changed setting computes its own cells only."""
-    file, table, ran = tmp_path / "sweep.nc", module._table, []
-    counted = lambda cell: ran.append((cell.scene.name, cell.method.name)) or table(cell)
+    file, table, calls = tmp_path / "sweep.nc", module._table, []
+    record = lambda cell: calls.append((cell.scene.name, cell.method.name)) or table(cell)
 
     def stopping(cell):
-        if len(ran) == 3:
+        if len(calls) == 3:
             raise KeyboardInterrupt
-        return counted(cell)
+        return record(cell)
 
     call = {**ARGUMENTS, "path": file, "threads": 1}
     monkeypatch.setattr(module, "_table", stopping)
     with pytest.raises(KeyboardInterrupt):
         symtop.sweep(["spheroid", "goldstein"], METHODS, **call)
-    ran.clear()
-    monkeypatch.setattr(module, "_table", counted)
-    whole = symtop.sweep(["spheroid", "goldstein"], METHODS, **call)
-    assert len(ran) == 5
-    assert (whole["made_of"] != "").all()
-    ran.clear()
+    calls.clear()
+    monkeypatch.setattr(module, "_table", record)
+    data = symtop.sweep(["spheroid", "goldstein"], METHODS, **call)
+    assert len(calls) == 5
+    assert (data["made_of"] != "").all()
+    calls.clear()
     symtop.sweep(["spheroid", "goldstein"], METHODS, **call)
-    assert ran == []
+    assert calls == []
     symtop.sweep(["spheroid", "goldstein"], METHODS, **{**call, "tolerance": [1e-5]})
-    assert ran == [("spheroid", "rk45-compiled"), ("goldstein", "rk45-compiled")]
+    assert calls == [("spheroid", "rk45-compiled"), ("goldstein", "rk45-compiled")]
     symtop.sweep(["spheroid", "goldstein"], METHODS, **call, observe="axis")
-    assert len(ran) == 2 + 8
+    assert len(calls) == 2 + 8
 
 
 def test_failures_are_rows():
@@ -83,8 +83,8 @@ def test_failures_are_rows():
     def broken(top, start, plan):
         raise ZeroDivisionError("of its own")
 
-    bad = symtop.Integrator(name="broken", family="other", summary="raises", solvers={"axis": broken})
-    data = symtop.sweep("spheroid", [bad, "stormer-verlet", "strang"], step_size=[1.0, 0.01], horizon=8.0, quiet=True)
+    entry = symtop.Integrator(name="broken", family="other", summary="raises", solvers={"axis": broken})
+    data = symtop.sweep("spheroid", [entry, "stormer-verlet", "strang"], step_size=[1.0, 0.01], horizon=8.0, quiet=True)
     outcomes = data["outcome"].values[0]
     assert outcomes[0].tolist() == ["raised", "raised"]
     assert "ZeroDivisionError: of its own" in str(data["message"].values[0, 0, 0])
@@ -99,61 +99,61 @@ def test_a_file_with_other_cells_is_refused_and_left_as_it_is(tmp_path, monkeypa
     symtop.sweep("spheroid", ["rk4[axis]", "strang"], path=file, **arguments)
     before, table = file.read_bytes(), module._table
     monkeypatch.setattr(module, "_table", lambda _: pytest.fail("it computes"))
-    for scene, names, left in (
+    for scene, names, cells in (
         ("spheroid", ["strang"], r"rk4\[axis\] on spheroid"),
         ("spheroid", ["midpoint"], r"rk4\[axis\] on spheroid, strang on spheroid"),
         ("goldstein", ["rk4[axis]", "strang"], r"rk4\[axis\] on spheroid, strang on spheroid"),
     ):
-        with pytest.raises(symtop.SymtopError, match=f"holds what was not asked for, {left}: ask for these as well"):
+        with pytest.raises(symtop.SymtopError, match=f"holds what was not asked for, {cells}: ask for these as well"):
             symtop.sweep(scene, names, path=file, **arguments)
     with files.locked(tmp_path / "sweep.nc.parts", wait=True), pytest.raises(symtop.SymtopError, match="is writing"):
         symtop.sweep("spheroid", ["rk4[axis]", "strang"], path=file, **arguments)
     assert file.read_bytes() == before
     netcdf.write(netcdf.read(file).assign(axis=lambda data: 3.0 * data["axis"]), file)
-    for path, says in ((file, "damaged, its numbers are not those that were"), (file / "x.nc", "in a folder")):
-        with pytest.raises(symtop.SymtopError, match=says):
+    for path, message in ((file, "damaged, its numbers are not those that were"), (file / "x.nc", "in a folder")):
+        with pytest.raises(symtop.SymtopError, match=message):
             symtop.sweep("spheroid", ["rk4[axis]", "strang"], path=path, **arguments)
     file.write_bytes(before)
-    turned = symtop.sweep("spheroid", ["strang", "rk4[axis]"], path=file, **arguments)
-    xr.testing.assert_identical(netcdf.read(file).drop_attrs(), turned.drop_attrs())
+    small = symtop.sweep("spheroid", ["strang", "rk4[axis]"], path=file, **arguments)
+    xr.testing.assert_identical(netcdf.read(file).drop_attrs(), small.drop_attrs())
     monkeypatch.setattr(module, "_table", table)
-    more = symtop.sweep(["spheroid", "goldstein"], ["strang", "stormer-verlet", "rk4[axis]"], path=file, **arguments)
-    assert {*more["outcome"].values.flat} - {*turned["outcome"].values.flat} == {"left_chart"}
-    xr.testing.assert_identical(netcdf.read(file).drop_attrs(), more.drop_attrs())
-    assert (more["axis"].sel(scene=turned["scene"], variant=turned["variant"]) == turned["axis"]).all()
+    large = symtop.sweep(["spheroid", "goldstein"], ["strang", "stormer-verlet", "rk4[axis]"], path=file, **arguments)
+    assert {*large["outcome"].values.flat} - {*small["outcome"].values.flat} == {"left_chart"}
+    xr.testing.assert_identical(netcdf.read(file).drop_attrs(), large.drop_attrs())
+    assert (large["axis"].sel(scene=small["scene"], variant=small["variant"]) == small["axis"]).all()
 
 
 def test_a_cell_that_raised_is_tried_again_and_one_that_ended_early_is_not(tmp_path, monkeypatch):
-    file, disk, well = tmp_path / "sweep.nc", tmp_path / "disk", symtop.integrator("strang[axis]").solvers["axis"]
-    ran, table = [], module._table
+    file, disk, solver = tmp_path / "sweep.nc", tmp_path / "disk", symtop.integrator("strang[axis]").solvers["axis"]
+    calls, table = [], module._table
 
     def moody(top, start, plan):
         if not disk.exists():  # a list of calls would be part of what the numbers depend on
             disk.touch()
             raise OSError("the disk is away")
-        return well(top, start, plan)
+        return solver(top, start, plan)
 
-    monkeypatch.setattr(module, "_table", lambda cell: ran.append(cell.method.name) or table(cell))
+    monkeypatch.setattr(module, "_table", lambda cell: calls.append(cell.method.name) or table(cell))
     method = symtop.Integrator(name="moody", family="other", summary="raises once", solvers={"axis": moody})
     expected = (["raised", "ok"], ["stormer-verlet", "moody"]), (["ok", "ok"], ["moody"]), (["ok", "ok"], [])
-    for outcomes, again in expected:
+    for outcomes, names in expected:
         arguments = {"step_size": [1.0, 0.02], "path": file, "threads": 1, "quiet": True}
         data = symtop.sweep("spheroid", ["stormer-verlet", method], **arguments)
         assert data["outcome"].sel(variant="moody").values[0].tolist() == outcomes
         assert data["outcome"].sel(variant="stormer-verlet").values[0].tolist() == ["left_chart", "ok"]
-        assert ran == again
-        ran.clear()
+        assert calls == names
+        calls.clear()
         xr.testing.assert_identical(netcdf.read(file).drop_attrs(), data.drop_attrs())
 
 
-@pytest.mark.parametrize(("words", "says"), [
+@pytest.mark.parametrize(("words", "message"), [
     ({}, "strang has a fixed step: give step_size or per_nutation"),
     ({"step_size": 0.1, "integrators": "rk45"}, "rk45 is adaptive: give tolerance"),
     ({"step_size": 0.1, "scenes": ["spheroid", "spheroid"]}, "scenes must be one or more, each once"),
     ({"step_size": 0.1, "scenes": {"I1": [1.0]}}, "for a dataset of tops there is ensemble"),
 ])  # fmt: skip
-def test_bad_input_is_one_sentence(words, says):
-    with pytest.raises(symtop.SymtopError, match=says):
+def test_bad_input_is_one_sentence(words, message):
+    with pytest.raises(symtop.SymtopError, match=message):
         symtop.sweep(**{"scenes": "spheroid", "integrators": "strang", **words})
 
 
@@ -173,20 +173,20 @@ def test_steps_a_nutation_are_those_of_each_scene_and_a_file_of_something_else_i
 def test_times_are_those_of_runs_that_ended_well_and_are_kept(tmp_path):
     options = {"step_size": [0.001, 3.0], "horizon": 20.0, "timed": True, "quiet": True, "path": tmp_path / "sweep.nc"}
     data = symtop.sweep("spheroid", ["rk4", "strang"], **options)
-    good = data["outcome"].values == "ok"
-    assert 0 < good.sum() < good.size
-    assert (np.isfinite(data["seconds"].values) == good).all()
-    assert (data["seconds"].values[good] > 0.0).all()
+    ok = data["outcome"].values == "ok"
+    assert 0 < ok.sum() < ok.size
+    assert (np.isfinite(data["seconds"].values) == ok).all()
+    assert (data["seconds"].values[ok] > 0.0).all()
     assert "one call of the method's solver" in data.attrs["timed"]
-    again = symtop.sweep("spheroid", ["rk4", "strang"], **options)
-    np.testing.assert_array_equal(again["seconds"].values, data["seconds"].values)
+    repeat = symtop.sweep("spheroid", ["rk4", "strang"], **options)
+    np.testing.assert_array_equal(repeat["seconds"].values, data["seconds"].values)
     solvers = {"attitude": lambda *_: pytest.fail("another chart"), "axis": symtop.integrator("rk4").solvers["axis"]}
-    both, asked = symtop.Integrator("both", "other", "", solvers), options | {"path": None, "observe": "axis"}
-    assert symtop.sweep("spheroid", both, **asked)["seconds"].values[0, 0, 0] > 0.0
-    untimed = symtop.sweep(["spheroid", "goldstein"], "rk4", step_size=0.1, quiet=True)
-    ends = {name: symtop.scene(name).horizon for name in untimed["scene"].values}
-    assert json.loads(untimed.attrs["horizon"]) == ends
-    assert ("seconds" in untimed, untimed.attrs["timed"][:7]) == (False, "nothing")
+    method, arguments = symtop.Integrator("both", "other", "", solvers), options | {"path": None, "observe": "axis"}
+    assert symtop.sweep("spheroid", method, **arguments)["seconds"].values[0, 0, 0] > 0.0
+    data = symtop.sweep(["spheroid", "goldstein"], "rk4", step_size=0.1, quiet=True)
+    ends = {name: symtop.scene(name).horizon for name in data["scene"].values}
+    assert json.loads(data.attrs["horizon"]) == ends
+    assert ("seconds" in data, data.attrs["timed"][:7]) == (False, "nothing")
     with pytest.raises(symtop.SymtopError, match="timed must be"):
         symtop.sweep("spheroid", "rk4", step_size=0.1, timed="yes")
 

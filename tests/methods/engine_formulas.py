@@ -52,7 +52,7 @@ def _without(attitude, w, h, inertia, tau, turned):
     return turned(attitude, w, h), w
 
 
-no_gyro, no_gyro_linear = (partial(_without, turned=one) for one in (_exp, _moved))
+no_gyro, no_gyro_linear = (partial(_without, turned=update) for update in (_exp, _moved))
 
 
 def mujoco_euler(attitude, w, h, inertia, tau):
@@ -94,9 +94,9 @@ def rapier(attitude, w, h, inertia, tau):
 
 def ode(attitude, w, h, inertia, tau):
     R = attitude.as_matrix()
-    there = R @ inertia @ R.T
-    L = there @ w
-    w = np.linalg.solve(there - h * hat(L), L) + h * _inverse(attitude, inertia, tau(attitude))
+    tensor = R @ inertia @ R.T
+    L = tensor @ w
+    w = np.linalg.solve(tensor - h * hat(L), L) + h * _inverse(attitude, inertia, tau(attitude))
     return _moved(attitude, w, h), w
 
 
@@ -105,9 +105,9 @@ def lammps_rigid(attitude, w, h, inertia, tau):
     w = _inverse(attitude, inertia, L)
     full, half = _moved(attitude, w, h), _moved(attitude, w, 0.5 * h)
     half = _moved(half, _inverse(half, inertia, L), 0.5 * h)
-    one, two = full.as_quat(), half.as_quat()
-    two = two if one @ two > 0.0 else -two
-    attitude = Rotation.from_quat(2.0 * two - one)
+    q_full, q_half = full.as_quat(), half.as_quat()
+    q_half = q_half if q_full @ q_half > 0.0 else -q_half
+    attitude = Rotation.from_quat(2.0 * q_half - q_full)
     return attitude, _inverse(attitude, inertia, L + 0.5 * h * tau(attitude))
 
 
@@ -137,7 +137,7 @@ def _leapfrog(attitude, w, h, inertia, tau, published):
     return attitude, _inverse(attitude, inertia, L + 0.5 * h * tau(attitude))
 
 
-yade, fincham = (partial(_leapfrog, published=one) for one in (False, True))
+yade, fincham = (partial(_leapfrog, published=flag) for flag in (False, True))
 
 
 def _three_stages(attitude, b, h, inertia, tau):
@@ -174,7 +174,7 @@ def _bernoulli(turn, b):
     return total
 
 
-mujoco3_rk4, rkmk4 = (partial(_kutta, corrected=one) for one in (lambda turn, b: b, _bernoulli))
+mujoco3_rk4, rkmk4 = (partial(_kutta, corrected=correction) for correction in (lambda turn, b: b, _bernoulli))
 
 
 def jsbsim_default(attitude, w, h, inertia, tau):

@@ -34,38 +34,38 @@ if way == "numba alone":
 if way in ("stored", "bitcode"):
     jit.on_cold[:] = [lambda: sys.exit("compiled")]
 lanes.FEW = -1
-every = [f"{one.name}[{chart}]" for one in symtop.integrators().values() if one.implementation == "compiled"
-         for chart in one.charts()]
+rows = [f"{entry.name}[{chart}]" for entry in symtop.integrators().values() if entry.implementation == "compiled"
+        for chart in entry.charts()]
 for k in range(count):
-    one = symtop.integrator(every[k * (len(every) - 1) // (count - 1)])
-    setting = one.given(0.02 if one.fixed_step else 1e-7)
-    runs = [symtop.simulate("spheroid", one, **setting, samples=30, guard=False)]
+    row = symtop.integrator(rows[k * (len(rows) - 1) // (count - 1)])
+    setting = row.given(0.02 if row.fixed_step else 1e-7)
+    runs = [symtop.simulate("spheroid", row, **setting, samples=30, guard=False)]
     if k % 3 == 0:
-        runs.append(symtop.ensemble(["spheroid", "goldstein"] * 20, one, **setting, horizon=3.0, threads=1, quiet=True))
+        runs.append(symtop.ensemble(["spheroid", "goldstein"] * 20, row, **setting, horizon=3.0, threads=1, quiet=True))
     for run in runs:
         values = [run[name].values for name in sorted(run.data_vars) if run[name].dtype.kind == "f" and run[name].ndim]
-        print(one.name, hashlib.sha256(b"".join(value.tobytes() for value in values)).hexdigest())
+        print(row.name, hashlib.sha256(b"".join(value.tobytes() for value in values)).hexdigest())
 """
 
 
 @pytest.mark.slow
 def test_kernels_return_the_same_bits_whichever_way_they_were_made(tmp_path):
     """By numba alone, compiled here, from disk, from bitcode, and from that for a processor with fewer instructions."""
-    plain, output, count = {"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": ""}, {}, 36
-    ways = {"numba alone": {}, "compiled": {}, "stored": {}, "bitcode": {}, "bitcode, x86-64": plain}
+    x86, output, count = {"NUMBA_CPU_NAME": "x86-64", "NUMBA_CPU_FEATURES": ""}, {}, 36
+    ways = {"numba alone": {}, "compiled": {}, "stored": {}, "bitcode": {}, "bitcode, x86-64": x86}
     code = lambda: {file: (file.read_bytes(), file.stat().st_mtime_ns) for file in tmp_path.rglob("*.code")}
     for way, processor in ways.items():
-        made = code()
-        for file in made if way != "stored" else ():
+        before = code()
+        for file in before if way != "stored" else ():
             file.unlink()
         output[way] = printed_by(BITS, way.partition(",")[0], count, SYMTOP_CACHE=tmp_path, **processor).splitlines()
         assert len(output[way]) == count + -(-count // 3)
         assert output[way] == output["numba alone"], way
-        assert way != "stored" or code() == made  # nor is machine code made of bitcode again
+        assert way != "stored" or code() == before  # nor is machine code made of bitcode again
         if way == "bitcode":  # mostly the same machine code, and so as fast
-            assert np.mean([file.read_bytes() == stored for file, (stored, _) in made.items()]) > 0.8
+            assert np.mean([file.read_bytes() == content for file, (content, _) in before.items()]) > 0.8
         if way == "bitcode, x86-64":
-            assert not any(file.exists() for file in made)
+            assert not any(file.exists() for file in before)
     assert all(any(f"[{chart}]" in line for line in output["compiled"]) for chart in ("angles", "axis", "attitude"))
 
 
@@ -98,30 +98,30 @@ def test_a_file_is_named_after_the_signature_whose_code_it_holds(monkeypatch, tm
 def test_the_code_of_another_signature_is_not_run(monkeypatch, tmp_path, swapped):
     _kept_twice(monkeypatch, tmp_path)
     for kind in swapped:
-        one, other = tmp_path.rglob(f"*.{kind}")
-        aside = one.read_bytes()
-        one.write_bytes(other.read_bytes())
-        other.write_bytes(aside)
-    again = compile_kernel(_doubled)
-    assert (again(2), again(2.5)) == (4, 5.0)
-    assert {signature[0].name for signature in again.signatures} == {"int64", "float64"}
+        first, second = tmp_path.rglob(f"*.{kind}")
+        content = first.read_bytes()
+        first.write_bytes(second.read_bytes())
+        second.write_bytes(content)
+    kernel = compile_kernel(_doubled)
+    assert (kernel(2), kernel(2.5)) == (4, 5.0)
+    assert {signature[0].name for signature in kernel.signatures} == {"int64", "float64"}
 
 
 def test_machine_code_is_run_with_the_bitcode_that_it_was_made_of(monkeypatch, tmp_path):
     """Names in it hang on the process that compiled: with another's, a process ended."""
     kernel, files = _kept_twice(monkeypatch, tmp_path)
-    old = [file.read_bytes() for file in files]
+    contents = [file.read_bytes() for file in files]
     for file in tmp_path.rglob("*.bitcode"):
         file.unlink()
     for number in range(3):  # more names of numba's
         compile_kernel(lambda x, number=number: x + number)(1)
     monkeypatch.setattr(jit, "_pruned", [])
     assert compile_kernel(_doubled)(2) == 4
-    for file, code in zip(files, old, strict=True):
+    for file, code in zip(files, contents, strict=True):
         file.write_bytes(code)
-    again = compile_kernel(_doubled)
-    assert (again(2), again(2.5)) == (4, 5.0)
-    assert kernel.signatures == again.signatures
+    reloaded = compile_kernel(_doubled)
+    assert (reloaded(2), reloaded(2.5)) == (4, 5.0)
+    assert kernel.signatures == reloaded.signatures
 
 
 def test_a_full_disk_or_a_numba_that_keeps_nothing_costs_time_and_no_run(monkeypatch, tmp_path):
@@ -151,9 +151,9 @@ def test_kernels_of_one_factory_have_names_of_their_own():
 
         return compile_kernel(added)
 
-    one, same, other = adding(1.0), adding(1.0), adding(2.0)
-    assert (one(1.0), same(1.0), other(1.0)) == (2.0, 2.0, 3.0)
-    names = [kernel.py_func.__qualname__ for kernel in (one, same, other)]
+    first, twin, second = adding(1.0), adding(1.0), adding(2.0)
+    assert (first(1.0), twin(1.0), second(1.0)) == (2.0, 2.0, 3.0)
+    names = [kernel.py_func.__qualname__ for kernel in (first, twin, second)]
     assert names[0] == names[1] != names[2]
 
 
@@ -184,12 +184,12 @@ def test_kernels_of_two_processes_do_not_call_each_others_inner_functions(tmp_pa
     script.write_text(CLASH, encoding="utf-8")
     run = "import runpy, sys; runpy.run_path(sys.argv[1])"
     output = lambda *numbers: printed_by(run, script, *numbers, SYMTOP_CACHE=tmp_path / "cache").split()
-    alone = [*output("0.1"), *output("0.2")]
-    assert alone[0] != alone[1]
-    assert output("0.1", "0.2") == alone
+    expected = [*output("0.1"), *output("0.2")]
+    assert expected[0] != expected[1]
+    assert output("0.1", "0.2") == expected
     for file in (tmp_path / "cache").rglob("*.code"):
         file.unlink()  # and once more from bitcode
-    assert output("0.2", "0.1") == alone[::-1]
+    assert output("0.2", "0.1") == expected[::-1]
     assert len(list((tmp_path / "cache").rglob("*.bitcode"))) == 2
 
 
@@ -208,13 +208,13 @@ def tops(count, seed=3):
         yield top, Angles(theta, draw.uniform(-9, 9), draw.uniform(-9, 9), *rates)
 
 
-@pytest.mark.parametrize("prepare", PREPARATIONS, ids=lambda one: one.numbers.__name__)
+@pytest.mark.parametrize("prepare", PREPARATIONS, ids=lambda prepare: prepare.numbers.__name__)
 def test_a_preparation_compiles_to_its_own_bits(prepare):
     numbers = prepare.numbers
-    compiled = compile_kernel(lambda plain: numbers(BareTop(*plain[:3]), Start(*plain[3:])))
-    for top, at in tops(3000):
-        par, state = compiled(flat(top, at))
-        assert (tuple(par), state) == tuple(map(tuple, prepare(top, at)))
+    compiled = compile_kernel(lambda values: numbers(BareTop(*values[:3]), Start(*values[3:])))
+    for top, start in tops(3000):
+        par, state = compiled(flat(top, start))
+        assert (tuple(par), state) == tuple(map(tuple, prepare(top, start)))
         assert len(state) == prepare.size
 
 
@@ -223,23 +223,23 @@ def test_the_tables_of_a_kernel_are_closed_as_python_closes_them(name):
     """Against `math.fsum`, for any step and top: no sum of drifts or kicks is off by a rounding."""
     chart, solver = next(iter(symtop.integrator(name).solvers.items()))
     rule, draw = solver.rule.rule, random.Random(5)
-    for top, at in tops(1000, seed=5):
+    for top, start in tops(1000, seed=5):
         h = 10.0 ** draw.uniform(-6, 1)
-        made = solver.rule(top, at, h)
+        table = solver.rule(top, start, h)
         drift, kick = (h / top.I1, h) if chart == "angles" else (0.5 * h / top.I1, h * top.mgl)
-        assert tuple(made.drift) == exact_sum([a * drift for a in rule.drift], drift)
-        assert tuple(made.kick) == exact_sum([b * kick for b in rule.kick], kick)
+        assert tuple(table.drift) == exact_sum([a * drift for a in rule.drift], drift)
+        assert tuple(table.kick) == exact_sum([b * kick for b in rule.kick], kick)
         if chart != "angles":
             bend = 2.0 * h * kick * kick / top.I1
-            assert tuple(made.bend) == tuple(c * bend for c in rule.gradient)
+            assert tuple(table.bend) == tuple(c * bend for c in rule.gradient)
 
 
 def assert_the_same_run(solver, top, start, plan):
     """At once, and in stretches by a solver whose preparation does not compile."""
     in_python = dataclasses.replace(solver, prepare=solver.prepare.__call__)
     at_once, stretched = solver(top, start, plan), in_python(top, start, plan)
-    for one, other in zip(at_once, stretched, strict=True):
-        np.testing.assert_array_equal(one, other)
+    for first, second in zip(at_once, stretched, strict=True):
+        np.testing.assert_array_equal(first, second)
     assert type(at_once.steps) is int
     assert type(at_once.force_evaluations) is int
     with pytest.raises(symtop.SymtopError, match="whose parts all compile"):
@@ -248,7 +248,7 @@ def assert_the_same_run(solver, top, start, plan):
 
 @pytest.mark.parametrize(("name", "chart"), [
     ("midpoint", "angles"), ("takahashi-imada", "attitude"), ("rk4", "angles"), ("gauss-4", "attitude"), *(
-        pytest.param(*one, marks=pytest.mark.quick) for one in (
+        pytest.param(*pair, marks=pytest.mark.quick) for pair in (
             ("midpoint-unreduced", "angles"), ("cayley-tuned", "axis"), ("stormer-verlet", "angles"),
             ("stormer-verlet-blanes-moan-6", "angles"), ("collective-gauss-6", "axis"), ("kahan-li-8", "attitude"),
             ("sofroniou-spaletta-10", "axis")))
@@ -265,8 +265,8 @@ def test_a_run_at_once_is_a_run_in_stretches(name, chart):
 def test_every_run_at_once_is_a_run_in_stretches():
     for scene in (symtop.scene(name, bodies=True) for name in ("goldstein", "grazing", "fast", "tennis-racket")):
         for method in symtop.integrators().values():
-            mine = [solver for chart, solver in method.solvers.items() if (chart == "body") is scene.of_body]
-            for solver in filter(None, map(inside, mine)):
+            solvers = [solver for chart, solver in method.solvers.items() if (chart == "body") is scene.of_body]
+            for solver in filter(None, map(inside, solvers)):
                 for h in (scene.horizon / 400, scene.horizon / 5):
                     assert_the_same_run(solver, scene.top, scene.start, symtop.Plan.steps(h, np.arange(0, 400, 3)))
 
@@ -275,10 +275,10 @@ def test_long_runs_return_to_python(monkeypatch):
     """Beyond `BLOCK` steps a run is made in stretches, to the same bits, so that an interrupt is heard."""
     scene, solver = symtop.scene("spheroid"), symtop.integrator("gauss-4").solvers["attitude"]
     plan = symtop.Plan.steps(0.01, [0, 50, 100])
-    whole = solver(scene.top, scene.start, plan)
+    expected = solver(scene.top, scene.start, plan)
     monkeypatch.setattr(loops, "BLOCK", 7)
     monkeypatch.setattr(loop, "flat", None)  # what a run in one call begins with
-    np.testing.assert_array_equal(solver(scene.top, scene.start, plan).states, whole.states)
+    np.testing.assert_array_equal(solver(scene.top, scene.start, plan).states, expected.states)
 
 
 @pytest.mark.parametrize("rule", [(0.0,), np.array([0.5, 0.25])])
@@ -305,7 +305,7 @@ def test_tables_and_compositions_travel_as_arrays_and_arrive_whole():
     # Numbers of every kind, a rule that hangs on the start included, to the bits of the rule that Python makes.
     scene = symtop.scene("spheroid")
     drift, kick = [0.1, 0.2, 0.4, 0.2, 0.1], [0.05, 0.15, 0.3, 0.3, 0.15, 0.05]
-    for more in ({"rotation": "cayley-tuned"}, {"gradient": [0.0, 1e-3, 0.0, 0.0, 1e-3, 0.0], "processor": 0.01}):
-        for solver in symtop.composition("long", drift, kick, chart="space", **more).solvers.values():
+    for options in ({"rotation": "cayley-tuned"}, {"gradient": [0.0, 1e-3, 0.0, 0.0, 1e-3, 0.0], "processor": 0.01}):
+        for solver in symtop.composition("long", drift, kick, chart="space", **options).solvers.values():
             assert solver._whole.rule[1].tolist()[:11] == [*solver.rule.rule.drift, *solver.rule.rule.kick]
             assert_the_same_run(solver, scene.top, scene.start, symtop.Plan.steps(0.02, [0, 1, 300]))

@@ -13,7 +13,7 @@ from symtop.methods.framework import registry
 from symtop.methods.framework.calling import solve
 from symtop.model import charts
 from symtop.model.top import flat
-from tests.conftest import late, random_scenes
+from tests.conftest import defer, random_scenes
 from tests.methods import engine_formulas
 from tests.methods.test_lanes import assert_runs_alone
 
@@ -72,9 +72,9 @@ def test_without_the_gyroscopic_term_an_engine_follows_the_spherical_top_and_con
     top = GOLDSTEIN.top
     spherical = symtop.ClosedForm(symtop.SymmetricTop(top.I1, top.I1, top.mgl), GOLDSTEIN.start)
     counts = (400, 800, 1600, 3200, 6400)
-    there = [axis_error("no-gyro[axis]", steps, against=spherical) for steps in counts]
+    errors = [axis_error("no-gyro[axis]", steps, against=spherical) for steps in counts]
     assert axis_error("no-gyro[axis]", 4000, against=spherical) == pytest.approx(3.6e-4, rel=0.02)
-    np.testing.assert_allclose(np.log2(np.array(there[:-1]) / there[1:]), 1.0, atol=0.05)
+    np.testing.assert_allclose(np.log2(np.array(errors[:-1]) / errors[1:]), 1.0, atol=0.05)
     assert min(axis_error("no-gyro[axis]", steps) for steps in counts) > 1.5
     assert min(axis_error("mujoco-euler[axis]", steps, against=spherical) for steps in counts) > 1.0
     run = symtop.simulate(GOLDSTEIN, "no-gyro", step_size=0.0025, horizon=100.0, samples=2001, guard=False)
@@ -86,14 +86,14 @@ def test_without_the_gyroscopic_term_an_engine_follows_the_spherical_top_and_con
     assert wobble == pytest.approx(0.10, abs=0.01)  # L_z alone shows it, and nobody looks
 
 
-@pytest.mark.parametrize("name", [*ROUNDED, *late(*(one for one in registry.engines() if one not in ROUNDED))])
+@pytest.mark.parametrize("name", [*ROUNDED, *defer(*(name for name in registry.engines() if name not in ROUNDED))])
 def test_a_top_that_starts_at_rest_falls_and_a_free_one_stays(name):
     """Jolt, PhysX and rapier rescale a momentum to its length, and each asks first whether it has one."""
     for mgl in (1.0, 0.0):
         scene = symtop.Scene("rest", symtop.SymmetricTop(1.0, 0.5, mgl), symtop.Angles(1.0), 2.0)
         for chart in symtop.integrator(name).charts():
-            shown = "axis" if chart == "axis" else "attitude"
-            run = symtop.simulate(scene, f"{name}[{chart}]", step_size=0.005, observe=shown, samples=11, guard=False)
+            observe = "axis" if chart == "axis" else "attitude"
+            run = symtop.simulate(scene, f"{name}[{chart}]", step_size=0.005, observe=observe, samples=11, guard=False)
             assert run.attrs["outcome"] == "ok"
             assert float(symtop.errors(run)["axis"].max()) < (0.02 if mgl else 1e-6)
 
@@ -109,26 +109,26 @@ def test_a_step_is_the_engines_formula_in_body_axes_and_a_turn_about_the_axis_ch
         attitude, inertia = Rotation.from_quat(np.roll(state[:4], -1)), np.diag([top.I1, top.I1, top.I3])
         w = attitude.apply(np.linalg.solve(inertia, attitude.inv().apply(state[4:])))
 
-        def tau(at, mgl=top.mgl):
-            return mgl * np.cross([0.0, 0.0, 1.0], at.as_matrix()[:, 2])
+        def tau(attitude, mgl=top.mgl):
+            return mgl * np.cross([0.0, 0.0, 1.0], attitude.as_matrix()[:, 2])
 
-        new, w = formula(attitude, w, h, inertia, tau)
-        L, done = new.apply(inertia @ new.inv().apply(w)), one_step(name, scene, h)
-        assert charts.attitude_distance(done[:4], np.roll(new.as_quat(), 1)) < 1e-13
-        np.testing.assert_allclose(done[4:], L, rtol=0.0, atol=2e-14 * np.linalg.norm(L) + 1e-14)
+        after, w = formula(attitude, w, h, inertia, tau)
+        L, result = after.apply(inertia @ after.inv().apply(w)), one_step(name, scene, h)
+        assert charts.attitude_distance(result[:4], np.roll(after.as_quat(), 1)) < 1e-13
+        np.testing.assert_allclose(result[4:], L, rtol=0.0, atol=2e-14 * np.linalg.norm(L) + 1e-14)
         if "axis" in symtop.integrator(name).charts():
-            np.testing.assert_allclose(one_step(name, scene, h, "axis"), [*new.as_matrix()[:, 2], *L],
+            np.testing.assert_allclose(one_step(name, scene, h, "axis"), [*after.as_matrix()[:, 2], *L],
                                        atol=2e-14 * (1.0 + np.linalg.norm(L)))  # fmt: skip
     quaternion = np.array([0.8, 0.4, -0.3, 0.2]) / math.sqrt(0.93)
-    at, h = symtop.Attitude(tuple(quaternion), (0.7, -1.1, 2.0)), 0.013
+    start, h = symtop.Attitude(tuple(quaternion), (0.7, -1.1, 2.0)), 0.013
     for moments in ((0.5, 0.9, 1.3), (1.3, 0.5, 0.9)):
         body = symtop.RigidBody(*moments, 1.7, (0.3, -0.2, 1.0))
         attitude, inertia = Rotation.from_quat(np.roll(quaternion, -1)), np.diag(body.moments)
-        pull = lambda there, c=body.torque: np.cross([0.0, 0.0, 1.0], there.apply(c))
-        new, w = formula(attitude, attitude.apply(at.omega_body), h, inertia, pull)
-        done = solve(symtop.integrator(name), "body", body, at, symtop.Plan.steps(h, [1])).states[-1]
-        assert charts.attitude_distance(done[:4], np.roll(new.as_quat(), 1)) < 1e-14
-        np.testing.assert_allclose(done[4:], inertia @ new.inv().apply(w), rtol=0.0, atol=2e-14)
+        pull = lambda attitude, c=body.torque: np.cross([0.0, 0.0, 1.0], attitude.apply(c))
+        after, w = formula(attitude, attitude.apply(start.omega_body), h, inertia, pull)
+        result = solve(symtop.integrator(name), "body", body, start, symtop.Plan.steps(h, [1])).states[-1]
+        assert charts.attitude_distance(result[:4], np.roll(after.as_quat(), 1)) < 1e-14
+        np.testing.assert_allclose(result[4:], inertia @ after.inv().apply(w), rtol=0.0, atol=2e-14)
     # No-squish depends on where the transverse axes are put.
     spun = [dataclasses.replace(GOLDSTEIN, start=dataclasses.replace(GOLDSTEIN.start, psi=psi)) for psi in (0.0, 0.7)]
     axes = [charts.axis_from_quaternion(one_step(name, scene, 0.02)[:4]) for scene in spun]
@@ -163,7 +163,7 @@ def test_a_member_of_an_ensemble_has_the_bits_of_the_run_alone(name):
 
 @pytest.mark.parametrize("name", ROUNDED)
 def test_in_single_precision_a_step_is_the_same_but_for_rounding(name):
-    exact, rounded = (one_step(one, GOLDSTEIN, 0.01) for one in (name, name + "-float32"))
+    exact, rounded = (one_step(key, GOLDSTEIN, 0.01) for key in (name, name + "-float32"))
     assert 1e-9 < np.abs(rounded - exact).max() / np.abs(exact).max() < 2e-6  # rapier rounds four times
     assert (rounded[:4] == rounded[:4].astype(np.float32)).all()
     assert (exact[:4] != exact[:4].astype(np.float32)).any()

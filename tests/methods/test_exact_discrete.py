@@ -44,11 +44,11 @@ def oscillators(scene, h, steps):
 def test_the_step_is_the_motion_whatever_its_size(name, steps):
     scene = symtop.scene(name)
     h, count = scene.nutation_period / steps, math.ceil(10 * steps)
-    done, bound = run(scene.top, scene.start, h, count), UNSTABLE.get(name, 1.5e-12)
+    result, bound = run(scene.top, scene.start, h, count), UNSTABLE.get(name, 1.5e-12)
     truth = closed_form(scene).state(h * np.arange(count + 1))
-    assert done.outcome == "ok"
-    assert charts.attitude_distance(done.states[:, :4], truth[:, :4]).max() < bound
-    assert np.abs(done.states[:, 4:] - truth[:, 4:]).max() < bound * np.abs(truth[:, 4:]).max()
+    assert result.outcome == "ok"
+    assert charts.attitude_distance(result.states[:, :4], truth[:, :4]).max() < bound
+    assert np.abs(result.states[:, 4:] - truth[:, 4:]).max() < bound * np.abs(truth[:, 4:]).max()
     axis = run(scene.top, scene.start, h, count, "axis")
     assert charts.axis_distance(axis.states[:, :3], charts.axis_from_quaternion(truth[:, :4])).max() < bound
 
@@ -64,11 +64,11 @@ def test_a_slow_top_keeps_its_energy_at_a_third_of_a_nutation_and_whole_ones_are
     beside_the_separatrix = symtop.Angles(1e-4, psi_dot=0.5), symtop.Angles(2.0, theta_dot=1.68295)  # over both poles
     for start in starts + beside_the_separatrix:
         form = symtop.ClosedForm(top, start)
-        most = 30 if start.theta == 1.0 else 8  # beside the separatrix short steps, too, lose 3e-9 in thirty of these
-        for share, count in ((1.0, 30), (2.2, most), (3.4, most)) if start in starts else ((1.0, 10),):
+        limit = 30 if start.theta == 1.0 else 8  # beside the separatrix short steps, too, lose 3e-9 in thirty of these
+        for share, count in ((1.0, 30), (2.2, limit), (3.4, limit)) if start in starts else ((1.0, 10),):
             times = share * form.nutation_period * np.arange(count + 1)
-            done = run(top, start, times[1], count, "axis")
-            assert charts.axis_distance(done.states[:, :3], form.axis(times)).max() < 1e-9
+            result = run(top, start, times[1], count, "axis")
+            assert charts.axis_distance(result.states[:, :3], form.axis(times)).max() < 1e-9
 
 
 def test_random_tops_follow_the_closed_form_at_every_step():
@@ -79,8 +79,8 @@ def test_random_tops_follow_the_closed_form_at_every_step():
             h = form.nutation_period / steps
             if not math.isfinite(h):
                 continue
-            done = run(top, start, h, round(2 * steps))
-            gap = charts.attitude_distance(done.states[:, :4], form.quaternion(h * np.arange(round(2 * steps) + 1)))
+            result = run(top, start, h, round(2 * steps))
+            gap = charts.attitude_distance(result.states[:, :4], form.quaternion(h * np.arange(round(2 * steps) + 1)))
             worst = max(worst, gap.max() / (1.0 + form.phi_per_period + form.psi_per_period))
     assert worst < 2e-12
 
@@ -88,10 +88,10 @@ def test_random_tops_follow_the_closed_form_at_every_step():
 def test_a_step_agrees_with_fifty_digits_and_a_neighbour_of_the_map_is_no_motion():
     scene = symtop.scene("spheroid")
     precise, h = PreciseForm(scene.top, scene.start, digits=50), scene.nutation_period / 3.1
-    done = run(scene.top, scene.start, h, 3)
+    result = run(scene.top, scene.start, h, 3)
     for k in range(1, 4):
         quaternion = charts.quaternion_from_angles(*(float(value) for value in precise(k * h)[:3]))
-        assert charts.attitude_distance(done.states[k, :4], quaternion) < 5e-15
+        assert charts.attitude_distance(result.states[k, :4], quaternion) < 5e-15
     h, kernel = scene.nutation_period / 20.0, inside(METHOD.solvers["axis"])
     par, _ = on_oscillators(scene.top, scene.start)
     true = exact_map(scene.top, scene.start, h)
@@ -107,26 +107,26 @@ def test_a_step_agrees_with_fifty_digits_and_a_neighbour_of_the_map_is_no_motion
 
 def test_a_free_top_a_step_back_and_the_separatrix_where_large_steps_are_divided():
     top, start = symtop.SymmetricTop(2.0, 1.0, 0.0), symtop.Angles(0.7, 0.2, 0.1, 0.3, -0.8, 1.1)
-    form, done = symtop.model.exact.closed_form.ClosedForm(top, start), run(top, start, 0.7, 30)
-    assert charts.attitude_distance(done.states[:, :4], form.quaternion(0.7 * np.arange(31))).max() < 1e-13
+    form, result = symtop.model.exact.closed_form.ClosedForm(top, start), run(top, start, 0.7, 30)
+    assert charts.attitude_distance(result.states[:, :4], form.quaternion(0.7 * np.arange(31))).max() < 1e-13
     assert np.ptp(run(top, symtop.Angles(0.7, 0.2, 0.1), 0.7, 3).states, axis=0).max() < 1e-15  # at rest
     scene = symtop.scene("goldstein")
-    back = run(scene.top, scene.start, -0.3, 20)
+    backwards = run(scene.top, scene.start, -0.3, 20)
     truth = closed_form(scene).quaternion(-0.3 * np.arange(21))
-    assert charts.attitude_distance(back.states[:, :4], truth).max() < 1e-13
+    assert charts.attitude_distance(backwards.states[:, :4], truth).max() < 1e-13
     scene = symtop.scene("separatrix")
     h = scene.horizon / 4.0
-    done, truth = run(scene.top, scene.start, h, 4), closed_form(scene).quaternion(h * np.arange(5))
-    assert charts.attitude_distance(done.states[:, :4], truth).max() < 1e-6
-    assert done.force_evaluations > done.steps
-    ordinary = symtop.scene("spheroid")
-    assert run(ordinary.top, ordinary.start, ordinary.nutation_period / 2.3, 8).force_evaluations == 8
+    result, truth = run(scene.top, scene.start, h, 4), closed_form(scene).quaternion(h * np.arange(5))
+    assert charts.attitude_distance(result.states[:, :4], truth).max() < 1e-6
+    assert result.force_evaluations > result.steps
+    scene = symtop.scene("spheroid")
+    assert run(scene.top, scene.start, scene.nutation_period / 2.3, 8).force_evaluations == 8
 
 
 def lagrangian(A, B, r, q0, q1):
     """L_d of one oscillator on two points of the plane, shape (2,), complex for a complex step."""
-    apart, s = q1 - q0, [q @ q for q in (q0, q1)]
-    return r * (0.5 * apart @ apart - 0.5 * sum(value - A / B * np.log(1.0 + B * value) for value in s))
+    delta, s = q1 - q0, [q @ q for q in (q0, q1)]
+    return r * (0.5 * delta @ delta - 0.5 * sum(value - A / B * np.log(1.0 + B * value) for value in s))
 
 
 @pytest.mark.parametrize("name", ["spheroid", "goldstein", "grazing", "hairer-lubich-wanner"])
@@ -135,12 +135,12 @@ def test_the_true_motion_solves_the_discrete_euler_lagrange_equations(name, step
     scene = symtop.scene(name)
     for A, B, r, J, Z in oscillators(scene, scene.nutation_period / steps, 12):
         q = np.stack([Z.real, Z.imag], axis=1)
-        for before, here, after in zip(q, q[1:], q[2:], strict=False):
-            arrives = slopes(lagrangian, A, B, r, before, here)[1]
-            leaves, wrong = (slopes(lagrangian, start, B, r, here, after)[0] for start in (A, 1.001 * A))
+        for before, middle, after in zip(q, q[1:], q[2:], strict=False):
+            arrives = slopes(lagrangian, A, B, r, before, middle)[1]
+            leaves, control = (slopes(lagrangian, start, B, r, middle, after)[0] for start in (A, 1.001 * A))
             assert np.abs(arrives + leaves).max() < 2e-14 * r
-            assert np.abs(arrives + wrong).max() > 1e-8 * r
-            assert here[0] * arrives[1] - here[1] * arrives[0] == pytest.approx(J, abs=2e-14 * r)  # Noether
+            assert np.abs(arrives + control).max() > 1e-8 * r
+            assert middle[0] * arrives[1] - middle[1] * arrives[0] == pytest.approx(J, abs=2e-14 * r)  # Noether
 
 
 def test_reduction_commutes_with_the_step():
@@ -162,17 +162,17 @@ def test_the_discrete_routhians_of_both_oscillators_are_one_map_of_the_height(na
     scene = symtop.scene(name)
     h = scene.nutation_period / steps
     true = closed_form(scene).axis(h * np.arange(13))[:, 2]
-    for wrong in (0.0, 1e-6):
+    for error in (0.0, 1e-6):
         gaps = []
         for (A, B, r, J, Z), sign in zip(oscillators(scene, h, 12), (1.0, -1.0), strict=True):
-            s, x, swept = abs(Z[1]) ** 2, (np.conj(Z[0]) * Z[1]).real, (J / r * (1.0 + wrong)) ** 2
+            s, x, swept = abs(Z[1]) ** 2, (np.conj(Z[0]) * Z[1]).real, (J / r * (1.0 + error)) ** 2
             heights = []
             for _ in range(11):
                 x = 2.0 * A * s / (1.0 + B * s) - x
                 s = (x * x + swept) / s
                 heights.append(sign * (2.0 * s - 1.0))
             gaps.append(np.abs(np.array(heights) - true[2:]).max())
-        assert min(gaps) > 1e-8 if wrong else max(gaps) < 1e-12
+        assert min(gaps) > 1e-8 if error else max(gaps) < 1e-12
 
 
 def test_constants_stay_over_long_runs_and_edges_are_met_to_rounding():
@@ -211,5 +211,5 @@ def test_a_thousand_random_tops_and_long_runs_keep_energy_and_momenta():
         assert np.abs(errors[:, k]).max() < 2e-14
         assert stay(marks, errors[:, k])
         assert not stay(marks, errors[:, k] + 1e-21 * marks)
-    few = np.unique(np.geomspace(1e5, 1e7, 9).astype(np.int64))
-    assert not stay(few, exactness.walkers(few, exactness.forgetful())[:, 1])
+    marks = np.unique(np.geomspace(1e5, 1e7, 9).astype(np.int64))
+    assert not stay(marks, exactness.walkers(marks, exactness.forgetful())[:, 1])

@@ -98,12 +98,12 @@ def test_a_step_next_to_a_vertical_top_is_the_stability_function(stages, phase, 
     spin = 7.0  # p_psi = L_z; upright tops sleep from 2 sqrt(I1 mgl) = 4.9 on
     slope = 1j * np.array([[spin / top.I1, -up / top.I1], [top.mgl, 0.0]])
     h, tilt = phase / np.abs(np.linalg.eigvals(slope).imag).max(), 1e-6
-    measured = np.empty((2, 2), dtype=complex)
+    matrix = np.empty((2, 2), dtype=complex)
     for column, (z, momentum) in enumerate(((tilt, 0.0), (0.0, tilt))):
         after = one_step(stages, (z, 0.0, up, momentum, 0.0, spin), par, h)
-        measured[:, column] = after[0] + 1j * after[1], after[3] + 1j * after[4]
-    np.testing.assert_allclose(measured / tilt, pade(stages, h * slope), rtol=0, atol=1e-8)
-    np.testing.assert_allclose(np.abs(np.linalg.eigvals(measured / tilt)), 1.0, rtol=0, atol=1e-8)
+        matrix[:, column] = after[0] + 1j * after[1], after[3] + 1j * after[4]
+    np.testing.assert_allclose(matrix / tilt, pade(stages, h * slope), rtol=0, atol=1e-8)
+    np.testing.assert_allclose(np.abs(np.linalg.eigvals(matrix / tilt)), 1.0, rtol=0, atol=1e-8)
     assert abs(abs(pade(stages, 1.0 + 1j * phase)) - 1.0) > 1e-3  # off the imaginary axis it is not one
 
 
@@ -124,10 +124,10 @@ def test_frames_are_attitudes(theta):
     phi, psi = (values.ravel() for values in np.meshgrid(np.linspace(-3, 3, 7), np.linspace(0, 6, 7)))
     quaternion = charts.quaternion_from_angles(theta, phi, psi)
     axis = charts.axis_from_quaternion(quaternion)
-    across = Rotation.from_quat(np.roll(quaternion, -1, axis=1)).as_matrix()[..., 0]
-    frames = np.concatenate([axis, np.zeros_like(axis), across], axis=1)
-    again = frame_to_attitude(SpaceTop(1.0, 1.0, 0.0), np.zeros(phi.size), frames)[:, :4]
-    assert np.max(charts.attitude_distance(again, quaternion)) < 2e-15
+    first_axis = Rotation.from_quat(np.roll(quaternion, -1, axis=1)).as_matrix()[..., 0]
+    frames = np.concatenate([axis, np.zeros_like(axis), first_axis], axis=1)
+    attitudes = frame_to_attitude(SpaceTop(1.0, 1.0, 0.0), np.zeros(phi.size), frames)[:, :4]
+    assert np.max(charts.attitude_distance(attitudes, quaternion)) < 2e-15
 
 
 def test_the_frame_turns_with_the_body():
@@ -184,16 +184,16 @@ def test_a_step_is_what_newton_finds_and_sweeps_do_not(stages, scene):
     par, y, h = started(scene, 0.3)
     after = march_axis(par, gauss_rule(stages), tuple(y), h, ONE).states[0]
     for solve in (newton_step, sweep_step):  # at a small step both, and they agree
-        solved, change = solve(par, stages, y, h)
+        solution, change = solve(par, stages, y, h)
         assert change < 1e-13
-        np.testing.assert_allclose(after, solved, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(after, solution, rtol=0, atol=1e-13)
     for phase in (5.0, 8.0):
         par, y, h = started(scene, phase)
-        done = march_axis(par, gauss_rule(stages), tuple(y), h, ONE)
-        solved, change = newton_step(par, stages, y, h)
-        assert done.outcome == 0
+        result = march_axis(par, gauss_rule(stages), tuple(y), h, ONE)
+        solution, change = newton_step(par, stages, y, h)
+        assert result.outcome == 0
         assert change < 1e-13
-        np.testing.assert_allclose(done.states[0], solved, rtol=0, atol=1e-12 * np.abs(solved).max())
+        np.testing.assert_allclose(result.states[0], solution, rtol=0, atol=1e-12 * np.abs(solution).max())
     par, y, h = started(scene, 10.0)
     assert not sweep_step(par, stages, y, h)[1] < 1e3  # diverges
 
@@ -205,15 +205,15 @@ def test_a_sweep_ends_at_its_own_limit_and_a_step_beyond_newtons_reach_is_grown(
     assert sweep_step(par, 1, y, 1.6 / OMEGA, 400)[1] < 1e-12
     assert not sweep_step(par, 1, y, 2.2 / OMEGA, 400)[1] < 1e-2
     for phase in np.linspace(1.2, 2.4, 49):
-        done = march_axis(par, gauss_rule(1), tuple(y), phase / OMEGA, ONE)
-        np.testing.assert_allclose(done.states[0], newton_step(par, 1, y, phase / OMEGA)[0], rtol=0, atol=1e-13)
+        result = march_axis(par, gauss_rule(1), tuple(y), phase / OMEGA, ONE)
+        np.testing.assert_allclose(result.states[0], newton_step(par, 1, y, phase / OMEGA)[0], rtol=0, atol=1e-13)
     par, y, h = started("spheroid", 10.0)
     constants = lambda z: (z[:3] @ z[:3], z[:3] @ z[3:], z[5], z[3:] @ z[3:] + 2.0 * par.I1 * par.mgl * z[2])
     for stages in STAGES:
-        done = march_axis(par, gauss_rule(stages), tuple(y), h, ONE)
-        assert done.outcome == 0
-        assert done.work > 20
-        assert constants(done.states[0]) == pytest.approx(constants(y), rel=1e-13)
+        result = march_axis(par, gauss_rule(stages), tuple(y), h, ONE)
+        assert result.outcome == 0
+        assert result.work > 20
+        assert constants(result.states[0]) == pytest.approx(constants(y), rel=1e-13)
 
 
 @pytest.mark.parametrize("stages", STAGES)
@@ -229,13 +229,13 @@ def test_the_table_keeps_small_nutations_stable_at_any_step_and_the_frame_orthon
     method = symtop.integrator(f"gauss-{2 * stages}")
     assert math.isnan(linear_limits(method, STEADY, np.linspace(0.02, 10.0, 200) / OMEGA)[0])
     for phase in LARGE:
-        at = trace(method, STEADY, phase / OMEGA)
-        assert abs(at.trace) < 2.0
-        assert abs(at.theta - STEADY.start.theta) < 1e-12  # where the reduced energy is least, whatever the step
-        gap = abs(at.trace - 2.0 * pade(stages, 1j * phase).real)
-        faster = steady(200.0)  # precesses 10 times slower, and a nutation turns 10 times faster
-        omega = faster.top.nutation_frequency(faster.top.momenta(faster.start))
-        gap_faster = abs(trace(method, faster, phase / omega).trace - 2.0 * pade(stages, 1j * phase).real)
+        record = trace(method, STEADY, phase / OMEGA)
+        assert abs(record.trace) < 2.0
+        assert abs(record.theta - STEADY.start.theta) < 1e-12  # where the reduced energy is least, whatever the step
+        gap = abs(record.trace - 2.0 * pade(stages, 1j * phase).real)
+        fast_scene = steady(200.0)  # precesses 10 times slower, and a nutation turns 10 times faster
+        omega = fast_scene.top.nutation_frequency(fast_scene.top.momenta(fast_scene.start))
+        gap_faster = abs(trace(method, fast_scene, phase / omega).trace - 2.0 * pade(stages, 1j * phase).real)
         assert gap < 0.15
         assert gap_faster < max(0.02 * gap, 1e-6)  # theory holds as precession / nutation goes to nothing, squared
     # At large steps a' = L x a / I1 is solved too: the frame's axis is that of the run on (e, L).
@@ -244,12 +244,12 @@ def test_the_table_keeps_small_nutations_stable_at_any_step_and_the_frame_orthon
     marks = np.arange(0, 201, 20)
     for phase in (2.0, 5.0, 10.0):
         h = phase * scene.nutation_period / (2.0 * math.pi)
-        done = march_frame(par, gauss_rule(stages), state, h, marks)
-        e, across = done.states[:, :3], done.states[:, 6:]
-        assert done.outcome == 0
-        assert np.abs(np.sum(e * across, axis=1)).max() < 1e-13
-        assert np.abs(np.sum(across * across, axis=1) - 1.0).max() < 1e-13
-        alone = march_axis(*on_axis(scene.top, scene.start)[:1], gauss_rule(stages), state[:6], h, marks[:2])
-        np.testing.assert_allclose(done.states[1, :6], alone.states[1], rtol=0, atol=1e-9)
-        quaternion = frame_to_attitude(par, h * marks, done.states)[:, :4]
+        result = march_frame(par, gauss_rule(stages), state, h, marks)
+        e, a = result.states[:, :3], result.states[:, 6:]
+        assert result.outcome == 0
+        assert np.abs(np.sum(e * a, axis=1)).max() < 1e-13
+        assert np.abs(np.sum(a * a, axis=1) - 1.0).max() < 1e-13
+        axis_run = march_axis(*on_axis(scene.top, scene.start)[:1], gauss_rule(stages), state[:6], h, marks[:2])
+        np.testing.assert_allclose(result.states[1, :6], axis_run.states[1], rtol=0, atol=1e-9)
+        quaternion = frame_to_attitude(par, h * marks, result.states)[:, :4]
         assert charts.axis_distance(charts.axis_from_quaternion(quaternion), e).max() < 1e-13

@@ -20,7 +20,7 @@ from symtop.methods.lagrangian.discrete_lagrangian import Quadrature, forces, ma
 from symtop.methods.lagrangian.galerkin_gauss import gauss_rule
 from symtop.methods.lagrangian.unreduced import unreduced
 from symtop.model.top import Angles, SymmetricTop
-from tests.conftest import late, random_scenes
+from tests.conftest import defer, random_scenes
 
 
 def fitted(scene_name, method, coarsest, column):
@@ -53,8 +53,8 @@ def test_starting_from_q0_plus_h_v0_costs_an_order():
         begun_wrongly.h = plan.step_size
         return FixedStep(march, Quadrature((0.5,), (1.0,)), begun_wrongly, 1, implicit=True)(top, start, plan)
 
-    wrong = Integrator(name="badly-started-midpoint", family="other", summary="", solvers={"angles": solve})
-    assert fitted("goldstein", wrong, 200.37, "attitude").slope == pytest.approx(1.0, abs=0.06)
+    method = Integrator(name="badly-started-midpoint", family="other", summary="", solvers={"angles": solve})
+    assert fitted("goldstein", method, 200.37, "attitude").slope == pytest.approx(1.0, abs=0.06)
 
 
 @pytest.mark.parametrize("form", [lambda reduced: reduced, unreduced], ids=["reduced", "unreduced"])
@@ -74,8 +74,8 @@ def violent(count, seed):
     for k in range(count):
         top = SymmetricTop(1.0, draw.uniform(0.05, 1.95), draw.uniform(-3.0, 3.0))
         theta = draw.choice([draw.uniform(0.0, math.pi), 10.0 ** draw.uniform(-6.0, -1.0)])
-        at = Angles(theta, theta_dot=draw.gauss(0.0, 2.0), phi_dot=draw.gauss(0.0, 3.0), psi_dot=draw.gauss(0.0, 30.0))
-        yield top, at, 10.0 ** (draw.uniform(-3.0, 1.5) if k % 8 else draw.uniform(10.0, 20.0))
+        y0 = Angles(theta, theta_dot=draw.gauss(0.0, 2.0), phi_dot=draw.gauss(0.0, 3.0), psi_dot=draw.gauss(0.0, 30.0))
+        yield top, y0, 10.0 ** (draw.uniform(-3.0, 1.5) if k % 8 else draw.uniform(10.0, 20.0))
 
 
 @pytest.mark.parametrize("theta", [0.0, -1e-300, math.pi, 4.0, 1e300])
@@ -93,12 +93,12 @@ def test_an_iteration_that_wanders_off_ends_as_with_the_sines_of_the_library(fam
     name = {discrete_lagrangian: "trapezoidal", galerkin: "galerkin-simpson"}[family]
     loop, rule = family.march, inside(symtop.integrator(name).solvers["angles"]).rule
     ends = []
-    for top, at, h in violent(400, seed=3):
-        par, state = on_angles(top, at)
+    for top, start, h in violent(400, seed=3):
+        par, state = on_angles(top, start)
         interpreted = family.march.increment(par, rule, state, family.begin(par, rule, state, h), h)[3]
         ends.append((interpreted, loop(par, rule, state, h, np.array([1])).outcome))
     assert {OK, LEFT_CHART} < {outcome for outcome, _ in ends}  # and not converged
-    assert sum(one != other for one, other in ends) <= 4
+    assert sum(first != second for first, second in ends) <= 4
 
 
 @pytest.mark.quick
@@ -127,23 +127,23 @@ def derivatives(top, theta, rate):
 
 def independent_step(top, point, h, degree, nodes, weights):
     """One step from the stationary polynomial: equations for all its places, nothing eliminated, SciPy's solver."""
-    q0, k, even = point[:3], np.arange(degree + 1), np.linspace(0.0, 1.0, degree + 1)[:, None]
-    c, basis = np.array(nodes)[:, None], np.linalg.inv(even**k)
+    q0, k, grid = point[:3], np.arange(degree + 1), np.linspace(0.0, 1.0, degree + 1)[:, None]
+    c, basis = np.array(nodes)[:, None], np.linalg.inv(grid**k)
     values, rates = c**k @ basis, k * c ** np.maximum(k - 1, 0) @ basis  # at the nodes, of places at equal distances
 
     def slopes(unknown):
         q = np.concatenate([q0, unknown]).reshape(-1, 3)
-        parts = [derivatives(top, at[0], rate / h) for at, rate in zip(values @ q, rates @ q, strict=True)]
-        P, F = (np.array(each) * np.array(weights)[:, None] for each in zip(*parts, strict=True))
+        parts = [derivatives(top, place[0], rate / h) for place, rate in zip(values @ q, rates @ q, strict=True)]
+        P, F = (np.array(column) * np.array(weights)[:, None] for column in zip(*parts, strict=True))
         return h * values.T @ F + rates.T @ P
 
     def equations(unknown):
-        left = slopes(unknown)[:-1]
-        left[0] += point[3:]
-        return left.ravel()
+        residual = slopes(unknown)[:-1]
+        residual[0] += point[3:]
+        return residual.ravel()
 
-    at = angles_at(top, point)
-    guess = q0 + h * even[1:] * np.array([at.theta_dot, at.phi_dot, at.psi_dot])
+    start = angles_at(top, point)
+    guess = q0 + h * grid[1:] * np.array([start.theta_dot, start.phi_dot, start.psi_dot])
     solution = root(equations, guess.ravel(), tol=1e-14)
     assert np.max(np.abs(solution.fun)) < 1e-12
     return np.concatenate([solution.x[-3:], slopes(solution.x)[-1]])
@@ -159,13 +159,13 @@ def test_one_step_is_that_of_the_stationary_polynomial(name, scene):
         point = step.point(scene.start)
         assert np.max(np.abs(step.image(point) - independent_step(scene.top, point, h, degree, nodes, weights))) < 2e-12
         if h == 0.1 and scene.name == "random-0":  # the control: other weights are another method
-            other = (weights[0] + 0.01, *weights[1:-1], weights[-1] - 0.01)
-            wrong = independent_step(scene.top, point, h, degree, nodes, other)
-            assert not np.max(np.abs(step.image(point) - wrong)) < 2e-12
+            wrong_weights = (weights[0] + 0.01, *weights[1:-1], weights[-1] - 0.01)
+            image = independent_step(scene.top, point, h, degree, nodes, wrong_weights)
+            assert not np.max(np.abs(step.image(point) - image)) < 2e-12
 
 
 @pytest.mark.parametrize(
-    "name", ["galerkin-gauss-4", *late(*(name for name in GALERKIN if name != "galerkin-gauss-4"), "galerkin-gauss-12")]
+    "name", ["galerkin-gauss-4", *defer(*(key for key in GALERKIN if key != "galerkin-gauss-4"), "galerkin-gauss-12")]
 )
 def test_momenta_are_those_of_the_steps_made_however_long(name):
     """Of slow tops, whose steps are too long for one solution alone: a second solution would show other momenta."""
@@ -179,18 +179,18 @@ def test_momenta_are_those_of_the_steps_made_however_long(name):
 
 def test_a_step_without_its_last_force_is_neither_symplectic_nor_symmetric():
     """The negative control of both: p_theta moved by the forces of the first two nodes only."""
-    good = symtop.integrator(NAME)
+    method = symtop.integrator(NAME)
 
     def solve(top, start, plan):
-        run = good.solvers["angles"](top, start, plan)
+        run = method.solvers["angles"](top, start, plan)
         states = run.states.copy()
         states[:, 1] += plan.step_size / 6.0 * top.potential_slope(states[:, 0], top.momenta(start))
         return run._replace(states=states)
 
-    wrong = symtop.Integrator(name="wrong", family="other", summary="", solvers={"angles": solve})
+    variant = symtop.Integrator(name="wrong", family="other", summary="", solvers={"angles": solve})
     scene = random_scenes(1, seed=22)[0]
-    assert symplectic_defect(one_step(wrong, "angles", scene, 0.02), scene.start).size > 1e-5
-    assert return_miss(one_step(wrong, "angles", scene, 0.02), scene.start) > 1e-5
+    assert symplectic_defect(one_step(variant, "angles", scene, 0.02), scene.start).size > 1e-5
+    assert return_miss(one_step(variant, "angles", scene, 0.02), scene.start) > 1e-5
 
 
 @pytest.mark.parametrize("scene", random_scenes(4, seed=25), ids=lambda s: s.name)
@@ -201,11 +201,11 @@ def test_every_derivative_of_a_trial_is_right(scene):
     trial = lambda shift_m, shift_1: kernel._evaluate(par, start, theta + m + shift_m, theta + d + shift_1)
 
     def agree(factor):
-        here = trial(0.0, 0.0)
+        jets = trial(0.0, 0.0)
         by_m = [(a.value - b.value) / (2 * e) for a, b in zip(trial(e, 0.0), trial(-e, 0.0), strict=True)]
         by_1 = [(a.value - b.value) / (2 * e) for a, b in zip(trial(0.0, e), trial(0.0, -e), strict=True)]
-        pairs = [(jet.by_m, value) for jet, value in zip(here, by_m, strict=True)]
-        pairs += [(jet.by_1, value) for jet, value in zip(here, by_1, strict=True)]
+        pairs = [(jet.by_m, value) for jet, value in zip(jets, by_m, strict=True)]
+        pairs += [(jet.by_1, value) for jet, value in zip(jets, by_1, strict=True)]
         scale = max(abs(value) for _, value in pairs)
         return max(abs(factor * exact - value) for exact, value in pairs) < 1e-6 * scale
 
@@ -217,9 +217,9 @@ def test_every_derivative_of_a_trial_is_right(scene):
 def test_the_iteration_ends_soon(scene_name):
     """At 200 steps a nutation the cubic predictor leaves two iterations; at 2000, one."""
     scene = symtop.scene(scene_name)
-    for resolution, most in ((200.0, 2.1), (2000.0, 1.3)):
+    for resolution, limit in ((200.0, 2.1), (2000.0, 1.3)):
         run = symtop.simulate(scene, NAME, step_size=scene.nutation_period / resolution)
-        assert run.attrs["newton_iterations"] / run.attrs["steps"] < most
+        assert run.attrs["newton_iterations"] / run.attrs["steps"] < limit
 
 
 def test_midpoint_is_the_implicit_midpoint_rule_to_rounding_also_near_a_pole():
@@ -229,8 +229,8 @@ def test_midpoint_is_the_implicit_midpoint_rule_to_rounding_also_near_a_pole():
     h, marks = 0.02, np.arange(0, 40)
 
     def residual(tolerance):
-        done = march(par, Quadrature((0.5,), (1.0,), tolerance), state, h, marks)
-        theta, p = done.states[:, 0], done.states[:, 1]
+        result = march(par, Quadrature((0.5,), (1.0,), tolerance), state, h, marks)
+        theta, p = result.states[:, 0], result.states[:, 1]
         middle, momenta = 0.5 * (theta[1:] + theta[:-1]), scene.top.momenta(scene.start)
         assert np.diff(theta) == pytest.approx(h * 0.5 * (p[1:] + p[:-1]) / scene.top.I1, abs=5e-16)
         return np.max(np.abs(np.diff(p) + h * scene.top.potential_slope(middle, momenta)))

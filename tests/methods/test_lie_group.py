@@ -18,7 +18,7 @@ from symtop.methods.framework.space import SpaceTop, field_axis, on_axis
 from symtop.methods.lie_group import variational
 from symtop.methods.lie_group.generalised_alpha import generalised_alpha
 from symtop.model import charts
-from tests.conftest import late, random_scenes
+from tests.conftest import defer, random_scenes
 from tests.judging.blind.right import product
 from tests.methods.engine_formulas import hat
 
@@ -53,13 +53,13 @@ def energies(scene, rows):
     return 0.5 * np.sum(rows[:, 3:] ** 2, axis=1) / scene.top.I1 + scene.top.mgl * rows[:, 2]
 
 
-@pytest.mark.parametrize("name", [*LIE_TABLES, *VARIATIONAL[::2], *late(VARIATIONAL[1], *COLLECTIVE)])
+@pytest.mark.parametrize("name", [*LIE_TABLES, *VARIATIONAL[::2], *defer(VARIATIONAL[1], *COLLECTIVE)])
 def test_casimirs_are_exact_where_rk4_loses_them(name):
     scene = symtop.scene("spheroid")
     for method, exact in ((name, True), ("rk4", False)):
-        done = states(method, scene, scene.nutation_period / 40.0, 400, "axis")
-        lost = np.abs(np.sum(done[:, :3] * done[:, 3:], axis=1) / (done[0, :3] @ done[0, 3:]) - 1.0).max()
-        assert bool(lost < 3e-14) is exact
+        rows = states(method, scene, scene.nutation_period / 40.0, 400, "axis")
+        change = np.abs(np.sum(rows[:, :3] * rows[:, 3:], axis=1) / (rows[0, :3] @ rows[0, 3:]) - 1.0).max()
+        assert bool(change < 3e-14) is exact
 
 
 def kicked(scene, rows, h):
@@ -105,9 +105,9 @@ def test_rattle_on_directors_is_the_lie_group_variational_integrator():
     upper = np.triu_indices(3)
 
     def symmetric(values):
-        made = np.zeros((3, 3))
-        made[upper] = values
-        return made + made.T
+        matrix = np.zeros((3, 3))
+        matrix[upper] = values
+        return matrix + matrix.T
 
     for k in range(4):
 
@@ -119,8 +119,8 @@ def test_rattle_on_directors_is_the_lie_group_variational_integrator():
         half, R = ahead(multipliers)
         P = half + 0.5 * h * force
         V = R.T @ P @ np.linalg.inv(Jd)  # tangent: V must be skew, by a second set of multipliers
-        wrong, inverse = V + V.T, np.diag(np.linalg.inv(Jd))
-        P = P - R @ (wrong / (inverse[:, None] + inverse[None, :]))
+        defect, inverse = V + V.T, np.diag(np.linalg.inv(Jd))
+        P = P - R @ (defect / (inverse[:, None] + inverse[None, :]))
         np.testing.assert_allclose(R, matrices(rows)[k + 1], atol=3e-13)
     M = R.T @ P
     L = R @ np.array([M[2, 1] - M[1, 2], M[0, 2] - M[2, 0], M[1, 0] - M[0, 1]])
@@ -169,17 +169,17 @@ def test_the_discrete_gradients_are_the_midpoint_rule_and_the_mean_field_loses_t
     slope = lambda y: np.array([0.0, 0.0, scene.top.mgl, *(y[3:] / scene.top.I1)])
 
     def gonzalez(y):
-        middle, apart = 0.5 * (before + y), y - before
-        return slope(middle) + (value(y) - value(before) - slope(middle) @ apart) / (apart @ apart) * apart
+        middle, delta = 0.5 * (before + y), y - before
+        return slope(middle) + (value(y) - value(before) - slope(middle) @ delta) / (delta @ delta) * delta
 
     def itoh_abe(y):
         """Quotients of differences, one component after the other."""
-        made, at = np.zeros(6), before.copy()
+        gradient, point = np.zeros(6), before.copy()
         for k in range(6):
-            last, gap = value(at), y[k] - before[k]
-            at[k] = y[k]
-            made[k] = (value(at) - last) / gap if abs(gap) > 1e-9 else slope(at)[k]
-        return made
+            last, gap = value(point), y[k] - before[k]
+            point[k] = y[k]
+            gradient[k] = (value(point) - last) / gap if abs(gap) > 1e-9 else slope(point)[k]
+        return gradient
 
     def mean(y):
         ends = (0.5 - 0.5 / math.sqrt(3.0), 0.5 + 0.5 / math.sqrt(3.0))
@@ -193,12 +193,12 @@ def test_the_discrete_gradients_are_the_midpoint_rule_and_the_mean_field_loses_t
         middle = np.array(field_axis(par, 0.5 * (before + y)))
         return (np.array(field_axis(par, before)) + 4.0 * middle + np.array(field_axis(par, y))) / 6.0
 
-    there = states("gauss-2", scene, h, 1, "axis")[1]
+    expected = states("gauss-2", scene, h, 1, "axis")[1]
     for gradient in (gonzalez, itoh_abe, mean):
         y = root(lambda y, gradient=gradient: y - before - h * structure(y) @ gradient(y), guess)
-        np.testing.assert_allclose(y, there, atol=1e-11)
+        np.testing.assert_allclose(y, expected, atol=1e-11)
     mean_field = root(lambda y: y - before - h * average(y), guess)
-    assert abs(value(there) / value(before) - 1.0) < 1e-13
+    assert abs(value(expected) / value(before) - 1.0) < 1e-13
     assert abs(value(mean_field) / value(before) - 1.0) > 1e-8
 
 
@@ -239,47 +239,47 @@ def test_the_image_of_a_step_does_not_depend_on_the_point_above(seed):
 
 def test_collective_methods_bound_the_energy_that_gauss_keeps_to_rounding():
     scene = symtop.scene("spheroid")
-    h, lost = scene.nutation_period / 40.3, {}
+    h, changes = scene.nutation_period / 40.3, {}
     for name in ("collective-gauss-4", "gauss-4", "commutator-free-4"):
-        done = states(name, scene, h, 20_000, "axis")
-        lost[name] = np.abs(energies(scene, done) / energies(scene, done)[0] - 1.0)
-    assert lost["gauss-4"].max() < 1e-12
-    assert 1e-9 < lost["collective-gauss-4"][-2000:].max() < 1.1 * lost["collective-gauss-4"][:2000].max()
-    assert lost["commutator-free-4"][-1] > 5.0 * lost["commutator-free-4"][2000]
+        rows = states(name, scene, h, 20_000, "axis")
+        changes[name] = np.abs(energies(scene, rows) / energies(scene, rows)[0] - 1.0)
+    assert changes["gauss-4"].max() < 1e-12
+    assert 1e-9 < changes["collective-gauss-4"][-2000:].max() < 1.1 * changes["collective-gauss-4"][:2000].max()
+    assert changes["commutator-free-4"][-1] > 5.0 * changes["commutator-free-4"][2000]
 
 
 @pytest.mark.parametrize("scene", random_scenes(3, seed=15), ids=lambda scene: scene.name)
 @pytest.mark.parametrize("radius", [0.0, 0.6, 1.0])
 def test_two_steps_are_those_of_the_generalised_alpha_method(radius, scene):
     """The definition in body axes with matrices, its equation solved by a general solver."""
-    for wrong in (-0.1, 1.1, math.nan):
+    for value in (-0.1, 1.1, math.nan):
         with pytest.raises(symtop.SymtopError, match="spectral_radius"):
-            generalised_alpha("alpha", wrong)
+            generalised_alpha("alpha", value)
     method, h, J = generalised_alpha("alpha", radius), 0.01, moments(scene.top)
-    done = solve(method, "attitude", scene.top, scene.start, Plan.steps(h, [0, 1, 2])).states
+    rows = solve(method, "attitude", scene.top, scene.start, Plan.steps(h, [0, 1, 2])).states
     am, af = (2.0 * radius - 1.0) / (radius + 1.0), radius / (radius + 1.0)
     gamma = 0.5 + af - am
-    beta, R = 0.25 * (gamma + 0.5) ** 2, matrices(done)[0]
-    W = np.linalg.solve(J, R.T @ done[0, 4:])
+    beta, R = 0.25 * (gamma + 0.5) ** 2, matrices(rows)[0]
+    W = np.linalg.solve(J, R.T @ rows[0, 4:])
     change = lambda R, W: np.linalg.solve(J, R.T @ (scene.top.mgl * np.cross(K, R[:, 2])) - np.cross(W, J @ W))
     slope = a = change(R, W)
     for k in (1, 2):
 
         def ahead(new, R=R, W=W, a=a, slope=slope):
             b = ((1.0 - af) * new + af * slope - am * a) / (1.0 - am)
-            turned = Rotation.from_rotvec(h * W + h * h * ((0.5 - beta) * a + beta * b)).as_matrix()
-            return b, R @ turned, W + h * ((1.0 - gamma) * a + gamma * b)
+            rotation = Rotation.from_rotvec(h * W + h * h * ((0.5 - beta) * a + beta * b)).as_matrix()
+            return b, R @ rotation, W + h * ((1.0 - gamma) * a + gamma * b)
 
         new = root(lambda new: new - change(*ahead(new)[1:]), slope)
         a, R, W = ahead(new)
         slope = new
-        np.testing.assert_allclose(matrices(done)[k], R, atol=3e-13)
-        np.testing.assert_allclose(done[k, 4:], R @ J @ W, rtol=1e-11, atol=1e-11)
+        np.testing.assert_allclose(matrices(rows)[k], R, atol=3e-13)
+        np.testing.assert_allclose(rows[k, 4:], R @ J @ W, rtol=1e-11, atol=1e-11)
 
 
 @pytest.mark.parametrize(("name", "steps", "band"), [("simo-wong", 128000, 1e-5), ("collective-gauss-6", 2000, 6e-6)])
 def test_the_benchmark_of_bruls_cardona_and_arnold(name, steps, band):
     """The displacement of the centre at t = 1 to the printed five digits: (0.17334, -0.35991, -0.74849)."""
-    printed = [one.published for one in published_values() if one.source.startswith("Bruls")]
+    published = [value.published for value in published_values() if value.source.startswith("Bruls")]
     run = symtop.simulate("bruls-cardona-arnold", name, step_size=1.0 / steps, horizon=1.0, samples=2, observe="axis")
-    np.testing.assert_allclose(run["axis"].values[-1] - [0.0, 1.0, 0.0], printed, atol=band)
+    np.testing.assert_allclose(run["axis"].values[-1] - [0.0, 1.0, 0.0], published, atol=band)

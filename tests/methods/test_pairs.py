@@ -46,39 +46,39 @@ def test_tables_meet_the_order_conditions_of_every_tree_up_to_their_order_and_no
     assert conditions(matrix, b - weights(table.error, stages), order).order == estimate
     if third is not None:
         assert conditions(matrix, b - weights(table.third, stages), order).order == third
-    wrong = matrix.copy()
-    wrong[-2, 0] += 1e-9
-    assert conditions(wrong, b, order).order < order
+    wrong_matrix = matrix.copy()
+    wrong_matrix[-2, 0] += 1e-9
+    assert conditions(wrong_matrix, b, order).order < order
 
 
 def test_the_tables_of_order_five_and_eight_are_scipys():
     theirs, pair = integrate.RK45, DORMAND_PRINCE
     np.testing.assert_array_equal(square(pair, 6)[:, :5], theirs.A)
-    for mine, other in ((pair.b, theirs.B), (pair.error, theirs.E), (pair.dense, theirs.P)):
-        np.testing.assert_array_equal(mine, other)
+    for ours, scipys in ((pair.b, theirs.B), (pair.error, theirs.E), (pair.dense, theirs.P)):
+        np.testing.assert_array_equal(ours, scipys)
     theirs = integrate.DOP853
     np.testing.assert_array_equal(square(DOP853, 12), theirs.A)
     np.testing.assert_array_equal(DOP853.b, theirs.B)
-    for mine, other in ((DOP853.error, theirs.E5), (DOP853.third, theirs.E3)):
-        np.testing.assert_array_equal(weights(mine, 13), other)
-    for mine, other in zip(DOP853.extra + DOP853.dense, [*theirs.A_EXTRA, *theirs.D], strict=True):
-        np.testing.assert_array_equal(weights(mine, 16), other)
+    for ours, scipys in ((DOP853.error, theirs.E5), (DOP853.third, theirs.E3)):
+        np.testing.assert_array_equal(weights(ours, 13), scipys)
+    for ours, scipys in zip(DOP853.extra + DOP853.dense, [*theirs.A_EXTRA, *theirs.D], strict=True):
+        np.testing.assert_array_equal(weights(ours, 16), scipys)
 
 
 @pytest.mark.parametrize("chart", list(FORMULATIONS))
-@pytest.mark.parametrize(("name", "scene", "tolerance", "close"), [
+@pytest.mark.parametrize(("name", "scene", "tolerance", "bound"), [
     ("dop853", "spheroid", 1e-6, 2e-8), ("dop853", "spheroid", 1e-10, 2e-8), ("dop853", "goldstein", 1e-4, 2e-8),
     ("rk45", "spheroid", 1e-6, 1e-9), ("rk45", "spheroid", 1e-7, 1e-9), ("rk45", "goldstein", 1e-4, 1e-9),
 ])  # fmt: skip
-def test_a_pair_accepts_and_rejects_scipys_steps(name, scene, tolerance, close, chart):
+def test_a_pair_accepts_and_rejects_scipys_steps(name, scene, tolerance, bound, chart):
     """In angles rounding grows from step to step: a start of spheroid that is off by 1e-15 gives SciPy 462 or 449 steps
     of order 8 instead of 460 until t = 40."""
-    for horizon, apart in ((0.5, 1e-12), (8.0 if chart == "angles" else 40.0, close)):
+    for horizon, atol in ((0.5, 1e-12), (8.0 if chart == "angles" else 40.0, bound)):
         span = {"tolerance": tolerance, "horizon": horizon, "samples": 301, "guard": False}
-        mine, theirs = (symtop.simulate(scene, f"{one}[{chart}]", **span) for one in (f"{name}-compiled", name))
+        mine, theirs = (symtop.simulate(scene, f"{key}[{chart}]", **span) for key in (f"{name}-compiled", name))
         for count in ("steps", "force_evaluations", "outcome"):
             assert mine.attrs[count] == theirs.attrs[count]
-        np.testing.assert_allclose(mine["axis"], theirs["axis"], rtol=0.0, atol=apart)
+        np.testing.assert_allclose(mine["axis"], theirs["axis"], rtol=0.0, atol=atol)
 
 
 def test_the_interpolant_of_tsit5_has_order_four_and_costs_where_it_is_asked():
@@ -88,19 +88,19 @@ def test_the_interpolant_of_tsit5_has_order_four_and_costs_where_it_is_asked():
     b = np.array([np.polyval((*reversed(row), 0.0), scale) for row in TSIT5.dense]) / scale
     assert conditions(matrix / scale, b, 5).order == 4
     np.testing.assert_allclose(np.sum(TSIT5.dense, axis=1), weights(TSIT5.b, 7), atol=1e-14)
-    few, many = (symtop.simulate("spheroid", "dop853-compiled[axis]", tolerance=1e-6, samples=n, guard=False).attrs
-                 for n in (2, 2000))  # fmt: skip
-    assert few["steps"] == many["steps"]
-    assert many["force_evaluations"] - few["force_evaluations"] == 3 * (many["steps"] - 2)  # the first and the last
+    sparse, dense = (symtop.simulate("spheroid", "dop853-compiled[axis]", tolerance=1e-6, samples=n, guard=False).attrs
+                     for n in (2, 2000))  # fmt: skip
+    assert sparse["steps"] == dense["steps"]
+    assert dense["force_evaluations"] - sparse["force_evaluations"] == 3 * (dense["steps"] - 2)  # first and last
 
 
 def test_a_wrong_estimate_takes_other_steps():
     scene, pair = symtop.scene("spheroid"), PAIRS["dop853-compiled"]
     plan, _ = make_plan(scene, symtop.integrator("dop853-compiled"), None, 1e-6, horizon=8.0, samples=2)
-    wrong = pair._replace(table=DOP853._replace(third=DOP853.error))
-    solvers = (pairs.solver(FORMULATIONS["axis"], chosen, chosen.rows) for chosen in (pair, wrong))
-    right, other = (solver(scene.top, scene.start, plan) for solver in solvers)
-    assert right.steps != other.steps
+    variant = pair._replace(table=DOP853._replace(third=DOP853.error))
+    solvers = (pairs.solver(FORMULATIONS["axis"], entry, entry.rows) for entry in (pair, variant))
+    first, second = (solver(scene.top, scene.start, plan) for solver in solvers)
+    assert first.steps != second.steps
 
 
 @pytest.mark.parametrize("name", PAIRS)
@@ -110,13 +110,13 @@ def test_one_fixed_step_is_the_table(name):
     par, state = form.prepare(scene.top, scene.start)
     h, y, slopes = 0.03, np.array(state), []
     for row in ((), *table.a):
-        moved = h * sum((a * k for a, k in zip(row, slopes, strict=False)), np.zeros(6))
-        slopes.append(np.array(form.field(par, tuple(y + moved))))
+        change = h * sum((a * k for a, k in zip(row, slopes, strict=False)), np.zeros(6))
+        slopes.append(np.array(form.field(par, tuple(y + change))))
     fixed = symtop.integrator(f"{name}-fixed[axis]")
     plan, _ = make_plan(scene, fixed, h, None, horizon=h, samples=2)
     run = fixed.solvers["axis"](scene.top, scene.start, plan)
-    moved = h * sum(b * k for b, k in zip(table.b, slopes, strict=False))
-    np.testing.assert_allclose(run.states[-1], y + moved, rtol=1e-14, atol=1e-14)
+    change = h * sum(b * k for b, k in zip(table.b, slopes, strict=False))
+    np.testing.assert_allclose(run.states[-1], y + change, rtol=1e-14, atol=1e-14)
     assert run.force_evaluations == len(table.b)
 
 
@@ -130,12 +130,12 @@ def number(near, far, which):
     "heavy-chaotic", "body", marks=pytest.mark.quick)])  # fmt: skip
 def test_two_runs_in_one_register_have_the_bits_of_each_alone(name, chart):
     scene, h, marks = models.scene(name, bodies=True), 0.03, np.array([1, 50, 400])
-    moved = replace(scene.start, **({"psi_dot": 1.0} if chart == "axis" else {"omega_body": (0.1, 0.2, 0.3)}))
+    neighbour = replace(scene.start, **({"psi_dot": 1.0} if chart == "axis" else {"omega_body": (0.1, 0.2, 0.3)}))
     run, fixed = pairs.two_runs(chart, pairs.DOP8, number), symtop.integrator("dop853-compiled-fixed").solvers[chart]
-    near, far = (fixed(scene.top, start, symtop.Plan.steps(h, marks)).states for start in (scene.start, moved))
+    near, far = (fixed(scene.top, start, symtop.Plan.steps(h, marks)).states for start in (scene.start, neighbour))
     out = np.empty((near.shape[1] + far.shape[1], marks.size))
     for which, row in enumerate(out):
-        run(flat(scene.top, scene.start), flat(scene.top, moved), h, marks, which, row)
+        run(flat(scene.top, scene.start), flat(scene.top, neighbour), h, marks, which, row)
     np.testing.assert_array_equal(out.T, np.hstack([near, far]))
     assert not np.array_equal(near, far)
 
@@ -155,11 +155,11 @@ def forests(order):
     """Sorted tuples of trees, each of which takes two orders more than its own F for a position: t + 1."""
     if order == 0:
         return ((),)
-    made = set()
+    result = set()
     for first in range(1, order):
-        for tree, rest in itertools.product(trees(first), forests(order - first - 1)):
-            made.add(tuple(sorted((tree, *rest))))
-    return tuple(sorted(made))
+        for tree, forest in itertools.product(trees(first), forests(order - first - 1)):
+            result.add(tuple(sorted((tree, *forest))))
+    return tuple(sorted(result))
 
 
 def elementary(tree, matrix):
@@ -180,17 +180,17 @@ def moment(tree):
     return factor, power
 
 
-def order_of(matrix, position, velocity, most=10):
+def order_of(matrix, position, velocity, highest=10):
     """The order to which weights of positions and velocities meet all conditions."""
     b, c = (weights(row, len(NODES)) for row in (position, velocity))
-    for order in range(1, most):
-        for row, less in ((c, 0), (b, 1)):  # a position takes one integration more
-            for tree in trees(order - less):
+    for order in range(1, highest):
+        for row, offset in ((c, 0), (b, 1)):  # a position takes one integration more
+            for tree in trees(order - offset):
                 factor, power = moment(tree)
-                solution = factor / ((power + 1) * (power + 2) ** less)
+                solution = factor / ((power + 1) * (power + 2) ** offset)
                 if abs(row @ elementary(tree, matrix) - solution) > 1e-12:
                     return order - 1
-    return most
+    return highest
 
 
 @functools.cache
@@ -207,10 +207,10 @@ def kernel(name):
     return compile_kernel(sample if name == "sample" else refine)
 
 
-def compiled(name, scene, h, **changed):
+def compiled(name, scene, h, **fields):
     """What `sample` returns for a step of h from the start of a scene, or `refine` leaves in the last row."""
     par, state = REDUCED.prepare(scene.top, scene.start)
-    par, memory = par._replace(**changed), np.zeros((3, 4))
+    par, memory = par._replace(**fields), np.zeros((3, 4))
     memory[0] = REDUCED.field(par, state)
     return par, kernel(name)(par, state, memory, h), memory[-1]
 
@@ -232,9 +232,9 @@ def test_momenta_come_from_the_increments(factor):
     scene = symtop.scene("spheroid")
     momenta = scene.top.momenta(scene.start)
     p_psi = factor * momenta.p_psi
-    changed = {"p_psi": p_psi, "north": momenta.p_phi - p_psi, "south": momenta.p_phi + p_psi}
-    _, _, shown = compiled("refine", scene, 0.02, **changed)
-    np.testing.assert_allclose(shown[:2], [momenta.p_phi, p_psi], rtol=1e-13)
+    fields = {"p_psi": p_psi, "north": momenta.p_phi - p_psi, "south": momenta.p_phi + p_psi}
+    _, _, row = compiled("refine", scene, 0.02, **fields)
+    np.testing.assert_allclose(row[:2], [momenta.p_phi, p_psi], rtol=1e-13)
 
 
 def test_the_table_has_order_eight_its_estimate_six_and_it_needs_fewer_forces_than_dop853():
@@ -245,30 +245,30 @@ def test_the_table_has_order_eight_its_estimate_six_and_it_needs_fewer_forces_th
     assert order_of(MATRIX, *lower) == 6
     np.testing.assert_allclose(MATRIX.sum(axis=1), NODES**2 / 2.0, atol=1e-14)
     np.testing.assert_array_equal(DPRKN8.a[-1], DPRKN8.b)  # the ninth stage is the first of the next step
-    wrong = MATRIX.copy()
-    wrong[-3, 0] += 1e-8
-    assert order_of(wrong, DPRKN8.b, DPRKN8.velocity) < 8
+    wrong_matrix = MATRIX.copy()
+    wrong_matrix[-3, 0] += 1e-8
+    assert order_of(wrong_matrix, DPRKN8.b, DPRKN8.velocity) < 8
     for tolerance in (1e-6, 1e-9, 1e-12):
         mine, theirs = (symtop.simulate("spheroid", f"{name}[angles]", tolerance=tolerance, guard=False)
                         for name in ("dprkn8", "dop853-compiled"))  # fmt: skip
-        error, other = (float(symtop.errors(run)["axis"].max()) for run in (mine, theirs))
+        error, dop853_error = (float(symtop.errors(run)["axis"].max()) for run in (mine, theirs))
         assert mine.attrs["force_evaluations"] < theirs.attrs["force_evaluations"]
-        assert error < min(tolerance, other)
+        assert error < min(tolerance, dop853_error)
 
 
 def test_a_projected_step_ends_on_the_constants_next_to_where_the_plain_one_ends():
     scene = symtop.scene("goldstein")
     (I1, mgl), plan = (scene.top.I1, scene.top.mgl), symtop.Plan.steps(scene.nutation_period / 4.0, [0, 1])
-    plain, done = (solve(symtop.integrator(name), "axis", scene.top, scene.start, plan).states
-                   for name in ("dop853-compiled-fixed", "dop853-projected"))  # fmt: skip
+    plain, result = (solve(symtop.integrator(name), "axis", scene.top, scene.start, plan).states
+                     for name in ("dop853-compiled-fixed", "dop853-projected"))  # fmt: skip
     constants = lambda y: np.array([0.5 * y[:3] @ y[:3], y[:3] @ y[3:], 0.5 * y[3:] @ y[3:] / I1 + mgl * y[2]])
     e, L = plain[1, :3], plain[1, 3:]
     gradients = np.array([[*e, 0, 0, 0], [*L, *e], [0, 0, mgl, *L / I1]])
     directions = gradients * ([1.0] * 3 + [plain[0, 3:] @ plain[0, 3:] + I1 * mgl] * 2 + [0.0])
-    off = lambda factors: constants(plain[1] + factors @ directions) - constants(plain[0])
-    expected = plain[1] + optimize.root(off, np.zeros(3), tol=1e-15).x @ directions
-    np.testing.assert_allclose(done[1], expected, rtol=0.0, atol=1e-14)
-    assert np.abs(off(np.zeros(3))).max() > 1e-8  # the control: the plain step leaves them
+    gap = lambda factors: constants(plain[1] + factors @ directions) - constants(plain[0])
+    expected = plain[1] + optimize.root(gap, np.zeros(3), tol=1e-15).x @ directions
+    np.testing.assert_allclose(result[1], expected, rtol=0.0, atol=1e-14)
+    assert np.abs(gap(np.zeros(3))).max() > 1e-8  # the control: the plain step leaves them
 
 
 @pytest.mark.parametrize("name", ["steady", "sleeping", "sleeping-unstable"])
@@ -281,7 +281,7 @@ def test_a_gradient_that_depends_on_the_others_is_left_out_of_the_projection(nam
 def test_a_projected_step_has_the_order_of_its_table_though_runs_show_a_higher_one(monkeypatch):
     """Y(h) - Y(h/2) o Y(h/2) begins with h^10: its powers of h by Cauchy's integral over complex steps."""
     monkeypatch.setattr(projected, "summed", lambda u, v: tuple(np.add(u, v)))
-    monkeypatch.setattr(projected, "_inverse", lambda own, whole: 1.0 / own)  # complex numbers are not compared
+    monkeypatch.setattr(projected, "_inverse", lambda value, scale: 1.0 / value)  # complex numbers are not compared
     scene, matrix, f = symtop.scene("spheroid"), square(VERN9, len(VERN9.b)), projected.AXIS.field
     par, start = projected._levels(scene.top, generic_start(scene))
     start = np.array(start)

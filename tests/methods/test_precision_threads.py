@@ -43,29 +43,29 @@ def disturbed(times):
 
 def test_coefficients_and_starts_are_those_computed_alone_while_others_change_the_precision():
     assert [len(str(context(number).sqrt(2))) for number in (20, 50, 20)] == [21, 51, 21]  # a point and the digits
-    alone = coefficients(), numbers("spheroid"), numbers("goldstein")
+    expected = coefficients(), numbers("spheroid"), numbers("goldstein")
     rule, first, second, _ = together(lambda: [coefficients() for _ in range(5)],
                                       lambda: [numbers("spheroid") for _ in range(20)],
                                       lambda: [numbers("goldstein") for _ in range(20)],
                                       lambda: disturbed(20_000))  # fmt: skip
-    assert all(np.array_equal(values, alone[0]) for values in rule)
-    assert (set(first), set(second)) == ({alone[1]}, {alone[2]})
+    assert all(np.array_equal(values, expected[0]) for values in rule)
+    assert (set(first), set(second)) == ({expected[1]}, {expected[2]})
     with mpmath.workdps(5):
-        assert np.array_equal(coefficients(), alone[0])
-        assert numbers("spheroid") == alone[1]
+        assert np.array_equal(coefficients(), expected[0])
+        assert numbers("spheroid") == expected[1]
         assert mpmath.mp.dps == 5
 
 
 def test_taylor_runs_of_one_kind_at_once_do_not_share_a_stepper():
     runs = lambda name: [symtop.simulate(name, "taylor", horizon=50.0, samples=200)["axis"].values for _ in range(20)]
-    alone = [runs(name)[0] for name in SCENES]
-    for expected, states in zip(alone, together(*(lambda name=name: runs(name) for name in SCENES)), strict=True):
-        assert all(np.array_equal(expected, one) for one in states)
+    references = [runs(name)[0] for name in SCENES]
+    for expected, states in zip(references, together(*(lambda name=name: runs(name) for name in SCENES)), strict=True):
+        assert all(np.array_equal(expected, axes) for axes in states)
 
 
 def test_the_bare_loop_of_heyoka_computes_what_the_solver_does_and_begins_anew():
     scene, plan = symtop.scene("goldstein"), symtop.Plan.until(np.array([0.0, 8.0]), 1e-9)
     solver = symtop.integrator("taylor[axis]").solvers["axis"]
     run, evaluations = solver.bare(scene.top, scene.start, plan)
-    done = solver(scene.top, scene.start, plan)
-    assert (evaluations, run()[3], run()[3]) == (done.force_evaluations, done.steps, done.steps)
+    result = solver(scene.top, scene.start, plan)
+    assert (evaluations, run()[3], run()[3]) == (result.force_evaluations, result.steps, result.steps)

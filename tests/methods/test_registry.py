@@ -26,15 +26,15 @@ def test_a_catalogue_is_a_dict_that_a_notebook_shows_as_a_table(catalogue):
     assert isinstance(catalogue(), dict)
     assert all(f"<td>{name}</td>" in html for name in catalogue())
     assert html.count("<tr") == len(catalogue()) + 1
-    assert all(f"<td>{name}</td>" in one._repr_html_() for name, one in catalogue().items())
+    assert all(f"<td>{name}</td>" in entry._repr_html_() for name, entry in catalogue().items())
 
 
 def test_a_registered_one_is_pickled_by_its_name_and_no_other():
-    for own in map(symtop.integrator, ("rk4", "dop853", "strang[axis]")):
-        assert pickle.loads(pickle.dumps(own)) is own
+    for method in map(symtop.integrator, ("rk4", "dop853", "strang[axis]")):
+        assert pickle.loads(pickle.dumps(method)) is method
         with pytest.raises(TypeError, match="cannot pickle"):
-            pickle.dumps(other := replace(own, order=7))
-        assert copy.copy(other) == other
+            pickle.dumps(variant := replace(method, order=7))
+        assert copy.copy(variant) == variant
 
 
 def test_two_threads_that_make_the_very_first_call_together_see_every_integrator(monkeypatch):
@@ -56,7 +56,7 @@ def test_two_threads_that_make_the_very_first_call_together_see_every_integrator
         assert list(pool.map(first_call, range(4))) == [shipped] * 4
 
 
-@pytest.mark.parametrize(("fields", "says"), [
+@pytest.mark.parametrize(("fields", "message"), [
     ({"symplectic": "yes"}, "symplectic must be True, False or None, not 'yes'"),
     ({"exact_steps": "no"}, "exact_steps must be True or False, not 'no'"),
     ({"default_tolerance": -1}, "default_tolerance must be above zero"),
@@ -64,12 +64,12 @@ def test_two_threads_that_make_the_very_first_call_together_see_every_integrator
     ({"least_tolerance": -1.0}, "least_tolerance must be at least 0"),
     ({"reference": 5}, "reference must be text, not 5"),
 ])  # fmt: skip
-def test_a_field_that_makes_no_sense_is_refused_and_one_that_does_is_not(fields, says):
-    right = {"name": "mine", "family": "other", "summary": "", "solvers": {"angles": print}}
-    with pytest.raises(symtop.SymtopError, match=f"^{re.escape(says)}"):
-        Integrator(**right | fields)
+def test_a_field_that_makes_no_sense_is_refused_and_one_that_does_is_not(fields, message):
+    arguments = {"name": "mine", "family": "other", "summary": "", "solvers": {"angles": print}}
+    with pytest.raises(symtop.SymtopError, match=f"^{re.escape(message)}"):
+        Integrator(**arguments | fields)
     claims = {"explicit": True, "symplectic": False, "symmetric": np.bool_(True), "least_tolerance": 0}
-    assert Integrator(**right | claims, default_tolerance=1e-6, reference="x").record()["symmetric"] == "yes"
+    assert Integrator(**arguments | claims, default_tolerance=1e-6, reference="x").record()["symmetric"] == "yes"
 
 
 EVERY = symtop.integrators()
@@ -116,9 +116,9 @@ def test_claims_agree_with_needs_and_what_is_made_for_this_top_exists_for_no_oth
 def test_tables_of_ones_own_have_the_needs_of_their_family_and_a_plug_in_has_none():
     heun = symtop.runge_kutta("heun", ((), (1.0,)), (0.5, 0.5), order=2)
     assert (heun.needs, heun.general) == ("derivative", True)
-    mine = Integrator(name="mine", family="other", summary="", solvers={"axis": print})
-    assert (mine.needs, mine.general) == (None, None)
-    assert mine.record()["needs"] == mine.record()["general"] == "unknown"
+    method = Integrator(name="mine", family="other", summary="", solvers={"axis": print})
+    assert (method.needs, method.general) == (None, None)
+    assert method.record()["needs"] == method.record()["general"] == "unknown"
     with pytest.raises(symtop.SymtopError, match="needs must be 'derivative'"):
         Integrator(name="mine", family="other", summary="", solvers={"axis": print}, needs="luck")
 

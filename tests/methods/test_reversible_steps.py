@@ -62,26 +62,26 @@ def test_the_grid_is_that_of_the_formulas(k):
     scene, eps = grazing(0.1), 0.02
     points = by_hand(scene, eps, 400, k)
     plan = symtop.Plan.steps(eps, [1])._replace(times=points[:, 0])
-    done = Reversible(k)(scene.top, scene.start, plan)
+    result = Reversible(k)(scene.top, scene.start, plan)
     assert points[:, 1].min() < 0.15
-    assert done.states[:, :2] == pytest.approx(points[:, 1:], rel=1e-10)
+    assert result.states[:, :2] == pytest.approx(points[:, 1:], rel=1e-10)
     assert np.abs(Reversible(3.0 - k)(scene.top, scene.start, plan).states[:, :2] - points[:, 1:]).max() > 1e-6
 
 
 def test_samples_and_blocks_move_no_step(monkeypatch):
     scene, h = symtop.scene("goldstein"), 0.05
-    few, many = run(scene, h, [400, 800]), run(scene, h, np.arange(801))
-    assert np.array_equal(few.states, many.states[[400, 800]])
-    assert many.states[0] == pytest.approx(symtop.on_angles(scene.top, scene.start)[1], abs=0.0)
-    for done in (few, many):
-        assert (done.force_evaluations, done.newton_iterations) == (done.steps, 0)
-    assert many.steps == few.steps + 798  # the start costs nothing
+    sparse, dense = run(scene, h, [400, 800]), run(scene, h, np.arange(801))
+    assert np.array_equal(sparse.states, dense.states[[400, 800]])
+    assert dense.states[0] == pytest.approx(symtop.on_angles(scene.top, scene.start)[1], abs=0.0)
+    for result in (sparse, dense):
+        assert (result.force_evaluations, result.newton_iterations) == (result.steps, 0)
+    assert dense.steps == sparse.steps + 798  # the start costs nothing
     scene = symtop.scene("grazing")
-    whole = run(scene, 0.02, [50, 200])
+    expected = run(scene, 0.02, [50, 200])
     monkeypatch.setattr(reversible, "BLOCK", 7)
     parts = run(scene, 0.02, [50, 200])
-    assert np.array_equal(whole.states, parts.states)
-    assert whole.steps == parts.steps > 200
+    assert np.array_equal(expected.states, parts.states)
+    assert expected.steps == parts.steps > 200
 
 
 def read_off(scene, eps, marks):
@@ -98,14 +98,14 @@ def read_off(scene, eps, marks):
 @compile_kernel
 def _read_off(par, theta, p, eps, marks):
     I1, _, mgl, _, north, south = par
-    states, done = np.empty((len(marks), 2)), 0
+    states, count = np.empty((len(marks), 2)), 0
     for j in range(len(marks)):
-        while done < marks[j]:
+        while count < marks[j]:
             h = eps * np.sin(theta)
             p -= 0.5 * h * effective_force(theta, north, south, I1, mgl)[0]
             theta += h * p / I1
             p -= 0.5 * h * effective_force(theta, north, south, I1, mgl)[0]
-            done += 1
+            count += 1
         states[j] = theta, p
     return states, states[-1]
 
@@ -113,43 +113,43 @@ def _read_off(par, theta, p, eps, marks):
 @pytest.mark.parametrize("scene", [symtop.scene("goldstein"), grazing(0.01)], ids=lambda s: s.name)
 def test_the_way_back_has_the_same_steps(scene):
     _, state = symtop.on_angles(scene.top, scene.start)
-    back = SOLVER.onward(scene.top, scene.start, (0.01,) * 500 + (-0.01,) * 500)
-    there = SOLVER.onward(scene.top, scene.start, (0.01,) * 500)
-    assert np.abs(there.states[0] - state).max() > 0.1
-    assert back.states[0] == pytest.approx(state, abs=1e-11)
-    assert back.steps > there.steps + 500
+    round_trip = SOLVER.onward(scene.top, scene.start, (0.01,) * 500 + (-0.01,) * 500)
+    outward = SOLVER.onward(scene.top, scene.start, (0.01,) * 500)
+    assert np.abs(outward.states[0] - state).max() > 0.1
+    assert round_trip.states[0] == pytest.approx(state, abs=1e-11)
+    assert round_trip.steps > outward.steps + 500
     assert np.abs(read_off(scene, 0.01, [500])[1] - state[:2]).max() > 1e-6
 
 
 def test_momenta_stay_and_the_energy_is_bounded_where_that_of_steps_read_off_drifts():
     for name in ("spheroid", "goldstein", "grazing"):
         scene = symtop.scene(name)
-        done, momenta = run(scene, 0.003, np.arange(0, 100_001, 500)), scene.top.momenta(scene.start)
-        for values, first in ((done.p_phi, momenta.p_phi), (done.p_psi, momenta.p_psi)):
+        result, momenta = run(scene, 0.003, np.arange(0, 100_001, 500)), scene.top.momenta(scene.start)
+        for values, first in ((result.p_phi, momenta.p_phi), (result.p_psi, momenta.p_psi)):
             assert np.abs(values / first - 1.0).max() < 1e-12
     scene, eps = grazing(0.1), 0.05
     marks = np.arange(0, 400_001, 200)
-    done = run(scene, eps, marks)
-    assert done.outcome == "ok"
-    errors = energies(scene, done.states) - energies(scene, done.states)[0]
-    lost = energies(scene, read_off(scene, eps, marks)[0])
-    lost -= lost[0]
+    result = run(scene, eps, marks)
+    assert result.outcome == "ok"
+    errors = energies(scene, result.states) - energies(scene, result.states)[0]
+    drift = energies(scene, read_off(scene, eps, marks)[0])
+    drift -= drift[0]
     assert np.abs(errors).max() < 1.1 * np.abs(errors[:200]).max()
     assert abs(trend(marks, errors).rise) < 0.01 * np.abs(errors).max()
-    assert trend(marks, lost).rise > 100.0 * np.abs(errors).max()
+    assert trend(marks, drift).rise > 100.0 * np.abs(errors).max()
 
 
 def forces_for(scene, method, error):
     """The least force evaluations from which on finer steps keep the axis within that error, over one nutation."""
     form, forces = closed_form(scene), 0
     for h in scene.nutation_period * np.geomspace(0.05, 1e-7, 300):
-        done = symtop.simulate(scene, method, step_size=h, horizon=scene.nutation_period, samples=101, observe="axis",
+        data = symtop.simulate(scene, method, step_size=h, horizon=scene.nutation_period, samples=101, observe="axis",
                                guard=False)  # fmt: skip
-        gap = charts.axis_distance(done["axis"].values, form.axis(done["time"].values)).max()
+        gap = charts.axis_distance(data["axis"].values, form.axis(data["time"].values)).max()
         if not gap < error:
             forces = 0
         elif not forces:
-            forces = done.attrs["force_evaluations"]
+            forces = data.attrs["force_evaluations"]
         elif gap < error / 4.0:
             return forces
     raise AssertionError(method)
@@ -172,10 +172,10 @@ def test_runs_that_fail_say_how(monkeypatch):
     monkeypatch.setattr(reversible, "STEPS", 50)
     too_long = run(grazing(1e-6), 1.0 / 3.0, [0, 1, 6])
     assert (too_long.outcome, too_long.steps) == ("out_of_budget", 50)
-    for done in (onto_the_pole, too_large, too_long):
-        assert 0.0 < done.reached < 4.0
-        assert np.isfinite(done.states[0]).all()
-        assert np.isnan([*done.states[-1], done.p_phi[-1]]).all()
+    for result in (onto_the_pole, too_large, too_long):
+        assert 0.0 < result.reached < 4.0
+        assert np.isfinite(result.states[0]).all()
+        assert np.isnan([*result.states[-1], result.p_phi[-1]]).all()
     assert np.isfinite(too_long.states[1]).all()
 
 
@@ -183,8 +183,8 @@ def test_a_budget_ends_a_run_whose_steps_become_too_many_alone_and_as_a_member()
     scene, setting = grazing(1e-4), {"step_size": 0.05, "horizon": 4.0, "samples": 5}
     needed = symtop.simulate(scene, METHOD, **setting, guard=False).attrs["steps"]
     for budget, outcome, steps in ((needed, "ok", needed), (300.5, "out_of_budget", 301), (100, "out_of_budget", 100)):
-        alone = symtop.simulate(scene, METHOD, **setting, guard=False, budget=budget).attrs
+        attrs = symtop.simulate(scene, METHOD, **setting, guard=False, budget=budget).attrs
         member = symtop.ensemble([scene], METHOD, **setting, budget=budget, quiet=True).isel(member=0)
-        assert (alone["outcome"], alone["steps"]) == (str(member.outcome.values), int(member.steps)) == (outcome, steps)
+        assert (attrs["outcome"], attrs["steps"]) == (str(member.outcome.values), int(member.steps)) == (outcome, steps)
     symtop.simulate(scene, METHOD, **setting, guard=(sentences := []).append, budget=100)
     assert "expect the run to be stopped at t = " in sentences[0]

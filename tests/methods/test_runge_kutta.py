@@ -63,9 +63,9 @@ def test_the_right_hand_side_is_the_derivative_of_the_true_motion(name, chart):
     moment, h = 0.37 * scene.nutation_period, 3e-4 * scene.nutation_period
     motion = np.array(closed_form(scene)(moment + h * np.array([-2.0, -1.0, 0.0, 1.0, 2.0]))).T  # angles and rates
     states = [form.prepare(scene.top, symtop.Angles(*map(float, values)))[1] for values in motion]
-    back2, back, here, ahead, ahead2 = np.array(states)
+    back2, back, middle, ahead, ahead2 = np.array(states)
     slope = (8.0 * (ahead - back) - (ahead2 - back2)) / (12.0 * h)
-    np.testing.assert_allclose(form.field(par, tuple(here)), slope, atol=1e-7 * np.max(np.abs(slope)))
+    np.testing.assert_allclose(form.field(par, tuple(middle)), slope, atol=1e-7 * np.max(np.abs(slope)))
     state = symtop.field(chart, scene.top).state(symtop.Angles(*map(float, motion[2])))
     theirs = [symtop.field(chart, scene.top, compiled=compiled)(0.0, state) for compiled in (False, True)]
     np.testing.assert_allclose(theirs, [slope] * 2, atol=1e-7 * np.max(np.abs(slope)))
@@ -92,7 +92,7 @@ def test_p_phi_stays_where_it_is_linear_in_the_state_and_is_lost_in_angles(name)
     assert change["axis"]["p_phi"] <= 2e-16
     assert change["attitude"]["p_phi"] <= 2e-16
     assert 1e-8 < change["angles"]["p_phi"] < 1e-3  # the negative control
-    spins = [one["p_psi"] for one in change.values()]
+    spins = [row["p_psi"] for row in change.values()]
     assert 1e-9 < min(spins) <= max(spins) < 1e-3  # L.e is not linear, and nothing is copied
 
 
@@ -140,15 +140,15 @@ def test_a_state_of_another_shape_is_refused(chart, compiled):
     """Compiled code does not look where an array ends."""
     size, f = 6 + (chart == "attitude"), symtop.field(chart, symtop.SymmetricTop(1.0, 0.5, 1.0), compiled=compiled)
     for shape in ((3,), (13 - size,), (size, 3), (size, 1), (0,), ()):
-        with pytest.raises(symtop.SymtopError) as refused:
+        with pytest.raises(symtop.SymtopError) as info:
             f(0.0, np.ones(shape))
-        assert str(refused.value) == f"y must have the shape ({size},) in the chart {chart}, not {shape}"
+        assert str(info.value) == f"y must have the shape ({size},) in the chart {chart}, not {shape}"
     for value in ("abcdef", np.array([*"abcdef"]), None, [1.0, 2.0], [[1.0], [2.0, 3.0]]):
         with pytest.raises(symtop.SymtopError, match="y must"):
             f(0.0, value)
     y = f.state(symtop.Angles(1.0, psi_dot=2.0))
-    for same in (list(y), np.repeat(y, 2)[::2]):
-        np.testing.assert_array_equal(f(0.0, same), f(0.0, y))
+    for state in (list(y), np.repeat(y, 2)[::2]):
+        np.testing.assert_array_equal(f(0.0, state), f(0.0, y))
 
 
 def _walk(scene, tolerance, pair=pairs.RK45, **limits):
@@ -164,13 +164,13 @@ def test_scipys_solvers_are_solve_ivp(name):
     run = symtop.simulate(scene, name, tolerance=1e-6, horizon=2.0, samples=41)
     par, start = with_rates(scene.top, scene.start)
     rhs, method = RightHandSide(field_angles, par), symtop.integrator(name).summary.split()[1]
-    done = solve_ivp(rhs, (0.0, 2.0), start, method, run["time"].values, rtol=1e-6, atol=1e-6)
-    for angle, values in zip(("theta", "phi", "psi"), done.y, strict=False):
+    solution = solve_ivp(rhs, (0.0, 2.0), start, method, run["time"].values, rtol=1e-6, atol=1e-6)
+    for angle, values in zip(("theta", "phi", "psi"), solution.y, strict=False):
         np.testing.assert_array_equal(run[angle], values)
     assert run.attrs["force_evaluations"] == rhs.calls  # more than nfev where a Jacobian is made of differences
-    assert rhs.calls >= done.nfev
+    assert rhs.calls >= solution.nfev
     if name in ("rk45", "dop853"):
-        assert rhs.calls == done.nfev
+        assert rhs.calls == solution.nfev
 
 
 def test_a_tableau_may_be_made_of_arrays_and_taylor_runs_in_three_precisions():

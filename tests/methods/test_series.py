@@ -32,14 +32,14 @@ def worst_gap(chart, method, scene, per_nutation, nutations=10.0):
     """Largest error of a run with a fixed step at eleven samples."""
     h = scene.nutation_period / per_nutation
     plan = symtop.Plan.steps(h, np.linspace(0, round(nutations * per_nutation), 11).astype(int))
-    done = method.solvers[chart](scene.top, scene.start, plan)
-    assert done.outcome == "ok"
-    return gaps(chart, done.states, closed_form(scene), plan.times).max()
+    result = method.solvers[chart](scene.top, scene.start, plan)
+    assert result.outcome == "ok"
+    return gaps(chart, result.states, closed_form(scene), plan.times).max()
 
 
 def called(function, *arguments):
     """What an intrinsic returns, which only compiled code can call."""
-    return njit(lambda given: function(*given))(arguments)
+    return njit(lambda args: function(*args))(arguments)
 
 
 @pytest.mark.parametrize(("of_order", "size"), [(axis_sum, 6), (attitude_sum, 7)])
@@ -59,9 +59,9 @@ def test_the_sums_are_those_of_the_first_terms_of_the_equations_and_agree_on_the
     state = charts.space_state("axis", scene.top, scene.start)
     e, L = [state[:3]], [state[3:]]
     for n in range(order + 1):
-        turned = sum(np.cross(L[k], e[n - k]) for k in range(n + 1))
+        term = sum(np.cross(L[k], e[n - k]) for k in range(n + 1))
         L.append(h * mgl * np.array([-e[n][1], e[n][0], 0.0]) / (n + 1))
-        e.append(h / I1 * turned / (n + 1))
+        e.append(h / I1 * term / (n + 1))
     result = called(axis_sum(order), tuple(state.tolist()), h / I1, h * mgl)
     assert result[:3] == pytest.approx(sum(e[1 : order + 1]), rel=1e-11)
     assert result[3:5] == pytest.approx(sum(L[1 : order + 1])[:2], rel=1e-11)
@@ -74,10 +74,10 @@ def test_the_sums_are_those_of_the_first_terms_of_the_equations_and_agree_on_the
     result = called(attitude_sum(order), tuple(state.tolist()), h / I1, h * mgl)
     axis = charts.space_state("axis", scene.top, scene.start)
     theirs = called(axis_sum(order), tuple(axis.tolist()), h / I1, h * mgl)
-    moved = state[:4] + np.array(result[:4])
-    assert charts.axis_from_quaternion(moved) == pytest.approx(axis[:3] + np.array(theirs[:3]), abs=1e-13)
+    quaternion = state[:4] + np.array(result[:4])
+    assert charts.axis_from_quaternion(quaternion) == pytest.approx(axis[:3] + np.array(theirs[:3]), abs=1e-13)
     assert result[4:6] == pytest.approx(theirs[3:5], rel=1e-12)
-    assert np.linalg.norm(moved) == pytest.approx(1.0, abs=1e-13)
+    assert np.linalg.norm(quaternion) == pytest.approx(1.0, abs=1e-13)
 
 
 @pytest.mark.parametrize("chart", CHARTS)
@@ -107,13 +107,13 @@ def test_the_error_follows_the_tolerance(chart, method, name):
     scene = symtop.scene(name)
     times, form = np.linspace(0.0, min(scene.horizon, 10.0 * scene.time_scale()), 41), closed_form(scene)
     for tolerance in (1e-5, 1e-8, 1e-11):
-        done = method.solvers[chart](scene.top, scene.start, symtop.Plan.until(times, tolerance))
-        assert done.outcome == "ok"
+        result = method.solvers[chart](scene.top, scene.start, symtop.Plan.until(times, tolerance))
+        assert result.outcome == "ok"
         growth = 1e4 if name in ("separatrix", "sleeping") else 1e2
-        assert gaps(chart, done.states, form, times).max() < growth * tolerance
-    strict = method.solvers[chart](scene.top, scene.start, symtop.Plan.until(times, 1e-17))
-    assert strict.steps > method.solvers[chart](scene.top, scene.start, symtop.Plan.until(times, 1e-5)).steps
-    assert strict.p_psi == pytest.approx(np.full(41, scene.top.momenta(scene.start).p_psi), rel=1e-11)
+        assert gaps(chart, result.states, form, times).max() < growth * tolerance
+    finest = method.solvers[chart](scene.top, scene.start, symtop.Plan.until(times, 1e-17))
+    assert finest.steps > method.solvers[chart](scene.top, scene.start, symtop.Plan.until(times, 1e-5)).steps
+    assert finest.p_psi == pytest.approx(np.full(41, scene.top.momenta(scene.start).p_psi), rel=1e-11)
 
 
 def test_a_free_top_and_one_at_rest_and_bad_input():
@@ -123,11 +123,11 @@ def test_a_free_top_and_one_at_rest_and_bad_input():
     for chart, method in ADAPTIVE:
         top, start = symtop.SymmetricTop(2.0, 1.0, 0.0), symtop.Angles(0.7, 0.2, 0.1, 0.3, -0.8, 1.1)
         times = np.linspace(0.0, 30.0, 11)
-        done = method.solvers[chart](top, start, symtop.Plan.until(times, 1e-12))
-        assert done.outcome == "ok"
-        assert gaps(chart, done.states, symtop.ClosedForm(top, start), times).max() < 1e-10
-        rest = method.solvers[chart](top, symtop.Angles(0.7, 0.2, 0.1, 0.0, 0.0, 0.0), symtop.Plan.until(times, 1e-12))
-        assert rest.outcome == "ok"
+        result = method.solvers[chart](top, start, symtop.Plan.until(times, 1e-12))
+        assert result.outcome == "ok"
+        assert gaps(chart, result.states, symtop.ClosedForm(top, start), times).max() < 1e-10
+        idle = method.solvers[chart](top, symtop.Angles(0.7, 0.2, 0.1, 0.0, 0.0, 0.0), symtop.Plan.until(times, 1e-12))
+        assert idle.outcome == "ok"
         with pytest.raises(symtop.SymtopError, match="tolerance"):
             symtop.simulate("spheroid", method, tolerance=1e-25, observe="axis")
         with pytest.raises(symtop.SymtopError, match="step_size"):
@@ -138,9 +138,9 @@ def test_a_hyphen_before_a_chart_names_a_row_too():
     for chart in CHARTS:
         assert symtop.integrator(f"series-{chart}").name == f"series[{chart}]"
         assert symtop.integrators()[f"series-{chart}"].charts() == (chart,)
-    for wrong in ("series-angles", "series-", "axis", "-axis"):
+    for name in ("series-angles", "series-", "axis", "-axis"):
         with pytest.raises(symtop.SymtopError):
-            symtop.integrator(wrong)
+            symtop.integrator(name)
     with pytest.raises(KeyError):
         symtop.integrators()["serious-axis"]
 
@@ -165,8 +165,8 @@ def coefficients(chart, order, shift=0.0):
 
 
 def problem(chart):
-    chosen = symtop.scene("heavy-brick" if chart == "body" else "goldstein", bodies=True)
-    return chosen.top, chosen.start
+    scene = symtop.scene("heavy-brick" if chart == "body" else "goldstein", bodies=True)
+    return scene.top, scene.start
 
 
 @pytest.mark.parametrize("chart", GENERAL)
@@ -180,8 +180,8 @@ def test_coefficients_solve_the_equations_that_every_other_method_takes(chart):
         residuals.append(np.abs(np.subtract(slope, field(par, state))).max())
     assert math.log2(residuals[0] / residuals[1]) == pytest.approx(12.0, abs=1.0)
     if chart != "axis":
-        _, other = coefficients(chart, 12, shift=0.01)
-        assert np.abs(other[1] - c[1]).max() > 1e-3
+        _, control = coefficients(chart, 12, shift=0.01)
+        assert np.abs(control[1] - c[1]).max() > 1e-3
 
 
 @pytest.mark.parametrize("chart", OF_TOPS)
@@ -206,13 +206,13 @@ def test_fixed_steps_have_order_sixteen(chart):
 def test_a_motion_without_end_of_steps_is_one_step_and_constants_stay_at_rounding():
     scene, method = symtop.scene("spheroid"), symtop.integrator("series")
     h = scene.nutation_period / 30.1
-    done = method.solvers["axis"](scene.top, scene.start, symtop.Plan.steps(h, np.arange(0, 1_000_001, 10_000)))
-    e, L = done.states[:, :3], done.states[:, 3:]
+    result = method.solvers["axis"](scene.top, scene.start, symtop.Plan.steps(h, np.arange(0, 1_000_001, 10_000)))
+    e, L = result.states[:, :3], result.states[:, 3:]
     energy = 0.5 * (L * L).sum(axis=1) / scene.top.I1 + scene.top.mgl * e[:, 2]
     assert np.abs(energy / energy[0] - 1.0).max() < 3e-12
-    assert np.ptp(done.p_phi) == 0.0
-    assert np.abs(done.p_psi / done.p_psi[0] - 1.0).max() < 3e-12
+    assert np.ptp(result.p_phi) == 0.0
+    assert np.abs(result.p_psi / result.p_psi[0] - 1.0).max() < 3e-12
     # At rest on its axis every coefficient but the first is zero.
-    rest = symtop.Scene("rest", symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(1.0), 5.0, observes="axis")
-    run = symtop.simulate(rest, "series-general-adaptive[axis]", tolerance=1e-9, guard=False)
+    scene = symtop.Scene("rest", symtop.SymmetricTop(1.0, 1.0, 0.0), symtop.Angles(1.0), 5.0, observes="axis")
+    run = symtop.simulate(scene, "series-general-adaptive[axis]", tolerance=1e-9, guard=False)
     assert (run.attrs["outcome"], run.attrs["steps"]) == ("ok", 1)

@@ -13,7 +13,7 @@ from symtop.methods.splitting import coefficients as tables, rotor, space
 from symtop.methods.splitting.composition import built_in, composition
 from symtop.model.scenes import closed_form
 
-TABLES = {name: one.table for name, one in tables.METHODS.items() if one.table.order > 1}  # of more than a sum of 1
+TABLES = {name: item.table for name, item in tables.METHODS.items() if item.table.order > 1}  # of more than a sum of 1
 METHODS = {method.name: method for method in built_in()}
 
 
@@ -39,8 +39,8 @@ def test_tables_sum_to_one_read_the_same_from_both_ends_and_integrate_polynomial
         assert abs(math.fsum(row) - 1.0) <= np.spacing(abs(row[len(row) // 2]))
     order = QUADRATURE.get(name, table.order)
     assert quadrature_defect(table, order) < 3e-15
-    wrong = table._replace(kick=(table.kick[0] + 1e-9, *table.kick[1:-1], table.kick[-1] - 1e-9))
-    assert quadrature_defect(wrong, order) > 1e-10
+    control = table._replace(kick=(table.kick[0] + 1e-9, *table.kick[1:-1], table.kick[-1] - 1e-9))
+    assert quadrature_defect(control, order) > 1e-10
 
 
 @pytest.mark.parametrize("chart", ["space", "angles"])
@@ -65,10 +65,10 @@ def test_a_drift_turns_by_its_angle_in_series_and_beyond(x):
 @pytest.mark.parametrize("chart", ["axis", "attitude"])
 def test_lengths_and_momenta_have_no_trend_in_a_million_steps(name, chart):
     scene = symtop.scene("spheroid")
-    done = run(METHODS[name], scene, scene.nutation_period / 20.2, np.arange(0, 1_000_001, 100_000), chart)
-    assert np.abs(np.linalg.norm(done.states[:, :-3], axis=1) - 1.0).max() < 2e-15
-    assert np.ptp(done.states[:, -1]) == 0.0  # L_z
-    assert np.abs(done.p_psi - done.p_psi[0]).max() < 5e-13 * max(abs(done.p_phi[0]), abs(done.p_psi[0]))
+    result = run(METHODS[name], scene, scene.nutation_period / 20.2, np.arange(0, 1_000_001, 100_000), chart)
+    assert np.abs(np.linalg.norm(result.states[:, :-3], axis=1) - 1.0).max() < 2e-15
+    assert np.ptp(result.states[:, -1]) == 0.0  # L_z
+    assert np.abs(result.p_psi - result.p_psi[0]).max() < 5e-13 * max(abs(result.p_phi[0]), abs(result.p_psi[0]))
 
 
 def cayley_drift(method, scene, h, tau, steps):
@@ -128,19 +128,19 @@ def test_the_tuned_step_is_symplectic_but_for_its_number_and_strang_accurate_in_
     defect = symplectic_defect(one_step(METHODS["cayley-tuned"], "attitude", scene, 0.2), start)
     assert defect.size > 1e-4
     assert defect.rest < 1e-10
-    other = symplectic_defect(one_step(symtop.integrator("gauss-4"), "attitude", scene, 0.2), start)
-    assert other.rest > 1e-7  # a number of the start explains nothing here
+    defect = symplectic_defect(one_step(symtop.integrator("gauss-4"), "attitude", scene, 0.2), start)
+    assert defect.rest > 1e-7  # a number of the start explains nothing here
     euler = composition("euler", (1.0,), (1.0, 0.0), chart="space", order=1)
     assert not euler.symmetric
     assert return_miss(one_step(euler, "attitude", scene, 0.1), start) > 1e-3
     assert tables.exact_sum((1.0, 0.0)) == (1.0, 0.0)
     closed = tables.exact_sum((0.7, 0.2, 0.1 - 1e-10, 0.0))
     assert closed == pytest.approx((0.7, 0.2 + 5e-11, 0.1 - 5e-11, 0.0), abs=1e-15)
-    for name, far in (("fast", True), ("goldstein", False)):
+    for name, better in (("fast", True), ("goldstein", False)):
         scene = symtop.scene(name)
         h = scene.nutation_period / 193.7
         verlet, strang = (largest_error(method, scene, h, 8.0) for method in ("stormer-verlet", "strang"))
-        assert (verlet > 50.0 * strang) is far
+        assert (verlet > 50.0 * strang) is better
 
 
 def spin_power(name):
@@ -164,16 +164,16 @@ def test_a_new_composition_compiles_nothing():
     scene = symtop.scene("spheroid")
     run(METHODS["yoshida-4"], scene, 0.01, [1], "axis")
     march = METHODS["yoshida-4"].solvers["axis"]._whole.alone[0]
-    known = len(march.signatures)
+    count = len(march.signatures)
     run(composition("thirds", (1 / 3,) * 3, (1 / 6, 1 / 3, 1 / 3, 1 / 6), chart="space"), scene, 0.01, [1], "axis")
     bent = composition("bent", (0.2, 0.6, 0.2), (0.1, 0.4, 0.4, 0.1), (0, 1e-3, 1e-3, 0), chart="space")
     run(bent, scene, 0.01, [1], "axis")
-    assert len(march.signatures) == known
+    assert len(march.signatures) == count
     assert bent.solvers["axis"]._whole.alone[0] is march
     assert METHODS["strang"].solvers["axis"]._whole.alone[0] is not march
 
 
-@pytest.mark.parametrize(("words", "arguments", "more"), [
+@pytest.mark.parametrize(("words", "arguments", "options"), [
     ("kick must have one coefficient more", ((1.0,), (1.0,)), {}),
     ("drift coefficients must sum to 1", ((0.9,), (0.5, 0.5)), {}),
     ("gradient must have as many", ((1.0,), (0.5, 0.5), (0.0,)), {"chart": "space"}),
@@ -181,6 +181,6 @@ def test_a_new_composition_compiles_nothing():
     ("chart must be 'space'", ((1.0,), (0.5, 0.5), (0.1, 0.1)), {}),
     ("rotation 'caley' is unknown; did you mean cayley", ((1.0,), (0.5, 0.5)), {"rotation": "caley"}),
 ])  # fmt: skip
-def test_bad_tables_are_refused_in_one_sentence(words, arguments, more):
+def test_bad_tables_are_refused_in_one_sentence(words, arguments, options):
     with pytest.raises(symtop.SymtopError, match=words):
-        composition("bad", *arguments, **more)
+        composition("bad", *arguments, **options)

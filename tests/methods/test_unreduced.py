@@ -47,8 +47,8 @@ def momentum_walk(scene_name, loop, steps=1_000_000):
     scene = symtop.scene(scene_name)
     par, state = with_momenta(scene.top, scene.start)
     marks = np.arange(0, steps + 1, 997)
-    done = loop(par, Quadrature((0.5,), (1.0,)), state, 0.01, marks)
-    changes = [(done.momenta[1:, k] - state[4 + k]) / max(abs(state[4]), abs(state[5])) for k in (0, 1)]
+    result = loop(par, Quadrature((0.5,), (1.0,)), state, 0.01, marks)
+    changes = [(result.momenta[1:, k] - state[4 + k]) / max(abs(state[4]), abs(state[5])) for k in (0, 1)]
     return max(np.abs(c).max() for c in changes), max(abs(trend(marks[1:], c).rise) for c in changes)
 
 
@@ -74,15 +74,15 @@ def one_iteration(par, rule, state, carry, h):
 
 def test_maps_that_invent_or_let_go_of_their_momenta_are_seen():
     """The negative control: a p_phi moved by 1e-4 sin(theta) after an otherwise right step is seen."""
-    good = symtop.integrator("midpoint" + TWIN)
+    method = symtop.integrator("midpoint" + TWIN)
 
     def solve(top, start, plan):
-        run = good.solvers["angles"](top, start, plan)
+        run = method.solvers["angles"](top, start, plan)
         return run._replace(p_phi=run.p_phi + 1e-4 * np.sin(run.states[:, 0]))
 
-    wrong = symtop.Integrator(name="wrong", family="other", summary="", solvers={"angles": solve})
+    variant = symtop.Integrator(name="wrong", family="other", summary="", solvers={"angles": solve})
     scene = random_scenes(1, seed=11)[0]
-    step = one_step(wrong, "angles", scene, 0.02)
+    step = one_step(variant, "angles", scene, 0.02)
     assert symplectic_defect(step, scene.start).size * step.unit > 1e-5
     # The negative control: equations that are not solved show in p_phi, which no parameter holds.
     largest, _ = momentum_walk("goldstein", Loop(kernel.begin, one_iteration, kernel.observe), steps=50_000)

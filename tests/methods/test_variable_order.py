@@ -19,7 +19,7 @@ from symtop.methods.runge_kutta.adams import ALPHA, BETA, GAMMA, HIGHEST, LAST, 
 from symtop.model.scenes import closed_form
 from symtop.run.ensemble.chunks import nutation_periods
 from symtop.run.ensemble.inputs import read_members
-from tests.conftest import late
+from tests.conftest import defer
 
 
 def prepared(steps, h, k):
@@ -31,19 +31,19 @@ def prepared(steps, h, k):
 
 
 def test_coefficients_of_equal_steps_are_those_of_adams_and_bashforth():
-    made = prepared(np.full(13, 0.25), 0.25, 12)
-    np.testing.assert_allclose(made[:7, G], [1, 1 / 2, 5 / 12, 3 / 8, 251 / 720, 95 / 288, 19087 / 60480], rtol=1e-13)
-    np.testing.assert_array_equal(made[:12, BETA], 1.0)
-    np.testing.assert_allclose(made[:, SIGMA], 1.0, rtol=1e-14)
-    np.testing.assert_allclose(made[:12, ALPHA], 1.0 / np.arange(1, 13), rtol=1e-15)
+    rows = prepared(np.full(13, 0.25), 0.25, 12)
+    np.testing.assert_allclose(rows[:7, G], [1, 1 / 2, 5 / 12, 3 / 8, 251 / 720, 95 / 288, 19087 / 60480], rtol=1e-13)
+    np.testing.assert_array_equal(rows[:12, BETA], 1.0)
+    np.testing.assert_allclose(rows[:, SIGMA], 1.0, rtol=1e-14)
+    np.testing.assert_allclose(rows[:12, ALPHA], 1.0 / np.arange(1, 13), rtol=1e-15)
     np.testing.assert_allclose(GAMMA[:6], [1, 1 / 2, 1 / 12, 1 / 24, 19 / 720, 3 / 160], rtol=1e-13)
-    np.testing.assert_allclose(np.diff(made[:7, G]), -np.array(GAMMA[1:7]), rtol=1e-12)  # gamma*_j
+    np.testing.assert_allclose(np.diff(rows[:7, G]), -np.array(GAMMA[1:7]), rtol=1e-12)  # gamma*_j
 
 
 @pytest.mark.parametrize("k", range(1, HIGHEST + 1))
 def test_a_predictor_integrates_polynomials_below_its_order_on_any_nodes_and_no_higher_one(k):
     past, h = np.random.default_rng(k).uniform(0.5, 2.0, 13), 0.8
-    nodes, made = -np.concatenate([[0.0], np.cumsum(past)])[:k], prepared(past, h, k)
+    nodes, rows = -np.concatenate([[0.0], np.cumsum(past)])[:k], prepared(past, h, k)
     for degree in range(k + 1):
         f = nodes**degree if degree else np.ones(k)
         differences = []  # psi_1 .. psi_i f[t_n, .., t_{n-i}], of the nodes behind
@@ -53,7 +53,7 @@ def test_a_predictor_integrates_polynomials_below_its_order_on_any_nodes_and_no_
             if i + 1 < k:
                 table = (table[:-1] - table[1:]) / (nodes[: -i - 1] - nodes[i + 1 :])
                 factor *= nodes[0] - nodes[i + 1]
-        terms, exact = h * made[:k, G] * made[:k, BETA] * differences, h ** (degree + 1) / (degree + 1)
+        terms, exact = h * rows[:k, G] * rows[:k, BETA] * differences, h ** (degree + 1) / (degree + 1)
         gap = abs(np.sum(terms) - exact) / max(np.abs(terms).sum(), exact)
         assert gap < 1e-11 if degree < k else gap > 1e-2, (degree, gap)
 
@@ -67,9 +67,9 @@ def test_once_its_start_is_over_adams_raises_its_order_in_every_second_step_at_m
     while t < 10.0:
         state, t, h, *_ = advance(par, state, memory, 1e-10, t, h, 10.0)
         orders += [memory[LAST, ORDER]] if memory[LAST, SETTLED] else []
-    raised = np.diff(orders) > 0
-    assert raised.sum() > 5
-    assert not (raised[1:] & raised[:-1]).any()
+    rises = np.diff(orders) > 0
+    assert rises.sum() > 5
+    assert not (rises[1:] & rises[:-1]).any()
 
 
 @pytest.mark.parametrize("name", ["spheroid", "goldstein"])
@@ -96,7 +96,7 @@ def test_it_needs_no_more_evaluations_than_scipys_adams_codes_and_errs_no_more(n
         assert error < 1.1 * np.linalg.norm(axis - truth, axis=1).max()
 
 
-@pytest.mark.parametrize("chart", ["angles", "axis", *late("attitude")])
+@pytest.mark.parametrize("chart", ["angles", "axis", *defer("attitude")])
 @pytest.mark.parametrize(("name", "tolerances"), [
     ("adams", (1e-5, 1e-8, 1e-12)),  # at 1e-4 a quaternion is longer than one by more than 0.1 %, an outcome
     ("extrapolation", (1e-4, 1e-8, 1e-12)),
@@ -109,10 +109,10 @@ def test_errors_follow_the_tolerance_and_orders_rise_with_it(name, tolerances, c
     assert max(axis[0] for axis in axes) < 1e-15  # the start itself
     assert all(50.0 * fine.max() < coarse.max() for coarse, fine in itertools.pairwise(axes))
     assert axes[-1].max() < 1e-9
-    counts, steps = ([run.attrs[each] for run in runs] for each in ("force_evaluations", "steps"))
+    counts, steps = ([run.attrs[key] for run in runs] for key in ("force_evaluations", "steps"))
     if name == "adams":
         assert counts[-1] < 5.6 * counts[0]  # of one order k it would be 1000^(2/k) times: k = 8 and more
-        assert all(2 * made <= count for made, count in zip(steps, counts, strict=True))
+        assert all(2 * n <= count for n, count in zip(steps, counts, strict=True))
     else:
         assert counts[0] / steps[0] < counts[1] / steps[1] < counts[2] / steps[2]
         assert steps[2] < 2.5 * steps[0]  # of one order: hundreds of times as many
@@ -188,18 +188,18 @@ def test_members_have_the_bits_of_runs_alone(name, budget):
     numbers, tolerance, times, counts = members()
     if "angles" in name:
         numbers[5, 3] = 0.0  # on a pole
-    done, reached = SOLVERS[name].many(numbers, tolerance, times, counts, budget)
+    results, end_times = SOLVERS[name].many(numbers, tolerance, times, counts, budget)
     for i, (top, start) in enumerate(members_of(numbers)):
         if "angles" in name and i == 5:
-            assert (OUTCOMES[done.outcome[i]], done.steps[i], reached[i]) == ("left_chart", 0, 0.0)
-            assert np.isnan(done.states[i]).all()
+            assert (OUTCOMES[results.outcome[i]], results.steps[i], end_times[i]) == ("left_chart", 0, 0.0)
+            assert np.isnan(results.states[i]).all()
             continue
         run = SOLVERS[name](top, start, Plan.until(times[i, : counts[i]], tolerance[i], budget))
-        np.testing.assert_array_equal(done.states[i, : counts[i]], run.states)
-        np.testing.assert_array_equal(done.momenta[i, : counts[i]].T, (run.p_phi, run.p_psi))
-        assert np.isnan(done.states[i, counts[i] :]).all()
-        assert (done.steps[i], done.work[i], OUTCOMES[done.outcome[i]], reached[i]) == (*run[3:5], *run[6:])
-    outcomes = {OUTCOMES[k] for k in done.outcome}
+        np.testing.assert_array_equal(results.states[i, : counts[i]], run.states)
+        np.testing.assert_array_equal(results.momenta[i, : counts[i]].T, (run.p_phi, run.p_psi))
+        assert np.isnan(results.states[i, counts[i] :]).all()
+        assert (results.steps[i], results.work[i], OUTCOMES[results.outcome[i]], end_times[i]) == (*run[3:5], *run[6:])
+    outcomes = {OUTCOMES[k] for k in results.outcome}
     assert ("ok" in outcomes, "out_of_budget" in outcomes) == (True, budget is not None)
 
 
@@ -218,11 +218,11 @@ def test_an_infinite_budget_ends_no_run(row):
 @pytest.mark.parametrize("name", SOLVERS)
 def test_a_budget_is_passed_by_less_than_a_step(name):
     numbers, tolerance, times, _ = members(20)
-    done, reached = SOLVERS[name].many(numbers, tolerance, times, np.full(20, COUNTS), BUDGET)
-    ended = done.outcome == OUTCOMES.index("out_of_budget")
-    assert ended.any()
-    assert (done.work[ended] < BUDGET + LARGEST.get(name.split("[")[0], 48.0)).all()
-    assert (reached[ended] < times[ended, -1]).all()
+    results, end_times = SOLVERS[name].many(numbers, tolerance, times, np.full(20, COUNTS), BUDGET)
+    mask = results.outcome == OUTCOMES.index("out_of_budget")
+    assert mask.any()
+    assert (results.work[mask] < BUDGET + LARGEST.get(name.split("[")[0], 48.0)).all()
+    assert (end_times[mask] < times[mask, -1]).all()
 
 
 @pytest.mark.quick
@@ -230,12 +230,12 @@ def test_a_run_in_pieces_has_the_bits_of_a_run_in_one():
     assert (len(OWN), len(SOLVERS)) == (9, 23)  # none is left out
     numbers, tolerance, times, counts = members(12)
     for solver in SOLVERS.values():
-        whole, parts = (one.many(numbers, tolerance, times, counts)[0] for one in (solver, replace(solver, block=9)))
+        whole, parts = (each.many(numbers, tolerance, times, counts)[0] for each in (solver, replace(solver, block=9)))
         np.testing.assert_array_equal(whole.states, parts.states)
         np.testing.assert_array_equal(whole.work, parts.work)
 
 
-@pytest.mark.parametrize("name", ["rk45", *OWN[:-2], *late(*OWN[-2:])])  # tsit5, vern9
+@pytest.mark.parametrize("name", ["rk45", *OWN[:-2], *defer(*OWN[-2:])])  # tsit5, vern9
 def test_a_pole_ends_a_run_in_angles_alone(name):
     """Falling through the pole exactly: without rotation theta' only changes sign in the angles chart."""
     top, start = symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0, theta_dot=-2.0)
@@ -251,10 +251,10 @@ def test_a_pole_ends_a_run_in_angles_alone(name):
 def test_samples_inside_steps_are_as_good_as_their_ends_and_change_no_step(name):
     """They cost evaluations in the pairs of order 8 and 9 alone (`test_pairs` counts them)."""
     row = f"{name}[axis]" if "axis" in symtop.integrator(name).charts() else name
-    few, many = (symtop.simulate("spheroid", row, tolerance=1e-9, samples=n, guard=False) for n in (2, 801))
-    assert few.attrs["steps"] == many.attrs["steps"]
+    sparse, dense = (symtop.simulate("spheroid", row, tolerance=1e-9, samples=n, guard=False) for n in (2, 801))
+    assert sparse.attrs["steps"] == dense.attrs["steps"]
     if name not in ("dop853-compiled", "vern9"):
-        assert few.attrs["force_evaluations"] == many.attrs["force_evaluations"]
-    np.testing.assert_array_equal(few["axis"][-1], many["axis"][-1])
-    error = symtop.errors(many)["axis"].values
+        assert sparse.attrs["force_evaluations"] == dense.attrs["force_evaluations"]
+    np.testing.assert_array_equal(sparse["axis"][-1], dense["axis"][-1])
+    error = symtop.errors(dense)["axis"].values
     assert error.max() < (10.0 if name in PAIRS else 3.0) * error[-1] < 1e-6

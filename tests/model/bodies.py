@@ -74,8 +74,8 @@ class PreciseBody:
         outer = (moments[high] - moments[middle]) * moments[low] * momentum[high] ** 2
         gap = outer - (moments[middle] - moments[low]) * moments[high] * momentum[low] ** 2  # without a rounding
         self.axes = axes = (low, middle, high) if gap >= 0 else (high, middle, low)
-        third = -1 if momentum[axes[2]] < 0 else 1
-        self.signs = (1, third if (axes[1] - axes[0]) % 3 == 1 else -third, third)
+        last_sign = -1 if momentum[axes[2]] < 0 else 1
+        self.signs = (1, last_sign if (axes[1] - axes[0]) % 3 == 1 else -last_sign, last_sign)
         self.m = m1, m2, m3 = [sign * momentum[axis] for sign, axis in zip(self.signs, axes, strict=True)]
         a1, a2, self.a3 = (rates[axis] for axis in axes)
         self.s, alpha, beta, gamma = 1 if gap >= 0 else -1, abs(a1 - a2), abs(a2 - self.a3), abs(a1 - self.a3)
@@ -140,9 +140,9 @@ class PreciseBody:
     def _jacobi(self, u: Any) -> tuple[Any, Any, Any]:
         """sn, cn, dn for abs(u) <= K by descending means; what cancels in dn is covered by `GUARD`."""
         mp = self.mp
-        mean, other, gap, ratios = mp.one, self.kc, mp.sqrt(self.k2), []
+        mean, geometric, gap, ratios = mp.one, self.kc, mp.sqrt(self.k2), []
         while gap > mean * mp.eps:
-            mean, other, gap = (mean + other) / 2, mp.sqrt(mean * other), (mean - other) / 2
+            mean, geometric, gap = (mean + geometric) / 2, mp.sqrt(mean * geometric), (mean - geometric) / 2
             ratios.append(gap / mean)
         angle = 2 ** len(ratios) * mean * u
         for ratio in reversed(ratios):

@@ -55,8 +55,8 @@ def test_close_to_a_pole_the_attitude_keeps_theta_and_the_sum_or_difference(thet
 
 @pytest.mark.parametrize("size", [1e-15, 1e-12, 1e-8, 1e-3, 1.0, 3.0])
 def test_distances_measure_small_and_large_angles(size):
-    apart = charts.axis_distance(charts.axis_from_angles(1.0, 0.3), charts.axis_from_angles(1.0 + size, 0.3))
-    assert apart == pytest.approx(min(size, 2 * math.pi - size), rel=1e-12, abs=3e-16)
+    distance = charts.axis_distance(charts.axis_from_angles(1.0, 0.3), charts.axis_from_angles(1.0 + size, 0.3))
+    assert distance == pytest.approx(min(size, 2 * math.pi - size), rel=1e-12, abs=3e-16)
     base = charts.quaternion_from_angles(1.0, 0.3, 0.2)
     turned = charts.quaternion_from_angles(1.0, 0.3, 0.2 + size)
     assert charts.attitude_distance(base, turned) == pytest.approx(size, rel=1e-12, abs=5e-16)
@@ -146,11 +146,11 @@ def test_the_charts_agree_on_momentum_and_energy_in_the_precision_of_the_states(
 
 
 @pytest.mark.parametrize("chart", ["axis", "attitude"])
-@pytest.mark.parametrize("known", [401, 250], ids=["whole", "broken off"])
-def test_axis_energy_and_momentum_have_the_bits_of_a_view(chart, known):
+@pytest.mark.parametrize("count", [401, 250], ids=["whole", "broken off"])
+def test_axis_energy_and_momentum_have_the_bits_of_a_view(chart, count):
     form = closed_form(scene("spheroid"))
     states = form.state(np.linspace(0.0, 40.0, 401))
-    states[known:] = np.nan
+    states[count:] = np.nan
     if chart == "axis":
         states = np.concatenate([charts.axis_from_quaternion(states[:, :4]), states[:, 4:]], axis=1)
     view = View(chart, scene("spheroid").top, states, np.full(401, form.p_phi), np.full(401, form.p_psi))

@@ -30,11 +30,11 @@ SEPARATRIX = SymmetricTop(1.0, 0.5, -1.0), Angles(0.0, theta_dot=2.0)
 
 def _double(monkeypatch):
     """Double arithmetic in place of double-double."""
-    short = {"add": lambda a, b: (a[0] + b[0], 0.0), "sub": lambda a, b: (a[0] - b[0], 0.0),
-             "mul": lambda a, b: (a[0] * b[0], 0.0), "div": lambda a, b: (a[0] / b[0], 0.0),
-             "square": lambda a: (a[0] * a[0], 0.0), "root": lambda a: (math.sqrt(max(a[0], 0.0)), 0.0)}  # fmt: skip
+    doubles = {"add": lambda a, b: (a[0] + b[0], 0.0), "sub": lambda a, b: (a[0] - b[0], 0.0),
+               "mul": lambda a, b: (a[0] * b[0], 0.0), "div": lambda a, b: (a[0] / b[0], 0.0),
+               "square": lambda a: (a[0] * a[0], 0.0), "root": lambda a: (math.sqrt(max(a[0], 0.0)), 0.0)}  # fmt: skip
     for module in (turning_points, elliptic, constants, double_double):
-        for name, function in short.items():
+        for name, function in doubles.items():
             if hasattr(module, name):
                 monkeypatch.setattr(module, name, function)
 
@@ -53,7 +53,7 @@ def test_double_arithmetic_in_place_of_double_double_is_seen(monkeypatch):
 
 def test_the_bound_sends_tops_to_quad_double_that_need_it(monkeypatch):
     """With double-double sums alone the rates of some of them are wrong; the bound says so of every one."""
-    wrong, longer = 0, 0
+    misses, longer = 0, 0
     kinds = ["nearly steady", "near the separatrix", "threshold of sleep", "pendulum to the top"]
     for top, start in tops(4, 23, kinds):
         ours, _ = short(top, start)
@@ -68,17 +68,17 @@ def test_the_bound_sends_tops_to_quad_double_that_need_it(monkeypatch):
                 patch.setattr(module, name, math.inf)
             rounded, status = short(top, start)
         assert status != constants.DONE or max(rounded[at.RATE_ERROR], rounded[at.VALUE_ERROR]) > turning_points.RATE
-        wrong += status != constants.DONE or (deviation(rounded, true) > LIMITS).any()
+        misses += status != constants.DONE or (deviation(rounded, true) > LIMITS).any()
     assert longer >= 4
-    assert wrong >= 1
+    assert misses >= 1
 
 
 def test_the_arithmetic_is_recorded():
     assert ClosedForm(scene("spheroid").top, scene("spheroid").start).provenance.arithmetic == "double-double"
     steady = scene("steady")
-    long = ClosedForm(steady.top, steady.start).provenance
-    assert long.arithmetic == "quad-double"
-    assert 0.0 <= long.rate_error < turning_points.RATE
+    provenance = ClosedForm(steady.top, steady.start).provenance
+    assert provenance.arithmetic == "quad-double"
+    assert 0.0 <= provenance.rate_error < turning_points.RATE
     far = ClosedForm(SymmetricTop(1.0, 0.5, 1.0), Angles(1.0, 3e12, 0.2, 0.3, 0.4, 0.5))
     assert (far.provenance.arithmetic, far.provenance.rate_error) == ("40 digits", closed_form.DIGITS_ERROR)
     assert "range" in far.provenance.reason
@@ -98,8 +98,8 @@ def test_the_last_resort_gives_the_same_motion(named, monkeypatch):
     assert ours.provenance.arithmetic != digits.provenance.arithmetic == "40 digits"
     for name in ("nutation_period", "phi_per_period", "psi_per_period", "theta_range"):
         assert getattr(ours, name) == getattr(digits, name)
-    for one, other in zip(ours(times), digits(times), strict=True):
-        np.testing.assert_allclose(one, other, rtol=EPS, atol=4 * EPS)
+    for first, second in zip(ours(times), digits(times), strict=True):
+        np.testing.assert_allclose(first, second, rtol=EPS, atol=4 * EPS)
     np.testing.assert_allclose(ours.axis(times), digits.axis(times), rtol=0, atol=2 * EPS)
 
 
@@ -107,23 +107,23 @@ def test_compiled_and_interpreted_functions_give_the_same_bits():
     closed_form.compile_now()
     times = np.array([0.0, 0.3, -17.1, 1e3, 1e6, 1e17])
     for top, start in [*tops(4, seed=24), SEPARATRIX]:
-        plain, status = short(top, start)
+        record, status = short(top, start)
         out = np.empty((1, at.SIZE))
         closed_form._build.compiled(np.array([flat(top, start)]), out)
-        plain[at.STATUS] = status
-        assert out.tobytes() == plain.tobytes()
+        record[at.STATUS] = status
+        assert out.tobytes() == record.tobytes()
         if status != constants.DONE:
             continue
         for view, width in enumerate(samples.WIDTHS):
             shape = (1, width, times.size) if view in samples.ROWS else (1, times.size, width)
             ours, theirs = np.empty(shape), np.empty(shape)
-            samples.all_samples([plain.tolist()], [times.tolist()], view, ours)
+            samples.all_samples([record.tolist()], [times.tolist()], view, ours)
             closed_form._fill.compiled(out, times[None], view, theirs)
             assert ours.tobytes() == theirs.tobytes()
         axes = np.random.default_rng(3).normal(size=(1, times.size, 3))
         axes /= np.linalg.norm(axes, axis=-1, keepdims=True)
         ours, theirs = np.empty((1, times.size)), np.empty((1, times.size))
-        samples.all_gaps([plain.tolist()], [times.tolist()], axes, ours)
+        samples.all_gaps([record.tolist()], [times.tolist()], axes, ours)
         closed_form._compare.compiled(out, times[None], axes, theirs)
         assert ours.tobytes() == theirs.tobytes()
 
@@ -136,9 +136,9 @@ def test_compiled_and_interpreted_functions_give_the_same_bits():
 def test_values_at_the_ends_of_the_range_end_in_a_status(numbers):
     """Neither way raises, and both say the same."""
     closed_form.compile_now()
-    plain, out = [0.0] * at.SIZE, np.empty((1, at.SIZE))
+    record, out = [0.0] * at.SIZE, np.empty((1, at.SIZE))
     failed = closed_form._build.compiled(np.array([numbers]), out)
-    status = constants.motion_constants(numbers, plain)
+    status = constants.motion_constants(numbers, record)
     assert out[0, at.STATUS] == status
     assert failed == (status != constants.DONE)
     assert status in closed_form.REASONS
@@ -161,9 +161,9 @@ def test_a_few_forms_import_no_slow_library_and_many_samples_are_worth_compiling
 
 def test_what_another_process_has_compiled_is_loaded_before_patience_ends(monkeypatch, tmp_path):
     monkeypatch.setenv("SYMTOP_CACHE", str(tmp_path))
-    waiting, other = (LazyKernel(charts._unwrap, charts._unwrapper.arguments, patience=100.0) for _ in range(2))
+    waiting, compiler = (LazyKernel(charts._unwrap, charts._unwrapper.arguments, patience=100.0) for _ in range(2))
     assert not waiting.ready(10.0)
-    other.compile()
+    compiler.compile()
     assert not waiting.ready(1.0)  # it looks at the cache again when it has spent as much again
     assert waiting.ready(10.0)
     assert waiting.compiled is not None
@@ -211,8 +211,8 @@ def test_next_to_the_separatrix_the_motion_is_periodic():
     top, start = SEPARATRIX
     assert top.nutation_period(start) == ClosedForm(top, start).nutation_period == math.inf
     assert ClosedForm(top, start)(1.0).theta == pytest.approx(4.0 * math.atan(math.tanh(0.5)), rel=EPS)
-    for near in (math.nextafter(2.0, 0.0), math.nextafter(2.0, 3.0)):
-        form = ClosedForm(top, Angles(0.0, theta_dot=near))
+    for rate in (math.nextafter(2.0, 0.0), math.nextafter(2.0, 3.0)):
+        form = ClosedForm(top, Angles(0.0, theta_dot=rate))
         assert 30.0 < form.nutation_period < 100.0
         assert abs(form(1.0).theta - ClosedForm(top, start)(1.0).theta) < 1e-15
     T = [ClosedForm(top, Angles(0.0, theta_dot=2.0, psi_dot=10.0**-k)).nutation_period for k in (9, 74.5, 140)]
@@ -226,7 +226,7 @@ def test_next_to_the_separatrix_the_motion_is_periodic():
 ])  # fmt: skip
 def test_a_start_that_all_but_rests_moves_as_from_rest_and_a_rate_of_1e_300_is_refused(start, rest):
     top, times = SymmetricTop(1.0, 1.0, 1.0), np.linspace(0.0, 7.0, 29)
-    near, still = (ClosedForm(top, one)(times).theta for one in (start, rest))
+    near, still = (ClosedForm(top, angles)(times).theta for angles in (start, rest))
     np.testing.assert_allclose(near, still, rtol=0.0, atol=4 * EPS)
     with pytest.raises(symtop.SymtopError, match="must meet a pole or miss it"):
         ClosedForm(top, Angles(1.0, phi_dot=1e-300))
@@ -234,16 +234,16 @@ def test_a_start_that_all_but_rests_moves_as_from_rest_and_a_rate_of_1e_300_is_r
 
 @pytest.mark.parametrize(("spin", "tilt"), [(1.0, 1e-8), (0.0, 1e-7), (1.9, 1e-7)])
 def test_beside_a_pole_the_period_of_a_scene_is_that_of_the_closed_form(spin, tilt):
-    beside = sleeping(spin, tilt)
-    exact = ClosedForm(beside.top, beside.start).nutation_period
-    assert beside.nutation_period == exact
-    assert not math.isclose(beside.top.nutation_period(beside.start), exact, rel_tol=1e-4)  # what it replaces
+    case = sleeping(spin, tilt)
+    exact = ClosedForm(case.top, case.start).nutation_period
+    assert case.nutation_period == exact
+    assert not math.isclose(case.top.nutation_period(case.start), exact, rel_tol=1e-4)  # what it replaces
 
 
 def test_after_as_many_turns_as_doubles_count_the_attitude_is_within_its_bound():
-    named, most = scene("spheroid"), 2.0**52
-    form, precise = ClosedForm(named.top, named.start), PreciseForm(named.top, named.start, 60)
-    times = np.random.default_rng(0).uniform(most, 2.0 * most, 12) * form.nutation_period / 4.0
+    case, limit = scene("spheroid"), 2.0**52
+    form, precise = ClosedForm(case.top, case.start), PreciseForm(case.top, case.start, 60)
+    times = np.random.default_rng(0).uniform(limit, 2.0 * limit, 12) * form.nutation_period / 4.0
     true = np.array([[float(part) for part in precise.quaternion(float(time))] for time in times])
     assert charts.attitude_distance(form.quaternion(times), true).max() < 1e-14
 
@@ -301,8 +301,8 @@ def test_a_member_has_the_bits_of_its_own_form(implementation):
         assert forms.arithmetic[i] == form.provenance.arithmetic
         for ours, theirs in zip(motion, form(TIMES), strict=True):
             assert ours[i].tobytes() == theirs.tobytes()
-        for ours, theirs, same in zip(forms.turns(TIMES), form.turns(TIMES), (motion.phi, motion.psi), strict=True):
-            assert ours[i].tobytes() == theirs.tobytes() == same[i].tobytes()
+        for ours, theirs, angle in zip(forms.turns(TIMES), form.turns(TIMES), (motion.phi, motion.psi), strict=True):
+            assert ours[i].tobytes() == theirs.tobytes() == angle[i].tobytes()
         for name, values in views.items():
             assert values[i].tobytes() == getattr(form, name)(TIMES).tobytes()
     assert forms.refused == {}
@@ -313,20 +313,20 @@ def test_the_mean_precession_is_that_of_a_period_and_each_member_may_have_times_
     forms = ClosedForms([flat(*pair) for pair in _pairs(1) if math.isfinite(ClosedForm(*pair).nutation_period)])
     period = forms.nutation_period
     np.testing.assert_allclose(forms.precession_rate * period, forms.phi_per_period, rtol=1e-14, atol=1e-300)
-    grown = np.diff(forms(np.stack([0.21 * period, 1.21 * period], axis=1)).phi, axis=1)[:, 0]
-    gap = (grown - forms.phi_per_period) / math.pi  # phi jumps by pi where the axis passes through a pole
+    growth = np.diff(forms(np.stack([0.21 * period, 1.21 * period], axis=1)).phi, axis=1)[:, 0]
+    gap = (growth - forms.phi_per_period) / math.pi  # phi jumps by pi where the axis passes through a pole
     assert np.abs(gap - np.rint(gap)).max() < 1e-12
     forms = ClosedForms([flat(*pair) for pair in _pairs(1)])
     times = np.random.default_rng(5).uniform(-10.0, 10.0, (len(forms), 7))
-    each, strided = forms.axis(times), forms.axis(np.repeat(times, 2, axis=1)[:, ::2])
-    assert each.tobytes() == strided.tobytes()
+    axes, strided = forms.axis(times), forms.axis(np.repeat(times, 2, axis=1)[:, ::2])
+    assert axes.tobytes() == strided.tobytes()
     for i in (0, len(forms) - 1):
-        assert each[i].tobytes() == forms.axis(times[i])[i].tobytes()
+        assert axes[i].tobytes() == forms.axis(times[i])[i].tobytes()
     assert forms(times).theta.shape == (len(forms), 7)
     forms = ClosedForms([flat(*SEPARATRIX), flat(*ASLEEP)])
-    for bad in ([[0.0, 1.0]], [[0.0], [1.0], [2.0]], [[[0.0]]]):
+    for times in ([[0.0, 1.0]], [[0.0], [1.0], [2.0]], [[[0.0]]]):
         with pytest.raises(symtop.SymtopError, match=r"shape \(2, samples\)"):
-            forms.axis(bad)
+            forms.axis(times)
     with pytest.raises(symtop.SymtopError, match="must be finite numbers of at most 1e\\+100 in size, not inf"):
         forms.axis([[0.0, 1.0], [0.0, math.inf]])
 
@@ -378,7 +378,7 @@ def test_distances_from_an_axis_are_those_of_the_chart(implementation):
 def test_members_momenta_and_threads():
     """A kernel that several threads ask for at once is made once, and none of them sees half of it."""
     rows = np.array([flat(*pair) for pair in _pairs(1)])
-    alone = ClosedForms(rows).state(TIMES).tobytes()
+    expected = ClosedForms(rows).state(TIMES).tobytes()
     forms, begin = ClosedForms(rows), threading.Barrier(8)
     kernel = LazyKernel(samples.all_samples, closed_form._fill.arguments, patience=1e9)
 
@@ -390,7 +390,7 @@ def test_members_momenta_and_threads():
 
     with ThreadPoolExecutor(8) as pool:
         for result in pool.map(work, range(8)):
-            assert result == (alone, alone)
+            assert result == (expected, expected)
     forms = ClosedForms([flat(*pair) for pair in _pairs(1)])
     states, momenta = forms.run(TIMES)
     assert states.tobytes() == forms.state(TIMES).tobytes()

@@ -68,8 +68,8 @@ def test_sums_products_square_roots_and_rounding():
         assert _error(dd.root(a), mp.sqrt(_exact(a))) <= 4 * UNIT
         assert dd.square(a) == dd.mul(a, a)
     assert dd.root((-1.0, 0.0)) == (0.0, 0.0)
-    half, most = 2.0**51, 2.0**52
-    for x in (0.5, 1.5, 2.5, -0.5, -2.5, 3.49, 3e17, -7.0, half + 0.5, half + 1.5, -half - 1.5, most - 0.5, most + 1.0):
+    half, edge = 2.0**51, 2.0**52
+    for x in (0.5, 1.5, 2.5, -0.5, -2.5, 3.49, 3e17, -7.0, half + 0.5, half + 1.5, -half - 1.5, edge - 0.5, edge + 1.0):
         assert dd.whole_part(x) == round(x)
 
 
@@ -85,8 +85,8 @@ def test_elementary_functions_of_double_doubles():
         assert _error(dd.exp(power), mp.exp(power)) <= 4 * UNIT
         size = dd.scaled(a, math.copysign(1.0, a[0]))
         assert abs(_exact(dd.log(size)) - mp.log(_exact(size))) <= 8 * UNIT * max(1.0, abs(math.log(size[0])))
-    for k, near in enumerate((math.pi, 1.5 * math.pi)):  # all digits but those of the third double of pi/2 cancel
-        assert _error(dd.sincos(near)[k], (mp.sin, mp.cos)[k](near)) <= 8 * UNIT
+    for k, angle in enumerate((math.pi, 1.5 * math.pi)):  # all digits but those of the third double of pi/2 cancel
+        assert _error(dd.sincos(angle)[k], (mp.sin, mp.cos)[k](angle)) <= 8 * UNIT
     assert math.isnan(dd.sincos(math.nan)[0][0])
     assert math.isnan(dd.sincos(7.5)[1][0])
     assert math.isnan(dd.exp(800.0)[0])

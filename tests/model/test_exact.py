@@ -48,17 +48,17 @@ def test_thirty_digits_of_the_published_states(name):
     if "axis_xyz" in entry:
         pairs += zip(form.axis(entry["t"]), entry["axis_xyz"], strict=True)
         pairs += zip(form.quaternion(entry["t"]), entry["quaternion_wxyz"], strict=True)
-    printed = [(x, y) for x, y in pairs if len(y) > 20]
-    assert len(printed) >= 9
-    last = [mp.mpf(10) ** Decimal(y).as_tuple().exponent for _, y in printed]  # units of the last digits
-    assert all(abs(x - mp.mpf(y)) <= unit for (x, y), unit in zip(printed, last, strict=True))
+    long_values = [(x, y) for x, y in pairs if len(y) > 20]
+    assert len(long_values) >= 9
+    last = [mp.mpf(10) ** Decimal(y).as_tuple().exponent for _, y in long_values]  # units of the last digits
+    assert all(abs(x - mp.mpf(y)) <= unit for (x, y), unit in zip(long_values, last, strict=True))
     assert all(abs(x - mp.mpf(y)) < 1e-12 for x, y in pairs)
 
 
 def test_every_scene_has_its_landmarks_and_a_state_to_thirty_digits():
-    known = [[*map(float, (e["I1"], e["I3"], e["mgl"], *e["q0_theta_phi_psi"], *e["v0"]))] for e in TRUTH.values()]
-    same = {one.name: np.isclose(known, flat(one.top, one.start), 1e-14, 0.0) for one in scenes().values()}
-    lacking = [name for name, rows in same.items() if name not in added_scenes() and not rows.all(axis=1).any()]
+    numbers = [[*map(float, (e["I1"], e["I3"], e["mgl"], *e["q0_theta_phi_psi"], *e["v0"]))] for e in TRUTH.values()]
+    matches = {scene.name: np.isclose(numbers, flat(scene.top, scene.start), 1e-14, 0.0) for scene in scenes().values()}
+    lacking = [name for name, rows in matches.items() if name not in added_scenes() and not rows.all(axis=1).any()]
     assert not lacking, f"tests/data/truth.json lacks {lacking}: add numbers that the closed form did not make"
 
 
@@ -151,11 +151,11 @@ def test_elementary_separatrix(body):
         form = PreciseForm((I1, I3, mgl), start, digits=60)
         assert form.m < 1 < form.m + mp.mpf(10) ** -100
         for gt in (mp.mpf("0.5"), 3, 20):
-            true_phi, at = mp.sqrt(3) / 2 * gt + mp.atan(mp.tanh(mp.mpf(gt) / 2) / mp.sqrt(3)), form(gt / g)
-            assert abs(mp.cos(at.theta) - 1 / (1 + mp.sech(gt))) < mp.mpf(10) ** -60
-            assert abs(at.phi - true_phi) < mp.mpf(10) ** -58
-            assert abs(at.psi - (mp.sqrt(3) * gt * (I1 / I3 - 1) + true_phi)) < mp.mpf(10) ** -58
-            assert abs(at.phi - true_phi - mp.mpf(10) ** -50) > mp.mpf(10) ** -51
+            true_phi, q = mp.sqrt(3) / 2 * gt + mp.atan(mp.tanh(mp.mpf(gt) / 2) / mp.sqrt(3)), form(gt / g)
+            assert abs(mp.cos(q.theta) - 1 / (1 + mp.sech(gt))) < mp.mpf(10) ** -60
+            assert abs(q.phi - true_phi) < mp.mpf(10) ** -58
+            assert abs(q.psi - (mp.sqrt(3) * gt * (I1 / I3 - 1) + true_phi)) < mp.mpf(10) ** -58
+            assert abs(q.phi - true_phi - mp.mpf(10) ** -50) > mp.mpf(10) ** -51
 
 
 def test_the_axis_stands_still_at_a_cusp():

@@ -60,26 +60,26 @@ def largest(count, seed):
 def test_motion_is_that_of_fifty_digits(count, seeds):
     """Of each kind so many bodies with each seed."""
     with ProcessPoolExecutor() as pool:  # started by its first task
-        made = list((map if len(seeds) == 1 else pool.map)(largest, [count * len(KINDS)] * len(seeds), seeds))
-    worst = {kind: np.max([part[kind] for part in made], axis=0) for kind in KINDS}
+        parts = list((map if len(seeds) == 1 else pool.map)(largest, [count * len(KINDS)] * len(seeds), seeds))
+    worst = {kind: np.max([part[kind] for part in parts], axis=0) for kind in KINDS}
     for kind, (turn, share, momentum) in worst.items():
         print(f"{kind:18s} {turn:6.2f} {momentum:6.2f} of 2^-53, {share:.2f} of the bound")
         assert share < 1.0, kind
         assert max(turn, momentum) < LARGEST, kind
 
 
-@pytest.mark.parametrize(("places", "factor", "least"), [
+@pytest.mark.parametrize(("places", "factor", "limit"), [
     *(([place], -1.0, 1e9) for place in (at.SIGN, at.PHASE, at.HALF, at.LEAN, at.A2)),
     ([at.PHASE + 1, at.HALF + 1], 0.0, 1e3),  # rates of one double
 ])  # fmt: skip
-def test_a_wrong_sign_and_rates_of_one_double_break_the_bound(places, factor, least):
+def test_a_wrong_sign_and_rates_of_one_double_break_the_bound(places, factor, limit):
     body = Body("hyperbolic", np.array([0.5, 0.9, 1.3]), np.array([0.8, 0.0, 0.6, 0.0]), np.array([0.5, 0.9, 0.81]))
 
     def wrong(free):
         free._constants[places] *= factor
 
     assert errors(body, np.random.default_rng(1))[1] < 1.0
-    assert errors(body, np.random.default_rng(1), wrong)[1] > least
+    assert errors(body, np.random.default_rng(1), wrong)[1] > limit
 
 
 def test_interpreted_functions_return_the_bits_of_compiled_ones(monkeypatch):
@@ -91,10 +91,10 @@ def test_interpreted_functions_return_the_bits_of_compiled_ones(monkeypatch):
     for kernel in (free_body._build, free_body._fill):
         monkeypatch.setattr(kernel, "ready", lambda _: False)
     for body, motion, first in zip(bodies(len(KINDS), seed=5), motions, compiled, strict=True):
-        plain = FreeBody(*body[1:])
-        np.testing.assert_array_equal(plain._constants, first._constants)
-        np.testing.assert_array_equal(plain.samples(times).quaternion, motion.quaternion)
-        np.testing.assert_array_equal(plain.samples(times).momentum, motion.momentum)
+        interpreted = FreeBody(*body[1:])
+        np.testing.assert_array_equal(interpreted._constants, first._constants)
+        np.testing.assert_array_equal(interpreted.samples(times).quaternion, motion.quaternion)
+        np.testing.assert_array_equal(interpreted.samples(times).momentum, motion.momentum)
 
 
 @pytest.mark.parametrize("rates", [(0.3, 0.0, 2.0), (-1.5, 0.0, 0.4), (1.0, 0.0, 0.0), (0.2, 0.0, -3.0)])
@@ -110,8 +110,8 @@ def test_symmetric_body_moves_as_the_symmetric_top(moments, rates):
     gap = 2.0 * np.linalg.norm(motion.quaternion - true["quaternion"].values, axis=1)
     assert (gap <= motion.bound + true["attitude_error_bound"].values).all()
     assert motion.bound.max() < 1e-14
-    off = FreeBody((1.001 * I1, I1, I3), (math.cos(half), math.sin(half), 0.0, 0.0), *np.transpose(momentum))
-    assert 2.0 * np.linalg.norm(off.samples(times).quaternion - true["quaternion"].values, axis=1).max() > 1e-3
+    control = FreeBody((1.001 * I1, I1, I3), (math.cos(half), math.sin(half), 0.0, 0.0), *np.transpose(momentum))
+    assert 2.0 * np.linalg.norm(control.samples(times).quaternion - true["quaternion"].values, axis=1).max() > 1e-3
 
 
 @pytest.mark.slow
@@ -140,8 +140,8 @@ def worst_share(mp, motion, true):
     """The largest distance from given quaternions over the bound."""
     shares = []
     for high, low, bound, exact in zip(motion.quaternion, motion.quaternion_lo, motion.bound, true, strict=True):
-        whole = [mp.mpf(float(a)) + mp.mpf(float(b)) for a, b in zip(high, low, strict=True)]
-        shares.append(float(2 * mp.norm([a - b for a, b in zip(whole, exact, strict=True)])) / bound)
+        total = [mp.mpf(float(a)) + mp.mpf(float(b)) for a, b in zip(high, low, strict=True)]
+        shares.append(float(2 * mp.norm([a - b for a, b in zip(total, exact, strict=True)])) / bound)
     return max(shares)
 
 
@@ -175,16 +175,16 @@ def test_symmetric_heavy_body_moves_as_the_symmetric_top(moments, mgl, precise):
     motion = HeavyBody((I1, I1, I3), (0.0, 0.0, mgl), quaternion, *momentum).samples(times, precise=precise)
     assert worst_share(form.ctx, motion, true) < 1.0
     assert motion.bound.max() < (1e-25 if precise else 1e-10)
-    wrong = HeavyBody((I1, I1, I3), (0.0, 0.0, -mgl), quaternion, *momentum).samples(times, precise=precise)
-    assert worst_share(form.ctx, wrong, true) > 1e6
+    control = HeavyBody((I1, I1, I3), (0.0, 0.0, -mgl), quaternion, *momentum).samples(times, precise=precise)
+    assert worst_share(form.ctx, control, true) > 1e6
 
 
 def shares_of_the_bound(body, times):
     """Distances between both precisions over the bound of the first where it is finite, and both bounds."""
     short, long = body.samples(times), body.samples(times, precise=True)
     gap = (short.quaternion - long.quaternion) + (short.quaternion_lo - long.quaternion_lo)
-    good = np.isfinite(short.bound)
-    return 2.0 * np.linalg.norm(gap[good], axis=1) / short.bound[good], short.bound, long.bound
+    mask = np.isfinite(short.bound)
+    return 2.0 * np.linalg.norm(gap[mask], axis=1) / short.bound[mask], short.bound, long.bound
 
 
 def test_both_precisions_agree_within_the_bound_of_the_first():
@@ -197,25 +197,25 @@ def test_both_precisions_agree_within_the_bound_of_the_first():
 @pytest.mark.slow
 def test_both_precisions_of_random_bodies_agree_within_the_bound_of_the_first():
     """Three hundred bodies, regular and chaotic, over ten natural periods."""
-    rng, shares, lost = np.random.default_rng(28), [], 0
+    rng, shares, losses = np.random.default_rng(28), [], 0
     for body in bodies(300, 28, ("generic", "near symmetric", "near middle axis")):
         size, middle = float(np.linalg.norm(body.momentum)), float(np.median(body.inertia))
         weight = rng.normal(size=3) * 10.0 ** rng.uniform(-1.0, 0.7)
         period = 2.0 * math.pi / math.sqrt((size / middle) ** 2 + float(np.linalg.norm(weight)) / middle)
         times = np.linspace(0.0, 10.0, 21) * period
         share, _, _ = shares_of_the_bound(HeavyBody(body.inertia, weight, body.quaternion, body.momentum), times)
-        lost += share.size < times.size
+        losses += share.size < times.size
         shares.append(share.max())
-    print(f"largest distance over the bound {max(shares):.2f}, median {np.median(shares):.2f}; lost {lost} of 300")
+    print(f"largest distance over the bound {max(shares):.2f}, median {np.median(shares):.2f}; lost {losses} of 300")
     assert max(shares) < 1.0
 
 
 def test_what_is_lost_in_chaos_is_not_a_number(monkeypatch):
     times, body = np.linspace(0.0, 300.0, 31), HeavyBody(BRICK, WEIGHT, START, MOMENTUM)
     motion = body.samples(times)
-    lost = times[np.isinf(motion.bound)].min()
-    assert 60.0 < lost < 300.0
-    after = times >= lost
+    end = times[np.isinf(motion.bound)].min()
+    assert 60.0 < end < 300.0
+    after = times >= end
     assert np.isinf(motion.bound[after]).all()
     assert np.isnan(np.hstack([motion.quaternion, motion.momentum])[after]).all()
     assert np.isfinite(motion.quaternion[~after]).all()
@@ -225,31 +225,31 @@ def test_what_is_lost_in_chaos_is_not_a_number(monkeypatch):
     assert np.array_equal(HeavyBody(BRICK, WEIGHT, START, MOMENTUM).samples([0.0]).quaternion, [START])
     assert HeavyBody(BRICK, (0.0, 0.0, -1e9), (1, 0, 0, 0), (0, 0, 0)).samples([1e9]).bound < 1e-15  # in long pieces
     monkeypatch.setattr(heavy_body, "ACCURACY", 1e-13)
-    assert times[np.isinf(body.samples(times).bound)].min() < lost
+    assert times[np.isinf(body.samples(times).bound)].min() < end
 
 
 @pytest.mark.parametrize("precise", [False, True])
 def test_a_value_and_its_bound_do_not_depend_on_the_times_beside_it_or_asked_for_before(precise):
-    at, times = np.array([-3.7, 0.0, 8.0, 8.1, 33.3, 69.0]), np.linspace(-12.0, 20.0, 12)
+    queries, times = np.array([-3.7, 0.0, 8.0, 8.1, 33.3, 69.0]), np.linspace(-12.0, 20.0, 12)
     new, used = (HeavyBody(BRICK, WEIGHT, START, MOMENTUM) for _ in range(2))
-    at_once, before = new.samples(at, precise=precise), used.samples(times, precise=precise)
+    at_once, before = new.samples(queries, precise=precise), used.samples(times, precise=precise)
     heavy_body._piece.cache_clear()  # the pieces are made again from the states that are kept
-    alone = [used.samples([time], precise=precise) for time in at]
+    single = [used.samples([time], precise=precise) for time in queries]
     for name in ("quaternion", "quaternion_lo", "momentum", "bound"):
-        assert np.array_equal(np.concatenate([getattr(one, name) for one in alone]), getattr(at_once, name)), name
+        assert np.array_equal(np.concatenate([getattr(row, name) for row in single]), getattr(at_once, name)), name
     assert before.known >= 12.0
     assert (np.diff(used.samples(np.linspace(0.0, 50.0, 301), precise=precise).bound) >= 0.0).all()
 
 
 def test_a_run_that_was_interrupted_is_begun_again(monkeypatch):
-    left, body = iter([True] * 100), HeavyBody(BRICK, WEIGHT, START, MOMENTUM)
+    steps, body = iter([True] * 100), HeavyBody(BRICK, WEIGHT, START, MOMENTUM)
     body.samples([1.0])
-    monkeypatch.setattr(heavy_body, "_heard", lambda _: next(left))  # as Ctrl-C ends a step
+    monkeypatch.setattr(heavy_body, "_heard", lambda _: next(steps))  # as Ctrl-C ends a step
     with pytest.raises(StopIteration):
         body.samples([30.0])
     monkeypatch.undo()
-    again, other = (one.samples([2.0, 30.0]) for one in (body, HeavyBody(BRICK, WEIGHT, START, MOMENTUM)))
-    assert np.array_equal(np.c_[again.bound, again.quaternion_lo], np.c_[other.bound, other.quaternion_lo])
+    repeat, fresh = (each.samples([2.0, 30.0]) for each in (body, HeavyBody(BRICK, WEIGHT, START, MOMENTUM)))
+    assert np.array_equal(np.c_[repeat.bound, repeat.quaternion_lo], np.c_[fresh.bound, fresh.quaternion_lo])
 
 
 NOWHERE = (0.0, 0.0, 0.0, 0.0)

@@ -39,10 +39,10 @@ def test_the_gyroscope_of_kinon_and_betsch_is_a_cone_of_aluminium():
 
 
 def test_the_scale_of_the_energy_of_many_tops_is_that_of_each():
-    every = symtop.scenes().values()
-    numbers = np.array([flat(one.top, one.start) for one in every])
-    scales = energy_scales(numbers, np.array([closed_form(one).theta_range for one in every]))
-    np.testing.assert_allclose(scales, [one.energy_scale for one in every], rtol=1e-12)
+    scenes = symtop.scenes().values()
+    numbers = np.array([flat(scene.top, scene.start) for scene in scenes])
+    scales = energy_scales(numbers, np.array([closed_form(scene).theta_range for scene in scenes]))
+    np.testing.assert_allclose(scales, [scene.energy_scale for scene in scenes], rtol=1e-12)
 
 
 @pytest.mark.parametrize("delta", [1e-1, 1e-3, -1e-3, 1e-6])
@@ -57,9 +57,9 @@ def test_grazing_misses_the_pole_by_eleven_tenths_of_its_gap(delta):
 
 def test_a_top_sleeps_above_the_threshold_precesses_steadily_above_a_spin_and_never_comes_back_on_the_separatrix():
     assert closed_form(sleeping(2.05)).theta_range[1] < 0.01
-    slow = sleeping(1.9, 1e-5)
-    assert closed_form(slow).theta_range[1] == pytest.approx(math.acos(0.5 * 1.9**2 - 1.0), rel=1e-6)
-    theta = closed_form(slow)(np.array([20.0, 22.0])).theta
+    scene = sleeping(1.9, 1e-5)
+    assert closed_form(scene).theta_range[1] == pytest.approx(math.acos(0.5 * 1.9**2 - 1.0), rel=1e-6)
+    theta = closed_form(scene)(np.array([20.0, 22.0])).theta
     assert math.log(theta[1] / theta[0]) / 2.0 == pytest.approx(0.5 * math.sqrt(4.0 - 1.9**2), rel=1e-3)
     for spin in (2.8285, 20.0, 100.0):
         low, high = closed_form(steady(spin)).theta_range
@@ -92,8 +92,8 @@ def test_a_steady_precession_measures_energies_by_a_nutation_of_one_radian(spin)
     scene = steady(spin)
     top, amplitude = scene.top, 1e-3
     momenta = top.momenta(scene.start)
-    raised = top.potential(scene.start.theta + amplitude, momenta) - top.potential(scene.start.theta, momenta)
-    assert raised / scene.energy_scale == pytest.approx(amplitude**2, rel=0.01)
+    gain = top.potential(scene.start.theta + amplitude, momenta) - top.potential(scene.start.theta, momenta)
+    assert gain / scene.energy_scale == pytest.approx(amplitude**2, rel=0.01)
 
 
 @pytest.mark.parametrize("start", [{"theta": 0.0, "psi_dot": 3.0}, {"theta": 0.0, "psi_dot": 1.0}, {"theta": 1.0},
@@ -105,11 +105,11 @@ def test_every_start_has_an_energy_scale(start, I3, mgl):
     assert 1.0 <= scene.energy_grain < math.inf
 
 
-def body_rates(at):
+def body_rates(start):
     """The angular velocity in the body frame, by Goldstein's formulas."""
-    c, s = math.cos(at.psi), math.sin(at.psi)
-    swing = at.phi_dot * math.sin(at.theta)
-    return np.array([at.theta_dot * c + swing * s, swing * c - at.theta_dot * s, at.spin])
+    c, s = math.cos(start.psi), math.sin(start.psi)
+    swing = start.phi_dot * math.sin(start.theta)
+    return np.array([start.theta_dot * c + swing * s, swing * c - start.theta_dot * s, start.spin])
 
 
 def matrix(q):
@@ -119,20 +119,20 @@ def matrix(q):
 
 @pytest.mark.parametrize("scene", random_scenes(20, seed=5))
 def test_a_start_goes_to_a_quaternion_and_back(scene):
-    at, top = scene.start, scene.top
-    q, body = charts.quaternion_from_angles(at.theta, at.phi, at.psi), body_rates(at)
+    start, top = scene.start, scene.top
+    q, body = charts.quaternion_from_angles(start.theta, start.phi, start.psi), body_rates(start)
     for kind, omega in (("omega_body", body), ("omega_space", matrix(q) @ body)):
         back = symtop.Angles.from_quaternion(q, **{kind: omega})
         for name in ("theta", "theta_dot", "phi_dot", "psi_dot"):
-            assert getattr(back, name) == pytest.approx(getattr(at, name), abs=1e-12)
+            assert getattr(back, name) == pytest.approx(getattr(start, name), abs=1e-12)
         for name in ("phi", "psi"):
-            assert math.remainder(getattr(back, name) - getattr(at, name), 2.0 * math.pi) == pytest.approx(0, abs=1e-12)
-    wrong = symtop.Angles.from_quaternion(q, omega_body=matrix(q) @ body)  # the frame matters
-    assert abs(wrong.theta_dot - at.theta_dot) + abs(wrong.phi_dot - at.phi_dot) > 1e-6
-    state = charts.space_state("axis", top, at)
-    same = symtop.Angles.from_axis(top, state[:3], state[3:])
-    assert top.energy(same) == pytest.approx(top.energy(at), rel=1e-13)
-    np.testing.assert_allclose(charts.space_state("axis", top, same), state, atol=1e-12)
+            assert math.remainder(getattr(back, name) - getattr(start, name), math.tau) == pytest.approx(0, abs=1e-12)
+    control = symtop.Angles.from_quaternion(q, omega_body=matrix(q) @ body)  # the frame matters
+    assert abs(control.theta_dot - start.theta_dot) + abs(control.phi_dot - start.phi_dot) > 1e-6
+    state = charts.space_state("axis", top, start)
+    twin = symtop.Angles.from_axis(top, state[:3], state[3:])
+    assert top.energy(twin) == pytest.approx(top.energy(start), rel=1e-13)
+    np.testing.assert_allclose(charts.space_state("axis", top, twin), state, atol=1e-12)
 
 
 @pytest.mark.parametrize(("quaternion", "theta"), [
@@ -140,11 +140,11 @@ def test_a_start_goes_to_a_quaternion_and_back(scene):
 def test_a_start_on_a_pole_keeps_its_motion(quaternion, theta):
     """The rates hold the whole angular velocity, and the attitude is the one that was given."""
     omega = np.array([0.3, -0.4, 5.0])
-    at = symtop.Angles.from_quaternion(quaternion, omega_body=omega)
-    assert at.theta == theta
-    q = charts.quaternion_from_angles(at.theta, at.phi, at.psi)
+    start = symtop.Angles.from_quaternion(quaternion, omega_body=omega)
+    assert start.theta == theta
+    q = charts.quaternion_from_angles(start.theta, start.phi, start.psi)
     assert float(charts.attitude_distance(q, np.array(quaternion))) < 1e-15
-    np.testing.assert_allclose(body_rates(at), omega, atol=1e-14)
+    np.testing.assert_allclose(body_rates(start), omega, atol=1e-14)
     top, L = symtop.SymmetricTop(2.0, 1.0, 1.0), matrix(quaternion) @ (omega * [2.0, 2.0, 1.0])
     state = charts.space_state("axis", top, symtop.Angles.from_axis(top, matrix(quaternion)[:, 2], L))
     np.testing.assert_allclose(state[3:], L, atol=1e-14)
@@ -160,26 +160,26 @@ def test_a_start_next_to_a_pole_keeps_its_motion(pole):
     for tilt in (1e-17, 1.2e-16, 1e-15, 1e-12, 1e-10, 1e-9, 1e-8, 1e-6):
         x = 0.5 * tilt
         q = (math.cos(x), math.sin(x), 0.0, 0.0) if pole == 0.0 else (math.sin(x), math.cos(x), 0.0, 0.0)
-        at = symtop.Angles.from_quaternion(q, omega_body=omega)
-        assert charts.attitude_distance(charts.quaternion_from_angles(at.theta, at.phi, at.psi), np.array(q)) < 3e-9
-        np.testing.assert_allclose(body_rates(at), omega, atol=3e-7)
-        assert abs(at.spin - omega[2]) < 3e-7
+        y0 = symtop.Angles.from_quaternion(q, omega_body=omega)
+        assert charts.attitude_distance(charts.quaternion_from_angles(y0.theta, y0.phi, y0.psi), np.array(q)) < 3e-9
+        np.testing.assert_allclose(body_rates(y0), omega, atol=3e-7)
+        assert abs(y0.spin - omega[2]) < 3e-7
         e, L = matrix(q)[:, 2], matrix(q) @ (omega * [1.0, 1.0, 0.8])
-        given = symtop.Angles.from_axis(top, e, L)
-        np.testing.assert_allclose(charts.space_state("axis", top, given)[3:], L, atol=1e-6)
+        twin = symtop.Angles.from_axis(top, e, L)
+        np.testing.assert_allclose(charts.space_state("axis", top, twin)[3:], L, atol=1e-6)
         for rates in ([0.0, 0.0, 50.3], None):
             still = symtop.Angles.from_quaternion(q, omega_body=rates)
             assert still.theta == pytest.approx(abs(pole - tilt), rel=1e-15)
-    assert at.theta == pytest.approx(abs(pole - 1e-6), abs=1e-15)
+    assert y0.theta == pytest.approx(abs(pole - 1e-6), abs=1e-15)
 
 
 def test_a_body_from_its_moments_about_the_centre_is_the_spheroid():
     mass, polar, equatorial, arm = 1.3, 0.2, 0.1, 0.25
     spheroid = symtop.SymmetricTop.from_spheroid(mass, polar, equatorial, pivot_distance=arm)
     across, along = mass * (polar**2 + equatorial**2) / 5.0, 0.4 * mass * equatorial**2
-    made = symtop.SymmetricTop.from_inertia(mass, across, along, arm)
-    assert (made.I1, made.I3, made.mgl) == pytest.approx((spheroid.I1, spheroid.I3, spheroid.mgl), rel=1e-15)
-    assert symtop.SymmetricTop.from_inertia(mass, across, along, -arm).mgl == -made.mgl
+    top = symtop.SymmetricTop.from_inertia(mass, across, along, arm)
+    assert (top.I1, top.I3, top.mgl) == pytest.approx((spheroid.I1, spheroid.I3, spheroid.mgl), rel=1e-15)
+    assert symtop.SymmetricTop.from_inertia(mass, across, along, -arm).mgl == -top.mgl
     on_the_moon = symtop.SymmetricTop.from_inertia(mass, across, along, arm, gravity=1.62)
     assert on_the_moon.mgl == pytest.approx(mass * 1.62 * arm)
     assert symtop.SymmetricTop.from_inertia(1.32, 1.32 * 3 * 0.85**2 / 12, 1.32 * 0.85**2 / 2, 0.0).mgl == 0.0  # a disc

@@ -11,9 +11,9 @@ from symtop.model.top import effective_force, newton_between
 from tests.conftest import random_scenes
 
 
-@pytest.mark.parametrize("chosen", random_scenes(8, seed=1), ids=lambda s: s.name)
-def test_slope_and_curvature_are_the_derivatives_of_the_potential(chosen):
-    top, start, momenta = chosen.top, chosen.start, chosen.top.momenta(chosen.start)
+@pytest.mark.parametrize("case", random_scenes(8, seed=1), ids=lambda s: s.name)
+def test_slope_and_curvature_are_the_derivatives_of_the_potential(case):
+    top, start, momenta = case.top, case.start, case.top.momenta(case.start)
     energy = top.reduced_energy(start.theta, top.I1 * start.theta_dot, momenta.p_phi, momenta.p_psi)
     assert energy == pytest.approx(top.energy(start), rel=1e-13, abs=1e-13)
     with mpmath.workdps(40):
@@ -53,14 +53,14 @@ def test_the_potential_keeps_its_digits_at_a_pole_where_the_textbook_form_does_n
 
 
 def test_nutation_frequency_is_the_limit_of_small_nutations_and_has_the_classical_threshold():
-    chosen = scene("steady")
-    momenta = chosen.top.momenta(chosen.start)
-    assert chosen.top.steady_theta(momenta) == pytest.approx(math.pi / 3, abs=1e-8)
+    case = scene("steady")
+    momenta = case.top.momenta(case.start)
+    assert case.top.steady_theta(momenta) == pytest.approx(math.pi / 3, abs=1e-8)
     # V'' at the precession Omega = 1: omega^2 = (p_psi - 2 I1 Omega c)^2/I1^2 + Omega^2 s^2 + c [...]/I1 = 1
-    assert chosen.top.nutation_frequency(momenta) == pytest.approx(1.0, rel=1e-8)
-    nudged = Angles(theta=chosen.start.theta + 1e-4, phi_dot=chosen.start.phi_dot, psi_dot=chosen.start.psi_dot)
-    period = chosen.top.nutation_period(nudged)
-    assert 2.0 * math.pi / period == pytest.approx(chosen.top.nutation_frequency(chosen.top.momenta(nudged)), rel=1e-6)
+    assert case.top.nutation_frequency(momenta) == pytest.approx(1.0, rel=1e-8)
+    nudged = Angles(theta=case.start.theta + 1e-4, phi_dot=case.start.phi_dot, psi_dot=case.start.psi_dot)
+    period = case.top.nutation_period(nudged)
+    assert 2.0 * math.pi / period == pytest.approx(case.top.nutation_frequency(case.top.momenta(nudged)), rel=1e-6)
     # Stable for I3 w3 > 2 sqrt(I1 mgl): omega^2 = p_psi^2/4 I1^2 - mgl/I1 at theta = 0.
     asleep = SymmetricTop(1.0, 1.0, 1.0)
     awake = asleep.momenta(Angles(theta=0.0, psi_dot=2.5))
@@ -84,9 +84,9 @@ def test_spheroids_have_the_notebooks_inertia_and_a_top_that_falls_from_rest_mov
     hung = SymmetricTop.from_spheroid(2.0, 2.0, 1.0, gravity=10.0, pivot_distance=0.5)
     assert pytest.approx(2.0 * 5.0 / 5.0 + 2.0 * 0.25) == hung.I1  # Huygens-Steiner
     assert hung.mgl == pytest.approx(2.0 * 10.0 * 0.5)
-    free = SymmetricTop(1.0, 0.5, 0.0)
+    top = SymmetricTop(1.0, 0.5, 0.0)
     for swing in (0.2, 1e-200):  # a great circle through both poles, however slowly
-        assert free.turning_cosines(Angles(1.0, theta_dot=swing)) == (-1.0, 1.0)
+        assert top.turning_cosines(Angles(1.0, theta_dot=swing)) == (-1.0, 1.0)
     low, high = SymmetricTop(1.0, 0.5, 1.0).turning_cosines(Angles(1.0))
     assert (low, high) == (-1.0, pytest.approx(math.cos(1.0), abs=1e-15))
 
@@ -118,7 +118,7 @@ def test_a_slope_that_is_wrong_costs_steps_and_a_few_units_in_the_last_place():
         return math.exp(x) - 2.0
 
     assert newton_between(value, math.exp, -5.0, 8.0) == pytest.approx(LN2, abs=2.0 * math.ulp(LN2))
-    good = len(calls)
-    off = (2.0 * 3.7 + 2.0) * math.ulp(LN2)  # the last step is too short, and exp(x) - 2 is rounded
-    assert newton_between(value, lambda x: 3.7 * math.exp(x), -5.0, 8.0) == pytest.approx(LN2, abs=off)
-    assert good < 15 < len(calls) - good < 200
+    count = len(calls)
+    bound = (2.0 * 3.7 + 2.0) * math.ulp(LN2)  # the last step is too short, and exp(x) - 2 is rounded
+    assert newton_between(value, lambda x: 3.7 * math.exp(x), -5.0, 8.0) == pytest.approx(LN2, abs=bound)
+    assert count < 15 < len(calls) - count < 200

@@ -53,15 +53,15 @@ def test_the_integral_of_the_third_kind_is_carlsons_and_the_edges_of_the_range()
         for g2, g3, rng in cubics(30):
             e = roots(g2, g3)
             h, b = half_period(e) * rng.uniform(0.01, 0.9), e.e3 - rng.exponential()
-            above = differences(e, h)
-            rest = sum(above) / 3.0 - b
-            assert abs(r_j(*above, rest) / elliprj(*map(mpf, above), mpf(rest)) - 1) < 2e-15
+            args = differences(e, h)
+            p = sum(args) / 3.0 - b
+            assert abs(r_j(*args, p) / elliprj(*map(mpf, args), mpf(p)) - 1) < 2e-15
             width = 1e-4 * h
-            near = [differences(e, h + by) for by in (-width, width)]
-            before, after = (r_j(*ends, sum(ends) / 3.0 - b) / 3.0 for ends in near)
+            pairs = [differences(e, h + by) for by in (-width, width)]
+            before, after = (r_j(*ends, sum(ends) / 3.0 - b) / 3.0 for ends in pairs)
             rate = (after - before) / (2.0 * width)
-            assert rate == pytest.approx(1.0 / rest, rel=1e-6)
-            assert rate != pytest.approx(1.001 / rest, rel=1e-6)
+            assert rate == pytest.approx(1.0 / p, rel=1e-6)
+            assert rate != pytest.approx(1.001 / p, rel=1e-6)
     assert half_period(roots(3.0, -1.0)) == pytest.approx(math.inf)  # e1 = e2
     free = roots(0.0, 0.0)
     assert (half_period(free), differences(free, 0.5)) == (math.inf, (4.0, 4.0, 4.0))

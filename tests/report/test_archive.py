@@ -50,10 +50,10 @@ def results(tmp_path_factory):
 @pytest.fixture(scope="module")
 def scenes():
     """Three scenes for all of the test set, whose 30 digits `test_scene_states` checks."""
-    few = {name: scene for name, scene in symtop.scenes().items() if name in ("spheroid", "goldstein", "sleeping")}
+    subset = {name: scene for name, scene in symtop.scenes().items() if name in ("spheroid", "goldstein", "sleeping")}
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(archive, "scenes", lambda: few)
-        yield few
+        patch.setattr(archive, "scenes", lambda: subset)
+        yield subset
 
 
 @pytest.fixture(scope="module")
@@ -91,6 +91,6 @@ def test_its_states_can_be_read_and_the_same_results_make_the_same_bundle(bundle
     assert list(states["scene"].values) == list(scenes)
     assert (states["quaternion_lo"].dims, lacking(states)) == (("scene", "sample", "part"), [])
     with zipfile.ZipFile(archive.bundle(results, tmp_path / "again.zip")) as file:
-        again = {name.removeprefix(f"{archive.NAME}/"): file.read(name) for name in file.namelist()}
+        second = {name.removeprefix(f"{archive.NAME}/"): file.read(name) for name in file.namelist()}
     dated = {"results/report.html", "SHA256SUMS"}  # the page says the day
-    assert {name for name in bundled if again[name] != bundled[name]} <= dated
+    assert {name for name in bundled if second[name] != bundled[name]} <= dated

@@ -59,10 +59,10 @@ def test_the_badge_says_what_is_refuted_or_what_the_method_is(ledger, tmp_path):
     words = [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")]
     assert words == ["symtop", "refuted: symplectic, energy"]
     confirmed = Finding("order", "2", Measured("slope", 2.0, text="2.000 +- 0.001"), "confirmed", "a <b>", 2.0, 0.05)
-    good = handmade(confirmed, name="<mine>")
-    assert "order 2" in badge(good)
-    assert "refuted" not in badge(good)
-    ET.fromstring(badge(good))
+    claim_ledger = handmade(confirmed, name="<mine>")
+    assert "order 2" in badge(claim_ledger)
+    assert "refuted" not in badge(claim_ledger)
+    ET.fromstring(badge(claim_ledger))
     assert root.get("width").isdigit()
 
 
@@ -75,6 +75,6 @@ def test_a_card_without_measurements_says_why_and_one_that_cannot_be_written_is_
         card(NOTHING, tmp_path)
     with pytest.raises(symtop.SymtopError, match="path must be the name of a file, not 3"):
         card(NOTHING, 3)
-    for other in (3, None, {}, "card.html"):
+    for value in (3, None, {}, "card.html"):
         with pytest.raises(symtop.SymtopError, match=r"a card needs a ledger, which symtop\.judge returns, not "):
-            symtop.card(other, tmp_path / "card.html")
+            symtop.card(value, tmp_path / "card.html")

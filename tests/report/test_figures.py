@@ -37,8 +37,8 @@ def saturation(color) -> float:
 def least_text(figure) -> tuple[float, str]:
     """The smallest text of a figure in points, if the figure is printed `WIDTH` inches wide, and what it says."""
     figure.draw_without_rendering()
-    texts = [one for one in figure.findobj(Text) if one.get_visible() and one.get_text().strip()]
-    sizes = ((one.get_fontsize() * style.WIDTH / figure.get_figwidth(), one.get_text()) for one in texts)
+    texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text().strip()]
+    sizes = ((text.get_fontsize() * style.WIDTH / figure.get_figwidth(), text.get_text()) for text in texts)
     return min(sizes, default=(math.inf, ""))
 
 
@@ -51,9 +51,9 @@ def faults(name, figure) -> list[str]:
     if not figure.get_suptitle() and runner.file_beside(name, "page.md") is None:  # a template has the titles
         problems.append("no message")
     legends = [*figure.legends, *(axis.get_legend() for axis in figure.axes if axis.get_legend())]
-    lines = [sum(isinstance(entry, Line2D) for entry in one.legend_handles) for one in legends]  # a map has patches
-    if (most := max(lines, default=0)) > MOST_ENTRIES and name not in SHOWN_BY_ORDER:
-        problems.append(f"a legend of {most} entries")
+    lines = [sum(isinstance(entry, Line2D) for entry in key.legend_handles) for key in legends]  # a map has patches
+    if (count := max(lines, default=0)) > MOST_ENTRIES and name not in SHOWN_BY_ORDER:
+        problems.append(f"a legend of {count} entries")
     for axis in figure.axes if name not in SHOWN_BY_ORDER else []:
         kinds = {line.get_label() for line in axis.get_lines() if saturation(line.get_color()) > GREYS}
         if len(kinds - {label for label in kinds if label.startswith("_")}) > MOST_LINES:
@@ -64,49 +64,49 @@ def faults(name, figure) -> list[str]:
 @pytest.mark.parametrize("name", runner.names())
 def test_every_figure_can_be_read_in_print(name, quick_results):
     data, study = netcdf.read_any(quick_results / f"{name}.nc"), runner.load(name)
-    pictures = [one for one in study.pictures(data) if not hasattr(one.figure, "suffix")]
+    pictures = [picture for picture in study.pictures(data) if not hasattr(picture.figure, "suffix")]
     assert pictures or study.facts(data)["busy"]  # times of a busy machine are not drawn
-    assert {one.name: faults(name, one.figure) for one in pictures} == {one.name: [] for one in pictures}
-    assert all(one.figure.get_figwidth() <= style.WIDTH for one in pictures)
-    assert all(one.figure.get_figheight() <= 10.0 for one in pictures)  # inches: a page
+    assert {entry.name: faults(name, entry.figure) for entry in pictures} == {entry.name: [] for entry in pictures}
+    assert all(picture.figure.get_figwidth() <= style.WIDTH for picture in pictures)
+    assert all(picture.figure.get_figheight() <= 10.0 for picture in pictures)  # inches: a page
 
 
 def shows(drawn, groups, variant) -> bool:
     """Are all of these numbers, but those too small to draw, among those of a variant, whatever their signs?"""
-    every = (one.sel(variant=variant).data_vars.values() for one in groups if variant in one["variant"].values)
-    numbers = [column.values.ravel() for each in every for column in each if column.dtype.kind == "f"]
+    parts = (group.sel(variant=variant).data_vars.values() for group in groups if variant in group["variant"].values)
+    numbers = [column.values.ravel() for part in parts for column in part if column.dtype.kind == "f"]
     return bool(np.isin(drawn[drawn > figures.SMALLEST], np.abs(np.concatenate(numbers))).all())
 
 
 @pytest.mark.parametrize("name", ["convergence", "drift", "reduction", "oscillators", "notebook", "stability"])
 def test_a_line_named_after_a_variant_shows_its_numbers_and_no_others(name, quick_results):
     data = netcdf.read_any(quick_results / f"{name}.nc")
-    groups = [one for one in netcdf.groups(data).values() if "variant" in one.coords]
-    known = {str(variant) for one in groups for variant in one["variant"].values}
-    axes = [axis for one in runner.load(name).pictures(data) for axis in one.figure.axes]
+    groups = [group for group in netcdf.groups(data).values() if "variant" in group.coords]
+    variants = {str(variant) for group in groups for variant in group["variant"].values}
+    axes = [axis for picture in runner.load(name).pictures(data) for axis in picture.figure.axes]
     drawn = [(axis.get_ylabel(), line) for axis in axes for line in axis.lines]
     named = [(np.abs(line.get_xdata() if "lambda" in label else line.get_ydata()),  # scaled times: see the other side
               line.get_label().rpartition(", ")[2]) for label, line in drawn]  # fmt: skip
-    named = [(values, variant) for values, variant in named if variant in known]
+    named = [(values, variant) for values, variant in named if variant in variants]
     assert [variant for values, variant in named if not shows(values, groups, variant)] == []
     large = [(values, variant) for values, variant in named if np.unique(values[values > 1e-14]).size > 1]
     assert large  # rounding, or a bound that many reach, is often the same
-    assert not any(shows(values, groups, min(known - {variant})) for values, variant in large)
+    assert not any(shows(values, groups, min(variants - {variant})) for values, variant in large)
 
 
 def tables_and_axes(name, folder):
     """The tables of a study, and the axes of its figures."""
     data, study = netcdf.read_any(folder / f"{name}.nc"), runner.load(name)
-    return dict(study.tables(data)), {one.name: one.figure.axes for one in study.pictures(data)}
+    return dict(study.tables(data)), {picture.name: picture.figure.axes for picture in study.pictures(data)}
 
 
 def test_points_of_carry_over_are_numbers_of_its_tables(quick_results):
     tables, axes = tables_and_axes("carry_over", quick_results)
     ranked = tables["rankings"].query("runs == 'short' and quantity == 'axis'")
-    shown = {line.get_label(): line.get_ydata() for line in axes["rankings"][0].lines}
+    points = {line.get_label(): line.get_ydata() for line in axes["rankings"][0].lines}
     for decades, mark in zip((3, 6, 9), MARKS, strict=True):
-        tau, part = (one[np.isclose(one["error"], 10.0**-decades)] for one in (ranked, tables["steps"]))
-        assert np.array_equal(shown[f"axis to 1e-{decades} rad"], tau["tau"], equal_nan=True)
+        tau, part = (frame[np.isclose(frame["error"], 10.0**-decades)] for frame in (ranked, tables["steps"]))
+        assert np.array_equal(points[f"axis to 1e-{decades} rad"], tau["tau"], equal_nan=True)
         marked = (line for line in axes["steps"][0].lines if line.get_marker() == mark and line.get_ydata().size)
         dots = {round(line.get_xdata().mean()): line.get_ydata() for line in marked}
         for place, family in enumerate(part.columns[4:]):
@@ -119,8 +119,8 @@ def test_counts_of_the_ledger_are_those_of_its_table(quick_results):
     counts = tables["ledger"].value_counts(["family", "claim", "verdict"]).to_dict()
     texts = [(*text.get_position(), text.get_text().split()) for text in axes["ledger"][0].texts]
     verdicts = {symbol: verdict for verdict, symbol in SYMBOLS.items()}
-    drawn = {(names[column], claim_name(CLAIMS[line]), verdicts[one[-1]]): int(one[:-1])
-             for column, line, words in texts if column < len(names) for one in words}  # fmt: skip
+    drawn = {(names[column], claim_name(CLAIMS[line]), verdicts[word[-1]]): int(word[:-1])
+             for column, line, words in texts if column < len(names) for word in words}  # fmt: skip
     assert drawn == counts
 
 
@@ -128,11 +128,11 @@ def test_orders_beside_the_lines_of_oscillators_are_those_of_the_table(quick_res
     tables, axes = tables_and_axes("oscillators", quick_results)
     orders = tables["damped"].set_index(["b", "rule"])
     for axis in axes["orders"]:
-        what, _, damping = axis.get_title().partition("\nb = ")
-        column = "order of x" if what.startswith("position") else "order of the rate of decay"
+        title, _, damping = axis.get_title().partition("\nb = ")
+        column = "order of x" if title.startswith("position") else "order of the rate of decay"
         for rule, _, order in (text.get_text().partition(": order ") for text in axis.texts):
-            at = float(damping.partition(",")[0]), rule.replace(" ", "-")
-            assert float(order) == round(orders.loc[at, column], 1)
+            key = float(damping.partition(",")[0]), rule.replace(" ", "-")
+            assert float(order) == round(orders.loc[key, column], 1)
 
 
 def test_cells_of_the_atlas_have_the_shares_of_its_table(quick_results):
@@ -155,10 +155,10 @@ def test_cells_of_the_atlas_have_the_shares_of_its_table(quick_results):
 ])  # fmt: skip
 def test_numbers_of_a_table_are_points_of_the_figure(name, picture, table, columns, rows, quick_results):
     tables, axes = tables_and_axes(name, quick_results)
-    shown = tables[table].query(rows)[columns].dropna().to_numpy()
+    points = tables[table].query(rows)[columns].dropna().to_numpy()
     lines = [line.get_xydata() for line in axes[picture][0].lines if len(line.get_xdata())]
-    near = [np.isclose(np.concatenate(lines), one, rtol=1e-12, atol=0.0).all(axis=1).any() for one in shown]
-    assert (len(near) >= 4, all(near)) == (True, True)
+    hits = [np.isclose(np.concatenate(lines), point, rtol=1e-12, atol=0.0).all(axis=1).any() for point in points]
+    assert (len(hits) >= 4, all(hits)) == (True, True)
 
 
 def test_a_figure_that_cannot_be_read_is_found(monkeypatch):
@@ -200,8 +200,8 @@ def test_labels_keep_their_order_and_their_distance(places):
     placed = figures.keep_apart(places, 0.05)
     assert np.all(np.diff(np.sort(placed)) >= 0.05 - 1e-12)
     assert max(placed) <= 1.0 + 1e-12
-    for one, other in ((0, 1), (1, 2)):
-        assert (places[one] < places[other]) <= (placed[one] < placed[other])
+    for i, j in ((0, 1), (1, 2)):
+        assert (places[i] < places[j]) <= (placed[i] < placed[j])
     assert figures.keep_apart([0.1, 0.5], 0.05) == [0.1, 0.5]
 
 
@@ -212,8 +212,8 @@ def test_labels_keep_their_order_and_their_distance(places):
 def test_a_number_of_a_title(value, text):
     assert formats.number(value) == text.replace(" ", formats.FIRM)
     assert formats.typeset("1e-06 (us), `1e-6 us`, [x](1e-3), 2 us, us") == "10⁻⁶ (µs), `1e-6 us`, [x](1e-3), 2 µs, us"
-    assert [formats.at_most(one) for one in (1.249, 1.2, 0.1, 185.3)] == ["1.3", "1.2", "0.1", "190"]
-    assert [formats.at_least(one) for one in (0.958, 0.95, 185.3)] == ["0.95", "0.95", "180"]
+    assert [formats.at_most(number) for number in (1.249, 1.2, 0.1, 185.3)] == ["1.3", "1.2", "0.1", "190"]
+    assert [formats.at_least(number) for number in (0.958, 0.95, 185.3)] == ["0.95", "0.95", "180"]
 
 
 def test_a_published_figure_has_a_vector_beside_it_and_the_same_bytes_again(tmp_path):
@@ -234,7 +234,7 @@ def test_no_two_integrators_look_alike_and_a_formula_has_one_colour():
     colors = {}
     for name in symtop.integrators():
         colors.setdefault(name.replace("-compiled", "").removesuffix("-fixed"), set()).add(style.look(name).color)
-    assert [formula for formula, several in colors.items() if len(several) > 1] == []
+    assert [formula for formula, names in colors.items() if len(names) > 1] == []
     assert [style.look(f"rk4[{chart}]").fill for chart in ("angles", "axis", "attitude")] == ["none", "full", "left"]
     assert len({*colors["vern9"], *colors["tsit5"], *colors["rk45"], *colors["dop853"], *colors["rk4"]}) == 5
 

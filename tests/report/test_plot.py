@@ -13,20 +13,20 @@ from tests.commands import call
 
 def test_errors_are_drawn_as_the_run_and_a_trajectory_of_no_integrator_and_without_time_refused():
     run = symtop.simulate("goldstein", "midpoint", step_size=0.02, horizon=10.0, samples=51, guard=False)
-    wrong = symtop.errors(run)
-    ax = symtop.plot(wrong)
+    errors = symtop.errors(run)
+    ax = symtop.plot(errors)
     line, bound = ax.get_lines()
-    assert np.array_equal(line.get_ydata(), wrong["axis"].values[1:])
+    assert np.array_equal(line.get_ydata(), errors["axis"].values[1:])
     assert np.array_equal(line.get_ydata(), symtop.plot(run).get_lines()[0].get_ydata())
     assert line.get_color() == symtop.plot(run).get_lines()[0].get_color()
     assert bound.get_ydata().max() < 1e-9 < line.get_ydata().max()
     symtop.plot(symtop.simulate("goldstein", "rk4[axis]", step_size=0.02, horizon=10.0, guard=False), ax)
     assert (ax.get_title(), ax.get_legend_handles_labels()[1]) == ("", ["midpoint[angles]", "rk4[axis]"])
-    assert symtop.plot(wrong, quantity="energy").get_ylabel() == "energy error / energy of the nutation"
-    wrong = symtop.errors({"time": run["time"].values, "axis": run["axis"].values}, "goldstein")
-    assert np.array_equal(symtop.plot(wrong).get_lines()[0].get_ydata(), wrong["axis"].values[1:])
+    assert symtop.plot(errors, quantity="energy").get_ylabel() == "energy error / energy of the nutation"
+    errors = symtop.errors({"time": run["time"].values, "axis": run["axis"].values}, "goldstein")
+    assert np.array_equal(symtop.plot(errors).get_lines()[0].get_ydata(), errors["axis"].values[1:])
     with pytest.raises(symtop.SymtopError, match="does not show the attitude; it shows axis"):
-        symtop.plot(wrong, quantity="attitude")
+        symtop.plot(errors, quantity="attitude")
     with pytest.raises(symtop.SymtopError, match="must have the dimension time"):
         symtop.plot(symtop.reference("goldstein", [1.0]).isel(time=0, drop=True))
 
@@ -43,8 +43,8 @@ def test_an_ensemble_of_short_runs_is_drawn_over_time(n, per_nutation):
     ax.figure.canvas.draw()
 
 
-@pytest.mark.parametrize(("quantity", "most"), [("axis", np.pi), ("energy", 1e3)])
-def test_failed_runs_are_named_and_angles_end_at_pi(quantity, most):
+@pytest.mark.parametrize(("quantity", "limit"), [("axis", np.pi), ("energy", 1e3)])
+def test_failed_runs_are_named_and_angles_end_at_pi(quantity, limit):
     tops = symtop.population(60, seed=0)
     for name, fail in (("stormer-verlet", True), ("strang", False)):
         runs = symtop.ensemble(tops, name, per_nutation=30, nutations=2, quiet=True)
@@ -52,16 +52,16 @@ def test_failed_runs_are_named_and_angles_end_at_pi(quantity, most):
         texts = [text.get_text() for text in ax.texts]
         assert texts == ["1 %", "10 %", "median", *(f"{level} %{': failed' * fail}" for level in (90, 99))]
         heights = np.concatenate([band.get_paths()[0].vertices[:, 1] for band in ax.collections])
-        assert heights.max() <= most
-        assert (heights.max() == most) == fail
+        assert heights.max() <= limit
+        assert (heights.max() == limit) == fail
 
 
 def test_one_integrator_or_scene_of_a_sweep_is_drawn():
     options = {"step_size": [0.1, 0.05], "tolerance": [1e-3, 1e-6], "horizon": 4.0, "quiet": True}
     sweep = symtop.sweep(["spheroid", "goldstein"], ["rk4", "rk45"], **options)
-    whole = {line.get_label(): line for line in symtop.plot(sweep, plt.figure().gca(), x="steps").get_lines()}
-    assert len(whole) == 4
-    assert {key.split()[-1]: one.get_linestyle() for key, one in whole.items()} == {"spheroid": "-", "goldstein": "--"}
+    full = {line.get_label(): line for line in symtop.plot(sweep, plt.figure().gca(), x="steps").get_lines()}
+    assert len(full) == 4
+    assert {key.split()[-1]: line.get_linestyle() for key, line in full.items()} == {"spheroid": "-", "goldstein": "--"}
     for part in (sweep.isel(variant=0), sweep.isel(scene=1), sweep.isel(variant=0, scene=1)):
         lines = symtop.plot(part, plt.figure().gca(), x="steps").get_lines()
         assert len(lines) == (2 if "scene" in part.dims else 1) * (2 if "variant" in part.dims else 1)
@@ -69,23 +69,23 @@ def test_one_integrator_or_scene_of_a_sweep_is_drawn():
         if "scene" not in part.dims:
             labels = [f"{label} on goldstein" for label in labels]
         for label, line in zip(labels, lines, strict=True):
-            assert np.array_equal(line.get_ydata(), whole[label].get_ydata())
+            assert np.array_equal(line.get_ydata(), full[label].get_ydata())
     with pytest.raises(symtop.SymtopError, match="a sweep must have the scenes that it compares"):
         symtop.plot(sweep.isel(scene=0, drop=True), plt.figure().gca())
 
 
-@pytest.mark.parametrize(("step", "shown"), [(8.0, 0), (1.0, 0), (0.5, 6)])
-def test_a_run_that_fails_in_its_first_step_is_drawn(step, shown, tmp_path, monkeypatch):
+@pytest.mark.parametrize(("step", "count"), [(8.0, 0), (1.0, 0), (0.5, 6)])
+def test_a_run_that_fails_in_its_first_step_is_drawn(step, count, tmp_path, monkeypatch):
     """Lines without a number are left out, and one with a single one has a marker."""
     drawn = []
     monkeypatch.setattr("symtop.report.style.save", lambda figure, path: (save(figure, path), drawn.append(figure)))
     call("run", "spheroid", "midpoint", "--step-size", step, "--no-guard", "--figure", tmp_path / "f.png", code=3)
     errors = [line for line in drawn[0].axes[1].get_lines() if line.get_label() != "stopped here"]
-    assert [np.isfinite(line.get_ydata()).sum() for line in errors] == [shown] * (3 if shown else 0)
-    lines = {one.get_label(): one for axis in drawn[0].axes for one in axis.get_lines()}
+    assert [np.isfinite(line.get_ydata()).sum() for line in errors] == [count] * (3 if count else 0)
+    lines = {line.get_label(): line for axis in drawn[0].axes for line in axis.get_lines()}
     assert lines["true theta"].get_ydata()[0] == pytest.approx(np.degrees(symtop.scene("spheroid").start.theta))
-    assert lines["stopped here"].get_xdata()[0] == (3.0 if shown else 0.0)
-    assert not shown or np.nanmin(lines["residual of energy, relative"].get_ydata()) > 1e-3  # the energy is less
+    assert lines["stopped here"].get_xdata()[0] == (3.0 if count else 0.0)
+    assert not count or np.nanmin(lines["residual of energy, relative"].get_ydata()) > 1e-3  # the energy is less
 
 
 @pytest.mark.parametrize(("samples", "marker"), [(2, "o"), (3, "None")])
@@ -139,9 +139,9 @@ def test_quantiles_are_members_failed_ones_infinitely_wrong_and_samples_a_run_ha
 
 def test_errors_at_a_place_are_those_of_the_same_time():
     """Runs of 4, 5 and 40 steps: at each place the latest sample of each, from where all of them have stepped."""
-    some = SOME.isel(member=slice(3))
-    data = symtop.ensemble(some, "strang[axis]", per_nutation=[4, 5, 40], nutations=1, samples=101, quiet=True)
-    errors = member_errors(some, data, "axis")
+    members = SOME.isel(member=slice(3))
+    data = symtop.ensemble(members, "strang[axis]", per_nutation=[4, 5, 40], nutations=1, samples=101, quiet=True)
+    errors = member_errors(members, data, "axis")
     places, latest = at_places(data, errors)
     np.testing.assert_allclose(places, np.arange(10, 41) / 40.0, atol=1e-12)
     assert np.isfinite(latest).all()
@@ -153,27 +153,27 @@ def test_errors_at_a_place_are_those_of_the_same_time():
 
 def test_errors_are_those_of_the_ensemble_and_runs_of_all_samples_are_compared_by_index():
     data = symtop.ensemble(SOME, "strang[axis]", **ASKED)
-    wrong = symtop.errors(data, SOME)
-    np.testing.assert_allclose(member_errors(SOME, data, "axis"), wrong["axis"], rtol=1e-6, atol=1e-14)
-    some = slice(None, None, 7)  # none of them begins beside a pole, where the start's own energy is rounded
-    changed = np.abs(wrong["energy"].values[some])
-    np.testing.assert_allclose(member_errors(SOME, data, "energy")[some], changed, rtol=1e-6, atol=1e-13)
+    errors = symtop.errors(data, SOME)
+    np.testing.assert_allclose(member_errors(SOME, data, "axis"), errors["axis"], rtol=1e-6, atol=1e-14)
+    part = slice(None, None, 7)  # none of them begins beside a pole, where the start's own energy is rounded
+    expected = np.abs(errors["energy"].values[part])
+    np.testing.assert_allclose(member_errors(SOME, data, "energy")[part], expected, rtol=1e-6, atol=1e-13)
     errors = member_errors(SOME, data, "axis")
-    places, same = at_places(data, errors)
-    assert same is errors
+    places, values = at_places(data, errors)
+    assert values is errors
     np.testing.assert_allclose(places, np.arange(41) / 40.0, atol=0.013)  # half an interval
     short = symtop.ensemble(SOME, "strang[axis]", **ASKED | {"per_nutation": 2, "nutations": 2})
-    places, few = at_places(short, member_errors(SOME, short, "axis"))
+    places, values = at_places(short, member_errors(SOME, short, "axis"))
     np.testing.assert_allclose(places, [0.25, 0.5, 0.75, 1.0], atol=1e-12)
-    np.testing.assert_array_equal(few, member_errors(SOME, short, "axis")[:, 1:5])
+    np.testing.assert_array_equal(values, member_errors(SOME, short, "axis")[:, 1:5])
 
 
 def test_members_of_other_labels_are_refused():
-    one, other = (SOME.assign_coords(member=labels) for labels in (range(30), range(30, 60)))
-    data = symtop.ensemble(one, "strang[axis]", **ASKED)
-    assert np.array_equal(member_errors(SOME, data, "axis"), member_errors(one, data, "axis"))
+    first, second = (SOME.assign_coords(member=labels) for labels in (range(30), range(30, 60)))
+    data = symtop.ensemble(first, "strang[axis]", **ASKED)
+    assert np.array_equal(member_errors(SOME, data, "axis"), member_errors(first, data, "axis"))
     with pytest.raises(symtop.SymtopError, match="their labels are others"):
-        member_errors(other, data, "axis")
+        member_errors(second, data, "axis")
 
 
 @pytest.mark.parametrize(("members", "quantity", "reason"), [

@@ -33,17 +33,17 @@ def results(tmp_path_factory):
     folder = tmp_path_factory.mktemp("results")
     for name in ("speed", "pitfalls", "convergence"):
         study = runner.load(name)
-        few = [case for case in study.cases(True) if name == "pitfalls" or case.integrator in (*FEW, "together")]
-        few = [case for case in few if name != "convergence" or case.scene == "spheroid"]
+        cases = [case for case in study.cases(True) if name == "pitfalls" or case.integrator in (*FEW, "together")]
+        cases = [case for case in cases if name != "convergence" or case.scene == "spheroid"]
         if name == "speed":
-            asked, timed = {"lengths": (4.0, 8.0), "settings": 4}, {"integrators": FEW}
-            few = [dataclasses.replace(case, settings=asked | timed if case.timed else asked) for case in few]
-        small = dataclasses.replace(study, cases=lambda _, few=few: few)
-        with pytest.MonkeyPatch.context() as here:  # workers take longer to start than these cases
-            here.setattr(pool, "WORTH_WORKERS", len(few) + 1)
-            here.setattr(sweep, "BATCHES", 3)
-            here.setattr(fingerprint, "_known", {})  # of code with this patch, which no later study of the process is
-            here.setattr(fingerprint, "reached", fingerprint.functools.cache(fingerprint.code))
+            settings, timed = {"lengths": (4.0, 8.0), "settings": 4}, {"integrators": FEW}
+            cases = [dataclasses.replace(case, settings=settings | timed if case.timed else settings) for case in cases]
+        small = dataclasses.replace(study, cases=lambda _, cases=cases: cases)
+        with pytest.MonkeyPatch.context() as patch:  # workers take longer to start than these cases
+            patch.setattr(pool, "WORTH_WORKERS", len(cases) + 1)
+            patch.setattr(sweep, "BATCHES", 3)
+            patch.setattr(fingerprint, "_known", {})  # of code with this patch, which no later study of the process is
+            patch.setattr(fingerprint, "reached", fingerprint.functools.cache(fingerprint.code))
             assert runner.run(small, folder, jobs=1, quiet=True, save=style.sketch)["failures"] == []
     page.write(folder)
     return folder
@@ -68,22 +68,22 @@ def scheme(browser, request):
 def test_nothing_overflows_and_every_figure_is_there(browser, scheme, width):
     browser.resize(width, 900)
     assert browser.too_wide == 0
-    browser.evaluate("[...document.images].forEach(one => { one.loading = 'eager'; })")
-    browser.wait_for("[...document.images].every(one => one.complete)")
-    assert browser.evaluate("[...document.images].every(one => one.naturalWidth > 100 && one.alt)")
+    browser.evaluate("[...document.images].forEach(image => { image.loading = 'eager'; })")
+    browser.wait_for("[...document.images].every(image => image.complete)")
+    assert browser.evaluate("[...document.images].every(image => image.naturalWidth > 100 && image.alt)")
     assert browser.evaluate("document.images.length") == 4
-    least = "Math.min(...[...document.querySelectorAll('.chart svg text')].map(t => t.getBoundingClientRect().height))"
-    assert browser.evaluate(least) >= 10.0  # pixels: legible
+    height = "Math.min(...[...document.querySelectorAll('.chart svg text')].map(t => t.getBoundingClientRect().height))"
+    assert browser.evaluate(height) >= 10.0  # pixels: legible
     assert browser.problems == []
 
 
 def test_every_text_has_the_contrast_of_wcag_aa_in_both_schemes(browser, scheme):
     browser.resize(1280, 900)
     assert browser.evaluate(FAINT) == []
-    shown = browser.evaluate("getComputedStyle(document.body).backgroundColor")
-    assert (shown == "rgb(255, 255, 255)") is (scheme == "light")
+    background = browser.evaluate("getComputedStyle(document.body).backgroundColor")
+    assert (background == "rgb(255, 255, 255)") is (scheme == "light")
     browser.evaluate("document.querySelector('p.title').style.color = '#888'")
-    assert [one.split()[0] for one in browser.evaluate(FAINT)] == ["strong."] * (scheme == "light")
+    assert [entry.split()[0] for entry in browser.evaluate(FAINT)] == ["strong."] * (scheme == "light")
     browser.evaluate("document.querySelector('p.title').style.color = ''")
 
 
@@ -102,19 +102,19 @@ def test_the_reader_chooses_the_colours(browser):
 
 def test_headings_figures_and_tables_have_addresses_and_the_contents_follow_the_reader(browser):
     titles = "[...document.querySelectorAll('main h2, main h3, figcaption')]"
-    assert browser.evaluate(f"{titles}.filter(one => !one.querySelector('a.anchor')).length") <= 1  # of the registry
-    ids = browser.evaluate("[...document.querySelectorAll('[id]')].map(one => one.id)")
+    assert browser.evaluate(f"{titles}.filter(box => !box.querySelector('a.anchor')).length") <= 1  # of the registry
+    ids = browser.evaluate("[...document.querySelectorAll('[id]')].map(node => node.id)")
     assert len(ids) == len(set(ids))
-    local = browser.evaluate("[...document.querySelectorAll('a[href^=\"#\"]')].map(one => one.hash.slice(1))")
+    local = browser.evaluate("[...document.querySelectorAll('a[href^=\"#\"]')].map(link => link.hash.slice(1))")
     assert set(local) <= set(ids)
     assert len(local) > 10
     browser.resize(1280, 900)
-    here = "document.querySelector('nav a[aria-current]')?.hash"
+    current = "document.querySelector('nav a[aria-current]')?.hash"
     for name in ("part-provenance", "part-equations", "part-measured", "part-convergence"):
         browser.evaluate(f"location.hash = '{name}'")
-        browser.wait_for(f"{here} === '#{name}'")
+        browser.wait_for(f"{current} === '#{name}'")
     browser.evaluate("scrollTo(0, 0)")
-    browser.wait_for(f"{here} === '#part-front'")
+    browser.wait_for(f"{current} === '#part-front'")
 
 
 def test_a_table_in_full_is_opened_searched_sorted_and_saved(browser):
@@ -124,8 +124,8 @@ def test_a_table_in_full_is_opened_searched_sorted_and_saved(browser):
     browser.wait_for(f'document.querySelector("{fold} table") !== null')
     table = f'document.querySelector("{fold} table")'
     names = f"[...{table}.tBodies[0].rows].filter(row => !row.hidden).map(row => row.cells[0].textContent)"
-    every = browser.evaluate(names)
-    assert every == list(symtop.integrators())
+    methods = browser.evaluate(names)
+    assert methods == list(symtop.integrators())
     browser.set(f"{fold} input", "gauss compiled")
     rows_shown = browser.evaluate(names)
     assert {"gauss-2", "gauss-12"} <= set(rows_shown)
@@ -134,28 +134,28 @@ def test_a_table_in_full_is_opened_searched_sorted_and_saved(browser):
     assert browser.evaluate(f"{names}.length") == 0
     browser.set(f"{fold} input", "")
     browser.click(f"{fold} th button")
-    assert browser.evaluate(names) == sorted(every, key=str.lower) or set(browser.evaluate(names)) == set(every)
-    up = browser.evaluate(names)
+    assert browser.evaluate(names) == sorted(methods, key=str.lower) or set(browser.evaluate(names)) == set(methods)
+    ascending = browser.evaluate(names)
     browser.click(f"{fold} th button")
-    assert browser.evaluate(names) == up[::-1]
+    assert browser.evaluate(names) == ascending[::-1]
     assert browser.evaluate(f"{table}.tHead.rows[0].cells[0].ariaSort") == "descending"
     cells = f"[...{table}.tBodies[0].rows].map(row => row.cells[1])"
-    odd = {"3": "inf", "5": "2\u00a0×\u00a010⁴", "7": "10⁻²", "9": "word", "11": ""}
-    browser.evaluate(f"{cells}.forEach((cell, k) => {{ cell.textContent = {json.dumps(odd)}[k] ?? `${{k}}`; }})")
+    texts = {"3": "inf", "5": "2\u00a0×\u00a010⁴", "7": "10⁻²", "9": "word", "11": ""}
+    browser.evaluate(f"{cells}.forEach((cell, k) => {{ cell.textContent = {json.dumps(texts)}[k] ?? `${{k}}`; }})")
     browser.click(f"{fold} th:nth-child(2) button")
     ordered = browser.evaluate(f"{cells}.map(cell => cell.textContent)")
-    plain = [str(k) for k in range(len(every)) if str(k) not in odd]
-    assert ordered == [plain[0], odd["7"], *plain[1:], odd["5"], "inf", "word", ""]  # numbers before words
-    saved = browser.evaluate("""(async () => {
+    numbers = [str(k) for k in range(len(methods)) if str(k) not in texts]
+    assert ordered == [numbers[0], texts["7"], *numbers[1:], texts["5"], "inf", "word", ""]  # numbers before words
+    text = browser.evaluate("""(async () => {
         document.querySelector("table[data-name='scenes']").rows[1].cells[1].textContent = "2\u00a0×\u00a010⁻⁴";
         let blob; const link = HTMLAnchorElement.prototype.click, make = URL.createObjectURL;
         HTMLAnchorElement.prototype.click = function () { this.dataset.saved = this.download; };
-        URL.createObjectURL = (one) => { blob = one; return make(one); };
+        URL.createObjectURL = (file) => { blob = file; return make(file); };
         document.querySelector(".tools:has(+ .scroll table[data-name='scenes']) button").click();
         HTMLAnchorElement.prototype.click = link; URL.createObjectURL = make;
         return blob.text();
     })()""")
-    rows = list(csv.DictReader(io.StringIO(saved)))
+    rows = list(csv.DictReader(io.StringIO(text)))
     assert [row["scene"] for row in rows] == list(symtop.scenes())
     assert "2e-4" in rows[0].values()
 
@@ -169,7 +169,7 @@ def test_the_keyboard_reaches_content_tables_and_points(browser):
     assert browser.evaluate("document.activeElement.getBoundingClientRect().left") >= 0.0
     browser.press("Enter")
     browser.wait_for("document.activeElement.id === 'content'")
-    reachable = "[...document.querySelectorAll('.scroll, .chart svg')].filter(one => one.tabIndex || !one.ariaLabel)"
+    reachable = "[...document.querySelectorAll('.scroll, .chart svg')].filter(box => box.tabIndex || !box.ariaLabel)"
     assert browser.evaluate(f"{reachable}.length") == 0
     browser.evaluate("document.querySelector('.chart svg').focus()")
     tips = []
@@ -177,14 +177,14 @@ def test_the_keyboard_reaches_content_tables_and_points(browser):
         browser.press("ArrowRight")
         tips.append(browser.evaluate("document.querySelector('.chart .tip').textContent"))
     assert tips[0] != tips[1]
-    assert all(re.search("step|tolerance", one) for one in tips)
+    assert all(re.search("step|tolerance", tip) for tip in tips)
     browser.press("Escape")
     assert browser.evaluate("document.querySelector('.chart .tip').hidden")
 
 
 def test_it_prints_with_every_figure_and_in_black_on_white(browser, scheme, results, tmp_path):
-    printed = browser.pdf(tmp_path / "report.pdf").read_bytes()
-    assert len(re.findall(rb"/Subtype\s*/Image", printed)) >= len(list((results / "figures").glob("*.png")))
+    pdf = browser.pdf(tmp_path / "report.pdf").read_bytes()
+    assert len(re.findall(rb"/Subtype\s*/Image", pdf)) >= len(list((results / "figures").glob("*.png")))
     assert browser.evaluate("matchMedia('print').matches") is False
 
 
@@ -215,18 +215,18 @@ def test_methods_cost_error_and_run_length_are_chosen(browser, results):
     browser.resize(1280, 900)
     marks = "document.querySelectorAll('.chart .mark').length"
     lines = "document.querySelector('.chart svg').innerHTML.split('<circle')[0]"
-    everything, before = browser.evaluate(marks), browser.evaluate(lines)
+    count, before = browser.evaluate(marks), browser.evaluate(lines)
     data = xr.load_dataset(results / "speed.nc").sel(scene="goldstein").isel(nutations=0)
-    assert everything == int(((data["axis"] > 0.0) & (data["seconds"] > 0.0) & (data["variant"] != "exact")).sum())
+    assert count == int(((data["axis"] > 0.0) & (data["seconds"] > 0.0) & (data["variant"] != "exact")).sum())
     browser.click(".chart input[value='rk4']")
-    assert 0 < browser.evaluate(marks) < everything
+    assert 0 < browser.evaluate(marks) < count
     browser.click(".chart input[value='rk4']")
-    assert browser.evaluate(marks) == everything
-    labels = "[...document.querySelectorAll('.chart svg text')].map(one => one.textContent)"
+    assert browser.evaluate(marks) == count
+    labels = "[...document.querySelectorAll('.chart svg text')].map(text => text.textContent)"
     assert "rk4[axis]" in browser.evaluate(labels)
     key = "document.querySelector('.chart .key').checkVisibility() && document.querySelector('.chart .key').textContent"
     assert "exact motion, no integrator" in browser.evaluate(key)
-    for menu, choice, shown in (
+    for menu, choice, label in (
         ("Error", "largest error of the attitude (rad)", "rk4[attitude]"),
         ("Cost", "force evaluations", "force evaluations"),
         ("run length", "8 nutations", "strang[axis]"),
@@ -235,7 +235,7 @@ def test_methods_cost_error_and_run_length_are_chosen(browser, results):
         first = browser.evaluate(f'document.querySelector("{select}").value')
         browser.set(select, choice)
         assert browser.evaluate(lines) != before
-        assert shown in browser.evaluate(labels)
+        assert label in browser.evaluate(labels)
         assert bool(browser.evaluate(key)) is (menu == "run length")  # the bound is that of the axis over its time
         browser.set(select, first)
         assert browser.evaluate(lines) == before
@@ -258,15 +258,15 @@ def test_a_figure_that_is_cut_off_has_a_shade_at_its_edge(browser, tmp_path):
     for end in (0, 9999):
         browser.evaluate(f"{region}.scrollIntoView(), {region}.scrollLeft = {end}, {region}.firstChild.decode()")
         box = browser.evaluate(f"{region}.getBoundingClientRect().toJSON()")
-        shown = plt.imread(browser.screenshot(tmp_path / "edge.png"))[..., :3]
-        edge = shown[int(box["top"]) + 3 : int(box["bottom"]) - 3, int(box["right"]) - 3]
+        image = plt.imread(browser.screenshot(tmp_path / "edge.png"))[..., :3]
+        edge = image[int(box["top"]) + 3 : int(box["bottom"]) - 3, int(box["right"]) - 3]
         assert bool(edge.max() < 0.95) is (end == 0)  # of its white
 
 
 def open_with(chart, browser, results, file):
     """Show the page with another chart."""
-    stored, content = r'(?<=class="chart"><script type="application/json">).*', page.prepared(chart)
-    full = re.sub(stored, lambda _: f"{content}</script></div>", (results / "report.html").read_text("utf-8"))
+    pattern, content = r'(?<=class="chart"><script type="application/json">).*', page.prepared(chart)
+    full = re.sub(pattern, lambda _: f"{content}</script></div>", (results / "report.html").read_text("utf-8"))
     file.write_text(full, "utf-8")
     browser.open(file.as_uri())
 
@@ -276,30 +276,30 @@ def test_lines_to_names_do_not_cross_and_each_name_has_the_colour_of_its_line(br
     series = [(f"line {k}", [(1.0, 1.0, ""), (*10.0**end, "")]) for k, end in enumerate(ends)]
     browser.resize(1280, 900)
     open_with({"title": "", "x": "x", "y": "y", "panels": {"": series}}, browser, results, tmp_path / "ends.html")
-    lines = browser.evaluate("""[...document.querySelectorAll('.chart svg path[stroke-width="0.5"]')].map(one =>
-        [one.getAttribute('d'), one.getAttribute('stroke'), getComputedStyle(one.nextSibling).fill])""")
+    lines = browser.evaluate("""[...document.querySelectorAll('.chart svg path[stroke-width="0.5"]')].map(path =>
+        [path.getAttribute('d'), path.getAttribute('stroke'), getComputedStyle(path.nextSibling).fill])""")
     ends = [[*map(float, re.findall(r"[-\d.]+", path))] for path, *_ in lines]
     assert len(ends) == 12
-    for (x, y, right, at), (x2, y2, _, at2) in itertools.combinations(ends, 2):
-        heights = [np.interp(max(x, x2), one[::2], one[1::2]) for one in ((x, y, right, at), (x2, y2, right, at2))]
-        assert (heights[0] - heights[1]) * (at - at2) >= 0.0
+    for (x, y, right, end), (x2, y2, _, end2) in itertools.combinations(ends, 2):
+        heights = [np.interp(max(x, x2), path[::2], path[1::2]) for path in ((x, y, right, end), (x2, y2, right, end2))]
+        assert (heights[0] - heights[1]) * (end - end2) >= 0.0
     for _, color, ink in lines:
-        assert style.ink(color) == pytest.approx([int(one) / 255 for one in re.findall(r"\d+", ink)], abs=0.003)
+        assert style.ink(color) == pytest.approx([int(part) / 255 for part in re.findall(r"\d+", ink)], abs=0.003)
 
 
 def test_each_of_more_than_thirty_lines_has_its_name_beside_or_below_and_zeros_are_told(browser, results, tmp_path):
     study, data = runner.load("speed"), xr.load_dataset(results / "speed.nc")
     names = [name for name in dict.fromkeys(case.integrator for case in study.cases(True)) if name != "together"]
-    every = data.sel(variant=["exact", *["midpoint[angles]"] * (len(names) - 1)]).assign_coords(variant=names)
-    (chart,) = study.charts(every.assign(p_phi=0.0 * every["p_phi"]))
+    data = data.sel(variant=["exact", *["midpoint[angles]"] * (len(names) - 1)]).assign_coords(variant=names)
+    (chart,) = study.charts(data.assign(p_phi=0.0 * data["p_phi"]))
     open_with(chart._asdict(), browser, results, tmp_path / "full.html")
     for width in (1280, 390):
         browser.resize(width, 900)
         boxes = browser.evaluate("""(() => {
             const svg = document.querySelector('.chart svg'), all = svg.getBoundingClientRect();
-            return [...svg.querySelectorAll('text')].filter(one => one.textContent.endsWith(']')).map(one => {
-                const box = one.getBoundingClientRect();
-                return [one.textContent, box.top - all.top, all.right - box.right, all.bottom - box.bottom];
+            return [...svg.querySelectorAll('text')].filter(text => text.textContent.endsWith(']')).map(text => {
+                const box = text.getBoundingClientRect();
+                return [text.textContent, box.top - all.top, all.right - box.right, all.bottom - box.bottom];
             });
         })()""")
         assert sorted(box[0] for box in boxes) == sorted(set(names) - {"exact"})
@@ -312,15 +312,15 @@ def test_each_of_more_than_thirty_lines_has_its_name_beside_or_below_and_zeros_a
 
 
 def test_words_follow_from_the_stored_data_and_findings_that_are_not_whole_are_told(results, tmp_path):
-    study, stored = runner.load("convergence"), xr.load_dataset(results / "convergence.nc")
+    study, data = runner.load("convergence"), xr.load_dataset(results / "convergence.nc")
     findings = json.loads((results / "convergence.json").read_text(encoding="utf-8"))
     text = re.sub(r"<[^>]+>", "", html.unescape((results / "report.html").read_text(encoding="utf-8")))
     twin = (results / "report.md").read_text(encoding="utf-8")
-    assert json.loads(json.dumps(study.facts(stored))) == findings["facts"]
-    for one in (text, twin.replace("`", "")):
-        assert template.answer(findings, results) in one
-    later = stored.assign(force_evaluations=2.0 * stored["force_evaluations"])
-    assert study.facts(later) != findings["facts"]  # they read the data, they do not remember it
+    assert json.loads(json.dumps(study.facts(data))) == findings["facts"]
+    for content in (text, twin.replace("`", "")):
+        assert template.answer(findings, results) in content
+    changed = data.assign(force_evaluations=2.0 * data["force_evaluations"])
+    assert study.facts(changed) != findings["facts"]  # they read the data, they do not remember it
     shutil.copytree(results, tmp_path, dirs_exist_ok=True)
     (tmp_path / "tables" / "convergence-costs.csv").unlink()
     with pytest.raises(symtop.SymtopError, match=r"convergence-costs.csv is missing\); run it again: symtop study"):
@@ -336,8 +336,8 @@ def test_words_follow_from_the_stored_data_and_findings_that_are_not_whole_are_t
 
 
 def test_markdown_becomes_figures_tables_and_formulas():
-    shown = {"figures/a-b.png": {"source": "figures/a-b.png", "width": 3, "height": 4}}
-    writer = Writer(shown, lambda kind, name: f"[{kind} {name}]")
+    figures = {"figures/a-b.png": {"source": "figures/a-b.png", "width": 3, "height": 4}}
+    writer = Writer(figures, lambda kind, name: f"[{kind} {name}]")
     text = writer(
         "## A question?\n\n**Title**\n\n![alt <b>](figures/a-b.png)\n\nCaption, `rk4[axis]`.\n\nMore.\n\n**Rows**\n\n"
         "| a | b |\n|---|---|\n| 1 | \\<i> |\n\n<!-- table x-y -->\n\n$$a = \\frac{1}{2}$$\n\n## A question?\n\n"
@@ -345,8 +345,8 @@ def test_markdown_becomes_figures_tables_and_formulas():
     )
     assert '<h2 id="a-question">A question? ' in text
     assert '<h2 id="a-question-1">' in text
-    shown = r'<figure id="a-b">.*width="3" height="4".*alt="alt &lt;b&gt;".*<figcaption>Caption, <code>rk4'
-    assert re.search(shown, text)
+    pattern = r'<figure id="a-b">.*width="3" height="4".*alt="alt &lt;b&gt;".*<figcaption>Caption, <code>rk4'
+    assert re.search(pattern, text)
     assert "<p>More.</p>" in text
     assert re.search(r'aria-label="Rows"><table data-name="rows">(.|\n)*&lt;i&gt;', text)
     assert "[table x-y]" in text

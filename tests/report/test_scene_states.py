@@ -50,11 +50,11 @@ def test_thirty_digits_agree_with_four_independent_evaluations(truth, name):
     entry = truth[name]
     row = read(archive.states_csv([like(entry)]))[-1]
     assert float(row["time"]) == float(entry["t"])
-    stored = {ours: entry["state"][theirs] for ours, theirs in THEIRS.items()}
-    stored |= dict(zip(COLUMNS[6:], [*entry["axis_xyz"], *entry["quaternion_wxyz"]], strict=True))
-    assert all(digit_gap(row[column], value) <= 1 for column, value in stored.items())
-    other = read(archive.states_csv([like(entry | {"mgl": str(float(entry["mgl"]) * (1.0 + 2.3e-16))})]))[-1]
-    assert digit_gap(other["theta"], stored["theta"]) > 1e10  # another last bit of mgl is another motion
+    expected = {ours: entry["state"][theirs] for ours, theirs in THEIRS.items()}
+    expected |= dict(zip(COLUMNS[6:], [*entry["axis_xyz"], *entry["quaternion_wxyz"]], strict=True))
+    assert all(digit_gap(row[column], value) <= 1 for column, value in expected.items())
+    control = read(archive.states_csv([like(entry | {"mgl": str(float(entry["mgl"]) * (1.0 + 2.3e-16))})]))[-1]
+    assert digit_gap(control["theta"], expected["theta"]) > 1e10  # another last bit of mgl is another motion
 
 
 def distances(data, true, name):
@@ -78,8 +78,8 @@ def test_the_reference_agrees_with_the_test_set_to_its_bounds(names, precision, 
         assert np.all(axis <= true["axis_error_bound"].values + 1e-31), name
         assert np.all(theta <= true["theta_error_bound"].values + 1e-31), name
     assert not precision or true["axis_error_bound"].values.max() < 1e-25
-    wrong = data.assign(axis_lo=data["axis_lo"] + shift)
-    assert np.any(distances(wrong, true, name)[0] > true["axis_error_bound"].values)
+    control = data.assign(axis_lo=data["axis_lo"] + shift)
+    assert np.any(distances(control, true, name)[0] > true["axis_error_bound"].values)
 
 
 def test_every_scene_has_ten_times_and_the_dataset_the_numbers_of_the_text():
@@ -93,8 +93,8 @@ def test_every_scene_has_ten_times_and_the_dataset_the_numbers_of_the_text():
     for row, scene in zip(problems, symtop.scenes().values(), strict=True):
         assert symtop.SymmetricTop(*(float(row[key]) for key in ("I1", "I3", "mgl"))) == scene.top
         assert symtop.Angles(*(float(row[key]) for key in ANGLES)) == scene.start
-    chosen = [symtop.scene("spheroid"), symtop.scene("fast")]
-    data, rows = archive.states(chosen), read(archive.states_csv(chosen))
+    scenes = [symtop.scene("spheroid"), symtop.scene("fast")]
+    data, rows = archive.states(scenes), read(archive.states_csv(scenes))
     with localcontext(prec=80):
         for k, row in enumerate(rows):
             cell = data.isel(scene=k // TIMES, sample=k % TIMES)
@@ -114,7 +114,7 @@ def bodies(tmp_path_factory):
         return test_set.write(tmp_path_factory.mktemp("set") / "bodies", scenes), scenes
 
 
-def checked(folder, mine, reference="states-17.csv"):
+def run_checker(folder, mine, reference="states-17.csv"):
     """Of each problem the largest errors of attitude and momentum and the number beyond the bound."""
     words = [sys.executable, str(folder / "check.py"), str(mine), str(folder / reference)]
     result = subprocess.run(words, capture_output=True, text=True, check=True)
@@ -126,13 +126,13 @@ def own_file(path, scenes, times, change=lambda body: body):
     """States of `dop853` on the bodies, `change` made to each."""
     lines = [",".join(("name", "time", *test_set.STATE))]
     for scene in scenes:
-        other = symtop.Scene(scene.name, change(scene.top), scene.start, scene.horizon)
-        at = np.array([float(row["time"]) for row in times if row["name"] == scene.name])
-        run = symtop.simulate(other, "dop853", tolerance=1e-12, horizon=float(at[-1]), samples=2001)
-        q = [np.interp(at, run.time.values, column) for column in run["quaternion"].values.T]
-        L = [np.interp(at, run.time.values, column) for column in run["momentum"].values.T]
+        body_scene = symtop.Scene(scene.name, change(scene.top), scene.start, scene.horizon)
+        t = np.array([float(row["time"]) for row in times if row["name"] == scene.name])
+        run = symtop.simulate(body_scene, "dop853", tolerance=1e-12, horizon=float(t[-1]), samples=2001)
+        q = [np.interp(t, run.time.values, column) for column in run["quaternion"].values.T]
+        L = [np.interp(t, run.time.values, column) for column in run["momentum"].values.T]
         q /= np.linalg.norm(q, axis=0)
-        lines += [",".join([scene.name, *map(repr, row)]) for row in np.stack([at, *q, *L], axis=1).tolist()]
+        lines += [",".join([scene.name, *map(repr, row)]) for row in np.stack([t, *q, *L], axis=1).tolist()]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
 
@@ -140,20 +140,20 @@ def own_file(path, scenes, times, change=lambda body: body):
 def test_the_reference_has_nothing_beyond_its_bounds_and_what_is_printed_is_what_is_meant(bodies):
     folder, scenes = bodies
     for reference in ("states-17.csv", "states-30.csv"):
-        rows, _ = checked(folder, folder / reference, reference)
+        rows, _ = run_checker(folder, folder / reference, reference)
         assert [*rows] == [scene.name for scene in scenes]
         assert all(beyond == 0 and attitude == momentum == 0.0 for attitude, momentum, beyond in rows.values())
-    rows, _ = checked(folder, folder / "states-30.csv")  # rounding to 17 digits is within the bound
+    rows, _ = run_checker(folder, folder / "states-30.csv")  # rounding to 17 digits is within the bound
     assert all(beyond == 0 and 0.0 < attitude < 2e-16 for attitude, _, beyond in rows.values())
     with pytest.raises(subprocess.CalledProcessError):
-        checked(folder, folder / "problems.csv")
+        run_checker(folder, folder / "problems.csv")
     data, rows = (netcdf.read(folder / "states.nc"), rows_of(folder / "states-30.csv"))
-    for scene, given in zip(scenes, rows_of(folder / "problems.csv"), strict=True):
-        printed = [float(row["time"]) for row in rows if row["name"] == scene.name]
-        assert printed == data["time"].sel(problem=scene.name).values.tolist()
-        assert [float(given[name]) for name in test_set.GIVEN] == list(scene.top.flat(scene.start))
-    said = " ".join((folder / "README.md").read_text(encoding="utf-8").split())
-    assert "a number that is given, of a problem or a time, is the double nearest to what is printed" in said
+    for scene, problem in zip(scenes, rows_of(folder / "problems.csv"), strict=True):
+        times = [float(row["time"]) for row in rows if row["name"] == scene.name]
+        assert times == data["time"].sel(problem=scene.name).values.tolist()
+        assert [float(problem[name]) for name in test_set.GIVEN] == list(scene.top.flat(scene.start))
+    text = " ".join((folder / "README.md").read_text(encoding="utf-8").split())
+    assert "a number that is given, of a problem or a time, is the double nearest to what is printed" in text
 
 
 def test_a_sign_in_the_inertia_is_found_by_both_checkers(bodies, tmp_path):
@@ -161,30 +161,30 @@ def test_a_sign_in_the_inertia_is_found_by_both_checkers(bodies, tmp_path):
     times = rows_of(folder / "states-17.csv")
     right = own_file(tmp_path / "right.csv", scenes, times)
     wrong = own_file(tmp_path / "wrong.csv", scenes, times, lambda b: RigidBody(*b.moments[::-1], b.mgl, b.centre))
-    near, _ = checked(folder, right)
-    far, shown = checked(folder, wrong)
-    assert max(attitude for attitude, _, _ in near.values()) < 1e-5  # of the lines between its samples
-    assert all(attitude > 0.01 and beyond == test_set.TIMES for attitude, _, beyond in far.values())
+    errors, _ = run_checker(folder, right)
+    control, output = run_checker(folder, wrong)
+    assert max(attitude for attitude, _, _ in errors.values()) < 1e-5  # of the lines between its samples
+    assert all(attitude > 0.01 and beyond == test_set.TIMES for attitude, _, beyond in control.values())
     if (compiler := shutil.which("cc")) is None:
         pytest.skip("no compiler of C")
     subprocess.run([compiler, str(folder / "check.c"), "-o", str(tmp_path / "check"), "-lm"], check=True)
-    for mine, answer in ((wrong, shown), (folder / "states-17.csv", None)):
+    for mine, expected in ((wrong, output), (folder / "states-17.csv", None)):
         words = [str(tmp_path / "check"), str(mine), str(folder / "states-17.csv")]
         result = subprocess.run(words, capture_output=True, text=True, check=True).stdout
-        assert result == answer if answer else result.count(" 0 beyond the bound") == len(scenes)
+        assert result == expected if expected else result.count(" 0 beyond the bound") == len(scenes)
 
 
-@pytest.mark.parametrize("lost", ["qw", "qz", "Lx", "Lz"])
-def test_a_number_that_is_lost_is_beyond_the_bound(lost, bodies, tmp_path):
+@pytest.mark.parametrize("column", ["qw", "qz", "Lx", "Lz"])
+def test_a_number_that_is_lost_is_beyond_the_bound(column, bodies, tmp_path):
     folder, scenes = bodies
     rows = rows_of(folder / "states-17.csv")
     for row in rows[: test_set.TIMES]:
-        row[lost] = "nan"
+        row[column] = "nan"
     with (tmp_path / "lost.csv").open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, rows[0])
         writer.writeheader()
         writer.writerows(rows)
-    beyond = [row[2] for row in checked(folder, tmp_path / "lost.csv")[0].values()]
+    beyond = [row[2] for row in run_checker(folder, tmp_path / "lost.csv")[0].values()]
     assert beyond == [test_set.TIMES] + [0] * (len(scenes) - 1)
     result = subprocess.run([sys.executable, str(folder / "check.py")], capture_output=True, text=True, check=False)
     assert (result.returncode, result.stderr) == (1, "usage: python check.py MINE.csv states-17.csv\n")
@@ -198,11 +198,11 @@ def test_the_digits_are_those_of_other_ways(bodies):
     mp = context(100)  # in which the product of two doubles is exact
     for scene in scenes:
         times = data["time"].sel(problem=scene.name).values
-        own = [row for row in rows if row["name"] == scene.name]
+        own_rows = [row for row in rows if row["name"] == scene.name]
         if scene.top.free:
             momentum = [mp.mpf(a) * mp.mpf(b) for a, b in zip(scene.top.moments, scene.start.omega_body, strict=True)]
             true = PreciseBody(scene.top.moments, scene.start.quaternion, momentum)
-            for row, state in zip(own, true.states(times), strict=True):
+            for row, state in zip(own_rows, true.states(times), strict=True):
                 q = [true.mp.mpf(row[name]) for name in ("qw", "qx", "qy", "qz")]
                 gap = min(true.mp.norm([a - s * b for a, b in zip(q, state[:4], strict=True)]) for s in (1, -1))
                 assert gap < 3e-30
@@ -215,11 +215,11 @@ def test_the_digits_are_those_of_other_ways(bodies):
 
 def test_a_start_that_is_moved_by_a_rounding_is_another_motion(monkeypatch):
     scene = scenes_of(body_population(1, seed=3, kind="regular"))[0]
-    one, again = (body_digits(scene.top, scene.start, [0.5]) for _ in range(2))
-    assert one == again
+    first, second = (body_digits(scene.top, scene.start, [0.5]) for _ in range(2))
+    assert first == second
     w1, w2, w3 = scene.start.omega_body
-    other = body_digits(scene.top, Attitude(scene.start.quaternion, (np.nextafter(w1, 9.0), w2, w3)), [0.5])
-    assert 1e-18 < abs(other.momentum[0][0] - one.momentum[0][0]) < 1e-14
+    control = body_digits(scene.top, Attitude(scene.start.quaternion, (np.nextafter(w1, 9.0), w2, w3)), [0.5])
+    assert 1e-18 < abs(control.momentum[0][0] - first.momentum[0][0]) < 1e-14
     monkeypatch.setattr("symtop.model.exact.body_digits.LONGEST", 5)
     with pytest.raises(symtop.SymtopError, match="times must be within 5 steps of the series, not reach 1000"):
         body_digits(scene.top, scene.start, [1000.0])

@@ -71,17 +71,17 @@ def test_a_page_without_what_was_not_measured_says_so_once_and_points_without_a_
     assert text.split("\n\n") == ["# Q?", template.PARTIAL, "It is 1. So it ends.", "Raw.", "- one 1", "**A title**",
                                   "![For the blind](figures/a.png)", "A title.\n"]  # fmt: skip
     assert template.answer(findings, tmp_path) == "It is 1. So it ends."
-    whole = template.filled(findings | {"facts": {"a": 1, "b": 2}}, tmp_path)
-    assert template.PARTIAL not in whole
-    assert "**Head.** Only 2." in whole
-    assert "- two 2 and more" in whole
+    text = template.filled(findings | {"facts": {"a": 1, "b": 2}}, tmp_path)
+    assert template.PARTIAL not in text
+    assert "**Head.** Only 2." in text
+    assert "- two 2 and more" in text
     with pytest.raises(symtop.SymtopError, match="page of mine"):
         template.filled(findings | {"facts": {"a": 1}}, tmp_path)
     chart = {"title": "c", "panels": {"one": [("rk4", [(1.0, math.nan, 1e-3, "w"), (2.0, math.inf, 1e-4, "v")])]}}
     points = json.loads(prepared(chart))["panels"]["one"][0]["points"]
     assert points == [[1.0, None, 1e-3, "w"], [2.0, None, 1e-4, "v"]]
-    for stored, words in (("[]", "no study has left findings"), ("{}", "the findings of drift in .* are incomplete")):
-        (tmp_path / "drift.json").write_text(stored, encoding="utf-8")
+    for content, words in (("[]", "no study has left findings"), ("{}", "the findings of drift in .* are incomplete")):
+        (tmp_path / "drift.json").write_text(content, encoding="utf-8")
         with pytest.raises(symtop.SymtopError, match=words):
             gather(tmp_path)
 
@@ -90,16 +90,16 @@ def test_a_page_without_what_was_not_measured_says_so_once_and_points_without_a_
 def test_a_damaged_file_is_named_and_one_of_another_kind_is_left_out(name, remedy, tmp_path):
     findings = {"study": "mine", "question": "Q?", "page": PAGE, "facts": {}, "tables": [], "pictures": []}
     (tmp_path / "mine.json").write_text(json.dumps(findings), encoding="utf-8")
-    for other in ("null", "[]"):
-        (tmp_path / f"{name}.json").write_text(other, encoding="utf-8")
-        assert [one["study"] for one in gather(tmp_path)] == ["mine"]
+    for content in ("null", "[]"):
+        (tmp_path / f"{name}.json").write_text(content, encoding="utf-8")
+        assert [finding["study"] for finding in gather(tmp_path)] == ["mine"]
     (tmp_path / f"{name}.json").write_text("{", encoding="utf-8")
     with pytest.raises(symtop.SymtopError, match=rf"{name}\.json is damaged \(.*\); {remedy}remove the file"):
         gather(tmp_path)
     (tmp_path / "quick").mkdir()
     (tmp_path / "mine.json").rename(tmp_path / "quick" / "mine.json")
-    about = {"measured": "Then.", "command": "python -m benchmarks.guard", "pictures": [{"file": "none.png"}]}
-    (tmp_path / f"{name}.json").write_text(json.dumps(findings | about), encoding="utf-8")
+    extra = {"measured": "Then.", "command": "python -m benchmarks.guard", "pictures": [{"file": "none.png"}]}
+    (tmp_path / f"{name}.json").write_text(json.dumps(findings | extra), encoding="utf-8")
     with pytest.raises(symtop.SymtopError, match=r"run it again: python -m benchmarks\.guard$"):
         gather(tmp_path)
     assert "the report is made of those in" in call("report", "--results", tmp_path, code=None).output
@@ -111,8 +111,8 @@ def lines(table):
 
 
 def test_the_tables_of_scenes_give_every_scene_back_to_the_last_bit():
-    known = page.scene_tables()
-    uses, starts = lines(known["uses"]), lines(known["starts"])
+    tables = page.scene_tables()
+    uses, starts = lines(tables["uses"]), lines(tables["starts"])
     assert [row[0] for row in uses] == [row[0] for row in starts] == list(symtop.scenes())
     for row, numbers in zip(uses, starts, strict=True):
         scene, values = symtop.scene(row[0]), [float(cell) for cell in numbers[1:]]

@@ -21,7 +21,7 @@ from symtop.model.exact import heavy_body
 from symtop.run.ensemble import chunks
 from symtop.run.ensemble.bodies import scenes_of
 from tests.commands import call
-from tests.conftest import late
+from tests.conftest import defer
 from tests.run.test_ensemble import assert_alone
 
 pytestmark = pytest.mark.usefixtures("in_lanes")
@@ -70,7 +70,7 @@ def slope(scene: symtop.Scene, method: str, order: int, true: symtop.Scene | Non
 
 @pytest.mark.parametrize("name", BODIES)
 @pytest.mark.parametrize(("method", "order"), [
-    *((name, FIXED[name]) for name in CONSERVED), *late(*(one for one in FIXED.items() if one[0] not in CONSERVED)),
+    *((name, FIXED[name]) for name in CONSERVED), *defer(*(row for row in FIXED.items() if row[0] not in CONSERVED)),
 ])  # fmt: skip
 def test_the_error_falls_by_the_order(name: str, method: str, order: int) -> None:
     steep = 6.0 if order in (9, 16) else 1.6  # there the long steps fall as powers of h over a radius
@@ -82,8 +82,8 @@ def test_the_error_falls_by_the_order(name: str, method: str, order: int) -> Non
 def test_a_table_for_an_exact_drift_falls_to_order_two_with_one_of_order_two(name: str, method: str) -> None:
     entry = symtop.integrator(method)
     solver = dataclasses.replace(entry.solvers[BODY], loop=splitting_body.march(STRANG))  # type: ignore[type-var]
-    plain = dataclasses.replace(entry, name="plain", order=2, solvers={BODY: solver})
-    coarse, fine = (error(name, plain, step_size=symtop.body_scenes()[name].nutation_period / n) for n in (40, 80))
+    variant = dataclasses.replace(entry, name="plain", order=2, solvers={BODY: solver})
+    coarse, fine = (error(name, variant, step_size=symtop.body_scenes()[name].nutation_period / n) for n in (40, 80))
     assert abs(math.log2(coarse / fine) - 2.0) < 0.1
 
 
@@ -96,15 +96,15 @@ def test_a_tight_tolerance_comes_to_the_true_motion(name: str, method: str) -> N
 
 @pytest.mark.parametrize("name", BODIES)
 @pytest.mark.parametrize(("order", "method"), [
-    (2, "strang"), (4, "gauss-4"), *late(*{order: method for method, order in FIXED.items()}.items())])  # fmt: skip
+    (2, "strang"), (4, "gauss-4"), *defer(*{order: method for method, order in FIXED.items()}.items())])  # fmt: skip
 def test_a_wrong_sign_in_the_inertia_is_caught(name: str, method: str, order: int) -> None:
     """The same momentum of the mirrored body: I1 and I3 exchanged turn the gyroscopic torque around."""
     scene = symtop.body_scenes()[name]
     body, M = scene.top, scene.top.momentum(scene.start)
     mirrored = RigidBody(body.I3, body.I2, body.I1, body.mgl, body.centre)
     rates = tuple(part / moment for part, moment in zip(M, mirrored.moments, strict=True))
-    other = symtop.Scene("other", mirrored, Attitude(scene.start.quaternion, rates), scene.horizon)
-    assert abs(slope(other, method, order, scene)) < order - 0.6
+    control = symtop.Scene("other", mirrored, Attitude(scene.start.quaternion, rates), scene.horizon)
+    assert abs(slope(control, method, order, scene)) < order - 0.6
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -121,10 +121,10 @@ def test_a_method_keeps_what_it_must_and_nothing_else(name: str, method: str) ->
 @pytest.mark.parametrize("mgl", [0.0, 2.0])
 def test_a_symmetric_body_has_the_energy_and_the_momenta_of_the_top(mgl: float) -> None:
     quaternion, rates = (0.8, 0.6, 0.0, 0.0), (0.2, 0.3, 3.0)
-    at, start = Attitude(quaternion, rates), symtop.Angles.from_quaternion(quaternion, omega_body=rates)
+    attitude, start = Attitude(quaternion, rates), symtop.Angles.from_quaternion(quaternion, omega_body=rates)
     body, top = RigidBody(2.0, 2.0, 1.0, mgl), symtop.SymmetricTop(2.0, 1.0, mgl)
-    assert body.energy(at) == pytest.approx(top.energy(start), rel=1e-14)
-    assert body.momenta(at) == pytest.approx(top.momenta(start)[:2], rel=1e-14)
+    assert body.energy(attitude) == pytest.approx(top.energy(start), rel=1e-14)
+    assert body.momenta(attitude) == pytest.approx(top.momenta(start)[:2], rel=1e-14)
 
 
 @pytest.mark.parametrize("mgl", [0.0, 1.0])
@@ -142,8 +142,8 @@ def gap(method: str, second: float, step: float) -> float:
     start = symtop.Angles.from_quaternion(quaternion, omega_body=rates)
     top = symtop.Scene("top", symtop.SymmetricTop(2.0, 1.0, 2.0), start, 10.0)
     body = symtop.Scene("body", RigidBody(2.0, second, 1.0, 2.0), Attitude(quaternion, rates), 10.0)
-    runs = (symtop.simulate(one, f"{method}[{chart}]", step_size=step, guard=False)["quaternion"].values
-            for one, chart in ((top, "attitude"), (body, "body")))  # fmt: skip
+    runs = (symtop.simulate(scene, f"{method}[{chart}]", step_size=step, guard=False)["quaternion"].values
+            for scene, chart in ((top, "attitude"), (body, "body")))  # fmt: skip
     return float(attitude_distance(*runs).max())
 
 
@@ -170,8 +170,8 @@ def test_energy_and_momentum_of_a_run_are_those_of_its_states():
     assert abs(run["energy"][0] - truth["energy"][0]) < 1e-15
     assert 1e-6 < abs(run["energy"] - run["energy"][0]).max() < 1e-1
     slow = symtop.Scene("slow", RigidBody(1.0, 1.3, 0.7, 1.0, (1.0, 0.0, 1.0)), Attitude(omega_body=(0, 0, 1e-8)), 20.0)
-    shown = symtop.errors(symtop.reference(slow, run.time.values).assign(p_psi=run.time), slow, precision="quad")
-    assert 1e-10 < shown.momentum.max() < shown.momentum_bound.max()  # |L| becomes 1e8 times that of the start
+    errors = symtop.errors(symtop.reference(slow, run.time.values).assign(p_psi=run.time), slow, precision="quad")
+    assert 1e-10 < errors.momentum.max() < errors.momentum_bound.max()  # |L| becomes 1e8 times that of the start
     thin = symtop.Scene("thin", RigidBody(1e-13, 1.0, 1.0, 1.0, (1.0, 0.0, 0.0)), Attitude(), 500.0)
     assert thin.momentum_scale == 1.0  # whatever the order of the axes
     assert symtop.ensemble([thin], "vern9", tolerance=1e-9).outcome == "ok"
@@ -183,11 +183,11 @@ def test_a_sweep_and_a_comparison_take_a_body(tmp_path) -> None:  # type: ignore
     data = symtop.sweep("heavy-brick", ["rk4", "tsit5-fixed"], **setting)
     error = data["attitude"].values[0]
     assert ((error[:, 1] < error[:, 0] / 10.0) & (error[:, 1] > 1e-12) & (data["chart"].values == "body")).all()
-    shown = symtop.compare("check-case-2", ["rk4", "series-general"], quantity="attitude", quiet=True)
-    assert [*shown["variant"].values] == ["rk4[body]", "series-general[body]"]
-    assert ((shown["seconds"].max("setting") > 0.0) & shown["exact_seconds"].isnull()).all()
-    for drawn in (data, shown, symtop.simulate("heavy-brick", "rk4", step_size=0.2, samples=11, guard=False)):
-        assert symtop.plot(drawn, quantity="energy").get_ylabel().endswith("energy error / (T0 + |mgl|)")
+    comparison = symtop.compare("check-case-2", ["rk4", "series-general"], quantity="attitude", quiet=True)
+    assert [*comparison["variant"].values] == ["rk4[body]", "series-general[body]"]
+    assert ((comparison["seconds"].max("setting") > 0.0) & comparison["exact_seconds"].isnull()).all()
+    for dataset in (data, comparison, symtop.simulate("heavy-brick", "rk4", step_size=0.2, samples=11, guard=False)):
+        assert symtop.plot(dataset, quantity="energy").get_ylabel().endswith("energy error / (T0 + |mgl|)")
 
 
 OWN = ["--body", "1,2,3", "--rates", "0.01,1,0"]
@@ -207,45 +207,45 @@ def test_a_body_of_ones_own_that_is_none(words: list[str], sentence: str) -> Non
 
 
 def test_a_body_of_ones_own_on_the_command_line() -> None:
-    body, at = RigidBody(1.0, 1.2, 0.6, 1.0, (0.1, 0.0, 1.0)), Attitude((0.8, 0.6, 0.0, 0.0), (0.2, 0.3, 3.0))
+    body, state = RigidBody(1.0, 1.2, 0.6, 1.0, (0.1, 0.0, 1.0)), Attitude((0.8, 0.6, 0.0, 0.0), (0.2, 0.3, 3.0))
     options = ["--body=1,1.2,0.6", "--mgl=1", "--centre=0.1,0,1", "--attitude=0.8,0.6,0,0", "--rates=0.2,0.3,3"]
-    stored = json.loads(call("scenes", "body", "--json", *options).stdout)[0]
-    assert stored["top"]["centre"] == list(body.centre)
-    assert float(stored["nutation period"]) == pytest.approx(body.nutation_period(at), rel=1e-5)
+    entry = json.loads(call("scenes", "body", "--json", *options).stdout)[0]
+    assert entry["top"]["centre"] == list(body.centre)
+    assert float(entry["nutation period"]) == pytest.approx(body.nutation_period(state), rel=1e-5)
     run = ["rk4", "--step-size", "0.05", "--horizon", "20", "--json"]
-    own, named = (json.loads(call("run", *words).stdout) for words in (["body", *run, *options], ["heavy-brick", *run]))
-    assert own["errors"] == named["errors"]
-    lost = call("run", "heavy-chaotic", "rk4", "--step-size", "0.05", "--horizon", "60", "--json")
-    assert (json.loads(lost.stdout)["errors"], json.loads(lost.stdout)["judgement"]) == ({}, None)
-    assert "not compared with the true motion: horizon must be at most" in lost.stderr
+    mine, named = (json.loads(call("run", *args).stdout) for args in (["body", *run, *options], ["heavy-brick", *run]))
+    assert mine["errors"] == named["errors"]
+    result = call("run", "heavy-chaotic", "rk4", "--step-size", "0.05", "--horizon", "60", "--json")
+    assert (json.loads(result.stdout)["errors"], json.loads(result.stdout)["judgement"]) == ({}, None)
+    assert "not compared with the true motion: horizon must be at most" in result.stderr
     # with two equal moments and the centre on the third axis it is a top, and has all that a top has
     run = ["run", "body", "stormer-verlet", "--step-size", "1e-3", "--json", "--mgl", "3", "--centre", "0,0,-2"]
-    own = json.loads(call(*run, *options[-2:], "--body", "2,2,1").stdout)
-    start = symtop.Angles.from_quaternion(at.quaternion, omega_body=at.omega_body)
-    top = symtop.Scene("body", symtop.SymmetricTop(2.0, 1.0, -3.0), start, own["reached_time"])
+    report = json.loads(call(*run, *options[-2:], "--body", "2,2,1").stdout)
+    start = symtop.Angles.from_quaternion(state.quaternion, omega_body=state.omega_body)
+    top = symtop.Scene("body", symtop.SymmetricTop(2.0, 1.0, -3.0), start, report["reached_time"])
     errors = symtop.errors(symtop.simulate(top, "stormer-verlet", step_size=1e-3))
-    assert own["errors"]["axis"]["largest"] == float(errors["axis"].max()) < 1e-4
+    assert report["errors"]["axis"]["largest"] == float(errors["axis"].max()) < 1e-4
     assert "chart body" in call(*run, *options[-2:], "--body", "2,2.001,1", code=2).stderr
 
 
 def test_chaos_ends_the_reference_and_a_body_at_rest_stays(monkeypatch):
     assert symtop.simulate("check-case-2", "lie-variational", step_size=6.0, guard=False).outcome == "not_converged"
-    whole = symtop.simulate("check-case-2", "euler-poincare", step_size=6.0, guard=False)
-    assert symtop.errors(whole)["momentum"].max() < 2e-14
-    still = symtop.Scene("still", RigidBody(1.0, 2.0, 2.5), Attitude(), 1.0)
-    data = symtop.long_run(still, "rk4", step_size=0.1, steps=20, quiet=True)
+    data = symtop.simulate("check-case-2", "euler-poincare", step_size=6.0, guard=False)
+    assert symtop.errors(data)["momentum"].max() < 2e-14
+    scene = symtop.Scene("still", RigidBody(1.0, 2.0, 2.5), Attitude(), 1.0)
+    data = symtop.long_run(scene, "rk4", step_size=0.1, steps=20, quiet=True)
     assert not data[["momentum_least", "momentum_largest"]].to_array().values.any()
     for times in ([400.0], [0.0, 20.0, 100.0, 200.0, 400.0], [4e9]):
-        with pytest.raises(symtop.SymtopError, match=r"times must be at most \d+.* on heavy-chaotic, not 4") as refused:
+        with pytest.raises(symtop.SymtopError, match=r"times must be at most \d+.* on heavy-chaotic, not 4") as info:
             symtop.reference("heavy-chaotic", times)
-        bound = symtop.reference("heavy-chaotic", [20.0, float(str(refused.value).split()[5])])["attitude_error_bound"]
+        bound = symtop.reference("heavy-chaotic", [20.0, float(str(info.value).split()[5])])["attitude_error_bound"]
         assert float(bound[0]) < 1e-12 < float(bound[1]) < 1e-9
     monkeypatch.setattr(heavy_body, "MOST_STEPS", 3000)
     ends, words = [], "on heavy-brick, not .*: to integrate its motion for longer takes more than 1,000,000 Taylor"
     for times in ([1e4], [3.0, 90.0, 1e5]):
-        with pytest.raises(symtop.SymtopError, match=words) as refused:
+        with pytest.raises(symtop.SymtopError, match=words) as info:
             symtop.reference("heavy-brick", times)
-        ends.append(float(str(refused.value).split()[5]))
+        ends.append(float(str(info.value).split()[5]))
     assert 80.0 < ends[0] == ends[1]  # and what is named is known
     assert symtop.reference("heavy-brick", ends[:1])["attitude_error_bound"] < 1e-12
 
@@ -256,12 +256,12 @@ def test_the_inertia_matrix_is_diagonalised_and_its_axes_kept() -> None:
     matrix = columns @ np.diag([1.0, 1.4, 2.1]) @ columns.T
     body = RigidBody.from_inertia(matrix.tolist(), 2.0, (columns @ [0.0, 0.6, 0.8]).tolist())
     assert body.moments == pytest.approx((1.0, 1.4, 2.1), rel=1e-14)
-    at = Attitude((0.6, 0.0, 0.8, 0.0), (0.3, 0.2, 0.1))
-    inside, spin = body.in_principal(at), np.array(at.omega_body)
-    kinetic = 0.5 * np.dot(body.momentum(inside), inside.omega_body)
+    start = Attitude((0.6, 0.0, 0.8, 0.0), (0.3, 0.2, 0.1))
+    principal, spin = body.in_principal(start), np.array(start.omega_body)
+    kinetic = 0.5 * np.dot(body.momentum(principal), principal.omega_body)
     assert 0.5 * spin @ matrix @ spin == pytest.approx(kinetic, rel=1e-13)
-    heavy = rotated(inside.quaternion, body.centre)[2]  # the height of the centre, in either axes
-    assert heavy == pytest.approx(rotated(at.quaternion, columns @ [0.0, 0.6, 0.8])[2], rel=1e-13)
+    height = rotated(principal.quaternion, body.centre)[2]  # the height of the centre, in either axes
+    assert height == pytest.approx(rotated(start.quaternion, columns @ [0.0, 0.6, 0.8])[2], rel=1e-13)
     for k, moments in enumerate([(1.4, 2.1, 1.0), (2.1, 1.0, 1.4), (1.0, 1.4, 2.1)]):  # third: that of the centre
         body = RigidBody.from_inertia(matrix.tolist(), 2.0, (columns @ -np.eye(3)[k]).tolist())
         assert (*body.moments, *body.centre) == pytest.approx((*moments, 0.0, 0.0, 1.0), abs=1e-14)
@@ -306,9 +306,9 @@ def together(members):
     (lambda: together([*scenes()[:2], "spheroid"]), "members must be all tops or all bodies without symmetry"),
 ])  # fmt: skip
 def test_what_is_no_body_or_takes_none_is_refused(make, words: str) -> None:  # type: ignore[no-untyped-def]
-    with pytest.raises(symtop.SymtopError) as refused:
+    with pytest.raises(symtop.SymtopError) as info:
         make()
-    assert words in str(refused.value)
+    assert words in str(info.value)
 
 
 def test_a_body_stored_or_of_plain_numbers_is_read_back_to_the_bit(tmp_path):  # type: ignore[no-untyped-def]
@@ -332,7 +332,7 @@ def test_a_body_stored_or_of_plain_numbers_is_read_back_to_the_bit(tmp_path):  #
 @pytest.mark.parametrize(("name", "execution"), [
     *((name, chunks.IN_LANES) for name in (
         "rk4", "strang", "chin-4a", "five-rotations", "vern9-fixed", "gauss-6", "rkmk-se3-4", "lie-variational")),
-    *late(*((name, chunks.IN_LANES) for name in ("gauss-12", "srkn-19-8", "crouch-grossman-3")), mark="slow"),
+    *defer(*((name, chunks.IN_LANES) for name in ("gauss-12", "srkn-19-8", "crouch-grossman-3")), mark="slow"),
     ("series-general", chunks.IN_TURN),
 ])  # fmt: skip
 @pytest.mark.parametrize("per_nutation", [4, 30])  # a turn of more than a radian leaves its lane
@@ -346,8 +346,8 @@ def test_a_member_is_the_run_of_simulate_to_the_last_bit(name, execution, per_nu
 def test_scenes_and_a_population_are_the_same_members_and_threads_change_nothing(monkeypatch, tmp_path):
     settings = {"step_size": 0.05, "horizon": 3.0, "samples": 5, "quiet": True}
     data = symtop.ensemble(bodies(), "strang", **settings)
-    others = symtop.ensemble(scenes(), "strang", **settings)
-    xr.testing.assert_identical(data.drop_vars("stratum").drop_attrs(), others.drop_vars("scene").drop_attrs())
+    expected = symtop.ensemble(scenes(), "strang", **settings)
+    xr.testing.assert_identical(data.drop_vars("stratum").drop_attrs(), expected.drop_vars("scene").drop_attrs())
     monkeypatch.setattr(chunks, "LEAST_STEPS", 100)
     xr.testing.assert_identical(symtop.ensemble(bodies(), "strang", threads=3, **settings), data)
     with symtop.ensemble(bodies(), "strang", path=tmp_path / "runs.nc", **settings) as written:
@@ -355,20 +355,20 @@ def test_scenes_and_a_population_are_the_same_members_and_threads_change_nothing
 
 
 def test_errors_are_those_of_each_member_against_its_own_truth():
-    some = [scenes()[i] for i in (0, 2, 4, 12)]  # free
+    members = [scenes()[i] for i in (0, 2, 4, 12)]  # free
     settings = {"nutations": 3, "samples": 5, "quiet": True}
-    data = symtop.ensemble(some, "strang", per_nutation=[100, 100, 100, 20], **settings)
-    errors = symtop.errors(data, some)
-    for i, scene in enumerate(some):
+    data = symtop.ensemble(members, "strang", per_nutation=[100, 100, 100, 20], **settings)
+    errors = symtop.errors(data, members)
+    for i, scene in enumerate(members):
         run = symtop.simulate(scene, "strang", step_size=float(data.step_size[i]), horizon=float(data.horizon[i]),
                               samples=5, guard=False)  # fmt: skip
         np.testing.assert_array_equal(errors.attitude[i], symtop.errors(run).attitude)
-    fine = symtop.errors(symtop.ensemble(some, "strang", per_nutation=100, **settings), some).attitude.max("time")
+    fine = symtop.errors(symtop.ensemble(members, "strang", per_nutation=100, **settings), members).attitude.max("time")
     ratio = errors.attitude.max("time") / fine
     assert ratio[:3].values.tolist() == [1.0] * 3
     assert 20.0 < ratio[3] < 30.0  # five times the step: order 2
     with pytest.warns(symtop.SymtopWarning, match="is this the start of the scene"):  # of other members: the control
-        assert symtop.errors(data.drop_vars("scene"), some[::-1]).attitude.max() > 1.0
+        assert symtop.errors(data.drop_vars("scene"), members[::-1]).attitude.max() > 1.0
 
 
 @pytest.mark.quick

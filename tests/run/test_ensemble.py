@@ -16,7 +16,7 @@ from symtop.model.scenes import nutation_period
 from symtop.run.ensemble import chunks
 from symtop.run.ensemble.chunks import nutation_periods, schedule
 from symtop.run.simulation import sample_times
-from tests.conftest import late
+from tests.conftest import defer
 
 pytestmark = pytest.mark.usefixtures("in_lanes")
 SOME = symtop.population(36, seed=5)
@@ -33,20 +33,20 @@ def assert_alone(members, name, data, samples, **setting):
     if isinstance(members, xr.Dataset):
         members = [symtop.Scene("one", *pair, 1.0) for pair in members_of(numbers_of(members))]
     for i, scene in enumerate(members):
-        one = data.isel(member=i)
-        settings = {"samples": samples, "horizon": float(one.horizon), "guard": False} | setting
+        member = data.isel(member=i)
+        settings = {"samples": samples, "horizon": float(member.horizon), "guard": False} | setting
         if not setting:
-            settings["step_size"] = float(one.step_size)
+            settings["step_size"] = float(member.step_size)
         observe = "attitude" if {"psi", "quaternion"} & {*data} else "axis"
         run = symtop.simulate(scene, name, observe=observe, **settings)
-        shown = run.sizes["time"]
+        count = run.sizes["time"]
         for variable in run.variables:
             if variable not in ("component", "part"):
-                np.testing.assert_array_equal(one[variable].values[:shown], run[variable].values, err_msg=f"{i}")
-                assert np.isnan(one[variable].values[shown:]).all()
-        assert str(one.outcome.values) == run.attrs["outcome"]
-        assert [one[word].item() for word in COUNTS] == [run.attrs[word] for word in COUNTS]
-        assert bool(one.dithered) == (run.attrs["sampling"] == "dithered")
+                np.testing.assert_array_equal(member[variable].values[:count], run[variable].values, err_msg=f"{i}")
+                assert np.isnan(member[variable].values[count:]).all()
+        assert str(member.outcome.values) == run.attrs["outcome"]
+        assert [member[word].item() for word in COUNTS] == [run.attrs[word] for word in COUNTS]
+        assert bool(member.dithered) == (run.attrs["sampling"] == "dithered")
 
 
 @pytest.mark.parametrize(("name", "settings", "samples"), [
@@ -55,7 +55,7 @@ def assert_alone(members, name, data, samples, **setting):
     ("strang[axis]", {"step_size": 0.02, "horizon": 2.0}, 60),
     ("midpoint[angles]", {"per_nutation": 12, "nutations": 20}, 45),
     ("cayley-tuned[axis]", {"per_nutation": 12, "nutations": 3}, 20),
-    *late(("gauss-4[attitude]", {"per_nutation": 12, "nutations": 5.5}, 50)),
+    *defer(("gauss-4[attitude]", {"per_nutation": 12, "nutations": 5.5}, 50)),
 ])  # fmt: skip
 def test_a_member_is_the_run_of_simulate_to_the_last_bit(name, settings, samples):
     data = symtop.ensemble(SOME, name, samples=samples, quiet=True, **settings)
@@ -68,48 +68,48 @@ def test_a_member_is_the_run_of_simulate_to_the_last_bit(name, settings, samples
     ("rk45", {"tolerance": 1e-4}), ("exact", {}),
 ])  # fmt: skip
 def test_methods_that_choose_their_steps_run_as_well(name, setting):
-    some = SOME.isel(member=slice(0, 8))
-    data = symtop.ensemble(some, name, nutations=2.7, samples=20, quiet=True, **setting)
-    assert_alone(some, name, data, 20, **(setting or {"tolerance": None}))
+    members = SOME.isel(member=slice(0, 8))
+    data = symtop.ensemble(members, name, nutations=2.7, samples=20, quiet=True, **setting)
+    assert_alone(members, name, data, 20, **(setting or {"tolerance": None}))
     assert data.attrs["execution"] == (chunks.IN_PYTHON if name == "rk45" else chunks.IN_TURN)
 
 
 @pytest.mark.slow
 def test_every_method_runs_and_every_member_is_the_run_of_simulate():
-    few = SOME.isel(member=slice(0, 5))
+    members = SOME.isel(member=slice(0, 5))
     for method in symtop.integrators().values():
         for chart in method.charts():
             row = method.variant(chart)
             setting = {"tolerance": max(1e-6, row.least_tolerance)} if row.adaptive else {}
             settings = {"per_nutation": 30} if row.fixed_step else setting
-            data = symtop.ensemble(few, row, nutations=1.3, samples=11, quiet=True, **settings)
+            data = symtop.ensemble(members, row, nutations=1.3, samples=11, quiet=True, **settings)
             if row.speed > 0.1:
-                assert_alone(few, row, data, 11, **(setting or ({} if row.fixed_step else {"tolerance": None})))
+                assert_alone(members, row, data, 11, **(setting or ({} if row.fixed_step else {"tolerance": None})))
 
 
 def test_threads_and_pieces_change_nothing(monkeypatch):
     settings = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
-    one = symtop.ensemble(SOME, "strang[axis]", threads=1, **settings)
+    expected = symtop.ensemble(SOME, "strang[axis]", threads=1, **settings)
     monkeypatch.setattr(chunks, "CHUNK", 21 * 5)
-    assert symtop.ensemble(SOME, "strang[axis]", threads=3, **settings).identical(one)
+    assert symtop.ensemble(SOME, "strang[axis]", threads=3, **settings).identical(expected)
     monkeypatch.setattr(chunks, "CHUNK_STEPS", 100)
-    assert symtop.ensemble(SOME, "strang[axis]", threads=2, **settings).identical(one)
+    assert symtop.ensemble(SOME, "strang[axis]", threads=2, **settings).identical(expected)
 
 
-@pytest.mark.parametrize(("n", "steps", "most"), [
+@pytest.mark.parametrize(("n", "steps", "share"), [
     (10_000, 1000, 0.1), (10_000, np.geomspace(10, 4000, 10_000).astype(int), 0.1),
     (10_000, "rk45-compiled", 0.1), (10_000, "rk45", 0.004), (40, 10, 1.0), (1, 10**9, 1.0), (3, 10**7, 0.4),
 ])  # fmt: skip
-def test_pieces_are_shares_of_the_work_and_whole_blocks(n, steps, most):
+def test_pieces_are_shares_of_the_work_and_whole_blocks(n, steps, share):
     """What is worth more than a millisecond is shared evenly; a few short runs stay in one piece."""
-    named = isinstance(steps, str)
-    counts, method = None if named else np.broadcast_to(steps, n), symtop.integrator(steps if named else "strang")
+    is_name = isinstance(steps, str)
+    counts, method = None if is_name else np.broadcast_to(steps, n), symtop.integrator(steps if is_name else "strang")
     members = np.zeros((n, 9)), np.ones(n), counts, None
-    cut = list(chunks.Job(method.variant("axis"), "axis", *members, 11, None, ("axis",)).chunks())
-    assert [*(piece.start for piece in cut), n] == [0, *(piece.stop for piece in cut)]
+    pieces = list(chunks.Job(method.variant("axis"), "axis", *members, 11, None, ("axis",)).chunks())
+    assert [*(piece.start for piece in pieces), n] == [0, *(piece.stop for piece in pieces)]
     work = np.ones(n) if counts is None else counts
-    assert 0.5 * most < max(work[piece].sum() for piece in cut) / work.sum() <= most
-    assert all((piece.stop - piece.start) % W == 0 for piece in cut[:-1] if piece.stop - piece.start > 4 * W)
+    assert 0.5 * share < max(work[piece].sum() for piece in pieces) / work.sum() <= share
+    assert all((piece.stop - piece.start) % W == 0 for piece in pieces[:-1] if piece.stop - piece.start > 4 * W)
 
 
 def test_scalars_count_for_all_members_and_steps_and_horizons_may_differ():
@@ -121,38 +121,38 @@ def test_scalars_count_for_all_members_and_steps_and_horizons_may_differ():
         assert data.theta[:, 0].values == pytest.approx([0.3, 0.8, 1.2], abs=1e-15)
         assert_alone(members, "strang[axis]", data, 31)
     np.testing.assert_array_equal(data["time"], [0.0, 0.5, 1.0, 1.5, 2.0, *[np.nan] * 26])
-    other = symtop.ensemble(members, "strang[axis]", step_size=[0.5, 0.5, 0.4], **settings)
-    assert other["time"].dims == ("member", "time")
+    data = symtop.ensemble(members, "strang[axis]", step_size=[0.5, 0.5, 0.4], **settings)
+    assert data["time"].dims == ("member", "time")
     members = SOME.isel(member=slice(0, 3))
     period = nutation_periods(numbers_of(members))
     steps, ends = period / [10.0, 20.0, 35.0], period * [1.0, 2.0, 3.0]
-    given = symtop.ensemble(members, "strang[axis]", step_size=steps, horizon=xr.DataArray(ends), quiet=True)
-    counted = symtop.ensemble(members, "strang[axis]", per_nutation=[10, 20, 35], nutations=[1, 2, 3], quiet=True)
-    assert given.steps.values.tolist() == [10, 40, 105]
-    assert given.identical(counted)
-    assert np.isfinite(given.theta).sum("time").values.tolist() == [11, 41, 101]
+    data = symtop.ensemble(members, "strang[axis]", step_size=steps, horizon=xr.DataArray(ends), quiet=True)
+    expected = symtop.ensemble(members, "strang[axis]", per_nutation=[10, 20, 35], nutations=[1, 2, 3], quiet=True)
+    assert data.steps.values.tolist() == [10, 40, 105]
+    assert data.identical(expected)
+    assert np.isfinite(data.theta).sum("time").values.tolist() == [11, 41, 101]
 
 
 def test_a_member_that_fails_fails_alone():
     """Steps that jump over a pole, a start on a pole where the angles chart ends: the others do not notice."""
     members = symtop.population(40, seed=3)
-    moved = members.copy(deep=True)
-    moved.theta[4] = 0.0
+    control = members.copy(deep=True)
+    control.theta[4] = 0.0
     settings = {"per_nutation": 30, "nutations": 2.2, "samples": 21, "quiet": True}
     for name in ("stormer-verlet", "rk4[angles]"):
-        data, other = (symtop.ensemble(some, name, **settings) for some in (members, moved))
+        data, second = (symtop.ensemble(tops, name, **settings) for tops in (members, control))
         assert {"ok", "left_chart"} <= set(data.outcome.values.tolist())
         failed = data.isel(member=data.outcome.values == "left_chart")
         assert (failed.reached_time < failed.horizon).all()
         assert not np.isfinite(failed.theta[:, -1]).any()
-        rest = np.arange(40) != 4
-        assert other.isel(member=rest).identical(data.isel(member=rest))
-        assert other.attrs["title"] == f"{name} on 40 tops"
+        mask = np.arange(40) != 4
+        assert second.isel(member=mask).identical(data.isel(member=mask))
+        assert second.attrs["title"] == f"{name} on 40 tops"
         with pytest.warns(symtop.SymtopWarning, match="^1 of 1 members ended early: 1 left_chart$"):
-            one = symtop.ensemble(moved.isel(member=[4]), name, **settings | {"quiet": False})
-        assert one.attrs["title"] == f"{name} on 1 top"
-        assert (other.outcome[4], other.steps[4], other.reached_time[4]) == ("left_chart", 0, 0.0)
-        assert np.isnan(other.theta[4]).all()
+            single = symtop.ensemble(control.isel(member=[4]), name, **settings | {"quiet": False})
+        assert single.attrs["title"] == f"{name} on 1 top"
+        assert (second.outcome[4], second.steps[4], second.reached_time[4]) == ("left_chart", 0, 0.0)
+        assert np.isnan(second.theta[4]).all()
 
 
 @pytest.mark.parametrize(("spoilt", "reason"), [
@@ -226,7 +226,7 @@ def test_periods_are_those_of_one_top_and_one_without_a_nutation_has_no_steps_pe
     assert chunks._periods.compiled is None  # few are interpreted
     assert nutation_periods(np.tile(numbers, (8, 1))).tolist() == 8 * period.tolist()
     assert chunks._periods.compiled is not None
-    assert period.tolist() == [nutation_period(*one) for one in members_of(numbers)]
+    assert period.tolist() == [nutation_period(*pair) for pair in members_of(numbers)]
     assert (period != [top.nutation_period(start) for top, start in members_of(numbers)]).sum() > 5
     np.testing.assert_allclose(period, ClosedForms(numbers).nutation_period, rtol=1e-7)
 
@@ -234,16 +234,16 @@ def test_periods_are_those_of_one_top_and_one_without_a_nutation_has_no_steps_pe
 def test_kernels_in_lanes_wait_for_many_steps_unless_they_are_stored_and_change_no_bit(monkeypatch):
     """36 members of 60 steps."""
     settings = {"per_nutation": 20, "nutations": 3, "samples": 9, "quiet": True}
-    whole, blocks = symtop.ensemble(SOME, STRANG, **settings), symtop.integrator(STRANG).solvers["axis"]._whole.blocks()
+    first, blocks = symtop.ensemble(SOME, STRANG, **settings), symtop.integrator(STRANG).solvers["axis"]._whole.blocks()
     run = Mock(side_effect=blocks.run)
     cases = (False, 5000, 0, 0), (False, 5000, 2160, 0), (False, 5000, 4320, 1), (True, 5000, 0, 2), (False, 2100, 0, 4)
-    for stored, few, before, calls in cases:  # the last in two chunks, each of fewer steps
-        for place, change in ((lanes, {"is_stored": {blocks.march: stored}.get, "FEW": few}),
-                              (chunks, {"LEAST_STEPS": few}), (blocks, {"run": run, "asked": before})):  # fmt: skip
+    for stored, limit, before, calls in cases:  # the last in two chunks, each of fewer steps
+        for place, change in ((lanes, {"is_stored": {blocks.march: stored}.get, "FEW": limit}),
+                              (chunks, {"LEAST_STEPS": limit}), (blocks, {"run": run, "asked": before})):  # fmt: skip
             for name, value in change.items():
                 monkeypatch.setattr(place, name, value)
-        assert symtop.ensemble(SOME, STRANG, **settings).identical(whole)
-        assert (run.call_count, blocks.asked) == (calls, before + 2160 * (few == 5000))
+        assert symtop.ensemble(SOME, STRANG, **settings).identical(first)
+        assert (run.call_count, blocks.asked) == (calls, before + 2160 * (limit == 5000))
 
 
 def marching(solver):
@@ -265,23 +265,23 @@ def test_the_dataset_says_how_members_were_run_and_they_are_the_same(change, exe
     """Members of fewer steps than samples, too, whose rows of marks end before those of others."""
     strang = symtop.integrator("strang[axis]")
     solver = dataclasses.replace(strang.solvers["axis"], **change(strang.solvers["axis"]))
-    changed = dataclasses.replace(strang, name="mine[axis]", solvers={"axis": solver})
+    variant = dataclasses.replace(strang, name="mine[axis]", solvers={"axis": solver})
     settings = {"per_nutation": np.linspace(5.0, 40.0, 36), "nutations": 3, "samples": 41, "quiet": True}
-    one, other = (symtop.ensemble(SOME, method, **settings) for method in (strang, changed))
-    assert (one.attrs["execution"], other.attrs["execution"]) == (chunks.IN_LANES, execution)
-    xr.testing.assert_identical(one.drop_attrs(), other.drop_attrs())
+    first, second = (symtop.ensemble(SOME, method, **settings) for method in (strang, variant))
+    assert (first.attrs["execution"], second.attrs["execution"]) == (chunks.IN_LANES, execution)
+    xr.testing.assert_identical(first.drop_attrs(), second.drop_attrs())
 
 
 def test_variables_are_those_of_all_and_need_no_closed_form(monkeypatch):
     settings = {"per_nutation": 20, "nutations": 3, "quiet": True}
-    whole = symtop.ensemble(SOME, "strang[attitude]", **settings)
+    expected = symtop.ensemble(SOME, "strang[attitude]", **settings)
     monkeypatch.setattr(chunks, "ClosedForms", None)
     data = symtop.ensemble(SOME, "strang[attitude]", variables=("energy", "axis"), **settings)
     assert [name for name in data if "time" in data[name].dims] == ["axis", "energy"]
-    xr.testing.assert_identical(data.axis, whole.axis)
-    xr.testing.assert_identical(data.energy, whole.energy)
+    xr.testing.assert_identical(data.axis, expected.axis)
+    xr.testing.assert_identical(data.energy, expected.energy)
     data = symtop.ensemble(SOME, "strang[attitude]", **settings)  # nor does phi, before it is read
-    xr.testing.assert_identical(data.theta, whole.theta)
+    xr.testing.assert_identical(data.theta, expected.theta)
     with pytest.raises(TypeError):
         data.phi.values  # noqa: B018
 
@@ -289,19 +289,19 @@ def test_variables_are_those_of_all_and_need_no_closed_form(monkeypatch):
 @pytest.mark.parametrize("name", ["strang[axis]", "strang[attitude]"])
 def test_angles_are_made_when_they_are_read_with_the_bits_of_a_file(name, tmp_path, monkeypatch):
     settings = {"per_nutation": 20, "nutations": 3, "samples": 7, "quiet": True}
-    data, again = (symtop.ensemble(SOME, name, **settings) for _ in range(2))
+    data, second = (symtop.ensemble(SOME, name, **settings) for _ in range(2))
     angles = [angle for angle in ("phi", "psi") if angle in data]
     with symtop.ensemble(SOME, name, path=tmp_path / "runs.nc", **settings) as written:
-        whole = {angle: written[angle].values for angle in angles}
-    assert any(np.abs(values).max() > np.pi for values in whole.values())  # more than a turn
+        expected = {angle: written[angle].values for angle in angles}
+    assert any(np.abs(values).max() > np.pi for values in expected.values())  # more than a turn
     for angle in angles:
-        np.testing.assert_array_equal(pickle.loads(pickle.dumps(data))[angle], whole[angle])
-        np.testing.assert_array_equal(data[angle].isel(member=[3, 30], time=slice(2, 5)), whole[angle][[3, 30], 2:5])
-        np.testing.assert_array_equal(data[angle].isel(member=4, time=-1), whole[angle][4, -1])
-    xr.testing.assert_identical(data.isel(member=slice(5, 30)).phi, again.load().phi.isel(member=slice(5, 30)))
+        np.testing.assert_array_equal(pickle.loads(pickle.dumps(data))[angle], expected[angle])
+        np.testing.assert_array_equal(data[angle].isel(member=[3, 30], time=slice(2, 5)), expected[angle][[3, 30], 2:5])
+        np.testing.assert_array_equal(data[angle].isel(member=4, time=-1), expected[angle][4, -1])
+    xr.testing.assert_identical(data.isel(member=slice(5, 30)).phi, second.load().phi.isel(member=slice(5, 30)))
     monkeypatch.setattr(chunks, "ClosedForms", None)  # what has been read is kept
-    again["phi"][2, 1] = 9.0
-    assert again.phi.values[2, 1] == 9.0
+    second["phi"][2, 1] = 9.0
+    assert second.phi.values[2, 1] == 9.0
 
 
 def raising(error, *bad):
@@ -318,31 +318,31 @@ def raising(error, *bad):
 
 def test_numbers_that_leave_the_range_fail_alone():
     settings = {"step_size": 0.1, "horizon": 2.0, "quiet": True}
-    one, other = (symtop.ensemble(SOME, method, **settings) for method in ("rk4[axis]", raising(ZeroDivisionError, 3)))
-    rest = np.arange(36) != 3
-    xr.testing.assert_identical(one.isel(member=rest).drop_attrs(), other.isel(member=rest).drop_attrs())
-    assert (other.outcome[3], other.reached_time[3]) == ("not_finite", 0.0)
-    assert np.isnan(other.theta[3]).all()
-    assert "raised" not in other.attrs
+    base, data = (symtop.ensemble(SOME, method, **settings) for method in ("rk4[axis]", raising(ZeroDivisionError, 3)))
+    mask = np.arange(36) != 3
+    xr.testing.assert_identical(base.isel(member=mask).drop_attrs(), data.isel(member=mask).drop_attrs())
+    assert (data.outcome[3], data.reached_time[3]) == ("not_finite", 0.0)
+    assert np.isnan(data.theta[3]).all()
+    assert "raised" not in data.attrs
 
 
 @pytest.mark.parametrize("path", [None, "runs.nc"])
 def test_a_member_on_which_a_solver_raises_is_lost_alone_and_told(path, tmp_path, monkeypatch):
     monkeypatch.setattr(chunks, "CHUNK", 21 * 5)
-    more = {} if path is None else {"path": tmp_path / path}
-    settings = {"step_size": 0.1, "horizon": 2.0, "samples": 21, "quiet": True, **more}
-    one = symtop.ensemble(SOME, "rk4[axis]", **settings).load()
-    one.close()
+    options = {} if path is None else {"path": tmp_path / path}
+    settings = {"step_size": 0.1, "horizon": 2.0, "samples": 21, "quiet": True, **options}
+    expected = symtop.ensemble(SOME, "rk4[axis]", **settings).load()
+    expected.close()
     for members, name in ((SOME, "3"), (SOME.assign_coords(member=[f"m{i}" for i in range(36)]), "m3")):
         first = rf"rk4-python\[axis\] on member {name} failed: TypeError: a reason"
         with pytest.warns(symtop.SymtopWarning, match=f"2 of 36 members raised an exception, the first: .*{first}"):
-            other = symtop.ensemble(members, raising(TypeError, 3, 30), **settings).load()
-        other.close()
-        assert ("raised" in other.attrs) == (path is None)
-        assert np.flatnonzero(other.outcome == "raised").tolist() == [3, 30]
-        assert np.isnan(other.theta[3]).all()
-        rest, bare = ~np.isin(np.arange(36), [3, 30]), other.drop_vars("member", errors="ignore")
-        xr.testing.assert_identical(one.isel(member=rest).drop_attrs(), bare.isel(member=rest).drop_attrs())
+            data = symtop.ensemble(members, raising(TypeError, 3, 30), **settings).load()
+        data.close()
+        assert ("raised" in data.attrs) == (path is None)
+        assert np.flatnonzero(data.outcome == "raised").tolist() == [3, 30]
+        assert np.isnan(data.theta[3]).all()
+        mask, bare = ~np.isin(np.arange(36), [3, 30]), data.drop_vars("member", errors="ignore")
+        xr.testing.assert_identical(expected.isel(member=mask).drop_attrs(), bare.isel(member=mask).drop_attrs())
 
 
 @pytest.mark.parametrize(("name", "meant"), [
@@ -362,28 +362,28 @@ def test_members_may_have_labels_of_any_other_name_and_rows_are_taken_by_label()
     settings = {"per_nutation": 20, "nutations": 2, "quiet": True}
     names = ("period", "weight", "phase", "p_phi", "theta_max", "group", "steps")
     members = SOME.assign(dict.fromkeys(names, SOME.I1)).assign(curve=("place", [1.0, 2.0]))
-    plain = symtop.ensemble(SOME, "strang[axis]", **settings)
-    assert symtop.ensemble(members, "strang[axis]", **settings).identical(plain)
+    expected = symtop.ensemble(SOME, "strang[axis]", **settings)
+    assert symtop.ensemble(members, "strang[axis]", **settings).identical(expected)
     counts, settings = np.linspace(10.0, 45.0, 36), {"nutations": 2, "quiet": True}
-    plain = symtop.ensemble(SOME, "strang[axis]", per_nutation=counts, **settings)
+    expected = symtop.ensemble(SOME, "strang[axis]", per_nutation=counts, **settings)
     for labels in ([f"m{i}" for i in range(36)], list(range(100, 136))):
         members, row = SOME.assign_coords(member=labels), xr.DataArray(counts, {"member": labels}, "member")
-        for given in (row, row[::-1], counts):
-            data = symtop.ensemble(members, "strang[axis]", per_nutation=given, **settings)
+        for values in (row, row[::-1], counts):
+            data = symtop.ensemble(members, "strang[axis]", per_nutation=values, **settings)
             assert data.member.values.tolist() == labels
-            assert data.drop_vars("member").identical(plain)
-    assert not symtop.ensemble(SOME, "strang[axis]", per_nutation=counts[::-1], **settings).identical(plain)
+            assert data.drop_vars("member").identical(expected)
+    assert not symtop.ensemble(SOME, "strang[axis]", per_nutation=counts[::-1], **settings).identical(expected)
     row, settings = xr.DataArray([1e-4, 1e-6, 1e-8] * 12, {"member": labels}, "member"), settings | {"nutations": 1}
-    one, other = (symtop.ensemble(members, RK45, tolerance=given, **settings) for given in (row, row[::-1]))
-    assert one.identical(other)
-    assert one.steps[0] < one.steps[2]
+    first, second = (symtop.ensemble(members, RK45, tolerance=tolerance, **settings) for tolerance in (row, row[::-1]))
+    assert first.identical(second)
+    assert first.steps[0] < first.steps[2]
 
 
 @pytest.mark.parametrize("name", ["step_size", "per_nutation", "horizon", "nutations"])
 def test_rows_of_others_are_refused(name):
     labels = [f"m{i}" for i in range(36)]
     members, values = SOME.assign_coords(member=labels), np.full(36, 5.0)
-    rest = {"step_size": 0.1} if name in ("horizon", "nutations") else {"horizon": 9.0}
+    options = {"step_size": 0.1} if name in ("horizon", "nutations") else {"horizon": 9.0}
     for row, reason in (
         (xr.DataArray(values, {"member": range(36)}, "member"), "the labels of the 36 members"),
         (xr.DataArray(values, {"member": ["m0"] * 36}, "member"), "the labels of the 36 members"),
@@ -392,21 +392,21 @@ def test_rows_of_others_are_refused(name):
         (xr.DataArray(-values, {"member": labels}, "member"), f"{name} of member m0 must be above zero"),
     ):
         with pytest.raises(symtop.SymtopError, match=reason):
-            symtop.ensemble(members, "strang[axis]", quiet=True, **rest, **{name: row})
+            symtop.ensemble(members, "strang[axis]", quiet=True, **options, **{name: row})
 
 
 def test_a_solver_that_raises_on_every_member_is_refused_and_an_ensemble_for_a_cluster_before_it_is_sent(tmp_path):
-    every = raising(TypeError, *range(36))
-    for more in ({}, {"path": tmp_path / "runs.nc"}):
+    method = raising(TypeError, *range(36))
+    for options in ({}, {"path": tmp_path / "runs.nc"}):
         with pytest.raises(symtop.SymtopError, match=r"on member 0 failed: TypeError: a reason"):
-            symtop.ensemble(SOME, every, step_size=0.1, horizon=2.0, quiet=True, **more)
+            symtop.ensemble(SOME, method, step_size=0.1, horizon=2.0, quiet=True, **options)
     assert list(tmp_path.iterdir()) == []
     settings = {"step_size": 0.1, "horizon": 2.0, "quiet": True, "path": tmp_path / "runs.nc"}
     with pytest.raises(symtop.SymtopError, match=r"scheduler must be the address of a dask scheduler.* not 5"):
         symtop.ensemble(SOME, "strang", scheduler=5, **settings)
-    own = symtop.composition("own-split", [0.5, 0.5], [0.25, 0.5, 0.25])
+    method = symtop.composition("own-split", [0.5, 0.5], [0.25, 0.5, 0.25])
     with pytest.raises(symtop.SymtopError, match=r"own-split.* cannot be sent to other processes: register it"):
-        symtop.ensemble(SOME, own, scheduler="tcp://127.0.0.1:1", **settings)
+        symtop.ensemble(SOME, method, scheduler="tcp://127.0.0.1:1", **settings)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -420,7 +420,7 @@ def test_scenes_are_members_with_horizons_of_their_own_and_swings_as_simulate_sa
     run = symtop.simulate("kinon-betsch", "strang", step_size=float(data.step_size[1]), samples=101, guard=False)
     np.testing.assert_array_equal(data.isel(member=1).phi, run.phi)
     # Its nutations count, where gravity alone would let it run.
-    fast = symtop.Scene("fast-one", symtop.SymmetricTop(1.0, 0.5, 1e-6), symtop.Angles(0.5, psi_dot=200.0), 2e7)
-    for run in (symtop.simulate, lambda one, name, **settings: symtop.ensemble([one], name, quiet=True, **settings)):
+    scene = symtop.Scene("fast-one", symtop.SymmetricTop(1.0, 0.5, 1e-6), symtop.Angles(0.5, psi_dot=200.0), 2e7)
+    for run in (symtop.simulate, lambda top, name, **settings: symtop.ensemble([top], name, quiet=True, **settings)):
         with pytest.raises(symtop.SymtopError, match=r"3\.18e\+08 swings"):
-            run(fast, "rk45-compiled[axis]", tolerance=1e-3)
+            run(scene, "rk45-compiled[axis]", tolerance=1e-3)

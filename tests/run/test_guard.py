@@ -49,12 +49,12 @@ def test_a_good_run_is_met_with_silence_and_any_run_with_the_same_bits(name, con
 
 def test_a_bad_run_is_the_same_run_with_a_warning():
     controls = {"step_size": 0.1, "samples": 41}
-    with pytest.warns(symtop.SymtopWarning, match="expect an axis error") as caught:
+    with pytest.warns(symtop.SymtopWarning, match="expect an axis error") as record:
         watched = symtop.simulate("spheroid", "midpoint", **controls)
-    assert len(caught) == 1
-    assert "\n" not in str(caught[0].message)
-    assert caught[0].filename == __file__  # the line that the user wrote
-    assert watched.attrs.pop("guard") == str(caught[0].message)
+    assert len(record) == 1
+    assert "\n" not in str(record[0].message)
+    assert record[0].filename == __file__  # the line that the user wrote
+    assert watched.attrs.pop("guard") == str(record[0].message)
     with warnings.catch_warnings(action="error"):
         quiet = symtop.simulate("spheroid", "midpoint", guard=False, **controls)
     del quiet.attrs["guard"]
@@ -113,9 +113,9 @@ def test_each_cause_is_named():
     assert "jumps over half a nutation" in caution("goldstein", "gauss-4", step_size=2.0)
     assert "1/3 of a turn, a resonance" in caution(nutating(), "stormer-verlet", step_size=math.sqrt(3.0) / frequency)
     assert "errors add up over" in caution("goldstein", "midpoint", step_size=0.1, horizon=1000.0)
-    assert all("it has no order" in caution("goldstein", one, step_size=0.01) for one in ("no-gyro", "jolt-float32"))
-    false = replace(symtop.integrator("no-gyro"), name="own", order=2)
-    assert all("`symtop claims own`" in caution("goldstein", false, step_size=h, horizon=2.0) for h in (0.01, 5e-4))
+    assert all("it has no order" in caution("goldstein", name, step_size=0.01) for name in ("no-gyro", "jolt-float32"))
+    method = replace(symtop.integrator("no-gyro"), name="own", order=2)
+    assert all("`symtop claims own`" in caution("goldstein", method, step_size=h, horizon=2.0) for h in (0.01, 5e-4))
     assert "take a step of about" in caution("goldstein", "mujoco-euler", step_size=0.01)
     assert "tolerance" in caution("goldstein", "rk45-compiled", tolerance=1e-5, horizon=1000.0)
     assert "not solved; take a step of about 0.063" in caution("sleeping", "trapezoidal", step_size=2.0, horizon=4000.0)
@@ -133,21 +133,21 @@ def test_a_remedy_is_a_remedy(scene, name, control, horizon):
     assert 1e-5 < float(symtop.errors(run)["axis"].max()) < EXPECTED
 
 
-def advised(draw, methods):
+def advice_errors(draw, methods):
     """A random run of a scene that the guard warns of, with a step: axis errors of the run and of the one advised."""
-    on, row = symtop.scene(draw.choice(REMEDIED)), symtop.integrator(draw.choice(methods))
-    chart, period = row.charts()[0], on.nutation_period
+    scene, row = symtop.scene(draw.choice(REMEDIED)), symtop.integrator(draw.choice(methods))
+    chart, period = row.charts()[0], scene.nutation_period
     step, horizon = period * math.exp(draw.uniform(math.log(0.004), math.log(0.7))), period * draw.uniform(2.0, 40.0)
-    plan, _ = make_plan(on, row, step, horizon=horizon, samples=201)
-    advice = re.search(r"take a step of about ([\d.e-]+)", guard.warning(on, row, chart, plan))
+    plan, _ = make_plan(scene, row, step, horizon=horizon, samples=201)
+    advice = re.search(r"take a step of about ([\d.e-]+)", guard.warning(scene, row, chart, plan))
     if advice is None:
         return None
     errors = []
     for setting in (step, float(advice[1])):
-        plan, _ = make_plan(on, row, setting, horizon=horizon, samples=201)
-        run = row.solvers[chart](on.top, on.start, plan)
+        plan, _ = make_plan(scene, row, setting, horizon=horizon, samples=201)
+        run = row.solvers[chart](scene.top, scene.start, plan)
         with np.errstate(all="ignore"):  # a run may have blown up
-            error = charts.axis_distance(axes(chart, run.states), closed_form(on).axis(plan.times))
+            error = charts.axis_distance(axes(chart, run.states), closed_form(scene).axis(plan.times))
         errors.append(float(error.max()) if run.outcome == "ok" else math.inf)
     return errors
 
@@ -156,7 +156,7 @@ def test_the_step_that_is_advised_works_whatever_the_cause():
     """Poles, resonances, steps beyond the stability limit and errors that add up; 2 of 600 were wrong, by 0.0125."""
     draw = random.Random(5)
     names = ("midpoint", "stormer-verlet", "strang", "rk4[axis]", "gauss-4", "generalised-alpha")
-    pairs = [pair for _ in range(120) if (pair := advised(draw, names)) is not None]
+    pairs = [pair for _ in range(120) if (pair := advice_errors(draw, names)) is not None]
     assert len(pairs) > 55
     before, after = np.array(pairs).T
     assert np.mean(after > EXPECTED) <= 0.02
@@ -249,7 +249,7 @@ def beside(moments, rates, periods):
     return symtop.Scene("beside", body, start, periods * body.nutation_period(start))
 
 
-@pytest.mark.parametrize(("scene", "name", "setting", "wrong"), [
+@pytest.mark.parametrize(("scene", "name", "setting", "alarm"), [
     ("heavy-brick", "rk4", 0.05, False), ("heavy-brick", "strang", 0.3, True), ("heavy-brick", "gauss-4", 0.1, False),
     ("tennis-racket", "strang", 0.3, True), ("tennis-racket", "kahan-li-8", 0.05, False),
     (beside((0.6, 0.73, 0.87), (2e-4, 1.7, -1e-4), 20.0), "crouch-grossman-3", 0.046, True),  # by 3 rad, at the second
@@ -260,12 +260,12 @@ def beside(moments, rates, periods):
     (beside((0.5, 0.8, 1.0), (math.sqrt(4 / 3) * (1 + 1e-10), 0.3, 1.0), 40.0), "gauss-4", 0.07, False),
     (beside((8.0101e37, 8.0103e37, 8.0365e37), (7e-11, 0.0, 7.292e-5), 20.0), "gauss-4", 600.0, False),  # Earth, in SI
 ])  # fmt: skip
-def test_a_run_of_a_body_is_warned_of_where_its_attitude_is_lost(scene, name, setting, wrong):
+def test_a_run_of_a_body_is_warned_of_where_its_attitude_is_lost(scene, name, setting, alarm):
     sentences = []
     run = symtop.simulate(scene, name, guard=sentences.append, **{symtop.integrator(name).control: setting})
-    assert run.attrs["outcome"] != "ok" or bool(symtop.errors(run)["attitude"].max() > EXPECTED) is wrong
-    assert bool(sentences) is wrong
-    assert not wrong or re.search("expect an attitude error|expect the run|rounding alone", sentences[0])
+    assert run.attrs["outcome"] != "ok" or bool(symtop.errors(run)["attitude"].max() > EXPECTED) is alarm
+    assert bool(sentences) is alarm
+    assert not alarm or re.search("expect an attitude error|expect the run|rounding alone", sentences[0])
 
 
 @pytest.mark.parametrize("name", ["rk4", "strang", "gauss-4", "midpoint"])
@@ -292,9 +292,9 @@ def test_the_guard_without_the_truth_is_asked_for_by_its_name():
 
 def test_a_run_far_longer_than_is_watched_is_warned_of_and_a_free_top_judged_like_any():
     for spin in (0.0, 0.5):
-        free = symtop.Scene("free", symtop.SymmetricTop(2, 1, 0), symtop.Angles(1, 0, 0, 1, 0, spin), 20.0)
-        assert "expect an axis error" in caution(free, "rk4[axis]", step_size=1.5)
-        assert caution(free, "rk4[axis]", step_size=1e-3) == ""
+        scene = symtop.Scene("free", symtop.SymmetricTop(2, 1, 0), symtop.Angles(1, 0, 0, 1, 0, spin), 20.0)
+        assert "expect an axis error" in caution(scene, "rk4[axis]", step_size=1.5)
+        assert caution(scene, "rk4[axis]", step_size=1e-3) == ""
     disc = symtop.Scene("disc", symtop.RigidBody(1.0, 0.3, 0.7), symtop.Attitude(omega_body=(1.0, 0.0, 1e-9)), 343.0)
     doubling, right, infinite = (caution(disc, name, step_size=h) for name, h in WOBBLY)
     assert ("3 rad by t = 343" in doubling, right, "stopped at t =" in infinite) == (True, "", True)
@@ -305,10 +305,10 @@ def test_a_run_far_longer_than_is_watched_is_warned_of_and_a_free_top_judged_lik
 def test_changes_tell_chaos_from_order_and_unstable_motions_are_warned_of_beyond_their_piece():
     """What a method commits later than its piece may exceed it; a stable motion has no such margin."""
     for name, margin in (("heavy-chaotic", 30.0), ("heavy-brick", 1.0)):
-        whole = (motion := Integrated(symtop.scene(name, bodies=True))).amplification(50.0, 50.0)
-        later = 1e-12 * margin * whole / motion.amplification(5.0, 50.0)
-        assert motion.amplified(1e-12, 5.0, 50.0) == pytest.approx(later)
-        assert whole > 1e4 if margin > 1.0 else whole < 1e3
+        growth = (motion := Integrated(symtop.scene(name, bodies=True))).amplification(50.0, 50.0)
+        expected = 1e-12 * margin * growth / motion.amplification(5.0, 50.0)
+        assert motion.amplified(1e-12, 5.0, 50.0) == pytest.approx(expected)
+        assert growth > 1e4 if margin > 1.0 else growth < 1e3
 
 
 def fastest(scene, periods=40.0):
@@ -343,15 +343,15 @@ def test_passages_of_a_pole_add_up_and_what_was_lost_is_not_compared():
     start = symtop.Angles(0.23767446382442953, 1.8454010471293447, -0.6343726115524877, -4.183433893022597,
                           7.857719085937337, 22.33007075682596)  # fmt: skip
     scene, name = symtop.Scene("needle", top, start, 706.2087736496838), "stormer-verlet-blanes-moan-6"
-    for step, lost in ((0.004708058490997893, True), (0.0015, False)):
+    for step, is_lost in ((0.004708058490997893, True), (0.0015, False)):
         run = symtop.simulate(scene, name, step_size=step, guard=False)
-        assert (float(symtop.errors(run)["axis"].max()) > EXPECTED) is lost
-        assert bool(caution(scene, name, step_size=step)) is lost
-    whole, units = (1.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0), (1.0, 1.0)
-    for lost in ((math.nan, *whole[1:]), (1.002, *whole[1:]), (*whole[:6], math.inf)):
-        assert all(math.isnan(_apart(*pair, units)) for pair in ((whole, lost), (lost, whole)))
-    assert _apart(whole, (*whole[:6], 3.5), units) == 0.5
-    assert _apart(whole[1:], (1.002, *whole[2:]), units) == 1.002  # an axis
+        assert (float(symtop.errors(run)["axis"].max()) > EXPECTED) is is_lost
+        assert bool(caution(scene, name, step_size=step)) is is_lost
+    state, units = (1.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0), (1.0, 1.0)
+    for broken_state in ((math.nan, *state[1:]), (1.002, *state[1:]), (*state[:6], math.inf)):
+        assert all(math.isnan(_apart(*pair, units)) for pair in ((state, broken_state), (broken_state, state)))
+    assert _apart(state, (*state[:6], 3.5), units) == 0.5
+    assert _apart(state[1:], (1.002, *state[2:]), units) == 1.002  # an axis
 
 
 def test_beside_a_pole_no_growth_is_seen_where_there_is_none_and_a_length_that_drifts_away_is():
@@ -376,13 +376,13 @@ def test_a_projection_onto_the_energy_lets_no_nutation_grow_and_a_run_of_two_to_
     scene, method = symtop.Scene("fast", top, start, 1.325), symtop.integrator("dop853-projected")
     assert caution(scene, "dop853-projected[axis]", step_size=1.7e-4) == ""  # right to 1e-13
     assert caution("spheroid", "vern9-projected", step_size=0.0884, horizon=1e5) == ""  # 6e-5 rad: the error grows as t
-    for one, noise in ((method, True), (replace(method, conserves=frozenset()), False)):
-        growth = nutation_growth(one, scene, 1.7e-4, "axis", guard.Exact(scene).landmarks.frequency)
+    for variant, noise in ((method, True), (replace(method, conserves=frozenset()), False)):
+        growth = nutation_growth(variant, scene, 1.7e-4, "axis", guard.Exact(scene).landmarks.frequency)
         assert (growth.factor - 1.0 < growth.doubt) is noise
     top, start = symtop.SymmetricTop(8.93085313694772, 17.86170627389544, 0.0), symtop.Angles(2.66, psi_dot=0.0401)
-    ending = symtop.Scene("free", top, start, 190.0)
-    assert symtop.simulate(ending, "dop853-compiled[attitude]", tolerance=2e-3, guard=False).outcome == "not_normalised"
-    assert "left one" in caution(ending, "dop853-compiled[attitude]", tolerance=2e-3)
+    scene = symtop.Scene("free", top, start, 190.0)
+    assert symtop.simulate(scene, "dop853-compiled[attitude]", tolerance=2e-3, guard=False).outcome == "not_normalised"
+    assert "left one" in caution(scene, "dop853-compiled[attitude]", tolerance=2e-3)
 
 
 @pytest.mark.parametrize("x", [0.02, 0.6])
@@ -394,10 +394,10 @@ def test_a_step_of_eulers_method_multiplies_small_nutations_by_its_stability_fun
 
 def test_no_body_turns_much_faster_than_the_watch_takes_it_to():
     """By what the start says alone, the natural period and its own rate, some turn a fifth faster or more."""
-    drawn = [one for one in scenes_of(body_population(48, seed=29)) if math.isfinite(one.nutation_period)]
-    np.testing.assert_allclose([one.horizon / one.nutation_period for one in drawn], 10.0, rtol=1e-12)
-    rates, bounds = (np.array([rate(one) for one in drawn]) for rate in (fastest, lambda one: Integrated(one).fast))
-    starts = [math.hypot(2.0 * math.pi / one.nutation_period, *one.start.omega_body) for one in drawn]
+    cases = [case for case in scenes_of(body_population(48, seed=29)) if math.isfinite(case.nutation_period)]
+    np.testing.assert_allclose([case.horizon / case.nutation_period for case in cases], 10.0, rtol=1e-12)
+    rates, bounds = (np.array([rate(case) for case in cases]) for rate in (fastest, lambda case: Integrated(case).fast))
+    starts = [math.hypot(2.0 * math.pi / case.nutation_period, *case.start.omega_body) for case in cases]
     assert (rates / bounds).max() < 1.1
     assert np.median(rates / bounds) > 0.8
     assert (rates / np.array(starts)).max() > 1.2  # the control

@@ -19,7 +19,7 @@ from symtop.methods.framework import loop as drive
 from symtop.run import long_run as longrun
 from symtop.run.long_run import chart_of, leaves, long_run, regrown, scattered, windows
 from tests.commands import ROOT, call, printed_by
-from tests.conftest import late
+from tests.conftest import defer
 
 SCENE = symtop.scene("spheroid")
 H = SCENE.nutation_period / 400.37
@@ -85,24 +85,24 @@ def test_a_run_in_stretches_has_the_bits_of_one_in_one_piece(name, h):
     solver = chart_of(symtop.integrator(name))[1]
     par, rule, state = solver.setup(SCENE.top, SCENE.start, h)
     marks = np.array([3, 50, 51, 200])
-    shown = slice(6 if name == "exact-discrete" else None)  # it steps eight numbers and shows six: others are not set
-    whole = solver.loop(par, rule, state, h, marks)
-    first, at = solver.loop.advance(par, rule, solver.loop.start(par, rule, state, h), h, marks[:2])
-    again = at._replace(carry=regrown(at.carry, iter(leaves(at.carry))))
-    for position in (at, again):
+    columns = slice(6 if name == "exact-discrete" else None)  # it steps eight numbers and shows six: others are not set
+    expected = solver.loop(par, rule, state, h, marks)
+    first, middle = solver.loop.advance(par, rule, solver.loop.start(par, rule, state, h), h, marks[:2])
+    copy = middle._replace(carry=regrown(middle.carry, iter(leaves(middle.carry))))
+    for position in (middle, copy):
         second, end = solver.loop.advance(par, rule, position, h, marks[2:])
-        assert np.array_equal(np.concatenate([first.states, second.states])[:, shown], whole.states[:, shown])
-        assert np.array_equal(np.concatenate([first.momenta, second.momenta])[1:], whole.momenta[1:])
-        assert (end.k, at.k) == (200, 50)
+        assert np.array_equal(np.concatenate([first.states, second.states])[:, columns], expected.states[:, columns])
+        assert np.array_equal(np.concatenate([first.momenta, second.momenta])[1:], expected.momenta[1:])
+        assert (end.k, middle.k) == (200, 50)
 
 
 @pytest.mark.parametrize(("name", "h"), [("stormer-verlet", H), ("exact-discrete", SCENE.nutation_period / 4.37)])
 def test_what_was_rounded_off_is_part_of_a_position(name, h):
     _, solver = chart_of(symtop.integrator(name))
     par, rule, state = solver.setup(SCENE.top, SCENE.start, h)
-    _, at = solver.loop.advance(par, rule, solver.loop.start(par, rule, state, h), h, np.array([1000]))
-    sums = {"low": (0.0,) * 4} if name == "stormer-verlet" else {"carry": at.carry[:4] + (0.0,) * 8}
-    ends = [solver.loop.advance(par, rule, one, h, np.array([20_000]))[1] for one in (at, at._replace(**sums))]
+    _, stop = solver.loop.advance(par, rule, solver.loop.start(par, rule, state, h), h, np.array([1000]))
+    sums = {"low": (0.0,) * 4} if name == "stormer-verlet" else {"carry": stop.carry[:4] + (0.0,) * 8}
+    ends = [solver.loop.advance(par, rule, start, h, np.array([20_000]))[1] for start in (stop, stop._replace(**sums))]
     assert ends[0].state != ends[1].state
 
 
@@ -130,18 +130,18 @@ def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
             child.kill()  # it is waited for even if the machine was too slow for the minute
     assert code == (-signal.SIGKILL if blow == signal.SIGKILL else 128 + signal.SIGTERM)
     monkeypatch.setattr(longrun, "LONGEST", 200_000)
-    reached, steps = longrun.netcdf.read(file)["steps_done"].item(), 4_000_000
-    assert 10_000 <= reached < steps
+    steps_done, steps = longrun.netcdf.read(file)["steps_done"].item(), 4_000_000
+    assert 10_000 <= steps_done < steps
     positions, resume = [], longrun._Checkpoint.resumed
 
     def noting(self, start):
-        at, rows = resume(self, start)
-        positions.append(at.k)
-        return at, rows
+        position, rows = resume(self, start)
+        positions.append(position.k)
+        return position, rows
 
     monkeypatch.setattr(longrun._Checkpoint, "resumed", noting)  # a checkpoint holds a hash of the loop itself
     resumed = long_run(SCENE, "midpoint", steps=steps, step_size=H, checkpoint=file, quiet=True)
-    assert reached in positions  # it did go on from there
+    assert steps_done in positions  # it did go on from there
     assert not file.exists()
     assert resumed.identical(long_run(SCENE, "midpoint", steps=steps, step_size=H, quiet=True))
 
@@ -155,24 +155,24 @@ def test_a_checkpoint_knows_a_method_by_what_it_holds_and_not_by_its_name():
     identity = lambda method: longrun._identity(SCENE, method, h, 500, True)
     assert identity(triple(0.3)) == identity(triple(0.3))  # the control: made twice, it is the same
     assert identity(triple(0.3)) != identity(triple(0.3000001))
-    plain = symtop.integrator("stormer-verlet")
-    renamed = dataclasses.replace(symtop.integrator("strang"), name=plain.name)
-    assert identity(renamed) != identity(plain)  # another kernel
-    assert identity(dataclasses.replace(plain, summary="said otherwise")) == identity(plain)
-    others = [(SCENE, 2.0 * h, 500, True), (SCENE, h, 501, True), (SCENE, h, 500, False)]
-    others.append((symtop.scene("goldstein"), h, 500, True))
-    assert len({longrun._identity(scene, plain, *run) for scene, *run in others} | {identity(plain)}) == 5
+    method = symtop.integrator("stormer-verlet")
+    renamed = dataclasses.replace(symtop.integrator("strang"), name=method.name)
+    assert identity(renamed) != identity(method)  # another kernel
+    assert identity(dataclasses.replace(method, summary="said otherwise")) == identity(method)
+    runs = [(SCENE, 2.0 * h, 500, True), (SCENE, h, 501, True), (SCENE, h, 500, False)]
+    runs.append((symtop.scene("goldstein"), h, 500, True))
+    assert len({longrun._identity(scene, method, *run) for scene, *run in runs} | {identity(method)}) == 5
 
 
 def test_an_interrupt_keeps_every_finished_window(tmp_path, monkeypatch):
     file, calls = tmp_path / "run.nc", []
     note = longrun._Checkpoint.note
 
-    def tired(self, at, rows):
+    def tired(self, position, rows):
         calls.append(1)
         if len(calls) == 5:
             raise KeyboardInterrupt
-        note(self, at, rows)
+        note(self, position, rows)
 
     monkeypatch.setattr(longrun._Checkpoint, "note", tired)
     with pytest.raises(KeyboardInterrupt):
@@ -216,7 +216,7 @@ def test_checkpoints_of_other_runs_are_refused_and_a_failed_run_shows_the_window
     assert data.attrs["outcome"] == "left_chart"
 
 
-@pytest.mark.parametrize("name", ["midpoint", "strang", "cayley", *late("stormer-verlet")])
+@pytest.mark.parametrize("name", ["midpoint", "strang", "cayley", *defer("stormer-verlet")])
 def test_compensated_sums_drift_less_than_plain_ones(name):
     data = rounding(SCENE, symtop.integrator(name), 300_000, 1000.37, 3)
     assert float(data["end"]) < 2e-15
@@ -248,11 +248,11 @@ def test_the_command_runs_and_says_what_changed(tmp_path):
     files = ["--checkpoint", tmp_path / "c.nc", "-o", tmp_path / "long.nc"]
     assert "modified_energy" in call("long", "spheroid", "cayley", "--steps", "2e4", *files).output
     assert (tmp_path / "long.nc").is_file()
-    refused = call("long", "spheroid", "rk45", "--steps", "10", "--step-size", "0.1", code=2)
-    assert "rk45 has no compiled loop of fixed steps, as strang has, to be run" in refused.stderr
+    result = call("long", "spheroid", "rk45", "--steps", "10", "--step-size", "0.1", code=2)
+    assert "rk45 has no compiled loop of fixed steps, as strang has, to be run" in result.stderr
 
 
-@pytest.mark.parametrize("name", ["strang", *late("gauss-4")])  # the latter turns back what it steps, to show it
+@pytest.mark.parametrize("name", ["strang", *defer("gauss-4")])  # the latter turns back what it steps, to show it
 def test_a_body_is_watched_as_simulate_shows_it(name):
     scene = symtop.scene("heavy-brick", bodies=True)
     steps, h = 10_000, scene.nutation_period / 50.37
@@ -268,10 +268,10 @@ def test_a_body_is_watched_as_simulate_shows_it(name):
         assert float(data[f"{quantity}_least"].min()) == pytest.approx(float(values.min()), abs=0.05 * span + 1e-15)
         assert float(data[f"{quantity}_largest"].max()) == pytest.approx(float(values.max()), abs=0.05 * span + 1e-15)
     scene = symtop.Scene("free", symtop.RigidBody(1.0, 1.2, 0.6), symtop.Attitude((1, 0, 0, 0), (0.2, 0.3, 5.0)), 200.0)
-    lost = long_run(scene, "rk4", steps=2000, step_size=0.1, quiet=True)
-    alone = symtop.simulate(scene, "rk4", step_size=0.1, guard=False)
-    assert lost.outcome == alone.outcome == "not_normalised"
-    assert abs(lost.reached_time - alone.reached_time) < 0.02 * alone.reached_time
+    data = long_run(scene, "rk4", steps=2000, step_size=0.1, quiet=True)
+    run = symtop.simulate(scene, "rk4", step_size=0.1, guard=False)
+    assert data.outcome == run.outcome == "not_normalised"
+    assert abs(data.reached_time - run.reached_time) < 0.02 * run.reached_time
 
 
 def test_what_a_free_body_keeps_grows_as_rounding_and_what_it_does_not_keep_as_the_time(tmp_path):
@@ -305,5 +305,5 @@ for name in ("galerkin-simpson", "gauss-4", "stormer-verlet"):  # each builds an
     symtop.kernel_loop.plain.func(long_run.chart_of(symtop.integrator(name))[1].loop)
 print(identity())
 """
-    printed = printed_by(script, cwd=ROOT).split()
-    assert printed == [str(longrun._identity(SCENE, symtop.integrator("midpoint"), 0.01, 1000, True))] * 2
+    output = printed_by(script, cwd=ROOT).split()
+    assert output == [str(longrun._identity(SCENE, symtop.integrator("midpoint"), 0.01, 1000, True))] * 2

@@ -25,30 +25,30 @@ MADE = {
 
 @pytest.mark.parametrize(("name", "how"), [("strang", "a copy"), *((name, "made anew") for name in MADE)])
 def test_long_run_modified_energy_stability_and_forecast_do_not_look_at_the_name(clean_registry, name, how):
-    own = symtop.integrator(name)
-    other = symtop.register(dataclasses.replace(own, name="renamed") if how == "a copy" else MADE[name](), replace=True)
+    base = symtop.integrator(name)
+    twin = symtop.register(dataclasses.replace(base, name="renamed") if how == "a copy" else MADE[name](), replace=True)
     h = SCENE.nutation_period / 137.3
-    runs = [symtop.long_run(SCENE, method.name, steps=20_000, step_size=h, quiet=True) for method in (own, other)]
+    runs = [symtop.long_run(SCENE, method.name, steps=20_000, step_size=h, quiet=True) for method in (base, twin)]
     for variable in runs[0]:
         np.testing.assert_array_equal(runs[0][variable].values, runs[1][variable].values)
-    chart = own.chart_for("axis")
+    chart = base.chart_for("axis")
     states = np.random.default_rng(5).normal(1.0, 0.1, (50, 4 if chart == "angles" else 6))
-    first, second = (modified_energy(SCENE, method, chart, states, h) for method in (own, other))
+    first, second = (modified_energy(SCENE, method, chart, states, h) for method in (base, twin))
     np.testing.assert_array_equal(first, second)
     assert np.max(np.abs(first - modified_energy(SCENE, "rk4", chart, states, h))) > 1e-6  # it is not the energy itself
     steady, grid = symtop.scene("steady-fast"), np.linspace(0.02, 0.5, 12)
-    limits, again = (linear_limits(method, steady, grid) for method in (own, other))
-    assert limits == pytest.approx(again, rel=0, abs=0, nan_ok=True)
-    assert (own.sleeps_from is None) == (other.sleeps_from is None)
-    assert own.sleeps_from is None or own.sleeps_from(0.4) == other.sleeps_from(0.4)
-    assert sleeping_threshold(own, 0.4) == sleeping_threshold(other, 0.4)
-    plans = [make_plan(SCENE, method, h, horizon=8.0, samples=101)[0] for method in (own, other)]
-    assert forecast(SCENE, own, chart, plans[0]) == forecast(SCENE, other, chart, plans[1])
+    limits, expected = (linear_limits(method, steady, grid) for method in (base, twin))
+    assert limits == pytest.approx(expected, rel=0, abs=0, nan_ok=True)
+    assert (base.sleeps_from is None) == (twin.sleeps_from is None)
+    assert base.sleeps_from is None or base.sleeps_from(0.4) == twin.sleeps_from(0.4)
+    assert sleeping_threshold(base, 0.4) == sleeping_threshold(twin, 0.4)
+    plans = [make_plan(SCENE, method, h, horizon=8.0, samples=101)[0] for method in (base, twin)]
+    assert forecast(SCENE, base, chart, plans[0]) == forecast(SCENE, twin, chart, plans[1])
 
 
 def test_closed_forms_belong_to_the_four_methods_they_are_of():
-    known = [name for name, method in symtop.integrators().items() if method.modified_energy is not None]
-    assert sorted(known) == sorted(MADE)
+    names = [name for name, method in symtop.integrators().items() if method.modified_energy is not None]
+    assert sorted(names) == sorted(MADE)
     assert [name for name, method in symtop.integrators().items() if method.sleeps_from] == ["strang", "cayley"]
     assert symtop.composition("other", (0.5, 0.5), (0.25, 0.5, 0.25)).modified_energy is None
     assert symtop.composition("other", (1.0,), (1.0, 0.0)).modified_energy is None
@@ -56,18 +56,18 @@ def test_closed_forms_belong_to_the_four_methods_they_are_of():
 
 
 def test_slow_solvers_and_software_arithmetic_are_known_by_traits_and_rules_by_numbers():
-    own = symtop.integrator("rk45")
-    other = dataclasses.replace(own, name="renamed")
-    plain = dataclasses.replace(own, name="renamed", same_steps_as=None)
-    plan, _ = make_plan(SCENE, own, None, 1e-8, horizon=8.0, samples=101)
-    expected = forecast(SCENE, own, "angles", plan)
-    np.testing.assert_equal(tuple(forecast(SCENE, other, "angles", plan)), tuple(expected))  # some are nan
-    slow = forecast(SCENE, plain, "angles", plan)  # without it a tenth of the run is all that is probed
-    assert slow.axis_error != expected.axis_error
+    base = symtop.integrator("rk45")
+    twin = dataclasses.replace(base, name="renamed")
+    variant = dataclasses.replace(base, name="renamed", same_steps_as=None)
+    plan, _ = make_plan(SCENE, base, None, 1e-8, horizon=8.0, samples=101)
+    expected = forecast(SCENE, base, "angles", plan)
+    np.testing.assert_equal(tuple(forecast(SCENE, twin, "angles", plan)), tuple(expected))  # some are nan
+    partial = forecast(SCENE, variant, "angles", plan)  # without it a tenth of the run is all that is probed
+    assert partial.axis_error != expected.axis_error
     assert (symtop.integrator("taylor-quad").speed, symtop.integrator("taylor").speed) == (0.002, 1.0)
     strang = symtop.integrator("strang")
-    slow = dataclasses.replace(strang, name="renamed", speed=0.02)
-    steps = [constants.long_run(method, SCENE, "axis", quick=True).steps for method in (strang, slow)]
+    variant = dataclasses.replace(strang, name="renamed", speed=0.02)
+    steps = [constants.long_run(method, SCENE, "axis", quick=True).steps for method in (strang, variant)]
     assert steps[1] == pytest.approx(0.02 * steps[0], rel=0.01)
     assert is_midpoint(symtop.discrete_lagrangian("mine", (0.5,), (1.0,)))
     assert not is_midpoint(symtop.integrator("trapezoidal"))

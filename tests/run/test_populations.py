@@ -39,11 +39,11 @@ def test_grazing_tops_pass_a_pole_as_near_as_they_say_and_those_near_the_separat
     assert grazing.period.max() < 8.0
     assert (Motion("slow").gap > 2.0**-4).mean() > 0.7  # the negative control
     # Its period grows as the logarithm of the gap: 2 ln(1/gap)/r and some, r the rate at which it leaves the pole.
-    near = Motion("near-separatrix")
-    assert 2.0**-17 < near.low.min() < near.low.max() < 2.0**-5.9
-    assert near.sigma.max() < 0.9
-    assert (near.period * np.sqrt(1.0 - near.sigma**2) > 2.0 * np.log(1.0 / near.low)).all()
-    assert near.period.min() > 1.5 * Motion("grazing").period.max()
+    motion = Motion("near-separatrix")
+    assert 2.0**-17 < motion.low.min() < motion.low.max() < 2.0**-5.9
+    assert motion.sigma.max() < 0.9
+    assert (motion.period * np.sqrt(1.0 - motion.sigma**2) > 2.0 * np.log(1.0 / motion.low)).all()
+    assert motion.period.min() > 1.5 * Motion("grazing").period.max()
 
 
 def test_slow_fast_hanging_and_sleeping_tops_are_what_they_are_called():
@@ -110,15 +110,15 @@ class Bodies:
 
 @pytest.mark.parametrize("kind", BODY_STRATA)
 def test_members_are_bodies_with_directions_of_length_one(kind):
-    drawn = Bodies(kind, 16)
-    assert (drawn.high <= drawn.low + drawn.middle).all()
+    bodies = Bodies(kind, 16)
+    assert (bodies.high <= bodies.low + bodies.middle).all()
     for name in ("centre", "quaternion"):
-        assert np.abs(np.linalg.norm(drawn.data[name].values, axis=1) - 1.0).max() < 1e-15
-    assert (drawn.data.mgl == (0.0 if kind in FREE else 1.0)).all()
-    for row, scene in enumerate(scenes_of(drawn.data)):  # the way back
-        assert scene.top.moments == tuple(float(drawn.data[name][row]) for name in ("I1", "I2", "I3"))
-        np.testing.assert_allclose(scene.start.quaternion, drawn.data.quaternion[row], atol=2e-16)
-        assert scene.start.omega_body == tuple(drawn.data.omega_body[row].values.tolist())
+        assert np.abs(np.linalg.norm(bodies.data[name].values, axis=1) - 1.0).max() < 1e-15
+    assert (bodies.data.mgl == (0.0 if kind in FREE else 1.0)).all()
+    for row, scene in enumerate(scenes_of(bodies.data)):  # the way back
+        assert scene.top.moments == tuple(float(bodies.data[name][row]) for name in ("I1", "I2", "I3"))
+        np.testing.assert_allclose(scene.start.quaternion, bodies.data.quaternion[row], atol=2e-16)
+        assert scene.start.omega_body == tuple(bodies.data.omega_body[row].values.tolist())
 
 
 def test_free_bodies_rotate_as_their_strata_say():
@@ -127,41 +127,41 @@ def test_free_bodies_rotate_as_their_strata_say():
     assert np.abs(long.momentum[:, 0] / long.size).min() > np.cos(0.501)
     assert np.abs(near.share - 1.0).max() < 0.1
     assert (np.abs(near.share - 1.0) < 1e-3).mean() > 0.3
-    assert max((np.abs(drawn.share - 1.0) < 1e-3).mean() for drawn in (short, long)) < 0.01  # the negative control
+    assert max((np.abs(bodies.share - 1.0) < 1e-3).mean() for bodies in (short, long)) < 0.01  # the negative control
     symmetric, needle = Bodies("near-symmetric"), Bodies("needle")
-    apart = np.minimum(symmetric.middle / symmetric.low, symmetric.high / symmetric.middle) - 1.0
-    assert apart.max() < 2.0**-5.9
-    assert (apart < 1e-4).mean() > 0.3
+    gap = np.minimum(symmetric.middle / symmetric.low, symmetric.high / symmetric.middle) - 1.0
+    assert gap.max() < 2.0**-5.9
+    assert (gap < 1e-4).mean() > 0.3
     assert (needle.low / needle.middle).max() < 2.0**-4.9
     assert (short.low / short.middle).min() > 0.29
-    for drawn in (short, long, near, symmetric, needle):
-        assert np.abs(drawn.size - 1.0).max() < 1e-8
-        firsts = [float((drawn.data[name].values == drawn.low).mean()) for name in ("I1", "I2", "I3")]
+    for bodies in (short, long, near, symmetric, needle):
+        assert np.abs(bodies.size - 1.0).max() < 1e-8
+        firsts = [float((bodies.data[name].values == bodies.low).mean()) for name in ("I1", "I2", "I3")]
         assert min(firsts) > 0.2  # axes in any order
 
 
 def test_heavy_bodies_lie_at_their_distance_from_a_lagrange_top():
     for epsilon in (0.0, 0.01, 0.3):
-        drawn = body_population(400, seed=3, kind="heavy", epsilon=epsilon)
-        assert (drawn.I1 == 1.0).all()
-        assert float(drawn.I2.max()) <= 1.0 + epsilon
-        assert float(drawn.I2.median()) > 1.0 + 0.6 * epsilon - 1e-9
-        tilt = np.arctan(np.hypot(*drawn.centre.values[:, :2].T) / drawn.centre.values[:, 2])
+        bodies = body_population(400, seed=3, kind="heavy", epsilon=epsilon)
+        assert (bodies.I1 == 1.0).all()
+        assert float(bodies.I2.max()) <= 1.0 + epsilon
+        assert float(bodies.I2.median()) > 1.0 + 0.6 * epsilon - 1e-9
+        tilt = np.arctan(np.hypot(*bodies.centre.values[:, :2].T) / bodies.centre.values[:, 2])
         assert 0.9 * np.arctan(epsilon) <= tilt.max() <= epsilon + 1e-9
     free_distance = body_population(400, seed=3, kind="heavy")
     assert float(free_distance.I2.min()) - 1.0 > 2.0**-8.01
     assert float(free_distance.I2.max()) > 1.2
-    same = [body_population(9, seed=3, kind="heavy", epsilon=epsilon) for epsilon in (0.0, 0.1)]
+    pair = [body_population(9, seed=3, kind="heavy", epsilon=epsilon) for epsilon in (0.0, 0.1)]
     for name in ("I3", "quaternion", "omega_body"):
-        np.testing.assert_array_equal(same[0][name], same[1][name])
+        np.testing.assert_array_equal(pair[0][name], pair[1][name])
     lagrange = body_population(9, seed=3, kind="lagrange")
     assert (lagrange.I1 == lagrange.I2).all()
     assert (lagrange.centre.values == [0.0, 0.0, 1.0]).all()
 
 
 def test_regular_and_chaotic_bodies_are_told_apart_by_the_growth_of_a_disturbance():
-    rows = lambda bodies: np.array([one.top.flat(one.start) for one in scenes_of(bodies)])
-    growths = lambda count, **drawn: growth(rows(body_population(count, seed=3, **drawn)))
+    rows = lambda bodies: np.array([scene.top.flat(scene.start) for scene in scenes_of(bodies)])
+    growths = lambda count, **options: growth(rows(body_population(count, seed=3, **options)))
     regular, chaotic = (growths(6, kind=kind, epsilon=0.3) for kind in ("regular", "chaotic"))
     assert max(regular) < CHAOS < min(chaotic)
     assert max(tops := growths(60, kind="lagrange")) < CHAOS  # an integrable motion shears

@@ -93,11 +93,11 @@ def test_the_bound_of_the_closed_form_holds_the_rounding_and_the_rates(name):
 def test_an_integration_that_differs_from_the_closed_form_has_the_distance_as_its_bound(monkeypatch):
     module = sys.modules["symtop.run.reference.truth"]
     scene, times = symtop.scene("goldstein"), np.array([1.0, 2.0, 3.0])
-    off = lambda *given: (values := closed_values(*given)) | {"theta": values["theta"] + 1e-9}
-    for values, least, most in ((off, 0.99e-9, math.inf), (closed_values, 0.0, 1e-15)):
+    perturbed = lambda *args: (values := closed_values(*args)) | {"theta": values["theta"] + 1e-9}
+    for values, low, high in ((perturbed, 0.99e-9, math.inf), (closed_values, 0.0, 1e-15)):
         monkeypatch.setattr(module, "closed_values", values)
         bound = module._integration(scene, times, "longdouble")["theta_error_bound"]
-        assert np.all((bound >= least) & (bound < most))
+        assert np.all((bound >= low) & (bound < high))
 
 
 def test_a_bound_too_small_would_be_seen_and_times_at_which_it_is_read_change_no_bit():
@@ -105,18 +105,18 @@ def test_a_bound_too_small_would_be_seen_and_times_at_which_it_is_read_change_no
     scene = symtop.scene("spheroid")
     data = symtop.reference(scene, [3.0, 500.0, 1000.0], "longdouble")
     assert not np.all(true_errors(scene, data)[0] <= data["attitude_error_bound"].values / 1000.0)
-    run = symtop.scene("goldstein")  # the study of the truth reads an error and its bound off one integration
+    scene = symtop.scene("goldstein")  # the study of the truth reads an error and its bound off one integration
     for precision in ("double", "longdouble", "quad"):
         times = np.array([3.0, 11.0, 20.0])
-        both, alone = integrate_with_checks(run, times, precision), integrate(run, times, precision)[0]
-        assert (both.states[both.chosen] == alone).all()
-        assert (both.axes == charts.axis_from_quaternion(alone[:, :4])).all()
+        result, expected = integrate_with_checks(scene, times, precision), integrate(scene, times, precision)[0]
+        assert (result.states[result.chosen] == expected).all()
+        assert (result.axes == charts.axis_from_quaternion(expected[:, :4])).all()
 
 
 def test_a_certificate_that_contradicts_the_bounds_raises_them(monkeypatch, cache):
     """One of a witness that is 1e-6 away, one of an error three times its bound, and one that finds nothing."""
     module, times = sys.modules["symtop.run.reference.truth"], [1.0, 2.0, 3.0]
-    plain, quantities = symtop.reference("goldstein", times), ("axis", "attitude", "theta", "phi", "psi")
+    base, quantities = symtop.reference("goldstein", times), ("axis", "attitude", "theta", "phi", "psi")
     for record, floor, factor in (
         (Certificate(1e6, 30, 0.3, 100.0, 0.0, 1e-6), 1e-6, 1.0),
         (Certificate(1e6, 30, 0.3, 100.0, 1e-6, math.nan), 1e-6, 1.0),
@@ -126,7 +126,7 @@ def test_a_certificate_that_contradicts_the_bounds_raises_them(monkeypatch, cach
         monkeypatch.setattr(module, "certificate", lambda *_, record=record: record)
         data = symtop.reference("goldstein", times)
         for name in quantities:
-            expected = factor * plain[f"{name}_error_bound"].values + floor
+            expected = factor * base[f"{name}_error_bound"].values + floor
             np.testing.assert_allclose(data[f"{name}_error_bound"], expected, rtol=1e-12)
         assert data.attrs["certificate"] == str(record)
 
@@ -145,26 +145,26 @@ def test_a_long_reference_takes_milliseconds_and_states_what_it_rests_on(cache):
     """1001 times up to 1e5 took half a minute by integration; the certificate is made once and told afterwards."""
     closed_form.compile_now()
     times = np.linspace(0.0, 1e5, 1001)
-    plain = symtop.reference("spheroid", times)
+    data = symtop.reference("spheroid", times)
     assert min(timeit.repeat(lambda: symtop.reference("spheroid", times), number=1, repeat=7)) < 0.01
-    assert (plain.attrs["precision"], plain.attrs["certificate"]) == ("closed-form", UNCERTIFIED)
-    assert plain.attrs["arithmetic"] == "constants in double-double, values in double"
+    assert (data.attrs["precision"], data.attrs["certificate"]) == ("closed-form", UNCERTIFIED)
+    assert data.attrs["arithmetic"] == "constants in double-double, values in double"
     assert not list(cache.glob("reference/*.nc"))
-    assert float(plain["theta_error_bound"].max()) < 3e-15
+    assert float(data["theta_error_bound"].max()) < 3e-15
     certified = symtop.reference("spheroid", times, certify="integration")
     assert certified.attrs["certificate"].startswith("40 digits at 32 times up to t = 1.18e+06")
     assert "long double integration up to t = 118" in certified.attrs["certificate"]
     assert len(list(cache.glob("reference/*.nc"))) == 1
-    again = symtop.reference("spheroid", times)
-    assert again.identical(certified)
-    assert again.equals(plain)
+    repeat = symtop.reference("spheroid", times)
+    assert repeat.identical(certified)
+    assert repeat.equals(data)
     assert min(timeit.repeat(lambda: symtop.reference("spheroid", times), number=1, repeat=7)) < 0.01
 
 
 @pytest.mark.parametrize("damage", ["truncated", "zeros", "empty", "foreign", "one value changed"])
 def test_a_damaged_cache_file_is_noticed_said_and_computed_again(cache, damage):
     times = np.linspace(0.0, 5.0, 21)
-    good = symtop.reference("spheroid", times, "longdouble")
+    expected = symtop.reference("spheroid", times, "longdouble")
     (path,) = cache.glob("reference/*.nc")
     content = path.read_bytes()
     if damage == "one value changed":
@@ -176,8 +176,8 @@ def test_a_damaged_cache_file_is_noticed_said_and_computed_again(cache, damage):
         half, zeros = content[: len(content) // 2], b"\0" * len(content)
         path.write_bytes({"truncated": half, "zeros": zeros, "empty": b"", "foreign": b"GIF89a"}[damage])
     with pytest.warns(symtop.SymtopWarning, match="is damaged and is computed again"):
-        assert symtop.reference("spheroid", times, "longdouble").equals(good)
-    assert symtop.reference("spheroid", times, "longdouble").equals(good)  # and mended on disk, in silence
+        assert symtop.reference("spheroid", times, "longdouble").equals(expected)
+    assert symtop.reference("spheroid", times, "longdouble").equals(expected)  # and mended on disk, in silence
 
 
 CALL = """
@@ -200,17 +200,17 @@ def call(cache, *arguments):
 
 @pytest.mark.slow
 def test_a_process_killed_while_it_writes_the_cache_harms_nobody_and_several_share_it(cache):
-    dying = call(cache, "die")
-    dying.communicate(timeout=120)
-    assert dying.returncode == -9
-    left = list(cache.glob("reference/.*.part"))
+    process = call(cache, "die")
+    process.communicate(timeout=120)
+    assert process.returncode == -9
+    parts = list(cache.glob("reference/.*.part"))
     assert not list(cache.glob("reference/*.nc"))
-    crowd = [call(cache) for _ in range(2)]
-    shown = [float(process.communicate(timeout=120)[0]) for process in crowd]
-    assert [process.returncode for process in crowd] == [0, 0]
+    processes = [call(cache) for _ in range(2)]
+    values = [float(process.communicate(timeout=120)[0]) for process in processes]
+    assert [process.returncode for process in processes] == [0, 0]
     assert len(list(cache.glob("reference/*.nc"))) == 1
-    assert list(cache.glob("reference/.*.part")) == left  # of the killed one alone
-    assert shown == [float(symtop.reference("spheroid", np.linspace(0.0, 5.0, 21), "longdouble")["theta"][-1])] * 2
+    assert list(cache.glob("reference/.*.part")) == parts  # of the killed one alone
+    assert values == [float(symtop.reference("spheroid", np.linspace(0.0, 5.0, 21), "longdouble")["theta"][-1])] * 2
 
 
 def test_a_cache_that_cannot_be_written_costs_time_and_nothing_else(tmp_path, monkeypatch):

@@ -38,10 +38,10 @@ def swing(_, y):
     return [y[1], -y[0]]
 
 
-def measured(f, y0, horizon, name, **control):
+def true_error(f, y0, horizon, name, **control):
     """The error of the run itself, by SciPy or by steps of rk4."""
-    h, early = control.get("step_size"), horizon * np.geomspace(1e-6, 1.0, 200)
-    times = np.union1d(np.linspace(0.0, horizon, 401), early) if h is None else h * np.arange(round(horizon / h) + 1)
+    h, onset = control.get("step_size"), horizon * np.geomspace(1e-6, 1.0, 200)
+    times = np.union1d(np.linspace(0.0, horizon, 401), onset) if h is None else h * np.arange(round(horizon / h) + 1)
     if h is None:
         tolerance, solver = control["tolerance"], {"radau": "Radau"}.get(name, name.upper())
         states = solve_ivp(f, (0.0, horizon), y0, solver, times, rtol=tolerance, atol=tolerance).y
@@ -74,15 +74,15 @@ def decay(rate):
 def test_an_error_is_forecast_within_a_factor_of_three(f, y0, horizon, name, control, causes):
     """In a transient, too: nothing is left of exp(-1000 t) at the first of even times; exp(-30 t) ends at 7e13."""
     expected = symtop.guard(f, 0.0, y0, horizon, name, **control)
-    assert 1.0 / 3.0 < expected.error / measured(f, y0, horizon, name, **control) < 3.0
+    assert 1.0 / 3.0 < expected.error / true_error(f, y0, horizon, name, **control) < 3.0
     assert causes is None or expected.cause in causes
 
 
 def test_an_error_that_has_halved_goes_on_as_it_was_and_one_that_has_faded_as_it_is():
     times = np.arange(1.0, 11.0)
     whole, halved, faded = (
-        right_hand_side._expected(times, 1e-9 * np.where(times < 5.0, 1.0, left), 1000.0, 1.0, math.inf)
-        for left in (1.0, 0.5, 0.05)
+        right_hand_side._expected(times, 1e-9 * np.where(times < 5.0, 1.0, share), 1000.0, 1.0, math.inf)
+        for share in (1.0, 0.5, 0.05)
     )
     assert halved == pytest.approx(whole, rel=1e-9)
     assert faded == pytest.approx(0.05 * whole, rel=1e-9)
@@ -101,8 +101,8 @@ def test_steps_that_are_too_long_for_a_stiff_f_are_no_small_error(f, y0, step):
 
 @pytest.mark.quick
 def test_chaos_is_told_from_order_and_what_was_not_watched_says_so():
-    said = str(symtop.guard(prothero_robinson(1e6), 0.0, [1.0], 10.0, "radau", tolerance=1e-6))
-    assert "; the motion was watched to t = 0.0" in said
+    text = str(symtop.guard(prothero_robinson(1e6), 0.0, [1.0], 10.0, "radau", tolerance=1e-6))
+    assert "; the motion was watched to t = 0.0" in text
     assert "watched" not in str(symtop.guard(swing, 0.0, [1.0, 0.0], 1500.0, "rk4", step_size=0.1))
     y0, horizon = of_energy(1.0 / 6.0, -0.1), 120.0
     chaotic = symtop.guard(henon_heiles, 0.0, y0, horizon, "rk45", tolerance=1e-6)
@@ -134,9 +134,9 @@ def test_a_forecast_has_the_units_of_the_motion():
     outlook = lambda length, time: symtop.guard(
         lambda _, y: np.array([y[1], -y[0]]) / time, 0.0, [length, 0.0], 60.0 * time, "rk4", step_size=0.2 * time,
         accuracy=1e-4 * length)  # fmt: skip
-    one, other = outlook(1.0, 1.0), outlook(1024.0, 64.0)
-    assert (other.cause, other.error) == (one.cause, pytest.approx(1024.0 * one.error, rel=1e-3))
-    assert other.setting == pytest.approx(64.0 * one.setting, rel=0.1)  # two digits
+    small, large = outlook(1.0, 1.0), outlook(1024.0, 64.0)
+    assert (large.cause, large.error) == (small.cause, pytest.approx(1024.0 * small.error, rel=1e-3))
+    assert large.setting == pytest.approx(64.0 * small.setting, rel=0.1)  # two digits
 
 
 def test_a_motion_may_begin_at_zero():
@@ -149,19 +149,19 @@ def test_a_motion_may_begin_at_zero():
         error = max(error, math.hypot(z[0] - c * place, z[1] - c * slope))
     assert 1.0 / 3.0 < symtop.guard(driven, 0.0, [0.0, 0.0], 20.0, step_size=h, accuracy=1e-12).error / error < 3.0
     assert symtop.guard(prothero_robinson(1e3), 0.0, [0.0], 0.5, step_size=0.01).cause == "stiffness"
-    still = symtop.guard(lambda _t, y: 0.0 * y, 0.0, [0.0], 10.0, step_size=0.1)
-    assert (still.error, still.setting) == (0.0, 10.0)  # no step is longer than the run
-    turning = symtop.guard(lambda _t, y: [y[1], -y[0]], 0.0, [1.0, 0.0], 93.05488730716638, "rk45", tolerance=1e-4)
-    assert 1e-4 < turning.error < 0.1  # two of its times are neighbours, which SciPy refuses
+    result = symtop.guard(lambda _t, y: 0.0 * y, 0.0, [0.0], 10.0, step_size=0.1)
+    assert (result.error, result.setting) == (0.0, 10.0)  # no step is longer than the run
+    result = symtop.guard(lambda _t, y: [y[1], -y[0]], 0.0, [1.0, 0.0], 93.05488730716638, "rk45", tolerance=1e-4)
+    assert 1e-4 < result.error < 0.1  # two of its times are neighbours, which SciPy refuses
 
 
 def test_f_may_return_one_array_again_and_a_horizon_beyond_the_end_is_refused():
-    one = np.empty(2)
+    buffer = np.empty(2)
 
     def swing_in_place(_, y):
-        one[:] = y[1], -y[0]
+        buffer[:] = y[1], -y[0]
         y[:] = math.nan
-        return one
+        return buffer
 
     for name, control in (("rk4", {"step_size": 0.1}), ("rk45", {"tolerance": 1e-4})):
         expected = symtop.guard(swing, 0.0, [1.0, 0.0], 30.0, name, **control)
@@ -173,15 +173,15 @@ def test_f_may_return_one_array_again_and_a_horizon_beyond_the_end_is_refused():
     # A motion beside zero ends at once.
     assert symtop.guard(lambda _t, y: 1e12 * y * y, 0.0, [0.0], 1.0, step_size=0.01).error == 0.0
     for start in (0.1, 0.3, 0.7, 1e10):  # where the rounded end of a run is not its horizon
-        first, later = (symtop.guard(swing, t0, [1.0, 0.0], 0.6, step_size=0.01)[:4] for t0 in (0.0, start))
-        assert later == first
+        first, second = (symtop.guard(swing, t0, [1.0, 0.0], 0.6, step_size=0.01)[:4] for t0 in (0.0, start))
+        assert second == first
 
 
 def test_the_step_that_is_advised_keeps_the_accuracy_also_where_the_piece_itself_fails():
     horizon = 20.0 * math.pi
     expected = symtop.guard(kepler, 0.0, at_pericentre(0.3), horizon, step_size=0.1, accuracy=1e-3)
     assert expected.error > 1e-3
-    assert 3e-4 < measured(kepler, at_pericentre(0.3), horizon, "rk4", step_size=expected.setting) < 2e-3
+    assert 3e-4 < true_error(kepler, at_pericentre(0.3), horizon, "rk4", step_size=expected.setting) < 2e-3
     assert f"take a step of about {expected.setting!r}" in str(expected)
     step, stiffening = 0.8, lambda t, y: [y[1], -(y[0] ** 3)]
     expected = symtop.guard(stiffening, 0.0, [3.0, 0.0], 30.0, step_size=step)
@@ -203,6 +203,6 @@ def test_the_step_that_is_advised_keeps_the_accuracy_also_where_the_piece_itself
     (lambda t, y: y if t < 0.5 else y * math.nan, [1.0], {"step_size": 0.1}, "not [nan] at t = 0."),
 ])  # fmt: skip
 def test_what_makes_no_sense_is_refused_in_one_sentence(f, y0, control, words):
-    with pytest.raises(symtop.SymtopError) as refused:
+    with pytest.raises(symtop.SymtopError) as info:
         symtop.guard(f, control.pop("t0", 0.0), y0, 1.0, **control)
-    assert [words in line for line in str(refused.value).splitlines()] == [True]
+    assert [words in line for line in str(info.value).splitlines()] == [True]

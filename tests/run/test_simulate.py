@@ -51,8 +51,8 @@ def sorted_times(horizon, samples, period, steps):
         marks = None if steps is None else np.unique(np.rint(steps * (place / last)).astype(np.int64))
         times = horizon * (place / last) if steps is None else marks * (horizon / steps)
         phases = np.sort(np.mod(times / period, 1.0))
-        gap, every = np.max(np.diff(phases, append=phases[0] + 1.0)), steps is not None and marks.size > steps
-        if not (math.isfinite(period) and horizon > 2.0 * period) or gap < WIDEST_GAP or every:
+        gap, all_steps = np.max(np.diff(phases, append=phases[0] + 1.0)), steps is not None and marks.size > steps
+        if not (math.isfinite(period) and horizon > 2.0 * period) or gap < WIDEST_GAP or all_steps:
             break
     return times, marks, dithered
 
@@ -63,18 +63,18 @@ def test_samples_are_dithered_where_commensurate_and_those_of_a_sort():
     period = scene.nutation_period
     run = symtop.simulate(scene, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=51)
     assert run.attrs["sampling"] == "dithered"
-    honest = float(np.max(np.abs(run["energy"] - run["energy"][0])))
+    largest = float(np.max(np.abs(run["energy"] - run["energy"][0])))
     dense = symtop.simulate(scene, "stormer-verlet", step_size=period / 200, horizon=period * 50, samples=10_001)
     assert dense.attrs["sampling"] == "uniform"
-    every = np.abs(dense["energy"].values - dense["energy"].values[0])
-    assert honest > 0.3 * every.max()
-    blind = every[::200]  # what uniform samples would have shown
-    assert blind.max() < 0.01 * every.max()
+    change = np.abs(dense["energy"].values - dense["energy"].values[0])
+    assert largest > 0.3 * change.max()
+    sparse = change[::200]  # what uniform samples would have shown
+    assert sparse.max() < 0.01 * change.max()
     for settings in ({"step_size": 0.01}, {"step_size": 0.016}, {"step_size": 0.1}, {"tolerance": 1e-6}):
         name = "tsit5" if "tolerance" in settings else "strang"  # which makes 800 steps, 500, 80
-        one = symtop.simulate(scene, name, guard=False, **settings)
-        gaps = np.diff(one["time"].values)
-        assert one.attrs["sampling"] == ("uniform" if np.ptp(gaps) < 1e-9 else "nearest steps")
+        run = symtop.simulate(scene, name, guard=False, **settings)
+        gaps = np.diff(run["time"].values)
+        assert run.attrs["sampling"] == ("uniform" if np.ptp(gaps) < 1e-9 else "nearest steps")
         assert (np.ptp(gaps) < 1e-9) == (settings != {"step_size": 0.01})
     draw, dithered = np.random.default_rng(4), 0
     for k in range(4000):
@@ -123,8 +123,8 @@ def test_two_datasets_share_nothing_and_a_trajectory_has_the_numbers_of_its_data
     data = symtop.simulate("spheroid", "midpoint", guard=False, **settings)
     trajectory = integrate("spheroid", "midpoint", **settings)
     np.testing.assert_equal(Trajectory.of_data(data)._asdict(), trajectory._asdict())
-    stored = {name: data[name].values.tobytes() for name in data.data_vars}
-    assert stored == {name: values.tobytes() for name, values in trajectory.columns.items()}
+    contents = {name: data[name].values.tobytes() for name in data.data_vars}
+    assert contents == {name: values.tobytes() for name, values in trajectory.columns.items()}
 
 
 def test_files_are_whole_and_a_failed_write_leaves_the_old_one(tmp_path, monkeypatch):
@@ -162,20 +162,20 @@ def test_times_of_ones_own_show_the_true_motion_in_every_chart(scene, row, h, ac
     assert run.attrs["sampling"] == "at times"
     if h:
         assert run.attrs["steps"] == math.floor(OWN[-1] / h)
-        every = symtop.simulate(scene, row, step_size=h, horizon=3.9, samples=1001, guard=False)["axis"].values
-        shown = run["axis"].values[np.isin(OWN, np.arange(0.0, 4.0, 0.3))]
-        np.testing.assert_allclose(shown, every[:: round(0.3 / h)], rtol=0.0, atol=accuracy)
+        dense = symtop.simulate(scene, row, step_size=h, horizon=3.9, samples=1001, guard=False)["axis"].values
+        values = run["axis"].values[np.isin(OWN, np.arange(0.0, 4.0, 0.3))]
+        np.testing.assert_allclose(values, dense[:: round(0.3 / h)], rtol=0.0, atol=accuracy)
 
 
 def test_a_time_inside_a_step_has_the_order_of_the_method_and_a_line_between_steps_has_order_two():
-    steps, wrong = np.array([0.04, 0.02, 0.01, 0.005]), []
+    steps, errors = np.array([0.04, 0.02, 0.01, 0.005]), []
     for h in steps:
         ends, inside = np.arange(0.0, 2.0, h), np.arange(0.0, 2.0, h)[:-1] + 0.4 * h
         run = symtop.simulate("spheroid", "rk4[axis]", step_size=h, times=inside, guard=False)
         line = np.interp(inside, ends, symtop.reference("spheroid", ends)["theta"].values)
-        off = np.abs(line - symtop.reference("spheroid", inside)["theta"].values).max()
-        wrong.append([float(symtop.errors(run)["axis"].max()), off])
-    assert np.polyfit(np.log(steps), np.log(wrong), 1)[0] == pytest.approx([4.0, 2.0], abs=0.2)
+        gap = np.abs(line - symtop.reference("spheroid", inside)["theta"].values).max()
+        errors.append([float(symtop.errors(run)["axis"].max()), gap])
+    assert np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx([4.0, 2.0], abs=0.2)
 
 
 @pytest.mark.parametrize(("scene", "row", "h"), [
@@ -184,15 +184,15 @@ def test_a_time_inside_a_step_has_the_order_of_the_method_and_a_line_between_ste
 ])  # fmt: skip
 def test_a_time_inside_a_step_is_the_same_step_that_is_shorter_by_hand(scene, row, h):
     """From a state whose |e| or |q| is not one: one step of half the length of f, as anybody has it."""
-    chosen, method, chart, plan, _ = _prepared(scene, row, h, times=[40 * h, 40.5 * h])
-    before, after = _stepped(chosen, method, chart, plan).states
+    case, method, chart, plan, _ = _prepared(scene, row, h, times=[40 * h, 40.5 * h])
+    before, after = _stepped(case, method, chart, plan).states
     assert 1e-7 < abs(np.linalg.norm(before[:-3]) - 1.0) < 1e-2
-    f, slopes, zero = symtop.field(chart, chosen.top), [], np.zeros(before.size)
+    f, slopes, zero = symtop.field(chart, case.top), [], np.zeros(before.size)
     a, b = RK4 if row.startswith("rk4") else (((), *DOP853.a), DOP853.b)
     for weights in a[: len(b)]:
         slopes.append(f(0.0, before + 0.5 * h * sum(map(np.multiply, weights, slopes), zero)))
-    whole = before + 0.5 * h * sum(map(np.multiply, b, slopes), zero)
-    np.testing.assert_allclose(after, whole, rtol=0.0, atol=3e-15 * np.abs(before).max())
+    expected = before + 0.5 * h * sum(map(np.multiply, b, slopes), zero)
+    np.testing.assert_allclose(after, expected, rtol=0.0, atol=3e-15 * np.abs(before).max())
 
 
 def test_times_before_a_first_step_at_zero_and_after_a_failure():
@@ -205,10 +205,10 @@ def test_times_before_a_first_step_at_zero_and_after_a_failure():
             symtop.plot(run)
     for row, h, outcome in (("rk4[axis]", 1.0, "not_finite"), ("rk4[attitude]", 0.02, "not_normalised")):
         run = symtop.simulate("simo-wong", row, step_size=h, times=np.linspace(0.0, 10.0, 77), guard=False)
-        shown = np.isfinite(run["axis"].values).all(axis=1)
-        assert (run.attrs["outcome"], shown[0], shown[-1]) == (outcome, True, False)
-        np.testing.assert_array_equal(shown, run["time"].values <= run.attrs["reached_time"])
-        assert all((np.isfinite(run[name].values) == shown).all() for name in ("theta", "phi", "energy", "p_psi"))
+        mask = np.isfinite(run["axis"].values).all(axis=1)
+        assert (run.attrs["outcome"], mask[0], mask[-1]) == (outcome, True, False)
+        np.testing.assert_array_equal(mask, run["time"].values <= run.attrs["reached_time"])
+        assert all((np.isfinite(run[name].values) == mask).all() for name in ("theta", "phi", "energy", "p_psi"))
     run = symtop.simulate("spheroid", "rk4[axis]", step_size=0.1, times=np.linspace(0.0, 4.0, 401), guard=False)
     lengths = np.linalg.norm(run["axis"].values, axis=1)
     assert np.abs(np.diff(lengths)).max() < 0.2 * np.ptp(lengths)  # a shorter step keeps what a step has done to |e|
@@ -253,14 +253,14 @@ HUGE = symtop.Scene("huge", symtop.SymmetricTop(1.0, 1.0, 1e30), symtop.Angles(t
 ])  # fmt: skip
 def test_every_outcome_is_produced_said_and_timed(scene, name, controls, outcome):
     run = symtop.simulate(scene, name, guard=False, **{"samples": 201, **controls})
-    reached, unit = run.attrs["reached_time"], symtop.scene(scene).second
+    end, unit = run.attrs["reached_time"], symtop.scene(scene).second
     assert run.attrs["outcome"] == outcome
-    assert re.fullmatch(rf"stopped at t = {reached:.6g} of [\d.e+-]+{unit}: .+; .+", run.attrs["outcome_message"])
-    assert 0.0 <= reached < run.attrs["horizon"]
-    assert reached > 0.0 or outcome != "out_of_budget"
-    known, after = np.isfinite(run["axis"].values).all(axis=1), run["time"].values > reached * (1.0 + 1e-9)
-    assert known[0]
-    assert not known[after].any()  # nothing is made up
+    assert re.fullmatch(rf"stopped at t = {end:.6g} of [\d.e+-]+{unit}: .+; .+", run.attrs["outcome_message"])
+    assert 0.0 <= end < run.attrs["horizon"]
+    assert end > 0.0 or outcome != "out_of_budget"
+    mask, after = np.isfinite(run["axis"].values).all(axis=1), run["time"].values > end * (1.0 + 1e-9)
+    assert mask[0]
+    assert not mask[after].any()  # nothing is made up
 
 
 def test_an_early_end_is_announced_and_a_budget_that_was_kept_is_no_failure():
@@ -269,11 +269,11 @@ def test_an_early_end_is_announced_and_a_budget_that_was_kept_is_no_failure():
         run = symtop.simulate(grazing(gap), "radau", tolerance=tolerance, guard=sentences.append, **controls)
         assert run.attrs["outcome"] == outcome
         assert len(sentences) == (outcome != "ok")
-        reached = f"expect the run to be stopped at t = {run.attrs['reached_time']:.6g} "
-        assert all(reached in sentence and "step size fell below" in sentence for sentence in sentences)
-    free = symtop.simulate("spheroid", "rk45-compiled", tolerance=1e-6)
-    count = free.attrs["force_evaluations"]
-    assert symtop.simulate("spheroid", "rk45-compiled", tolerance=1e-6, budget=count).equals(free)
+        words = f"expect the run to be stopped at t = {run.attrs['reached_time']:.6g} "
+        assert all(words in sentence and "step size fell below" in sentence for sentence in sentences)
+    run = symtop.simulate("spheroid", "rk45-compiled", tolerance=1e-6)
+    count = run.attrs["force_evaluations"]
+    assert symtop.simulate("spheroid", "rk45-compiled", tolerance=1e-6, budget=count).equals(run)
     assert symtop.simulate("spheroid", "rk45", tolerance=1e-6, budget=count + 2).attrs["outcome"] == "ok"
     assert symtop.simulate("spheroid", "taylor", budget=1e4).attrs["outcome"] == "ok"
     with pytest.raises(symtop.SymtopError, match="the limit is 700"):
@@ -304,8 +304,8 @@ def test_implicit_steps_are_solved_where_nothing_moves_but_rounding(name, turn):
     *((HUGE, name, {"tolerance": 1e-6}) for name in ("rk45", "rk45-compiled", "taylor")),
 ])  # fmt: skip
 def test_absurd_runs_end_at_once_with_a_sentence(scene, name, controls):
-    usual = {None: {}, "step_size": {"step_size": 0.1}, "tolerance": {"tolerance": 1e-3}}
-    symtop.simulate("spheroid", name, guard=False, **usual[symtop.integrator(name).control])
+    defaults = {None: {}, "step_size": {"step_size": 0.1}, "tolerance": {"tolerance": 1e-3}}
+    symtop.simulate("spheroid", name, guard=False, **defaults[symtop.integrator(name).control])
     start, sentences = time.process_time(), []  # of this process: others may be busy
     try:
         run = symtop.simulate(scene, name, guard=sentences.append, **controls)
@@ -323,39 +323,39 @@ def test_a_quaternion_that_leaves_length_one_has_failed_alone_and_in_an_ensemble
     run = symtop.simulate("spheroid", name, **options, guard=False)
     assert run.attrs["outcome"] == "not_normalised"
     assert "0.1 %" in run.attrs["outcome_message"]
-    shown = np.isfinite(run["quaternion"].values).all(axis=1)
-    assert 0 < shown.sum() < shown.size
-    assert (np.diff(shown.astype(int)) <= 0).all()  # nothing after the failure
-    assert np.abs(np.linalg.norm(run["quaternion"].values[shown], axis=1) - 1.0).max() <= 1e-3
-    assert run.attrs["reached_time"] == run["time"].values[shown][-1]
-    assert np.isnan(run["p_phi"].values[~shown]).all()
+    mask = np.isfinite(run["quaternion"].values).all(axis=1)
+    assert 0 < mask.sum() < mask.size
+    assert (np.diff(mask.astype(int)) <= 0).all()  # nothing after the failure
+    assert np.abs(np.linalg.norm(run["quaternion"].values[mask], axis=1) - 1.0).max() <= 1e-3
+    assert run.attrs["reached_time"] == run["time"].values[mask][-1]
+    assert np.isnan(run["p_phi"].values[~mask]).all()
     assert np.nanmax(symtop.errors(run)["attitude"].values) <= np.pi
-    many = symtop.ensemble(["spheroid", "goldstein"], name, **options, observe="attitude", quiet=True).isel(member=0)
-    assert (many["outcome"].item(), many["reached_time"].item()) == ("not_normalised", run.attrs["reached_time"])
-    np.testing.assert_array_equal(many["quaternion"].values[: shown.size], run["quaternion"].values)
+    member = symtop.ensemble(["spheroid", "goldstein"], name, **options, observe="attitude", quiet=True).isel(member=0)
+    assert (member["outcome"].item(), member["reached_time"].item()) == ("not_normalised", run.attrs["reached_time"])
+    np.testing.assert_array_equal(member["quaternion"].values[: mask.size], run["quaternion"].values)
 
 
 def test_a_quaternion_that_keeps_its_length_has_not_failed_and_a_state_whose_squares_overflow_is_not_finite():
     assert symtop.simulate("spheroid", "strang[attitude]", step_size=0.5, guard=False).attrs["outcome"] == "ok"
-    near = symtop.simulate("spheroid", "rk4[attitude]", step_size=0.05, guard=False)
-    assert near.attrs["outcome"] == "ok"
-    assert np.abs(np.linalg.norm(near["quaternion"].values, axis=1) - 1.0).max() > 5e-4
+    run = symtop.simulate("spheroid", "rk4[attitude]", step_size=0.05, guard=False)
+    assert run.attrs["outcome"] == "ok"
+    assert np.abs(np.linalg.norm(run["quaternion"].values, axis=1) - 1.0).max() > 5e-4
     assert charts.attitude_distance(np.array([3e116, 0.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0, 0.0])) == np.pi
     # L is finite, about 1e160; the energy is the square of it.
     top, start = symtop.SymmetricTop(0.1862, 0.2285, 0.1828), symtop.Angles(0.00337, psi_dot=-1.61)
-    doubtful = symtop.Scene("doubtful", top, start, 87.0)
-    run = symtop.simulate(doubtful, "rk4[axis]", step_size=43.5, horizon=130.5, guard=False)
+    scene = symtop.Scene("doubtful", top, start, 87.0)
+    run = symtop.simulate(scene, "rk4[axis]", step_size=43.5, horizon=130.5, guard=False)
     assert np.isfinite(run["axis"].values).all()
     assert not np.isfinite(run["energy"].values).all()
     assert (run.attrs["outcome"], run.attrs["reached_time"]) == ("not_finite", 87.0)
-    both = symtop.ensemble([doubtful] * 2, "rk4[axis]", step_size=43.5, horizon=130.5, quiet=True)
-    assert (both["outcome"].values.tolist(), both["reached_time"].values.tolist()) == (["not_finite"] * 2, [87.0] * 2)
-    assert symtop.simulate(doubtful, "rk4[axis]", step_size=0.5, guard=False).attrs["outcome"] == "ok"  # the control
+    data = symtop.ensemble([scene] * 2, "rk4[axis]", step_size=43.5, horizon=130.5, quiet=True)
+    assert (data["outcome"].values.tolist(), data["reached_time"].values.tolist()) == (["not_finite"] * 2, [87.0] * 2)
+    assert symtop.simulate(scene, "rk4[axis]", step_size=0.5, guard=False).attrs["outcome"] == "ok"  # the control
 
 
 @pytest.mark.parametrize("count", [2, pytest.param(4, marks=pytest.mark.slow)])
 def test_every_variant_shows_finite_numbers_or_says_that_it_does_not(count):
-    draw, ended = np.random.default_rng(50), set()
+    draw, outcomes = np.random.default_rng(50), set()
     for row in (method.variant(chart) for method in symtop.integrators().values() for chart in method.charts()):
         for _ in range(count):
             I1, mgl, rate = 10.0 ** draw.uniform(-2.0, 2.0, 3)
@@ -371,5 +371,5 @@ def test_every_variant_shows_finite_numbers_or_says_that_it_does_not(count):
             run = symtop.simulate(scene, row, **control, guard=False)
             finite = all(np.isfinite(values).all() for values in run.data_vars.values())
             assert finite or run.attrs["outcome"] != "ok", (row.name, scene, control)
-            ended.add(run.attrs["outcome"])
-    assert {"ok", "not_finite", "left_chart"} <= ended
+            outcomes.add(run.attrs["outcome"])
+    assert {"ok", "not_finite", "left_chart"} <= outcomes

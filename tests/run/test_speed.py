@@ -21,42 +21,42 @@ def test_a_run_costs_what_it_computes(name):
 
     The probe makes the steps again. On spheroid the guard tries the step it advises, a forecast that is taken off.
     """
-    chosen, row = symtop.scene(name), symtop.integrator("stormer-verlet[angles]")
-    horizon = min(chosen.horizon, 3.0 * chosen.nutation_period) if name == "goldstein" else chosen.horizon
+    case, row = symtop.scene(name), symtop.integrator("stormer-verlet[angles]")
+    horizon = min(case.horizon, 3.0 * case.nutation_period) if name == "goldstein" else case.horizon
     h = horizon / 400
-    steps = bare_run(chosen, row, "angles", h, horizon)
-    plan, _ = make_plan(chosen, row, h, horizon=horizon, samples=501)
-    form, warned = closed_form(chosen), list[str]()
+    steps = bare_run(case, row, "angles", h, horizon)
+    plan, _ = make_plan(case, row, h, horizon=horizon, samples=501)
+    form, sentences = closed_form(case), list[str]()
     settings = {"step_size": h, "horizon": horizon}
     calls = [steps,
-             lambda: symtop.simulate(chosen, row, **settings, guard=False),
-             lambda: symtop.simulate(chosen, row, **settings, guard=warned.append),
+             lambda: symtop.simulate(case, row, **settings, guard=False),
+             lambda: symtop.simulate(case, row, **settings, guard=sentences.append),
              lambda: form.axis(plan.times[:300]),
-             lambda: forecast(chosen, row, "angles", plan._replace(step_size=0.5 * h))]  # fmt: skip
+             lambda: forecast(case, row, "angles", plan._replace(step_size=0.5 * h))]  # fmt: skip
     kernel, bare, whole, truth, finer = (timing.best for timing in timings(calls, batches=80, batch=2e-3))
-    assert bool(warned) == (name == "spheroid")
+    assert bool(sentences) == (name == "spheroid")
     assert bare / kernel < 12.0
-    assert (whole - truth - (finer if warned else 0.0)) / kernel < 24.0
+    assert (whole - truth - (finer if sentences else 0.0)) / kernel < 24.0
 
 
 @pytest.mark.slow
 def test_a_run_of_one_step_costs_little_and_two_samples_no_more_than_501():
     """In steps of Stormer-Verlet: 80, and 175 with a table of 35 stages. It was 370, and 600."""
-    chosen, verlet = symtop.scene("spheroid"), symtop.integrator("stormer-verlet")
+    case, verlet = symtop.scene("spheroid"), symtop.integrator("stormer-verlet")
     names = ("stormer-verlet", "midpoint", "strang", "rk4", "gauss-4", "srkn-14-6", "sofroniou-spaletta-10")
     methods = [symtop.integrator(name) for name in names]
-    calls = [bare_run(chosen, verlet, "angles", 0.001, 20.0)]
-    calls += [bare_run(chosen, one, chart, 0.01, 0.01) for one in methods for chart in one.charts()]
+    calls = [bare_run(case, verlet, "angles", 0.001, 20.0)]
+    calls += [bare_run(case, method, chart, 0.01, 0.01) for method in methods for chart in method.charts()]
     base, *singles = (timing.best for timing in timings(calls, batches=60, batch=1e-3))
-    labels = [(one.name, chart) for one in methods for chart in one.charts()]
+    labels = [(method.name, chart) for method in methods for chart in method.charts()]
     for (name, chart), seconds in zip(labels, singles, strict=True):
         assert seconds / (base / 20_000) < (300.0 if name == "sofroniou-spaletta-10" else 150.0), (name, chart)
     # They did once: phases were sorted that are always too few, and twice.
     ask = functools.partial(symtop.simulate, symtop.scene("spheroid"), "takahashi-imada", step_size=8 / 400)
     for guard in (False, True):
         calls = [functools.partial(ask, samples=count, observe="axis", guard=guard) for count in (2, 501)]
-        two, many = (timing.best for timing in timings(calls, batches=80, batch=2e-3))
-        assert two < many
+        sparse, dense = (timing.best for timing in timings(calls, batches=80, batch=2e-3))
+        assert sparse < dense
 
 
 @pytest.mark.slow
@@ -75,6 +75,6 @@ def test_the_guard_watches_two_motions_in_the_time_of_one():
         watched.growths.clear()
         watched.growth(watched.scene.horizon)
 
-    one, two, twice = (timing.best for timing in timings([alone, both, lambda: (alone(), alone())], 40, 2e-3))
-    assert two / one < 1.4
-    assert twice / one > 1.7
+    single, pair, twice = (timing.best for timing in timings([alone, both, lambda: (alone(), alone())], 40, 2e-3))
+    assert pair / single < 1.4
+    assert twice / single > 1.7

@@ -17,7 +17,7 @@ import symtop
 from symtop.core import files
 from symtop.run.ensemble import chunks, ensemble, ensemble as ensembles
 from tests.commands import printed_by
-from tests.conftest import late
+from tests.conftest import defer
 
 SOME = symtop.population(60, seed=5)
 SETTINGS = {"per_nutation": 20, "nutations": 3, "samples": 21, "quiet": True}
@@ -35,21 +35,21 @@ def small_pieces(monkeypatch):
     monkeypatch.setattr(chunks, "CHUNK", 21 * 7)
 
 
-def refused(words, path, name="strang[axis]", **changed):
+def assert_refused(words, path, name="strang[axis]", **changes):
     """The ensemble is not written to that file."""
     with pytest.raises(symtop.SymtopError, match=words):
-        symtop.ensemble(SOME, name, path=path, **SETTINGS | changed)
+        symtop.ensemble(SOME, name, path=path, **SETTINGS | changes)
 
 
 @pytest.mark.parametrize(("name", "settings"), [
     ("stormer-verlet", {}), ("strang[axis]", {"variables": ["energy", "p_phi"]}),
-    ("exact", {"per_nutation": None, "nutations": None, "horizon": 2.0}), *late(("strang[attitude]", {}),
+    ("exact", {"per_nutation": None, "nutations": None, "horizon": 2.0}), *defer(("strang[attitude]", {}),
           ("midpoint", {"nutations": None, "horizon": 0.7, "per_nutation": None, "step_size": 0.01})),
 ])  # fmt: skip
 def test_the_file_holds_the_ensemble_in_memory(tmp_path, small_pieces, name, settings):
-    whole = symtop.ensemble(SOME, name, **SETTINGS | settings)
+    expected = symtop.ensemble(SOME, name, **SETTINGS | settings)
     with symtop.ensemble(SOME, name, path=tmp_path / "runs.nc", **SETTINGS | settings) as data:
-        assert data.load().identical(whole)
+        assert data.load().identical(expected)
     assert [file.name for file in tmp_path.iterdir()] == ["runs.nc"]
 
 
@@ -65,24 +65,24 @@ def test_times_that_all_share_are_a_row_in_the_file_as_well(tmp_path, small_piec
 def test_what_is_on_disk_is_not_computed_again_and_the_bytes_are_the_same(tmp_path, small_pieces, monkeypatch, threads):
     calm, path = tmp_path / "calm.nc", tmp_path / "runs.nc"
     symtop.ensemble(SOME, "strang[axis]", path=calm, **SETTINGS).close()
-    made, keep = [], ensemble.Stream.keep
+    starts, keep = [], ensemble.Stream.keep
 
     def interrupted(stream, piece, columns):
-        if len(made) == 4:
+        if len(starts) == 4:
             raise KeyboardInterrupt
-        made.append(piece.start)
+        starts.append(piece.start)
         keep(stream, piece, columns)
 
     monkeypatch.setattr(ensemble.Stream, "keep", interrupted)
     with pytest.raises(KeyboardInterrupt):
         symtop.ensemble(SOME, "strang[axis]", path=path, threads=threads, **SETTINGS)
     parts = {file.name for file in (tmp_path / "runs.nc.parts").glob("*.npz")}
-    assert parts == {f"{first}-{first + 7}.npz" for first in made}
+    assert parts == {f"{first}-{first + 7}.npz" for first in starts}
     assert not path.exists()
-    again = []
-    monkeypatch.setattr(ensemble.Stream, "keep", lambda *given: again.append(given[1].start) or keep(*given))
+    new_starts = []
+    monkeypatch.setattr(ensemble.Stream, "keep", lambda *args: new_starts.append(args[1].start) or keep(*args))
     symtop.ensemble(SOME, "strang[axis]", path=path, threads=threads, **SETTINGS).close()
-    assert (made, again) == ([0, 7, 14, 21], [28, 35, 42, 49, 56])
+    assert (starts, new_starts) == ([0, 7, 14, 21], [28, 35, 42, 49, 56])
     assert path.read_bytes() == calm.read_bytes()
 
 
@@ -91,11 +91,11 @@ def test_the_beginning_of_another_ensemble_and_a_damaged_piece_are_refused(tmp_p
     with monkeypatch.context() as patch:
         patch.setattr(ensemble.Stream, "finish", lambda *_: xr.Dataset())
         symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS)
-    for changed in ({"samples": 20}, {"per_nutation": 21}, {"variables": ["axis"]}):
-        refused("beginning of another ensemble", path, **changed)
-    refused("beginning of another ensemble", path, "cayley[axis]")
+    for changes in ({"samples": 20}, {"per_nutation": 21}, {"variables": ["axis"]}):
+        assert_refused("beginning of another ensemble", path, **changes)
+    assert_refused("beginning of another ensemble", path, "cayley[axis]")
     (folder / "7-14.npz").write_bytes((folder / "7-14.npz").read_bytes()[:-300])
-    refused(r"7-14.npz is damaged .*: remove it", path)
+    assert_refused(r"7-14.npz is damaged .*: remove it", path)
     (folder / "7-14.npz").unlink()
     with symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS) as data:
         assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **SETTINGS))
@@ -103,32 +103,32 @@ def test_the_beginning_of_another_ensemble_and_a_damaged_piece_are_refused(tmp_p
 
 def test_one_process_at_a_time_writes_a_file(tmp_path, small_pieces, monkeypatch):
     """A second one on the same path is told so in a sentence; another path, and the same one later, are free."""
-    path, keep, once = tmp_path / "runs.nc", ensemble.Stream.keep, []
+    path, keep, calls = tmp_path / "runs.nc", ensemble.Stream.keep, []
 
     def disturbed(stream, piece, columns):
-        if piece.start == 7 and not once:
-            once.append(1)
-            refused(f"another process is writing {path}: wait until it has", path)
+        if piece.start == 7 and not calls:
+            calls.append(1)
+            assert_refused(f"another process is writing {path}: wait until it has", path)
             symtop.ensemble(SOME, "strang[axis]", path=tmp_path / "other.nc", **SETTINGS).close()
         keep(stream, piece, columns)
 
     monkeypatch.setattr(ensemble.Stream, "keep", disturbed)
     with symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS) as data:
         assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **SETTINGS))
-    assert once
+    assert calls
     assert {file.name for file in tmp_path.iterdir()} == {"runs.nc", "other.nc"}
 
 
 def test_a_piece_that_was_removed_is_not_called_damaged(tmp_path, small_pieces, monkeypatch):
     path, finish = tmp_path / "runs.nc", ensemble.Stream.finish
 
-    def robbed(stream, some, added):
+    def robbed(stream, pieces, added):
         (tmp_path / "runs.nc.parts" / "7-14.npz").unlink()
-        return finish(stream, some, added)
+        return finish(stream, pieces, added)
 
     with monkeypatch.context() as patch:
         patch.setattr(ensemble.Stream, "finish", robbed)
-        refused(r"7-14.npz is not there any more, so somebody has removed it", path)
+        assert_refused(r"7-14.npz is not there any more, so somebody has removed it", path)
     with symtop.ensemble(SOME, "strang[axis]", path=path, **SETTINGS) as data:
         assert data.load().identical(symtop.ensemble(SOME, "strang[axis]", **SETTINGS))
 
@@ -147,28 +147,28 @@ def test_pieces_that_do_not_say_whose_they_are_belong_to_nobody(tmp_path, small_
         patch.setattr(Path, "unlink", killed)
         with pytest.raises(KeyboardInterrupt):
             symtop.ensemble(SOME, "strang[axis]", **settings)
-    others = symtop.population(60, seed=6)
+    members = symtop.population(60, seed=6)
     with pytest.raises(symtop.SymtopError, match="holds the beginning of another ensemble"):
-        symtop.ensemble(others, "strang[axis]", **settings)
-    made = path.read_bytes()
+        symtop.ensemble(members, "strang[axis]", **settings)
+    content = path.read_bytes()
     symtop.ensemble(SOME, "strang[axis]", **settings).close()  # the same goes on, to the same file
-    assert path.read_bytes() == made
+    assert path.read_bytes() == content
     assert [file.name for file in tmp_path.iterdir()] == ["runs.nc"]
     folder = tmp_path / "runs.nc.parts"
     folder.mkdir()
     (folder / "0-7.npz").write_bytes(b"somebody's")
-    refused("does not say which ensemble it is of", path)
+    assert_refused("does not say which ensemble it is of", path)
     assert (folder / "0-7.npz").read_bytes() == b"somebody's"
-    assert path.read_bytes() == made
+    assert path.read_bytes() == content
 
 
 def test_nothing_is_replaced_that_is_no_netcdf_file(tmp_path, small_pieces):
     path = tmp_path / "mine.py"
     path.write_text("print(1)")
-    refused("it is there, and no netCDF file", path)
+    assert_refused("it is there, and no netCDF file", path)
     assert path.read_text() == "print(1)"
-    for place, says in ((tmp_path, "cannot write"), (tmp_path / "no" / "runs.nc", "path must be in a folder that is")):
-        refused(says, place)
+    for place, words in ((tmp_path, "cannot write"), (tmp_path / "no" / "runs.nc", "path must be in a folder that is")):
+        assert_refused(words, place)
     assert [file.name for file in tmp_path.iterdir()] == ["mine.py"]
     for name in ("strang[axis]", "rk4[axis]"):
         with symtop.ensemble(SOME, name, path=tmp_path / "runs.nc", **SETTINGS) as data:
@@ -181,7 +181,7 @@ def test_what_a_killed_writer_left_is_swept_and_a_library_without_room_says_so(t
     no_room = Mock(side_effect=RuntimeError("NetCDF: HDF error"))
     with monkeypatch.context() as patch:
         patch.setattr(ensemble, "_lay_out", no_room)
-        refused("is the disk full", path)
+        assert_refused("is the disk full", path)
     assert {file.name for file in tmp_path.iterdir()} == {"runs.nc.parts"}
     (tmp_path / "runs.nc.parts" / ".0-7.npz.0123abcd.part.npz").write_bytes(b"half")
     monkeypatch.setattr(ensemble.Stream, "keep", no_room)  # nothing is left to be computed
@@ -213,12 +213,12 @@ def test_a_million_members_take_little_memory_and_survive_a_kill(tmp_path):
         peak[n] = int(printed_by(MILLION, n, file)) / 1024
         print(f"{n} members: {time.monotonic() - begin:.1f} s, {peak[n]:.0f} MB at most")
     assert peak[1_000_000] - peak[100_000] < 500
-    killed = subprocess.Popen([sys.executable, "-c", MILLION, "1000000", str(path)], stdout=subprocess.DEVNULL)
+    process = subprocess.Popen([sys.executable, "-c", MILLION, "1000000", str(path)], stdout=subprocess.DEVNULL)
     while len(list((tmp_path / "runs.nc.parts").glob("*.npz"))) < 15:
         time.sleep(0.02)
-        assert killed.poll() is None
-    killed.send_signal(signal.SIGKILL)
-    killed.wait()
+        assert process.poll() is None
+    process.send_signal(signal.SIGKILL)
+    process.wait()
     assert not path.exists()
     printed_by(MILLION, 1_000_000, path)
     assert path.read_bytes() == calm.read_bytes()
@@ -258,7 +258,7 @@ except KeyboardInterrupt:
 def test_an_interrupt_is_heard_within_a_second(name, setting, long, threads):
     code = INTERRUPTED.replace("NAME", repr(name)).replace("THREADS", str(threads))
     code = code.replace("SETTING", setting).replace("LONG", str(long))
-    raised, ended = map(float, printed_by(code).split())
-    print(f"{name}: heard after {raised:.2f} s, ended after {ended:.2f} s")
-    assert raised < 1.0
-    assert ended < 4.0
+    raise_time, end_time = map(float, printed_by(code).split())
+    print(f"{name}: heard after {raise_time:.2f} s, ended after {end_time:.2f} s")
+    assert raise_time < 1.0
+    assert end_time < 4.0

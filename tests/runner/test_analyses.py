@@ -15,7 +15,7 @@ from symtop.runner import run as runner, store
 from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool
 from symtop.runner.run import analyse_stored, drawing_digest
-from tests.commands import answer, leftovers, same
+from tests.commands import assert_identical, code_and_output, leftovers
 
 SCRIPT = """
 import os, signal
@@ -67,9 +67,9 @@ def shared(pool, monkeypatch):
     monkeypatch.setattr("symtop.runner.pool.Pool", lambda *_: contextlib.nullcontext(pool))
 
 
-def studied(results, *files):
+def run_studies(results, *files):
     """Exit code and output of one command for several studies."""
-    return answer("study", *files, "--results", results, "--jobs", 2)
+    return code_and_output("study", *files, "--results", results, "--jobs", 2)
 
 
 def process_of(results, name):
@@ -79,22 +79,22 @@ def process_of(results, name):
 @pytest.mark.usefixtures("shared")
 def test_each_of_several_is_concluded_by_another_process_to_the_same_files(script, tmp_path):
     files = [script("first"), script("second")]
-    code, output = studied(tmp_path / "together", *files)
+    code, output = run_studies(tmp_path / "together", *files)
     assert code == 0, output
     assert output.index("first: 2 of 2") < output.index("second: 2 of 2")
     assert {process_of(tmp_path / "together", name) == os.getpid() for name in ("first", "second")} == {False}
     for file in files:
-        assert studied(tmp_path / "alone", file)[0] == 0  # the control: one by itself has nothing to run beside
+        assert run_studies(tmp_path / "alone", file)[0] == 0  # the control: one by itself has nothing to run beside
     assert {process_of(tmp_path / "alone", name) for name in ("first", "second")} == {os.getpid()}
-    assert same(tmp_path / "together", tmp_path / "alone") == 6
-    assert "0 of 2 cases computed" in studied(tmp_path / "together", *files)[1]
+    assert assert_identical(tmp_path / "together", tmp_path / "alone") == 6
+    assert "0 of 2 cases computed" in run_studies(tmp_path / "together", *files)[1]
     assert not leftovers(tmp_path / "together")
 
 
 @pytest.mark.slow
 @pytest.mark.usefixtures("shared")
 def test_a_process_that_is_killed_is_done_without(script, tmp_path):
-    code, output = studied(tmp_path / "r", script("killed"), script("second"))
+    code, output = run_studies(tmp_path / "r", script("killed"), script("second"))
     assert code == 0, output
     assert process_of(tmp_path / "r", "killed") == os.getpid()
     assert "second: 2 of 2 cases computed" in output  # by whichever process was left
@@ -115,16 +115,16 @@ def test_a_study_that_is_edited_before_it_is_concluded_is_drawn_again(script, tm
 
 
 @pytest.mark.usefixtures("shared")
-@pytest.mark.parametrize("bad", ["refused", "silent"])
-def test_what_stops_one_study_does_not_stop_the_others(script, tmp_path, bad):
+@pytest.mark.parametrize("kind", ["refused", "silent"])
+def test_what_stops_one_study_does_not_stop_the_others(script, tmp_path, kind):
     """A grid that is refused ends the command after those before it; of findings that fail the next go on."""
-    code, output = studied(tmp_path / "r", script("first"), script(bad), script("second"))
+    code, output = run_studies(tmp_path / "r", script("first"), script(kind), script("second"))
     assert code == 2
     assert "first: 2 of 2 cases computed" in output
     assert (tmp_path / "r" / "first.json").is_file()
-    assert f"study {bad} has" in output
-    assert ("second: 2 of 2 cases computed" in output) == (bad == "silent")
-    assert (tmp_path / "r" / "second.json").is_file() == (bad == "silent")
+    assert f"study {kind} has" in output
+    assert ("second: 2 of 2 cases computed" in output) == (kind == "silent")
+    assert (tmp_path / "r" / "second.json").is_file() == (kind == "silent")
     assert not leftovers(tmp_path / "r")
 
 
@@ -132,40 +132,40 @@ def test_what_an_ended_process_has_left_is_removed(script, tmp_path):
     study = runner.load(script("first"))
     (tmp_path / "figures").mkdir()
     (tmp_path / "cases" / "first").mkdir(parents=True)
-    own = [tmp_path / name for name in (".first.nc.x.part", ".first.json.y.part", "figures/.first-a.png.z.part.png")]
-    others = [tmp_path / name for name in (".other.nc.x.part", "figures/.other-a.png.z.part.png")]
-    for file in (*own, *others):
+    parts = [tmp_path / name for name in (".first.nc.x.part", ".first.json.y.part", "figures/.first-a.png.z.part.png")]
+    other_parts = [tmp_path / name for name in (".other.nc.x.part", "figures/.other-a.png.z.part.png")]
+    for file in (*parts, *other_parts):
         file.touch()
     with files.locked(tmp_path / "first.nc", wait=True):
         store.tidy(tmp_path, study)
-        assert all(file.is_file() for file in own)  # somebody writes them
+        assert all(file.is_file() for file in parts)  # somebody writes them
     store.tidy(tmp_path, study)
-    assert not any(file.is_file() for file in own)
-    assert all(file.is_file() for file in others)
+    assert not any(file.is_file() for file in parts)
+    assert all(file.is_file() for file in other_parts)
 
 
 def test_a_case_whose_file_is_gone_has_failed_and_timed_cases_wait_for_analyses(script, tmp_path, pool, monkeypatch):
     """The study is not taken for whole without it, and the next run computes it again."""
-    study, results, analyse, gone = runner.load(script("first")), tmp_path / "r", pool.analyse, []
+    study, results, analyse, paths = runner.load(script("first")), tmp_path / "r", pool.analyse, []
 
     def lose(*task):
-        gone.append(min((results / "cases" / "first").glob("*.npz")))
-        gone[0].unlink()
+        paths.append(min((results / "cases" / "first").glob("*.npz")))
+        paths[0].unlink()
         return analyse(*task)
 
     with monkeypatch.context() as patch:
         patch.setattr(pool, "analyse", lose)
         (failure,) = runner.start(study, results, pool, quiet=True, beside=True).result()["failures"]
-    (other,) = (results / "cases" / "first").glob("*.npz")
-    assert gone[0].name in failure
-    assert other.name not in failure
-    again = runner.start(study, results, pool, quiet=True).result()
-    assert (again["failures"], again["computed"]) == ([], 1)
+    (path,) = (results / "cases" / "first").glob("*.npz")
+    assert paths[0].name in failure
+    assert path.name not in failure
+    result = runner.start(study, results, pool, quiet=True).result()
+    assert (result["failures"], result["computed"]) == ([], 1)
     states, future = [], pool.analyse(time.sleep, 0.3)
     measure = lambda _: states.append(future.done()) or xr.Dataset()
     for timed in (False, True):
         study = replace(runner.load(script("first")), timed=timed, measure=measure)
         symtop.register_scene(replace(symtop.scene("spheroid"), name=f"here-{timed}"))  # cases of this process
-        here = replace(study, cases=lambda _, name=f"here-{timed}": [symtop.Case(name, "midpoint")])
-        runner.start(here, tmp_path / "r", pool, quiet=True)
+        study = replace(study, cases=lambda _, name=f"here-{timed}": [symtop.Case(name, "midpoint")])
+        runner.start(study, tmp_path / "r", pool, quiet=True)
     assert states == [False, True]

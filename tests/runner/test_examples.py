@@ -90,13 +90,13 @@ def test_functions_count_wherever_they_stand_and_however_they_were_imported(tmp_
     commented = "# a comment\ndef twice(x):\n    return 2 * x\n"
     same_code = {"plug": f"# moved\n{PLUGIN}", "coeffs": commented, "other": "x = 2\n"}
     edits = {"lazily": "def late(x):\n    return -x\n", "coeffs": "def twice(x):\n    return 3 * x\n"}
-    folders = [write(tmp_path / name, **files | changed).parent
-               for name, changed in (("first", {}), ("moved", same_code), ("edited", edits))]  # fmt: skip
-    before, same, other = map(json.loads, printed_by(CODE, *folders).splitlines())
+    folders = [write(tmp_path / name, **files | change).parent
+               for name, change in (("first", {}), ("moved", same_code), ("edited", edits))]  # fmt: skip
+    before, moved, edited = map(json.loads, printed_by(CODE, *folders).splitlines())
     assert {"code plug.py", "code coeffs.py", "code lazily.py"} <= before.keys()
     assert "code other.py" not in before
-    assert same == before
-    assert changes(before, other) == ["code coeffs.py", "code lazily.py"]
+    assert moved == before
+    assert changes(before, edited) == ["code coeffs.py", "code lazily.py"]
 
 
 @pytest.mark.parametrize(("mistake", "message"), [

@@ -21,46 +21,46 @@ from symtop.core import files, netcdf
 from symtop.core.errors import SymtopError
 from symtop.core.signals import at_most
 from symtop.runner import pool as work, run as runner, store
-from tests.commands import PROBE, contents, ended, leftovers, probed as probe, same, stop, succeeded, symtop
+from tests.commands import PROBE, assert_identical, contents, finish, leftovers, probe, stdout_of, stop, symtop
 from tests.kills import survive
 
 
-def refused(results, says):
+def assert_refused(results, message):
     """One sentence, code 2, nothing partial."""
     output = probe(results, code=2)
     assert output.count("\n") == 1, output
     assert output.startswith("symtop: cannot write")
-    assert says in output
+    assert message in output
     assert not leftovers(Path(results)) if Path(results).is_dir() else True
 
 
 def test_a_full_disk_ends_the_run_and_what_was_computed_is_kept(tmp_path, monkeypatch):
-    real, count = np.savez, []
+    original, count = np.savez, []
 
     def full(*arguments, **options):
         count.append(1)
         if len(count) > 2:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
-        return real(*arguments, **options)
+        return original(*arguments, **options)
 
     monkeypatch.setattr(np, "savez", full)
-    refused(tmp_path, "No space left on device")
+    assert_refused(tmp_path, "No space left on device")
     assert len(count) == 3  # the third case was the last one tried
     assert len(list(tmp_path.rglob("cases/probe/*.npz"))) == 2
     monkeypatch.undo()
     assert "2 of 4 cases computed" in probe(tmp_path)
 
 
-@pytest.mark.parametrize(("place", "name", "error", "says"), [
+@pytest.mark.parametrize(("place", "name", "error", "message"), [
     (xr.Dataset, "to_netcdf", RuntimeError("NetCDF: HDF error"), "NetCDF: HDF error"),
     (store.tempfile, "TemporaryFile", OSError(errno.EROFS, os.strerror(errno.EROFS)), "Read-only file system"),
 ])  # fmt: skip
-def test_what_the_netcdf_library_or_the_system_refuses_to_write(tmp_path, monkeypatch, place, name, error, says):
+def test_what_the_netcdf_library_or_the_system_refuses_to_write(tmp_path, monkeypatch, place, name, error, message):
     monkeypatch.setattr(place, name, Mock(side_effect=error))
-    refused(tmp_path, says)
+    assert_refused(tmp_path, message)
     if place is xr.Dataset:
         monkeypatch.setattr(netcdf, "LITTLE", 1e30)
-        refused(tmp_path, "no room is left")
+        assert_refused(tmp_path, "no room is left")
 
 
 def sentences(err):
@@ -71,7 +71,7 @@ def sentences(err):
 @pytest.mark.slow
 def test_a_real_limit_on_the_size_of_files(tmp_path):
     """The kernel refuses to let files grow beyond 8 kB: every write fails as on a full disk, in workers too."""
-    succeeded(symtop("study", PROBE, "--results", tmp_path / "warm"))  # kernels are cached now
+    stdout_of(symtop("study", PROBE, "--results", tmp_path / "warm"))  # kernels are cached now
     code = "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (8192, 8192)); "
     code += "from symtop.cli.main import main; sys.argv[0] = 'symtop'; main()"
     command = [sys.executable, "-c", code, "study", str(PROBE), "--results", str(tmp_path / "small")]
@@ -87,44 +87,44 @@ def test_a_real_limit_on_the_size_of_files(tmp_path):
 def test_a_file_where_a_folder_should_be(tmp_path, place):
     (tmp_path / place).parent.mkdir(parents=True, exist_ok=True)
     (tmp_path / place).write_text("I was here first")
-    refused(tmp_path, str(tmp_path / "quick"))
+    assert_refused(tmp_path, str(tmp_path / "quick"))
     assert (tmp_path / place).read_text() == "I was here first"
 
 
 def test_files_where_folders_should_be_and_folders_where_files(tmp_path):
     (tmp_path / "file").touch()
     assert "is a file" in probe(tmp_path / "file", code=2)
-    refused("/proc/nowhere", "/proc/nowhere")
+    assert_refused("/proc/nowhere", "/proc/nowhere")
     probe(tmp_path)
     for name in ("probe.nc", "probe.json", "figures/probe-energy.png"):
         target = tmp_path / "quick" / name
         (tmp_path / "quick" / "probe.nc").unlink(missing_ok=True)  # so that there is something to do
         target.unlink(missing_ok=True)
         target.mkdir()
-        refused(tmp_path, "it is a folder")
+        assert_refused(tmp_path, "it is a folder")
         target.rmdir()
     case = next((tmp_path / "quick" / "cases" / "probe").glob("*.npz"))
     case.unlink()
     case.mkdir()
-    refused(tmp_path, "it is a folder")
+    assert_refused(tmp_path, "it is a folder")
 
 
 def test_truncated_damaged_and_foreign_files_are_computed_again(tmp_path):
     probe(tmp_path)
     before, cases = contents(tmp_path), sorted((tmp_path / "quick" / "cases" / "probe").glob("*.npz"))
-    whole = cases[0].read_bytes()
+    content = cases[0].read_bytes()
     with np.load(cases[1]) as file:
         arrays = dict(file)
-    cases[0].write_bytes(whole[: len(whole) // 2])
+    cases[0].write_bytes(content[: len(content) // 2])
     np.savez(cases[1], **arrays | {"0": arrays["0"] * (1.0 + 1e-15)})  # readable, and not what it says
     np.savez(cases[2], energy=[1.0])  # somebody else's
-    cases[3].write_bytes(whole)  # another case's file under this name
+    cases[3].write_bytes(content)  # another case's file under this name
     assert "4 of 4 cases computed" in probe(tmp_path)
     after = contents(tmp_path)
     assert all(before[name].identical(after[name]) for name in before)
     assert "0 of 4 cases computed" in probe(tmp_path)
-    about = str(arrays["about"]).replace('"made_of": {', '"made_of": {"code nothing.py": "0", ')
-    np.savez(cases[1], **arrays | {"about": about})  # the numbers are right, and what is said of them is not
+    record = str(arrays["about"]).replace('"made_of": {', '"made_of": {"code nothing.py": "0", ')
+    np.savez(cases[1], **arrays | {"about": record})  # the numbers are right, and what is said of them is not
     assert "1 of 4 cases computed" in probe(tmp_path)
 
 
@@ -156,26 +156,26 @@ def test_two_runs_at_once_share_the_work_and_agree(tmp_path):
     log, words = tmp_path / "log", ["study", PROBE, "--results", tmp_path / "shared", "--jobs", 2]
     runs = [symtop(*words, PROBE_LOG=log, PROBE_PAUSE=0.3) for _ in range(2)]
     for run in runs:
-        assert "of 12 cases computed" in succeeded(run)
+        assert "of 12 cases computed" in stdout_of(run)
     names = log.read_text().split()
     assert len(names) == len(set(names)) == 12
-    succeeded(symtop("study", PROBE, "--results", tmp_path / "alone"))
-    same(tmp_path / "shared", tmp_path / "alone")
+    stdout_of(symtop("study", PROBE, "--results", tmp_path / "alone"))
+    assert_identical(tmp_path / "shared", tmp_path / "alone")
     assert not leftovers(tmp_path / "shared")
 
 
 def test_damaged_findings_and_what_a_killed_worker_left_are_made_again(tmp_path):
     probe(tmp_path)
     path = tmp_path / "quick" / "probe.json"
-    good = json.loads(path.read_text())
+    findings = json.loads(path.read_text())
     for damage in ("", "{", "[1, 2]", '{"stamp": 3}', "\0\0\0"):
         path.write_text(damage)
         assert "0 of 4 cases computed" in probe(tmp_path), damage
-        assert json.loads(path.read_text()) == good
+        assert json.loads(path.read_text()) == findings
     (case,) = tmp_path.rglob("cases/probe/goldstein--midpoint--*.npz")
     case.unlink()
-    left = case.with_name(f".{case.stem}.trace"), files.lock_path(case), case.with_name(f".{case.name}.x.part.nc")
-    for name in left:
+    paths = case.with_name(f".{case.stem}.trace"), files.lock_path(case), case.with_name(f".{case.name}.x.part.nc")
+    for name in paths:
         name.touch()
     assert "1 of 4 cases computed" in probe(tmp_path)
     assert not leftovers(tmp_path)
@@ -203,15 +203,15 @@ def test_an_interrupt_keeps_what_was_computed(tmp_path, number, code, quick):
     wait_for_cases(log, 3 if quick else 5, process)
     os.killpg(process.pid, number) if number == signal.SIGHUP else process.send_signal(number)  # as a terminal does
     start = time.monotonic()
-    ended_with, _, err = ended(process)
+    status, _, err = finish(process)
     assert time.monotonic() - start < 10.0
-    assert ended_with == code
-    says = "interrupted" if number == signal.SIGINT else "terminated"
-    assert sentences(err) == [f"symtop: {says}; what was computed is kept, and the same command goes on from there"]
+    assert status == code
+    word = "interrupted" if number == signal.SIGINT else "terminated"
+    assert sentences(err) == [f"symtop: {word}; what was computed is kept, and the same command goes on from there"]
     assert not leftovers(tmp_path / "r")
     count = len(list((tmp_path / "r").rglob("cases/probe/*.npz")))
     assert count >= 1, [path.read_text() for path in (tmp_path / "r").rglob("*.failed.json")]
-    assert f"{(4 if quick else 12) - count} of" in succeeded(symtop(*words, PROBE_LOG=log))
+    assert f"{(4 if quick else 12) - count} of" in stdout_of(symtop(*words, PROBE_LOG=log))
     assert not leftovers(tmp_path / "r")
 
 
@@ -233,7 +233,7 @@ def test_a_worker_that_is_killed_costs_no_more_than_what_it_was_computing(tmp_pa
     workers = [int(pid) for pid in Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()]
     spawned = [pid for pid in workers if b"spawn_main" in Path(f"/proc/{pid}/cmdline").read_bytes()]
     os.kill(spawned[0], signal.SIGKILL)
-    assert "12 of 12 cases computed" in succeeded(process)
+    assert "12 of 12 cases computed" in stdout_of(process)
     names = log.read_text().split()
     assert len(names) - len(set(names)) <= 2  # one case a worker
 
@@ -276,31 +276,31 @@ def test_methods_that_raise_hang_end_their_process_or_return_nonsense(tmp_path):
     plugin.write_text(BAD)
     results = tmp_path / "r"
     words = ["study", PROBE, "--results", results, "--jobs", 2]
-    succeeded(symtop(*words))  # the good ones have compiled their kernels
-    code, out, err = ended(symtop(*words, "--plugin", plugin, "--limit", 3))
+    stdout_of(symtop(*words))  # the good ones have compiled their kernels
+    code, out, err = finish(symtop(*words, "--plugin", plugin, "--limit", 3))
     assert code == 1
     assert "2 of 24 cases computed" in out  # those that return NaN: a result like any other
-    says = {
+    expected = {
         "raises": "RuntimeError: no luck", "hangs": "it was not done after 3 s", "exits": "its process was ended",
         "deaf": "it was not done after 3 s and did not answer", "shape": "must return a Run with real states",
     }  # fmt: skip
     lines = sentences(err)
-    assert len(lines) == 2 * len(says)
-    for name, sentence in says.items():
-        own = [line for line in lines if f"bad-{name} on " in line]
-        assert len(own) == 2, err
-        assert all(sentence in line for line in own), own
+    assert len(lines) == 2 * len(expected)
+    for name, sentence in expected.items():
+        own_lines = [line for line in lines if f"bad-{name} on " in line]
+        assert len(own_lines) == 2, err
+        assert all(sentence in line for line in own_lines), own_lines
     data = netcdf.read(results / "probe.nc")
     assert list(data["outcome"].sel(variant="bad-nan").values) == ["not_finite", "not_finite"]
-    good = data.drop_sel(variant="bad-nan")
-    assert set(good["outcome"].values.ravel()) == {"ok"}
-    assert good.sizes["variant"] == 6
+    data = data.drop_sel(variant="bad-nan")
+    assert set(data["outcome"].values.ravel()) == {"ok"}
+    assert data.sizes["variant"] == 6
     records = [json.loads(path.read_text()) for path in results.rglob("*.failed.json")]
     assert len(records) == 10
     assert any("raise RuntimeError" in line for r in records for line in r["traceback"])
     assert any("in deaf" in line for r in records for line in r["traceback"])
     assert not leftovers(results)
-    code, out, _ = ended(symtop("study", PROBE, "--results", results, "--plugin", plugin, "--status", "--json"))
+    code, out, _ = finish(symtop("study", PROBE, "--results", results, "--plugin", plugin, "--status", "--json"))
     assert code == 1
     states = [row["state"] for row in json.loads(out)["probe"]]
     assert (states.count("failed"), states.count("done")) == (10, 14)
@@ -332,7 +332,7 @@ def test_a_clock_that_jumps(tmp_path, monkeypatch):
     monkeypatch.setattr(time, "time", lambda: draw.uniform(-1e9, 4e9))
     probe(tmp_path / "r")
     monkeypatch.undo()
-    same(tmp_path / "calm", tmp_path / "r")
+    assert_identical(tmp_path / "calm", tmp_path / "r")
 
 
 @pytest.mark.slow
@@ -352,8 +352,8 @@ def test_errors_of_the_place_are_not_errors_of_a_case(tmp_path):
     task = work.Task(str(PROBE), case, path, (), 10.0)
     assert (work.execute_case(task).state, work.execute_case(task).state) == ("computed", "found")
     assert work.execute_case(task._replace(fresh=True)).state == "computed"
-    other = path.with_name(path.name.replace(store.digest_of(path), "0" * 20))
+    control = path.with_name(path.name.replace(store.digest_of(path), "0" * 20))
     with pytest.raises(SymtopError, match="not those that the study was started with"):
-        work.execute_case(task._replace(path=other))
+        work.execute_case(task._replace(path=control))
     with files.locked(path, wait=False):
         assert work.execute_case(task).state == "busy"

@@ -38,10 +38,10 @@ def pool():
         yield workers
 
 
-def study(folder, some="range(12)"):
-    """Eight ordinary cases and four timed ones, or what `some` of them are."""
+def study(folder, expression="range(12)"):
+    """Eight ordinary cases and four timed ones, or as many as `expression` has."""
     (folder / "crew").mkdir(parents=True)
-    (folder / "slept.py").write_text(SCRIPT.replace("range(12)", some))
+    (folder / "slept.py").write_text(SCRIPT.replace("range(12)", expression))
     return runner.load(str(folder / "slept.py"))
 
 
@@ -57,9 +57,9 @@ def crew(cases):
     return {int(case["process"]) for case in cases}
 
 
-def at_once(cases):
+def overlaps(cases):
     """How many pairs of neighbours overlap."""
-    return sum(float(one["end"]) > float(other["begin"]) for one, other in itertools.pairwise(cases))
+    return sum(float(first["end"]) > float(second["begin"]) for first, second in itertools.pairwise(cases))
 
 
 @pytest.mark.slow
@@ -72,12 +72,12 @@ def test_a_trial_decides_whether_timed_cases_run_at_once_in_workers_that_are_the
         slept = study(folder)
         ordinary, timed = computed(slept, folder / "r", pool)
         assert (len(ordinary), len(timed)) == (8, 4)
-        assert at_once(ordinary) > 0  # the control
+        assert overlaps(ordinary) > 0  # the control
         assert max(float(case["end"]) for case in ordinary) <= float(timed[0]["begin"])
         assert crew(timed) <= crew(ordinary)
         assert os.getpid() not in crew(ordinary)
-        assert (at_once(timed) >= 2) is side_by_side
-        assert (at_once(timed) == 0) is not side_by_side
+        assert (overlaps(timed) >= 2) is side_by_side
+        assert (overlaps(timed) == 0) is not side_by_side
         for case in timed:
             assert (case.attrs["timed_at_once"], case.attrs["timed_slowdown"]) == (2 if side_by_side else 1, ratio)
         computed(slept, folder / "again", pool)
@@ -100,7 +100,7 @@ def test_families_do_not_begin_side_by_side_and_half_as_many_workers_may_not_dis
 def test_few_cases_are_computed_here_and_timed_ones_need_no_trial(tmp_path):
     with Pool(1) as pool:
         _, cases = computed(study(tmp_path, "range(8, 12)"), tmp_path / "r", pool)
-    assert at_once(cases) == 0
+    assert overlaps(cases) == 0
     assert crew(cases) == {os.getpid()}
     assert {case.attrs["timed_at_once"] for case in cases} == {1}
     assert all(math.isnan(case.attrs["timed_slowdown"]) for case in cases)

@@ -40,16 +40,16 @@ def test_timed_cases_that_alone_are_missing_run_in_new_workers(tmp_path, monkeyp
     (tmp_path / "rounds.py").write_text(ROUNDS)
     study, results = runner.load(str(tmp_path / "rounds.py")), tmp_path / "r"
     assert runner.run(study, results, quiet=True)["failures"] == []
-    (later,) = (results / "cases" / "rounds").glob("*--together--*.npz")
-    assert set(np.ravel(store.load_case(later)["process"])) == {os.getpid()}  # the control: few cases need no workers
-    later.unlink()
+    (path,) = (results / "cases" / "rounds").glob("*--together--*.npz")
+    assert set(np.ravel(store.load_case(path)["process"])) == {os.getpid()}  # the control: few cases need no workers
+    path.unlink()
     monkeypatch.setattr(pools, "WORTH_WORKERS", 1)
     with Pool(2) as pool:
         result = runner.run(study, results, quiet=True, pool=pool)
     assert (result["computed"], result["failures"]) == (1, [])
-    again = store.load_case(later)
-    assert os.getpid() not in set(np.ravel(again["process"]))
-    assert set(np.ravel(again["later"])) == {2.0}
+    data = store.load_case(path)
+    assert os.getpid() not in set(np.ravel(data["process"]))
+    assert set(np.ravel(data["later"])) == {2.0}
 
 
 @pytest.fixture(params=["probe", "rounds"])
@@ -76,13 +76,13 @@ def bring(request, tmp_path, monkeypatch):
 def test_what_was_copied_or_touched_is_read_once(bring):
     computed, _ = bring()
     shutil.copytree(bring.folder, bring.folder.with_name("copy"), copy_function=shutil.copyfile)
-    again, read = bring("copy")
-    assert (again, read >= computed) == (0, True)
+    count, read = bring("copy")
+    assert (count, read >= computed) == (0, True)
     assert bring("copy") == (0, 0)
     file = bring.files()[0]
     os.utime(file, ns=(0, file.stat().st_mtime_ns + 1))
-    again, read = bring()
-    assert (again, read >= computed) == (0, True)
+    count, read = bring()
+    assert (count, read >= computed) == (0, True)
 
 
 def test_a_case_of_any_round_or_a_dataset_that_is_gone_or_damaged_is_made_again(bring):
@@ -94,11 +94,11 @@ def test_a_case_of_any_round_or_a_dataset_that_is_gone_or_damaged_is_made_again(
             assert bring()[0] == 1, file
             assert bring() == (0, 0)
     bring()
-    whole = netcdf.read_any(bring.dataset)
+    expected = netcdf.read_any(bring.dataset)
     for spoil in (bring.dataset.unlink, lambda: bring.dataset.write_bytes(b"\0" * 9)):
         spoil()
         assert bring()[0] == 0
-        assert netcdf.read_any(bring.dataset).identical(whole)
+        assert netcdf.read_any(bring.dataset).identical(expected)
 
 
 def test_nothing_is_read_twice_and_a_damaged_manifest_is_not_believed(bring):
@@ -108,6 +108,6 @@ def test_nothing_is_read_twice_and_a_damaged_manifest_is_not_believed(bring):
     assert bring() == (0, 0)
     for nonsense in ("", "[]", '{"probe": 1, "rounds": 1}', '{"probe": {}, "rounds": {"files": []}}'):
         store.manifest(bring.folder).write_text(nonsense)
-        again, read = bring()
-        assert (again, read >= computed) == (0, True), nonsense
+        count, read = bring()
+        assert (count, read >= computed) == (0, True), nonsense
         assert bring() == (0, 0)

@@ -19,7 +19,7 @@ from symtop.report import style
 from symtop.runner import fingerprint, run as runner
 from symtop.runner.cases import status
 from symtop.runner.run import drawing_digest
-from tests.commands import PROBE, probed, succeeded, symtop as symtop_command
+from tests.commands import PROBE, probe, stdout_of, symtop as symtop_command
 
 
 @contextlib.contextmanager
@@ -57,7 +57,7 @@ def stale_after(places, study, before):
         for place in places.split():
             edits.enter_context(edited(place))
         after = digests(study)
-    return {case.integrator for case, one, two in zip(study.cases(True), before, after, strict=True) if one != two}
+    return {case.integrator for case, old, new in zip(study.cases(True), before, after, strict=True) if old != new}
 
 
 def of_everyone():
@@ -102,23 +102,23 @@ def test_an_edit_of_what_all_cases_reach_makes_all_stale(everyone, place):
 
 def test_measure_code_and_the_reference_make_the_cases_of_their_study_stale():
     convergence = runner.load("convergence")
-    every, before = {case.integrator for case in convergence.cases(True)}, digests(convergence)
+    names, before = {case.integrator for case in convergence.cases(True)}, digests(convergence)
     for place in ("symtop.run.reference.truth:reference", "symtop.measure.accuracy:error_row"):
-        assert stale_after(place, convergence, before) == every, place
+        assert stale_after(place, convergence, before) == names, place
     places = "symtop_studies.convergence.figures:pictures symtop.measure.step_map:step_map"
     assert (stale_after(places, convergence, before), digests(convergence)) == (set(), before)
 
 
-@pytest.mark.parametrize(("place", "again"), [
+@pytest.mark.parametrize(("place", "remade"), [
     ("symtop_studies.cost.cells:winners", True), ("symtop_studies.cost.facts:facts", True),
     ("symtop.measure.datasets:_dense", True), ("symtop.cli.common:as_text", False),
     ("symtop_studies.drift.facts:facts", False),
 ])  # fmt: skip
-def test_findings_are_made_again_when_what_draws_or_judges_them_is_edited(place, again):
+def test_findings_are_made_again_when_what_draws_or_judges_them_is_edited(place, remade):
     study = runner.load("cost")
     before = drawing_digest(study, style.save)
     with edited(place):
-        assert (drawing_digest(study, style.save) != before) is again
+        assert (drawing_digest(study, style.save) != before) is remade
     assert drawing_digest(study, style.save) == before
 
 
@@ -128,9 +128,9 @@ def test_coefficients_count(clean_registry):
     before, solver = fingerprint.reasons(study, case), method.solvers["axis"]
     kicks = solver.rule.rule.kick
     nudged = solver.rule.rule._replace(kick=(kicks[0] * (1.0 + 1e-15), *kicks[1:]))
-    changed = dataclasses.replace(solver.rule, rule=nudged)
-    other = dataclasses.replace(method, solvers={"axis": dataclasses.replace(solver, rule=changed)})
-    symtop.register(other, replace=True)
+    variant = dataclasses.replace(solver.rule, rule=nudged)
+    method = dataclasses.replace(method, solvers={"axis": dataclasses.replace(solver, rule=variant)})
+    symtop.register(method, replace=True)
     assert "integrator chin-4a" in code_hash.changes(before, fingerprint.reasons(study, case))
 
 
@@ -138,10 +138,10 @@ def test_a_case_depends_on_the_integrators_that_its_study_says_it_runs():
     reduction = runner.load("reduction")
     twins = next(case for case in reduction.cases(True) if case.settings["part"] == "twins")
     assert fingerprint.uses(reduction, twins) == sorted(["exact", twins.integrator, f"{twins.integrator}-unreduced"])
-    silent = dataclasses.replace(reduction, uses=None)
-    assert fingerprint.uses(silent, twins) == sorted(["exact", twins.integrator])
-    several = symtop.Case("goldstein", "together", {"integrators": ["rk4[axis]", "strang[axis]"]})
-    assert fingerprint.uses(silent, several) == ["exact", "rk4", "strang"]
+    study = dataclasses.replace(reduction, uses=None)
+    assert fingerprint.uses(study, twins) == sorted(["exact", twins.integrator])
+    case = symtop.Case("goldstein", "together", {"integrators": ["rk4[axis]", "strang[axis]"]})
+    assert fingerprint.uses(study, case) == ["exact", "rk4", "strang"]
     assert fingerprint.uses(of_everyone(), symtop.Case("goldstein", "*", {})) == sorted(symtop.integrators())
 
 
@@ -149,13 +149,13 @@ def test_digests_are_the_same_whatever_the_process_has_run_or_registered():
     """Values that calls have left in modules are state and count for nothing."""
     studies = [runner.load(name) for name in ("convergence", "cost", "notebook")]
     cases = [(study, case) for study in studies for case in study.cases(True)[:20]]
-    before = [fingerprint.digest(*one) for one in cases]
+    before = [fingerprint.digest(*pair) for pair in cases]
     symtop.simulate("spheroid", "strang", step_size=0.01)
     symtop.reference("cusp", [0.0, 1.0])
     symtop.ensemble(symtop.population(5, seed=1), "rk4", step_size=0.01, horizon=0.1, samples=3)
     studies[0].measure(cases[0][1])
     forget()
-    assert [fingerprint.digest(*one) for one in cases] == before
+    assert [fingerprint.digest(*pair) for pair in cases] == before
 
     def part(x):
         return 2.0 * x
@@ -192,7 +192,7 @@ def test_a_constant_of_the_script_counts_and_a_caption_does_not(tmp_path):
 
 def test_a_missing_case_is_told_by_its_settings_and_by_what_was_edited(tmp_path):
     study = runner.load(str(PROBE))
-    probed(tmp_path)
+    probe(tmp_path)
     coarser = dataclasses.replace(study, cases=lambda quick: [symtop.Case("loop", "midpoint", {"step_size": 0.02})])
     for place, causes in (("cli.common:as_text", []), ("model.top:SymmetricTop.energy", ["code symtop/model/top.py"])):
         with edited(f"symtop.{place}"):
@@ -220,8 +220,8 @@ def test_an_edit_of_each_family_is_named_by_status_and_is_all_that_is_computed(t
     (tmp_path / "coeffs.py").write_text("W = (0.0, 1.0)\n")
     words = ["study", tmp_path / "probe.py", "--plugin", tmp_path / "plug.py", "--results", tmp_path / "r"]
 
-    def command(*more):
-        return succeeded(symtop_command(*words, *more, cwd=tmp_path, PYTHONPATH=tmp_path))
+    def command(*options):
+        return stdout_of(symtop_command(*words, *options, cwd=tmp_path, PYTHONPATH=tmp_path))
 
     assert "14 of 14 cases computed" in command()
     edits = [
@@ -235,7 +235,7 @@ def test_an_edit_of_each_family_is_named_by_status_and_is_all_that_is_computed(t
         assert before in text
         file.write_text(text.replace(before, after, 1))
         rows = json.loads(command("--status", "--why", "--json"))["probe"]
-        some = {row["integrator"] for row in rows} if stale == "all" else stale
-        assert {row["integrator"] for row in rows if row["state"] == "stale"} == some, file
+        names = {row["integrator"] for row in rows} if stale == "all" else stale
+        assert {row["integrator"] for row in rows if row["state"] == "stale"} == names, file
         assert all(row["why"] == [why] for row in rows if row["state"] == "stale"), rows
         assert f"{sum(row['state'] == 'stale' for row in rows)} of 14 cases computed" in command()

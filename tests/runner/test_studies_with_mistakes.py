@@ -48,12 +48,12 @@ def run_study(folder, change, *words, code=0):
     return call("study", script, "--jobs", 1, "--results", folder / "results", *words, code=code).output
 
 
-def refused(folder, change, says, *words):
+def assert_refused(folder, change, message, *words):
     """Code 2 and one sentence, which names the study."""
     output = run_study(folder, change, *words, code=2)
     assert output.startswith("symtop: study mine: ")
     assert output.count("\n") == 1
-    assert says in output
+    assert message in output
 
 
 @pytest.mark.parametrize("limit", ["1e8", "1e300"])  # as long as one likes
@@ -68,18 +68,18 @@ def test_the_study_itself_is_right_and_none_that_ships_is_replaced(tmp_path, mon
     assert not (tmp_path / "other" / "results").exists()
 
 
-@pytest.mark.parametrize(("change", "says"), [
+@pytest.mark.parametrize(("change", "message"), [
     ("cases = lambda quick: None", "cases must return a list of Case, not None"),
     ("cases = lambda quick: 1 / 0", "cases failed: ZeroDivisionError"),
     ("cases = lambda quick: [Case('spheroid', 'rk4', {'a': np.arange(3.0)})]", "setting 'a' must be numbers"),
     ("more = {'uses': lambda case: 1 / 0}", "uses failed: ZeroDivisionError"),
 ])  # fmt: skip
-def test_a_grid_that_is_none_is_refused(tmp_path, change, says):
+def test_a_grid_that_is_none_is_refused(tmp_path, change, message):
     for words in [(), ("--status",), ("--only", "rk4")][: 3 if "uses" in change else 1]:  # by whichever command
-        refused(tmp_path, change, says, *words)
+        assert_refused(tmp_path, change, message, *words)
 
 
-@pytest.mark.parametrize(("change", "says"), [
+@pytest.mark.parametrize(("change", "message"), [
     ("facts = lambda data: None", "facts must return numbers by name, not None"),
     ("facts = lambda data: {'a b': 1}", "a fact's name must be a word of letters, digits and _, not 'a b'"),
     ("facts = lambda data: [symtop.simulate('spheroid', 'rk4', step_size=np.nan).title]",
@@ -92,8 +92,8 @@ def test_a_grid_that_is_none_is_refused(tmp_path, change, says):
     ("tables = lambda data: {'../a': pd.DataFrame()}", "name of a table must be"),
     ("more = {'charts': lambda data: None}", "charts must return a list of Chart, not None"),
 ])  # fmt: skip
-def test_an_answer_of_the_wrong_kind_is_refused_and_the_cases_are_kept(tmp_path, change, says):
-    refused(tmp_path, change, says)
+def test_an_answer_of_the_wrong_kind_is_refused_and_the_cases_are_kept(tmp_path, change, message):
+    assert_refused(tmp_path, change, message)
     assert len(list(tmp_path.rglob("cases/mine/*.npz"))) == 2
 
 
@@ -102,13 +102,13 @@ def test_an_answer_may_come_in_any_order_of_things():
     assert names(lambda: ("a", "b")) == ["a", "b"]
     assert names(lambda: iter(["a"])) == ["a"]
     assert names(list) == []
-    for bad in ("a", b"a", {"a": 1}, 3, [None]):
+    for value in ("a", b"a", {"a": 1}, 3, [None]):
         with pytest.raises(StudyError, match="study mine: names must return a list of names"):
-            names(lambda bad=bad: bad)
+            names(lambda value=value: value)
 
 
 def test_a_page_that_is_wrong_is_told_of(tmp_path):
-    for page, says in (
+    for page, message in (
         ("{{ f.wrost | number }}", "page of mine, line 1: there is no fact 'wrost'"),
         ("# Q\n{{ f.worst | numbr }}", "page of mine, line 2: No filter named 'numbr'"),
         ("{% if f.worst %}", "page of mine, line 1: Unexpected end of template"),
@@ -116,7 +116,7 @@ def test_a_page_that_is_wrong_is_told_of(tmp_path):
         ("# Q\n{{ 1 / (f.worst - 0.25) }}", "page of mine, line 2: float division by zero"),
     ):
         (tmp_path / "mine.md").write_text(page)
-        assert says in run_study(tmp_path, "pictures = lambda data: []", code=2)
+        assert message in run_study(tmp_path, "pictures = lambda data: []", code=2)
     (tmp_path / "mine.md").write_text("# {{ question }}\n\nThe worst is {{ f.worst | number }}.\n\n{{ table('one') }}")
     output = run_study(tmp_path, "")
     assert "0 of 2 cases computed" in output
@@ -140,12 +140,12 @@ def test_a_step_that_is_nan_is_no_option_and_a_limit_holds_for_checked_cases_too
     assert "study mine: no case could be measured; rk4 on spheroid failed: step_size must be a finite" in output
     change = "def measure(case):\n    assert case.integrator != 'rk4', 'so'\n    return xr.Dataset({'err': 1.0})"
     combining = "\ncases = lambda quick: [Case('spheroid', n, {'h': h}) for n in ('rk4', 'strang') for h in (1, 2)]"
-    failed, again, sentence = run_study(tmp_path, change + combining, code=2).splitlines()  # which may be why
-    assert failed == again == "  rk4 on spheroid failed: AssertionError: so"
+    first, second, sentence = run_study(tmp_path, change + combining, code=2).splitlines()  # which may be why
+    assert first == second == "  rk4 on spheroid failed: AssertionError: so"
     assert "two cases of strang on spheroid measure err" in sentence
-    slow = "import os, time\ndef measure(case):\n    time.sleep(float(os.environ.get('LATE', '0')))\n"
-    slow += "    return xr.Dataset({'err': 1.0})"
-    run_study(tmp_path, slow)
-    assert "2 of 2 cases computed again, the same" in run_study(tmp_path, slow, "--check", "--limit", 30)
+    script = "import os, time\ndef measure(case):\n    time.sleep(float(os.environ.get('LATE', '0')))\n"
+    script += "    return xr.Dataset({'err': 1.0})"
+    run_study(tmp_path, script)
+    assert "2 of 2 cases computed again, the same" in run_study(tmp_path, script, "--check", "--limit", 30)
     monkeypatch.setenv("LATE", "3")
-    assert run_study(tmp_path, slow, "--check", "--limit", 0.2, code=1).count("it was not done after 0.2 s") == 2
+    assert run_study(tmp_path, script, "--check", "--limit", 0.2, code=1).count("it was not done after 0.2 s") == 2

@@ -18,23 +18,23 @@ from symtop.model import scenes as catalogue
 from symtop.model.scenes import TAGS
 from symtop.runner import run as runner, store
 from symtop.runner.study import Case
-from tests.commands import PROBE, call, contents, probed as probe
+from tests.commands import PROBE, call, contents, probe
 
 
 def test_every_study_leaves_figures_and_findings_that_follow_from_its_dataset(quick_results, tmp_path):
     """Nothing is said that the dataset on disk does not say again; `seconds` aside, nothing else is asked."""
     for name in runner.names():
-        study, stored = runner.load(name), netcdf.read_any(quick_results / f"{name}.nc")
-        assert all({"scene", "variant"} <= {*data.dims} for data in netcdf.groups(stored).values() if data.variables)
+        study, tree = runner.load(name), netcdf.read_any(quick_results / f"{name}.nc")
+        assert all({"scene", "variant"} <= {*data.dims} for data in netcdf.groups(tree).values() if data.variables)
         findings = json.loads((quick_results / f"{name}.json").read_text(encoding="utf-8"))
         assert findings["failures"] == []
         assert findings["pictures"] or findings["facts"]["busy"]  # times of a busy machine are not drawn
         for picture in findings["pictures"]:
             assert (quick_results / "figures" / picture["file"]).stat().st_size > 5000
-        again = runner.findings_of(study, stored, tmp_path, None, failures=[], cases=findings["cases"])
-        assert json.loads(json.dumps(again["facts"])) == findings["facts"], name
+        repeat = runner.findings_of(study, tree, tmp_path, None, failures=[], cases=findings["cases"])
+        assert json.loads(json.dumps(repeat["facts"])) == findings["facts"], name
         assert any(type(value) in (int, float) for value in findings["facts"].values()), name
-        assert again["tables"] == findings["tables"], name
+        assert repeat["tables"] == findings["tables"], name
         for table in findings["tables"]:
             file = f"tables/{table['file']}"
             assert (tmp_path / file).read_bytes() == (quick_results / file).read_bytes(), file
@@ -79,28 +79,28 @@ def test_check_finds_a_value_that_this_version_does_not_compute(tmp_path):
     probe(tmp_path, "--check", code=2)  # nothing is stored
     probe(tmp_path)
     assert "4 of 4 cases computed again, the same to the last bit" in probe(tmp_path, "--check", "--fresh")
-    victim, study = next((tmp_path / "quick" / "cases" / "probe").glob("*.npz")), runner.load(str(PROBE))
-    (case,) = [one for one in study.cases(True) if one.label == victim.name.split("--")[0] + "--" + one.integrator
-               and victim.name.startswith(f"{one.label}--")]  # fmt: skip
-    data = store.load_case(victim)
+    path, study = next((tmp_path / "quick" / "cases" / "probe").glob("*.npz")), runner.load(str(PROBE))
+    (case,) = [case for case in study.cases(True) if case.label == path.name.split("--")[0] + "--" + case.integrator
+               and path.name.startswith(f"{case.label}--")]  # fmt: skip
+    data = store.load_case(path)
     data["energy"][3] = np.nextafter(data["energy"].values[3], np.inf)
-    store.save_case(data, victim, study, case)  # well made, and wrong
+    store.save_case(data, path, study, case)  # well made, and wrong
     assert "energy differs by up to" in probe(tmp_path, "--check", "--fresh", code=1)
 
 
 def test_differences_leave_out_times_and_nothing_else():
-    one = xr.Dataset({"axis": ("x", [1.0, float("nan")]), "seconds": ("x", [1.0, 2.0])}, attrs={"seed": 0})
-    assert differences(one, one.copy(deep=True)) == []
-    assert differences(one, one.assign(seconds=one["seconds"] * 2)) == []
-    assert differences(one, one.assign(axis=one["axis"] * 2)) == ["axis differs by up to 1"]
-    priced, steps = (one.rename(axis=name) for name in ("price", "sampled_steps"))
+    data = xr.Dataset({"axis": ("x", [1.0, float("nan")]), "seconds": ("x", [1.0, 2.0])}, attrs={"seed": 0})
+    assert differences(data, data.copy(deep=True)) == []
+    assert differences(data, data.assign(seconds=data["seconds"] * 2)) == []
+    assert differences(data, data.assign(axis=data["axis"] * 2)) == ["axis differs by up to 1"]
+    priced, steps = (data.rename(axis=name) for name in ("price", "sampled_steps"))
     assert differences(priced, priced.assign(price=priced["price"] * 2)) == []
     assert len(differences(steps, steps.assign(sampled_steps=steps["sampled_steps"] * 2))) == 1
-    assert differences(one, one.drop_vars("axis")) == ["axis is in one of them only"]
-    assert differences(one, one.assign_attrs(seed=1)) == ["attribute seed differs: 0 and 1"]
-    beside = [one.assign_attrs(timed_at_once=n, timed_slowdown=x) for n, x in ((1, float("nan")), (2, 1.01))]
-    assert differences(*beside) == []  # as times are, how they were taken is another matter each time
-    assert len(differences(one, one.isel(x=[0]))) == 2  # also of the times: their shape
+    assert differences(data, data.drop_vars("axis")) == ["axis is in one of them only"]
+    assert differences(data, data.assign_attrs(seed=1)) == ["attribute seed differs: 0 and 1"]
+    pair = [data.assign_attrs(timed_at_once=n, timed_slowdown=x) for n, x in ((1, float("nan")), (2, 1.01))]
+    assert differences(*pair) == []  # as times are, how they were taken is another matter each time
+    assert len(differences(data, data.isel(x=[0]))) == 2  # also of the times: their shape
 
 
 GRIDS = """
@@ -136,10 +136,10 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path, clean_registr
         raise RuntimeError("no luck")
 
     unlucky = Integrator(name="unlucky", family="other", summary="", solvers={"angles": solve})
-    whole = runner.load("stability")
-    cases = [case for case in whole.cases(True) if case.scene == "goldstein" and case.integrator == "midpoint[angles]"]
+    study = runner.load("stability")
+    cases = [case for case in study.cases(True) if case.scene == "goldstein" and case.integrator == "midpoint[angles]"]
     cases.append(dataclasses.replace(cases[0], integrator="unlucky[angles]"))
-    small = dataclasses.replace(whole, cases=lambda quick: cases)
+    small = dataclasses.replace(study, cases=lambda quick: cases)
     symtop.register(unlucky)
     (failure,) = runner.run(small, tmp_path, quick=True, quiet=True)["failures"]
     assert failure == "unlucky[angles] on goldstein failed: integrator unlucky[angles] failed: RuntimeError: no luck"
@@ -151,8 +151,8 @@ def test_a_failing_case_is_reported_and_the_others_go_on(tmp_path, clean_registr
 @pytest.mark.parametrize("quick", [False, True])
 def test_a_scene_that_joins_the_catalogue_is_in_every_study(study, quick, monkeypatch):
     new = dataclasses.replace(symtop.scene("loop"), name="brand-new", tags=())
-    known = catalogue._catalogue()
-    monkeypatch.setattr(catalogue, "_catalogue", lambda: {**known, new.name: new})
+    scenes = catalogue._catalogue()
+    monkeypatch.setattr(catalogue, "_catalogue", lambda: {**scenes, new.name: new})
     assert [*dict.fromkeys(case.scene for case in runner.load(study).cases(quick))][-1] == new.name
 
 
@@ -186,20 +186,20 @@ def test_single_precision_stays_and_is_stored_in_little_space(tmp_path):
         cases = [(Case("spheroid", name), xr.Dataset({"cost": ("member", row.astype(kind)[: 40_000 - (k == 2)])}))
                  for k, (name, row) in enumerate(zip(("rk4", "strang", "midpoint"), rounded, strict=True))]  # fmt: skip
         path = netcdf.write(datasets.combine(cases), tmp_path / f"{kind.__name__}.nc")
-        again = netcdf.read(path)["cost"].sel(scene="spheroid")
-        assert again.dtype == kind
-        np.testing.assert_array_equal(again.values[:2], rounded[:2])
-        assert np.isnan(again.values[2, -1])  # what a shorter case does not fill
+        data = netcdf.read(path)["cost"].sel(scene="spheroid")
+        assert data.dtype == kind
+        np.testing.assert_array_equal(data.values[:2], rounded[:2])
+        assert np.isnan(data.values[2, -1])  # what a shorter case does not fill
         sizes[kind] = path.stat().st_size
     assert sizes[np.float32] < 0.25 * sizes[np.float64]
 
 
 def test_a_tree_is_read_as_it_was_written_and_a_check_names_the_group_that_differs(tmp_path):
     data = netcdf.describe(tree(), "Groups", question="Does it come back?")
-    again = netcdf.read_any(netcdf.write(data, tmp_path / "groups.nc"))
-    assert (differences(data, again), again["phases/energy"].dtype) == ([], np.uint8)
-    assert again.attrs["question"] == "Does it come back?"
-    assert again["windows/energy"].attrs["long_name"] == "total energy"
+    copy = netcdf.read_any(netcdf.write(data, tmp_path / "groups.nc"))
+    assert (differences(data, copy), copy["phases/energy"].dtype) == ([], np.uint8)
+    assert copy.attrs["question"] == "Does it come back?"
+    assert copy["windows/energy"].attrs["long_name"] == "total energy"
     assert differences(tree(), tree()) == []
     (difference,) = differences(tree(), tree(PHASE + np.uint8(1)))
     assert difference.startswith("phases: energy differs")
@@ -214,9 +214,9 @@ def test_cases_that_would_replace_each_other_or_have_no_group_are_refused():
     steps = [(Case("spheroid", "rk4", {"n": n}), LONG) for n in (6, 3)]
     with pytest.raises(SymtopError, match="two cases of rk4 on spheroid measure energy, and one would replace the"):
         datasets.combine(steps)
-    other = LONG.rename(energy="seconds", outcome="told", steps="calls")
-    both = datasets.combine([steps[0], (steps[1][0], other)])  # the control: a round that measures something else
-    assert {"energy", "seconds"} <= set(both.data_vars)
+    timing = LONG.rename(energy="seconds", outcome="told", steps="calls")
+    data = datasets.combine([steps[0], (steps[1][0], timing)])  # the control: a round that measures something else
+    assert {"energy", "seconds"} <= set(data.data_vars)
     separate = datasets.combine([(Case("spheroid", "rk4", {"n": n}, group=f"n-{n}"), LONG) for n in (6, 3)])
     assert set(separate.children) == {"n-6", "n-3"}
     cases = [(Case("spheroid", "midpoint"), LONG), (Case("spheroid", "strang", group="windows"), LONG)]
@@ -230,8 +230,8 @@ def test_cases_that_differ_in_their_group_alone_have_files_and_scenes_of_their_o
     assert not data.to_dataset().variables
     assert dict(data["windows"].sizes) == {"scene": 2, "variant": 1, "window": 3}
     assert dict(data["phases"].sizes) == {"scene": 1, "variant": 1, "sample": 4}
-    short = data["windows/energy"].sel(scene="goldstein", variant="midpoint").values
-    np.testing.assert_array_equal(short, [4.0, np.nan, np.nan])
+    values = data["windows/energy"].sel(scene="goldstein", variant="midpoint").values
+    np.testing.assert_array_equal(values, [4.0, np.nan, np.nan])
     study = runner.load("drift")
     cases = [Case("spheroid", "strang", {"steps": 1}, group=group) for group in ("windows", "rounding")]
     paths = [store.case_path(tmp_path, study, case) for case in cases]

@@ -16,7 +16,7 @@ from symtop.measure.order import power_law
 from symtop.methods.framework import registry
 from symtop.methods.lagrangian.discrete_lagrangian import Quadrature
 from tests.conftest import random_scenes
-from tests.templates import checked
+from tests.templates import checked_page
 
 SCENES = ("spheroid", "goldstein")
 
@@ -44,8 +44,8 @@ def test_other_rules_do_not_commute_and_the_difference_falls_as_a_power_of_h(sce
 @pytest.mark.parametrize("scene_name", SCENES)
 def test_the_trapezoidal_routhian_is_stormer_verlet(scene_name):
     scene, verlet = symtop.scene(scene_name), symtop.integrator("stormer-verlet")
-    for rule, same in ((Quadrature((0.0, 1.0), (0.5, 0.5)), True), (Quadrature((0.0, 1.0), (0.4, 0.6)), False)):
-        assert (gap(scene, commutation.routhian_step(scene, rule), verlet, 0.02, 200) < 1e-13) is same
+    for rule, agrees in ((Quadrature((0.0, 1.0), (0.5, 0.5)), True), (Quadrature((0.0, 1.0), (0.4, 0.6)), False)):
+        assert (gap(scene, commutation.routhian_step(scene, rule), verlet, 0.02, 200) < 1e-13) is agrees
 
 
 def lobatto_step(top, point, h):
@@ -62,8 +62,8 @@ def lobatto_step(top, point, h):
 
     def equations(unknown):
         places, momenta = unknown[:3], unknown[3:]
-        left = places - theta - h * IIIA @ momenta / top.I1
-        return np.concatenate([left, momenta - p_theta + h * IIIB @ slopes(places)])
+        residual = places - theta - h * IIIA @ momenta / top.I1
+        return np.concatenate([residual, momenta - p_theta + h * IIIB @ slopes(places)])
 
     stages = root(equations, np.array([theta] * 3 + [p_theta] * 3), tol=1e-14).x
     return theta + h * weights @ stages[3:] / top.I1, p_theta - h * weights @ slopes(stages[:3])
@@ -72,9 +72,9 @@ def lobatto_step(top, point, h):
 @pytest.mark.parametrize("scene", random_scenes(4, seed=32), ids=lambda s: s.name)
 def test_lobatto_on_the_whole_top_is_galerkin_on_the_routhian_and_not_on_the_top(scene):
     """The two are one method for a constant mass only; the inertia of the top is not constant."""
-    at, momenta, h = scene.start, scene.top.momenta(scene.start), 0.05
-    point = (at.theta, at.phi, at.psi, scene.top.I1 * at.theta_dot, momenta.p_phi, momenta.p_psi)
-    lobatto, start = lobatto_step(scene.top, point, h), np.array([at.theta, point[3]])
+    angles, momenta, h = scene.start, scene.top.momenta(scene.start), 0.05
+    point = (angles.theta, angles.phi, angles.psi, scene.top.I1 * angles.theta_dot, momenta.p_phi, momenta.p_psi)
+    lobatto, start = lobatto_step(scene.top, point, h), np.array([angles.theta, point[3]])
     first = path(scene, commutation.routhian_galerkin_step(scene), h, 1)[1]
     last = kernel_path(scene, symtop.integrator("galerkin-simpson"), h, 1)[1]
     assert first == pytest.approx(lobatto, abs=1e-13)
@@ -106,54 +106,54 @@ def test_what_a_reduced_kernel_saves_is_split_into_iterations_and_the_time_of_on
 
 def test_facts_and_page_are_those_of_the_rules_and_charts(tmp_path):
     """Every rule on one scene, and one method in its charts, all with short runs."""
-    small = {"counts": [50, 100, 200, 400], "batches": 1, "horizon": 2.0, "step_sizes": [0.1, 0.01]}
+    overrides = {"counts": [50, 100, 200, 400], "batches": 1, "horizon": 2.0, "step_sizes": [0.1, 0.01]}
     parts = []
     for case in study.cases(True):
         if case.scene == "spheroid" and (case.settings["part"] != "charts" or case.integrator == "euler-poincare"):
-            settings = {key: small.get(key, value) for key, value in case.settings.items()}
+            settings = {key: overrides.get(key, value) for key, value in case.settings.items()}
             parts.append((case, study.measure(dataclasses.replace(case, settings=settings))))
-    measured = datasets.combine(parts)
-    answers = facts.facts(measured)
+    data = datasets.combine(parts)
+    answers = facts.facts(data)
     assert answers["commuting_gap"] < 1e-13
     assert answers["others"] == "trapezoidal, simpson-linear, galerkin-simpson"
     assert (answers["power_least"], answers["power_most"]) == pytest.approx((2.0, 4.0), abs=0.2)
     assert (answers["commuting"], answers["rules"]) == ("midpoint", "midpoint, trapezoidal")
     assert 0.0 < answers["twins_gap"] < 1e-11  # rounding over 10 000 steps without compensation
-    assert answers["attitude_count"] == len(facts.tables(measured)["charts"])
-    assert not (measured[["p_phi_drift", "p_psi_drift"]].to_dataarray() < 0.0).any()
-    assert 1.0 <= measured["iterations_per_step"].min() <= measured["iterations_per_step"].max() < 10.0
-    two = measured.isel(commutation_step=slice(2))  # too few for an order, and no less apart
-    assert facts.facts(two)["others"] == answers["others"]
-    assert np.isnan(facts.facts(two)["power_least"])
-    assert len(figures.pictures(two)) == 1
-    checked("reduction", measured, tmp_path)
+    assert answers["attitude_count"] == len(facts.tables(data)["charts"])
+    assert not (data[["p_phi_drift", "p_psi_drift"]].to_dataarray() < 0.0).any()
+    assert 1.0 <= data["iterations_per_step"].min() <= data["iterations_per_step"].max() < 10.0
+    part = data.isel(commutation_step=slice(2))  # too few for an order, and no less apart
+    assert facts.facts(part)["others"] == answers["others"]
+    assert np.isnan(facts.facts(part)["power_least"])
+    assert len(figures.pictures(part)) == 1
+    checked_page("reduction", data, tmp_path)
 
 
 @pytest.mark.parametrize(("failed", "ratio"), [(np.nan, 2.0), (0.1, 1.75)])
 def test_a_run_that_failed_has_no_part_in_the_time_of_a_chart(failed, ratio, monkeypatch):
     axis = np.array([[np.nan] * 4, [1e-2, 1e-3, 1e-4, 1e-5], [failed, 2e-3, 5e-5, 3e-5]])
     seconds = np.array([[np.nan] * 4, [1.0] * 4, [0.5, 1.5, 2.0, 2.5]])  # what fails early is fast
-    over = ("chart", "setting")
+    dims = ("chart", "setting")
     bounds = np.tile([1e-15, 1e-15, 1e-15, 2e-6], (3, 1))
-    cell = xr.Dataset({"axis": (over, axis), "axis_bound": (over, bounds), "seconds": (over, seconds)},
+    cell = xr.Dataset({"axis": (dims, axis), "axis_bound": (dims, bounds), "seconds": (dims, seconds)},
                       {"chart": ["angles", "axis", "attitude"]})  # fmt: skip
-    (one,) = chart_ratios(cell)
-    each = [Ratio("attitude", "axis", 9.0, 1.0, x) for x in (1.2, 1.05, 0.95, 0.85, 0.8, np.nan)]
-    monkeypatch.setattr(facts, "chart_ratios", lambda _: [*each, Ratio("angles", "axis", 9.0, 1.0, 3.0)])
-    told = facts.facts(cell.expand_dims(scene=["spheroid"], variant=["gauss-2"]))
-    assert [told[f"attitude_{x}"] for x in ("count", "longer", "shorter", "median", "most")] == [5, 1, 2, 0.95, 1.2]
-    assert (one.chart, one.base, one.time, told["angles_slowest"]) == ("attitude", "axis", ratio, "gauss-2[angles]")
+    (row,) = chart_ratios(cell)
+    ratios = [Ratio("attitude", "axis", 9.0, 1.0, x) for x in (1.2, 1.05, 0.95, 0.85, 0.8, np.nan)]
+    monkeypatch.setattr(facts, "chart_ratios", lambda _: [*ratios, Ratio("angles", "axis", 9.0, 1.0, 3.0)])
+    values = facts.facts(cell.expand_dims(scene=["spheroid"], variant=["gauss-2"]))
+    assert [values[f"attitude_{x}"] for x in ("count", "longer", "shorter", "median", "most")] == [5, 1, 2, 0.95, 1.2]
+    assert (row.chart, row.base, row.time, values["angles_slowest"]) == ("attitude", "axis", ratio, "gauss-2[angles]")
     back = time_to_error(*(cell.sel(chart=chart) for chart in ("attitude", "axis")))
     # Twice and half as large; the last are next to their bound. The errors 1e-3 and 1e-4 lie between 2e-3 and 5e-5.
-    assert [one.error, one.to_error, 1.0 / back] == pytest.approx([1.0, 3.0**0.5, 3.0**0.5])
+    assert [row.error, row.to_error, 1.0 / back] == pytest.approx([1.0, 3.0**0.5, 3.0**0.5])
 
 
 def test_a_kernel_is_known_under_any_name_and_a_method_without_a_twin_refused(monkeypatch):
     with pytest.raises(symtop.SymtopError, match="must be a reduced discrete Lagrangian, not 'rk45'"):
         commutation_table(symtop.scene("spheroid"), symtop.integrator("rk45"), 1.0, (10,))
-    known = dict(registry.integrators())
-    known["whole"] = dataclasses.replace(known.pop("midpoint-unreduced"), name="whole")
-    monkeypatch.setattr(registry, "_registry", known)
+    entries = dict(registry.integrators())
+    entries["whole"] = dataclasses.replace(entries.pop("midpoint-unreduced"), name="whole")
+    monkeypatch.setattr(registry, "_registry", entries)
     assert unreduced_forms() == {"midpoint": "whole", "trapezoidal": "trapezoidal-unreduced"}
     assert commutation.is_galerkin(dataclasses.replace(symtop.integrator("galerkin-simpson"), name="mine"))
     assert not commutation.is_galerkin(symtop.integrator("midpoint"))

@@ -11,7 +11,7 @@ import symtop
 from symtop.measure import datasets
 from symtop.measure.order import BESIDE, Fit, order_verdict
 from symtop.methods.framework.registry import integrator, methods, split_name, variants
-from tests.templates import checked
+from tests.templates import checked_page
 
 ROWS = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "strang[axis]", "strang[attitude]",
         "rk4[angles]", "rk4[axis]", "gauss-12[attitude]", "rk45[angles]", "rk45-compiled[angles]", "radau[angles]",
@@ -21,15 +21,15 @@ ROWS = ("midpoint[angles]", "trapezoidal[angles]", "stormer-verlet[angles]", "st
 @pytest.fixture(scope="module")
 def data():
     """A small grid on one scene."""
-    chosen = [case for case in study.on_scene("goldstein", quick=True) if case.integrator in ROWS]
-    assert {case.integrator for case in chosen} == set(ROWS)
-    longer = [symtop.Case(case.scene, case.integrator, case.settings | {"dense": True}) for case in chosen]
-    return datasets.combine([(case, study.measure(case)) for case in longer])
+    cases = [case for case in study.on_scene("goldstein", quick=True) if case.integrator in ROWS]
+    assert {case.integrator for case in cases} == set(ROWS)
+    dense = [symtop.Case(case.scene, case.integrator, case.settings | {"dense": True}) for case in cases]
+    return datasets.combine([(case, study.measure(case)) for case in dense])
 
 
 def test_every_chart_of_every_method_is_a_row_and_a_formula_is_none():
     names = {case.integrator for case in study.cases(False)}
-    with_order = {name for name, one in methods().items() if one.control and not one.exact_steps}
+    with_order = {name for name, method in methods().items() if method.control and not method.exact_steps}
     assert names == {row.name for row in variants() if row.control is not None and not row.exact_steps}
     assert {split_name(name)[0] for name in names} == with_order
     assert not any(split_name(name)[0] == "exact" for name in names)
@@ -44,33 +44,33 @@ def test_verdicts_are_those_of_the_one_rule_and_a_wrong_declaration_is_refuted(d
         if math.isfinite(main.slope):
             assert abs(main.slope - declared) <= main.interval + BESIDE, name
     assert sum(word == "confirmed" for word, _ in results.values()) >= 7
-    off = 3e-3 * (data["variant"] == "midpoint[angles]")
-    beside = data.assign({name: data[name] + off for name in ("axis", "axis_end")})
-    told = facts.tables(beside)["orders"].set_index("variant")["verdict"], facts.facts(beside)["wrong"]
-    assert (told[0]["midpoint[angles]"], told[0]["rk4[axis]"], told[1]) == ("wrong limit", "confirmed", 1)
+    offset = 3e-3 * (data["variant"] == "midpoint[angles]")
+    shifted = data.assign({name: data[name] + offset for name in ("axis", "axis_end")})
+    pair = facts.tables(shifted)["orders"].set_index("variant")["verdict"], facts.facts(shifted)["wrong"]
+    assert (pair[0]["midpoint[angles]"], pair[0]["rk4[axis]"], pair[1]) == ("wrong limit", "confirmed", 1)
     monkeypatch.setattr(measures, "declared_order", lambda name: 3)
     assert {measures.judged(data)["goldstein", name].verdict for name in ("strang[axis]", "rk4[axis]")} == {"refuted"}
     monkeypatch.setattr(facts, "declared_order", lambda name: 3)
     words = facts.tables(data)["orders"].set_index("variant")["verdict"]
     assert (words["strang[axis]"], words["rk4[axis]"]) == ("lower", "higher")
     monkeypatch.setattr(facts, "ratios", lambda _: {"a": np.array([1.0, 1.0, 9.0]), "b": np.full(4, 5.0)})
-    told = [facts.facts(data)[f"ratio_{name}"] for name in ("most_variant", "most", "middle", "runs")]
-    assert told == ["a", 9.0, 5.0, 7]
+    values = [facts.facts(data)[f"ratio_{name}"] for name in ("most_variant", "most", "middle", "runs")]
+    assert values == ["a", 9.0, 5.0, 7]
 
 
 def test_a_median_over_few_scenes_is_not_ranked(data, monkeypatch):
     scenes = ["goldstein", "spheroid", "loop"]
-    three = xr.concat([data.assign_coords(scene=[name]) for name in scenes], "scene")
+    stack = xr.concat([data.assign_coords(scene=[name]) for name in scenes], "scene")
     works = {(scene, "rk4[axis]"): measures.Efficiency(100.0, False) for scene in scenes}
     works["loop", "strang[axis]"] = measures.Efficiency(1.0, True)
     monkeypatch.setattr(facts, "efficiencies", lambda *_: works)
-    table = facts.cheapest(three)
-    more = {"midpoint[angles]": 10.0, "stormer-verlet[angles]": 20.0, "trapezoidal[angles]": 80.0}
-    more = {(scene, name): measures.Efficiency(work * (part if work == 80.0 else 1.0), False)
-            for name, work in more.items() for scene, part in zip(scenes, (1.0, 1.0, 9.0), strict=True)}  # fmt: skip
-    monkeypatch.setattr(facts, "efficiencies", lambda *_: works | more)
-    answers, known = facts.facts(three), measures.stepping(data).sizes["variant"]
-    assert (answers["span"], answers["span_order"], answers["unknown"]) == (8.0, 2, known - 5)
+    table = facts.cheapest(stack)
+    extra = {"midpoint[angles]": 10.0, "stormer-verlet[angles]": 20.0, "trapezoidal[angles]": 80.0}
+    extra = {(scene, name): measures.Efficiency(work * (part if work == 80.0 else 1.0), False)
+             for name, work in extra.items() for scene, part in zip(scenes, (1.0, 1.0, 9.0), strict=True)}  # fmt: skip
+    monkeypatch.setattr(facts, "efficiencies", lambda *_: works | extra)
+    answers, count = facts.facts(stack), measures.stepping(data).sizes["variant"]
+    assert (answers["span"], answers["span_order"], answers["unknown"]) == (8.0, 2, count - 5)
     monkeypatch.setattr(facts, "efficiencies", lambda *_: works)
     assert table["variant"].tolist() == ["rk4[axis]", "strang[axis, attitude]"]
     assert table[["ranked", "of these extrapolated"]].to_numpy().tolist() == [[True, 0], [False, 1]]
@@ -100,9 +100,9 @@ def test_work_follows_from_runs_beside_it_or_from_its_error_constant(data):
     assert answers.work == pytest.approx(work, rel=0.1)
     assert not answers.foreseen
     assert measures.efficiencies(data, 1e3)[pair].foreseen  # all runs are closer: a longer step was not tried
-    far, beyond = (measures.efficiencies(data, target)[pair] for target in (1e-14, 25e-16))
-    assert far.foreseen
-    assert beyond.work == pytest.approx(2.0 * far.work, rel=1e-6)
+    coarse, fine = (measures.efficiencies(data, target)[pair] for target in (1e-14, 25e-16))
+    assert coarse.foreseen
+    assert fine.work == pytest.approx(2.0 * coarse.work, rel=1e-6)
     assert ("goldstein", "rk45[angles]") not in measures.efficiencies(data, error)  # it has no step to choose
     # An implicit method iterates more at longer steps: the evaluations of other steps say nothing of these.
     pair = "goldstein", "midpoint[angles]"
@@ -110,19 +110,19 @@ def test_work_follows_from_runs_beside_it_or_from_its_error_constant(data):
     k = int(np.flatnonzero(measures.fits(data, "axis")[pair].used)[-1])
     error, forces = float(cell["axis"][k]), data["force_evaluations"].copy()
     forces.loc[{"scene": pair[0], "variant": pair[1], "setting": forces["setting"][k]}] *= 3.0
-    more = data.assign(force_evaluations=forces)
-    before, after = (measures.efficiencies(one, error)[pair].work for one in (data, more))
+    variant = data.assign(force_evaluations=forces)
+    before, after = (measures.efficiencies(each, error)[pair].work for each in (data, variant))
     assert after == pytest.approx(3.0 * before, rel=1e-9)
 
 
 def test_a_variant_whose_order_cannot_be_judged_has_the_work_of_its_runs(data, monkeypatch):
     pair = "goldstein", "midpoint[angles]"
-    known = measures.efficiencies(data, 1e-4)[pair]
+    expected = measures.efficiencies(data, 1e-4)[pair]
     unjudged = Fit(math.nan, math.nan, math.nan, np.zeros(data.sizes["setting"], bool))
     monkeypatch.setattr(measures, "fits", lambda *_: {pair: unjudged})
-    assert measures.efficiencies(data, 1e-4) == {pair: known}
+    assert measures.efficiencies(data, 1e-4) == {pair: expected}
     assert measures.efficiencies(data, 1e-14) == {}
-    monkeypatch.setattr(facts, "efficiencies", lambda *_: {pair: known})
+    monkeypatch.setattr(facts, "efficiencies", lambda *_: {pair: expected})
     assert facts.facts(data)["unknown"] == measures.stepping(data).sizes["variant"] - 1
 
 
@@ -138,20 +138,20 @@ def test_rows_show_the_axis_the_attitude_where_they_can_and_work_a_nutation_and_
     assert labels["rk4[axis]"] == "rk4[axis]"
     cell = data.sel(scene="goldstein", variant="stormer-verlet[angles]")
     work = measures.evaluations_a_nutation(cell, "goldstein")
-    period, good = symtop.scene("goldstein").nutation_period, np.isfinite(work)
-    assert work[good] == pytest.approx(period / cell["step_size"].values[good], rel=0.05)
+    period, mask = symtop.scene("goldstein").nutation_period, np.isfinite(work)
+    assert work[mask] == pytest.approx(period / cell["step_size"].values[mask], rel=0.05)
 
 
 def test_the_page_says_what_was_measured_and_adaptive_errors_follow_their_tolerance(data, tmp_path):
-    fitted = measures.tolerance_fits(data)
+    fits = measures.tolerance_fits(data)
     tolerance = 10.0 ** -np.arange(2.0, 10.0)  # errors near the bound are the reference's: they follow no tolerance
     columns = {"tolerance": tolerance, "axis": np.maximum(0.1 * tolerance, 5e-8), "axis_bound": np.full(8, 1e-8)}
-    rows = {name: (("scene", "variant", "setting"), one[None, None]) for name, one in columns.items()}
-    (one,) = measures.tolerance_fits(xr.Dataset(rows, {"scene": ["goldstein"], "variant": ["rk45[angles]"]})).values()
-    assert (one.slope, one.used.sum()) == (pytest.approx(1.0), 4)
-    assert {name for _, name in fitted} == {name for name in ROWS if integrator(name).adaptive}
-    assert fitted["goldstein", "rk45[angles]"].slope == pytest.approx(1.0, abs=0.15)
-    checked("convergence", data, tmp_path)
+    rows = {name: (("scene", "variant", "setting"), column[None, None]) for name, column in columns.items()}
+    (fit,) = measures.tolerance_fits(xr.Dataset(rows, {"scene": ["goldstein"], "variant": ["rk45[angles]"]})).values()
+    assert (fit.slope, fit.used.sum()) == (pytest.approx(1.0), 4)
+    assert {name for _, name in fits} == {name for name in ROWS if integrator(name).adaptive}
+    assert fits["goldstein", "rk45[angles]"].slope == pytest.approx(1.0, abs=0.15)
+    checked_page("convergence", data, tmp_path)
     answers = facts.facts(data)
     assert answers["pairs"] == answers["confirmed"] + answers["refuted"] + answers["undecided"]
     assert answers["ratio_runs"] == sum(map(len, measures.ratios(data).values())) < answers["ratio_asked"]

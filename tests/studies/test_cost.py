@@ -28,8 +28,8 @@ from symtop.report.formats import number
 from symtop.report.template import PARTIAL
 from symtop.runner.run import load
 from symtop.runner.study import Case
-from tests.conftest import late
-from tests.templates import checked
+from tests.conftest import defer
+from tests.templates import checked_page
 
 INF, NAN = math.inf, math.nan
 QUIET = np.array([0.01, 0.01])
@@ -59,8 +59,8 @@ def test_what_counts_as_a_hit(errors, cost):
 def test_a_cost_lies_between_miss_and_hit_and_slowdowns_wins_and_run_lengths_follow():
     work = np.array([[10.0], [20.0], [40.0]])
     errors = np.array([[1e-2], [1e-4], [1e-6]])  # two decades for each doubling
-    reached = cost_to_reach(work, errors, [1e-2, 1e-3, 1e-4, 1e-5, 1e-7])
-    assert reached[:, 0] == pytest.approx([10.0, 10.0 * math.sqrt(2.0), 20.0, 20.0 * math.sqrt(2.0), INF])
+    costs = cost_to_reach(work, errors, [1e-2, 1e-3, 1e-4, 1e-5, 1e-7])
+    assert costs[:, 0] == pytest.approx([10.0, 10.0 * math.sqrt(2.0), 20.0, 20.0 * math.sqrt(2.0), INF])
     table = np.array([[1.0, 4.0, INF], [2.0, 2.0, INF]])
     assert np.array_equal(slowdowns(table), [[1.0, 2.0, NAN], [2.0, 1.0, NAN]], equal_nan=True)
     won, level = wins(np.array([[1.0, 1.0, 1.0], [1.05, 2.0, 0.5], [3.0, 1.1, INF]]))
@@ -74,16 +74,16 @@ def test_wins_and_what_is_met_have_one_denominator_each():
     table = np.array([[1.0, 1.0, 1.0, INF], [1.05, 2.0, 0.5, INF], [INF, INF, 3.0, INF]])
     contest = hindsight(["a", "b", "c"], table, np.full(3, 0.01))
     assert (contest.tops, contest.solved) == (4, 3)
-    one = {standing.name: standing for standing in contest.standings}
-    assert (one["a"].share, one["a"].level, one["a"].met) == pytest.approx((1 / 3, 2 / 3, 3 / 4))
-    assert one["c"].met == pytest.approx(1 / 4)
+    by_name = {standing.name: standing for standing in contest.standings}
+    assert (by_name["a"].share, by_name["a"].level, by_name["a"].met) == pytest.approx((1 / 3, 2 / 3, 3 / 4))
+    assert by_name["c"].met == pytest.approx(1 / 4)
     assert not contest.called
     assert hindsight(["a", "b"], np.full((2, 4), INF), QUIET).first is None
     ties = np.array([[1.0, 2.0, 3.0], [2.0, 1.0, 1.0], [3.0, 3.0, 1.05]])  # a and b win on one top each
     assert hindsight("abc", ties, np.full(3, 0.01)).first.name == "b"  # and b is level on one more
     solved = np.random.default_rng(0).random((2, 100)) * [[0.9], [1.0]]
-    most, least = hindsight("ab", solved, QUIET), hindsight("ab", np.hstack([solved, np.full((2, 100), INF)]), QUIET)
-    assert [one[1:5] for one in least.standings] == [one[1:5] for one in most.standings]  # of the solved tops alone
+    first, second = hindsight("ab", solved, QUIET), hindsight("ab", np.hstack([solved, np.full((2, 100), INF)]), QUIET)
+    assert [row[1:5] for row in second.standings] == [row[1:5] for row in first.standings]  # of the solved tops alone
 
 
 def test_noise_of_a_price_widens_the_interval_of_a_share_which_covers_it_as_often_as_it_says():
@@ -92,8 +92,8 @@ def test_noise_of_a_price_widens_the_interval_of_a_share_which_covers_it_as_ofte
     true = 1.0 / (2.0 * 1.1)  # of a/b uniform in (0, 2): a wins where a/b < 1/1.1
     for _ in range(60):
         first = hindsight("ab", np.stack([2.0 * draw.random(200), np.ones(200)]), QUIET * 0.0).standings
-        one = next(standing for standing in first if standing.name == "a")
-        inside += one.low <= true <= one.high
+        standing = next(standing for standing in first if standing.name == "a")
+        inside += standing.low <= true <= standing.high
     assert 51 <= inside <= 60
     table = np.stack([np.exp(0.1 * np.random.default_rng(2).standard_normal(3000)), np.full(3000, 1.1)])
     narrow, wide = (hindsight("ab", table, np.array([error, error])).standings[0] for error in (0.0, 0.06))
@@ -101,50 +101,50 @@ def test_noise_of_a_price_widens_the_interval_of_a_share_which_covers_it_as_ofte
     assert wide.high - wide.low > 3.0 * (narrow.high - narrow.low)
 
 
-def steps(name, met, per_step=1.0, error=0.0, levels=8):
+def ladder_of(name, met, per_step=1.0, error=0.0, levels=8):
     settings = 2.0 ** np.arange(levels)
     return Ladder(name, np.asarray(met, dtype=float), settings, per_step * settings, True, error)
 
 
 def test_a_safe_setting_serves_95_of_100_tops():
     met = np.arange(1.0, 101.0)  # of 100 tops one needs so many steps each
-    (one,), _ = safe([steps("a", met)])
-    assert (one.setting, one.seconds) == pytest.approx((95.0, 95.0), rel=1e-6)  # a step costs one
-    assert one.low < one.seconds < one.high
-    (few,), _ = safe([steps("a", np.arange(1.0, 31.0))])  # 28 are less than 95 %, and 30 tops show no upper end
-    (one,), _ = safe([steps("a", np.arange(1.0, 61.0))])  # 58 of 61 draws need at most 52 in 1.5 %, 53 in 3.3 %
-    assert (few.setting, few.high, *one[2:]) == pytest.approx((29.0, INF, 57.0, 53.0, 60.0), rel=1e-6)
+    (choice,), _ = safe([ladder_of("a", met)])
+    assert (choice.setting, choice.seconds) == pytest.approx((95.0, 95.0), rel=1e-6)  # a step costs one
+    assert choice.low < choice.seconds < choice.high
+    (small,), _ = safe([ladder_of("a", np.arange(1.0, 31.0))])  # 28 are less than 95 %, and 30 tops show no upper end
+    (choice,), _ = safe([ladder_of("a", np.arange(1.0, 61.0))])  # 58 of 61 draws need at most 52 in 1.5 %, 53 in 3.3 %
+    assert (small.setting, small.high, *choice[2:]) == pytest.approx((29.0, INF, 57.0, 53.0, 60.0), rel=1e-6)
     assert (np.diff(ranking.ENDS)[0], sum(ranking.ENDS)) == pytest.approx((0.95, 1.0))
     assert np.log(ranking.factors(np.array([0.8]))).std() == pytest.approx(0.8, rel=0.15)  # and none is negative
-    (spoilt,), called = safe([steps("a", np.where(met > 94.0, INF, met))])
-    assert (spoilt.seconds, called) == (INF, False)  # six tops are never met
+    (choice,), called = safe([ladder_of("a", np.where(met > 94.0, INF, met))])
+    assert (choice.seconds, called) == (INF, False)  # six tops are never met
     tolerance = Ladder("b", 10.0 ** -np.linspace(2.0, 6.0, 100), 10.0 ** -np.arange(1.0, 9.0), np.arange(8.0) + 1.0,
                        False, 0.0)  # fmt: skip
-    (tight,), _ = safe([tolerance])
-    assert tight.setting == pytest.approx(10.0 ** -(2.0 + 4.0 * 94 / 99), rel=1e-6)
+    (choice,), _ = safe([tolerance])
+    assert choice.setting == pytest.approx(10.0 ** -(2.0 + 4.0 * 94 / 99), rel=1e-6)
 
 
 def test_a_lead_is_called_if_neither_tops_nor_prices_can_turn_it_and_hindsight_may_differ():
     draw = np.random.default_rng(0)
     fair, ahead = draw.random((2, 2000)), draw.random((2, 2000)) * [[0.7], [1.0]]
     assert not hindsight("ab", fair, QUIET).called
-    assert [hindsight("ab", ahead[:, :few], QUIET).called for few in (2000, 12)] == [True, False]  # too few tops
-    alone, many = (hindsight("ab", np.ones((2, tops)) * [[1.0], [2.0]], QUIET) for tops in (1, 200))  # a wins on all
-    assert (alone.called, *alone.first[1:4]) == (False, 1.0, 0.0, 1.0)
+    assert [hindsight("ab", ahead[:, :count], QUIET).called for count in (2000, 12)] == [True, False]  # too few tops
+    single, many = (hindsight("ab", np.ones((2, tops)) * [[1.0], [2.0]], QUIET) for tops in (1, 200))  # a wins on all
+    assert (single.called, *single.first[1:4]) == (False, 1.0, 0.0, 1.0)
     assert (many.called, many.first.low) == (True, pytest.approx(1.0 - 3.0 / 201.0, abs=0.006))
     assert not hindsight("ab", ahead, QUIET * 40.0).called  # the same tops, with prices that are hardly known
     assert not hindsight("ab", ahead, QUIET, marked=["a"]).called
     # A step that suits most tops and fails on one in five, against one that costs a little more on all of them.
     met = np.full(200, 4.0)
     met[::5] = 100.0
-    choices, called = safe([steps("spoilt", met), steps("even", np.full(200, 6.0))])
-    assert (called, [one.name for one in choices]) == (True, ["even", "spoilt"])
+    choices, called = safe([ladder_of("spoilt", met), ladder_of("even", np.full(200, 6.0))])
+    assert (called, [choice.name for choice in choices]) == (True, ["even", "spoilt"])
     assert hindsight(["spoilt", "even"], np.stack([met, np.full(200, 6.0)]), QUIET).first.name == "spoilt"
-    met, hard = np.full(200, 4.0), 8.0 * np.exp(draw.standard_normal((40, 2, 200)))
-    assert not safe([steps("a", met), steps("b", met)])[1]  # equals
-    assert sum(safe([*map(steps, "ab", pair)])[1] for pair in hard) <= 3  # equals, each with hard tops of its own
+    met, pairs = np.full(200, 4.0), 8.0 * np.exp(draw.standard_normal((40, 2, 200)))
+    assert not safe([ladder_of("a", met), ladder_of("b", met)])[1]  # equals
+    assert sum(safe([*map(ladder_of, "ab", pair)])[1] for pair in pairs) <= 3  # equals, each with hard tops of its own
     for error, called in ((0.005, True), (0.10, False)):
-        assert safe([steps("a", met, 1.0, error), steps("b", met, 1.08, error)])[1] is called
+        assert safe([ladder_of("a", met, 1.0, error), ladder_of("b", met, 1.08, error)])[1] is called
 
 
 def priced(price, names, call=2e-6):
@@ -168,7 +168,7 @@ def test_a_price_is_the_median_and_a_process_that_is_slower_at_everything_no_spr
     planted = quiet.copy()
     planted[0, 0], planted[1, 1] = 4e-10, -3e-9  # below what the arithmetic can take, and negative
     planted[2, 2] = 2.3e-8  # a process that was disturbed
-    plain, spoilt = (pricing.prices(tree_of(each)) for each in (quiet, planted))
+    plain, spoilt = (pricing.prices(tree_of(array)) for array in (quiet, planted))
     assert spoilt.price == pytest.approx(plain.price)
     assert spoilt.marked == []
     assert plain.error == pytest.approx(1.25 * 2.78 / 1.96 * 0.04 / math.sqrt(5.0))  # of medians of five, Student's
@@ -178,56 +178,56 @@ def test_a_price_is_the_median_and_a_process_that_is_slower_at_everything_no_spr
     assert np.min(planted, axis=0)[0] == 4e-10  # the control: the least of them would be that
     quiet, names = np.tile(quiet, 4), "abcdefghijkl"
     together = quiet * np.array([1.0, 1.3, 1.1, 0.8, 1.0])[:, np.newaxis]
-    apart = quiet * np.random.default_rng(1).uniform(0.7, 1.3, quiet.shape)
+    independent = quiet * np.random.default_rng(1).uniform(0.7, 1.3, quiet.shape)
     assert pricing.prices(tree_of(together, names)).marked == []
     assert pricing.prices(tree_of(together, names)).spread.max() < 0.01
-    assert pricing.prices(tree_of(apart, names)).marked  # the control
-    few = tree_of(together[:, :3])  # of so few a common factor would be their own noise
-    assert pricing.prices(few).marked == ["a", "b", "c"]
-    wide = pricing.prices(few).spread / 0.99  # standard deviations
-    assert pricing.prices(few).error == pytest.approx(1.25 * 2.78 / 1.96 * wide / math.sqrt(5.0))
-    slow = tree_of(together, names)
-    slow["prices"]["call"] = slow["prices"]["call"] * xr.DataArray([1.0, 2.6, 3.3, 3.2, 5.0], dims="scene")
-    assert pricing.prices(slow).call == pytest.approx(6e-6)  # 2, 4, 6, 8, 10 us where a process is slower at all
+    assert pricing.prices(tree_of(independent, names)).marked  # the control
+    tree = tree_of(together[:, :3])  # of so few a common factor would be their own noise
+    assert pricing.prices(tree).marked == ["a", "b", "c"]
+    spread = pricing.prices(tree).spread / 0.99  # standard deviations
+    assert pricing.prices(tree).error == pytest.approx(1.25 * 2.78 / 1.96 * spread / math.sqrt(5.0))
+    tree = tree_of(together, names)
+    tree["prices"]["call"] = tree["prices"]["call"] * xr.DataArray([1.0, 2.6, 3.3, 3.2, 5.0], dims="scene")
+    assert pricing.prices(tree).call == pytest.approx(6e-6)  # 2, 4, 6, 8, 10 us where a process is slower at all
 
 
 def test_a_noisy_price_is_measured_again_and_marked_if_it_stays():
-    noisy, again = np.array([[5e-9, 6e-9, 7e-9]] * 5), np.full((5, 3), NAN)
+    noisy, repeat = np.array([[5e-9, 6e-9, 7e-9]] * 5), np.full((5, 3), NAN)
     noisy[:, 1] *= [1.0, 1.4, 0.7, 1.5, 1.1]
     assert pricing.prices(tree_of(noisy)).marked == ["b"]
     for second, marked in ((6e-9, []), (noisy[:, 1], ["b"])):
-        again[:, 1] = second
-        assert pricing.prices(tree_of(np.concatenate([noisy, again]))).marked == marked
+        repeat[:, 1] = second
+        assert pricing.prices(tree_of(np.concatenate([noisy, repeat]))).marked == marked
 
 
 def test_a_price_is_the_slope_of_two_runs_and_the_guard_and_who_runs_long_are_counted(monkeypatch):
     monkeypatch.setattr(pricing, "run_of", lambda variant, tolerance, nutations: (nutations, 1000.0 * nutations))
-    taken = lambda calls, *_, **__: [SimpleNamespace(best=2e-6 + 1000.0 * nutations * 7e-9) for nutations in calls]
-    monkeypatch.setattr(pricing, "timings", taken)
+    fakes = lambda calls, *_, **__: [SimpleNamespace(best=2e-6 + 1000.0 * nutations * 7e-9) for nutations in calls]
+    monkeypatch.setattr(pricing, "timings", fakes)
     assert pricing.slopes(["rk4[axis]"], 5, 0.01) == [("rk4[axis]", 1e-8, *map(pytest.approx, (7e-9, 2e-6)))]
-    over = "scene", "variant", "level", "guarded"
-    seen = {"foretold": 0.05, "measured": 0.5, "watched": 1e-3, "whole": 0.0}
-    runs = xr.Dataset({name: (over, np.full((1, 1, 1, 1), value)) for name, value in seen.items()})
-    runs = runs.assign({name: (over[:2], [[word]]) for name, word in (("chart", "axis"), ("control", "step_size"))})
+    dims = "scene", "variant", "level", "guarded"
+    columns = {"foretold": 0.05, "measured": 0.5, "watched": 1e-3, "whole": 0.0}
+    runs = xr.Dataset({name: (dims, np.full((1, 1, 1, 1), value)) for name, value in columns.items()})
+    runs = runs.assign({name: (dims[:2], [[word]]) for name, word in (("chart", "axis"), ("control", "step_size"))})
     (row,) = cells.guard_counts(xr.DataTree.from_dict({"short": runs})).to_dict("records")
     assert (row["wrong"], row["wrong_warned"], row["wrong_seen"]) == (1, 1, 0)  # the forecast alone shows it
-    each = np.array([[1.0, 1.0, 100.0], [2.0, 2.0, 2.0]])
-    monkeypatch.setattr(cells, "costs", lambda *_: cells.Costs(["a", "b"], each, np.zeros(2)))
+    work = np.array([[1.0, 1.0, 100.0], [2.0, 2.0, 2.0]])
+    monkeypatch.setattr(cells, "costs", lambda *_: cells.Costs(["a", "b"], work, np.zeros(2)))
     assert cells.fewest(None, None) == "a"  # on the median top
-    drawn, none = np.full(len(KINDS), 100.0), np.zeros((1, len(KINDS)))
-    wrong, silent = none + 9.0 * np.eye(len(KINDS))[0], none + 5.0 * np.eye(len(KINDS))[1]
-    monkeypatch.setattr(cells, "health", lambda *_: cells.Health(np.array([facts.FINE]), drawn, wrong, silent, none))
-    told = facts.silent_facts({"short": xr.Dataset(coords={"variant": [facts.QUOTED]})})
-    assert (told["worst_kind"], told["worst_wrong"], told["worst_silent"]) == (KINDS[0], 0.09, 0.0)
+    total, zero = np.full(len(KINDS), 100.0), np.zeros((1, len(KINDS)))
+    wrong, silent = zero + 9.0 * np.eye(len(KINDS))[0], zero + 5.0 * np.eye(len(KINDS))[1]
+    monkeypatch.setattr(cells, "health", lambda *_: cells.Health(np.array([facts.FINE]), total, wrong, silent, zero))
+    answers = facts.silent_facts({"short": xr.Dataset(coords={"variant": [facts.QUOTED]})})
+    assert (answers["worst_kind"], answers["worst_wrong"], answers["worst_silent"]) == (KINDS[0], 0.09, 0.0)
     names, charts = ["a", "b", "c", "d"], ["axis", "attitude", "attitude", "angles"]
-    ran = xr.Dataset({"chart": (over[:2], [charts])}, {"variant": names, "target": [1e-3]})
-    each = {"axis": np.array([[1.0], [INF], [INF], [INF]]), "attitude": np.array([[1.0], [1.2], [2.0], [2.0]])}
-    monkeypatch.setattr(cells, "costs", lambda _, cell: cells.Costs(names, each[cell.quantity], np.zeros(4)))
-    assert cells.contenders(xr.DataTree.from_dict({"short": ran})) == ["a", "b", "d"]
-    names, over = ["rk4[axis]", "strang[axis]", "takahashi-imada[axis]"], ("scene", "variant", "target")
-    ran = {"interpolated": (over, np.full((1, 3, 1), 10.0)), "served": (over, [[[10.0], [20.0], [70.0]]]),
-           "share": (over, np.ones((1, 3, 1)))}  # fmt: skip
-    data = xr.DataTree.from_dict({cells.CONFIRMED: xr.Dataset(ran, {"variant": names, "target": [1e-3]})})
+    dataset = xr.Dataset({"chart": (dims[:2], [charts])}, {"variant": names, "target": [1e-3]})
+    work = {"axis": np.array([[1.0], [INF], [INF], [INF]]), "attitude": np.array([[1.0], [1.2], [2.0], [2.0]])}
+    monkeypatch.setattr(cells, "costs", lambda _, cell: cells.Costs(names, work[cell.quantity], np.zeros(4)))
+    assert cells.contenders(xr.DataTree.from_dict({"short": dataset})) == ["a", "b", "d"]
+    names, dims = ["rk4[axis]", "strang[axis]", "takahashi-imada[axis]"], ("scene", "variant", "target")
+    columns = {"interpolated": (dims, np.full((1, 3, 1), 10.0)), "served": (dims, [[[10.0], [20.0], [70.0]]]),
+               "share": (dims, np.ones((1, 3, 1)))}  # fmt: skip
+    data = xr.DataTree.from_dict({cells.CONFIRMED: xr.Dataset(columns, {"variant": names, "target": [1e-3]})})
     assert cells.served_over_interpolated(data, Cell("short", "axis", 1e-3, NATURAL), "strang[axis]") == 2.0
     assert facts.confirmed_facts(data)["finer"] == 2.0
 
@@ -236,12 +236,12 @@ def test_a_price_is_the_slope_of_two_runs_and_the_guard_and_who_runs_long_are_co
 def test_prices_of_fresh_processes_agree_with_a_run_timed_by_hand():
     """Evaluations times the price, plus the call, is the time of a run of another length."""
     names = ["strang[axis]", "rk4[axis]"]
-    each = pricing.measured(names, 6, 0.001)
+    data = pricing.measured(names, 6, 0.001)
     for name in names:
         call, evaluations = pricing.run_of(integrator(name), pricing.TOLERANCE, 20)
         by_hand = min(timeit.repeat(call, number=50, repeat=20)) / 50
-        price, rest = (float(each[key].sel(variant=name).min()) for key in ("price", "call"))
-        assert evaluations * price + rest == pytest.approx(by_hand, rel=0.5)
+        price, overhead = (float(data[key].sel(variant=name).min()) for key in ("price", "call"))
+        assert evaluations * price + overhead == pytest.approx(by_hand, rel=0.5)
 
 
 @pytest.fixture(scope="module")
@@ -260,9 +260,9 @@ def regime(scene):
 def test_the_natural_tops_are_written_down_and_variants_of_variable_order_have_prices():
     assert pricing.tolerances_of(integrator("series-adaptive[axis]")) == pricing.TOLERANCES
     assert pricing.tolerances_of(integrator("rk45-compiled[axis]")) == (pricing.TOLERANCE,)
-    known = pricing.Prices(["a"], np.array([8.0 / 4.0 ** np.arange(7)]), np.zeros((1, 7)), np.zeros(1), np.zeros(1), [],
+    table = pricing.Prices(["a"], np.array([8.0 / 4.0 ** np.arange(7)]), np.zeros((1, 7)), np.zeros(1), np.zeros(1), [],
                            NAN)  # fmt: skip
-    price, _ = known.at("a", np.array([1e-2, 1e-3, 1e-4, NAN]))
+    price, _ = table.at("a", np.array([1e-2, 1e-3, 1e-4, NAN]))
     assert price[:3] == pytest.approx([8.0, 4.0, 2.0])
     tops = natural(20_000, 1)
     I1, I3, mgl, theta, _, _, theta_dot, phi_dot, psi_dot = tops.T
@@ -276,19 +276,19 @@ def test_the_natural_tops_are_written_down_and_variants_of_variable_order_have_p
 
 
 def test_the_named_scenes_are_tops_among_the_others(tops):
-    assert [(tops.kinds == KINDS.index(one)).sum() for one in (NATURAL, SCENE)] == [20, len(tops_module.named())]
+    assert [(tops.kinds == KINDS.index(kind)).sum() for kind in (NATURAL, SCENE)] == [20, len(tops_module.named())]
     assert np.array_equal(tops.numbers[-len(tops_module.named()) :], [*tops_module.named().values()])
     assert "goldstein" in tops_module.named()
     members = list(tops.members(np.array([3, 0, 11])))
-    assert np.array_equal([flat(*one) for one in members], tops.numbers[[3, 0, 11]])
+    assert np.array_equal([flat(*pair) for pair in members], tops.numbers[[3, 0, 11]])
 
 
 def test_scales_of_many_tops_are_those_of_scenes_and_samples_fall_on_the_same_times_at_every_step(tops):
     scenes = [scene_of(tops, k) for k in range(80)]
-    assert tops.energy_scale[:80] == pytest.approx([one.energy_scale for one in scenes], rel=1e-6)
-    assert tops.period[:80] == pytest.approx([one.nutation_period for one in scenes], rel=1e-6)
-    assert tops.regime[:80] == pytest.approx(np.array([regime(one) for one in scenes]), abs=1e-6)
-    (highest, lowest, *_), wide = np.array([barriers(one) for one in scenes]).T, tops.width[:80] > 1e-3
+    assert tops.energy_scale[:80] == pytest.approx([scene.energy_scale for scene in scenes], rel=1e-6)
+    assert tops.period[:80] == pytest.approx([scene.nutation_period for scene in scenes], rel=1e-6)
+    assert tops.regime[:80] == pytest.approx(np.array([regime(scene) for scene in scenes]), abs=1e-6)
+    (highest, lowest, *_), wide = np.array([barriers(scene) for scene in scenes]).T, tops.width[:80] > 1e-3
     assert tops.width[:80][wide] == pytest.approx((lowest - highest)[wide], abs=1e-6)
     for level in (0, 3, 9):
         h = tops.period / FIRST * 0.5**level
@@ -299,31 +299,31 @@ def test_scales_of_many_tops_are_those_of_scenes_and_samples_fall_on_the_same_ti
 
 @pytest.mark.parametrize("name", EACH)
 def test_errors_of_many_runs_are_those_of_each(tops, name):
-    row, chosen = integrator(name), np.flatnonzero(tops.kinds < 2)[:4]
+    row, indices = integrator(name), np.flatnonzero(tops.kinds < 2)[:4]
     level = 5 if row.fixed_step else 4
-    many = tops.errors(row.charts()[0], ladder.run_level(row, tops, chosen, level, 1e6), chosen)
-    for k, member in enumerate(chosen):
+    errors = tops.errors(row.charts()[0], ladder.run_level(row, tops, indices, level, 1e6), indices)
+    for k, member in enumerate(indices):
         setting = tops.period[member] / FIRST * 0.5**level if row.fixed_step else ladder.setting_of(row, level)
-        alone = error_row(scene_of(tops, member), row, setting, float(tops.times[member, -1]))
-        if alone["outcome"] != "ok":
-            assert many["axis"][k] == INF
+        expected = error_row(scene_of(tops, member), row, setting, float(tops.times[member, -1]))
+        if expected["outcome"] != "ok":
+            assert errors["axis"][k] == INF
             continue
-        for quantity in set(ASKED) & many.keys():  # a dozen samples against a thousand
-            assert 0.3 * alone[quantity] <= many[quantity][k] <= 1.001 * alone[quantity] + 1e-14
-        assert many[MOMENTA][k] <= max(alone["p_phi"], alone["p_psi"]) * 1.001 + 1e-14
+        for quantity in set(ASKED) & errors.keys():  # a dozen samples against a thousand
+            assert 0.3 * expected[quantity] <= errors[quantity][k] <= 1.001 * expected[quantity] + 1e-14
+        assert errors[MOMENTA][k] <= max(expected["p_phi"], expected["p_psi"]) * 1.001 + 1e-14
 
 
-@pytest.mark.parametrize("name", ["rk4[attitude]", "strang[attitude]", *late("tsit5-fixed[attitude]")])
+@pytest.mark.parametrize("name", ["rk4[attitude]", "strang[attitude]", *defer("tsit5-fixed[attitude]")])
 def test_coarse_runs_end_in_the_ladder_as_they_end_alone(in_lanes, tops, name):
-    row, chosen = integrator(name), np.flatnonzero(tops.known)
-    shown = ladder.run_level(row, tops, chosen, 0, 1e6)
-    plans = [Plan.steps(float(tops.period[member]) / FIRST, tops.marks) for member in chosen]
-    alone = ladder.one_by_one(row, tops.members(chosen), plans)
-    lost = alone.outcome == NOT_NORMALISED
-    assert np.array_equal(shown.outcome == NOT_NORMALISED, lost)
-    assert np.array_equal(np.isnan(shown.states[lost]).all(axis=2), np.isnan(alone.states[lost]).all(axis=2))
-    assert lost.any() == ("strang" not in name)
-    assert (tops.errors("attitude", shown, chosen)["axis"][lost] == INF).all()
+    row, indices = integrator(name), np.flatnonzero(tops.known)
+    result = ladder.run_level(row, tops, indices, 0, 1e6)
+    plans = [Plan.steps(float(tops.period[member]) / FIRST, tops.marks) for member in indices]
+    expected = ladder.one_by_one(row, tops.members(indices), plans)
+    mask = expected.outcome == NOT_NORMALISED
+    assert np.array_equal(result.outcome == NOT_NORMALISED, mask)
+    assert np.array_equal(np.isnan(result.states[mask]).all(axis=2), np.isnan(expected.states[mask]).all(axis=2))
+    assert mask.any() == ("strang" not in name)
+    assert (tops.errors("attitude", result, indices)["axis"][mask] == INF).all()
 
 
 def test_a_failed_run_has_an_infinite_error_and_targets_are_asked_where_they_mean_something(tops):
@@ -334,12 +334,12 @@ def test_a_failed_run_has_an_infinite_error_and_targets_are_asked_where_they_mea
     errors = tops.errors("axis", Samples, np.array([4]))
     assert set(errors) == {"axis", "energy", MOMENTA}
     assert all(value == INF for values in errors.values() for value in values)
-    asked, bounds = tops.asked(TARGETS), tops.bounds()
+    masks, bounds = tops.asked(TARGETS), tops.bounds()
     for place, target in enumerate(TARGETS):
         for name in ASKED:
-            assert (asked[name][place] <= (tops.width > target)).all()
-            assert (bounds[name][asked[name][place]] <= 0.1 * target).all()
-    assert not asked["axis"][0].all()  # sleeping tops nutate less than 1e-3
+            assert (masks[name][place] <= (tops.width > target)).all()
+            assert (bounds[name][masks[name][place]] <= 0.1 * target).all()
+    assert not masks["axis"][0].all()  # sleeping tops nutate less than 1e-3
 
 
 @pytest.fixture(scope="module")
@@ -353,26 +353,26 @@ def test_the_stored_setting_meets_the_target_at_the_stored_cost(tops, strang, na
     table = strang if name == "strang[axis]" else ladder.table(row, tops, 2e4, twin=False, guarded=0)
     finest = table["cost"].sel(quantity="axis", target=1e-12)[tops.kinds == KINDS.index(NATURAL)]
     assert row.fixed_step or np.isfinite(finest).all()  # two tolerances with one error are no rounding
-    one = table.sel(quantity="axis", target=1e-3)
-    members = np.flatnonzero(np.isfinite(one["cost"].values))[:6]
-    assert np.array_equal(np.isfinite(one["met_at"].values), np.isfinite(one["cost"].values))
+    cell = table.sel(quantity="axis", target=1e-3)
+    members = np.flatnonzero(np.isfinite(cell["cost"].values))[:6]
+    assert np.array_equal(np.isfinite(cell["met_at"].values), np.isfinite(cell["cost"].values))
     for member in members:
-        setting, horizon = float(one["met_at"][member]), float(tops.times[member, -1])
+        setting, horizon = float(cell["met_at"][member]), float(tops.times[member, -1])
         step = tops.period[member] / setting if row.fixed_step else setting
-        alone = error_row(scene_of(tops, member), row, step, horizon)
-        assert alone["axis"] < (4e-3 if row.fixed_step else 1e-2)
-        assert alone["force_evaluations"] == pytest.approx(float(one["cost"][member]), rel=0.1)
+        expected = error_row(scene_of(tops, member), row, step, horizon)
+        assert expected["axis"] < (4e-3 if row.fixed_step else 1e-2)
+        assert expected["force_evaluations"] == pytest.approx(float(cell["cost"][member]), rel=0.1)
 
 
 def test_finer_targets_cost_more_within_the_budget_and_every_top_is_judged_or_dropped(strang, tops, monkeypatch):
     cost = strang["cost"].transpose("quantity", "target", "member").values
     for values in cost:
-        both = ~np.isnan(values[0]) & ~np.isnan(values[1])
-        assert (values[0, both] <= values[1, both]).all()
+        mask = ~np.isnan(values[0]) & ~np.isnan(values[1])
+        assert (values[0, mask] <= values[1, mask]).all()
     assert cost[np.isfinite(cost)].max() <= 2e4 * 1.001
     monkeypatch.setattr(ladder, "FORGIVEN", 1e9)  # nobody leaves who would reach a target
-    patient = ladder.table(integrator("strang[axis]"), tops, 2e4, twin=False, guarded=0)
-    assert np.array_equal(np.isfinite(patient["cost"]), np.isfinite(strang["cost"]))
+    control = ladder.table(integrator("strang[axis]"), tops, 2e4, twin=False, guarded=0)
+    assert np.array_equal(np.isfinite(control["cost"]), np.isfinite(strang["cost"]))
     assert np.isnan(strang["cost"].sel(quantity="attitude").values).all()
     runs, wrong, silent = (strang[name].values for name in ("runs", "wrong", "silent"))
     assert (runs[0] == strang["drawn"].values).all()
@@ -383,21 +383,21 @@ def test_finer_targets_cost_more_within_the_budget_and_every_top_is_judged_or_dr
     health = cells.health(data, "strang[axis]")
     assert (health.dropped >= 0).all()
     np.testing.assert_array_equal(health.wrong, wrong[: len(health.setting)])
-    monkeypatch.setattr(ladder, "costs_of", lambda *given: firsts.append(given[-1]) or {})
+    monkeypatch.setattr(ladder, "costs_of", lambda *args: firsts.append(args[-1]) or {})
     firsts = []  # levels that do not count: longer steps may keep the energy and miss the motion
     ladder.table(integrator("strang[axis]"), tops, 50.0, twin=False, guarded=0)
     assert firsts == [{"energy": 2}] == [{"energy": math.ceil(math.log2(LEAST_STEPS / FIRST))}]
     blank = np.full((ladder.LEVELS, 3), NAN)
     blank[0] = [1.0, 1.0, 10.0]
-    wrong = {"axis": blank, "energy": 0.2 * blank, MOMENTA: 0.05 * blank}
-    done = ladder.Climb(blank, wrong, blank == 1.0, blank[0] > 0.0)
-    three, rk4 = tops_module.Tops(tops.numbers[:3], 10.0), integrator("rk4[axis]")
-    assert ladder.typical_work(rk4, done, three)[0, 0] == 1.0  # of the median top
+    errors = {"axis": blank, "energy": 0.2 * blank, MOMENTA: 0.05 * blank}
+    climb = ladder.Climb(blank, errors, blank == 1.0, blank[0] > 0.0)
+    trio, rk4 = tops_module.Tops(tops.numbers[:3], 10.0), integrator("rk4[axis]")
+    assert ladder.typical_work(rk4, climb, trio)[0, 0] == 1.0  # of the median top
     for outcome, error in (("ok", 1.0), ("not_normalised", math.inf)):  # a run that is to end is warned of
         expected = SimpleNamespace(axis_error=1.0, whole=False, outcome=outcome)
         monkeypatch.setattr(ladder, "forecast", lambda *_, expected=expected: expected)
-        seen = ladder.guarded_runs(rk4, three, done, 2, 4e4)
-        assert (seen["watched"][0, 0], seen["foretold"][0, 0]) == (0.2, error)  # the larger
+        counts = ladder.guarded_runs(rk4, trio, climb, 2, 4e4)
+        assert (counts["watched"][0, 0], counts["foretold"][0, 0]) == (0.2, error)  # the larger
     assert health.dropped[-1].sum() > 0  # a budget ends every ladder of order 2
     rows = cells.guard_counts(data)  # the guard is counted once for every run that it was asked about
     assert rows[["wrong", "between", "right"]].to_numpy().sum() == np.isfinite(strang["foretold"].values).sum() > 0
@@ -429,57 +429,57 @@ def data(quick_results):
 def small():
     """A few variants on a few tops, with prices that are given."""
     names = ["rk4[axis]", "takahashi-imada[axis]", "taylor[axis]", "series[axis]"]
-    asked = study.QUICK["short"] | {"strata": 60, "natural": 30}
-    cases = [Case("tops", name, asked, group="short") for name in names]
-    cases += [Case("short", "exact", asked, group="tops")]
-    few = study.FAR_QUICK | {"members": 2, "levels": 6, "steps": 4e3, "budget": 1e4}
-    cases += [Case("natural", "rk4[axis]", few, group="far")]
-    done = [(case, study.measure(case)) for case in cases]
+    settings = study.QUICK["short"] | {"strata": 60, "natural": 30}
+    cases = [Case("tops", name, settings, group="short") for name in names]
+    cases += [Case("short", "exact", settings, group="tops")]
+    far = study.FAR_QUICK | {"members": 2, "levels": 6, "steps": 4e3, "budget": 1e4}
+    cases += [Case("natural", "rk4[axis]", far, group="far")]
+    results = [(case, study.measure(case)) for case in cases]
     priced = {"prices": tree_of([[7e-9, 3e-8, 1.4e-8, 8e-9]] * 5, names)["prices"]}
-    advised = cells.advised(datasets.combine(done).assign(priced), [])
-    other = {"members": 60, "seed": 2, "nutations": asked["nutations"]}
-    cases = [Case(NATURAL, name, other | {"start": start}, group=study.SAFE) for name, start in advised.items()]
-    tree = datasets.combine([*done, *((case, study.measure(case)) for case in cases)]).assign(priced)
+    advised = cells.advised(datasets.combine(results).assign(priced), [])
+    options = {"members": 60, "seed": 2, "nutations": settings["nutations"]}
+    cases = [Case(NATURAL, name, options | {"start": start}, group=study.SAFE) for name, start in advised.items()]
+    tree = datasets.combine([*results, *((case, study.measure(case)) for case in cases)]).assign(priced)
     tree.attrs.update(netcdf.provenance())
     return tree
 
 
 def test_facts_and_tables_are_those_of_the_cells(small):
-    said, tables = facts.facts(small), facts.tables(small)
+    answers, tables = facts.facts(small), facts.tables(small)
     winners = tables["winners"].query("tops == 'natural'").set_index(["needs", "error"])
     for place, target in ((3, 1e-3), (6, 1e-6)):
-        one = cells.winner(small, Cell("short", "axis", target, NATURAL))
-        assert said[f"safe_{place}"] == one["safe"].name
-        assert winners.loc[GENERAL, target]["time (us)"] == pytest.approx(1e6 * one["safe"].seconds)
-    assert said["kicks"] + said["kicks_serve"] == "takahashi-imada[axis] (symmetric)"
-    assert said["lagrangian"] is None  # there is none among these
+        entry = cells.winner(small, Cell("short", "axis", target, NATURAL))
+        assert answers[f"safe_{place}"] == entry["safe"].name
+        assert winners.loc[GENERAL, target]["time (us)"] == pytest.approx(1e6 * entry["safe"].seconds)
+    assert answers["kicks"] + answers["kicks_serve"] == "takahashi-imada[axis] (symmetric)"
+    assert answers["lagrangian"] is None  # there is none among these
     assert cells.safest(small, Cell("short", "axis", 1e-12, NATURAL, "kicks"))[0][0].seconds == INF
     kicks = tables["use"].set_index("you can supply").loc["torque, free motion"]
     assert kicks["1e-12 rad"] == "not within 600 evaluations"
-    assert said["nutations_long"] is None  # nothing was run over a thousand
+    assert answers["nutations_long"] is None  # nothing was run over a thousand
     assert "takahashi-imada[axis]" not in set(winners.loc[GENERAL]["safe"])  # it exists for symmetric bodies alone
     assert "takahashi-imada[axis] (symmetric)" in kicks["1e-3 rad"]
     assert tables["have"]["you have"].tolist() == ["rk4[axis]"]
-    parts = {name: one.to_dataset() for name, one in small.children.items()}
+    parts = {name: node.to_dataset() for name, node in small.children.items()}
     cell = Cell("short", "axis", 1e-3, "strata")
     kinds = cells.kinds_of(small, "short")[cells.chosen(small, "short", "strata")][cells.asked_tops(small, cell)]
-    (one,) = (one for one in cells.safest(small, cell)[0] if one.name == "taylor[axis]")
+    (choice,) = (choice for choice in cells.safest(small, cell)[0] if choice.name == "taylor[axis]")
     taylor, share = parts["short"].isel(scene=0).sel(variant="taylor[axis]"), np.bincount(kinds) / kinds.size
     mean = taylor["work"].transpose("level", "kind").values[:, : share.size] @ share  # of all that are asked
-    x, good = -np.log(taylor["setting"].values), np.isfinite(mean) & np.isfinite(taylor["setting"].values)
-    typical = math.exp(np.interp(-math.log(one.setting), x[good], np.log(1.4e-8 * mean[good] + 2e-6)))
-    assert one.seconds == pytest.approx(typical)
+    x, mask = -np.log(taylor["setting"].values), np.isfinite(mean) & np.isfinite(taylor["setting"].values)
+    typical = math.exp(np.interp(-math.log(choice.setting), x[mask], np.log(1.4e-8 * mean[mask] + 2e-6)))
+    assert choice.seconds == pytest.approx(typical)
     price, name = parts["prices"]["price"], parts["prices"]["variant"] == "taylor[axis]"
-    fine, dear = (xr.DataTree.from_dict({**parts, "prices": parts["prices"].assign(price=one)}) for one in
+    fine, dear = (xr.DataTree.from_dict({**parts, "prices": parts["prices"].assign(price=each)}) for each in
                   (price.where(~name | (price.priced_at > 1e-9), 1.0), price * xr.where(name, 1e3, 1.0)))  # fmt: skip
-    before, after = (cells.costs(one, cell._replace(needs="expression")).values for one in (small, fine))
-    counted = cells.costs(small, cell._replace(needs="expression"), cells.EVALUATIONS).values
-    assert before == pytest.approx(1.4e-8 * counted + 2e-6)  # the call is paid for
-    table, known = facts.tables(small)["prices"], pricing.prices(small)
-    assert np.log((table["high (ns)"] / table["price (ns)"]).to_numpy()) == pytest.approx(1.96 * known.error)
+    before, after = (cells.costs(tree, cell._replace(needs="expression")).values for tree in (small, fine))
+    counts = cells.costs(small, cell._replace(needs="expression"), cells.EVALUATIONS).values
+    assert before == pytest.approx(1.4e-8 * counts + 2e-6)  # the call is paid for
+    table, prices = facts.tables(small)["prices"], pricing.prices(small)
+    assert np.log((table["high (ns)"] / table["price (ns)"]).to_numpy()) == pytest.approx(1.96 * prices.error)
     assert np.mean(before == after) > 0.9  # at the prices of tolerances that meet the error, not of the finest
-    told = facts.winners_facts(dear)
-    assert 1.0 < told["misled"] == pytest.approx(told["fewest_seconds"] / told["instead_seconds"])
+    answers = facts.winners_facts(dear)
+    assert 1.0 < answers["misled"] == pytest.approx(answers["fewest_seconds"] / answers["instead_seconds"])
     rk4 = cells.reached(small, 1e-3)["rk4[axis]"]
     best = cells.winner(small, Cell("short", "axis", 1e-3, NATURAL))["safe"]
     assert tables["have"]["1e-3 rad"][0].endswith(f" {number(rk4.seconds / best.seconds)} times")
@@ -493,41 +493,41 @@ def test_the_grid_has_every_compiled_variant_and_what_is_kept_is_declared_or_lin
     assert {"strang[axis]", "strang[attitude]", "midpoint[angles]", "rk45-compiled[angles]", "taylor[axis]"} <= names
     assert not {name for name in names if "unreduced" in name or name.startswith("exact")}
     assert sum(case.timed for case in study.STUDY.cases(False)) == 5
-    kept = {
+    expected = {
         "rk4[axis]": "p_phi", "rk4[angles]": "nothing exactly", "rkmk-se3-4[axis]": "p_psi, |e|",
         "gauss-8[axis]": "p_phi, p_psi, |e|, energy", "takahashi-imada[axis]": "p_phi, p_psi, energy bounded",
     }  # fmt: skip
-    assert {name: facts.keeps(name) for name in kept} == kept
+    assert {name: facts.keeps(name) for name in expected} == expected
 
 
 def test_quick_results_hold_every_verdict_and_a_cost_holds_the_call(data):
     assert {"short", "long", "tops", "prices", "far"} <= set(data.children)
     winners = cells.winners(data)
     assert len(winners) == 2 * len(cells.CLASSES) * 2 * len(TARGETS)
-    for one in winners:
-        for best in filter(None, (one["safe"], one["hindsight"])):
+    for winner in winners:
+        for best in filter(None, (winner["safe"], winner["hindsight"])):
             method = integrator(best.name)
-            assert cells.of_class(method.needs, method.general, one["needs"])
+            assert cells.of_class(method.needs, method.general, winner["needs"])
             assert best.low <= best.high
-        if one["hindsight"]:
-            assert one["solved"] <= one["asked"]
+        if winner["hindsight"]:
+            assert winner["solved"] <= winner["asked"]
     cell = Cell("short", "axis", 1e-3, NATURAL)
-    seconds, counted = cells.costs(data, cell), cells.costs(data, cell, cells.EVALUATIONS)
+    seconds, counts = cells.costs(data, cell), cells.costs(data, cell, cells.EVALUATIONS)
     assert not any("[attitude]" in name for name in seconds.names if f"{name.split('[')[0]}[axis]" in seconds.names)
     row = seconds.names.index("rk4[axis]")
     price, call = pricing.prices(data).at("rk4[axis]", np.array([NAN]))
-    good = np.isfinite(counted.values[row])
+    mask = np.isfinite(counts.values[row])
     assert call[0] > 2e-7
-    assert seconds.values[row, good] == pytest.approx(counted.values[row, good] * price[0] + call[0])
+    assert seconds.values[row, mask] == pytest.approx(counts.values[row, mask] * price[0] + call[0])
     cell = cell._replace(needs="derivative")
-    every, keeping = ({one.name for one in cells.safest(data, cell, only)[0]} for only in (False, True))
-    assert keeping == {name for name in every if name.startswith("gauss-")} < every
-    served = facts.confirmed(data).set_index(["variant", "error"])
+    names, keeping = ({choice.name for choice in cells.safest(data, cell, flag)[0]} for flag in (False, True))
+    assert keeping == {name for name in names if name.startswith("gauss-")} < names
+    table = facts.confirmed(data).set_index(["variant", "error"])
     for needs, target in itertools.product(cells.CLASSES, cells.targets(data)):  # what the front page advises was run
         for first in cells.safest(data, Cell("short", "axis", target, NATURAL, needs))[0][:1]:
             if np.isfinite(first.seconds):
-                assert served.loc[(first.name, target), "served"] == pytest.approx(first.setting)
-                assert served.loc[(first.name, target), "share"] >= SAFE
+                assert table.loc[(first.name, target), "served"] == pytest.approx(first.setting)
+                assert table.loc[(first.name, target), "share"] >= SAFE
 
 
 def test_a_setting_is_made_finer_until_it_serves_but_no_tolerance_by_more_than_a_decade(monkeypatch):
@@ -543,52 +543,52 @@ def test_an_advised_setting_was_run_on_other_tops_and_serves_them(small):
     table = facts.tables(small)["confirmed"].set_index(["variant", "error"])
     for (name, error), row in table.iterrows():
         choices = cells.safest(small, Cell("short", "axis", error, NATURAL, integrator(name).needs))[0]
-        printed = facts.setting_words(name, next(one for one in choices if one.name == name).setting)
-        assert printed in (facts.setting_words(name, row["served"]), "inf steps")
-    one = table.loc["rk4[axis]", 1e-3]
-    variant, others = integrator("rk4[axis]"), natural(60, 2)
-    shares = [share_served(variant, others, 10.0, part * one["served"], 1e-3) for part in (0.5, 1.0)]
-    assert shares[0] < 0.9 < SAFE <= shares[1] == one["share"]
-    top, period = (scene := scene_of(tops_module.Tops(others, 10.0), 0)), scene.nutation_period  # from outside
-    run = symtop.simulate(top, "rk4[axis]", step_size=period / one["served"], horizon=10.0 * period)
+        text = facts.setting_words(name, next(choice for choice in choices if choice.name == name).setting)
+        assert text in (facts.setting_words(name, row["served"]), "inf steps")
+    row = table.loc["rk4[axis]", 1e-3]
+    variant, tops = integrator("rk4[axis]"), natural(60, 2)
+    shares = [share_served(variant, tops, 10.0, part * row["served"], 1e-3) for part in (0.5, 1.0)]
+    assert shares[0] < 0.9 < SAFE <= shares[1] == row["share"]
+    top, period = (scene := scene_of(tops_module.Tops(tops, 10.0), 0)), scene.nutation_period  # from outside
+    run = symtop.simulate(top, "rk4[axis]", step_size=period / row["served"], horizon=10.0 * period)
     largest = float(symtop.errors(run, top)["axis"].max())
     for part, share in ((1.01, 1.0), (0.5, 0.0)):
-        assert share_served(variant, others[:1], 10.0, one["served"], part * largest) == share
+        assert share_served(variant, tops[:1], 10.0, row["served"], part * largest) == share
 
 
 def test_the_page_says_what_was_measured_and_shares_of_silent_runs_are_of_their_kind(small, tmp_path):
-    wrong = facts.tables(small)["silent"].set_index(["variant", "kind of top"])["wrong"].sort_index()
+    counts = facts.tables(small)["silent"].set_index(["variant", "kind of top"])["wrong"].sort_index()
     health, kind = cells.health(small, "rk4[axis]"), KINDS.index("near-separatrix")
-    at = [int(np.argmin(np.abs(health.setting - steps))) for steps in facts.STEPS]
-    assert np.array_equal(wrong.loc["rk4[axis]", "near-separatrix"], health.wrong[at, kind] / health.drawn[kind])
-    assert PARTIAL in checked("cost", small, tmp_path, elsewhere={"use", "have"})  # there are no long runs
-    named = {one.get_text() for one in figures.draw_accuracy(small).axes[0].texts}
-    assert {"takahashi-imada (symmetric)", "rk4"} <= named
+    indices = [int(np.argmin(np.abs(health.setting - steps))) for steps in facts.STEPS]
+    assert np.array_equal(counts.loc["rk4[axis]", "near-separatrix"], health.wrong[indices, kind] / health.drawn[kind])
+    assert PARTIAL in checked_page("cost", small, tmp_path, elsewhere={"use", "have"})  # there are no long runs
+    labels = {text.get_text() for text in figures.draw_accuracy(small).axes[0].texts}
+    assert {"takahashi-imada (symmetric)", "rk4"} <= labels
 
 
 def test_where_f_is_dear_the_fewest_calls_win(monkeypatch):
-    some = [Safe("fast", 8.0, 1e-5, 0.0, 0.0), Safe("next", 8.0, 2e-5, 0.0, 0.0), Safe("few", 1e-5, 3e-5, 0.0, 0.0)]
-    monkeypatch.setattr(cells, "safest", lambda *_: (some, True))
+    safes = [Safe("fast", 8.0, 1e-5, 0.0, 0.0), Safe("next", 8.0, 2e-5, 0.0, 0.0), Safe("few", 1e-5, 3e-5, 0.0, 0.0)]
+    monkeypatch.setattr(cells, "safest", lambda *_: (safes, True))
     work = {"fast": np.array([500.0, 2000.0]), "next": np.array([80.0, 80.0]), "few": np.array([40.0, 90.0])}
     monkeypatch.setattr(cells, "mean_work", lambda _, __, name: work[name])
     settings = xr.DataArray([[[4.0, 16.0], [4.0, 16.0], [1e-4, 1e-6]]], dims=("scene", "variant", "level"))
     tree = xr.DataTree.from_dict({"short": xr.Dataset({"setting": settings}, {"variant": [*work], "target": [1e-3]})})
     # dearer by 2e-5 / 940 it leaves the fast one behind, but the next only by 1e-5 / 20; halfway between two settings
-    assert cells.fewest_calls(tree, Cell("short", "axis", 1e-3, NATURAL)) == (some[2], *map(pytest.approx, (60, 5e-7)))
+    assert cells.fewest_calls(tree, Cell("short", "axis", 1e-3, NATURAL)) == (safes[2], *map(pytest.approx, (60, 5e-7)))
     assert cells.advised(tree, [])["few"] == [1e-5]  # run on other tops, as all that the front page names, though slow
-    monkeypatch.setattr(cells, "safest", lambda *_: (some[:1], True))
-    assert cells.fewest_calls(tree, Cell("short", "axis", 1e-3, NATURAL)) == (some[0], pytest.approx(1000.0), 0.0)
+    monkeypatch.setattr(cells, "safest", lambda *_: (safes[:1], True))
+    assert cells.fewest_calls(tree, Cell("short", "axis", 1e-3, NATURAL)) == (safes[0], pytest.approx(1000.0), 0.0)
     monkeypatch.setattr(cells, "safest", lambda *_: ([], True))
     assert cells.fewest_calls(tree, Cell("short", "axis", 1e-3, NATURAL)) is None
 
 
 def test_a_row_of_the_front_page_is_of_a_slower_f(monkeypatch):
-    each = {1e-3: cells.FewestCalls(Safe("adams[axis]", 1e-4, 1e-5, 0.0, 0.0), 81.6, 1.7e-7),
-            1e-6: cells.FewestCalls(Safe("rk4[axis]", 8.0, 1e-5, 0.0, 0.0), 320.0, 0.0)}  # fmt: skip
-    monkeypatch.setattr(cells, "targets", lambda _: [*each])
-    monkeypatch.setattr(cells, "fewest_calls", lambda _, cell: each[cell.target])
+    calls = {1e-3: cells.FewestCalls(Safe("adams[axis]", 1e-4, 1e-5, 0.0, 0.0), 81.6, 1.7e-7),
+             1e-6: cells.FewestCalls(Safe("rk4[axis]", 8.0, 1e-5, 0.0, 0.0), 320.0, 0.0)}  # fmt: skip
+    monkeypatch.setattr(cells, "targets", lambda _: [*calls])
+    monkeypatch.setattr(cells, "fewest_calls", lambda _, cell: calls[cell.target])
     monkeypatch.setattr(facts, "over", lambda _: "")
     first = "f(t, y) that takes 0.2\xa0us longer", "adams[axis], tolerance 0.0001, 82 evaluations"
     assert (*facts.slower(None)[0].values(),) == (*first, "rk4[axis], 8 steps, 320 evaluations", "p_phi")
-    each[1e-3] = each[1e-6]  # nothing leads where f is slow that does not lead here
+    calls[1e-3] = calls[1e-6]  # nothing leads where f is slow that does not lead here
     assert facts.slower(None) == []

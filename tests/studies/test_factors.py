@@ -18,36 +18,36 @@ from symtop.measure import settings
 from symtop.measure.datasets import combine
 from symtop.methods.framework.equations import FORMULATIONS
 from symtop.report.formats import number
-from tests.templates import checked
+from tests.templates import checked_page
 
 SCENE = symtop.scene("spheroid")
 SHORT = Goal(3.0, 1e-5, LANGUAGES, CALLS)
 
 
 @pytest.fixture(scope="module")
-def measured():
+def dataset():
     """A small factorial as the study's functions see it; the second process is this one, which has started."""
-    answering = iter([fresh_process.call, operator.call])
+    functions = iter([fresh_process.call, operator.call])
 
-    def call(*asked):
-        return next(answering)(*asked)
+    def call(*args):
+        return next(functions)(*args)
 
-    with pytest.MonkeyPatch.context() as once:
-        once.setattr(measures, "TRIES", 1)
-        once.setattr(fresh_process, "call", call)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(measures, "TRIES", 1)
+        patch.setattr(fresh_process, "call", call)
         data = factorial(SCENE, [DORMAND_PRINCE, "Takahashi-Imada"], [SHORT], 2, 0.001, 2)
     return combine([(symtop.Case("spheroid", "together"), data)])
 
 
 @pytest.fixture(scope="module")
-def quiet(measured):
+def quiet(dataset):
     """The same with times that agree from process to process."""
-    return measured.assign({"spread": measured["spread"].where(~np.isfinite(measured["spread"]), 0.01)})
+    return dataset.assign({"spread": dataset["spread"].where(~np.isfinite(dataset["spread"]), 0.01)})
 
 
 @pytest.fixture(scope="module")
-def rows(measured):
-    return timed(measured)
+def rows(dataset):
+    return timed(dataset)
 
 
 @pytest.mark.parametrize(("plain", "name"), [(plain_numpy.RK4, "rk4"), (plain_numpy.STRANG, "strang")])
@@ -58,22 +58,22 @@ def test_the_loops_in_numpy_return_the_trajectory_of_the_compiled_ones(plain, na
         for quantity in ("axis", "energy", "p_phi", "p_psi"):
             np.testing.assert_allclose(mine[quantity], theirs[quantity], atol=1e-12)
         assert mine.attrs["force_evaluations"] == theirs.attrs["force_evaluations"]
-        another = symtop.simulate("goldstein", f"{name}[{chart}]", **plan | {"step_size": 0.02})
-        gap = np.abs(mine["axis"].values[-1] - another["axis"].values[-1]).max()
+        control = symtop.simulate("goldstein", f"{name}[{chart}]", **plan | {"step_size": 0.02})
+        gap = np.abs(mine["axis"].values[-1] - control["axis"].values[-1]).max()
         assert gap > 1e-9  # the control: another step is another trajectory
 
 
 def test_a_cell_is_named_once_and_taylor_in_angles_solves_the_same_equations():
-    every = cells()
-    assert len({cell.name for cell in every}) == len({cell.key for cell in every}) == len(every)
-    for cell in every:
+    all_cells = cells()
+    assert len({cell.name for cell in all_cells}) == len({cell.key for cell in all_cells}) == len(all_cells)
+    for cell in all_cells:
         assert cell.method.charts() == (cell.chart,)
         assert (cell.method.implementation == "compiled") == (cell.language == COMPILED)
-    schemes = {cell.scheme for cell in every}
-    compiled = {cell.scheme for cell in every if cell.language == COMPILED}
+    schemes = {cell.scheme for cell in all_cells}
+    compiled = {cell.scheme for cell in all_cells if cell.language == COMPILED}
     assert {scheme for members in grid.FAMILIES.values() for scheme in members} == compiled == schemes - {"DOP853"}
     hy = pytest.importorskip("heyoka")
-    assert {cell.chart for cell in every if cell.scheme == "Taylor"} == {*FORMULATIONS}
+    assert {cell.chart for cell in all_cells if cell.scheme == "Taylor"} == {*FORMULATIONS}
     from symtop.methods.taylor.heyoka import equations
 
     scene = symtop.scene("goldstein")
@@ -88,60 +88,60 @@ def test_a_cell_is_named_once_and_taylor_in_angles_solves_the_same_equations():
 
 
 @pytest.mark.quick
-def test_the_search_ends_closer_if_asked_and_languages_of_one_method_have_the_same_setting_and_work(measured):
+def test_the_search_ends_closer_if_asked_and_languages_of_one_method_have_the_same_setting_and_work(dataset):
     horizon = 10.0 * SCENE.nutation_period
     for name in ("rk4[axis]", "rk4[attitude]", "strang[axis]"):
         answers = settings.search(SCENE, symtop.integrator(name), 1e-5, "axis", horizon, least=LEAST)
         assert LEAST * 1e-5 <= answers.error <= 1e-5
-    part = measured.isel(scene=0, horizon=0, target=0)
+    part = dataset.isel(scene=0, horizon=0, target=0)
     for chart in ("angles", "axis", "attitude"):
         trio = [part.sel(variant=f"{name}[{chart}]") for name in ("rk45-compiled", "rk45", "rk45-numba")]
-        assert len({float(one["setting"]) for one in trio}) == 1
-        assert len({float(one["force_evaluations"]) for one in trio}) == 1
-        np.testing.assert_allclose([float(one["axis"]) for one in trio], float(trio[0]["axis"]), rtol=1e-3)
+        assert len({float(row["setting"]) for row in trio}) == 1
+        assert len({float(row["force_evaluations"]) for row in trio}) == 1
+        np.testing.assert_allclose([float(row["axis"]) for row in trio], float(trio[0]["axis"]), rtol=1e-3)
 
 
 def test_what_is_not_within_the_budget_has_a_reason_and_no_time(monkeypatch):
-    monkeypatch.setattr(measures, "timed", lambda asked, processes: np.ones((len(asked.runs), processes)))
+    monkeypatch.setattr(measures, "timed", lambda job, processes: np.ones((len(job.runs), processes)))
     goal = Goal(10.0, 1e-7, (NUMPY,), (KERNEL,))
-    settled = settle(SCENE, [cell for cell in cells(["Strang"]) if cell.chart == "axis"], goal)
-    assert [cell.language for cell in settled] == [COMPILED, NUMPY]
-    assert list(settled.values())[1].why == settings.BUDGET
+    results = settle(SCENE, [cell for cell in cells(["Strang"]) if cell.chart == "axis"], goal)
+    assert [cell.language for cell in results] == [COMPILED, NUMPY]
+    assert list(results.values())[1].why == settings.BUDGET
     data = factorial(SCENE, ["Strang"], [goal._replace(languages=(COMPILED, NUMPY))], 1, 0.001, 1)
     slow, fast = (data.sel(variant=name, call=KERNEL).squeeze() for name in ("strang-numpy[axis]", "strang[axis]"))
     assert (str(slow["reason"].values), bool(np.isnan(slow["seconds"]))) == (settings.BUDGET, True)
     assert (str(fast["reason"].values), bool(np.isnan(fast["seconds"]))) == ("", False)
 
 
-def test_every_timed_run_meets_its_target_and_its_time_is_the_median_of_its_processes(rows, measured):
-    known = {cell.name: cell for cell in cells()}
+def test_every_timed_run_meets_its_target_and_its_time_is_the_median_of_its_processes(rows, dataset):
+    by_name = {cell.name: cell for cell in cells()}
     assert ((rows["axis"] > 0.0) & (rows["axis"] <= SHORT.target)).all()
     for name in ("rk45-compiled[attitude]", "takahashi-imada[axis]", "rk45-numba[axis]"):
-        mine = rows[rows["variant"] == name]
-        (row,) = set(zip(mine["axis"], mine["force_evaluations"], strict=True))
-        met = settle(SCENE, [known[name]], SHORT)[known[name]]
-        assert met.error <= SHORT.target
-        if known[name].language == COMPILED:  # it was searched for by itself
-            assert (met.error, met.evaluations) == row
-    samples, seconds = measured["seconds_samples"], measured["seconds"]
+        part = rows[rows["variant"] == name]
+        (row,) = set(zip(part["axis"], part["force_evaluations"], strict=True))
+        attempt = settle(SCENE, [by_name[name]], SHORT)[by_name[name]]
+        assert attempt.error <= SHORT.target
+        if by_name[name].language == COMPILED:  # it was searched for by itself
+            assert (attempt.error, attempt.evaluations) == row
+    samples, seconds = dataset["seconds_samples"], dataset["seconds"]
     assert samples.sizes["process"] == 2
     assert np.array_equal(np.isfinite(seconds), np.isfinite(samples).all("process"))
     np.testing.assert_array_equal(seconds, np.median(samples, axis=samples.get_axis_num("process")))
-    taken = samples.values[np.isfinite(seconds.values)]
-    assert (np.ptp(taken, axis=-1) > 0.0).all()  # each process measures for itself
-    gap = measured["spread"].values[np.isfinite(seconds.values)]
-    np.testing.assert_allclose(gap, 0.5 * np.ptp(taken, axis=-1) / np.median(taken, axis=-1))
+    times = samples.values[np.isfinite(seconds.values)]
+    assert (np.ptp(times, axis=-1) > 0.0).all()  # each process measures for itself
+    gap = dataset["spread"].values[np.isfinite(seconds.values)]
+    np.testing.assert_allclose(gap, 0.5 * np.ptp(times, axis=-1) / np.median(times, axis=-1))
     assert set(rows["call"]) == set(CALLS)
     assert set(rows["language"][rows["call"] == grid.SOLVE_IVP]) == {SCIPY_PYTHON}
 
 
 def test_a_noisy_time_is_taken_again_and_the_fastest_processes_count(monkeypatch):
     noisy, quiet = [1.0, 1.0, 9.0, 9.0], [2.0, 2.0, 2.1, 2.1]
-    again = [np.array([[1.1, 9.0, 9.0, 1.0], [9.0, 9.0, 1.0, 9.0]]), *[np.array([[9.0, 9.0, 9.0, 9.0]])] * 2]
-    asked, taken = [], [np.array([noisy, quiet, noisy]), *again]
-    monkeypatch.setattr(measures, "timed", lambda runs, _: asked.append(runs.runs) or taken.pop(0))
+    repeats = [np.array([[1.1, 9.0, 9.0, 1.0], [9.0, 9.0, 1.0, 9.0]]), *[np.array([[9.0, 9.0, 9.0, 9.0]])] * 2]
+    calls, arrays = [], [np.array([noisy, quiet, noisy]), *repeats]
+    monkeypatch.setattr(measures, "timed", lambda runs, _: calls.append(runs.runs) or arrays.pop(0))
     times, tries = measures.settled_times(measures.Runs(SCENE, ["a", "b", "c"], 1, 0.001), 4)
-    assert asked == [["a", "b", "c"], ["a", "c"], ["c"], ["c"]]  # 1, 1, 1, 9 stays noisy: no more are tried
+    assert calls == [["a", "b", "c"], ["a", "c"], ["c"], ["c"]]  # 1, 1, 1, 9 stays noisy: no more are tried
     assert times.tolist() == [[1.0, 1.0, 1.0, 1.1], quiet, [1.0, 1.0, 1.0, 9.0]]
     assert tries.tolist() == [2, 1, 4]
 
@@ -149,45 +149,45 @@ def test_a_noisy_time_is_taken_again_and_the_fastest_processes_count(monkeypatch
 @pytest.mark.parametrize(("share", "busy"), [(0.0, None), (facts.NOISY_SHARE, None), (0.2, True)])
 def test_times_of_a_busy_machine_are_not_compared(quiet, share, busy):
     spread = quiet["spread"].values.copy()
-    known = np.flatnonzero(np.isfinite(spread))
-    loud = int(share * known.size)
-    spread.flat[known[:loud]] = 1.01 * facts.NOISY
+    indices = np.flatnonzero(np.isfinite(spread))
+    count = int(share * indices.size)
+    spread.flat[indices[:count]] = 1.01 * facts.NOISY
     data = quiet.assign({"spread": (quiet["spread"].dims, spread)})
     answers = facts.facts(data)
-    assert (answers["loud"], answers["times"], answers["busy"]) == (loud, known.size, busy)
+    assert (answers["loud"], answers["times"], answers["busy"]) == (count, indices.size, busy)
     assert answers["again"] == 0
-    retaken = data["seconds_tries"].where(~(data["spread"] > facts.NOISY), 4)
-    assert facts.facts(data.assign({"seconds_tries": retaken}))["again"] == loud
+    tries = data["seconds_tries"].where(~(data["spread"] > facts.NOISY), 4)
+    assert facts.facts(data.assign({"seconds_tries": tries}))["again"] == count
     assert (answers["called"] is None) == np.isnan(answers["user_most"]) == bool(busy)
     tables = facts.tables(data)
     assert tables["effects"].empty == tables["charts"].empty == tables["scipy"].empty == bool(busy)
-    assert len(tables["times"]) >= known.size
-    assert {one.name for one in figures.pictures(data)} == (set() if busy else {"waterfall"})
+    assert len(tables["times"]) >= indices.size
+    assert {picture.name for picture in figures.pictures(data)} == (set() if busy else {"waterfall"})
 
 
 def test_where_nothing_was_timed_nothing_is_said_and_the_page_has_numbers_and_none(quiet, tmp_path):
-    nothing = quiet.assign({name: quiet[name] * np.nan for name in ("seconds", "spread")})
-    answers = facts.facts(nothing)
+    data = quiet.assign({name: quiet[name] * np.nan for name in ("seconds", "spread")})
+    answers = facts.facts(data)
     assert answers["called"] is answers["busy"] is None
     assert answers["times"] == 0
     assert np.isnan(answers["near_share"])
-    assert list(figures.pictures(nothing)) == []
-    text = checked("factors", quiet, tmp_path)
+    assert list(figures.pictures(data)) == []
+    text = checked_page("factors", quiet, tmp_path)
     assert f"becomes {number(facts.facts(quiet)['called'], 2)} times faster" in text
     assert "busy" not in text
 
 
 @pytest.mark.parametrize("call_first", [False, True])
 def test_neighbours_in_the_waterfall_differ_in_exactly_the_factor_they_name(rows, call_first):
-    known = {cell.name: cell.key for cell in cells()}
+    keys = {cell.name: cell.key for cell in cells()}
     bars = waterfall(rows, call_first=call_first).to_dict("records")
-    levels = [(*known[bar["variant"]], bar["call"]) for bar in bars]
+    levels = [(*keys[bar["variant"]], bar["call"]) for bar in bars]
     assert levels[0] == (DORMAND_PRINCE, "angles", SCIPY_PYTHON, grid.SOLVE_IVP)
     assert levels[-1] == tuple(fastest(rows)[FACTORS])
     assert len(bars) >= 5
     for before, after, bar in zip(levels, levels[1:], bars[1:], strict=False):
-        changed = [(factor, a, b) for factor, a, b in zip(FACTORS, before, after, strict=True) if a != b]
-        assert changed == [(bar["factor"], bar["from"], bar["to"])]
+        changes = [(factor, a, b) for factor, a, b in zip(FACTORS, before, after, strict=True) if a != b]
+        assert changes == [(bar["factor"], bar["from"], bar["to"])]
         (seconds,) = rows[(rows[FACTORS] == list(after)).all(axis=1)]["seconds"]
         assert bar["time (s)"] == seconds
 
@@ -245,8 +245,8 @@ def test_effects_that_multiply_are_found_and_scipy_and_charts_compared_by_the_fa
     np.testing.assert_allclose(table["angles / axis"], 12.0)
     np.testing.assert_allclose(table["attitude / axis"], 1.5)
     goals = [synthetic(interaction=2.0**k).assign(target=10.0**-k, spread=0.01) for k in range(3)]
-    for one, slower in zip(goals, (1.0, 2.0, 6.0), strict=True):
-        one.loc[one["language"] == SCIPY_PYTHON, "seconds"] *= slower
+    for goal, factor in zip(goals, (1.0, 2.0, 6.0), strict=True):
+        goal.loc[goal["language"] == SCIPY_PYTHON, "seconds"] *= factor
     monkeypatch.setattr(facts, "compared", lambda _: pd.concat(goals, ignore_index=True))
     answers = facts.facts(quiet)
     assert [answers[f"user_{end}"] for end in ("least", "most")] == pytest.approx([1000.0, 6000.0])

@@ -21,9 +21,9 @@ def run_of(scene_, name, chart, step, count):
     h = step * scene_.nutation_period
     plan = symtop.Plan.steps(h, np.unique(np.rint(np.linspace(0, count, SAMPLES)).astype(np.int64)))
     run = solve(symtop.integrator(name), chart, scene_.top, scene_.start, plan)
-    seen = View(chart, scene_.top, run.states, run.p_phi, run.p_psi)
-    shown = {name: ("time", getattr(seen, name)) for name in ("theta", "energy", "p_phi", "p_psi")}
-    return plan.times, run, seen, xr.Dataset(shown, {"time": plan.times}, {"outcome": run.outcome})
+    view = View(chart, scene_.top, run.states, run.p_phi, run.p_psi)
+    columns = {name: ("time", getattr(view, name)) for name in ("theta", "energy", "p_phi", "p_psi")}
+    return plan.times, run, view, xr.Dataset(columns, {"time": plan.times}, {"outcome": run.outcome})
 
 
 def one_pass(scene_, times, states, momenta, followed=True):
@@ -43,16 +43,16 @@ def one_pass(scene_, times, states, momenta, followed=True):
 ])  # fmt: skip
 def test_one_pass_says_what_judgement_says(name, chart, step, word):
     cusp = scene("cusp")
-    times, run, seen, shown = run_of(cusp, name, chart, step, 400)
-    error = axis_distance(seen.axis, closed_form(cusp).axis(times))
+    times, run, view, data = run_of(cusp, name, chart, step, 400)
+    error = axis_distance(view.axis, closed_form(cusp).axis(times))
     momenta = np.stack([run.p_phi, run.p_psi], axis=-1)
     mapped, largest = one_pass(cusp, times, run.states, momenta)
-    assert mapped == judgement(cusp, shown, error).verdict == word
+    assert mapped == judgement(cusp, data, error).verdict == word
     assert largest == pytest.approx(error.max(), rel=1e-9)
-    early, some = one_pass(cusp, times, run.states, momenta, followed=False)
-    assert early == word
-    assert some <= largest
-    assert (some <= 1e-2) == (word == "accurate")
+    verdict, bound = one_pass(cusp, times, run.states, momenta, followed=False)
+    assert verdict == word
+    assert bound <= largest
+    assert (bound <= 1e-2) == (word == "accurate")
 
 
 @pytest.mark.parametrize("step", [0.08, 0.1])
@@ -74,13 +74,13 @@ def test_one_pass_says_what_judgement_says_of_runs_of_few_steps(name):
     cusp, words = scene("cusp"), set()
     for count in range(6, 41):
         for step in (0.08, 0.13, 0.2, 0.3):
-            times, run, seen, shown = run_of(cusp, name, "axis", step, count)
+            times, run, view, data = run_of(cusp, name, "axis", step, count)
             if run.outcome == "ok":
-                error = axis_distance(seen.axis, closed_form(cusp).axis(times))
-                seen_by_map = times, run.states, np.stack([run.p_phi, run.p_psi], axis=-1)  # its rows end in NaN
-                padded = [np.r_[one, np.full((SAMPLES - len(one), *one.shape[1:]), math.nan)] for one in seen_by_map]
+                error = axis_distance(view.axis, closed_form(cusp).axis(times))
+                arrays = times, run.states, np.stack([run.p_phi, run.p_psi], axis=-1)  # its rows end in NaN
+                padded = [np.r_[array, np.full((SAMPLES - len(array), *array.shape[1:]), math.nan)] for array in arrays]
                 word = one_pass(cusp, *padded)[0]
-                assert word == judgement(cusp, shown, error).verdict, (count, step)
+                assert word == judgement(cusp, data, error).verdict, (count, step)
                 words.add((word, times.size < 16))
     assert ("bounded_but_wrong", True) in words
     assert (("drifting", False) in words) == (name != "rkmk-se3-4")
@@ -88,21 +88,21 @@ def test_one_pass_says_what_judgement_says_of_runs_of_few_steps(name):
 
 
 def test_a_state_that_is_not_finite_and_a_pole_on_the_wrong_side_are_seen():
-    near, times = grazing(1e-3), np.linspace(0.0, 4.0, SAMPLES)
-    states, p_phi, p_psi = closed_form(near).run(times)
+    case, times = grazing(1e-3), np.linspace(0.0, 4.0, SAMPLES)
+    states, p_phi, p_psi = closed_form(case).run(times)
     momenta = np.stack([p_phi, p_psi], axis=-1)
-    assert one_pass(near, times, states, momenta) == ("accurate", pytest.approx(0.0, abs=1e-14))
-    late = states.copy()
-    late[-1, 5] = math.nan
-    word, error = one_pass(near, times, late, momenta)
+    assert one_pass(case, times, states, momenta) == ("accurate", pytest.approx(0.0, abs=1e-14))
+    broken = states.copy()
+    broken[-1, 5] = math.nan
+    word, error = one_pass(case, times, broken, momenta)
     assert word == "not_finite"
     assert math.isnan(error)
     turned = states.copy()  # by half a turn about the vertical
     turned[:, :4] = states[:, [3, 2, 1, 0]] * np.array([-1.0, -1.0, 1.0, 1.0])
-    assert one_pass(near, times, turned, momenta)[0] == "bounded_but_wrong"
-    for place, more, word in ((SAMPLES // 2, 1.5, "drifting"), (SAMPLES // 2 - 1, 1.5, "bounded_but_wrong"),
-                              (SAMPLES // 2, 1.0001, "wrong"), (SAMPLES // 2 - 1, 1.0001, "bounded_but_wrong"),
-                              (SAMPLES // 2, 1.0 + 1e-14, "bounded_but_wrong")):  # fmt: skip
-        (bent := turned.copy())[place, 4:] *= more  # energy at the first sample of the second half, or before it
-        assert one_pass(near, times, bent, momenta)[0] == word
-    assert one_pass(near, times, turned, momenta - np.array([2e-3, 0.0]))[0] == "wrong_regime"
+    assert one_pass(case, times, turned, momenta)[0] == "bounded_but_wrong"
+    for place, factor, word in ((SAMPLES // 2, 1.5, "drifting"), (SAMPLES // 2 - 1, 1.5, "bounded_but_wrong"),
+                                (SAMPLES // 2, 1.0001, "wrong"), (SAMPLES // 2 - 1, 1.0001, "bounded_but_wrong"),
+                                (SAMPLES // 2, 1.0 + 1e-14, "bounded_but_wrong")):  # fmt: skip
+        (bent := turned.copy())[place, 4:] *= factor  # energy at the first sample of the second half, or before it
+        assert one_pass(case, times, bent, momenta)[0] == word
+    assert one_pass(case, times, turned, momenta - np.array([2e-3, 0.0]))[0] == "wrong_regime"

@@ -16,7 +16,7 @@ from symtop.measure import datasets
 from symtop.methods.framework.angles import accelerations, momenta
 from symtop.methods.lagrangian.discrete_lagrangian import RULES
 from symtop.run.modified_energy import modified_energy
-from tests.templates import checked
+from tests.templates import checked_page
 
 FIRST = symtop.scene("spheroid").top
 NUMBERS = (FIRST.I1, FIRST.I3, FIRST.mgl)
@@ -122,9 +122,9 @@ def test_the_hard_way_and_the_easy_way_agree(name):
         assert easy[3] == pytest.approx(hard[4], rel=1e-11, abs=1e-11)  # round-off of terms in 1/sin^3
         kernel = accelerations(top.I1, top.I3, top.mgl, theta, theta_dot, phi_dot, psi_dot)
         assert hard[[4, 3, 5]] == pytest.approx(kernel, rel=1e-11, abs=1e-10)
-    both = both_derivations(scene)
-    assert float(both["ways_gap"].max()) < 1e-10
-    assert float(both["hard_gap"].max()) < 1e-10
+    gaps = both_derivations(scene)
+    assert float(gaps["ways_gap"].max()) < 1e-10
+    assert float(gaps["hard_gap"].max()) < 1e-10
 
 
 def test_radii_give_the_inertia_and_alpha_contradicts_a_release_at_rest():
@@ -164,19 +164,19 @@ def test_the_lagrangian_is_the_same_in_three_forms_and_another_modified_energy_i
     run = symtop.simulate(scene, "midpoint", step_size=0.01, guard=False)
     states, h = np.stack([run["theta"].values, run["p_theta"].values], axis=1), run.attrs["step_size"]
     names = "midpoint", "stormer-verlet"
-    its_own, other = (np.ptp(modified_energy(scene, name, "angles", states, h)) for name in names)
-    assert its_own < 0.02 * np.ptp(run["energy"].values) < other
+    midpoint, verlet = (np.ptp(modified_energy(scene, name, "angles", states, h)) for name in names)
+    assert midpoint < 0.02 * np.ptp(run["energy"].values) < verlet
 
 
 @pytest.fixture(scope="module")
 def data():
     """The quick grid, with shorter long runs."""
-    asked = [symtop.Case(case.scene, case.integrator, case.settings | {"long": 100.0}) for case in cases(True)]
-    return datasets.combine([(case, measure(case)) for case in asked])
+    grid = [symtop.Case(case.scene, case.integrator, case.settings | {"long": 100.0}) for case in cases(True)]
+    return datasets.combine([(case, measure(case)) for case in grid])
 
 
 def test_the_page_says_what_the_notebook_and_the_discrete_methods_keep(data, tmp_path):
-    checked("notebook", data, tmp_path)
+    checked_page("notebook", data, tmp_path)
     answers = facts.facts(data)
     assert (answers["compared"], answers["discrete"], answers["momenta_kept"]) == (5, 5, 5)
     assert answers["momenta"] < 1e-14
@@ -194,12 +194,12 @@ def test_the_page_says_what_the_notebook_and_the_discrete_methods_keep(data, tmp
 
 @pytest.mark.parametrize("name", ["midpoint[angles]", "strang[axis]", SOLVER])
 def test_one_method_alone_has_the_facts_and_figures_that_are_its_own(data, name, tmp_path):
-    alone = data.sel(variant=[name])
-    answers = facts.facts(alone)
+    part = data.sel(variant=[name])
+    answers = facts.facts(part)
     assert answers.keys() == facts.facts(data).keys()
     assert (answers["momenta"] is None) is (answers["ways"] is not None) is (name == SOLVER)
-    assert [one.name for one in STUDY.pictures(alone)] == ["energy", "modified-energy"][: 1 + (name[0] == "m")]
-    assert len(facts.tables(alone)["kept"]) == 2
+    assert [picture.name for picture in STUDY.pictures(part)] == ["energy", "modified-energy"][: 1 + (name[0] == "m")]
+    assert len(facts.tables(part)["kept"]) == 2
 
 
 def long_runs(level, slope):
@@ -215,16 +215,16 @@ def long_runs(level, slope):
 
 
 def test_momenta_beside_the_solvers_are_those_compared_and_the_notebooks_question_is_answered(data):
-    other = data.sel(variant=["cayley[axis]"]).assign_coords(variant=["five-rotations[attitude]"])
-    answers = facts.facts(xr.concat([data, other.assign(p_psi_largest=other["p_psi_largest"] + 1e-3)], "variant"))
+    part = data.sel(variant=["cayley[axis]"]).assign_coords(variant=["five-rotations[attitude]"])
+    answers = facts.facts(xr.concat([data, part.assign(p_psi_largest=part["p_psi_largest"] + 1e-3)], "variant"))
     assert (answers["compared"], answers["discrete"], answers["momenta_kept"]) == (6, 6, 5)  # all of order two
     assert answers["momenta"] == facts.facts(data)["momenta"]
     assert facts.facts(data.assign(p_psi_largest=data["p_psi_largest"] + 1e-3))["momenta"] > 9e-4  # the control
-    late = long_runs(3e-5, 1e-7)
-    time = late["long_time"].values[0, 0]
-    assert better_from(late, "spheroid", "midpoint[angles]") == time[time > 300.0][0]
-    late["long_energy"][0, 0, -1] = math.nan  # a run that has ended is no better
-    assert better_from(late, "spheroid", "midpoint[angles]") == math.inf
+    runs = long_runs(3e-5, 1e-7)
+    time = runs["long_time"].values[0, 0]
+    assert better_from(runs, "spheroid", "midpoint[angles]") == time[time > 300.0][0]
+    runs["long_energy"][0, 0, -1] = math.nan  # a run that has ended is no better
+    assert better_from(runs, "spheroid", "midpoint[angles]") == math.inf
     never, always = long_runs(3e-5, 1e-9), long_runs(1e-9, 1e-7)
     assert better_from(never, "spheroid", "midpoint[angles]") == math.inf
     assert better_from(always, "spheroid", "midpoint[angles]") == 0.0

@@ -20,7 +20,7 @@ from symtop.methods.lagrangian.damped_oscillator import ONE_SIDED, Oscillator, d
 from symtop.methods.lagrangian.damped_top import Friction, damped_run, four_equations
 from symtop.methods.library.scipy_ivp import integrated
 from symtop.runner.study import Case
-from tests.templates import checked
+from tests.templates import checked_page
 
 
 def step_matrix(oscillator, rule, h):
@@ -50,8 +50,8 @@ def test_the_exact_motion_is_the_matrix_exponential(damping):
     ("midpoint", STEPS, 2.0, 0.02), ("trapezoidal", STEPS, 2.0, 0.02), (ONE_SIDED, STEPS[4:], 1.0, 0.05)])  # fmt: skip
 def test_rules_have_order_two_and_the_whole_force_at_one_end_costs_one(damping, method, steps, order, band):
     table = convergence(Oscillator(damping=damping), method, steps, 25.0)
-    known = order if damping else 2.0  # without friction there is no force
-    assert power_law(table["step_size"], table["position_error"]).slope == pytest.approx(known, abs=band)
+    expected = order if damping else 2.0  # without friction there is no force
+    assert power_law(table["step_size"], table["position_error"]).slope == pytest.approx(expected, abs=band)
 
 
 @pytest.mark.parametrize("rule", [
@@ -65,11 +65,11 @@ def test_the_exponents_are_those_of_the_step_matrix(rule):
         assert eigenvalues.prod() == pytest.approx(np.linalg.det(matrix), abs=1e-13)
     four = Oscillator(damping=4.0)  # whose slow motion is exp(-0.268 t)
     slow = math.log(max(np.linalg.eigvals(step_matrix(four, RULES["midpoint"], 0.1)))) / 0.1
-    one, measured = Oscillator(damping=1.0), convergence(four, "midpoint", [0.1], 25.0)
-    assert float(measured["exponent_error"][0]) == pytest.approx(slow / (math.sqrt(3.0) - 2.0) - 1.0, rel=1e-6)
-    times, position, _ = discrete_path(one, RULES["trapezoidal"], 1.0, 0.0, 25.0, 250)
-    off, other = position - one.exact(times, 1.0, 0.0)[0], convergence(one, "trapezoidal", [0.1], 25.0)
-    assert 1.01 * off.max() < float(other["position_error"][0]) == pytest.approx(-off.min())
+    unit, table = Oscillator(damping=1.0), convergence(four, "midpoint", [0.1], 25.0)
+    assert float(table["exponent_error"][0]) == pytest.approx(slow / (math.sqrt(3.0) - 2.0) - 1.0, rel=1e-6)
+    times, position, _ = discrete_path(unit, RULES["trapezoidal"], 1.0, 0.0, 25.0, 250)
+    gap, data = position - unit.exact(times, 1.0, 0.0)[0], convergence(unit, "trapezoidal", [0.1], 25.0)
+    assert 1.01 * gap.max() < float(data["position_error"][0]) == pytest.approx(-gap.min())
 
 
 def test_undamped_steps_are_symplectic_and_only_midpoint_leaves_critical_damping_in_place():
@@ -92,19 +92,19 @@ def test_the_notebooks_update_is_the_midpoint_rule_its_guess_is_not_and_a_wrong_
         assert float(data["update_gap"].max()) < 5e-16 * (25.0 / h) ** 1.5
         gap = float(np.abs(data["seed_guess"] - data["seed_update"]).max())
         assert gap < 1e-12 if damping == 0.0 else gap > 0.5 * damping
-    late = notebook_history(Oscillator(damping=1.0), 0.1, 25.0)["seed_guess"].values[-70:]
-    assert late.mean() == pytest.approx(1.0, abs=0.1)  # about x = b
-    assert np.ptp(late) > 0.9  # and no smaller than at the start
+    tail = notebook_history(Oscillator(damping=1.0), 0.1, 25.0)["seed_guess"].values[-70:]
+    assert tail.mean() == pytest.approx(1.0, abs=0.1)  # about x = b
+    assert np.ptp(tail) > 0.9  # and no smaller than at the start
     _, position, _ = discrete_path(Oscillator(damping=0.5), RULES["midpoint"], 1.0, 0.0, 25.0, 250, 251)
-    good, bad = (damped_oscillator.notebook_positions(b, 0.1, *position[:2], 250)[0] for b in (0.5, 0.5 + 1e-6))
-    assert np.max(np.abs(good - position)) < 1e-12
-    assert np.max(np.abs(bad - position)) > 1e-8
+    exact, control = (damped_oscillator.notebook_positions(b, 0.1, *position[:2], 250)[0] for b in (0.5, 0.5 + 1e-6))
+    assert np.max(np.abs(exact - position)) < 1e-12
+    assert np.max(np.abs(control - position)) > 1e-8
 
 
 def test_the_midpoint_rule_conserves_the_undamped_energy_the_trapezoidal_bounds_it_and_rk45_drifts():
     free = Oscillator()
-    kept, error = (np.abs(decay(free, rule, 0.1, 1e4)["energy_error"]) for rule in ("midpoint", "trapezoidal"))
-    assert kept.max() < 1e-11  # a quadratic invariant is kept
+    drift, error = (np.abs(decay(free, rule, 0.1, 1e4)["energy_error"]) for rule in ("midpoint", "trapezoidal"))
+    assert drift.max() < 1e-11  # a quadratic invariant is kept
     assert 1e-3 < error.max() < 3e-3  # bounded by h^2/4
     assert error[error.size // 2 :].max() < 1.01 * error[: error.size // 2].max()
     rk45 = decay(free, "rk45", 0.05, 250.0)
@@ -120,9 +120,9 @@ FRICTION = Friction(0.05, 0.1)
 
 def _run(name, friction, rule, steps, horizon):
     scene, marks = symtop.scene(name), np.arange(steps + 1, dtype=np.int64)
-    done = damped_run(scene, friction, rule, horizon / steps, marks)
-    assert done.outcome == 0
-    return scene, done.states
+    result = damped_run(scene, friction, rule, horizon / steps, marks)
+    assert result.outcome == 0
+    return scene, result.states
 
 
 @pytest.mark.parametrize("rule", RULES)
@@ -130,8 +130,8 @@ def _run(name, friction, rule, steps, horizon):
 def test_each_step_changes_the_momenta_by_exactly_the_discrete_forces(name, rule):
     for step in (2000, 200):  # an identity of the method, whatever the step
         _, states = _run(name, FRICTION, rule, step, 8.0)
-        change, turned = np.diff(states[:, 4:], axis=0), np.diff(states[:, 1:3], axis=0)
-        assert np.max(np.abs(change + np.array(FRICTION) * turned)) < 1e-13
+        change, angles = np.diff(states[:, 4:], axis=0), np.diff(states[:, 1:3], axis=0)
+        assert np.max(np.abs(change + np.array(FRICTION) * angles)) < 1e-13
         assert np.max(np.abs(change)) > 1e-4  # and the forces are not nothing
         total = states[:, 4:] - states[0, 4:] + np.array(FRICTION) * (states[:, 1:3] - states[0, 1:3])
         assert np.max(np.abs(total)) < 2e-12
@@ -165,14 +165,14 @@ def test_the_power_of_the_friction_is_what_the_energy_loses_and_without_it_the_k
 @pytest.fixture(scope="module")
 def data():
     """The quick grid with fewer steps."""
-    fewer = {"steps": [10.0 ** (-k / 2.0) for k in range(2, 6)], "counts": [4000, 8000, 16000], "long_step": 0.25}
-    asked = [Case(case.scene, case.integrator, case.settings | ({"periods": 3.0} if case.scene in QUARTICS else fewer))
+    grid = {"steps": [10.0 ** (-k / 2.0) for k in range(2, 6)], "counts": [4000, 8000, 16000], "long_step": 0.25}
+    cases = [Case(case.scene, case.integrator, case.settings | ({"periods": 3.0} if case.scene in QUARTICS else grid))
              for case in study.cases(True)]  # fmt: skip
-    return datasets.combine([(case, study.measure(case)) for case in asked])
+    return datasets.combine([(case, study.measure(case)) for case in cases])
 
 
 def test_the_page_says_what_friction_does_and_what_is_exact(data, tmp_path):
-    checked("oscillators", data, tmp_path)
+    checked_page("oscillators", data, tmp_path)
     answers = facts.facts(data)
     assert None not in answers.values()
     assert (answers["order_least"], answers["order_most"]) == pytest.approx((2.0, 2.0), abs=0.05)
@@ -184,21 +184,21 @@ def test_the_page_says_what_friction_does_and_what_is_exact(data, tmp_path):
     assert answers["damped_midpoint"] > 1e-3
     assert max(answers["exact"], answers["update_gap"]) < 1e-11
     assert (answers["top_order_least"], answers["map_order_least"]) == pytest.approx((2.0, 2.0), abs=0.05)
-    turned = data.assign(energy_error=-data["energy_error"], balance_psi=data["balance_psi"] + 1e-3)
-    turned["quartic_error"].loc[{"scene": QUARTICS[1]}] += 1e-3
-    other = facts.facts(turned)
-    assert (other["damped_midpoint"], other["undamped_rk45"]) == (answers["damped_midpoint"], answers["undamped_rk45"])
-    assert (other["balance"], other["exact"]) == pytest.approx((1e-3, 1e-3), rel=1e-6)
+    variant = data.assign(energy_error=-data["energy_error"], balance_psi=data["balance_psi"] + 1e-3)
+    variant["quartic_error"].loc[{"scene": QUARTICS[1]}] += 1e-3
+    after = facts.facts(variant)
+    assert (after["damped_midpoint"], after["undamped_rk45"]) == (answers["damped_midpoint"], answers["undamped_rk45"])
+    assert (after["balance"], after["exact"]) == pytest.approx((1e-3, 1e-3), rel=1e-6)
     step = 0.1 / 2.0 ** np.arange(8.0)  # errors at rounding have no part in an order
     columns = {"step_size": step, "position_error": np.maximum(1e-4 * step**2, 5e-10), STEP: step,
                ERROR: np.maximum(1e-8 * step**2, 5e-14)}  # fmt: skip
-    one = xr.Dataset({name: (("scene", "variant", "k"), row[None, None]) for name, row in columns.items()})
-    one = one.assign_coords(scene=["a"], variant=["b"])
-    fits = order(one, "a", "b", "position_error"), quartic_order(one, "a", "b")
+    table = xr.Dataset({name: (("scene", "variant", "k"), row[None, None]) for name, row in columns.items()})
+    table = table.assign_coords(scene=["a"], variant=["b"])
+    fits = order(table, "a", "b", "position_error"), quartic_order(table, "a", "b")
     assert [fit.slope for fit in fits] == pytest.approx([2.0, 2.0])
 
 
-@pytest.mark.parametrize(("name", "drawn"), [("midpoint", 2), ("rk45", 0), ("exact-discrete", 1)])
-def test_one_method_alone_has_the_facts_and_figures_that_are_its_own(data, name, drawn):
+@pytest.mark.parametrize(("name", "count"), [("midpoint", 2), ("rk45", 0), ("exact-discrete", 1)])
+def test_one_method_alone_has_the_facts_and_figures_that_are_its_own(data, name, count):
     assert facts.facts(data.sel(variant=[name])).keys() == facts.facts(data).keys()
-    assert len(figures.pictures(data.sel(variant=[name]))) == drawn
+    assert len(figures.pictures(data.sel(variant=[name]))) == count

@@ -5,7 +5,7 @@ import pytest
 from symtop_studies.pitfalls import study
 
 from symtop.measure import datasets
-from tests.templates import checked
+from tests.templates import checked_page
 
 
 def test_the_pitfalls_are_there_and_the_page_says_what_was_measured(tmp_path):
@@ -20,8 +20,8 @@ def test_the_pitfalls_are_there_and_the_page_says_what_was_measured(tmp_path):
     assert answers["falling"] > 0.5
     assert answers["ended"] < 1.0
     assert (answers["bad_warned"], answers["good_warned"]) == (answers["bad"], 0)
-    through = study.run_of(data, study.POLE, study.AXIS).isel(setting=0)
-    assert float(through["axis"].max()) < 1e-3
-    assert float(through["time"].max()) == pytest.approx(2.0)
-    assert (np.isfinite(through["axis"]) == np.isfinite(through["time"])).all()  # the rest is padding
-    assert "left_chart" in checked("pitfalls", data, tmp_path, elsewhere={"three"})
+    run = study.run_of(data, study.POLE, study.AXIS).isel(setting=0)
+    assert float(run["axis"].max()) < 1e-3
+    assert float(run["time"].max()) == pytest.approx(2.0)
+    assert (np.isfinite(run["axis"]) == np.isfinite(run["time"])).all()  # the rest is padding
+    assert "left_chart" in checked_page("pitfalls", data, tmp_path, elsewhere={"three"})

@@ -42,8 +42,8 @@ def test_the_midpoint_rule_and_stormer_verlet_solve_their_equations(name):
     h = oscillator.period / 20.0
     paths = {method: discrete_path(oscillator, method, h, 30) for method in ("midpoint", "stormer-verlet")}
     for method, x in paths.items():
-        middle, here = (oscillator.slope(np.abs(y) ** 2) * y for y in (0.5 * (x[1:] + x[:-1]), x[1:-1]))
-        forces = {"midpoint": 0.5 * (middle[1:] + middle[:-1]), "stormer-verlet": here}
+        middle, inner = (oscillator.slope(np.abs(y) ** 2) * y for y in (0.5 * (x[1:] + x[:-1]), x[1:-1]))
+        forces = {"midpoint": 0.5 * (middle[1:] + middle[:-1]), "stormer-verlet": inner}
         gaps = {rule: np.abs(np.diff(x, 2) - h * h * force).max() for rule, force in forces.items()}
         assert gaps.pop(method) < 2e-14 * np.abs(x).max()
         assert max(gaps.values()) > 1e-6
@@ -55,14 +55,14 @@ def test_the_motion_solves_the_discrete_euler_lagrange_equations(name, steps):
     oscillator = oscillator_of(name)
     h = oscillator.period / steps
     rule = exact(oscillator, h)
-    turned = true_path(oscillator, h * np.arange(6)) * np.exp(-1j * rule.delta * np.arange(6))
-    points, wrong = np.stack([turned.real, turned.imag], axis=1), rule._replace(lift=rule.lift + 1e-6)
-    for before, here, after in zip(points, points[1:], points[2:], strict=False):
-        arrives = slopes(discrete_lagrangian, rule, before, here)[1]
-        assert np.abs(arrives + slopes(discrete_lagrangian, rule, here, after)[0]).max() < 2e-14 * rule.r
-        assert here[0] * arrives[1] - here[1] * arrives[0] == pytest.approx(oscillator.momentum, abs=1e-13)
-        off = slopes(discrete_lagrangian, wrong, before, here)[1] + slopes(discrete_lagrangian, wrong, here, after)[0]
-        assert np.abs(off).max() > 1e-8 * rule.r
+    motion = true_path(oscillator, h * np.arange(6)) * np.exp(-1j * rule.delta * np.arange(6))
+    points, wrong = np.stack([motion.real, motion.imag], axis=1), rule._replace(lift=rule.lift + 1e-6)
+    for before, now, after in zip(points, points[1:], points[2:], strict=False):
+        arrives = slopes(discrete_lagrangian, rule, before, now)[1]
+        assert np.abs(arrives + slopes(discrete_lagrangian, rule, now, after)[0]).max() < 2e-14 * rule.r
+        assert now[0] * arrives[1] - now[1] * arrives[0] == pytest.approx(oscillator.momentum, abs=1e-13)
+        gap = slopes(discrete_lagrangian, wrong, before, now)[1] + slopes(discrete_lagrangian, wrong, now, after)[0]
+        assert np.abs(gap).max() > 1e-8 * rule.r
 
 
 def test_without_the_quartic_term_it_is_the_exact_discrete_lagrangian_of_the_textbooks():
@@ -93,24 +93,24 @@ def test_the_truth_is_the_closed_form_and_any_planar_oscillator_has_its_own_func
     axis = closed_form(scene).axis(times)
     assert np.abs(np.abs(first) ** 2 - np.abs(second) ** 2 - axis[:, 2]).max() < 1e-14
     assert np.abs(2.0 * np.conj(first) * second - (axis[:, 0] + 1j * axis[:, 1])).max() < 1e-14
-    off = oscillators[0]._replace(b=1.0001 * oscillators[0].b)
-    assert np.abs(np.abs(true_path(off, times)) ** 2 - np.abs(first) ** 2).max() > 1e-5
+    control = oscillators[0]._replace(b=1.0001 * oscillators[0].b)
+    assert np.abs(np.abs(true_path(control, times)) ** 2 - np.abs(first) ** 2).max() > 1e-5
     oscillator = Quartic(-0.7, 0.4, 0.9 + 0.1j, 0.2 + 0.6j)  # a potential with a hump in the middle
     assert 1.0 + exact(oscillator, 0.5 * oscillator.period).lift == pytest.approx(0.0, abs=1e-7)
-    here, later = np.abs(true_path(oscillator, oscillator.period * np.array([0.3, 1.3])))
-    assert here == pytest.approx(later, abs=1e-14)
+    first, second = np.abs(true_path(oscillator, oscillator.period * np.array([0.3, 1.3])))
+    assert first == pytest.approx(second, abs=1e-14)
 
 
 def test_mcmillans_map_keeps_a_biquadratic_and_a_map_that_leaves_ends():
     """x0^2 + x1^2 - 2 A x0.x1 + B |x0|^2 |x1|^2 of the radial map, at a step that is not small."""
     oscillator = oscillator_of("planar-hardening")
     h = oscillator.period / 6.0
-    for method, kept in (("mcmillan", True), ("stormer-verlet", False)):
+    for method, keeps in (("mcmillan", True), ("stormer-verlet", False)):
         rule, path = mcmillan(oscillator, h), discrete_path(oscillator, method, h, 500)
         first, second = path[:-1], path[1:]
         s0, s1 = np.abs(first) ** 2, np.abs(second) ** 2
         invariant = s0 + s1 - 2.0 * (1.0 + rule.lift) * (np.conj(first) * second).real + rule.B * s0 * s1
-        assert (np.ptp(invariant) < 1e-12) == kept
+        assert (np.ptp(invariant) < 1e-12) == keeps
     path = discrete_path(oscillator, "stormer-verlet", oscillator.period / 2.1, 200)
     assert np.isnan(path[-1])
     assert np.isfinite(path[:3]).all()
@@ -118,6 +118,6 @@ def test_mcmillans_map_keeps_a_biquadratic_and_a_map_that_leaves_ends():
     assert float(table["quartic_error"].max()) < 1e-14
     assert quartic.Map(0.0, 0.0, 1.0, 0.0).kick(3.0) == 0.0
     oscillator, h = PLAIN["planar-softening"], PLAIN["planar-softening"].period / 40.0
-    off = discrete_path(oscillator, "midpoint", h, 40) - (true := true_path(oscillator, h * np.arange(41)))
+    gap = discrete_path(oscillator, "midpoint", h, 40) - (true := true_path(oscillator, h * np.arange(41)))
     table = quartic_table("planar-softening", "midpoint", (40.0,), 1.0)
-    assert table["quartic_error"][0] == pytest.approx(np.abs(off).max() / np.abs(true).max())
+    assert table["quartic_error"][0] == pytest.approx(np.abs(gap).max() / np.abs(true).max())

@@ -29,18 +29,18 @@ def without_a_chart(data: xr.Dataset) -> list[str]:
 
 @pytest.mark.parametrize("study", STUDIES)
 def test_every_stored_dataset_says_in_which_chart_a_method_ran(study, quick_results):
-    stored = netcdf.groups(netcdf.read_any(quick_results / f"{study}.nc"))
-    groups = [group for group in stored.values() if group.variables]
+    tree = netcdf.groups(netcdf.read_any(quick_results / f"{study}.nc"))
+    groups = [group for group in tree.values() if group.variables]
     assert groups
     assert [name for group in groups for name in without_a_chart(group)] == []
 
 
-@pytest.mark.parametrize(("names", "found"), [
+@pytest.mark.parametrize(("names", "expected"), [
     (["rk4", "midpoint"], ["rk4"]), (["rk4[axis]", "strang"], ["strang"]), (["rk4[axis]", "exact"], []),
 ])  # fmt: skip
-def test_a_name_that_leaves_the_chart_open_is_found(names, found):
+def test_a_name_that_leaves_the_chart_open_is_found(names, expected):
     data = xr.Dataset({"axis": ("variant", np.zeros(len(names)))}, coords={"variant": names})
-    assert without_a_chart(data) == found
+    assert without_a_chart(data) == expected
     assert without_a_chart(data.assign_coords(chart=["angles"])) == []
 
 
@@ -52,34 +52,34 @@ def test_the_rows_of_a_grid_are_every_method_and_no_chart_that_repeats_another()
 
 
 def test_an_answer_is_computed_once_for_each_object_and_question():
-    asked = []
+    calls = []
 
     @of_one_dataset
     def total(data, name, *, times=1):
-        asked.append((name, times))
+        calls.append((name, times))
         return times * float(data[name].sum())
 
     first, twin = (xr.Dataset({"a": ("x", [1.0, 2.0]), "b": ("x", [3.0, 4.0])}) for _ in range(2))
     assert [total(first, "a"), total(first, "a"), total(first, "a", times=2), total(first, "b")] == [3.0, 3.0, 6.0, 7.0]
-    assert asked == [("a", 1), ("a", 2), ("b", 1)]
+    assert calls == [("a", 1), ("a", 2), ("b", 1)]
     assert total(twin, "a") == 3.0  # equal, but another object
-    assert (total(first, "a"), len(asked)) == (3.0, 5)
+    assert (total(first, "a"), len(calls)) == (3.0, 5)
 
 
 def test_what_is_remembered_is_no_part_of_a_fingerprint():
-    seen = {}
+    store = {}
 
     @of_one_dataset
     def size(data):
-        return seen.setdefault("size", len(data))
+        return store.setdefault("size", len(data))
 
     def made_of():
         return digest(Code().reasons("measure", size))
 
     before = made_of()
-    seen["other"] = 1  # the control: this a function closes over
+    store["other"] = 1  # the control: this a function closes over
     assert made_of() != before
-    del seen["other"]
+    del store["other"]
     assert size({"a": 1}) == 1
-    del seen["size"]
+    del store["size"]
     assert made_of() == before

@@ -9,15 +9,15 @@ from symtop_studies.speed import facts, study
 
 import symtop
 from symtop.measure import datasets
-from tests.templates import checked
+from tests.templates import checked_page
 
 
 @pytest.fixture(scope="module")
 def data():
     """A few methods on one scene at five settings each."""
-    asked = {"lengths": (10.0,), "settings": 5}
+    settings = {"lengths": (10.0,), "settings": 5}
     names = ("exact", "rk4[axis]", "rk4[attitude]", "strang[axis]", "stormer-verlet[angles]", "taylor[axis]")
-    runs = [(case, study.measure(case)) for case in (symtop.Case("goldstein", name, asked) for name in names)]
+    runs = [(case, study.measure(case)) for case in (symtop.Case("goldstein", name, settings) for name in names)]
     return datasets.combine(runs + [(case, study.measure(case)) for case in study.follow_up(datasets.combine(runs))])
 
 
@@ -35,12 +35,12 @@ def test_a_cost_lies_between_the_runs_and_one_of_the_coarsest_setting_is_an_uppe
 
 def test_the_fastest_on_f_alone_is_named_and_others_are_told_over_it(data, monkeypatch):
     names = "takahashi-imada", "rk4", "rk45-compiled", "dop853-compiled", "rk45"
-    taken = dict(zip([f"{name}[axis]" for name in names], (1e-6, 2e-6, 4e-6, 6e-6, 8e-4), strict=True))
-    monkeypatch.setattr(facts, "costs", lambda _, to: {1e-9: taken, 1e-6: taken | {"rk45[axis]": 4e-4}}.get(to, {}))
+    times = dict(zip([f"{name}[axis]" for name in names], (1e-6, 2e-6, 4e-6, 6e-6, 8e-4), strict=True))
+    monkeypatch.setattr(facts, "costs", lambda _, to: {1e-9: times, 1e-6: times | {"rk45[axis]": 4e-4}}.get(to, {}))
     for spread, scipy in ((0.0, pytest.approx(100.0)), (1.0, None)):  # at 1e-6, others at 1e-9; not on a busy machine
-        one = facts.facts(data.assign(seconds_spread=spread + 0.0 * data["seconds"]))
-        told = [one[name] for name in ("fastest_9", "fastest_9_seconds", "beside", "scipy", "variants")]
-        assert told == ["rk4[axis]", 2e-6, pytest.approx(3.0), scipy, 5]  # without the exact motion
+        answers = facts.facts(data.assign(seconds_spread=spread + 0.0 * data["seconds"]))
+        values = [answers[name] for name in ("fastest_9", "fastest_9_seconds", "beside", "scipy", "variants")]
+        assert values == ["rk4[axis]", 2e-6, pytest.approx(3.0), scipy, 5]  # without the exact motion
 
 
 def test_a_run_is_that_of_its_setting_and_the_page_says_what_was_measured(data, tmp_path):
@@ -50,13 +50,13 @@ def test_a_run_is_that_of_its_setting_and_the_page_says_what_was_measured(data, 
     assert float(symtop.errors(run)["axis"].max()) == pytest.approx(float(cell["axis"][2]), rel=0.05)
     assert np.isfinite(cell["seconds"]).all()
     attitude = facts.shown(data).sel(variant="rk4[attitude]")
-    ended = symtop.simulate(scene, "rk4[attitude]", step_size=float(attitude["step_size"][0]),
-                            horizon=10.0 * scene.nutation_period, guard=False).attrs["outcome"]  # fmt: skip
-    assert ended == "not_normalised"  # so long a step loses the quaternion's length, and is neither judged nor timed
+    outcome = symtop.simulate(scene, "rk4[attitude]", step_size=float(attitude["step_size"][0]),
+                              horizon=10.0 * scene.nutation_period, guard=False).attrs["outcome"]  # fmt: skip
+    assert outcome == "not_normalised"  # so long a step loses the quaternion's length, and is neither judged nor timed
     assert not np.isfinite(attitude[["attitude", "seconds"]].isel(setting=0).to_array()).any()
     assert np.isfinite(attitude[["attitude", "seconds"]].isel(setting=slice(1, None)).to_array()).all()
     assert not np.isfinite(facts.shown(data)["axis"].sel(variant="rk4[attitude]")).any()
-    assert "`takahashi" not in checked("speed", data, tmp_path, elsewhere={"error-against-time"})
+    assert "`takahashi" not in checked_page("speed", data, tmp_path, elsewhere={"error-against-time"})
     assert facts.facts(data)["scipy"] is None
 
 

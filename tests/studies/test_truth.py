@@ -7,7 +7,7 @@ from symtop_studies.truth.measures import BOUND, ERROR, bound_ratios
 
 from symtop.measure import datasets
 from symtop.runner.study import Case
-from tests.templates import checked
+from tests.templates import checked_page
 
 
 def test_facts_and_page_follow_from_the_errors_and_a_broken_bound_is_counted(tmp_path):
@@ -20,11 +20,11 @@ def test_facts_and_page_follow_from_the_errors_and_a_broken_bound_is_counted(tmp
     assert answers["quadruple"] is None
     worse = data.assign({ERROR: data[ERROR].where(data["horizon"] < 10.0, 2.0 * data[BOUND])})
     assert facts.facts(worse)["bounds_held"] == 2
-    late = data.assign({ERROR: data[ERROR].where(data["horizon"] < 10.0, 0.5 * data[ERROR].min())})
-    assert facts.facts(late)["integrated_after"] == 8.0  # the worst is not the last
+    variant = data.assign({ERROR: data[ERROR].where(data["horizon"] < 10.0, 0.5 * data[ERROR].min())})
+    assert facts.facts(variant)["integrated_after"] == 8.0  # the worst is not the last
     assert answers["printed_met"] <= answers["printed"] < answers["published"]
     ratios = xr.Dataset({ERROR: ("run", [1.0, 2.0, 4.0, np.nan]), BOUND: ("run", [2.0, 1.0, 40.0, 1.0])})
     assert bound_ratios(ratios) == (3, 1, 2.0)
     assert facts.tables(data)["sources"]["time (s)"].tolist() == [20.0, 20.0]  # each at its longest
-    assert "quadruple precision, which" not in checked("truth", data, tmp_path)  # there was none
+    assert "quadruple precision, which" not in checked_page("truth", data, tmp_path)  # there was none
     assert np.isfinite(facts.facts(data)["bound_ratio"])

@@ -57,8 +57,8 @@ def undeclared(study, looked_up):
         declared = case.integrators if study.uses is None else study.uses(case)
         looked_up.clear()
         study.measure(case)
-        if more := looked_up - {split_name(name)[0] for name in declared} - {REFERENCE}:
-            missing[case.label] = more
+        if names := looked_up - {split_name(name)[0] for name in declared} - {REFERENCE}:
+            missing[case.label] = names
     return missing
 
 
@@ -71,5 +71,5 @@ def test_a_study_declares_the_integrators_that_its_cases_run(name, looked_up):
 def test_a_lookup_that_is_not_declared_is_found(looked_up):
     study = scripts.load("convergence")
     case = dataclasses.replace(study.grid(quick=True)[0], settings={})
-    hidden = dataclasses.replace(study, cases=lambda _: [case], measure=lambda _: registry.integrator("rk4[axis]"))
-    assert undeclared(hidden, looked_up) == {case.label: {"rk4"}}
+    variant = dataclasses.replace(study, cases=lambda _: [case], measure=lambda _: registry.integrator("rk4[axis]"))
+    assert undeclared(variant, looked_up) == {case.label: {"rk4"}}
