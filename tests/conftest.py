@@ -102,7 +102,7 @@ clean_registry = pytest.fixture(_forgetting)  # of what one test registers
 @pytest.fixture
 def in_lanes(monkeypatch):
     """Ensembles of few steps, too, compile their kernels in lanes."""
-    monkeypatch.setattr(lanes, "FEW", -1)
+    monkeypatch.setattr(lanes, "FEW_STEPS", -1)
 
 
 @pytest.fixture(autouse=True)

@@ -159,7 +159,7 @@ def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_wi
 
 def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch):
     limit_candidates(monkeypatch, 5)
-    monkeypatch.setattr(settings, "SHORT", 12.37)  # trials end before the horizon
+    monkeypatch.setattr(settings, "TRIAL_NUTATIONS", 12.37)  # trials end before the horizon
     original, names = settings.search, []
 
     def search(scene, method, accuracy, quantity, horizon, *arguments, **limits):
@@ -198,7 +198,7 @@ def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it
     assert advice.confidence == "checked"
     assert advice.integrator not in menu
     assert {*names} - {"series[axis]"} == usable_names
-    monkeypatch.setattr(advise, "LESS", 10.0)
+    monkeypatch.setattr(advise, "LOWER_BUDGET", 10.0)
     fails = symtop.recommend(scene, accuracy=1e-11, horizon=30.0).fails
     assert any(sentence.startswith(settings.BUDGET) and "vern9-fixed[axis]" in sentence for sentence in fails)
 

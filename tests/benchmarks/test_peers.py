@@ -89,8 +89,7 @@ def test_the_axis_as_a_particle_has_the_acceleration_of_the_axis():
 def test_the_kernel_alone_ends_where_simulate_ends(name, setting):
     peer = peers.Peer(measure.OURS, symtop.integrator(name), own.LANGUAGE)
     call, loop = measure.ready(SPHEROID, peer, setting)
-    data = call()
-    dense = measure.shown_by(peer) == common.DENSE
+    data, dense = call(), measure.shown_by(peer) == common.DENSE
     assert data["time"].size == (measure.SHOWN if dense else min(data.attrs["steps"] + 1, measure.SHOWN))
     truth = symtop.reference(SPHEROID, data["time"].values[-1:])["axis"].values
     distance = float(common.charts.axis_distance(data["axis"].values[-1:], truth)[0])

@@ -270,7 +270,7 @@ def test_without_a_file_the_package_is_cited_and_a_method_without_a_known_source
 SLOW = """\
 import sys, time
 from symtop.core import progress
-progress.FIRST, progress.EVERY = 0.1, 0.15
+progress.FIRST_LINE, progress.NEXT_LINE = 0.1, 0.15
 with progress.showing_work("judge"):
     time.sleep(float(sys.argv[1]))
     with progress.showing_seconds("trying methods"):

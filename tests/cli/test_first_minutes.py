@@ -9,7 +9,7 @@ from terminal import record
 
 import symtop
 from symtop.core import netcdf, progress
-from symtop.measure.verdicts import ACCURATE
+from symtop.measure.verdicts import ACCURATE_ERROR
 from symtop.methods.framework.registry import split_name
 from symtop.run.guard import EXPECTED
 from tests.commands import call
@@ -54,7 +54,7 @@ def test_one_method_alone_takes_part_in_a_study_on_a_users_scene_too(tmp_path):
 
 
 def test_a_proposed_step_is_of_use_and_the_guard_warns_of_what_the_verdict_calls_wrong():
-    assert EXPECTED == ACCURATE
+    assert EXPECTED == ACCURATE_ERROR
     coarse = call("run", "spheroid", "midpoint", "--step-size", "0.01")
     assert "expect an axis error" in coarse.stderr
     assert "judged against the truth: bounded but wrong, the axis error passed 0.01 rad" in coarse.stdout
@@ -70,7 +70,7 @@ def test_a_proposed_step_is_of_use_and_the_guard_warns_of_what_the_verdict_calls
 
 def test_a_bar_is_drawn_again_while_nothing_is_finished(monkeypatch):
     refreshes = []
-    monkeypatch.setattr(progress, "BEAT", 0.01)
+    monkeypatch.setattr(progress, "REDRAW_SECONDS", 0.01)
     monkeypatch.setattr(progress, "is_terminal", lambda _: True)
     monkeypatch.setattr("tqdm.tqdm.refresh", lambda *_, **__: refreshes.append(1))
     with progress.progress_bar("a bar"):

@@ -37,7 +37,7 @@ def measure():
     return part() + STEPS[0]
 
 def part():
-    return math.sin(gauss.STILL)
+    return math.sin(gauss.STILL_COMPONENT)
 """
 
 
@@ -226,7 +226,7 @@ def test_the_cache_keeps_what_was_used_last(tmp_path):
         (folder := tmp_path / name).mkdir()
         (folder / "kernel.code").write_bytes(b"\0" * 1000)
         os.utime(folder, (time.time() - age * 2 * files.DAY,) * 2)
-    os.utime(tmp_path / "a", (time.time() - (files.UNUSED + 1) * files.DAY,) * 2)
+    os.utime(tmp_path / "a", (time.time() - (files.UNUSED_DAYS + 1) * files.DAY,) * 2)
     files.touch(tmp_path / "d")  # it was used last, now
     files.prune(tmp_path, 2500)
     assert sorted(path.name for path in tmp_path.iterdir()) == ["b", "d"]

@@ -144,7 +144,7 @@ def test_inner_functions_get_no_machine_code_and_kernels_the_same_bits(monkeypat
     rows, generated, generate = np.linspace(0.0, 3.0, 17), [], JITCodeLibrary._finalize_specific
     final, optimise = [], JITCodeLibrary._optimize_final_module
     expected = sum((tenth(x) for x in rows.tolist()), 0.1) + rows.sum()
-    jit.register_jitable(tenth, jit.OPTIONS | jit.WITHIN)
+    jit.register_jitable(tenth, jit.OPTIONS | jit.KERNEL_ONLY)
     monkeypatch.setattr(JITCodeLibrary, "_finalize_specific", lambda lib: (generated.append(lib.name), generate(lib)))
     monkeypatch.setattr(JITCodeLibrary, "_optimize_final_module", lambda lib: (final.append(lib.name), optimise(lib)))
     kernel.__code__ = kernel.__code__.replace(co_filename=f"<{way}>")  # no file, and so no cache on disk

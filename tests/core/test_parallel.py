@@ -8,7 +8,7 @@ from concurrent.futures import ProcessPoolExecutor
 
 import pytest
 
-from symtop.core.parallel import VARIABLES, OneThreadEach, StoppedError, heed, in_threads
+from symtop.core.parallel import VARIABLES, OneThreadEach, StoppedError, check_interrupt, in_threads
 
 
 @pytest.mark.parametrize("threads", [1, 2, 5])
@@ -56,7 +56,7 @@ def test_pieces_that_have_begun_heed_an_interrupt():
             raise KeyboardInterrupt
         try:
             while True:
-                heed()
+                check_interrupt()
                 time.sleep(0.001)
         except StoppedError:
             ended.set()
@@ -65,7 +65,7 @@ def test_pieces_that_have_begun_heed_an_interrupt():
     with pytest.raises(KeyboardInterrupt):
         list(in_threads(work, range(2), 2))
     assert ended.wait(5.0)
-    heed()  # nothing asks the caller's thread to stop
+    check_interrupt()  # nothing asks the caller's thread to stop
 
 
 def seen_by(context):

@@ -372,7 +372,7 @@ def test_the_first_chart_of_costs_is_there_at_once_its_lines_those_of_compare_ti
     assert first["missing"] > 0
     chart = costs(integrator="trapezoidal", second="strang", horizon=7.5)
     lines = {line["name"]: line for line in chart["lines"]}
-    assert {"trapezoidal", "strang", *cost.BESIDE} == {*lines}
+    assert {"trapezoidal", "strang", *cost.PEERS} == {*lines}
     data = symtop.compare(setups[0].scene, ["trapezoidal[angles]"], budget=3e5, quiet=True).isel(variant=0)
     errors = data["error"].values[np.isfinite(data["seconds"].values)]
     assert (lines["trapezoidal"]["error"], chart["missing"]) == (errors.tolist(), 0)
@@ -424,7 +424,7 @@ def test_a_run_is_answered_while_lines_are_measured(site, monkeypatch):
     start = time.monotonic()
     for step in (0.02, 0.03, 0.04):
         chart = json.loads(request(site, "POST", "/cost", json.dumps(fields(theta=0.42, step_size=step)), **JSON)[1])
-        assert chart["missing"] == len(cost.BESIDE) + 1
+        assert chart["missing"] == len(cost.PEERS) + 1
         assert chart["seconds"][0] > 0.0
     assert json.loads(request(site, "POST", "/run", json.dumps(fields()), **JSON)[1])["outcome"] == "ok"
     assert time.monotonic() - start < 20.0

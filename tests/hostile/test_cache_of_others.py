@@ -59,7 +59,7 @@ def test_what_is_made_is_the_users_alone_no_pickle_and_ours_to_run(planted):
     assert modes == {True: 0o700, False: 0o600}
     assert not [finding for finding in doctor._caches(root) if not finding.healthy]
     # Reading it runs nothing: a line of JSON, and bitcode or machine code.
-    head, _, bitcode = planted[1].read_bytes()[jit.HASH :].partition(b"\n")
+    head, _, bitcode = planted[1].read_bytes()[jit.HASH_BYTES :].partition(b"\n")
     assert json.loads(head)["returned"] == "float64"
     assert zlib.decompress(bitcode).startswith(b"BC\xc0\xde")
     assert compile_kernel(_doubled)(2.0) == 8.0  # the control: this is what is refused below

@@ -15,8 +15,9 @@ def one_seed(monkeypatch):
 def shorten(monkeypatch):
     """A quick judging takes an eighth of the time: shorter runs, fewer starts that are drawn."""
     for module, name, numbers in (
-        (subject, "LONG", (10.0, 0.5)), (subject, "SLOPES", (6.0, 0.2)), (subject, "TIMED", 0.005),
-        (calls, "LATE", calls.LATE | {True: (20_000, 0.15)}), (order, "DRAWS", (96, 4)), (structure, "DRAWS", (8, 1)),
+        (subject, "LONG_SECONDS", (10.0, 0.5)), (subject, "SLOPE_SECONDS", (6.0, 0.2)), (order, "DRAWS", (96, 4)),
+        (subject, "TIMED_SECONDS", 0.005), (calls, "LATE_RUNS", calls.LATE_RUNS | {True: (20_000, 0.15)}),
+        (structure, "DRAWS", (8, 1)),
     ):  # fmt: skip
         monkeypatch.setattr(module, name, numbers)
 

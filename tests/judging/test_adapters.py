@@ -188,7 +188,7 @@ for numbers in map(str.split, sys.stdin):
 def test_a_server_is_started_once_and_again_only_if_it_fails(tmp_path, body, words, starts, monkeypatch):
     silent = "had not" in words
     monkeypatch.setattr(heartbeat, "patience", 2.0 if silent else 0.0 if "licence" in words else 20.0)
-    monkeypatch.setattr(external, "STARTING", 0.0 if silent else 30.0)  # seconds, also of a second start
+    monkeypatch.setattr(external, "STARTING_SECONDS", 0.0 if silent else 30.0)  # seconds, also of a second start
     mark, file = tmp_path / "starts", tmp_path / "engine.py"
     file.write_text(SERVES.format(mark=str(mark), body=body))
     stepper = open_target(f"{sys.executable} {file}", "server", "axis")
@@ -298,8 +298,8 @@ def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, kee
 def test_what_a_run_that_blows_up_makes_of_the_last_bit_is_nothing_that_a_step_keeps(memory):
     scene, calls_made = symtop.scene("separatrix"), itertools.count()
     stepper = PythonStep(lambda f, t, y, h: midpoint(f, t, y, h) + memory * h * (next(calls_made) % 7), "axis")
-    missed, _ = calls._cut(stepper, scene, calls.SHARE * scene.time_scale() / 1.6, [(8, 30), (3, 4)])
-    assert (missed > calls.RECALLED) is (memory > 0.0)
+    missed, _ = calls._cut(stepper, scene, calls.STEP_SHARE * scene.time_scale() / 1.6, [(8, 30), (3, 4)])
+    assert (missed > calls.LATE_GAP) is (memory > 0.0)
 
 
 def in_single(step):
@@ -315,7 +315,7 @@ def test_single_precision_is_no_other_motion_and_one_of_a_step_in_it_is(scene, k
     assert symtop.judge(in_single(midpoint), order=2, **options)["order"].verdict == "confirmed"
     assert symtop.judge(in_single(midpoint), order=3, **options).refuted == ["order"]
     with pytest.MonkeyPatch.context() as patch:  # time for every step that single precision allows, on any machine
-        patch.setattr(subject, "SLOPES", (600.0, 600.0))
+        patch.setattr(subject, "SLOPE_SECONDS", (600.0, 600.0))
         added = lambda f, t, y, h: y + (in_single(rk4)(f, t, y, h) - np.float32(y)).astype(float)
         findings = [symtop.judge(step, order=4, **options)["order"] for step in (in_single(rk4), added)]
     words = "undecided: single precision hides errors below about 1e-04: "
@@ -560,7 +560,7 @@ def _lives(pid: int) -> bool:
 def test_a_step_that_slows_down_is_judged_on_shorter_runs_and_one_that_stops_says_why_once(keep_claims, monkeypatch):
     """A step takes 0.5 ms from t = 20 on, which its first ones do not tell; or 2.5 ms, always, after 1 s to open it."""
     keep_claims("energy", "p_phi", "p_psi")
-    monkeypatch.setattr(judge_step, "QUICK_VERDICT", (1.0, 2.5, 1.0))
+    monkeypatch.setattr(judge_step, "QUICK_VERDICT_SECONDS", (1.0, 2.5, 1.0))
 
     def slow_from(since, seconds):
         def step(f, t, y, h):

@@ -195,7 +195,7 @@ def test_a_small_defect_of_the_bracket_that_stands_out_of_its_noise_is_not_confi
 @pytest.mark.slow
 def test_a_step_that_tires_after_a_hundred_thousand_is_found_in_full(monkeypatch):
     """It is of order 4 as long as the order is measured; a run of as many steps, and the first call again, show it."""
-    monkeypatch.setitem(calls.LATE, False, (calls.LATE[False][0], 60.0))  # enough for as many on a slow machine
+    monkeypatch.setitem(calls.LATE_RUNS, False, (calls.LATE_RUNS[False][0], 60.0))  # enough on a slow machine
     wrong._steps[0] = -80_000
     assert "calls" in symtop.judge(wrong.tires, order=4).refuted
 

@@ -20,7 +20,7 @@ from symtop.judging.claims import constants, constants as long, order, structure
 from symtop.judging.claims.constants import long_run
 from symtop.judging.claims.step_series import Series
 from symtop.judging.claims.subject import Subject, seconds_a_step
-from symtop.judging.findings import VERDICTS, About, Finding, Ledger, Measured, as_time, description
+from symtop.judging.findings import VERDICTS, About, Finding, Ledger, Reading, as_time, description
 from symtop.judging.remote import Process, separated, solvers_of
 from symtop.measure.conservation import Change, behaviour
 from symtop.measure.order import Fit
@@ -139,11 +139,11 @@ def test_jumps_short_runs_and_noise_are_told_from_growth():
 def test_an_energy_that_leaves_its_scale_is_said_to_blow_up_and_the_rest_judged_until_then(keep_claims, monkeypatch):
     """Euler's method gains energy, and keeps p_phi; the implicit one loses all that it can, which is no blow-up."""
     keep_claims("energy", "p_phi")
-    monkeypatch.setattr("symtop.judging.claims.subject.LONG", (10.0, 60.0))  # time for its 39,288 steps on any machine
+    monkeypatch.setattr("symtop.judging.claims.subject.LONG_SECONDS", (10.0, 60.0))  # 39,288 steps on any machine
     ledger = symtop.judge(euler, quick=True, energy="bounded")
     assert [ledger[claim].measured.kind for claim in (*ledger.refuted, "p_phi")] == ["blows up", "kept"]
     assert 1.0 < ledger["energy"].value / (1.0 + 2.0 * SPHEROID.top.mgl / SPHEROID.energy_scale) < 2.0
-    monkeypatch.setattr("symtop.judging.claims.subject.LONG", (10.0, 2.5))
+    monkeypatch.setattr("symtop.judging.claims.subject.LONG_SECONDS", (10.0, 2.5))
     assert symtop.judge(implicit_euler, quick=True)["energy"].measured.kind in ("drift", "growing", "bounded")
     ledger = symtop.judge(lambda q, w, h, inertia, torque: (q, w + h * w), form="rotation", scene=HEAVY, quick=True)
     assert ledger["energy"].measured.kind == "blows up"
@@ -268,7 +268,7 @@ def test_a_slope_yields_to_the_terms_of_a_step_but_for_one_that_is_clearly_lower
 
 @pytest.mark.parametrize(("lengths", "verdict"), [((8.37, 40.0), "confirmed"), ((8.37,), "undecided")])
 def test_a_slope_that_decides_nothing_is_measured_over_a_longer_run(lengths, verdict, monkeypatch):
-    monkeypatch.setattr(order, "LONGER", lengths)  # over eight nutations it is 7.75 +- 0.17: errors meet rounding soon
+    monkeypatch.setattr(order, "LONGER_RUNS", lengths)  # 7.75 +- 0.17 over eight nutations: errors meet rounding
     fit = order.measured_order(integrator("dop853-compiled-fixed"), *random_scenes(1, seed=7)).main
     assert order.order_verdict(8, fit) == verdict
 
@@ -414,8 +414,8 @@ def test_no_right_method_is_refuted_beside_a_pole():
 def test_a_time_has_the_unit_that_suits_what_is_printed_and_a_least_order_is_said_to_be_one():
     assert [*map(as_time, (5.4321e-6, 999.4e-6, 999.7e-6, 0.0))] == ["5.43 us", "999 us", "1 ms", "0 ns"]
     for text, words in (("2 or more", "order 2 or more"), ("2: the h^3 term is off", "order 2"), ("", "order 2.4")):
-        assert description([Finding("order", "", Measured("", 2 if text else 2.4, text), "measured", "")]) == words
-    walks = Finding("p_psi", "", Measured("random walk", 1e-11), "measured", "", math.inf)
+        assert description([Finding("order", "", Reading("", 2 if text else 2.4, text), "measured", "")]) == words
+    walks = Finding("p_psi", "", Reading("random walk", 1e-11), "measured", "", math.inf)
     runs = {"step_size": np.array([1.0, 0.5, 0.25]), "error": np.array([np.nan, np.nan, 1e-3])}
     screen = str(Ledger("mine", "any", (walks,), runs, About(nutation=8.0)))
     assert re.search(r" 8 to 32 steps .* order \(16 and fewer fail\)(.|\n)*It is: does not keep p_psi\.", screen)

@@ -87,8 +87,7 @@ def test_an_axis_or_theta_alone_is_enough(truth, name):
 
 
 def test_a_foreign_trajectory_is_compared_and_one_turned_by_a_thousandth_shows_a_thousandth(truth):
-    mine = {"time": TIMES, "quaternion": truth["quaternion"].values}
-    lengths = 1.0 + TIMES[:, None]
+    mine, lengths = {"time": TIMES, "quaternion": truth["quaternion"].values}, 1.0 + TIMES[:, None]
     for factor in (1.0, -1.0, 1.0002, lengths):  # either sign, and lengths that single precision or a method has lost
         errors = symtop.errors({**mine, "quaternion": factor * mine["quaternion"]}, "spheroid")
         names = ("axis", "attitude", "theta", "quaternion_length")

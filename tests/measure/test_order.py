@@ -10,7 +10,7 @@ import pytest
 import symtop
 from symtop.judging.claims import order_conditions as oc
 from symtop.judging.claims.step_series import compared, step_series
-from symtop.measure.order import BESIDE, CLEARLY, Fit, order, order_verdict, power_law
+from symtop.measure.order import CONFIRMED_BEYOND, REFUTED_BEYOND, Fit, order, order_verdict, power_law
 from symtop.measure.step_map import generic_start, one_step
 from symtop.methods.runge_kutta.pair_tables import DORMAND_PRINCE
 from tests.judging.blind.right import CLASSICAL
@@ -79,7 +79,7 @@ def test_one_rule_says_what_a_slope_says_of_a_declared_order(claim, main, others
 def test_no_slope_confirms_two_orders_and_a_step_taken_twice_is_one_point():
     for slope in np.linspace(1.0, 3.0, 201):
         assert [order_verdict(claim, fit(slope, 0.2)) for claim in (1, 2, 3)].count("confirmed") <= 1
-    assert 0.2 + BESIDE < 0.5 <= 0.1 + CLEARLY
+    assert 0.2 + CONFIRMED_BEYOND < 0.5 <= 0.1 + REFUTED_BEYOND
     # Two points of the same step say nothing of the scatter: counted twice they made 8.9 +- 0.1 of order 10.
     rng, steps = np.random.default_rng(3), np.geomspace(0.6, 0.8, 6)
     errors = 1e-11 * steps**10.0 * (1.0 + 0.3 * steps**2) * np.exp(0.01 * rng.standard_normal(6))

@@ -33,7 +33,7 @@ if way == "numba alone":
     jit.lean_probe = lambda: False
 if way in ("stored", "bitcode"):
     jit.on_cold[:] = [lambda: sys.exit("compiled")]
-lanes.FEW = -1
+lanes.FEW_STEPS = -1
 rows = [f"{entry.name}[{chart}]" for entry in symtop.integrators().values() if entry.implementation == "compiled"
         for chart in entry.charts()]
 for k in range(count):
@@ -168,7 +168,7 @@ def made(number):
                 x = x - math.floor(x) + math.sqrt(abs(x)) + number * x ** power / (1.0 + x ** 4 + math.tan(x) ** 2)
                 x = math.atan2(x, 1.0 + power) + math.log1p(abs(x)) - math.cosh(0.1 * x) * math.sinh(0.2 * x)
         return x
-    jit.register_jitable(within, jit.OPTIONS | jit.WITHIN)
+    jit.register_jitable(within, jit.OPTIONS | jit.KERNEL_ONLY)
     def kernel(x):
         return within(x) + within(x + 1.0) + within(x + number)
     return jit.compile_kernel(kernel)

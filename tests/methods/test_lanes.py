@@ -8,7 +8,7 @@ import pytest
 import symtop
 from symtop.methods.framework import lanes, loop as loops
 from symtop.methods.framework.angles import require_chart
-from symtop.methods.framework.lanes import ALIKE, LEAST, Many, W, divided, groups, members_of, refused, turns
+from symtop.methods.framework.lanes import LEAST_MEMBERS, Many, W, divided, groups, members_of, refused, turns
 from symtop.methods.framework.loop import FixedStep, inside
 from symtop.methods.framework.plan import LEFT_CHART, OK, OUTCOMES, Plan
 from symtop.methods.framework.registry import variants
@@ -97,7 +97,8 @@ def test_members_have_the_bits_of_runs_alone(name, ends):
 
 @pytest.mark.parametrize(("name", "count", "seed"), [
     *((name, 60, 7) for name in ALONE),
-    *(("strang[axis]", count, 3) for count in (1, LEAST - 1, LEAST, W - 1, W, W + 1, 2 * W + LEAST)),
+    *(("strang[axis]", count, 3) for count in (1, W - 1, W, W + 1)),
+    *(("strang[axis]", LEAST_MEMBERS + more, 3) for more in (-1, 0, 2 * W)),
 ])  # fmt: skip
 def test_members_one_after_another_and_in_blocks_that_are_not_full_have_the_bits_of_runs_alone(name, count, seed):
     arguments = members(count, seed=seed)
@@ -184,7 +185,7 @@ def test_runs_of_a_few_steps_at_a_time_are_the_same(monkeypatch, name, steps):
     arguments, solver = members(300), SOLVERS[name]
     expected = solver.many(*arguments)
     monkeypatch.setattr(loops, "BLOCK", steps)  # back to Python eight steps of a block at a time
-    monkeypatch.setattr(lanes, "BATCH", 2 * W)
+    monkeypatch.setattr(lanes, "BATCH_MEMBERS", 2 * W)
     for first, second in zip(expected, solver.many(*arguments), strict=True):
         np.testing.assert_array_equal(first, second)
 
@@ -196,7 +197,7 @@ def test_members_stand_in_the_order_of_their_steps_and_of_their_turns_and_uneven
     assert (np.diff(steps[in_order]) >= 0).all()
     assert {40, 41} <= set(leftovers)  # beside the others they would keep a block waiting
     assert [part.size for part in divided(np.arange(0), steps)] == [0, 0]
-    assert [divided(np.arange(LEAST - k), np.full(9, 7))[1 - k].size for k in (0, 1)] == [0, 0]
+    assert [divided(np.arange(LEAST_MEMBERS - k), np.full(9, 7))[1 - k].size for k in (0, 1)] == [0, 0]
     # Without turns they stand as they came (the negative control); with them, unlike steps still stand apart.
     count, draw = 8 * W, np.random.default_rng(0)
     turn, indices = draw.uniform(size=count), np.arange(count)
@@ -211,8 +212,8 @@ def test_members_stand_in_the_order_of_their_steps_and_of_their_turns_and_uneven
     short = in_order[steps[in_order] < 1000]
     np.testing.assert_array_equal(short, in_order[: len(short)])
     assert (np.diff(turn[short[turn[short] >= 0]]) > 0).all()
-    assert max(100, 103) / 100 < ALIKE < 1000 / 103
-    assert divided(np.arange(LEAST), np.zeros(9, dtype=int), turn)[0].size == LEAST  # no step at all
+    assert max(100, 103) / 100 < lanes.ALIKE_RATIO < 1000 / 103
+    assert divided(np.arange(LEAST_MEMBERS), np.zeros(9, dtype=int), turn)[0].size == LEAST_MEMBERS  # no step at all
 
 
 def test_groups_hold_every_member_once_and_turns_are_those_of_the_motion():
@@ -239,7 +240,7 @@ def test_a_start_that_a_kernel_refuses_is_refused_of_a_member_too():
 def test_lanes_given_up_between_samples_and_exact_steps_of_several_parts_are_run_alone():
     """The marks lie further apart than the steps after which a block looks for lanes that were given up."""
     numbers, h, _ = members(W, seed=4)
-    marks = np.tile([0, 2 * lanes.STRETCH + 7], (W, 1)) + np.arange(W)[:, None]
+    marks = np.tile([0, 2 * lanes.STRETCH_STEPS + 7], (W, 1)) + np.arange(W)[:, None]
     assert_runs_alone(SOLVERS["strang[axis]"], numbers, h, marks, SOLVERS["strang[axis]"].many(numbers, h, marks))
     # Next to a separatrix a long step is divided; its neighbours in the block are not.
     scene, solver = symtop.scene("separatrix"), SOLVERS["exact-discrete[axis]"]

@@ -131,7 +131,8 @@ def number(near, far, which):
 def test_two_runs_in_one_register_have_the_bits_of_each_alone(name, chart):
     scene, h, marks = models.scene(name, bodies=True), 0.03, np.array([1, 50, 400])
     neighbour = replace(scene.start, **({"psi_dot": 1.0} if chart == "axis" else {"omega_body": (0.1, 0.2, 0.3)}))
-    run, fixed = pairs.two_runs(chart, pairs.DOP8, number), symtop.integrator("dop853-compiled-fixed").solvers[chart]
+    run = pairs.two_runs(chart, pairs.DOP853_PAIR, number)
+    fixed = symtop.integrator("dop853-compiled-fixed").solvers[chart]
     near, far = (fixed(scene.top, start, symtop.Plan.steps(h, marks)).states for start in (scene.start, neighbour))
     out = np.empty((near.shape[1] + far.shape[1], marks.size))
     for which, row in enumerate(out):

@@ -167,8 +167,7 @@ def test_symmetric_heavy_body_moves_as_the_symmetric_top(moments, mgl, precise):
     start = symtop.Angles(1.1, theta_dot=0.3, psi_dot=2.0)
     rates = (start.theta_dot, 0.0, start.psi_dot)
     momentum = np.transpose([two_product(moment, rate) for moment, rate in zip((I1, I1, I3), rates, strict=True)])
-    quaternion = (1.0, math.tan(0.5 * start.theta), 0.0, 0.0)
-    ctx = context(60)
+    quaternion, ctx = (1.0, math.tan(0.5 * start.theta), 0.0, 0.0), context(60)
     theta = 2 * ctx.atan(ctx.mpf(quaternion[1]))  # of the very double
     form = PreciseForm((I1, I3, mgl), (theta, 0, 0, start.theta_dot, 0, start.psi_dot), 40)
     true = [form.quaternion(t) for t in times]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import symtop
-from symtop.judging.findings import About, Finding, Ledger, Measured
+from symtop.judging.findings import About, Finding, Ledger, Reading
 from symtop.report.card import badge, card, figures, write_badge
 from tests.judging.blind.right import midpoint
 from tests.judging.conftest import shorten
@@ -24,8 +24,8 @@ def handmade(*findings, name="mine"):
     return Ledger(name, "spheroid", findings, {}, About(name, "axis", "python", 0.0))
 
 
-ORDER = Finding("order", "4", Measured(), "undecided", "no <luck>")
-NOTHING = handmade(ORDER, Finding("energy", "", Measured(), "undecided", "it stopped"))
+ORDER = Finding("order", "4", Reading(), "undecided", "no <luck>")
+NOTHING = handmade(ORDER, Finding("energy", "", Reading(), "undecided", "it stopped"))
 
 
 def test_the_card_is_one_page_with_every_verdict_and_the_energy_of_the_long_run(ledger, tmp_path):
@@ -45,7 +45,7 @@ def test_the_card_is_one_page_with_every_verdict_and_the_energy_of_the_long_run(
     ("axis", "nutations", "nutation's energy"), ("body", "natural periods", "kinetic energy and |mgl|")])  # fmt: skip
 def test_the_units_of_a_card_are_those_of_its_scene(chart, unit, scale, tmp_path):
     run = {"long_nutations": [1.0, 2.0], "energy_change": [1e-9, 2e-9], "steps_run": np.array(200)}
-    energy = Finding("energy", "", Measured("drift", 2e-9), "measured", "it grows", 2e-9, 1e-11)
+    energy = Finding("energy", "", Reading("drift", 2e-9), "measured", "it grows", 2e-9, 1e-11)
     findings, about = (ORDER, energy), About("mine", chart, "python", 0.0)
     ledger = Ledger("mine", "any", findings, {name: np.asarray(values) for name, values in run.items()}, about)
     axes = figures(ledger)[1].axes[0]
@@ -58,7 +58,7 @@ def test_the_badge_says_what_is_refuted_or_what_the_method_is(ledger, tmp_path):
     root = ET.fromstring(write_badge(ledger, tmp_path / "badge.svg").read_text(encoding="utf-8"))
     words = [text.text for text in root.iter("{http://www.w3.org/2000/svg}text")]
     assert words == ["symtop", "refuted: symplectic, energy"]
-    confirmed = Finding("order", "2", Measured("slope", 2.0, text="2.000 +- 0.001"), "confirmed", "a <b>", 2.0, 0.05)
+    confirmed = Finding("order", "2", Reading("slope", 2.0, text="2.000 +- 0.001"), "confirmed", "a <b>", 2.0, 0.05)
     claim_ledger = handmade(confirmed, name="<mine>")
     assert "order 2" in badge(claim_ledger)
     assert "refuted" not in badge(claim_ledger)

@@ -210,7 +210,7 @@ def test_labels_keep_their_order_and_their_distance(places):
     (30012.0, "3 × 10⁴"), (7.0, "7"), (99.4, "99"), (99.6, "100"), (-99.6, "-100"), (9999.7, "10⁴"),
 ])  # fmt: skip
 def test_a_number_of_a_title(value, text):
-    assert formats.number(value) == text.replace(" ", formats.FIRM)
+    assert formats.number(value) == text.replace(" ", formats.NO_BREAK)
     assert formats.typeset("1e-06 (us), `1e-6 us`, [x](1e-3), 2 us, us") == "10⁻⁶ (µs), `1e-6 us`, [x](1e-3), 2 µs, us"
     assert [formats.at_most(number) for number in (1.249, 1.2, 0.1, 185.3)] == ["1.3", "1.2", "0.1", "190"]
     assert [formats.at_least(number) for number in (0.958, 0.95, 185.3)] == ["0.95", "0.95", "180"]
@@ -268,7 +268,7 @@ def pixels(path, mode: str) -> np.ndarray:
 
 
 @pytest.mark.parametrize(("write", "dpi"), [
-    (style.sketch, style.SKETCHED), pytest.param(style.publish, style.DPI, marks=pytest.mark.slow)])  # fmt: skip
+    (style.sketch, style.QUICK_DPI), pytest.param(style.publish, style.DPI, marks=pytest.mark.slow)])  # fmt: skip
 def test_a_picture_has_the_pixels_of_savefig(tmp_path, write, dpi):
     write(sample_figure(), tmp_path / "a.png")
     sample_figure().savefig(tmp_path / "b.png", dpi=dpi)

@@ -220,7 +220,7 @@ def test_a_start_that_is_moved_by_a_rounding_is_another_motion(monkeypatch):
     w1, w2, w3 = scene.start.omega_body
     control = body_digits(scene.top, Attitude(scene.start.quaternion, (np.nextafter(w1, 9.0), w2, w3)), [0.5])
     assert 1e-18 < abs(control.momentum[0][0] - first.momentum[0][0]) < 1e-14
-    monkeypatch.setattr("symtop.model.exact.body_digits.LONGEST", 5)
+    monkeypatch.setattr("symtop.model.exact.body_digits.MOST_STEPS", 5)
     with pytest.raises(symtop.SymtopError, match="times must be within 5 steps of the series, not reach 1000"):
         body_digits(scene.top, scene.start, [1000.0])
 

@@ -14,7 +14,7 @@ from symtop.model.scenes import Scene, closed_form, scene, scenes
 from symtop.model.top import Angles, SymmetricTop
 from symtop.run.reference import truth as module
 from symtop.run.reference.independent_checks import MAP_STEPS, iterate_map, iterate_map_with_error
-from symtop.run.reference.truth import SUSPICIOUS, Certificate, certificate, closed_bounds, closed_values, disagreement
+from symtop.run.reference.truth import Certificate, certificate, closed_bounds, closed_values, disagreement
 
 TIMES = np.array([0.3, 17.0, 1e3, 1e6])
 kind = lambda record: module.KINDS[int(np.isfinite(record[-2:]).sum())]
@@ -24,7 +24,8 @@ def test_views_and_integrals_agree_in_every_regime():
     """Rounding stays three digits below what is called suspicious, next to the poles as well."""
     forms.compile_now()
     for case in [*(Scene("drawn", *pair, 1.0) for pair in tops(20, seed=41)), *scenes().values()]:
-        assert disagreement(closed_form(case), TIMES, closed_values(case, TIMES)).max() < 1e-2 * SUSPICIOUS, case
+        gaps = disagreement(closed_form(case), TIMES, closed_values(case, TIMES))
+        assert gaps.max() < 1e-2 * module.SUSPICIOUS_GAP, case
 
 
 @pytest.mark.parametrize("place", [
@@ -103,7 +104,7 @@ def test_the_discrete_map_as_a_witness_knows_its_own_error_and_is_no_echo(monkey
     assert charts.attitude_distance(attitudes, truth).max() < 1e-12
     assert steps == sum(math.ceil(nutations * MAP_STEPS[0]) for nutations in (0.3, 7.7, 100.0))
     control = Scene("other", SymmetricTop(case.top.I1, case.top.I3, case.top.mgl * (1.0 + 1e-9)), case.start, 8.0)
-    assert module._against_map(case)[1] < SUSPICIOUS
+    assert module._against_map(case)[1] < module.SUSPICIOUS_GAP
     monkeypatch.setattr(module, "iterate_map_with_error", lambda _, times: iterate_map_with_error(control, times))
     assert module._against_map(case)[1] > 1e-9
     record = Certificate(1.0, 1, 0.1, 1.0, module._against_map(case)[1], 0.0)

@@ -238,7 +238,7 @@ def test_kernels_in_lanes_wait_for_many_steps_unless_they_are_stored_and_change_
     run = Mock(side_effect=blocks.run)
     cases = (False, 5000, 0, 0), (False, 5000, 2160, 0), (False, 5000, 4320, 1), (True, 5000, 0, 2), (False, 2100, 0, 4)
     for stored, limit, before, calls in cases:  # the last in two chunks, each of fewer steps
-        for place, change in ((lanes, {"is_stored": {blocks.march: stored}.get, "FEW": limit}),
+        for place, change in ((lanes, {"is_stored": {blocks.march: stored}.get, "FEW_STEPS": limit}),
                               (chunks, {"LEAST_STEPS": limit}), (blocks, {"run": run, "asked": before})):  # fmt: skip
             for name, value in change.items():
                 monkeypatch.setattr(place, name, value)

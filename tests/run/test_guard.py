@@ -21,7 +21,7 @@ from symtop.run import guard
 from symtop.run.ensemble.bodies import body_population, scenes_of
 from symtop.run.guard import EXPECTED, Probe, grown
 from symtop.run.linear_stability import nutation_growth, trace
-from symtop.run.motion import Exact, Integrated, _apart, landmarks
+from symtop.run.motion import ExactMotion, IntegratedMotion, _apart, landmarks
 from symtop.run.simulation import make_plan
 
 WOBBLY = ("jolt", 0.227), ("rk4", 0.227), ("mujoco-euler", 2.0)  # the first doubles a wobble in a turn
@@ -215,7 +215,7 @@ def test_an_end_at_a_pole_after_many_passages_is_announced(monkeypatch):
     controls = {"tolerance": 2.8942661247167517e-08, "observe": "attitude"}
     assert "stopped at t = 192.981" in caution(scene, "adams", **controls)
     assert caution(scene, "vern9", **controls) == ""
-    monkeypatch.setattr(guard, "THROUGH", 1.0)
+    monkeypatch.setattr(guard, "POLE_FACTOR", 1.0)
     assert caution(scene, "adams", **controls) == ""  # the control: of the first nutations it sees nothing
     top = symtop.SymmetricTop(0.21139120105289147, 0.17433412715295638, -0.10207649271382181)
     rates = -1.3442613475029312, 2.15157297712127, 2.483867050263369
@@ -274,7 +274,8 @@ def test_a_top_that_is_integrated_is_forecast_as_by_its_closed_form(scene, name)
     scene, method = symtop.scene(scene), symtop.integrator(name)
     chart, period = method.chart_for("axis"), scene.nutation_period
     plan, _ = make_plan(scene, method, step_size=period / 40.0, horizon=50.0 * period, samples=101)
-    exact, series = (guard.forecast(scene, method, chart, plan, kind(scene)).axis_error for kind in (Exact, Integrated))
+    motions = ExactMotion(scene), IntegratedMotion(scene)
+    exact, series = (guard.forecast(scene, method, chart, plan, motion).axis_error for motion in motions)
     assert 0.25 < series / exact < 4.0
 
 
@@ -305,7 +306,7 @@ def test_a_run_far_longer_than_is_watched_is_warned_of_and_a_free_top_judged_lik
 def test_changes_tell_chaos_from_order_and_unstable_motions_are_warned_of_beyond_their_piece():
     """What a method commits later than its piece may exceed it; a stable motion has no such margin."""
     for name, margin in (("heavy-chaotic", 30.0), ("heavy-brick", 1.0)):
-        growth = (motion := Integrated(symtop.scene(name, bodies=True))).amplification(50.0, 50.0)
+        growth = (motion := IntegratedMotion(symtop.scene(name, bodies=True))).amplification(50.0, 50.0)
         expected = 1e-12 * margin * growth / motion.amplification(5.0, 50.0)
         assert motion.amplified(1e-12, 5.0, 50.0) == pytest.approx(expected)
         assert growth > 1e4 if margin > 1.0 else growth < 1e3
@@ -313,7 +314,7 @@ def test_changes_tell_chaos_from_order_and_unstable_motions_are_warned_of_beyond
 
 def fastest(scene, periods=40.0):
     """The largest angular velocity of a body over some natural periods, by the series."""
-    motion = Integrated(symtop.Scene("body", scene.top, scene.start, periods * scene.nutation_period))
+    motion = IntegratedMotion(symtop.Scene("body", scene.top, scene.start, periods * scene.nutation_period))
     states = motion.states(np.linspace(0.0, motion.scene.horizon, 2001)[1:], 1e-12)
     return float(np.linalg.norm(states[:, 4:] / np.array(scene.top.moments), axis=1).max())
 
@@ -325,13 +326,13 @@ def test_a_body_at_rest_that_falls_into_chaos_is_watched_with_steps_short_enough
     quaternion = -0.47393681068836624, -0.09460717548517857, 0.2768361448418805, 0.8305390603278943
     scene = symtop.Scene("falling", top, symtop.Attitude(quaternion, (0.0, 0.0, 0.0)), 75.80899162607354)
     method, step = symtop.integrator("series-general"), 0.014985196599444847
-    fine = Integrated(scene).states(np.array([scene.horizon]), 1e-15)
+    fine = IntegratedMotion(scene).states(np.array([scene.horizon]), 1e-15)
     coarse = symtop.simulate(scene, method, step_size=step, guard=False, samples=2)
     assert charts.attitude_distance(coarse.quaternion.values[-1:], fine[:, :4])[0] > 10.0 * EXPECTED
     assert "rounding alone decides" in caution(scene, method, step_size=step)
     assert caution(scene, method, step_size=step, horizon=48.0) == ""  # right to 1e-5
     monkeypatch.setattr("symtop.run.motion.PAIR_STEPS", 4)
-    assert Integrated(scene).amplification(scene.horizon, scene.horizon) < 1e11  # the control
+    assert IntegratedMotion(scene).amplification(scene.horizon, scene.horizon) < 1e11  # the control
 
 
 def test_passages_of_a_pole_add_up_and_what_was_lost_is_not_compared():
@@ -377,7 +378,7 @@ def test_a_projection_onto_the_energy_lets_no_nutation_grow_and_a_run_of_two_to_
     assert caution(scene, "dop853-projected[axis]", step_size=1.7e-4) == ""  # right to 1e-13
     assert caution("spheroid", "vern9-projected", step_size=0.0884, horizon=1e5) == ""  # 6e-5 rad: the error grows as t
     for variant, noise in ((method, True), (replace(method, conserves=frozenset()), False)):
-        growth = nutation_growth(variant, scene, 1.7e-4, "axis", guard.Exact(scene).landmarks.frequency)
+        growth = nutation_growth(variant, scene, 1.7e-4, "axis", guard.ExactMotion(scene).landmarks.frequency)
         assert (growth.factor - 1.0 < growth.doubt) is noise
     top, start = symtop.SymmetricTop(8.93085313694772, 17.86170627389544, 0.0), symtop.Angles(2.66, psi_dot=0.0401)
     scene = symtop.Scene("free", top, start, 190.0)
@@ -396,7 +397,7 @@ def test_no_body_turns_much_faster_than_the_watch_takes_it_to():
     """By what the start says alone, the natural period and its own rate, some turn a fifth faster or more."""
     cases = [case for case in scenes_of(body_population(48, seed=29)) if math.isfinite(case.nutation_period)]
     np.testing.assert_allclose([case.horizon / case.nutation_period for case in cases], 10.0, rtol=1e-12)
-    rates, bounds = (np.array([rate(case) for case in cases]) for rate in (fastest, lambda case: Integrated(case).fast))
+    rates, bounds = np.array([(fastest(case), IntegratedMotion(case).fast) for case in cases]).T
     starts = [math.hypot(2.0 * math.pi / case.nutation_period, *case.start.omega_body) for case in cases]
     assert (rates / bounds).max() < 1.1
     assert np.median(rates / bounds) > 0.8

@@ -65,7 +65,7 @@ def test_a_file_that_would_replace_something_else_is_refused_before_a_step(tmp_p
 def test_windows_and_samples_cover_a_run_once(steps):
     ends = windows(steps)
     assert (ends[-1], ends) == (steps, sorted(set(ends)))
-    assert max(np.diff([0, *ends])) <= longrun.LONGEST
+    assert max(np.diff([0, *ends])) <= longrun.LONGEST_WINDOW
     marks = scattered(ends[-2] if len(ends) > 1 else 0, steps)
     assert marks[-1] == steps
     assert np.all(np.diff(marks) > 0)
@@ -129,7 +129,7 @@ def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
         finally:
             child.kill()  # it is waited for even if the machine was too slow for the minute
     assert code == (-signal.SIGKILL if blow == signal.SIGKILL else 128 + signal.SIGTERM)
-    monkeypatch.setattr(longrun, "LONGEST", 200_000)
+    monkeypatch.setattr(longrun, "LONGEST_WINDOW", 200_000)
     steps_done, steps = longrun.netcdf.read(file)["steps_done"].item(), 4_000_000
     assert 10_000 <= steps_done < steps
     positions, resume = [], longrun._Checkpoint.resumed

@@ -7,7 +7,7 @@ import symtop
 from symtop.core.netcdf import content_hash
 from symtop.model.exact.closed_form import NUMBERS, ClosedForms
 from symtop.run.ensemble import population as populations
-from symtop.run.ensemble.bodies import CHAOS, FREE, STRATA as BODY_STRATA, body_population, growth, scenes_of
+from symtop.run.ensemble.bodies import CHAOTIC_GROWTH, FREE, STRATA as BODY_STRATA, body_population, growth, scenes_of
 from symtop.run.ensemble.population import STRATA, population
 
 HASH = "8afda6e1ae62a77eabc29ef01ffbbb0c0777d931e63e1ed78ae8aed761d678b2"  # of 1000 members of seed 1
@@ -163,8 +163,8 @@ def test_regular_and_chaotic_bodies_are_told_apart_by_the_growth_of_a_disturbanc
     rows = lambda bodies: np.array([scene.top.flat(scene.start) for scene in scenes_of(bodies)])
     growths = lambda count, **options: growth(rows(body_population(count, seed=3, **options)))
     regular, chaotic = (growths(6, kind=kind, epsilon=0.3) for kind in ("regular", "chaotic"))
-    assert max(regular) < CHAOS < min(chaotic)
-    assert max(tops := growths(60, kind="lagrange")) < CHAOS  # an integrable motion shears
+    assert max(regular) < CHAOTIC_GROWTH < min(chaotic)
+    assert max(tops := growths(60, kind="lagrange")) < CHAOTIC_GROWTH  # an integrable motion shears
     assert np.median(tops) > 2.0
 
 
@@ -176,7 +176,7 @@ def test_a_population_is_the_beginning_of_a_larger_one_and_the_same_everywhere(m
     assert bodies.stratum[:8].values.tolist() == [*BODY_STRATA]
     # Hashes that were written down: nothing hangs on the machine's sine, its vectors or NumPy's distributions.
     assert (content_hash(population(1000, seed=1)), content_hash(bodies)) == (HASH, BODY_HASH)
-    monkeypatch.setattr(populations, "BLOCK", 128)
+    monkeypatch.setattr(populations, "BLOCK_MEMBERS", 128)
     assert population(3000, seed=1).identical(tops)
 
 

@@ -10,7 +10,7 @@ import symtop
 from symtop.measure.timing import bare_run, timings
 from symtop.model.scenes import closed_form, scene
 from symtop.run.guard import forecast
-from symtop.run.motion import PAIR_STEPS, POINTS, Integrated
+from symtop.run.motion import PAIR_STEPS, POINTS, IntegratedMotion
 from symtop.run.simulation import make_plan
 
 
@@ -63,7 +63,7 @@ def test_a_run_of_one_step_costs_little_and_two_samples_no_more_than_501():
 def test_the_guard_watches_two_motions_in_the_time_of_one():
     """Of a body over 200 natural periods; one after the other they take twice as long."""
     body = scene("heavy-brick", bodies=True)
-    watched = Integrated(symtop.Scene("long", body.top, body.start, 200.0 * body.nutation_period))
+    watched = IntegratedMotion(symtop.Scene("long", body.top, body.start, 200.0 * body.nutation_period))
     steps = math.ceil(watched.scene.horizon * watched.fast * PAIR_STEPS / (2.0 * math.pi))
     plan = symtop.Plan.steps(watched.scene.horizon / steps, np.arange(1, POINTS + 1) * steps // POINTS)
     solver = symtop.integrator("dop853-compiled-fixed").solvers["body"]

@@ -59,7 +59,7 @@ def test_what_the_netcdf_library_or_the_system_refuses_to_write(tmp_path, monkey
     monkeypatch.setattr(place, name, Mock(side_effect=error))
     assert_refused(tmp_path, message)
     if place is xr.Dataset:
-        monkeypatch.setattr(netcdf, "LITTLE", 1e30)
+        monkeypatch.setattr(netcdf, "LITTLE_SPACE", 1e30)
         assert_refused(tmp_path, "no room is left")
 
 

@@ -65,8 +65,8 @@ def overlaps(cases):
 @pytest.mark.slow
 def test_a_trial_decides_whether_timed_cases_run_at_once_in_workers_that_are_there(tmp_path, monkeypatch, pool):
     """After all others; few of them, too: workers have the kernels, this process has not."""
-    for ratio in (pools.DISTURBED, 1.01 * pools.DISTURBED):
-        sizes, side_by_side, folder = [], ratio <= pools.DISTURBED, tmp_path / str(ratio)
+    for ratio in (pools.DISTURBED_RATIO, 1.01 * pools.DISTURBED_RATIO):
+        sizes, side_by_side, folder = [], ratio <= pools.DISTURBED_RATIO, tmp_path / str(ratio)
         monkeypatch.setattr(pools, "slowdown", lambda _, size, sizes=sizes, ratio=ratio: sizes.append(size) or ratio)
         monkeypatch.setattr(pool, "_trials", {})
         slept = study(folder)

@@ -19,7 +19,7 @@ from symtop.core import netcdf
 from symtop.methods.framework.plan import NOT_CONVERGED, NOT_NORMALISED, OK, Plan
 from symtop.methods.framework.registry import integrator
 from symtop.model.charts import BODY, attitude_distance
-from symtop.run.motion import CHECK, FINE, Integrated
+from symtop.run.motion import CHECK_TOLERANCE, FINE_TOLERANCE, IntegratedMotion
 from symtop.runner import run as runner
 from tests.studies.test_cost import priced
 
@@ -70,8 +70,9 @@ def test_the_truth_is_within_its_bound_and_another_body_is_not(family):
     scenes = [symtop.Scene("other", symtop.RigidBody(scene.top.I1 * (1.0 + 1e-6), *scene.top.moments[1:],
               scene.top.mgl, scene.top.centre), scene.start, scene.horizon) for scene in bodies.scenes]  # fmt: skip
     if family != FREE:
-        motion = Integrated(bodies.scenes[0])
-        fine, check = (drawing.unit(motion.states(bodies.times[0], tolerance)[:, :4]) for tolerance in (FINE, CHECK))
+        motion = IntegratedMotion(bodies.scenes[0])
+        runs = (motion.states(bodies.times[0], tolerance) for tolerance in (FINE_TOLERANCE, CHECK_TOLERANCE))
+        fine, check = (drawing.unit(states[:, :4]) for states in runs)
         assert bounds[0] == 4.0 * attitude_distance(check, fine).max() + drawing.FLOOR
     assert bodies.asked([1e-3, 1e-6, 1e-9, 1e-12])["axis"].any(axis=1).tolist() == [True, True, True, False]
     control = Bodies(scenes, bodies.strata, PERIODS).truth[0]

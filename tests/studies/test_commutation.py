@@ -133,8 +133,7 @@ def test_facts_and_page_are_those_of_the_rules_and_charts(tmp_path):
 def test_a_run_that_failed_has_no_part_in_the_time_of_a_chart(failed, ratio, monkeypatch):
     axis = np.array([[np.nan] * 4, [1e-2, 1e-3, 1e-4, 1e-5], [failed, 2e-3, 5e-5, 3e-5]])
     seconds = np.array([[np.nan] * 4, [1.0] * 4, [0.5, 1.5, 2.0, 2.5]])  # what fails early is fast
-    dims = ("chart", "setting")
-    bounds = np.tile([1e-15, 1e-15, 1e-15, 2e-6], (3, 1))
+    dims, bounds = ("chart", "setting"), np.tile([1e-15, 1e-15, 1e-15, 2e-6], (3, 1))
     cell = xr.Dataset({"axis": (dims, axis), "axis_bound": (dims, bounds), "seconds": (dims, seconds)},
                       {"chart": ["angles", "axis", "attitude"]})  # fmt: skip
     (row,) = chart_ratios(cell)

@@ -9,7 +9,7 @@ from symtop_studies.convergence import facts, measures, study
 
 import symtop
 from symtop.measure import datasets
-from symtop.measure.order import BESIDE, Fit, order_verdict
+from symtop.measure.order import CONFIRMED_BEYOND, Fit, order_verdict
 from symtop.methods.framework.registry import integrator, methods, split_name, variants
 from tests.templates import checked_page
 
@@ -42,7 +42,7 @@ def test_verdicts_are_those_of_the_one_rule_and_a_wrong_declaration_is_refuted(d
         declared, main = integrator(name).order, slopes["axis"]
         assert word == order_verdict(declared, main, [fit for quantity, fit in slopes.items() if quantity != "axis"])
         if math.isfinite(main.slope):
-            assert abs(main.slope - declared) <= main.interval + BESIDE, name
+            assert abs(main.slope - declared) <= main.interval + CONFIRMED_BEYOND, name
     assert sum(word == "confirmed" for word, _ in results.values()) >= 7
     offset = 3e-3 * (data["variant"] == "midpoint[angles]")
     shifted = data.assign({name: data[name] + offset for name in ("axis", "axis_end")})

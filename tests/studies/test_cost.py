@@ -150,8 +150,7 @@ def test_a_lead_is_called_if_neither_tops_nor_prices_can_turn_it_and_hindsight_m
 def priced(price, names, call=2e-6):
     """Prices (processes, variants) as the study stores them."""
     price = np.asarray(price, dtype=float)
-    shape = (*price.shape, len(pricing.TOLERANCES))
-    dims = ("scene", "variant", "priced_at")
+    shape, dims = (*price.shape, len(pricing.TOLERANCES)), ("scene", "variant", "priced_at")
     return xr.Dataset({
         "price": (dims, np.broadcast_to(price[..., np.newaxis], shape)), "call": (dims, np.full(shape, call)),
         "sampled": (dims[:2], np.full(price.shape, NAN)),

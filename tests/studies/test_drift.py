@@ -14,10 +14,10 @@ from symtop_studies.drift.runs import PLAIN_MEMBERS, elapsed_steps, gauges_of, m
 from symtop_studies.drift.study import TOLERANCE, cases
 
 import symtop
-from symtop.judging.claims.constants import KEPT, Constant
+from symtop.judging.claims.constants import KEPT_CHANGE, Constant
 from symtop.measure import datasets
 from symtop.measure.conservation import CONSTANTS, Change, growth, law
-from symtop.methods.framework.lanes import LEAST
+from symtop.methods.framework.lanes import LEAST_MEMBERS
 from symtop.methods.framework.registry import integrator
 from symtop.model.scenes import scene
 from symtop.run import modified_energy as shadow
@@ -59,7 +59,7 @@ def test_a_history_says_with_what_it_ran_and_has_one_behaviour_in_every_study():
         columns = {"outcome": ("scene", ["ok"]), **{name: ("scene", [value]) for name, value in growth.items()}}
         cell = xr.Dataset(columns, coords={"scene": ["spheroid"]})
         grain = symtop.scene("spheroid").energy_grain
-        ledger = Constant(Change(size, 0.0, 1.0, 0.0, exponent, interval, ""), 0.0, KEPT * grain, grain)
+        ledger = Constant(Change(size, 0.0, 1.0, 0.0, exponent, interval, ""), 0.0, KEPT_CHANGE * grain, grain)
         assert measures.worst_behaviour(cell, "energy") == ledger.kind
 
 
@@ -196,7 +196,7 @@ def test_adaptive_methods_drift_at_one_tolerance_and_the_ordinary_ensemble_goes_
     assert len(ensembles) == 4
     for case in ensembles:
         row = integrator(case.integrator)
-        assert case.settings["count"] >= LEAST
+        assert case.settings["count"] >= LEAST_MEMBERS
         assert row.solvers[row.charts()[0]].in_lanes
 
 

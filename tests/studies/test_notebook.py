@@ -34,8 +34,7 @@ class Symbols:
         (theta, _, psi), (theta_dot, phi_dot, psi_dot) = self.q, self.v
         s, c, sp, cp = hy.sin(theta), hy.cos(theta), hy.sin(psi), hy.cos(psi)
         w = (phi_dot * s * sp + theta_dot * cp, phi_dot * s * cp - theta_dot * sp, phi_dot * c + psi_dot)
-        V = mgl * c
-        inertia = ((I1, 0.0, 0.0), (0.0, I1, 0.0), (0.0, 0.0, I3))
+        V, inertia = mgl * c, ((I1, 0.0, 0.0), (0.0, I1, 0.0), (0.0, 0.0, I3))
         self.ways = (
             0.5 * I1 * (w[0] ** 2 + w[1] ** 2) + 0.5 * I3 * w[2] ** 2 - V,
             0.5 * sum(w[i] * inertia[i][j] * w[j] for i in range(3) for j in range(3)) - V,

@@ -293,7 +293,7 @@ def edits_the_judge(f, t, y, h):
     """Heun's method, which changes the judge's thresholds in its own process."""
     for name, module in list(sys.modules.items()):
         if name.startswith("symtop.judging.claims"):
-            for word in ("RETURNED", "SYMPLECTIC", "KEPT", "TRUE_LIMIT", "BESIDE", "MISSED", "SURE"):
+            for word in ("RETURN_GAP", "SYMPLECTIC", "KEPT_CHANGE", "TRUE_LIMIT", "CONFIRMED_BEYOND", "SURE_WIDTHS"):
                 if hasattr(module, word):
                     setattr(module, word, 1e9)
     return right.heun(f, t, y, h)
