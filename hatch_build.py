@@ -18,7 +18,7 @@ import contextlib, math, os, sys
 from symtop import advise
 from symtop.cli.main import main
 from symtop.model.lazy_kernel import LAZY
-advise.TIED = math.inf  # every recommend tries a sixth method, as it may where times are noisy
+advise.TIE_RATIO = math.inf  # every recommend tries a sixth method, as it may where times are noisy
 os.chdir(sys.argv[1])
 for line in sys.stdin.read().splitlines():
     with contextlib.redirect_stdout(None):
