@@ -109,7 +109,7 @@ def test_what_was_rounded_off_is_part_of_a_position(name, h):
 SCRIPT = """
 import sys, symtop
 from symtop.run import long_run as longrun
-longrun.LONGEST, longrun.SAVE = 200_000, 0.0
+longrun.LONGEST_WINDOW, longrun.SAVE_SECONDS = 200_000, 0.0
 scene = symtop.scene("spheroid")
 longrun.long_run(scene, "midpoint", steps=4_000_000, step_size=scene.nutation_period / 400.37, checkpoint=sys.argv[1])
 """
