@@ -48,7 +48,7 @@ class Bodies:
 
     def __init__(self, scenes: list[Scene], strata: list[str], periods: float) -> None:
         self.scenes, self.strata, self.periods = scenes, strata, periods
-        self.period = np.array([one.top.nutation_period(one.start) for one in scenes])
+        self.period = np.array([scene.top.nutation_period(scene.start) for scene in scenes])
         self.marks = sample_marks(math.ceil(periods * FIRST))
         self.times = self.marks * (self.period / FIRST)[:, np.newaxis]
         self.kinds = np.zeros(len(scenes), dtype=np.int64)  # one kind
@@ -77,7 +77,7 @@ class Bodies:
     @cached_property
     def numbers(self) -> tuple[Array, ...]:
         """Moments, centre, weight's vector, M at the start (n, 3); energy, its scale (n,); L at the start (n, 3)."""
-        bodies = [(one.top, one.start) for one in self.scenes]
+        bodies = [(scene.top, scene.start) for scene in self.scenes]
         parts = [[getattr(body, name) for body, _ in bodies] for name in ("moments", "centre", "torque")]
         momentum = np.array([body.momentum(start) for body, start in bodies])
         energy, scale = ([getattr(body, name)(start) for body, start in bodies] for name in ("energy", "energy_scale"))
@@ -87,7 +87,7 @@ class Bodies:
     @cached_property
     def rows(self) -> Array:
         """Bodies and starts as rows of 14 numbers, (n, 14)."""
-        return np.array([one.top.flat(one.start) for one in self.scenes])
+        return np.array([scene.top.flat(scene.start) for scene in self.scenes])
 
     def asked(self, targets: Any) -> dict[str, NDArray[np.bool_]]:
         """Which targets are asked of which members, (targets, n)."""
@@ -111,7 +111,7 @@ class Bodies:
             q, M = states[..., :4], states[..., 4:]  # an error of |q| counts in energy and momenta
             up, lifted = np.stack(vertical(*np.moveaxis(q, -1, 0)), axis=-1), rotated(q, M)
             q = unit(q)
-            axes = (rotated(one, np.broadcast_to(centre, M.shape)) for one in (q, true))
+            axes = (rotated(quaternion, np.broadcast_to(centre, M.shape)) for quaternion in (q, true))
             free = (weight == 0.0).all(axis=-1)
             drift = lifted - start
             moved = np.where(free, np.linalg.norm(drift, axis=-1), np.abs(drift[..., 2]))
@@ -154,8 +154,8 @@ def bodies_of(family: str, count: int, seed: int, periods: float) -> Bodies:
 
 def as_tops(bodies: Bodies) -> Tops:
     """Bodies of epsilon = 0 as symmetric tops, with the same times."""
-    starts = [Angles.from_quaternion(one.start.quaternion, omega_body=one.start.omega_body) for one in bodies.scenes]
-    tops = [SymmetricTop(one.top.I1, one.top.I3, one.top.mgl) for one in bodies.scenes]
+    starts = [Angles.from_quaternion(body.start.quaternion, omega_body=body.start.omega_body) for body in bodies.scenes]
+    tops = [SymmetricTop(body.top.I1, body.top.I3, body.top.mgl) for body in bodies.scenes]
     drawn = Tops(np.array([flat(*pair) for pair in zip(tops, starts, strict=True)]), bodies.periods)
     drawn.period, drawn.marks, drawn.times = bodies.period, bodies.marks, bodies.times
     return drawn

@@ -51,8 +51,8 @@ def own_table(variant: Integrator, drawn: dict[str, Bodies], budget: float) -> x
     """A method in a chart of the top, on the bodies of epsilon = 0."""
     tops = as_tops(drawn[SYMMETRIC])
     asked = {"axis": drawn[SYMMETRIC].asked(TARGETS)["axis"] & tops.known}
-    done = climb(variant, tops, asked, budget)
-    return _costs(variant, done, asked, tops).assign(_traits(variant))
+    record = climb(variant, tops, asked, budget)
+    return _costs(variant, record, asked, tops).assign(_traits(variant))
 
 
 def _traits(variant: Integrator) -> dict[str, Any]:
@@ -60,26 +60,26 @@ def _traits(variant: Integrator) -> dict[str, Any]:
     return {name: ((), value) for name, value in numbers.items()}
 
 
-def _costs(variant: Integrator, done: Climb, asked: dict[str, Any], bodies: Any) -> xr.Dataset:
-    work = {"work": ("level", typical_work(variant, done, bodies)[:, 0])}
+def _costs(variant: Integrator, record: Climb, asked: dict[str, Any], bodies: Any) -> xr.Dataset:
+    work = {"work": ("level", typical_work(variant, record, bodies)[:, 0])}
     coords = {"quantity": list(asked), "target": list(TARGETS)}
-    return xr.Dataset(costs_of(variant, done, asked, list(asked)) | work, coords)
+    return xr.Dataset(costs_of(variant, record, asked, list(asked)) | work, coords)
 
 
 def _family(variant: Integrator, bodies: Bodies, budget: float) -> xr.Dataset:
     asked = bodies.asked(TARGETS)
-    done = climb(variant, bodies, asked, budget, run_level)
-    status = verdicts(done)[list(STATUS)].astype(np.float32)
-    order = observed_order(done.errors["attitude"]) if variant.fixed_step else np.nan
-    return _costs(variant, done, asked, bodies).assign(status=(("kept", "member"), status), order=((), order))
+    record = climb(variant, bodies, asked, budget, run_level)
+    status = verdicts(record)[list(STATUS)].astype(np.float32)
+    order = observed_order(record.errors["attitude"]) if variant.fixed_step else np.nan
+    return _costs(variant, record, asked, bodies).assign(status=(("kept", "member"), status), order=((), order))
 
 
-def verdicts(done: Climb) -> Array:
+def verdicts(record: Climb) -> Array:
     """The status of each member at each level, (LEVELS, n); one that left the ladder with an accurate run is right."""
-    ran, error = np.isfinite(done.work), done.errors["axis"]
-    kept = done.ended & (done.errors["energy"] <= KEPT) & (done.errors[MOMENTA] <= KEPT)
+    ran, error = np.isfinite(record.work), record.errors["axis"]
+    kept = record.ended & (record.errors["energy"] <= KEPT) & (record.errors[MOMENTA] <= KEPT)
     status = np.where(error <= WRONG, 1.0, np.where(kept, 3.0, 2.0))
-    return np.where(ran, status, np.where(done.settled, 1.0, 0.0))
+    return np.where(ran, status, np.where(record.settled, 1.0, 0.0))
 
 
 def observed_order(errors: Array) -> float:
@@ -90,8 +90,8 @@ def observed_order(errors: Array) -> float:
         steep = np.log2(errors[:-1] / errors[1:])
     both = inside[:-1] & inside[1:]
     last = both.shape[0] - 1 - np.argmax(both[::-1], axis=0)
-    found = both.any(axis=0)
-    return float(np.median(steep[last, np.arange(errors.shape[1])][found])) if found.any() else float("nan")
+    known = both.any(axis=0)
+    return float(np.median(steep[last, np.arange(errors.shape[1])][known])) if known.any() else float("nan")
 
 
 def growth_table(variant: Integrator, count: int, doublings: int, seed: int) -> xr.Dataset:
@@ -133,7 +133,7 @@ def about(drawn: dict[str, Bodies], *, long: bool) -> xr.Dataset:
     for row, bodies in enumerate(drawn.values()):
         strata[row], bounds[row] = bodies.strata, bodies.truth[1]
         if not long and not bodies.scenes[0].top.free:
-            grown[row] = growth(np.array([one.top.flat(one.start) for one in bodies.scenes]))
+            grown[row] = growth(np.array([scene.top.flat(scene.start) for scene in bodies.scenes]))
         chosen = [k for k in range(min(CHECKED, n)) if not bodies.scenes[k].top.free and bodies.known[k]]
         off = [_checked(bodies, k) for k in chosen] if have_heyoka() else []
         gap[row] = max(off, default=np.nan)
@@ -151,6 +151,6 @@ def _checked(bodies: Bodies, k: int) -> float:
     body, start = bodies.scenes[k].top, bodies.scenes[k].start
     motion = HeavyBody(body.moments, body.torque, start.quaternion, body.momentum(start), body.momentum_lo(start))
     exact = motion.samples(bodies.times[k])  # NaN from where it is not known
-    there = np.isfinite(exact.bound)
-    gap = attitude_distance(bodies.truth[0][k][there], unit(exact.quaternion[there]))
-    return float((gap / (bodies.truth[1][k] + exact.bound[there])).max(initial=0.0))
+    known = np.isfinite(exact.bound)
+    gap = attitude_distance(bodies.truth[0][k][known], unit(exact.quaternion[known]))
+    return float((gap / (bodies.truth[1][k] + exact.bound[known])).max(initial=0.0))

@@ -86,32 +86,32 @@ QUICK: dict[str, dict[str, Any]] = {
 def of_bodies() -> list[Integrator]:
     """The compiled methods with a step or a tolerance in the chart `body`, in that chart alone."""
     return [
-        integrator(f"{name}[{BODY}]") for name, one in methods().items()
-        if BODY in one.solvers and one.implementation == "compiled" and one.control and name not in LEFT_OUT
+        integrator(f"{name}[{BODY}]") for name, method in methods().items()
+        if BODY in method.solvers and method.implementation == "compiled" and method.control and name not in LEFT_OUT
     ]  # fmt: skip
 
 
 def of_tops() -> list[Integrator]:
     """The same methods in their smallest chart that shows the axis of a top."""
-    rows = [integrator(one.method) for one in of_bodies()]
-    return [one.variant(one.chart_for("axis")) for one in rows if one.charts()]
+    rows = [integrator(variant.method) for variant in of_bodies()]
+    return [row.variant(row.chart_for("axis")) for row in rows if row.charts()]
 
 
 def of_engines() -> list[str]:
     """The maps of engines that step a body without symmetry."""
-    return [name for name, one in engines().items() if BODY in one.solvers]
+    return [name for name, engine in engines().items() if BODY in engine.solvers]
 
 
 def grid(*, quick: bool = False) -> list[Case]:
     """Every method on all bodies over ten periods, on the tops; growth; steady bodies; engines; prices; bodies."""
     asked, bodies, tops = QUICK if quick else FULL, of_bodies(), of_tops()
     timing = {
-        "integrators": [one.name for one in (*bodies, *tops)], "rounds": 1 if quick else 4,
+        "integrators": [variant.name for variant in (*bodies, *tops)], "rounds": 1 if quick else 4,
         "batch": 0.0002 if quick else 0.002,
     }  # fmt: skip
     return [
-        *(Case("bodies", one.name, asked[SHORT], group=SHORT) for one in bodies),
-        *(Case("tops", one.name, asked[SHORT], group=OWN) for one in tops),
+        *(Case("bodies", variant.name, asked[SHORT], group=SHORT) for variant in bodies),
+        *(Case("tops", variant.name, asked[SHORT], group=OWN) for variant in tops),
         *(Case(span, "exact", asked[span], group=BODIES) for span in (SHORT, LONG)),
         *(Case("regular", f"{name}[{BODY}]", asked[GROWTH], group=GROWTH) for name in GROWN),
         *(Case("upright", f"{name}[{BODY}]", asked[STEADY], group=STEADY) for name in GROWN),

@@ -33,11 +33,11 @@ def measure(case: Case) -> xr.Dataset:
     if case.integrator in planted.LIES:
         return planted.measured(case)
     where = scene(case.scene, bodies=True)
-    found = judge(integrator(case.integrator), where, quick=case.settings["quick"]).dataset().assign(chart="every")
+    data = judge(integrator(case.integrator), where, quick=case.settings["quick"]).dataset().assign(chart="every")
     if where.of_body:  # a body has other claims: put each in its place among all
-        blank = {name: "" for name, column in found.data_vars.items() if column.dtype.kind == "U"}
-        found = found.reindex(claim=facts.EVERY, fill_value=blank).assign(chart=BODY)
-    return found
+        blank = {name: "" for name, column in data.data_vars.items() if column.dtype.kind == "U"}
+        data = data.reindex(claim=facts.EVERY, fill_value=blank).assign(chart=BODY)
+    return data
 
 
 STUDY = Study(

@@ -32,7 +32,7 @@ from .measures import (
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """How many orders are confirmed, the work within each order, and how errors compare with tolerances."""
-    words = [one.verdict for one in judged(data).values()]
+    words = [judgement.verdict for judgement in judged(data).values()]
     part, _ = named_variants(data)
     every = cheapest(data).query("ranked")
     spans = every.groupby("order")["work"].agg(lambda works: works.max() / works.min())
@@ -83,9 +83,9 @@ def cheapest(data: xr.Dataset) -> pd.DataFrame:
     works, enough = efficiencies(data, TARGET), min(LEAST_SCENES, data.sizes["scene"])
     rows = []
     for name, label in merged(stepping(data), MAIN).items():
-        every = [one for (_, variant), one in works.items() if variant == name]
+        every = [cost for (_, variant), cost in works.items() if variant == name]
         if every:
-            known, foreseen = [one.work for one in every], sum(one.foreseen for one in every)
+            known, foreseen = [cost.work for cost in every], sum(cost.foreseen for cost in every)
             work = float(np.median(known)), min(known), max(known), len(known), foreseen
             rows.append([label, declared_order(name), *work, len(known) >= enough])
     header = ["variant", "order", "work", "least", "most", "scenes", "of these extrapolated", "ranked"]

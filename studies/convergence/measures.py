@@ -105,7 +105,7 @@ def merged(data: xr.Dataset, quantity: str) -> dict[str, str]:
     labels: dict[str, str] = {}
     for name in map(str, data["variant"].values):
         method, chart = split_name(name)
-        twin = next((one for one in labels if split_name(one)[0] == method and _same(data, one, name, quantity)), None)
+        twin = next((key for key in labels if split_name(key)[0] == method and _same(data, key, name, quantity)), None)
         if twin is None:
             labels[name] = name
         else:
@@ -115,10 +115,10 @@ def merged(data: xr.Dataset, quantity: str) -> dict[str, str]:
 
 def _same(data: xr.Dataset, first: str, second: str, quantity: str) -> bool:
     """Do two variants have the same errors, wherever these are above rounding?"""
-    one, other = (data[quantity].sel(variant=name).values for name in (first, second))
+    x, y = (data[quantity].sel(variant=name).values for name in (first, second))
     limit = ABOVE_BOUND * data[f"{quantity}_bound"].sel(variant=first).values
-    seen = np.isfinite(one) & np.isfinite(other) & (one > np.maximum(limit, EPSILON))
-    return bool(seen.any() and np.all(np.abs(one[seen] - other[seen]) <= SAME * one[seen]))
+    seen = np.isfinite(x) & np.isfinite(y) & (x > np.maximum(limit, EPSILON))
+    return bool(seen.any() and np.all(np.abs(x[seen] - y[seen]) <= SAME * x[seen]))
 
 
 def evaluations_a_nutation(cell: xr.Dataset, name: str) -> np.ndarray:
