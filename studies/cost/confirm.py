@@ -67,4 +67,4 @@ def confirm(variant: Integrator, members: int, seed: int, nutations: float, star
                 setting = math.inf
         served[place] = setting
     variables = {"interpolated": np.array(start), "served": served, "share": share}
-    return xr.Dataset({name: ("target", one) for name, one in variables.items()}, {"target": list(TARGETS)})
+    return xr.Dataset({name: ("target", values) for name, values in variables.items()}, {"target": list(TARGETS)})

@@ -90,8 +90,8 @@ def tops_of(members: int, seed: int) -> Tops:
 
 def candidates() -> list[str]:
     """The variants of `CANDIDATES` that this machine has: heyoka's Taylor series may be missing."""
-    there = {variant.name for variant in variants()}
-    return [name for name in CANDIDATES if name in there]
+    names = {variant.name for variant in variants()}
+    return [name for name in CANDIDATES if name in names]
 
 
 def steps_of(tops: Tops, per_nutation: float) -> Array:
@@ -129,12 +129,12 @@ def run(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[
     """
     if variant.fixed_step:
         return together(variant, tops, wanted)
-    made = []
+    samples = []
     for setting, ends, budget in wanted:
         times = places(ends).ravel() * tops.period[:, np.newaxis]
-        done = in_turn(variant, tops.numbers, [Plan.until(one, setting, budget) for one in times])
-        made.append((Samples(done.states, done.momenta, done.work, done.outcome == 0), times))
-    return made
+        runs = in_turn(variant, tops.numbers, [Plan.until(row, setting, budget) for row in times])
+        samples.append((Samples(runs.states, runs.momenta, runs.work, runs.outcome == 0), times))
+    return samples
 
 
 def together(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Samples, Array]]:
@@ -143,22 +143,22 @@ def together(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[t
     for setting, ends, _ in wanted:
         whole = np.maximum(np.rint(places(ends).ravel() * setting), 1).astype(np.int64)
         marks.append(np.maximum.accumulate(whole))
-    each, n = [np.unique(one) for one in marks], len(tops.period)
-    most = max((one.size for one in each), default=0)
-    if any(one[-1] < most for one in each):  # a run with fewer steps than `most` samples
-        return [made for asked in wanted for made in together(variant, tops, [asked])]
+    each, n = [np.unique(part) for part in marks], len(tops.period)
+    longest = max((part.size for part in each), default=0)
+    if any(part[-1] < longest for part in each):  # a run with fewer steps than `longest` samples
+        return [samples for asked in wanted for samples in together(variant, tops, [asked])]
     if not wanted:
         return []
-    shown = np.stack([filled(one, most) for one in each])
+    shown = np.stack([filled(part, longest) for part in each])
     h = np.stack([steps_of(tops, asked.setting) for asked in wanted])
-    done = stepped(variant, np.tile(tops.numbers, (len(wanted), 1)), h.ravel(), np.repeat(shown, n, axis=0))
-    made = []
-    for k, (one, seen) in enumerate(zip(marks, shown, strict=True)):
-        rows, columns = slice(k * n, (k + 1) * n), np.searchsorted(seen, one)
-        states, momenta = done.states[rows, columns], done.momenta[rows, columns]
-        parts = Samples(states, momenta, done.work[rows], done.outcome[rows] == 0)
-        made.append((parts, one * h[k][:, np.newaxis]))
-    return made
+    runs = stepped(variant, np.tile(tops.numbers, (len(wanted), 1)), h.ravel(), np.repeat(shown, n, axis=0))
+    samples = []
+    for k, (part, seen) in enumerate(zip(marks, shown, strict=True)):
+        rows, columns = slice(k * n, (k + 1) * n), np.searchsorted(seen, part)
+        states, momenta = runs.states[rows, columns], runs.momenta[rows, columns]
+        parts = Samples(states, momenta, runs.work[rows], runs.outcome[rows] == 0)
+        samples.append((parts, part * h[k][:, np.newaxis]))
+    return samples
 
 
 def filled(marks: NDArray[np.int64], count: int) -> NDArray[np.int64]:
@@ -200,14 +200,14 @@ def measured(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[t
     """For each setting, the largest errors (quantities, horizons, n) of the stretches, inf after a failure, and
     evaluations a nutation.
     """
-    (chart,), made = variant.charts(), []
+    (chart,), results = variant.charts(), []
     for (setting, ends, _), (shown, times) in zip(wanted, run(variant, tops, wanted), strict=True):
         each = errors(chart, tops, shown, times)
         largest = np.stack([each[name].reshape(len(times), len(ends), SAMPLES).max(axis=2).T for name in QUANTITIES])
         if variant.fixed_step and setting < LEAST_STEPS:
             largest[1:] = np.inf
-        made.append((largest, np.where(shown.ended, shown.evaluations / ends[-1], np.nan)))
-    return made
+        results.append((largest, np.where(shown.ended, shown.evaluations / ends[-1], np.nan)))
+    return results
 
 
 def ladder(variant: Integrator, tops: Tops, levels: int, steps: float, budget: float) -> xr.Dataset:
@@ -229,11 +229,11 @@ def ladder(variant: Integrator, tops: Tops, levels: int, steps: float, budget: f
         ((tried, first),) = measured(
             variant, tops, [Asked(setting, far[:1], math.inf if variant.fixed_step else budget)]
         )
-        taken = float(np.nanmedian(first)) if np.isfinite(first).any() else math.nan
-        if math.isnan(taken):
+        typical = float(np.nanmedian(first)) if np.isfinite(first).any() else math.nan
+        if math.isnan(typical):
             values[level], reach[level], seen[:, level, 0] = setting, far[0], np.inf
             continue
-        longest = min(budget / taken, steps / setting if variant.fixed_step else math.inf, 1.0001e6)
+        longest = min(budget / typical, steps / setting if variant.fixed_step else math.inf, 1.0001e6)
         if longest < far[laws.FEWEST]:
             break
         wanted[level] = Asked(setting, far[far <= longest], 10.0 * budget)
@@ -309,13 +309,13 @@ class Diagram(NamedTuple):
 
 def runs_of(data: xr.DataTree, name: str) -> xr.Dataset:
     """The runs of a variant: without padding; errors are infinite for runs that failed or have no growth law."""
-    one = data["far"].to_dataset().isel(scene=0).sel(variant=name)
-    one = one.isel(setting=np.flatnonzero(np.isfinite(one["setting_value"].values)))
-    dead = np.isnan(one["work"]).all("member")  # all failed: there is no more to measure
+    runs = data["far"].to_dataset().isel(scene=0).sel(variant=name)
+    runs = runs.isel(setting=np.flatnonzero(np.isfinite(runs["setting_value"].values)))
+    dead = np.isnan(runs["work"]).all("member")  # all failed: there is no more to measure
     work = "setting", "member"
-    filled_in = work_of(one["work"].transpose(*work).values, one["setting_value"].values, integrator(name).fixed_step)
-    return one.assign(
-        error=one["error"].fillna(np.inf), reach=one["reach"].where(~dead, np.inf), work=(work, filled_in)
+    filled_in = work_of(runs["work"].transpose(*work).values, runs["setting_value"].values, integrator(name).fixed_step)
+    return runs.assign(
+        error=runs["error"].fillna(np.inf), reach=runs["reach"].where(~dead, np.inf), work=(work, filled_in)
     )
 
 
@@ -348,15 +348,15 @@ def diagram(data: xr.DataTree, quantity: str) -> Diagram:
     """The panel of a quantity."""
     names, costs, unseen, levels = variants_of(data, quantity), [], [], []
     for name in names:
-        one = runs_of(data, name)
-        errors = one["error"].sel(quantity=quantity).transpose("setting", "horizon", "member").values.astype(float)
-        work = one["work"].values * price_of(data, name, one["setting_value"].values)[:, np.newaxis]
+        runs = runs_of(data, name)
+        errors = runs["error"].sel(quantity=quantity).transpose("setting", "horizon", "member").values.astype(float)
+        work = runs["work"].values * price_of(data, name, runs["setting_value"].values)[:, np.newaxis]
         seconds = np.stack([cost_to_reach(work, errors[:, k], TARGETS) for k in range(errors.shape[1])], axis=1)
         places = np.arange(len(work))[:, np.newaxis, np.newaxis]
         level = np.stack([np.where(errors <= target, -1, places).max(axis=0) for target in TARGETS]) + 1
         costs.append(np.median(seconds, axis=2))
         levels.append(level)
-        reach, far = one["reach"].values, one["horizon"].values
+        reach, far = runs["reach"].values, runs["horizon"].values
         fine = np.minimum(level, len(reach) - 1)
         shorter = np.minimum(reach[fine], reach[np.maximum(level - 1, 0)])
         unseen.append((shorter < 0.999 * far[:, np.newaxis]).mean(axis=2) > 0.5)
@@ -385,12 +385,12 @@ def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
                     continue
                 pair, settings, dearest = (int(panel.winner[at]), int(panel.second[at])), [], 0.0
                 for row in pair:
-                    one = runs_of(data, panel.names[row])
-                    fine = min(int(np.median(panel.levels[row][at])), one.sizes["setting"] - 1)
-                    settings.append(one["setting_value"].values[[max(fine - 1, 0), fine]].tolist())
-                    dearest = max(dearest, float(np.nanmax(one["work"].values[fine])) * horizon)
+                    table = runs_of(data, panel.names[row])
+                    fine = min(int(np.median(panel.levels[row][at])), table.sizes["setting"] - 1)
+                    settings.append(table["setting_value"].values[[max(fine - 1, 0), fine]].tolist())
+                    dearest = max(dearest, float(np.nanmax(table["work"].values[fine])) * horizon)
                 runs = [[panel.names[row] for row in pair], settings]
-                if dearest <= limit and all([one["integrators"], one["settings"]] != runs for one in asked):
+                if dearest <= limit and all([case["integrators"], case["settings"]] != runs for case in asked):
                     asked.append({
                         "integrators": [panel.names[row] for row in pair], "quantity": quantity, "target": target,
                         "horizon": horizon, "settings": settings, "seed": data["far"].attrs.get("seed", 1),
@@ -408,7 +408,7 @@ def check(asked: Any) -> xr.Dataset:
     errors = np.full((2, 2, CHECKED_TOPS), np.nan)
     for rank, (name, pair) in enumerate(zip(asked["integrators"], asked["settings"], strict=True)):
         runs = measured(integrator(name), tops, [Asked(setting, ends, np.inf) for setting in pair])
-        errors[rank] = [one[place].max(axis=0) for one, _ in runs]
+        errors[rank] = [error[place].max(axis=0) for error, _ in runs]
     return xr.Dataset(
         {
             "errors": (("rank", "side", "member"), errors),
@@ -430,15 +430,15 @@ def checks(data: xr.DataTree) -> pd.DataFrame:
     names, rows = ["quantity", "target", "horizon", "winner", "next", "told", "ratio"], []
     group = data["checks"].to_dataset().isel(scene=0) if "checks" in data.children else None
     for name in () if group is None else group["variant"].values:
-        one = group.sel(variant=name)
-        quantity, target, horizon = str(one["quantity"].values), float(one["target"]), float(one["checked_horizon"])
-        pair, errors = list(map(str, one["contender"].values)), one["errors"].transpose("rank", "side", "member").values
+        row = group.sel(variant=name)
+        quantity, target, horizon = str(row["quantity"].values), float(row["target"]), float(row["checked_horizon"])
+        pair, errors = list(map(str, row["contender"].values)), row["errors"].transpose("rank", "side", "member").values
         cell = [quantity, target, horizon, *pair]
         for rank, side in np.ndindex(2, 2):
-            runs, setting = runs_of(data, pair[rank]), float(one["setting_value"][rank, side])
+            runs, setting = runs_of(data, pair[rank]), float(row["setting_value"][rank, side])
             level = int(np.argmin(np.abs(np.log(runs["setting_value"].values / setting))))
-            told = runs["error"].sel(quantity=quantity).isel(setting=level).sel(horizon=horizon, method="nearest")
-            for error, foretold in zip(errors[rank, side].tolist(), told.values.tolist(), strict=False):
+            foreseen = runs["error"].sel(quantity=quantity).isel(setting=level).sel(horizon=horizon, method="nearest")
+            for error, foretold in zip(errors[rank, side].tolist(), foreseen.values.tolist(), strict=False):
                 ratio = error / foretold if max(error, foretold) < 1.0 else math.nan
                 rows.append([*cell, (error <= target) == (foretold <= target), ratio])
     return pd.DataFrame(rows, columns=names).astype({"told": bool, "ratio": float})

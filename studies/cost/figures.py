@@ -78,7 +78,7 @@ def _safe_names(data: xr.DataTree) -> list[str]:
     """The cheapest safe choice for any body at each error, and of those that use f(t, y) alone."""
     asked = [Cell("short", "axis", target, NATURAL, needs)
              for needs in (GENERAL, "derivative") for target in cells.targets(data)]  # fmt: skip
-    return list(dict.fromkeys(one.name for cell in asked for one in cells.safest(data, cell)[0][:1]))
+    return list(dict.fromkeys(choice.name for cell in asked for choice in cells.safest(data, cell)[0][:1]))
 
 
 def draw_run_lengths(data: xr.DataTree) -> Any:
@@ -86,16 +86,16 @@ def draw_run_lengths(data: xr.DataTree) -> Any:
     asked = [Cell("short", "axis", target, NATURAL) for target in cells.targets(data)]
     each = [cells.costs(data, cell, EVALUATIONS) for cell in asked]
     firsts = filter(None, (cells.fewest(data, cell) for cell in asked))
-    every = list(dict.fromkeys(name for taken in each for name in taken.names))
+    every = list(dict.fromkeys(name for table in each for name in table.names))
     rows = chosen(every, list(dict.fromkeys([*_safe_names(data), *firsts, *BESIDE]))[:NAMED], NAMED)
     labels = "force evaluations of a run", "share of tops solved"
     figure, axes = grid(len(asked), 2, labels, height=2.3, sharex=True, sharey=True)
-    named = [taken.values[taken.names.index(name)] for taken in each for name in rows if name in taken.names]
+    named = [table.values[table.names.index(name)] for table in each for name in rows if name in table.names]
     ends = [np.quantile(part[np.isfinite(part)], LATEST) for part in named if np.isfinite(part).any()]
-    cheapest = min((float(taken.values.min()) for taken in each if taken.values.size), default=1.0)
+    cheapest = min((float(table.values.min()) for table in each if table.values.size), default=1.0)
     budgets = np.geomspace(0.9 * cheapest, 1.5 * max(ends, default=10.0 * cheapest), 400)
-    for axis, cell, taken in zip(axes, asked, each, strict=True):
-        for name, costs in zip(taken.names, taken.values, strict=True):
+    for axis, cell, table in zip(axes, asked, each, strict=True):
+        for name, costs in zip(table.names, table.values, strict=True):
             share = run_lengths(costs, budgets)
             if name in rows:
                 axis.plot(budgets, share, markevery=(5 * rows.index(name), len(budgets) // MARKS), lw=1.6, zorder=3,

@@ -79,11 +79,11 @@ def follow_up(data: xr.DataTree) -> list[Case]:
     quiet = [name for name in known.names if name not in known.marked]
     again = [*known.marked, *quiet[:: max(len(quiet) // COMPANY, 1)]] if known.marked else []
     short = (QUICK if quick else FULL)[SHORT]
-    other = {"members": short["natural"], "seed": SEED + 1, "nutations": short["nutations"]}
+    options = {"members": short["natural"], "seed": SEED + 1, "nutations": short["nutations"]}
     settings = cells.advised(data, [*facts.HAVE, *figures.FAMILIAR])
     return [
         *(Case("tops", name, asked, group=LONG) for name in cells.contenders(data)),
-        *(Case(NATURAL, name, other | {"start": start}, group=SAFE) for name, start in settings.items()),
+        *(Case(NATURAL, name, options | {"start": start}, group=SAFE) for name, start in settings.items()),
         *(timing(again, BATCHES[1], quick=quick) if again else []),
         *(Case("natural", f"check-{place:02d}", settings, group=CHECKS)
           for place, settings in enumerate(far.chosen(data, CHECKED[quick]) if FAR in data.children else ())),

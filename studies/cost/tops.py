@@ -204,9 +204,9 @@ def natural(members: int, seed: int) -> Array:
     spin = np.where(draw[3] < 0.5, -2.0, 2.0) * 2.0 ** (9.0 * draw[2] - 4.0)  # I3 w3
     speed, way = 2.0 * draw[4], 2.0 * np.pi * draw[5]
     phi_dot = speed * np.sin(way) / np.sin(theta)
-    one = np.ones(members)
+    ones = np.ones(members)
     columns = {
-        "I1": one, "I3": ratio, "mgl": one, "theta": theta, "phi": np.pi * (2.0 * draw[6] - 1.0),
+        "I1": ones, "I3": ratio, "mgl": ones, "theta": theta, "phi": np.pi * (2.0 * draw[6] - 1.0),
         "psi": np.pi * (2.0 * draw[7] - 1.0), "theta_dot": speed * np.cos(way), "phi_dot": phi_dot,
         "psi_dot": spin / ratio - phi_dot * np.cos(theta),
     }  # fmt: skip
@@ -216,8 +216,8 @@ def natural(members: int, seed: int) -> Array:
 def named() -> dict[str, Array]:
     """The nine numbers of each scene of the catalogue that has a nutation and repeats no other."""
     each = {name: scenes.scene(name) for name in grid_scenes(LEFT_OUT)}
-    chosen = {name: one for name, one in each.items() if math.isfinite(one.nutation_period)}
-    return {name: np.array(flat(one.top, one.start)) for name, one in chosen.items()}
+    chosen = {name: scene for name, scene in each.items() if math.isfinite(scene.nutation_period)}
+    return {name: np.array(flat(scene.top, scene.start)) for name, scene in chosen.items()}
 
 
 @functools.lru_cache(maxsize=3)

@@ -137,7 +137,7 @@ def _means(time: ArrayLike, error: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
 def columns_fitted(columns: Array, values: Array) -> tuple[Array, Array]:
     """Coefficients (m,) of columns (n, m) in values (n,), and their standard errors."""
     coefficients = np.linalg.lstsq(columns, values, rcond=None)[0]
-    rest = values - columns @ coefficients
+    residual = values - columns @ coefficients
     freedom = values.size - columns.shape[1]
-    variances = float(rest @ rest) / freedom * np.linalg.inv(columns.T @ columns).diagonal()
+    variances = float(residual @ residual) / freedom * np.linalg.inv(columns.T @ columns).diagonal()
     return np.asarray(coefficients), np.asarray(np.sqrt(variances))

@@ -57,7 +57,7 @@ def members(scene: Scene, count: int) -> list[Scene]:
 
 def gauges_of(scenes: Sequence[Scene], method: Integrator, per_nutation: float) -> list[Gauge]:
     """The gauge of each long run, fitted to its beginning; the same for compensated and for plain sums."""
-    return [gauge_of(one, method, one.nutation_period / per_nutation) for one in scenes]
+    return [gauge_of(scene, method, scene.nutation_period / per_nutation) for scene in scenes]
 
 
 def side_by_side(
@@ -73,15 +73,15 @@ def side_by_side(
     if not compensated:
         assert isinstance(solver.loop, Loop)  # noqa: S101
         solver = replace(solver, loop=solver.loop.plain)
-    h = np.array([one.nutation_period / per_nutation for one in scenes])
+    h = np.array([scene.nutation_period / per_nutation for scene in scenes])
     ends = windows_until(steps)
     stretches = [scattered(begin, end) for begin, end in pairwise([0, *ends])]
     marks, cuts = np.concatenate(stretches), np.cumsum([0, *map(len, stretches)])
-    done = solver.many(np.array([flat(one.top, one.start) for one in scenes]), h, np.tile(marks, (len(scenes), 1)))
+    run = solver.many(np.array([flat(scene.top, scene.start) for scene in scenes]), h, np.tile(marks, (len(scenes), 1)))
     rows = np.empty((len(scenes), len(ends), len(QUANTITIES), 3))
     for i, gauge in enumerate(gauges):
         for k, (first, last) in enumerate(pairwise(cuts)):
-            part = gauge(done.states[i, first:last], done.momenta[i, first:last], shown=True)
+            part = gauge(run.states[i, first:last], run.momenta[i, first:last], shown=True)
             rows[i, k] = np.reshape(summary(part), (-1, 3))
     return np.array(ends, dtype=float), {name: rows[:, :, q] for q, name in enumerate(QUANTITIES)}
 
@@ -133,8 +133,8 @@ def run_history(
 
     The last two are NaN for a method without them; ``own_tolerance`` is true for one that ran at its own default.
     """
-    given: dict[str, Any] = {"step_size": step_size, "tolerance": tolerance}
-    data = history(scene, method, horizon=horizon, samples=samples, **{k: v for k, v in given.items() if v is not None})
+    args: dict[str, Any] = {"step_size": step_size, "tolerance": tolerance}
+    data = history(scene, method, horizon=horizon, samples=samples, **{k: v for k, v in args.items() if v is not None})
     used = method.check_tolerance(tolerance) if method.adaptive else math.nan
     return data.assign(
         nutations=horizon / scene.nutation_period,

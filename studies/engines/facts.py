@@ -89,12 +89,12 @@ def on_bodies(data: xr.DataTree) -> pd.DataFrame:
     names = [str(name) for name in data["bodies"]["variant"].values] if "bodies" in data.children else []
     every = pd.DataFrame(index=pd.Index(names, name="variant"))
     entries = [integrator(name) for name in names]
-    every["order"] = [0.0 if one.method.startswith("no-gyro") else float(one.order or math.nan) for one in entries]
-    every["engine"] = [one.family == "engine" and one.precision == "double" for one in entries]
-    for one in BODIES:
+    every["order"] = [0.0 if row.method.startswith("no-gyro") else float(row.order or math.nan) for row in entries]
+    every["engine"] = [row.family == "engine" and row.precision == "double" for row in entries]
+    for body in BODIES:
         for rate in FREQUENCIES:
-            every[f"{one}, 1/{rate:g} s"] = [
-                float(read(data, "bodies", "attitude", scene=one, variant=name, rate=rate)) for name in names
+            every[f"{body}, 1/{rate:g} s"] = [
+                float(read(data, "bodies", "attitude", scene=body, variant=name, rate=rate)) for name in names
             ]
     return every
 
@@ -108,10 +108,10 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     beside = every.loc[BESIDE] if BESIDE in every.index else dict.fromkeys(every.columns)
     members = read(data, "population", "steps_a_nutation")
     bodies = on_bodies(data)
-    racket, case = (bodies[bodies["engine"] & (bodies["order"] > 0)][f"{one}, 1/{USUAL:g} s"] for one in BODIES)
+    racket, case = (bodies[bodies["engine"] & (bodies["order"] > 0)][f"{body}, 1/{USUAL:g} s"] for body in BODIES)
     still = bodies[bodies["engine"] & (bodies["order"] == 0)][[f"{BODIES[1]}, 1/{rate:g} s" for rate in FREQUENCIES]]
     long = {name: maps[name].abs()[maps["slow"].notna()] for name in ("energy", "spin")}
-    answers: dict[str, Any] = {
+    numbers: dict[str, Any] = {
         "slow": SLOW, "fast": FAST, "fast_nutation": scene(FAST).nutation_period,  # s
         "beside": BESIDE, "beside_fast_level": beside["fast_level"], "beside_share": beside["share"],
         "near": NEAR, "usual": USUAL, "short": HORIZON, "long": long_time(data),  # s
@@ -137,11 +137,11 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     for name, values, pick in (("best", turned["slow"], "min"), ("worst", turned["slow"], "max"),
                                ("level_fast", maps["fast_level"], "min")):  # fmt: skip
         known = values.dropna()
-        answers |= {
+        numbers |= {
             name: getattr(known, pick)(),
             f"{name}_variant": getattr(known, f"idx{pick}")() if len(known) else None,
         }
-    return answers
+    return numbers
 
 
 def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
