@@ -73,10 +73,10 @@ def fastest(part: pd.DataFrame, call: str = KERNEL, language: str | None = None,
 
     So noise does not decide which chart the waterfall shows; the targets need the axis only.
     """
-    taken = part[(part["call"] == call) & (part["language"] == (language or part["language"]))]
-    level = taken[taken["seconds"] <= (1.0 + tie) * taken["seconds"].min()]
+    table = part[(part["call"] == call) & (part["language"] == (language or part["language"]))]
+    level = table[table["seconds"] <= (1.0 + tie) * table["seconds"].min()]
     return min((row for _, row in level.iterrows()), default=None,
-               key=lambda one: (SMALLEST_FIRST["axis"].index(one["chart"]), one["seconds"]))  # fmt: skip
+               key=lambda row: (SMALLEST_FIRST["axis"].index(row["chart"]), row["seconds"]))  # fmt: skip
 
 
 def waterfall(part: pd.DataFrame, *, call_first: bool = False) -> pd.DataFrame:
@@ -122,13 +122,13 @@ def first_goal(frame: pd.DataFrame) -> pd.DataFrame:
 
 def pairs(frame: pd.DataFrame) -> pd.DataFrame:
     """The ratio of every pair of times that differ in one factor alone, for the changes in `STEPS`."""
-    answers = []
+    frames = []
     for factor, before, after in STEPS if len(frame) else ():
-        held = [*GOAL, *(other for other in FACTORS if other != factor)]
+        held = [*GOAL, *(name for name in FACTORS if name != factor)]
         both = frame[frame[factor] == before].merge(frame[frame[factor] == after], on=held)
-        answers.append(both[held].assign(factor=factor, before=before, after=after,
+        frames.append(both[held].assign(factor=factor, before=before, after=after,
                                        ratio=both["seconds_x"] / both["seconds_y"]))  # fmt: skip
-    return pd.concat(answers) if answers else pd.DataFrame(columns=["factor", "before", "after", "ratio"])
+    return pd.concat(frames) if frames else pd.DataFrame(columns=["factor", "before", "after", "ratio"])
 
 
 def effects(frame: pd.DataFrame) -> pd.DataFrame:
@@ -156,11 +156,11 @@ def against_scipy(frame: pd.DataFrame) -> pd.DataFrame:
         for scheme in SCIPYS:
             theirs = part[(part["method"] == scheme) & (part["language"] == SCIPY_PYTHON)]
             user, inner = (fastest(theirs, call, tie=0.0) for call in (SOLVE_IVP, KERNEL))
-            ours, own = (fastest(part, call, COMPILED) for call in (SIMULATE, KERNEL))
-            if user is not None and inner is not None and ours is not None and own is not None:
+            ours, kernel = (fastest(part, call, COMPILED) for call in (SIMULATE, KERNEL))
+            if user is not None and inner is not None and ours is not None and kernel is not None:
                 rows.append([*goal, scheme, user["variant"], user["seconds"], ours["variant"], ours["seconds"],
-                             user["seconds"] / ours["seconds"], own["variant"],
-                             inner["seconds"] / own["seconds"]])  # fmt: skip
+                             user["seconds"] / ours["seconds"], kernel["variant"],
+                             inner["seconds"] / kernel["seconds"]])  # fmt: skip
     header = [*GOAL, "method", "SciPy's", "solve_ivp (s)", "fastest, as called", "simulate (s)", "times, as called",
               "fastest kernel", "times, kernels"]  # fmt: skip
     return pd.DataFrame(rows, columns=header)
@@ -210,6 +210,6 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     reasons = data["reason"].to_dataframe().reset_index().query(f"{'reason'} != ''")
     times = {"axis": "error reached (rad)", "seconds": "time (s)", "force_evaluations": "force evaluations"}
     every = pd.concat([timed(data).drop(columns=FACTORS[:3], errors="ignore"), reasons]).rename(columns=times)
-    made = {"effects": effects(frame), "scipy": against_scipy(frame), "charts": charts(frame), "times": every}
+    frames = {"effects": effects(frame), "scipy": against_scipy(frame), "charts": charts(frame), "times": every}
     names = {"horizon": "nutations", "target": "axis error (rad)", "before": "from", "after": "to", "count": "pairs"}
-    return {name: table.rename(columns=names) for name, table in made.items()}
+    return {name: table.rename(columns=names) for name, table in frames.items()}

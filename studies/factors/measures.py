@@ -82,8 +82,8 @@ def least_times(asked: Runs) -> list[float]:
     for name, call, setting, horizon in asked.runs:
         brief: Any = caller(asked.scene, known[name], call, min(setting, WARM * horizon), WARM * horizon)
         first_call(brief)
-    taken = timings(functions, asked.rounds, asked.batch, warm=True, patience=ENOUGH, least=1)
-    return [timing.best for timing in taken]
+    times = timings(functions, asked.rounds, asked.batch, warm=True, patience=ENOUGH, least=1)
+    return [timing.best for timing in times]
 
 
 def timed(asked: Runs, processes: int) -> Array:
@@ -96,15 +96,15 @@ def settled_times(asked: Runs, processes: int) -> tuple[Array, Array]:
 
     Noisy times are measured again by as many processes; of all, the least are kept, as many as before.
     """
-    taken, tries = timed(asked, processes), np.ones(len(asked.runs))
+    times, tries = timed(asked, processes), np.ones(len(asked.runs))
     for _ in range(TRIES - 1):
-        loud = np.flatnonzero(quartile_spread(taken) > NOISY)
+        loud = np.flatnonzero(quartile_spread(times) > NOISY)
         if not loud.size:
             break
         again = timed(asked._replace(runs=[asked.runs[i] for i in loud]), processes)
-        taken[loud] = np.sort(np.hstack([taken[loud], again]))[:, :processes]
+        times[loud] = np.sort(np.hstack([times[loud], again]))[:, :processes]
         tries[loud] += 1
-    return taken, tries
+    return times, tries
 
 
 def factorial(
@@ -124,19 +124,19 @@ def factorial(
         part = [cell for cell in grid if cell.language in goal.languages]
         settled = settle(scene, part, goal)
         at = horizons.index(goal.nutations), targets.index(goal.target)
-        for cell, met in settled.items():
-            if met.why:
-                reasons[(grid.index(cell), *at)] = met.why
+        for cell, trial in settled.items():
+            if trial.why:
+                reasons[(grid.index(cell), *at)] = trial.why
                 continue
-            for name, value in zip(names, (met.setting, met.error, met.bound, met.evaluations), strict=True):
+            for name, value in zip(names, (trial.setting, trial.error, trial.bound, trial.evaluations), strict=True):
                 numbers[name][(grid.index(cell), *at)] = value
             for call in goal.calls:
-                if caller(scene, cell, call, met.setting, met.horizon) is not None:
+                if caller(scene, cell, call, trial.setting, trial.horizon) is not None:
                     places.append((grid.index(cell), *at, CALLS.index(call)))
-                    runs.append((cell.name, call, met.setting, met.horizon))
-    times, often = settled_times(Runs(scene, runs, rounds, batch), processes)
-    for place, taken, wide, count in zip(places, times, quartile_spread(times), often, strict=True):
-        samples[place], spread[place], tries[place] = taken, wide, count
+                    runs.append((cell.name, call, trial.setting, trial.horizon))
+    times, counts = settled_times(Runs(scene, runs, rounds, batch), processes)
+    for place, sample, width, count in zip(places, times, quartile_spread(times), counts, strict=True):
+        samples[place], spread[place], tries[place] = sample, width, count
     dims = ("variant", "horizon", "target")
     table = xr.Dataset(
         {name: (dims, values) for name, values in numbers.items()}

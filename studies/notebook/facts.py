@@ -126,6 +126,6 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
             rows.append([name, scene, str(run["outcome"].values), notebook_end(data, scene), *errors,
                          energy_until(data, scene, name, last), since if since < math.inf else math.nan])  # fmt: skip
     header = ["variant", "scene", "outcome", "end of the notebook (s)"]
-    header += [*(f"error of {one} to then" for one in CONSTANTS), f"error of energy to {last:g} s"]
+    header += [*(f"error of {constant} to then" for constant in CONSTANTS), f"error of energy to {last:g} s"]
     header.append("energy better than lsoda's from (s)")
     return {"kept": pd.DataFrame(rows, columns=header)}

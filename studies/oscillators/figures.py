@@ -28,9 +28,10 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     for draw, every, names in (
         (draw_orders, OSCILLATORS, SYMBOLS), (draw_maps, QUARTICS, MAPS),
     ):  # fmt: skip
-        scenes, there = [one for one in every if one in data["scene"]], [one for one in names if one in data["variant"]]
-        if scenes and there:
-            drawn.append(draw(data, scenes, there))
+        scenes = [name for name in every if name in data["scene"]]
+        variants = [name for name in names if name in data["variant"]]
+        if scenes and variants:
+            drawn.append(draw(data, scenes, variants))
     return drawn
 
 

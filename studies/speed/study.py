@@ -94,7 +94,7 @@ def times(on: Scene, variants: list[Integrator], length: float, ended: Array) ->
     columns = {name: np.full(ended.shape, np.nan) for name in ("seconds", "seconds_spread")}
     for name, column in columns.items():
         for place, (*_, rows) in enumerate(cells):
-            column[place, : len(rows)] = [one.get(name, np.nan) for one in rows]
+            column[place, : len(rows)] = [row.get(name, np.nan) for row in rows]
     coordinates = {"variant": [variant.name for variant in variants]}
     return xr.Dataset({name: (("variant", "setting"), column) for name, column in columns.items()}, coordinates)
 

@@ -185,7 +185,7 @@ def narrow_window(method: Integrator, scene: Scene, grid: np.ndarray) -> Window:
         if abs(first.trace) <= abs(before.trace) >= max(NEARLY, abs(at.trace)):
             close = np.linspace(earlier, h, TRIED + 1)
             tried = [trace(method, scene, x) for x in close.tolist()]
-            lost = np.flatnonzero([not surpasses(one, one.doubt) <= 0.0 for one in tried])
+            lost = np.flatnonzero([not surpasses(value, value.doubt) <= 0.0 for value in tried])
             if lost.size:
                 return Window(float(close[lost[0] - 1]), float(close[lost[-1] + 1]))
         earlier, last, first, before = last, h, before, at
