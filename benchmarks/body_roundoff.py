@@ -65,10 +65,10 @@ def main() -> None:
     for name in SCENES:
         for method in options.methods:
             parts = RUNS[method]
-            rng, own = np.random.default_rng(1), symtop.scene(name, bodies=True)
-            starts = [changed(own.start, rng) for _ in range(options.starts)]
-            residuals(own, method, parts, ends[:1])  # compiles
-            runs = [residuals(symtop.Scene(name, own.top, at, own.horizon), method, parts, ends) for at in starts]
+            rng, scene = np.random.default_rng(1), symtop.scene(name, bodies=True)
+            starts = [changed(scene.start, rng) for _ in range(options.starts)]
+            residuals(scene, method, parts, ends[:1])  # compiles
+            runs = [residuals(symtop.Scene(name, scene.top, at, scene.horizon), method, parts, ends) for at in starts]
             for constant in runs[0][0]:
                 rms = np.sqrt(np.mean([values[constant] ** 2 for values, _ in runs], axis=0))
                 late = np.array(ends) > ends[-1] / 10.0**DECADES

@@ -109,17 +109,17 @@ def prices(quantity: str) -> dict[str, tuple[float, float]]:
     """
     scene = symtop.scene("goldstein")
     known = advise._usable(advise._Question(scene, PRICED, quantity, scene.horizon, advise.OF_ANY))
-    each = [one for one in map(integrator, known) if quantity not in (one.conserves or ())]
+    each = [method for method in map(integrator, known) if quantity not in (method.conserves or ())]
     runs = []
     for horizon in (scene.horizon, SHORT * scene.nutation_period):
         step = functools.partial(likely_step, scene, horizon=horizon, accuracy=PRICED)
-        asked = [(one, step(one) if one.fixed_step else PRICED) for one in each]
-        mets = [settings.attempt(scene, one, setting, horizon, quantity) for one, setting in asked]
+        asked = [(method, step(method) if method.fixed_step else PRICED) for method in each]
+        mets = [settings.attempt(scene, method, setting, horizon, quantity) for method, setting in asked]
         runs.append((np.array(settings.seconds(scene, mets, quantity, horizon)), [met.evaluations for met in mets]))
-    (long, many), (short, few) = runs
-    price = (long - short) / np.subtract(many, few)
-    call = np.maximum(short - price * few, 0.0)
-    return {one.name: pair for one, *pair in zip(each, price.tolist(), call.tolist(), strict=True)}  # type: ignore[misc]
+    (long, n_long), (short, n_short) = runs
+    price = (long - short) / np.subtract(n_long, n_short)
+    call = np.maximum(short - price * n_short, 0.0)
+    return {method.name: pair for method, *pair in zip(each, price.tolist(), call.tolist(), strict=True)}  # type: ignore[misc]
 
 
 def costs(question: advise._Question, advised: symtop.Advice, menu: list[str]) -> dict[str, float]:
@@ -129,8 +129,8 @@ def costs(question: advise._Question, advised: symtop.Advice, menu: list[str]) -
     mets, spent = dict[str, settings.Attempt](), dict[str, float]()
     for name in sorted(each, key=lambda name: (name not in first, -(integrator(name).order or 0))):
         price, call = each[name]
-        most = math.inf if name in menu else min(PATIENCE * min(spent.values(), default=math.inf) / price, MOST)
-        met = settings.search(scene, integrator(name), accuracy, quantity, scene.horizon, patience=most)
+        patience = math.inf if name in menu else min(PATIENCE * min(spent.values(), default=math.inf) / price, MOST)
+        met = settings.search(scene, integrator(name), accuracy, quantity, scene.horizon, patience=patience)
         if not met.why:
             mets[name] = met
             part = settings.at_accuracy(met.integrator, met.error / accuracy)
@@ -138,10 +138,10 @@ def costs(question: advise._Question, advised: symtop.Advice, menu: list[str]) -
     least = min(spent.values(), default=math.inf)
     near = {name: met for name, met in mets.items() if spent[name] <= NEXT * least or name in menu}
     for name, met in near.items():
-        found = settings.search(
+        retry = settings.search(
             scene, met.integrator, accuracy, quantity, scene.horizon, met.setting, least=advise.CLOSE
         )  # fmt: skip
-        near[name] = met if found.why else found
+        near[name] = met if retry.why else retry
     if advised.integrator is not None:
         setting = float(advised.step_size or advised.tolerance or math.nan)
         near[ADVISED] = settings.attempt(scene, integrator(advised.integrator), setting, scene.horizon, quantity)

@@ -111,11 +111,11 @@ def measure() -> list[Item]:
     caller = np.inf
     for _ in range(ROUNDS):
         for name, (call, count) in calls.items():
-            begun, own = time.perf_counter(), time.thread_time()
+            wall, cpu = time.perf_counter(), time.thread_time()
             call()
-            best[name] = min(best[name], (time.perf_counter() - begun) / count)
+            best[name] = min(best[name], (time.perf_counter() - wall) / count)
             if name == f"{WHOLE}, {cores()} threads" and cores() > 1:
-                caller = min(caller, (time.thread_time() - own) / count)
+                caller = min(caller, (time.thread_time() - cpu) / count)
     best[STEPS_ALONE] = best.pop("twice the steps") - best.pop("once the steps")
     if caller < np.inf:
         best[CALLER] = caller
@@ -149,9 +149,9 @@ def calls() -> list[Call]:
             return symtop.simulate(scene, name, step_size=h, horizon=STEPS * h, samples=2, observe="axis", guard=False)
 
         each = timings([lambda: together(*SHORT), lambda: together(*LONG), alone], ALL_ROUNDS, batch=0.0)
-        few, many = SHORT[0] * SHORT[1], LONG[0] * LONG[1]
+        n0, n1 = SHORT[0] * SHORT[1], LONG[0] * LONG[1]
         short, long = (timing.best / CALLED for timing in each[:2])
-        rows.append(Call(method, short - few * (long - short) / (many - few), long / many, each[2].best / STEPS))
+        rows.append(Call(method, short - n0 * (long - short) / (n1 - n0), long / n1, each[2].best / STEPS))
     return rows
 
 
@@ -167,15 +167,15 @@ def said_of(rows: Sequence[Call]) -> list[str]:
 
 def verdict(items: Sequence[Item]) -> list[str]:
     """Sentences: how much faster an ensemble is, and the limit that its steps alone set."""
-    took = {item.name: item for item in items}
+    by_name = {item.name: item for item in items}
     fast = max((item for item in items if item.name.startswith(WHOLE)), key=lambda item: item.ratio)
-    said = (
+    text = (
         f"{MEMBERS} tops, {NUTATIONS * PER_NUTATION} steps of {METHOD}[{CHART}]: `ensemble` is {fast.ratio:.0f} times "
         "faster than as many calls of `simulate`"
     )
-    if STEPS_ALONE in took:
-        said += f"; the steps alone, on {cores()} cores, bound that at {cores() * took[STEPS_ALONE].ratio:.0f} times"
-    return [f"{said}."]
+    if STEPS_ALONE in by_name:
+        text += f"; the steps alone, on {cores()} cores, bound that at {cores() * by_name[STEPS_ALONE].ratio:.0f} times"
+    return [f"{text}."]
 
 
 def table(items: Sequence[Item]) -> Table:

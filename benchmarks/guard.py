@@ -225,10 +225,10 @@ def ablation(name: str, count: int) -> Table:
     ways: dict[str, dict[str, Any]] = {"as it is": {"EXPECTED": guard.EXPECTED}}
     ways |= {f"less: {check}": values for check, values in CHECKS.items()}
     for threshold, factor in itertools.product(THRESHOLDS, (0.5, 2.0)):
-        was = getattr(guard, threshold)
-        each = was if isinstance(was, dict) else dict(enumerate(np.atleast_1d(was).tolist()))
-        other = {key: type(part)(factor * part) for key, part in each.items()}
-        ways[f"{threshold} times {factor:g}"] = {threshold: other[0] if isinstance(was, float | int) else other}
+        value = getattr(guard, threshold)
+        each = value if isinstance(value, dict) else dict(enumerate(np.atleast_1d(value).tolist()))
+        scaled = {key: type(part)(factor * part) for key, part in each.items()}
+        ways[f"{threshold} times {factor:g}"] = {threshold: scaled[0] if isinstance(value, float | int) else scaled}
     counted, total = {way: np.zeros(4, dtype=int) for way in ways}, np.zeros(4, dtype=int)
     for k in range(count):
         scene, method, chart, plan, *_ = drawn(name, k)
@@ -269,8 +269,8 @@ def kept(name: str) -> list[Run]:
 def make(name: str, count: int, workers: int) -> None:
     """Make the runs that are missing."""
     TABLES.mkdir(parents=True, exist_ok=True)
-    done = {run.k // CHUNK for run in kept(name)}
-    missing = [place for place in range(math.ceil(count / CHUNK)) if place not in done]
+    chunks = {run.k // CHUNK for run in kept(name)}
+    missing = [place for place in range(math.ceil(count / CHUNK)) if place not in chunks]
     with ProcessPoolExecutor(workers) as pool, (TABLES / f"guard-{name}.csv").open("a") as file:
         for runs in pool.map(functools.partial(chunk, name), [place * CHUNK for place in missing]):
             csv.writer(file).writerows(runs)
@@ -286,15 +286,15 @@ PARTS = {  # ranges of the error of runs that did not end early
 def counts(runs: list[Run], guarded: str) -> list[str]:
     """Texts "warnings of runs", for the runs that ended early and for each of `PARTS`."""
     ended = [run for run in runs if run.outcome != "ok"]
-    rest = [run for run in runs if run.outcome == "ok"]
-    parts = [ended, *([run for run in rest if low < run.error <= high] for low, high in PARTS.values())]
+    finished = [run for run in runs if run.outcome == "ok"]
+    parts = [ended, *([run for run in finished if low < run.error <= high] for low, high in PARTS.values())]
     return [f"{sum(getattr(run, guarded) > guard.EXPECTED for run in part)} of {len(part)}" for part in parts]
 
 
 def curve(runs: list[Run], guarded: str) -> tuple[Any, Any]:
     """Fractions of right and of wrong runs that are warned of, for every limit of the score."""
-    rest = [run for run in runs if run.outcome == "ok"]
-    score_of, wrong = np.array([[getattr(run, guarded), run.error > guard.EXPECTED] for run in rest]).T
+    finished = [run for run in runs if run.outcome == "ok"]
+    score_of, wrong = np.array([[getattr(run, guarded), run.error > guard.EXPECTED] for run in finished]).T
     order = np.argsort(-score_of, kind="stable")
     wrong = wrong[order] > 0.0
     return np.cumsum(~wrong) / max((~wrong).sum(), 1), np.cumsum(wrong) / max(wrong.sum(), 1)
@@ -328,8 +328,8 @@ def draw(known: dict[str, list[Run]], target: Path) -> None:
         for label, runs, guarded, color in lines:
             false, hits = curve(runs, guarded)
             axis.plot(np.maximum(false, 1e-4), hits, color=color, label=label)
-            rest = [run for run in runs if run.outcome == "ok"]
-            last = sum(getattr(run, guarded) > guard.EXPECTED for run in rest) - 1
+            finished = [run for run in runs if run.outcome == "ok"]
+            last = sum(getattr(run, guarded) > guard.EXPECTED for run in finished) - 1
             axis.plot(max(false[last], 1e-4), hits[last], "o", color=color)
         axis.set(
             xscale="log", xlim=(1e-4, 1.2), ylim=(0.9, 1.003), title=title, xlabel="share of correct runs\nwarned of"

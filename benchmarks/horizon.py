@@ -37,13 +37,13 @@ def main() -> None:
     facts, tops = measured.circumstances(), far.tops_of(TOPS, SEED)
     ends = far.horizons()[far.horizons() <= 1.0001 * options.nutations]
     ((errors, work),) = far.measured(integrator(NAME), tops, [far.Asked(STEPS, ends, np.inf)])
-    ((fine, more),) = far.measured(integrator(NAME), tops, [far.Asked(FINE, ends[ends <= 1.0001 * FITTED], np.inf)])
+    ((fine, work_2),) = far.measured(integrator(NAME), tops, [far.Asked(FINE, ends[ends <= 1.0001 * FITTED], np.inf)])
     every = far.horizons()
     seen = np.full((len(far.QUANTITIES), 2, every.size, TOPS), np.nan)
     fitted = ends <= 1.0001 * FITTED
     seen[:, 0, : ends.size][:, fitted] = errors[:, fitted]
     seen[:, 1, : fine.shape[1]], drifts = fine, far.drifts_of(integrator(NAME))
-    prediction = far.predicted(seen, np.stack([work, more]), every, far.grain_of(tops), drifts=drifts)["error"][:, 0]
+    prediction = far.predicted(seen, np.stack([work, work_2]), every, far.grain_of(tops), drifts=drifts)["error"][:, 0]
     later = [horizon for horizon in 10.0 ** np.arange(5, 9) if horizon <= 1.0001 * ends[-1]]
     lines, ratios, parts = [], [], []
     for place, quantity in enumerate(far.QUANTITIES):
@@ -51,9 +51,9 @@ def main() -> None:
         lines.append([quantity])
         judged = []
         for horizon in later:
-            mine = largest[int(np.argmin(np.abs(ends - horizon)))]
-            ratio = mine / prediction.sel(quantity=quantity).sel(horizon=horizon, method="nearest").values
-            good = ratio[(mine < laws.SATURATED) & np.isfinite(ratio)]
+            error = largest[int(np.argmin(np.abs(ends - horizon)))]
+            ratio = error / prediction.sel(quantity=quantity).sel(horizon=horizon, method="nearest").values
+            good = ratio[(error < laws.SATURATED) & np.isfinite(ratio)]
             ratios += good.tolist()
             judged.append(str(good.size))
             lines[-1].append(

@@ -43,7 +43,7 @@ def choices(data: xr.DataTree) -> list[dict[str, Any]]:
     table = []
     for (needs, keeping), target in itertools.product(cells.ROWS, cells.targets(data)):
         each, called = cells.safest(data, Cell("short", "axis", target, NATURAL, needs), keeping)
-        seconds = {one.name: one.seconds for one in each if one.seconds <= NEAR * each[0].seconds < math.inf}
+        seconds = {safe.name: safe.seconds for safe in each if safe.seconds <= NEAR * each[0].seconds < math.inf}
         if seconds:
             table.append({"needs": needs, "keeping": keeping, "target": target, "called": called, "seconds": seconds})
     return table
@@ -60,15 +60,15 @@ class Pair(NamedTuple):
     differing: list[list[str]]  # rows: the cell, both choices, what each costs on the other machine
 
 
-def compare(one: list[dict[str, Any]], other: list[dict[str, Any]]) -> Pair:
+def compare(first: list[dict[str, Any]], second: list[dict[str, Any]]) -> Pair:
     """What two machines choose, and what the choice of each costs on the other."""
-    theirs = {_cell(row): row for row in other}
-    pairs = [(row, theirs[_cell(row)]) for row in one if _cell(row) in theirs]
+    theirs = {_cell(row): row for row in second}
+    pairs = [(row, theirs[_cell(row)]) for row in first if _cell(row) in theirs]
     apart = [pair for pair in pairs if _first(pair[0]) != _first(pair[1])]
     clear = [pair for pair in pairs if pair[0]["called"] or pair[1]["called"]]
     costs = [(_cost(a, b), _cost(b, a)) for a, b in apart]
-    rows = [[_words(a), _first(a), _first(b), _times(there), _times(here)]
-            for (a, b), (there, here) in zip(apart, costs, strict=True)]  # fmt: skip
+    rows = [[_words(a), _first(a), _first(b), _times(on_second), _times(on_first)]
+            for (a, b), (on_second, on_first) in zip(apart, costs, strict=True)]  # fmt: skip
     known = [cost for both in costs for cost in both if not math.isnan(cost)]
     return Pair(len(pairs), len(pairs) - len(apart), len(clear), sum(pair not in apart for pair in clear),
                 max(known, default=math.nan), rows)  # fmt: skip
@@ -78,9 +78,9 @@ def _first(row: dict[str, Any]) -> str:
     return next(iter(row["seconds"]))
 
 
-def _cost(chosen: dict[str, Any], there: dict[str, Any]) -> float:
+def _cost(chosen: dict[str, Any], machine: dict[str, Any]) -> float:
     """What a choice costs on another machine, in units of the best there; NaN if no other price is kept."""
-    seconds = there["seconds"]
+    seconds = machine["seconds"]
     return seconds.get(_first(chosen), math.inf) / min(seconds.values()) if len(seconds) > 1 else math.nan
 
 
@@ -113,8 +113,8 @@ def main() -> int:
         content = {"processor": str(data.attrs["processor"]), "choices": choices(data)}
         netcdf.write_json(KEPT / f"{options.name}.json", content)
     kept = [json.loads(file.read_text(encoding="utf-8")) for file in sorted(KEPT.glob("*.json"))]
-    pairs = [(one, other, compare(one["choices"], other["choices"]))
-             for one, other in itertools.combinations(kept, 2)]  # fmt: skip
+    pairs = [(first, second, compare(first["choices"], second["choices"]))
+             for first, second in itertools.combinations(kept, 2)]  # fmt: skip
     if not pairs:
         print("machines: two machines have to be kept to compare them")
         return 1

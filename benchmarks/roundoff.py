@@ -46,12 +46,12 @@ def main() -> None:
         momenta = spheroid.top.momenta(spheroid.start)
         top = np.array([spheroid.top.I1, spheroid.top.mgl, momenta.north, momenta.south], dtype=WIDE)
         step, function = np.array([h], dtype=WIDE), maps[name.replace("-", "_")]
-        at, done = solver.loop.start(par, rule, state, h), 0
+        at, last = solver.loop.start(par, rule, state, h), 0
         for place, end in enumerate(ends):
             _, at = solver.loop.advance(par, rule, at, h, np.array([end]))
             function(top.ctypes.data_as(ctypes.c_void_p), wide.ctypes.data_as(ctypes.c_void_p),
-                     ctypes.c_longdouble(step[0]), ctypes.c_long(end - done))  # fmt: skip
-            done = end
+                     ctypes.c_longdouble(step[0]), ctypes.c_long(end - last))  # fmt: skip
+            last = end
             ours = np.array(at.state[:size], dtype=WIDE) + np.array(at.low[:size], dtype=WIDE)
             pair = np.stack([ours, wide])
             energies = modified_energy(spheroid, name, chart, pair, h)

@@ -108,7 +108,7 @@ def cost(scene: Scene) -> list[Cost]:
         bare_run(scene, method, method.chart_for("axis"), scene.nutation_period / count, horizon)
         for method, count in zip(methods, chosen, strict=True)
     ]
-    return [Cost(row, count, one.best) for row, count, one in zip(ROWS, chosen, timings(calls), strict=True)]
+    return [Cost(row, count, timing.best) for row, count, timing in zip(ROWS, chosen, timings(calls), strict=True)]
 
 
 def main() -> None:
@@ -120,8 +120,8 @@ def main() -> None:
         print(f"{point.name:40} {SIMPSON} {point.simpson:9.3g}   {point.of} {point.control:9.3g}")
     each = cost(scene)
     print(f"inclination to {ACCURACY:g} rad over {NUTATIONS:g} nutations: steps a nutation, time, over {SIMPSON}")
-    for one in each:
-        print(f"{one.row:26} {one.per_nutation:7g} {1e6 * one.seconds:9.1f} us {one.seconds / each[0].seconds:7.2f}")
+    for run in each:
+        print(f"{run.row:26} {run.per_nutation:7g} {1e6 * run.seconds:9.1f} us {run.seconds / each[0].seconds:7.2f}")
 
 
 if __name__ == "__main__":

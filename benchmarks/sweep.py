@@ -52,18 +52,18 @@ def measure(count: int = STARTS, certified: int = CERTIFIED) -> Swept:
     for scene in scenes(2):
         symtop.errors(symtop.simulate(scene, METHOD, step_size=STEP))
     starts = scenes(count)
-    begun = time.perf_counter()
+    start = time.perf_counter()
     shown = [symtop.errors(symtop.simulate(scene, METHOD, step_size=STEP)) for scene in starts]
-    seconds = time.perf_counter() - begun
-    errors = [float(one["axis"].max()) for one in shown]
-    bound = max(float(one["axis_bound"].max()) for one in shown)
+    seconds = time.perf_counter() - start
+    errors = [float(data["axis"].max()) for data in shown]
+    bound = max(float(data["axis_bound"].max()) for data in shown)
     with tempfile.TemporaryDirectory() as cache:
         os.environ["SYMTOP_CACHE"] = cache
-        some = starts[:: max(1, count // certified)]
-        begun = time.perf_counter()
-        for scene in some:
+        sample = starts[:: max(1, count // certified)]
+        start = time.perf_counter()
+        for scene in sample:
             symtop.reference(scene, [HORIZON], certify="integration")
-        each = (time.perf_counter() - begun) / len(some)
+        each = (time.perf_counter() - start) / len(sample)
     return Swept(len(starts), seconds, float(np.median(errors)), bound, each * len(starts))
 
 

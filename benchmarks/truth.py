@@ -53,14 +53,14 @@ def _each(name: str, calls: list[float]) -> Row:
 def _timed(tops: list[tuple[SymmetricTop, Angles]]) -> list[float]:
     """Seconds of set-up and one sample of the axis, once for each top, after a round that is not counted."""
     when, clock = np.array([1.25]), time.perf_counter
-    taken = []
+    times = []
     for _ in range(2):
-        taken = []
+        times = []
         for top, start in tops:
-            begun = clock()
+            before = clock()
             ClosedForm(top, start).axis(when)
-            taken.append(clock() - begun)
-    return taken
+            times.append(clock() - before)
+    return times
 
 
 def measure() -> list[Row]:
@@ -71,16 +71,16 @@ def measure() -> list[Row]:
     ]
     long = []
     for scene in (sleeping(2.05), sleeping(2.05), spinning(3.0), steady(5.0)):  # the first imports mpmath
-        begun = time.perf_counter()
+        before = time.perf_counter()
         PreciseForm(scene.top, scene.start, digits=40)
-        long.append(time.perf_counter() - begun)
+        long.append(time.perf_counter() - before)
     rows.append(_each("set-up in 40 digits, for comparison", long[1:]))
     form, times = ClosedForm(*_tops("double-double", 1)[0]), np.linspace(0.0, 1e3, MANY)
     views = {"axis": form.axis, "quaternion": form.quaternion, "angles and rates": form, "state": form.state}
-    taken = timings([lambda view=view: view(times) for view in views.values()], batches=BATCHES)
+    results = timings([lambda view=view: view(times) for view in views.values()], batches=BATCHES)
     rows += [
         Row(f"one sample among many, {name}", timing.best / MANY, max(timing.samples) / MANY)
-        for name, timing in zip(views, taken, strict=True)
+        for name, timing in zip(views, results, strict=True)
     ]
     return rows + _of_many()
 
@@ -92,7 +92,7 @@ def _free() -> dict[str, tuple[Callable[[], object], int]]:
     build, fill, random = free_body._build.compiled, free_body._fill.compiled, np.random.default_rng(2)
     shares = random.uniform(0.2, 1.0, (COUNT, 3))  # of the mass along each axis, squared
     moments, momenta = shares.sum(axis=1, keepdims=True) - shares, random.normal(size=(COUNT, 3))
-    rows = [free_body.checked_body(one, (1, 0, 0, 0), L, (0, 0, 0)) for one, L in zip(moments, momenta, strict=True)]
+    rows = [free_body.checked_body(row, (1, 0, 0, 0), L, (0, 0, 0)) for row, L in zip(moments, momenta, strict=True)]
     constants, times, out = np.zeros(free_body.SIZE), np.linspace(0.0, 1e3, MANY), np.empty((MANY, 7))
     return {
         "constants of a free body": (lambda: [build(row, constants) for row in rows], COUNT),
@@ -110,10 +110,10 @@ def _of_many() -> list[Row]:
         "reference of spheroid at 1001 times to 1e5": (lambda: reference("spheroid", FAR), 1),
         **_free(),
     }
-    taken = timings([call for call, _ in calls.values()], batches=BATCHES)
+    results = timings([call for call, _ in calls.values()], batches=BATCHES)
     return [
         Row(name, timing.best / share, max(timing.samples) / share)
-        for (name, (_, share)), timing in zip(calls.items(), taken, strict=True)
+        for (name, (_, share)), timing in zip(calls.items(), results, strict=True)
     ]
 
 

@@ -22,11 +22,11 @@ def _run(dart: Any, held: str, body: Body, h: float, steps: int) -> Path:
     world.setTimeStep(h)
     world.setGravity([0, 0, -body.mgl / arm if pinned else 0])
     if pinned:
-        made = skeleton.createBallJointAndBodyNodePair
-        joint, node = made(None, dart.dynamics.BallJointProperties(), dart.dynamics.BodyNodeProperties())
+        make = skeleton.createBallJointAndBodyNodePair
+        joint, node = make(None, dart.dynamics.BallJointProperties(), dart.dynamics.BodyNodeProperties())
     else:
-        made = skeleton.createFreeJointAndBodyNodePair
-        joint, node = made(None, dart.dynamics.FreeJointProperties(), dart.dynamics.BodyNodeProperties())
+        make = skeleton.createFreeJointAndBodyNodePair
+        joint, node = make(None, dart.dynamics.FreeJointProperties(), dart.dynamics.BodyNodeProperties())
     node.setInertia(dart.dynamics.Inertia(1.0, [0, 0, arm], np.diag([across, across, body.I3])))
     world.addSkeleton(skeleton)
     turn = Rotation.from_matrix(body.rotation).as_rotvec()

@@ -17,12 +17,12 @@ def _run(exudyn: Any, scheme: str, body: Body, h: float, steps: int) -> Path:
 
     system, past = exudyn.SystemContainer().AddSystem(), Recorder()
     inertia = RigidBodyInertia(mass=1, inertiaTensor=np.diag([body.I1, body.I1, body.I3]), com=[0, 0, 0])
-    made = system.CreateRigidBody(
+    result = system.CreateRigidBody(
         inertia=inertia, nodeType=exudyn.NodeType.RotationRotationVector, referencePosition=[0, 0, 0],
         referenceRotationMatrix=body.rotation, initialAngularVelocity=body.velocity.tolist(), gravity=[0, 0, 0],
         returnDict=True,
     )  # fmt: skip
-    node, kinds = made["nodeNumber"], exudyn.OutputVariableType
+    node, kinds = result["nodeNumber"], exudyn.OutputVariableType
 
     def load(system: Any, time: float, vector: Any) -> list[float]:
         del time, vector

@@ -75,6 +75,6 @@ def settings() -> list[Setting]:
         ("Buss2, AB2", BUSS_2, ADAMS_BASHFORTH_2, "jsbsim-buss2"),
     )
     return [
-        Setting(ENGINE, version, name, FREE, method, functools.partial(_run, jsbsim, one, other))
-        for name, one, other, method in rows
+        Setting(ENGINE, version, name, FREE, method, functools.partial(_run, jsbsim, attitude, rate))
+        for name, attitude, rate, method in rows
     ]

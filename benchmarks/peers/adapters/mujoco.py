@@ -53,13 +53,13 @@ class Ball(Library):
         """Compile the model and step it from sample to sample."""
         model, data = self._built(top, plan.step_size)
         data.qpos[:], data.qvel[:] = _begin(top, start)
-        rows, done = np.empty((plan.times.size, 7)), 0
+        rows, steps = np.empty((plan.times.size, 7)), 0
         for row, mark in zip(rows, plan.marks.tolist(), strict=True):
-            if mark > done:
-                self.mujoco.mj_step(model, data, nstep=mark - done)
-                done = mark
+            if mark > steps:
+                self.mujoco.mj_step(model, data, nstep=mark - steps)
+                steps = mark
             row[:4], row[4:] = data.qpos, data.qvel
-        return Motion(rows, done, done * self.stages)
+        return Motion(rows, steps, steps * self.stages)
 
     def inner(self, top: SymmetricTop, start: Angles, plan: Plan) -> Inner:
         """Put the data back to the start and make all steps in one call."""
