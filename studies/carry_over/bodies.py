@@ -81,8 +81,8 @@ class Bodies:
         parts = [[getattr(body, name) for body, _ in bodies] for name in ("moments", "centre", "torque")]
         momentum = np.array([body.momentum(start) for body, start in bodies])
         energy, scale = ([getattr(body, name)(start) for body, start in bodies] for name in ("energy", "energy_scale"))
-        turned = rotated(np.array([start.quaternion for _, start in bodies]), momentum)
-        return *map(np.array, parts), momentum, np.array(energy), np.array(scale), turned
+        lifted = rotated(np.array([start.quaternion for _, start in bodies]), momentum)
+        return *map(np.array, parts), momentum, np.array(energy), np.array(scale), lifted
 
     @cached_property
     def rows(self) -> Array:
@@ -99,9 +99,9 @@ class Bodies:
         """The body and the start of each chosen member."""
         return ((self.scenes[k].top, self.scenes[k].start) for k in chosen.tolist())
 
-    def errors(self, _: str, shown: Any, chosen: NDArray[np.int64]) -> dict[str, Array]:
+    def errors(self, _: str, samples: Any, chosen: NDArray[np.int64]) -> dict[str, Array]:
         """Largest error of each quantity of the chosen members' runs, (chosen,); inf after a failure."""
-        return {name: values.max(axis=1) for name, values in self.errors_at(shown.states, chosen).items()}
+        return {name: values.max(axis=1) for name, values in self.errors_at(samples.states, chosen).items()}
 
     def errors_at(self, states: Array, chosen: NDArray[np.int64]) -> dict[str, Array]:
         """The error of each quantity at each sample, (chosen, samples); inf after a failure."""
@@ -156,9 +156,9 @@ def as_tops(bodies: Bodies) -> Tops:
     """Bodies of epsilon = 0 as symmetric tops, with the same times."""
     starts = [Angles.from_quaternion(body.start.quaternion, omega_body=body.start.omega_body) for body in bodies.scenes]
     tops = [SymmetricTop(body.top.I1, body.top.I3, body.top.mgl) for body in bodies.scenes]
-    drawn = Tops(np.array([flat(*pair) for pair in zip(tops, starts, strict=True)]), bodies.periods)
-    drawn.period, drawn.marks, drawn.times = bodies.period, bodies.marks, bodies.times
-    return drawn
+    result = Tops(np.array([flat(*pair) for pair in zip(tops, starts, strict=True)]), bodies.periods)
+    result.period, result.marks, result.times = bodies.period, bodies.marks, bodies.times
+    return result
 
 
 def grain(values: Array) -> Array:

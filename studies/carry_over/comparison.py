@@ -74,11 +74,11 @@ def costs(data: xr.DataTree, family: str, target: float, quantity: str = "axis",
     part = group.sel(quantity=quantity).sel(target=target, method="nearest")
     if span != "own":
         part = part.sel(family=family)
-    values, met = (part[name].transpose("variant", "member").values.astype(float) for name in ("cost", "met_at"))
+    values, met_at = (part[name].transpose("variant", "member").values.astype(float) for name in ("cost", "met_at"))
     tariff = prices(data)
     for row, name in enumerate(names):
         fixed = str(group["control"].values[row]) == "step_size"
-        price, call = tariff.at(name, np.full(met.shape[1], np.nan) if fixed else met[row])
+        price, call = tariff.at(name, np.full(met_at.shape[1], np.nan) if fixed else met_at[row])
         values[row] = values[row] * price + call
     errors = tariff.error[[tariff.names.index(name) for name in names]]
     return Costs(names, [str(needs) for needs in group["needs"].values], values, errors)
@@ -125,7 +125,7 @@ def bootstrap_tau(
             pair = draw, draw
         else:
             pair = tuple(part[generator.integers(part.size, size=part.size)] for part in (bodies, others))
-        priced = (medians(part[:, drawn]) for part, drawn in zip((a, b), pair, strict=True))
+        priced = (medians(part[:, picks]) for part, picks in zip((a, b), pair, strict=True))
         # prices do not change the rank of targets that are not reached
         taus.append(tau_of(*(np.where(c < UNREACHED, c * p[k], c) for c, p in zip(priced, price, strict=True))))
     ends = np.nanquantile(taus, ENDS).tolist() if np.isfinite(taus).any() else (float("nan"),) * 2
@@ -239,13 +239,13 @@ def safest(data: xr.DataTree, family: str, target: float, span: str = "short", w
     if span != "own":
         part, work = part.sel(family=family), work.sel(family=family)
     for name in map(str, group["variant"].values):
-        met = part["met_at"].sel(variant=name).values.astype(float)
-        met = met[~np.isnan(part["cost"].sel(variant=name).values) & members]
+        met_at = part["met_at"].sel(variant=name).values.astype(float)
+        met_at = met_at[~np.isnan(part["cost"].sel(variant=name).values) & members]
         fixed = integrator(name).fixed_step
         settings = np.array([setting_of(integrator(name), level) for level in range(work.sizes["level"])])
         price, call = tariff.at(name, np.full(settings.size, np.nan) if fixed else settings)
         seconds = work.sel(variant=name).values * price + call
-        ladders.append(Ladder(name, met, settings, seconds, fixed, float(tariff.error[tariff.names.index(name)])))
+        ladders.append(Ladder(name, met_at, settings, seconds, fixed, float(tariff.error[tariff.names.index(name)])))
     return {choice.name: choice for choice in safe(ladders)[0]}
 
 

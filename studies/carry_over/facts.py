@@ -316,8 +316,8 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
         growth = about["growth"].sel(family=family).dropna("member").values
         values[f"chaos_{key(family)}"] = float((growth > by.CHAOS).mean()) if growth.size else None
     known = {label(str(name)) for name in data["short"]["variant"].values}
-    tried = [code(name) for name in FIRST_TRIED if name in known]
-    values["first_tried"] = listed(tried) if tried else None
+    names = [code(name) for name in FIRST_TRIED if name in known]
+    values["first_tried"] = listed(names) if names else None
     for family in OTHERS:
         values |= _of_family(data, family)
     values["silent_0"] = silent_share(data, SYMMETRIC)
@@ -398,8 +398,8 @@ def rankings(data: xr.DataTree) -> pd.DataFrame:
                 top = by.ceiling(data, target, quantity, span)
                 for family in OTHERS:
                     tau = by.tau(data, family, target, quantity, span)
-                    asked = by.judged_bodies(by.costs(data, family, target, quantity, span)).size
-                    rows.append([span, quantity, target, words(family), asked, *tau, top.value, top.low,
+                    count = by.judged_bodies(by.costs(data, family, target, quantity, span)).size
+                    rows.append([span, quantity, target, words(family), count, *tau, top.value, top.low,
                                  by.own_tau(data, family, target).value if (span, quantity) == ("short", "axis")
                                  else math.nan])  # fmt: skip
     header = ["runs", "quantity", "error", "bodies", "asked", "tau", "low", "high", "ceiling", "ceiling low",

@@ -62,8 +62,8 @@ def draw_steps(data: xr.DataTree) -> Any:
         for place, family in enumerate(OTHERS):
             values = np.array([*by.step_factors(data, family, target).values()])
             at = place + 0.25 * (k - 1) + shift.uniform(-0.08, 0.08, values.size)
-            named = {"label": f"axis to 1e-{decades(target)} rad"} if place == 0 else {}
-            axis.plot(at, values, ls="none", marker=MARKS[k], ms=3, alpha=0.6, color=color, **named)
+            options = {"label": f"axis to 1e-{decades(target)} rad"} if place == 0 else {}
+            axis.plot(at, values, ls="none", marker=MARKS[k], ms=3, alpha=0.6, color=color, **options)
             beyond = int(np.isinf(values).sum())
             if beyond:
                 axis.annotate(f"+{beyond}", (place + 0.25 * (k - 1), 1.0), xycoords=axis.get_xaxis_transform(),

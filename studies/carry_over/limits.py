@@ -96,8 +96,8 @@ def displaced(variant: Integrator, rows: Array, h: Array, marks: NDArray[np.int6
     with np.errstate(all="ignore"):  # a run may have blown up
         up = np.stack(vertical(*np.moveaxis(states[..., :4], -1, 0)), axis=-1)
         up = up / np.linalg.norm(up, axis=-1, keepdims=True)
-        turned = np.where(up[..., 2:] < 0.0, 2.0 * np.sign(up[..., :2]), up[..., :2])  # beyond the horizontal
-        return np.concatenate([turned, states[..., 4:6]], axis=-1)
+        tilt = np.where(up[..., 2:] < 0.0, 2.0 * np.sign(up[..., :2]), up[..., :2])  # beyond the horizontal
+        return np.concatenate([tilt, states[..., 4:6]], axis=-1)
 
 
 def radius(variant: Integrator, bodies: Upright, h: Array) -> Array:
@@ -105,8 +105,8 @@ def radius(variant: Integrator, bodies: Upright, h: Array) -> Array:
     n, k = h.shape
     momentum = bodies.moments[:, 2] * np.abs(bodies.spin) + np.sqrt(np.abs(bodies.weight) * bodies.moments[:, 0])
     size = np.stack([np.ones(n), np.ones(n), momentum, momentum], axis=1)
-    aside = NUDGE * size[:, :, np.newaxis] * np.eye(4)  # (n, displacement, 4)
-    many = np.repeat(bodies.rows(aside), k, axis=0).reshape(-1, 14)
+    shifts = NUDGE * size[:, :, np.newaxis] * np.eye(4)  # (n, displacement, 4)
+    many = np.repeat(bodies.rows(shifts), k, axis=0).reshape(-1, 14)
     ends = displaced(variant, many, np.repeat(h.ravel(), 4), np.array([1]))[:, 0].reshape(n, k, 4, 4)
     slopes = np.swapaxes(ends, -1, -2) / NUDGE  # (n, k, y', displacement)
     slopes /= size[:, np.newaxis, :, np.newaxis]
@@ -123,8 +123,8 @@ def limits(variant: Integrator, bodies: Upright, omega: Array, grid: float) -> A
     low, high = phases[np.maximum(first - 1, 0)], phases[first]
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        over = radius(variant, bodies, (middle / omega)[:, np.newaxis])[:, 0] > 1.0 + GROWING
-        low, high = np.where(over, low, middle), np.where(over, middle, high)
+        beyond = radius(variant, bodies, (middle / omega)[:, np.newaxis])[:, 0] > 1.0 + GROWING
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
     return np.where(grows.any(axis=1), high, np.nan)
 
 
@@ -159,16 +159,16 @@ def steady_table(variant: Integrator, count: int, seed: int, grid: float, places
         h = np.where(np.isnan(limit), MOST, limit)[:, np.newaxis] * (np.arange(places) + 0.5) / places
         share = grown(variant, bodies, h / omega[:, np.newaxis], y, tilt).mean(axis=1)
         table[:, row] = np.where(stable, limit, 0.0), np.where(stable, share, np.nan)
-    over = ("family", "member")
-    data: dict[str, Any] = {"limit": (over, table[0]), "grown": (over, table[1]), "grid": ((), grid)}
+    dims = ("family", "member")
+    data: dict[str, Any] = {"limit": (dims, table[0]), "grown": (dims, table[1]), "grid": ((), grid)}
     return xr.Dataset(data, {"family": list(STEADY)})
 
 
-def engine_table(variant: Integrator, drawn: dict[str, Bodies]) -> xr.Dataset:
+def engine_table(variant: Integrator, families: dict[str, Bodies]) -> xr.Dataset:
     """The largest error of the axis, and whether it is above `WRONG` in the first period, by family, level, member."""
-    count = len(next(iter(drawn.values())).period)
-    table = np.full((2, len(drawn), len(LEVELS), count), np.nan)
-    for row, bodies in enumerate(drawn.values()):
+    count = len(next(iter(families.values())).period)
+    table = np.full((2, len(families), len(LEVELS), count), np.nan)
+    for row, bodies in enumerate(families.values()):
         known = np.flatnonzero(bodies.known)
         early = bodies.times[known] <= bodies.period[known, np.newaxis]
         for place, level in enumerate(LEVELS):
@@ -176,6 +176,6 @@ def engine_table(variant: Integrator, drawn: dict[str, Bodies]) -> xr.Dataset:
             error = bodies.errors_at(run.states, known)["axis"]
             table[0, row, place, known] = error.max(axis=1)
             table[1, row, place, known] = np.where(early, error, 0.0).max(axis=1) > WRONG
-    over = ("family", "steps", "member")
-    return xr.Dataset({"error": (over, table[0]), "lost": (over, table[1])},
-                      {"family": list(drawn), "steps": [FIRST * 2**level for level in LEVELS]})  # fmt: skip
+    dims = ("family", "steps", "member")
+    return xr.Dataset({"error": (dims, table[0]), "lost": (dims, table[1])},
+                      {"family": list(families), "steps": [FIRST * 2**level for level in LEVELS]})  # fmt: skip

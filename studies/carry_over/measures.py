@@ -41,16 +41,16 @@ REGULAR: dict[str, tuple[str, float | None]] = {
 FIRST_TIME = 5.0  # natural periods
 
 
-def table(variant: Integrator, drawn: dict[str, Bodies], budget: float) -> xr.Dataset:
+def table(variant: Integrator, families: dict[str, Bodies], budget: float) -> xr.Dataset:
     """One method on all families."""
-    parts = [_family(variant, bodies, budget) for bodies in drawn.values()]
-    return xr.concat(parts, dim="family").assign_coords(family=list(drawn)).assign(_traits(variant))
+    parts = [_family(variant, bodies, budget) for bodies in families.values()]
+    return xr.concat(parts, dim="family").assign_coords(family=list(families)).assign(_traits(variant))
 
 
-def own_table(variant: Integrator, drawn: dict[str, Bodies], budget: float) -> xr.Dataset:
+def own_table(variant: Integrator, families: dict[str, Bodies], budget: float) -> xr.Dataset:
     """A method in a chart of the top, on the bodies of epsilon = 0."""
-    tops = as_tops(drawn[SYMMETRIC])
-    asked = {"axis": drawn[SYMMETRIC].asked(TARGETS)["axis"] & tops.known}
+    tops = as_tops(families[SYMMETRIC])
+    asked = {"axis": families[SYMMETRIC].asked(TARGETS)["axis"] & tops.known}
     record = climb(variant, tops, asked, budget)
     return _costs(variant, record, asked, tops).assign(_traits(variant))
 
@@ -125,25 +125,25 @@ def growth_table(variant: Integrator, count: int, doublings: int, seed: int) -> 
     return xr.Dataset(data, {"family": list(REGULAR), "time": at}).assign(_traits(variant))
 
 
-def about(drawn: dict[str, Bodies], *, long: bool) -> xr.Dataset:
+def about(families: dict[str, Bodies], *, long: bool) -> xr.Dataset:
     """Of each family: growth of a disturbance over ten periods, error bounds of the references, a check of these."""
-    n = len(next(iter(drawn.values())).period)
-    grown, bounds = np.full((len(drawn), n), np.nan), np.full((len(drawn), n), np.nan)
-    strata, gap, known = np.full((len(drawn), n), "", dtype="U16"), np.full(len(drawn), np.nan), []
-    for row, bodies in enumerate(drawn.values()):
+    n = len(next(iter(families.values())).period)
+    grown, bounds = np.full((len(families), n), np.nan), np.full((len(families), n), np.nan)
+    strata, gap, known = np.full((len(families), n), "", dtype="U16"), np.full(len(families), np.nan), []
+    for row, bodies in enumerate(families.values()):
         strata[row], bounds[row] = bodies.strata, bodies.truth[1]
         if not long and not bodies.scenes[0].top.free:
             grown[row] = growth(np.array([scene.top.flat(scene.start) for scene in bodies.scenes]))
         chosen = [k for k in range(min(CHECKED, n)) if not bodies.scenes[k].top.free and bodies.known[k]]
-        off = [_checked(bodies, k) for k in chosen] if have_heyoka() else []
-        gap[row] = max(off, default=np.nan)
+        ratios = [_checked(bodies, k) for k in chosen] if have_heyoka() else []
+        gap[row] = max(ratios, default=np.nan)
         known.append(float(bodies.asked(TARGETS)["axis"][2].mean()))
-    over = ("family", "member")
+    dims = ("family", "member")
     data: dict[str, Any] = {
-        "growth": (over, grown), "truth_bound": (over, bounds), "stratum": (over, strata),
+        "growth": (dims, grown), "truth_bound": (dims, bounds), "stratum": (dims, strata),
         "off_bound": ("family", gap), "judged": ("family", known),
     }  # fmt: skip
-    return xr.Dataset(data, {"family": list(drawn)})
+    return xr.Dataset(data, {"family": list(families)})
 
 
 def _checked(bodies: Bodies, k: int) -> float:

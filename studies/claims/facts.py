@@ -86,5 +86,5 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     data, false = parts(data)
     lies = false[false["claim"] == false["integrator"].map(LIES)]
     entries, bodies = by_kind(ledger(data))
-    named = {"ledger": entries, "planted": lies.drop(columns=["scene", "family"]), "body": bodies}
-    return {name: part.assign(claim=part["claim"].map(claim_name)) for name, part in named.items() if len(part)}
+    frames = {"ledger": entries, "planted": lies.drop(columns=["scene", "family"]), "body": bodies}
+    return {name: part.assign(claim=part["claim"].map(claim_name)) for name, part in frames.items() if len(part)}

@@ -39,9 +39,9 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     span_order = int(spans.idxmax()) if len(spans) else None
     alike = every[every["order"] == span_order]  # the least work first
     (span_best, span_least), (span_worst, span_most) = map(first, (alike, alike[::-1]))
-    shown = orders(data)["verdict"]
-    met = {name: values for name, values in ratios(data).items() if values.size}
-    together = np.concatenate([np.full(1, np.nan), *met.values()])
+    verdicts = orders(data)["verdict"]
+    known = {name: values for name, values in ratios(data).items() if values.size}
+    together = np.concatenate([np.full(1, np.nan), *known.values()])
     return {
         "scenes": ", ".join(map(str, data["scene"].values)),
         "scene": str(part["scene"].values),
@@ -50,9 +50,9 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "beside": BESIDE,
         "pairs": len(words) or None,  # of a variant and a scene
         **{word: words.count(word) if words else None for word in ("confirmed", "refuted", "undecided")},
-        "higher": int((shown == "higher").sum()),
-        "lower": int((shown == "lower").sum()),
-        "wrong": int((shown == WRONG).sum()),
+        "higher": int((verdicts == "higher").sum()),
+        "lower": int((verdicts == "lower").sum()),
+        "wrong": int((verdicts == WRONG).sum()),
         "unknown": stepping(data).sizes["variant"] - len({name for _, name in efficiencies(data, TARGET)}),
         "span": float(spans.max()) if len(spans) else None,  # most work over least within an order
         "span_order": span_order,
@@ -63,10 +63,10 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "history_tolerance": HISTORY_TOLERANCE,
         "large": LARGE,  # rad
         "ratio_asked": int(np.isfinite(data["tolerance"].values).sum()) or None,  # runs at a tolerance
-        "ratio_runs": sum(values.size for values in met.values()),  # of these
-        "ratio_middle": float(np.nanmedian(together)) if met else None,  # error over tolerance
-        "ratio_most": float(np.nanmax(together)) if met else None,
-        "ratio_most_variant": max(met, key=lambda name: met[name].max(), default=None),
+        "ratio_runs": sum(values.size for values in known.values()),  # of these
+        "ratio_middle": float(np.nanmedian(together)) if known else None,  # error over tolerance
+        "ratio_most": float(np.nanmax(together)) if known else None,
+        "ratio_most_variant": max(known, key=lambda name: known[name].max(), default=None),
     }
 
 
@@ -104,10 +104,10 @@ def orders(data: xr.Dataset) -> pd.DataFrame:
     """Every order with its verdict, those that are not confirmed first."""
     ends, rows = fits(data, MAIN, at_end=True), []
     for pair, (word, slopes) in judged(data).items():
-        measured = [part for name in (MAIN, *OTHERS) for part in _order(slopes.get(name))]
-        off = "higher" if MAIN in slopes and slopes[MAIN].slope > declared_order(pair[1]) else "lower"
-        shown = off if word == "refuted" else word  # a claim is judged by more than this run: see the ledger
-        rows.append([*pair, declared_order(pair[1]), shown, *measured, ends[pair].constant])
+        numbers = [part for name in (MAIN, *OTHERS) for part in _order(slopes.get(name))]
+        side = "higher" if MAIN in slopes and slopes[MAIN].slope > declared_order(pair[1]) else "lower"
+        verdict = side if word == "refuted" else word  # a claim is judged by more than this run: see the ledger
+        rows.append([*pair, declared_order(pair[1]), verdict, *numbers, ends[pair].constant])
     names = [part for name in (MAIN, *OTHERS) for part in (f"order in {name}", f"+- in {name}")]
     every = pd.DataFrame(rows, columns=["scene", "variant", "declared", "verdict", *names, "C at the end (rad/s^p)"])
     rank = {WRONG: -1, "lower": 0, "higher": 1, "undecided": 2}

@@ -43,12 +43,12 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 def _named(data: xr.Dataset) -> Picture:
     """Panels on one scene: error against the step, against the tolerance, against work; energy over time."""
     part, labels = named_variants(data)
-    paid = part["force_evaluations"] * scene(str(part["scene"].values)).nutation_period / part["horizon"]
-    part = part.assign(work=paid.where(paid > 0.0))
-    shown = [kind for kind in ("step_size", "tolerance", "work") if np.isfinite(part[kind]).any()]
-    shown += ["energy"] if "history_time" in part and np.isfinite(part["history_time"]).any() else []
-    figure, axes = grid(len(shown), 2, height=2.3)
-    for kind, axis in zip(shown, axes, strict=True):
+    work = part["force_evaluations"] * scene(str(part["scene"].values)).nutation_period / part["horizon"]
+    part = part.assign(work=work.where(work > 0.0))
+    kinds = [kind for kind in ("step_size", "tolerance", "work") if np.isfinite(part[kind]).any()]
+    kinds += ["energy"] if "history_time" in part and np.isfinite(part["history_time"]).any() else []
+    figure, axes = grid(len(kinds), 2, height=2.3)
+    for kind, axis in zip(kinds, axes, strict=True):
         axis.set(xscale="log", yscale="log", xlabel=PANELS[kind][0], title=PANELS[kind][1])
         if kind == "energy":
             axis.set_ylabel("energy error\n/ energy of the nutation")
@@ -62,8 +62,8 @@ def _named(data: xr.Dataset) -> Picture:
             order = order[np.isfinite(x[order]) & np.isfinite(y[order])]
             if order.size:
                 axis.plot(x[order], y[order], **line(name), label=label)
-    if "tolerance" in shown:  # where error and tolerance are equal: wide, since lines cross it
-        axis, ends = axes[shown.index("tolerance")], np.array([1e-20, 1e2])
+    if "tolerance" in kinds:  # where error and tolerance are equal: wide, since lines cross it
+        axis, ends = axes[kinds.index("tolerance")], np.array([1e-20, 1e2])
         limits = axis.get_xlim(), axis.get_ylim()
         axis.plot(ends, ends, color="#9EC9E8", lw=5.0, alpha=0.8, zorder=0.5)
         axis.text(0.97, 0.06, "pale: error = tolerance", transform=axis.transAxes, ha="right", fontsize=7.5)

@@ -160,11 +160,11 @@ def efficiencies(data: xr.Dataset, error: float) -> dict[tuple[str, str], Effici
     that C h^p = error takes E T (C / error)^(1/p) of them in a nutation T. E is the median over the steps of the fit;
     an implicit method iterates more at longer steps, and needs more there.
     """
-    foretold = {}
+    works = {}
     for (name, label), fit in fits(data, MAIN).items():
         work = _between(data.sel(scene=name, variant=label), name, error)
         if np.isfinite(work):
-            foretold[name, label] = Efficiency(work, False)
+            works[name, label] = Efficiency(work, False)
             continue
         if not (np.isfinite(fit.slope) and fit.used.any()):
             continue
@@ -173,8 +173,8 @@ def efficiencies(data: xr.Dataset, error: float) -> dict[tuple[str, str], Effici
         each = np.median((evaluations_a_nutation(cell, name)[used] * steps) / scene(name).nutation_period)
         constant = np.median(cell[MAIN].values[used] / steps**order)
         work = float(each * scene(name).nutation_period * (constant / error) ** (1.0 / order))
-        foretold[name, label] = Efficiency(work, True)
-    return foretold
+        works[name, label] = Efficiency(work, True)
+    return works
 
 
 def _between(cell: xr.Dataset, name: str, error: float) -> float:
@@ -208,7 +208,7 @@ def named_variants(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
 def ratios(data: xr.Dataset) -> dict[str, np.ndarray]:
     """Axis errors over tolerances of every adaptive variant on all scenes, above rounding and below `LARGE`."""
     by_name: dict[str, list[np.ndarray]] = {}
-    for (on, name), fit in tolerance_fits(data).items():
-        cell = data.sel(scene=on, variant=name)
+    for (scene_name, name), fit in tolerance_fits(data).items():
+        cell = data.sel(scene=scene_name, variant=name)
         by_name.setdefault(name, []).append((cell[MAIN] / cell["tolerance"]).values[fit.used])
     return {name: np.concatenate(parts) for name, parts in by_name.items()}

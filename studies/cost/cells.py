@@ -118,11 +118,11 @@ def costs(data: xr.DataTree, cell: Cell, unit: str = SECONDS) -> Costs:
     values = np.where(np.isnan(values), np.inf, values)[np.ix_(rows, tops)]
     if unit == EVALUATIONS:
         return Costs(names, values, np.zeros(len(names)))
-    met = on_tops(part["met_at"], mask)[np.ix_(rows, tops)]
+    met_at = on_tops(part["met_at"], mask)[np.ix_(rows, tops)]
     fixed = part["control"].values[rows] == "step_size"
     tariff = prices(data)
     for row, name in enumerate(names):
-        price, call = tariff.at(name, np.full(met.shape[1], np.nan) if fixed[row] else met[row])
+        price, call = tariff.at(name, np.full(met_at.shape[1], np.nan) if fixed[row] else met_at[row])
         values[row] = values[row] * price + call
     return Costs(names, values, tariff.error[[tariff.names.index(name) for name in names]])
 
@@ -143,12 +143,12 @@ def safest(data: xr.DataTree, cell: Cell, keeping: bool = False) -> tuple[list[S
         if keeping and not (integrator(name).conserves or frozenset()) >= {"energy", "p_phi", "p_psi"}:
             continue
         runs = group.sel(variant=name)
-        met = runs["met_at"].sel(quantity=cell.quantity, target=cell.target).values[: mask.size].astype(float)
+        met_at = runs["met_at"].sel(quantity=cell.quantity, target=cell.target).values[: mask.size].astype(float)
         settings, fixed = runs["setting"].values, str(runs["control"].values) == "step_size"
         price, call = tariff.at(name, np.full(settings.size, np.nan) if fixed else settings)
         work = mean_work(data, cell, name)
         error = float(tariff.error[tariff.names.index(name)])
-        reached = met[mask][wide] * served_over_interpolated(data, cell, name)
+        reached = met_at[mask][wide] * served_over_interpolated(data, cell, name)
         ladders.append(Ladder(name, reached, settings, work * price + call, fixed, error))
     return safe(ladders, tariff.marked)
 
@@ -209,7 +209,7 @@ def advised(data: xr.DataTree, others: Sequence[str]) -> dict[str, list[float]]:
     For variants within `WITHIN` of the cheapest of their class, also of those that keep every constant, the cheapest
     where f is dear, and the `others`.
     """
-    asked: dict[str, list[float]] = {}
+    settings: dict[str, list[float]] = {}
     for place, target in enumerate(targets(data)):
         dear = fewest_calls(data, Cell("short", "axis", target, NATURAL, CLASSES[0]))
         extra = [*others, *([dear.best.name] if dear else [])]
@@ -218,8 +218,8 @@ def advised(data: xr.DataTree, others: Sequence[str]) -> dict[str, list[float]]:
             for choice in choices:
                 near = choice.seconds <= WITHIN * choices[0].seconds or choice.name in extra
                 if near and math.isfinite(choice.seconds):
-                    asked.setdefault(choice.name, [math.nan] * len(targets(data)))[place] = choice.setting
-    return dict(sorted(asked.items()))
+                    settings.setdefault(choice.name, [math.nan] * len(targets(data)))[place] = choice.setting
+    return dict(sorted(settings.items()))
 
 
 def reached(data: xr.DataTree, target: float) -> dict[str, Safe]:
@@ -284,14 +284,14 @@ def winners(data: xr.DataTree) -> list[dict[str, Any]]:
 def winner(data: xr.DataTree, cell: Cell) -> dict[str, Any]:
     """One cell in both protocols."""
     choices, called = safest(data, cell)
-    judged = contest(data, cell)
+    result = contest(data, cell)
     best = choices[0] if choices and np.isfinite(choices[0].seconds) else None
     return {
         "quantity": cell.quantity, "tops": cell.tops, "needs": cell.needs,
         "nutations": nutations(data, cell.horizon), "target": cell.target,
         "asked": int(asked_tops(data, cell).sum()), "safe": best,
-        "safe_called": called, "hindsight": judged.first, "hindsight_called": judged.called,
-        "solved": judged.solved,
+        "safe_called": called, "hindsight": result.first, "hindsight_called": result.called,
+        "solved": result.solved,
     }  # fmt: skip
 
 
@@ -330,8 +330,8 @@ def guard_counts(data: xr.DataTree) -> pd.DataFrame:
     kinds = {"wrong": runs["measured"] > WRONG, "right": runs["measured"] <= EXPECTED}
     kinds["between"] = ~kinds["wrong"] & ~kinds["right"]
     warned = {f"{name}_warned": mask & (runs["foretold"] > EXPECTED) for name, mask in kinds.items()}
-    counted = pd.DataFrame({**kinds, **warned, "wrong_seen": kinds["wrong"] & (runs["watched"] > KEPT)})
+    columns = pd.DataFrame({**kinds, **warned, "wrong_seen": kinds["wrong"] & (runs["watched"] > KEPT)})
     adaptive = np.where(runs["control"] == "tolerance", "adaptive", "fixed step, " + runs["chart"])
     return (
-        counted.assign(variants=adaptive, whole=runs["whole"] > 0.0).groupby(["variants", "whole"]).sum().reset_index()
+        columns.assign(variants=adaptive, whole=runs["whole"] > 0.0).groupby(["variants", "whole"]).sum().reset_index()
     )

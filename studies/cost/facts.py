@@ -174,10 +174,10 @@ def far_facts(data: xr.DataTree) -> dict[str, Any]:
     values |= {"map_tops": data["far"].sizes["member"], "map_methods": data["far"].sizes["variant"]}
     values |= {"predicted": predicted / reached if reached else None}
     checks = far.checks(data)
-    ran = checks.drop_duplicates(["quantity", "target", "horizon"])
+    cases = checks.drop_duplicates(["quantity", "target", "horizon"])
     values |= dict(zip(names[-3:], checks["ratio"].quantile([0.1, 0.5, 0.9]), strict=True))
-    return values | {"checks": len(ran) or None, "checks_runs": len(checks), "checks_told": int(checks["told"].sum()),
-                    "checks_longest": ran["horizon"].max()}  # fmt: skip
+    return values | {"checks": len(cases) or None, "checks_runs": len(checks), "checks_told": int(checks["told"].sum()),
+                    "checks_longest": cases["horizon"].max()}  # fmt: skip
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------

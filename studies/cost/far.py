@@ -122,39 +122,39 @@ class Asked(NamedTuple):
     budget: float  # force evaluations
 
 
-def run(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Samples, Array]]:
+def run(variant: Integrator, tops: Tops, requests: Sequence[Asked]) -> list[tuple[Samples, Array]]:
     """The runs of all tops with each setting, and the times (n, samples) of their samples.
 
     Those of a fixed step go side by side, the settings too, in one call.
     """
     if variant.fixed_step:
-        return together(variant, tops, wanted)
+        return together(variant, tops, requests)
     samples = []
-    for setting, ends, budget in wanted:
+    for setting, ends, budget in requests:
         times = places(ends).ravel() * tops.period[:, np.newaxis]
         runs = in_turn(variant, tops.numbers, [Plan.until(row, setting, budget) for row in times])
         samples.append((Samples(runs.states, runs.momenta, runs.work, runs.outcome == 0), times))
     return samples
 
 
-def together(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Samples, Array]]:
+def together(variant: Integrator, tops: Tops, requests: Sequence[Asked]) -> list[tuple[Samples, Array]]:
     """The runs of a fixed step, in one call, which needs equally many samples of all; extra samples are dropped."""
     marks = []
-    for setting, ends, _ in wanted:
+    for setting, ends, _ in requests:
         whole = np.maximum(np.rint(places(ends).ravel() * setting), 1).astype(np.int64)
         marks.append(np.maximum.accumulate(whole))
     each, n = [np.unique(part) for part in marks], len(tops.period)
     longest = max((part.size for part in each), default=0)
     if any(part[-1] < longest for part in each):  # a run with fewer steps than `longest` samples
-        return [samples for asked in wanted for samples in together(variant, tops, [asked])]
-    if not wanted:
+        return [samples for request in requests for samples in together(variant, tops, [request])]
+    if not requests:
         return []
-    shown = np.stack([filled(part, longest) for part in each])
-    h = np.stack([steps_of(tops, asked.setting) for asked in wanted])
-    runs = stepped(variant, np.tile(tops.numbers, (len(wanted), 1)), h.ravel(), np.repeat(shown, n, axis=0))
+    table = np.stack([filled(part, longest) for part in each])
+    h = np.stack([steps_of(tops, request.setting) for request in requests])
+    runs = stepped(variant, np.tile(tops.numbers, (len(requests), 1)), h.ravel(), np.repeat(table, n, axis=0))
     samples = []
-    for k, (part, seen) in enumerate(zip(marks, shown, strict=True)):
-        rows, columns = slice(k * n, (k + 1) * n), np.searchsorted(seen, part)
+    for k, (part, row) in enumerate(zip(marks, table, strict=True)):
+        rows, columns = slice(k * n, (k + 1) * n), np.searchsorted(row, part)
         states, momenta = runs.states[rows, columns], runs.momenta[rows, columns]
         parts = Samples(states, momenta, runs.work[rows], runs.outcome[rows] == 0)
         samples.append((parts, part * h[k][:, np.newaxis]))
@@ -167,9 +167,9 @@ def filled(marks: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     return np.union1d(marks, free)
 
 
-def errors(chart: str, tops: Tops, shown: Samples, times: Array) -> dict[str, Array]:
+def errors(chart: str, tops: Tops, samples: Samples, times: Array) -> dict[str, Array]:
     """Each quantity at each sample, (n, samples); inf where a run has failed."""
-    view = View(chart, chunks.together(tops.numbers), shown.states, shown.momenta[..., 0], shown.momenta[..., 1])
+    view = View(chart, chunks.together(tops.numbers), samples.states, samples.momenta[..., 0], samples.momenta[..., 1])
     with np.errstate(all="ignore"):
         axis, I1 = view.axis, view.top.I1
         if chart == "angles":
@@ -196,17 +196,17 @@ def shape(tops: Tops, u: Array, rate: Array) -> Array:
     return np.asarray(np.abs(off) / np.hypot(slope, 2.0 * omega * rate))
 
 
-def measured(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Array, Array]]:
+def measured(variant: Integrator, tops: Tops, requests: Sequence[Asked]) -> list[tuple[Array, Array]]:
     """For each setting, the largest errors (quantities, horizons, n) of the stretches, inf after a failure, and
     evaluations a nutation.
     """
     (chart,), results = variant.charts(), []
-    for (setting, ends, _), (shown, times) in zip(wanted, run(variant, tops, wanted), strict=True):
-        each = errors(chart, tops, shown, times)
+    for (setting, ends, _), (samples, times) in zip(requests, run(variant, tops, requests), strict=True):
+        each = errors(chart, tops, samples, times)
         largest = np.stack([each[name].reshape(len(times), len(ends), SAMPLES).max(axis=2).T for name in QUANTITIES])
         if variant.fixed_step and setting < LEAST_STEPS:
             largest[1:] = np.inf
-        results.append((largest, np.where(shown.ended, shown.evaluations / ends[-1], np.nan)))
+        results.append((largest, np.where(samples.ended, samples.evaluations / ends[-1], np.nan)))
     return results
 
 
@@ -221,12 +221,12 @@ def ladder(variant: Integrator, tops: Tops, levels: int, steps: float, budget: f
     far, n = horizons(), len(tops.period)
     seen, work = np.full((len(QUANTITIES), levels, far.size, n), np.nan), np.full((levels, n), np.nan)
     reach, values = np.full(levels, np.nan), np.full(levels, np.nan)
-    wanted: dict[int, Asked] = {}
+    requests: dict[int, Asked] = {}
     for level in range(levels):
         setting = setting_of(variant, level)
         if math.isnan(setting):
             break
-        ((tried, first),) = measured(
+        ((first_errors, first),) = measured(
             variant, tops, [Asked(setting, far[:1], math.inf if variant.fixed_step else budget)]
         )
         typical = float(np.nanmedian(first)) if np.isfinite(first).any() else math.nan
@@ -236,12 +236,12 @@ def ladder(variant: Integrator, tops: Tops, levels: int, steps: float, budget: f
         longest = min(budget / typical, steps / setting if variant.fixed_step else math.inf, 1.0001e6)
         if longest < far[laws.FEWEST]:
             break
-        wanted[level] = Asked(setting, far[far <= longest], 10.0 * budget)
-        if np.median(tried[:, 0], axis=1).max() < DONE:
+        requests[level] = Asked(setting, far[far <= longest], 10.0 * budget)
+        if np.median(first_errors[:, 0], axis=1).max() < DONE:
             break
-    for (level, asked), shown in zip(wanted.items(), measured(variant, tops, list(wanted.values())), strict=True):
-        values[level], reach[level] = asked.setting, asked.ends[-1]
-        seen[:, level, : asked.ends.size], work[level] = shown
+    for (level, request), pair in zip(requests.items(), measured(variant, tops, list(requests.values())), strict=True):
+        values[level], reach[level] = request.setting, request.ends[-1]
+        seen[:, level, : request.ends.size], work[level] = pair
     grain = grain_of(tops)
     return predicted(seen, work, far, grain, drifts=drifts_of(variant)).assign(
         setting_value=("setting", values), reach=("setting", reach), chart=((), variant.charts()[0]),
@@ -375,7 +375,7 @@ def diagram(data: xr.DataTree, quantity: str) -> Diagram:
 
 def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
     """Settings of the checks: predicted cells at some targets and horizons, runs of at most `limit` evaluations."""
-    asked: list[dict[str, Any]] = []
+    cases: list[dict[str, Any]] = []
     for quantity in QUANTITIES[:2]:
         panel = diagram(data, quantity)
         for target in CHECKED_TARGETS:
@@ -390,33 +390,33 @@ def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
                     settings.append(table["setting_value"].values[[max(fine - 1, 0), fine]].tolist())
                     dearest = max(dearest, float(np.nanmax(table["work"].values[fine])) * horizon)
                 runs = [[panel.names[row] for row in pair], settings]
-                if dearest <= limit and all([case["integrators"], case["settings"]] != runs for case in asked):
-                    asked.append({
+                if dearest <= limit and all([case["integrators"], case["settings"]] != runs for case in cases):
+                    cases.append({
                         "integrators": [panel.names[row] for row in pair], "quantity": quantity, "target": target,
                         "horizon": horizon, "settings": settings, "seed": data["far"].attrs.get("seed", 1),
                     })  # fmt: skip
-    return asked
+    return cases
 
 
-def check(asked: Any) -> xr.Dataset:
+def check(case: Any) -> xr.Dataset:
     """Largest ``errors`` of the first `CHECKED_TOPS` natural tops in the runs that decide a cell, over ``rank`` (the
     winner and the next variant), ``side`` (the coarser and the finer setting) and ``member``.
     """
-    tops, far = tops_of(CHECKED_TOPS, asked["seed"]), horizons()
-    ends = far[far <= 1.0001 * asked["horizon"]]
-    place = QUANTITIES.index(asked["quantity"])
+    tops, far = tops_of(CHECKED_TOPS, case["seed"]), horizons()
+    ends = far[far <= 1.0001 * case["horizon"]]
+    place = QUANTITIES.index(case["quantity"])
     errors = np.full((2, 2, CHECKED_TOPS), np.nan)
-    for rank, (name, pair) in enumerate(zip(asked["integrators"], asked["settings"], strict=True)):
+    for rank, (name, pair) in enumerate(zip(case["integrators"], case["settings"], strict=True)):
         runs = measured(integrator(name), tops, [Asked(setting, ends, np.inf) for setting in pair])
         errors[rank] = [error[place].max(axis=0) for error, _ in runs]
     return xr.Dataset(
         {
             "errors": (("rank", "side", "member"), errors),
-            "setting_value": (("rank", "side"), np.array(asked["settings"])),
-            "contender": ("rank", list(asked["integrators"])),
-            "quantity": ((), asked["quantity"]),
-            "target": ((), asked["target"]),
-            "checked_horizon": ((), asked["horizon"]),
+            "setting_value": (("rank", "side"), np.array(case["settings"])),
+            "contender": ("rank", list(case["integrators"])),
+            "quantity": ((), case["quantity"]),
+            "target": ((), case["target"]),
+            "checked_horizon": ((), case["horizon"]),
         }
     )
 
@@ -438,7 +438,7 @@ def checks(data: xr.DataTree) -> pd.DataFrame:
             runs, setting = runs_of(data, pair[rank]), float(row["setting_value"][rank, side])
             level = int(np.argmin(np.abs(np.log(runs["setting_value"].values / setting))))
             foreseen = runs["error"].sel(quantity=quantity).isel(setting=level).sel(horizon=horizon, method="nearest")
-            for error, foretold in zip(errors[rank, side].tolist(), foreseen.values.tolist(), strict=False):
-                ratio = error / foretold if max(error, foretold) < 1.0 else math.nan
-                rows.append([*cell, (error <= target) == (foretold <= target), ratio])
+            for error, prediction in zip(errors[rank, side].tolist(), foreseen.values.tolist(), strict=False):
+                ratio = error / prediction if max(error, prediction) < 1.0 else math.nan
+                rows.append([*cell, (error <= target) == (prediction <= target), ratio])
     return pd.DataFrame(rows, columns=names).astype({"told": bool, "ratio": float})

@@ -45,9 +45,9 @@ TITLES = {
 
 def pictures(data: xr.DataTree) -> list[Picture]:
     """All figures."""
-    drawn = {"accuracy": draw_accuracy, "run-lengths-evaluations": draw_run_lengths}
-    drawn |= {"map": draw_map} if "far" in data.children else {}
-    return [Picture(name, draw(data)) for name, draw in drawn.items()]
+    draws = {"accuracy": draw_accuracy, "run-lengths-evaluations": draw_run_lengths}
+    draws |= {"map": draw_map} if "far" in data.children else {}
+    return [Picture(name, draw(data)) for name, draw in draws.items()]
 
 
 def draw_accuracy(data: xr.DataTree) -> Any:
@@ -60,10 +60,10 @@ def draw_accuracy(data: xr.DataTree) -> Any:
         points = [(1e6 * known[name].seconds, target, 1e6 * known[name].low, 1e6 * known[name].high)
                   for target, known in each.items() if name in known]  # fmt: skip
         x, y, low, high = np.array(points).T
-        look, whom = style.line(name), " (this top)" if integrator(name).needs == TOP else serves(name)
+        look, suffix = style.line(name), " (this top)" if integrator(name).needs == TOP else serves(name)
         axis.plot(x, y, lw=1.6, zorder=3, **look)
         axis.hlines(y, low, high, color=look["color"], lw=3.0, alpha=0.35, zorder=2)
-        ends.append((f"{name.removesuffix('[axis]')}{whom}", look["color"], x, y))
+        ends.append((f"{name.removesuffix('[axis]')}{suffix}", look["color"], x, y))
     axis.set(xscale="log", yscale="log", ylim=(2e-13, 5e-3), ylabel="axis error that 95 % of the tops keep (rad)")
     axis.set_yticks(list(each), [f"$10^{{{math.log10(target):.0f}}}$" for target in each])
     axis.yaxis.minorticks_off()
@@ -83,18 +83,18 @@ def _safe_names(data: xr.DataTree) -> list[str]:
 
 def draw_run_lengths(data: xr.DataTree) -> Any:
     """The share of natural tops that each variant solves within a number of force evaluations, a panel per target."""
-    asked = [Cell("short", "axis", target, NATURAL) for target in cells.targets(data)]
-    each = [cells.costs(data, cell, EVALUATIONS) for cell in asked]
-    firsts = filter(None, (cells.fewest(data, cell) for cell in asked))
+    panel_cells = [Cell("short", "axis", target, NATURAL) for target in cells.targets(data)]
+    each = [cells.costs(data, cell, EVALUATIONS) for cell in panel_cells]
+    firsts = filter(None, (cells.fewest(data, cell) for cell in panel_cells))
     every = list(dict.fromkeys(name for table in each for name in table.names))
     rows = chosen(every, list(dict.fromkeys([*_safe_names(data), *firsts, *BESIDE]))[:NAMED], NAMED)
     labels = "force evaluations of a run", "share of tops solved"
-    figure, axes = grid(len(asked), 2, labels, height=2.3, sharex=True, sharey=True)
-    named = [table.values[table.names.index(name)] for table in each for name in rows if name in table.names]
-    ends = [np.quantile(part[np.isfinite(part)], LATEST) for part in named if np.isfinite(part).any()]
+    figure, axes = grid(len(panel_cells), 2, labels, height=2.3, sharex=True, sharey=True)
+    curves = [table.values[table.names.index(name)] for table in each for name in rows if name in table.names]
+    ends = [np.quantile(part[np.isfinite(part)], LATEST) for part in curves if np.isfinite(part).any()]
     cheapest = min((float(table.values.min()) for table in each if table.values.size), default=1.0)
     budgets = np.geomspace(0.9 * cheapest, 1.5 * max(ends, default=10.0 * cheapest), 400)
-    for axis, cell, table in zip(axes, asked, each, strict=True):
+    for axis, cell, table in zip(axes, panel_cells, each, strict=True):
         for name, costs in zip(table.names, table.values, strict=True):
             share = run_lengths(costs, budgets)
             if name in rows:

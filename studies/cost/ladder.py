@@ -170,11 +170,11 @@ def climb(
             if not live.size or math.isnan(setting_of(variant, level)):
                 break
             runs = run(variant, tops, live, level, budget)
-            shown = tops.errors(chart, runs, live)
-            good = (runs.outcome == 0) & np.isfinite(shown["axis"])
+            errors = tops.errors(chart, runs, live)
+            good = (runs.outcome == 0) & np.isfinite(errors["axis"])
             record.work[level, live], record.ended[level, live] = runs.work, good
             for name, values in record.errors.items():
-                values[level, live] = np.where(good, shown[name], np.inf)
+                values[level, live] = np.where(good, errors[name], np.inf)
             stay, settled = _stay(variant, record, asked, live, level, budget)
             record.settled[live] = settled
             live = live[stay]
@@ -250,15 +250,15 @@ def costs_of(
     """The variables ``cost``, ``met_at`` and ``setting``; `firsts` gives the first level that counts for a quantity."""
     settings = np.array([setting_of(variant, level) for level in range(LEVELS)])
     set_to = np.where(np.isfinite(record.work), settings[:, np.newaxis], np.nan)
-    costs, met = (np.full((len(names), len(TARGETS), record.work.shape[1]), np.nan, np.float32) for _ in range(2))
+    costs, met_at = (np.full((len(names), len(TARGETS), record.work.shape[1]), np.nan, np.float32) for _ in range(2))
     for place, name in enumerate(names):
         if name in asked:
             first = (firsts or {}).get(name, 0)
-            for into, values in ((costs, record.work), (met, set_to)):
+            for array, values in ((costs, record.work), (met_at, set_to)):
                 reached = cost_to_reach(values[first:], record.errors[name][first:], TARGETS)
-                into[place] = np.where(asked[name], stored(reached), np.nan)
+                array[place] = np.where(asked[name], stored(reached), np.nan)
     over = "quantity", "target", "member"
-    return {"cost": (over, costs), "met_at": (over, met), "setting": ("level", settings)}
+    return {"cost": (over, costs), "met_at": (over, met_at), "setting": ("level", settings)}
 
 
 def typical_work(variant: Integrator, record: Climb, tops: Any) -> Array:
@@ -290,10 +290,10 @@ def _healthy(record: Climb, tops: Tops) -> dict[str, Array]:
     right_later = record.settled & ~ran & tops.known  # left before with an accurate run
     wrong = ran & ~(error <= WRONG)
     silent = wrong & record.ended & (record.errors["energy"] <= KEPT) & (record.errors[MOMENTA] <= KEPT)
-    counted = {"runs": ran | right_later, "wrong": wrong, "ended": record.ended | right_later, "silent": silent}
+    masks = {"runs": ran | right_later, "wrong": wrong, "ended": record.ended | right_later, "silent": silent}
     return {
         name: np.stack([mask[:, tops.kinds == kind].sum(axis=1) for kind in range(len(KINDS))], axis=1).astype(float)
-        for name, mask in counted.items()
+        for name, mask in masks.items()
     }
 
 
@@ -303,7 +303,7 @@ def guarded_runs(variant: Integrator, tops: Tops, record: Climb, guarded: int, b
     Arrays (LEVELS, guarded). The error of a run that ends early is infinite, in the forecast and in the run.
     """
     (chart,) = variant.charts()
-    seen = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured", "whole")}
+    data = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured", "whole")}
     each = [
         np.flatnonzero(tops.known & part)
         for part in (tops.kinds < KINDS.index(NATURAL), tops.kinds == KINDS.index(NATURAL))
@@ -319,8 +319,8 @@ def guarded_runs(variant: Integrator, tops: Tops, record: Climb, guarded: int, b
                 else:
                     plan = Plan.until(tops.times[member], setting_of(variant, level), budget)
                 expected = forecast(scene, variant, chart, plan)
-                seen["foretold"][level, place] = expected.axis_error if expected.outcome == "ok" else math.inf
-                seen["whole"][level, place] = expected.whole
-                seen["watched"][level, place] = max(record.errors[name][level, member] for name in ("energy", MOMENTA))
-                seen["measured"][level, place] = record.errors["axis"][level, member]
-    return seen
+                data["foretold"][level, place] = expected.axis_error if expected.outcome == "ok" else math.inf
+                data["whole"][level, place] = expected.whole
+                data["watched"][level, place] = max(record.errors[name][level, member] for name in ("energy", MOMENTA))
+                data["measured"][level, place] = record.errors["axis"][level, member]
+    return data

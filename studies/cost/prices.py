@@ -71,8 +71,8 @@ Call = tuple[Callable[[], object], float]  # with its number of force evaluation
 @functools.cache
 def timed_top() -> tuple[SymmetricTop, Angles, float]:
     """The top that is timed, its start and its nutation period."""
-    drawn = population(DRAWN, seed=0, kind=KIND)
-    numbers = np.stack([drawn[name].values for name in NUMBERS], axis=1)
+    members = population(DRAWN, seed=0, kind=KIND)
+    numbers = np.stack([members[name].values for name in NUMBERS], axis=1)
     forms = ClosedForms(numbers)
     low, high = forms.theta_range.T
     chosen = int(np.flatnonzero((low > CLEAR) & (high < np.pi - CLEAR))[0])

@@ -74,8 +74,8 @@ def slowdowns(costs: Array) -> Array:
 
 def run_lengths(costs: Array, budgets: Array) -> Array:
     """The share of tops solved within each budget: an empirical distribution, NaN costs (not asked) left out."""
-    asked = np.sort(costs[~np.isnan(costs)])
-    return np.searchsorted(asked, budgets, side="right") / max(asked.size, 1)
+    known = np.sort(costs[~np.isnan(costs)])
+    return np.searchsorted(known, budgets, side="right") / max(known.size, 1)
 
 
 def factors(errors: Array, draws: int = DRAWS) -> Array:

@@ -170,13 +170,13 @@ class Tops:
                 self._members[k] = member
             yield member
 
-    def errors(self, chart: str, shown: Samples, chosen: NDArray[np.int64]) -> dict[str, Array]:
+    def errors(self, chart: str, samples: Samples, chosen: NDArray[np.int64]) -> dict[str, Array]:
         """Largest error of each quantity of the chosen members' runs, (chosen,); inf after a failure.
 
         `attitude` is left out where the chart does not show it.
         """
         parts = [slice(begin, begin + TOGETHER) for begin in range(0, max(len(chosen), 1), TOGETHER)]
-        each = [self._errors(chart, shown.states[part], shown.momenta[part], chosen[part]) for part in parts]
+        each = [self._errors(chart, samples.states[part], samples.momenta[part], chosen[part]) for part in parts]
         return {name: np.concatenate([part[name] for part in each]) for name in each[0]}
 
     def _errors(self, chart: str, states: Array, momenta: Array, chosen: NDArray[np.int64]) -> dict[str, Array]:
@@ -187,8 +187,8 @@ class Tops:
             each = {"axis": charts.axis_distance(view.axis, self.truth[0][chosen])}
             if chart != "axis":
                 each["attitude"] = charts.attitude_distance(view.quaternion, self.truth[1][chosen])
-            off = np.abs(view.energy - self.energy[chosen, np.newaxis])
-            each["energy"] = off / self.energy_scale[chosen, np.newaxis]
+            change = np.abs(view.energy - self.energy[chosen, np.newaxis])
+            each["energy"] = change / self.energy_scale[chosen, np.newaxis]
             start = [part[chosen, np.newaxis] for part in self.momenta[:2]]
             scale = np.maximum(np.maximum(np.abs(start[0]), np.abs(start[1])), TINY)
             each[MOMENTA] = np.maximum(np.abs(p_phi - start[0]), np.abs(p_psi - start[1])) / scale
@@ -223,8 +223,8 @@ def named() -> dict[str, Array]:
 @functools.lru_cache(maxsize=3)
 def tops_of(strata: int, natural_tops: int, seed: int, nutations: float) -> Tops:
     """Tops of both populations and the named scenes; cached, as every variant runs the same."""
-    drawn = population(strata, seed=seed)
-    parts = np.stack([drawn[name].values for name in NUMBERS], axis=1), natural(natural_tops, seed), [*named().values()]
-    places = [KINDS.index(name) for name in drawn["stratum"].values]
+    draws = population(strata, seed=seed)
+    parts = np.stack([draws[name].values for name in NUMBERS], axis=1), natural(natural_tops, seed), [*named().values()]
+    places = [KINDS.index(name) for name in draws["stratum"].values]
     kinds = [*places, *[KINDS.index(NATURAL)] * natural_tops, *[KINDS.index(SCENE)] * len(parts[2])]
     return Tops(np.concatenate([np.reshape(part, (-1, len(NUMBERS))) for part in parts]), nutations, np.array(kinds))

@@ -109,12 +109,12 @@ def of_walks(ensembles: xr.Dataset) -> dict[str, Any]:
 def of_losses(horizons: xr.Dataset) -> dict[str, Any]:
     """How well a short run predicts when the phase is lost."""
     lost, short = loss_table(horizons), float(horizons["short"].max())
-    off = np.abs(lost["predicted / measured"] - 1.0)
+    misses = np.abs(lost["predicted / measured"] - 1.0)
     return {
         "lost_short": short,  # nutations
         "lost_later": float(lost["measured (nutations)"].median() / short),  # times as late as the short run ends
-        "lost_hits": int((off <= CLOSE).sum()),
-        "lost_hit_most": float(off[off <= CLOSE].max()),
+        "lost_hits": int((misses <= CLOSE).sum()),
+        "lost_hit_most": float(misses[misses <= CLOSE].max()),
         "lost_count": len(lost),
     }
 

@@ -58,9 +58,9 @@ def fates(histories: xr.Dataset) -> pd.DataFrame:
     """
     lines = pd.DataFrame(index=list(map(str, histories["variant"].values)))
     for name in CONSTANTS:
-        asked = histories[["outcome", *(f"{name}_{part}" for part in ("largest", "exponent", "exponent_interval"))]]
-        lines[name] = [worst_behaviour(asked.isel(variant=k), name) for k in range(len(lines))]
-        lines[f"{name}_largest"] = asked[f"{name}_largest"].max("scene").values
+        columns = histories[["outcome", *(f"{name}_{part}" for part in ("largest", "exponent", "exponent_interval"))]]
+        lines[name] = [worst_behaviour(columns.isel(variant=k), name) for k in range(len(lines))]
+        lines[f"{name}_largest"] = columns[f"{name}_largest"].max("scene").values
     return lines
 
 

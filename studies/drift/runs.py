@@ -108,8 +108,8 @@ def rounding(scene: Scene, method: Integrator, steps: int, per_nutation: float, 
     gauges = gauges_of(scenes, method, per_nutation)
     for prefix, compensated, many in (("", True, count), ("plain_", False, PLAIN_MEMBERS)):
         chosen = scenes[:many], gauges[:many]
-        ends, seen = side_by_side(*chosen, method, steps, per_nutation, compensated=compensated)
-        elapsed, drifts = elapsed_steps(ends), seen["modified_energy"][..., MEAN]
+        ends, quantities = side_by_side(*chosen, method, steps, per_nutation, compensated=compensated)
+        elapsed, drifts = elapsed_steps(ends), quantities["modified_energy"][..., MEAN]
         grown = ensemble_growth(elapsed, drifts, ends[0])
         columns["elapsed"] = ("window", elapsed)
         columns[f"{prefix}drift"] = ((f"{prefix}member", "window"), drifts)
@@ -117,7 +117,7 @@ def rounding(scene: Scene, method: Integrator, steps: int, per_nutation: float, 
         columns[f"{prefix}end"] = float(grown.rms[-1])
         columns[f"{prefix}exponent"], columns[f"{prefix}exponent_interval"] = grown.fit.slope, grown.fit.interval
         for momentum in ("p_phi", "p_psi") if compensated else ():
-            columns[momentum] = float(np.abs(seen[momentum]).max())
+            columns[momentum] = float(np.abs(quantities[momentum]).max())
     late = elapsed > 0.1 * elapsed[-1]
     for prefix in ("", "plain_"):
         walks = columns[f"{prefix}drift"][1][:PLAIN_MEMBERS, late]

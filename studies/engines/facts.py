@@ -69,7 +69,7 @@ def _lines(data: xr.DataTree, names: dict[str, None]) -> Iterator[dict[str, Any]
         part = (count > BETWEEN[0]) & (count < BETWEEN[1]) & (error > ROUNDING)
         order, least = slope(count[part], error[part]), int(np.argmin(error)) if error.size else None
         single, term = entry.precision == "single", not split_name(name)[0].startswith("no-gyro")
-        off = np.degrees(read(data, "population", "off", scene="population", variant=name))
+        angles = np.degrees(read(data, "population", "off", scene="population", variant=name))
         yield {
             "variant": name, "summary": entry.summary, "engine": entry.family == "engine", "single": single,
             "term": term, "order": order, "group": 0.0 if not term else 1.0 if single else max(1.0, np.round(order)),
@@ -80,7 +80,7 @@ def _lines(data: xr.DataTree, names: dict[str, None]) -> Iterator[dict[str, Any]
             "slow_level": frame(data, "level_axis", name), "fast_level": frame(data, "level_axis", name, FAST),
             "energy": frame(data, "frame_energy", name, long=True), "spin": frame(data, "frame_spin", name, long=True),
             "spherical": frame(data, "frame_spherical", name),
-            "share": math.nan if np.isnan(off).any() else np.mean(off <= NEAR),
+            "share": math.nan if np.isnan(angles).any() else np.mean(angles <= NEAR),
         }  # fmt: skip
 
 

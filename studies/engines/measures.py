@@ -45,8 +45,8 @@ def axis_angle(first: np.ndarray, second: np.ndarray) -> np.ndarray:
 
 def azimuth(e: np.ndarray) -> float:
     """The angle (rad) that axes of shape (n, 3) have run through about the vertical; NaN where a run has ended."""
-    turned = np.unwrap(np.arctan2(e[:, 1], e[:, 0]))
-    return float(turned[-1] - turned[0])
+    angles = np.unwrap(np.arctan2(e[:, 1], e[:, 0]))
+    return float(angles[-1] - angles[0])
 
 
 def judged(scene: Scene, variant: Integrator, h: float, horizon: float) -> dict[str, float]:
@@ -89,9 +89,9 @@ def frames(scene: Scene, variant: Integrator, horizons: tuple[float, float]) -> 
     runs = at(FREQUENCIES)
     a_step = max(1, *(round(run["forces"] / run["steps"]) for part in runs for run in part))
     level = runs if a_step == 1 else at([rate / a_step for rate in FREQUENCIES])
-    shown = {f"frame_{name}": [[run[name] for run in part] for part in runs] for name in NUMBERS}
-    shown["level_axis"] = [[run["axis"] for run in part] for part in level]
-    table = xr.Dataset({name: (("rate", "horizon"), values) for name, values in shown.items()})
+    columns = {f"frame_{name}": [[run[name] for run in part] for part in runs] for name in NUMBERS}
+    columns["level_axis"] = [[run["axis"] for run in part] for part in level]
+    table = xr.Dataset({name: (("rate", "horizon"), values) for name, values in columns.items()})
     return table.assign(forces_a_step=float(a_step)).assign_coords(rate=list(FREQUENCIES), horizon=list(horizons))
 
 

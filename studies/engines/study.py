@@ -64,8 +64,8 @@ def measure(case: Case) -> xr.Dataset:
         return followed(scene(case.scene, bodies=True), row)
     tops, true, per_nutation = _members(chosen["members"], chosen["seed"])
     run = ensemble(tops, row, step_size=FRAME, horizon=HORIZON, samples=2, threads=1, quiet=True)
-    off = axis_angle(run["axis"].values[:, -1], true)
-    return xr.Dataset({"off": ("member", off), "steps_a_nutation": ("member", per_nutation)})
+    angles = axis_angle(run["axis"].values[:, -1], true)
+    return xr.Dataset({"off": ("member", angles), "steps_a_nutation": ("member", per_nutation)})
 
 
 STUDY = Study(

@@ -124,9 +124,9 @@ def pairs(frame: pd.DataFrame) -> pd.DataFrame:
     """The ratio of every pair of times that differ in one factor alone, for the changes in `STEPS`."""
     frames = []
     for factor, before, after in STEPS if len(frame) else ():
-        held = [*GOAL, *(name for name in FACTORS if name != factor)]
-        both = frame[frame[factor] == before].merge(frame[frame[factor] == after], on=held)
-        frames.append(both[held].assign(factor=factor, before=before, after=after,
+        columns = [*GOAL, *(name for name in FACTORS if name != factor)]
+        both = frame[frame[factor] == before].merge(frame[frame[factor] == after], on=columns)
+        frames.append(both[columns].assign(factor=factor, before=before, after=after,
                                        ratio=both["seconds_x"] / both["seconds_y"]))  # fmt: skip
     return pd.concat(frames) if frames else pd.DataFrame(columns=["factor", "before", "after", "ratio"])
 

@@ -53,10 +53,10 @@ def settle(scene: Scene, grid: Sequence[Cell], goal: Goal) -> dict[Cell, setting
         leader = leaders.get(pair)
         if leader is None:
             plan = {"patience": patience, "least": LEAST}
-            met = settings.search(scene, cell.method, goal.target, "axis", horizon, **plan)
-            if met.why == settings.STOPPED:  # the error of an adaptive method need not fall with every finer tolerance
-                met = settings.search(scene, cell.method, goal.target, "axis", horizon, FINER * goal.target, **plan)
-            settled[cell] = leaders[pair] = met
+            trial = settings.search(scene, cell.method, goal.target, "axis", horizon, **plan)
+            if trial.why == settings.STOPPED:  # an adaptive method's error need not fall with every finer tolerance
+                trial = settings.search(scene, cell.method, goal.target, "axis", horizon, FINER * goal.target, **plan)
+            settled[cell] = leaders[pair] = trial
         elif leader.why:
             settled[cell] = leader
         elif leader.evaluations > patience:
@@ -75,33 +75,33 @@ class Runs(NamedTuple):
     batch: float  # seconds
 
 
-def least_times(asked: Runs) -> list[float]:
+def least_times(plan: Runs) -> list[float]:
     """In this process: the least time of each run, in seconds."""
     known = {cell.name: cell for cell in cells()}
-    functions: Any = [caller(asked.scene, known[name], *run) for name, *run in asked.runs]
-    for name, call, setting, horizon in asked.runs:
-        brief: Any = caller(asked.scene, known[name], call, min(setting, WARM * horizon), WARM * horizon)
+    functions: Any = [caller(plan.scene, known[name], *run) for name, *run in plan.runs]
+    for name, call, setting, horizon in plan.runs:
+        brief: Any = caller(plan.scene, known[name], call, min(setting, WARM * horizon), WARM * horizon)
         first_call(brief)
-    times = timings(functions, asked.rounds, asked.batch, warm=True, patience=ENOUGH, least=1)
+    times = timings(functions, plan.rounds, plan.batch, warm=True, patience=ENOUGH, least=1)
     return [timing.best for timing in times]
 
 
-def timed(asked: Runs, processes: int) -> Array:
+def timed(plan: Runs, processes: int) -> Array:
     """The least time of every run in each of some fresh processes, (runs, processes)."""
-    return np.array([fresh_process.call(least_times, asked) for _ in range(processes)]).T
+    return np.array([fresh_process.call(least_times, plan) for _ in range(processes)]).T
 
 
-def settled_times(asked: Runs, processes: int) -> tuple[Array, Array]:
+def settled_times(plan: Runs, processes: int) -> tuple[Array, Array]:
     """As `timed`, and how often each time was measured.
 
     Noisy times are measured again by as many processes; of all, the least are kept, as many as before.
     """
-    times, tries = timed(asked, processes), np.ones(len(asked.runs))
+    times, tries = timed(plan, processes), np.ones(len(plan.runs))
     for _ in range(TRIES - 1):
         loud = np.flatnonzero(quartile_spread(times) > NOISY)
         if not loud.size:
             break
-        again = timed(asked._replace(runs=[asked.runs[i] for i in loud]), processes)
+        again = timed(plan._replace(runs=[plan.runs[i] for i in loud]), processes)
         times[loud] = np.sort(np.hstack([times[loud], again]))[:, :processes]
         tries[loud] += 1
     return times, tries

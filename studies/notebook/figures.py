@@ -15,8 +15,8 @@ from .measures import MIDPOINT, MODIFIED, SOLVER
 def pictures(data: xr.Dataset) -> list[Picture]:
     """The energy of the solver and of methods of order two; the modified energy."""
     runs = data["variant"].values
-    drawn = [draw_energy(data)] if any(name in runs for name in (SOLVER, *DRAWN)) else []
-    return [*drawn, draw_modified_energy(data)] if any(name in runs for name in MODIFIED) else drawn
+    figures = [draw_energy(data)] if any(name in runs for name in (SOLVER, *DRAWN)) else []
+    return [*figures, draw_modified_energy(data)] if any(name in runs for name in MODIFIED) else figures
 
 
 def draw_energy(data: xr.Dataset) -> Picture:

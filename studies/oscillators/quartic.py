@@ -188,8 +188,8 @@ def _terms(pulls: Sequence[int], x: Sequence[int], v: Sequence[int]) -> tuple[li
     for n in range(ORDER - 1):
         backward = [part[n::-1] for part in (real, imaginary)]
         squares.append(_product(real, backward[0]) + _product(imaginary, backward[1]))
-        for part, turned in zip((real, imaginary), backward, strict=True):
-            force = pulls[0] * _product(squares, turned) + pulls[1] * turned[0]
+        for part, row in zip((real, imaginary), backward, strict=True):
+            force = pulls[0] * _product(squares, row) + pulls[1] * row[0]
             part.append((force >> BITS) // ((n + 1) * (n + 2)))
     return real, imaginary
 

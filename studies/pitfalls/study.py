@@ -131,8 +131,8 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     figure, axes = panels(1, 3)
     figure.set_figheight(2.2)  # inches; the front page shows it among others
     titles = ("no gyroscopic term", "energy kept, motion wrong", "a pole in Euler's angles")
-    drawn = lines(data)
-    for place, (axis, title, each) in enumerate(zip(axes[0], titles, drawn, strict=True)):
+    curves = lines(data)
+    for place, (axis, title, each) in enumerate(zip(axes[0], titles, curves, strict=True)):
         axis.set(title=title, yscale="log", xlabel="nutations", ylabel="error of the axis (rad)")
         for label, color, x, y in each:
             axis.plot(x, y, color=color, marker="" if place else "o", ms=2.5)
@@ -143,7 +143,7 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     axes[0, 0].set(xscale="log", xlabel="steps a nutation")
     axes[0, 1].set_ylabel("error")
     few_ticks(*axes[0], most=5)
-    for axis, each in zip(axes[0], drawn, strict=True):
+    for axis, each in zip(axes[0], curves, strict=True):
         label_lines(axis, each)
     return [Picture("three", figure)]
 

@@ -31,7 +31,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     """Which rules commute with the reduction (rad), how far an unreduced form is from its kernel, times of charts."""
     gaps, kernels, charts = tables(data).values()
     compared = cells(data, "theta_gap")
-    same, apart = (gaps[(gaps[WORST] < COMMUTES) == wanted] for wanted in (True, False))
+    same, apart = (gaps[(gaps[WORST] < COMMUTES) == commutes] for commutes in (True, False))
     ends = {"least": apart["power of h"].min(), "most": apart["power of h"].max()}
     return {
         "charts_periods": CHART_PERIODS,  # nutations
@@ -93,9 +93,9 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
             charts.append([scene, name, ratio.base, ratio.time, ratio.error, ratio.to_error])
     header = ["scene", "rule", "step (s)", "time (ratio)", "iterations (ratio)", "time of an iteration (ratio)",
               "a step, reduced (s)", "unreduced (s)", "iterations a step, reduced", "unreduced"]  # fmt: skip
-    over = ["scene", "variant", "against", "time (ratio)", "axis error (ratio)", RATIO]
+    columns = ["scene", "variant", "against", "time (ratio)", "axis error (ratio)", RATIO]
     return {
         "commutation": commutation(data),
         "kernels": pd.DataFrame(kernels, columns=header),
-        "charts": pd.DataFrame(charts, columns=over).sort_values(RATIO, ascending=False, kind="stable"),
+        "charts": pd.DataFrame(charts, columns=columns).sort_values(RATIO, ascending=False, kind="stable"),
     }

@@ -26,9 +26,9 @@ def shown(data: xr.Dataset) -> xr.Dataset:
 
 def cost(cell: xr.Dataset, target: float) -> float:
     """Seconds of a run whose axis error is at most the target, by `cost_to_reach`; or inf."""
-    error, paid = cell["axis"].values, cell["seconds"].values
-    good = np.isfinite(error) & np.isfinite(paid) & (error > 0.0)
-    columns = paid[good, np.newaxis], error[good, np.newaxis]
+    error, seconds = cell["axis"].values, cell["seconds"].values
+    good = np.isfinite(error) & np.isfinite(seconds) & (error > 0.0)
+    columns = seconds[good, np.newaxis], error[good, np.newaxis]
     return float(cost_to_reach(*columns, [target])[0, 0]) if good.any() else math.inf
 
 

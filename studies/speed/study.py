@@ -41,18 +41,18 @@ def cases(quick: bool) -> list[Case]:
     """Every method of `METHODS` in the registry, in its charts, and the closed form, on every scene."""
     names = [f"{name}[{chart}]" for name, charts in METHODS.items() if name in integrators() for chart in charts]
     names.insert(0, REFERENCE)
-    asked = {"lengths": LENGTHS[:1] if quick else LENGTHS, "settings": 7 if quick else SETTINGS}
-    return [Case(place, name, asked) for place in (SCENES[:1] if quick else SCENES) for name in names]
+    settings = {"lengths": LENGTHS[:1] if quick else LENGTHS, "settings": 7 if quick else SETTINGS}
+    return [Case(place, name, settings) for place in (SCENES[:1] if quick else SCENES) for name in names]
 
 
 def follow_up(data: xr.Dataset) -> list[Case]:
     """One case for each scene, which times all its runs together, `without` those that have no error."""
     names, lengths = data["variant"].values.tolist(), data["nutations"].values.tolist()
-    asked = {"lengths": lengths, "settings": data.sizes["setting"], "integrators": names}
+    settings = {"lengths": lengths, "settings": data.sizes["setting"], "integrators": names}
     ended = (data["axis"].notnull() | data["attitude"].notnull()).transpose("scene", "variant", "nutations", "setting")
-    without = [np.argwhere(~on.values).tolist() for on in ended]  # places of runs, in the order of the last three
+    without = [np.argwhere(~mask.values).tolist() for mask in ended]  # places of runs, in the order of the last three
     return [
-        Case(str(place), "together", asked | {"without": places}, timed=True)
+        Case(str(place), "together", settings | {"without": places}, timed=True)
         for place, places in zip(data["scene"].values, without, strict=True)
     ]
 

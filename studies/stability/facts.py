@@ -40,13 +40,13 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
 
 def atlas_facts(data: xr.Dataset, family: str) -> dict[str, Any]:
     """The shares and reaches of the maps over the spin of one family."""
-    shown, known = maps(data, family), methods_of(data)
-    steps = {name: map_ for name, map_ in shown.items()
+    family_maps, known = maps(data, family), methods_of(data)
+    steps = {name: map_ for name, map_ in family_maps.items()
              if map_.control == "step_size" and not (name in known and known[name].exact_steps)}  # fmt: skip
-    ran = np.concatenate([map_.made.ravel() for map_ in shown.values()])
+    ran = np.concatenate([map_.made.ravel() for map_ in family_maps.values()])
     values = {
         "family": family,
-        "silent": float(pd.Series([map_.silent for map_ in shown.values()]).median()),  # of the inaccurate runs
+        "silent": float(pd.Series([map_.silent for map_ in family_maps.values()]).median()),  # of the inaccurate runs
         "cells": ran.size,
         "settled": 1.0 - ran.mean(),  # share that was not run
         **{name: int(data[name].sel(scene=family).sum()) for name in ("checks", "refuted")},

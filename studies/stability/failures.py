@@ -119,19 +119,19 @@ def separatrix_horizon(method: Integrator, scene: Scene, setting: float) -> Hori
     else:
         plan = Plan.until(np.linspace(0.0, LONGEST, 1601) / rate, setting)
     times = plan.times
-    outcome, seen = _run(method, scene, scene.start, plan)
+    outcome, view = _run(method, scene, scene.start, plan)
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
-        error = charts.axis_distance(seen.axis, closed_form(scene).axis(times))
+        error = charts.axis_distance(view.axis, closed_form(scene).axis(times))
     early = float(error[np.searchsorted(times, SEEN / rate * (1.0 - 1e-12))])
-    past = np.flatnonzero(error > LOST)
-    reached = float(times[past[0]]) if past.size else math.nan
+    late = np.flatnonzero(error > LOST)
+    reached = float(times[late[0]]) if late.size else math.nan
     predicted = (SEEN + math.log(LOST / early)) / rate if early > 0.0 else math.nan
-    return Horizon(early, reached, predicted, float(outcome != "ok" and not past.size))
+    return Horizon(early, reached, predicted, float(outcome != "ok" and not late.size))
 
 
 def sampled_energy_error(method: Integrator, scene: Scene, steps: int, periods: int) -> tuple[float, float]:
     """Largest |E - E0| seen once a nutation, and at every step; `steps` make one nutation."""
     plan = Plan.steps(scene.nutation_period / steps, np.arange(steps * periods + 1))
-    _, seen = _run(method, scene, scene.start, plan)
-    error = np.abs(seen.energy - scene.top.energy(scene.start))
+    _, view = _run(method, scene, scene.start, plan)
+    error = np.abs(view.energy - scene.top.energy(scene.start))
     return float(error[steps::steps].max()), float(error.max())

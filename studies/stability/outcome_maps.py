@@ -211,8 +211,8 @@ class _Descent:
             results = Made(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
         else:
             results = together(self.runs, self.solver, columns, self.tops[rows], self.truth.periods[rows])
-        seen = judge_runs(self.truth.part(rows), self.runs.phases[columns], self.followed[columns], *results)
-        self.judged.verdict[rows, columns], self.judged.axis_error[rows, columns] = seen
+        verdicts = judge_runs(self.truth.part(rows), self.runs.phases[columns], self.followed[columns], *results)
+        self.judged.verdict[rows, columns], self.judged.axis_error[rows, columns] = verdicts
         self.made[rows, columns] = True
 
     def _settle(self, rows: NDArray[np.int64], columns: slice) -> None:
