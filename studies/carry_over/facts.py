@@ -319,7 +319,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     names = [code(name) for name in FIRST_TRIED if name in known]
     values["first_tried"] = listed(names) if names else None
     for family in OTHERS:
-        values |= _of_family(data, family)
+        values |= _family_facts(data, family)
     values["silent_0"] = silent_share(data, SYMMETRIC)
     prices = np.array([*by.price_factors(data).values()])
     if prices.size:
@@ -346,7 +346,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     }
 
 
-def _of_family(data: xr.DataTree, family: str) -> dict[str, Any]:
+def _family_facts(data: xr.DataTree, family: str) -> dict[str, Any]:
     place, order = key(family), order_gap(data, family)
     within, known = exponents_within(data, family)
     ratios = steps(data, family)

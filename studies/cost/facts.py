@@ -101,7 +101,7 @@ def winners_facts(data: xr.DataTree) -> dict[str, Any]:
         cell, place = Cell("short", "axis", target, NATURAL), decades(target)
         winner, fewest = cells.winner(data, cell), cells.fewest(data, cell)
         values["safe_called"] += bool(winner["safe"] and winner["safe_called"])
-        values |= _safe(f"safe_{place}", data, cell)
+        values |= _safe_facts(f"safe_{place}", data, cell)
         if safe := winner["safe"]:
             misled += [(choice.seconds / safe.seconds, target, fewest, choice.seconds, safe.name, safe.seconds)
                        for choice in cells.safest(data, cell)[0] if choice.name == fewest]  # fmt: skip
@@ -109,7 +109,7 @@ def winners_facts(data: xr.DataTree) -> dict[str, Any]:
     worst = max((row for row in misled if 1.0 < row[0] < np.inf), default=(None,) * len(keys))
     values |= dict(zip(keys, worst, strict=True))
     for needs in CLASSES[:-1]:
-        values |= _safe(needs.replace("-", "_"), data, Cell("short", "axis", AT, NATURAL, needs))
+        values |= _safe_facts(needs.replace("-", "_"), data, Cell("short", "axis", AT, NATURAL, needs))
     values["kicks_serve"] = serves(values["kicks"]) if values["kicks_seconds"] else ""
     both = [row for row in cells.winners(data) if row["needs"] != "this-top" and row["safe"] and row["hindsight"]]
     values["cells"] = len(both) or None
@@ -117,7 +117,7 @@ def winners_facts(data: xr.DataTree) -> dict[str, Any]:
     return values
 
 
-def _safe(key: str, data: xr.DataTree, cell: Cell) -> dict[str, Any]:
+def _safe_facts(key: str, data: xr.DataTree, cell: Cell) -> dict[str, Any]:
     best = cells.winner(data, cell)["safe"]
     name = best.name if best else NOTHING if cells.costs(data, cell).names else None
     return {key: name, f"{key}_seconds": best and best.seconds}

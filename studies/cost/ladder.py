@@ -175,13 +175,13 @@ def climb(
             record.work[level, live], record.ended[level, live] = runs.work, good
             for name, values in record.errors.items():
                 values[level, live] = np.where(good, errors[name], np.inf)
-            stay, settled = _stay(variant, record, asked, live, level, budget)
+            stay, settled = _next_members(variant, record, asked, live, level, budget)
             record.settled[live] = settled
             live = live[stay]
     return record
 
 
-def _stay(
+def _next_members(
     variant: Integrator, record: Climb, asked: dict[str, NDArray[np.bool_]], live: Members, level: int, budget: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:  # fmt: skip
     """Which of the live members go on to the next setting, and which have an accurate run."""
@@ -223,7 +223,7 @@ def table(variant: Integrator, tops: Tops, budget: float, *, twin: bool, guarded
     data: dict[str, Any] = {
         **costs_of(variant, record, asked, ASKED, {"energy": energy_from}),
         "work": (("level", "kind"), typical_work(variant, record, tops)),
-        **{name: (("level", "kind"), values) for name, values in _healthy(record, tops).items()},
+        **{name: (("level", "kind"), values) for name, values in _outcome_counts(record, tops).items()},
         "drawn": ("kind", [float((tops.known & (tops.kinds == kind)).sum()) for kind in range(len(KINDS))]),
         "scene_error": (("level", "named"), stored(record.errors["axis"][:, scenes])),
         "scene_work": (("level", "named"), record.work[:, scenes]),
@@ -284,7 +284,7 @@ def growth_of_work(variant: Integrator) -> float:
     return 2.0 if variant.fixed_step else 10.0 ** (1.0 / (variant.order or 20))
 
 
-def _healthy(record: Climb, tops: Tops) -> dict[str, Array]:
+def _outcome_counts(record: Climb, tops: Tops) -> dict[str, Array]:
     """Numbers of members judged, wrong, ended `ok` and silent failures, (LEVELS, kinds)."""
     ran, error = np.isfinite(record.work), record.errors["axis"]
     right_later = record.settled & ~ran & tops.known  # left before with an accurate run

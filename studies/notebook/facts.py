@@ -46,7 +46,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "discrete": discrete.sizes["variant"] or None,
         "momenta_kept": int((lost < KEPT).sum()) if lost.size else None,  # variants
         "momenta": float(shown.max()) if shown.size else None,  # largest relative change of one by those of the figure
-        **of_the_solver(data, discrete),
+        **solver_facts(data, discrete),
         "power_least": changes["energy"].min(), "power_most": changes["energy"].max(),
         "modified_least": changes["modified"].min(), "modified_most": changes["modified"].max(),
     }  # fmt: skip
@@ -57,7 +57,7 @@ def order_two(runs: Iterable[str]) -> list[str]:
     return [name for name in map(str, runs) if integrator(name).order == 2 and "-unreduced[" not in name]
 
 
-def of_the_solver(data: xr.Dataset, discrete: xr.Dataset) -> dict[str, Any]:
+def solver_facts(data: xr.Dataset, discrete: xr.Dataset) -> dict[str, Any]:
     """The facts that need the notebook's solver: derivations, paths, alpha, and its energy error against others'."""
     if SOLVER not in data["variant"].values:
         parts = (f"{part}_{name}" for part in PARTS.values() for name in BY_PART)

@@ -70,7 +70,7 @@ def run_of(data: xr.Dataset, on: str, name: str) -> xr.Dataset | None:
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """Largest errors of the axis (rad) and of the energy (relative) in each, and when the run at the pole ended."""
     keys = "steps", "without", "without_energy", "needed", "falling", "falling_energy", "ended"
-    known: dict[str, Any] = dict.fromkeys(keys) | _warned(data)
+    known: dict[str, Any] = dict.fromkeys(keys) | _warning_counts(data)
     if (without := run_of(data, TERM, WITHOUT)) is not None:
         last = without.isel(setting=-1)
         known |= {"steps": float(last["steps"]), "without": float(last["axis"].max()),  # rad
@@ -85,7 +85,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     return known
 
 
-def _warned(data: xr.Dataset) -> dict[str, int]:
+def _warning_counts(data: xr.Dataset) -> dict[str, int]:
     """How many runs were wrong or ended early, how many were not, and in how many of each the guard warned."""
     ran = np.isfinite(data["steps"])
     bad = ((data["axis"].max("sample") > WRONG) | (data["outcome"] != "ok")) & ran
