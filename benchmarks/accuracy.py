@@ -39,7 +39,7 @@ LINES = (at.PHI_LINE, at.PSI_LINE, at.PHI_TURNS, at.DOWN_TURNS, at.UP_TURNS)
 MARKS = (at.ARITHMETIC, at.RATE_ERROR, at.VALUE_ERROR)
 
 
-class Examined(NamedTuple):
+class ErrorSummary(NamedTuple):
     """Largest errors of many tops, and the arithmetic that they needed."""
 
     motion: Array  # (nutations, quantities), largest errors
@@ -71,13 +71,13 @@ def short(top: SymmetricTop, start: Angles) -> tuple[Array, int]:
 def deviation(ours: Array, true: Array) -> Array:
     """Errors of constants, in the order of `CONSTANTS`."""
 
-    def apart(place: int) -> float:
+    def gap(place: int) -> float:
         return float(abs((ours[place] - true[place]) + (ours[place + 1] - true[place + 1])))
 
     largest = max(abs(true[place]) for place in LINES) or 1.0
-    rate = apart(at.QUARTERS) / (abs(true[at.QUARTERS]) or 1.0)
-    means = max(apart(place) for place in LINES) / largest
-    starts = max(apart(place + 2) / max(1.0, abs(true[place + 2])) for place in LINES)
+    rate = gap(at.QUARTERS) / (abs(true[at.QUARTERS]) or 1.0)
+    means = max(gap(place) for place in LINES) / largest
+    starts = max(gap(place + 2) / max(1.0, abs(true[place + 2])) for place in LINES)
     pairs = {place + k for place in (*LINES, at.QUARTERS) for k in range(4)} | set(MARKS)
     units = 0.0
     for place in set(range(at.SIZE)) - pairs:
@@ -85,7 +85,7 @@ def deviation(ours: Array, true: Array) -> Array:
         if x != y and not (math.isnan(x) and math.isnan(y)):
             noise = 1e-29 * max(1.0, largest)  # allowed for numbers that vanish exactly, such as b - a u at a cusp
             units = max(units, max(abs(x - y) - noise, 0.0) / math.ulp(y))
-    return np.array([rate, apart(at.QUARTERS + 2), means, starts, units])
+    return np.array([rate, gap(at.QUARTERS + 2), means, starts, units])
 
 
 def motion_errors(form: ClosedForm, precise: PreciseForm) -> tuple[Array, Array]:
@@ -106,7 +106,7 @@ def motion_errors(form: ClosedForm, precise: PreciseForm) -> tuple[Array, Array]
     return errors, allowed
 
 
-def examine(kind: str, count: int, first: int) -> Examined:
+def examine(kind: str, count: int, first: int) -> ErrorSummary:
     """Examine some tops of one family."""
     motion, constants, arithmetic, broken = np.zeros((3, 4)), np.zeros(5), Counter[str](), []
     for top, start in tops(count, SEED, [kind], first):
@@ -118,7 +118,7 @@ def examine(kind: str, count: int, first: int) -> Examined:
             broken.append(f"{kind}: {top} {start} {errors.tolist()} {gaps.tolist()}")
         motion, constants = np.maximum(motion, errors), np.maximum(constants, gaps)
         arithmetic[form.provenance.arithmetic] += 1
-    return Examined(motion, constants, arithmetic, broken)
+    return ErrorSummary(motion, constants, arithmetic, broken)
 
 
 def _pieces(each: int) -> Iterator[tuple[str, int, int]]:
@@ -128,14 +128,14 @@ def _pieces(each: int) -> Iterator[tuple[str, int, int]]:
             yield kind, min(PIECE, each - first), first
 
 
-def measure(each: int = EACH, jobs: int = 2, *, verbose: bool = False) -> Examined:
+def measure(each: int = EACH, jobs: int = 2, *, verbose: bool = False) -> ErrorSummary:
     """Examine this many tops of each family in this many processes."""
     closed_form.compile_now()
-    total, pieces = Examined(np.zeros((3, 4)), np.zeros(5), Counter(), []), list(_pieces(each))
+    total, pieces = ErrorSummary(np.zeros((3, 4)), np.zeros(5), Counter(), []), list(_pieces(each))
     with ProcessPoolExecutor(jobs) as pool:
         work = zip(*pieces, strict=True)
         for number, part in enumerate(map(examine, *work) if jobs == 1 else pool.map(examine, *work), 1):
-            total = Examined(
+            total = ErrorSummary(
                 np.maximum(total.motion, part.motion), np.maximum(total.constants, part.constants),
                 total.arithmetic + part.arithmetic, total.broken + part.broken,
             )  # fmt: skip
@@ -146,7 +146,7 @@ def measure(each: int = EACH, jobs: int = 2, *, verbose: bool = False) -> Examin
     return total
 
 
-def lines(total: Examined) -> list[str]:
+def lines(total: ErrorSummary) -> list[str]:
     """The tables."""
     head = f"{'largest error of ' + str(total.tops) + ' tops':<48}" + "".join(f"{name:>12}" for name in QUANTITIES)
     rows = [

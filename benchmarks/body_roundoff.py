@@ -49,8 +49,8 @@ def residuals(scene: symtop.Scene, name: str, parts: float, ends: list[int]) -> 
         length = float((np.linalg.norm(L, axis=1) / known[1] - 1.0).mean())
         rows.append((energy, length if scene.top.free else float(((L[:, 2] - known[0]) / known[1]).mean())))
     names = "energy", "|L|" if scene.top.free else "p_phi"
-    spent = (time.perf_counter() - began) / at.k * 1e9
-    return dict(zip(names, np.array(rows).T, strict=True)), spent
+    cost = (time.perf_counter() - began) / at.k * 1e9
+    return dict(zip(names, np.array(rows).T, strict=True)), cost
 
 
 def main() -> None:
@@ -73,8 +73,8 @@ def main() -> None:
                 rms = np.sqrt(np.mean([values[constant] ** 2 for values, _ in runs], axis=0))
                 late = np.array(ends) > ends[-1] / 10.0**DECADES
                 fit = power_law(np.array(ends, dtype=float)[late], rms[late])
-                spent = min(spent for _, spent in runs)
-                print(f"{name:<14}{method:<16}{constant:<10}{rms[-1]:>15.1e}{fit!s:>18}{spent:>11.0f}", flush=True)
+                cost = min(cost for _, cost in runs)
+                print(f"{name:<14}{method:<16}{constant:<10}{rms[-1]:>15.1e}{fit!s:>18}{cost:>11.0f}", flush=True)
 
 
 if __name__ == "__main__":

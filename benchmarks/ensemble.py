@@ -56,7 +56,7 @@ def measure() -> list[Item]:
     horizon, steps = NUTATIONS * period, np.full(MEMBERS, NUTATIONS * PER_NUTATION)
     plan, solver = schedule(period, horizon, SAMPLES, steps), row.solvers[CHART]
     assert isinstance(solver, FixedStep)
-    asked: dict[str, Any] = {"per_nutation": PER_NUTATION, "nutations": NUTATIONS, "samples": SAMPLES, "quiet": True}
+    options: dict[str, Any] = {"per_nutation": PER_NUTATION, "nutations": NUTATIONS, "samples": SAMPLES, "quiet": True}
 
     def one_by_one(*, guard: bool) -> Callable[[], None]:
         chosen = np.linspace(0, MEMBERS - 1, ALONE).astype(int)
@@ -78,13 +78,11 @@ def measure() -> list[Item]:
         """A function that makes `times` as many steps and returns the last state only."""
         return lambda: solver.many(numbers, plan.step_size, times * plan.marks[:, -1:])
 
-    def whole(threads: int, shown: tuple[str, ...] | None) -> Callable[[], object]:
-        return lambda: symtop.ensemble(tops, row, threads=threads, variables=shown, **asked)
+    def whole(threads: int, variables: tuple[str, ...] | None) -> Callable[[], object]:
+        return lambda: symtop.ensemble(tops, row, threads=threads, variables=variables, **options)
 
-    shown, angles = (
-        Job(row, CHART, numbers, horizon, steps, None, SAMPLES, None, names) for names in (SHOWN, ("phi",))
-    )
-    runs = shown._runs(plan)
+    job, phi_job = (Job(row, CHART, numbers, horizon, steps, None, SAMPLES, None, names) for names in (SHOWN, ("phi",)))
+    runs = job._runs(plan)
     cell = (
         CHART,
         together(numbers),
@@ -104,8 +102,8 @@ def measure() -> list[Item]:
         "of it: the steps": (lambda: solver.many(numbers, plan.step_size, plan.marks), MEMBERS),
         "once the steps": (stepped(1), MEMBERS),
         "twice the steps": (stepped(2), MEMBERS),
-        "of it: axis and energy": (lambda: shown._observables(View(*cell), plan.times), MEMBERS),
-        "of it: phi, with its closed form": (lambda: angles._observables(View(*cell), plan.times), MEMBERS),
+        "of it: axis and energy": (lambda: job._observables(View(*cell), plan.times), MEMBERS),
+        "of it: phi, with its closed form": (lambda: phi_job._observables(View(*cell), plan.times), MEMBERS),
     }
     best = dict.fromkeys(calls, np.inf)
     caller = np.inf
@@ -155,7 +153,7 @@ def calls() -> list[Call]:
     return rows
 
 
-def said_of(rows: Sequence[Call]) -> list[str]:
+def call_sentences(rows: Sequence[Call]) -> list[str]:
     """Sentences: the times of the calls of a user."""
     return [
         f"`symtop.ensemble` of {CALLED} tops, {row.method}, two samples of the axis, {cores()} cores: "
@@ -191,7 +189,7 @@ def table(items: Sequence[Item]) -> Table:
 def main() -> None:
     """Measure and print."""
     items = measure()
-    print("\n".join([table(items).text, *verdict(items), *said_of(calls())]))
+    print("\n".join([table(items).text, *verdict(items), *call_sentences(calls())]))
 
 
 if __name__ == "__main__":

@@ -79,13 +79,13 @@ def of_random_tops(count: int = TOPS) -> np.ndarray:
     method, rows = symtop.integrator(METHOD), []
     for top, start in random_tops(count):
         form = symtop.model.exact.closed_form.ClosedForm(top, start)
-        turned = 1.0 + 2.0 * (abs(form.phi_per_period) + abs(form.psi_per_period))
+        angle = 1.0 + 2.0 * (abs(form.phi_per_period) + abs(form.psi_per_period))
         row = []
         for steps in STEPS[:4]:
             h = form.nutation_period / steps
             marks = np.unique(np.linspace(1, round(2 * steps), MARKS).astype(int))
             states = method.solvers["attitude"](top, start, Plan.steps(h, marks)).states
-            row.append(charts.attitude_distance(states[:, :4], form.quaternion(h * marks)).max() / turned)
+            row.append(charts.attitude_distance(states[:, :4], form.quaternion(h * marks)).max() / angle)
         rows.append(row)
     return np.array(rows)
 
@@ -158,8 +158,8 @@ def of_constants() -> Iterator[str]:
         for name, row, middle, unsure in zip(("energy", "p_psi", "p_phi"), spread, mean, deviation, strict=False):
             slope = np.polyfit(np.log(marks), np.log(np.maximum(row, LAST_PLACE)), 1)[0]
             yield f"{name}, {words}: rms {row[0]:.1e} at {marks[0]:.0e} steps to {row[-1]:.1e} at {marks[-1]:.0e}"
-            off = abs(middle[-1]) / max(unsure[-1], LAST_PLACE)
-            yield f"    exponent {slope:.2f}, mean {middle[-1]:+.1e}, {off:.1f} standard errors"
+            ratio = abs(middle[-1]) / max(unsure[-1], LAST_PLACE)
+            yield f"    exponent {slope:.2f}, mean {middle[-1]:+.1e}, {ratio:.1f} standard errors"
 
 
 def main() -> None:

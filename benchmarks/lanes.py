@@ -177,10 +177,10 @@ def threads() -> list[Threads]:
     for (name, chart), steps in THREADED.items():
         piece = together(solver_of(name, chart), MEMBERS, h, steps)
 
-        def all_of_them(count: int, piece: Any = piece) -> list[Any]:
+        def run_pieces(count: int, piece: Any = piece) -> list[Any]:
             return list(in_threads(lambda _: piece(), range(PIECES), count))
 
-        one, two = timings([partial(all_of_them, count) for count in (1, 2)], batches=BATCHES, batch=BATCH)
+        one, two = timings([partial(run_pieces, count) for count in (1, 2)], batches=BATCHES, batch=BATCH)
         rows.append(Threads(name, chart, *kernels.ratio(one, two)))
     return rows
 
@@ -211,11 +211,11 @@ class Batches:
         """The last states, in batches; the last of them repeats the last top where tops do not fill it."""
         batch, wide, steps, ended = self.batch, self.wide, 0, np.empty_like(self.states)
         for i in range(0, len(ended), wide):
-            these = np.minimum(np.arange(i, i + wide), len(ended) - 1)
+            indices = np.minimum(np.arange(i, i + wide), len(ended) - 1)
             batch.set_time(0.0)
-            batch.state[:], batch.pars[:] = self.states[these].T, self.pars[these].T
+            batch.state[:], batch.pars[:] = self.states[indices].T, self.pars[indices].T
             batch.propagate_until(HORIZON)
-            ended[these] = batch.state.T
+            ended[indices] = batch.state.T
             steps += sum(count for *_, count in batch.propagate_res)
         self.steps_a_top = steps / (-(-len(ended) // wide) * wide)
         return ended

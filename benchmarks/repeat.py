@@ -45,9 +45,9 @@ SHOWN = 20
 
 def every_cell(data: xr.DataTree) -> Iterator[Cell]:
     """All cells that the study judges."""
-    asked = [("axis", tops, needs) for tops in POPULATIONS for needs in cells.CLASSES]
-    asked += [(quantity, NATURAL, GENERAL) for quantity in ("attitude", "energy")]
-    for quantity, tops, needs in asked:
+    groups = [("axis", tops, needs) for tops in POPULATIONS for needs in cells.CLASSES]
+    groups += [(quantity, NATURAL, GENERAL) for quantity in ("attitude", "energy")]
+    for quantity, tops, needs in groups:
         yield from cells.cells(data, quantity, tops, needs)
     for kind in KINDS[:-2]:
         yield from (cell for cell in cells.cells(data, "axis", kind) if cell.horizon == "short")
@@ -78,8 +78,8 @@ def compare(first: xr.DataTree, second: xr.DataTree) -> dict[str, Any]:
     print("cells that moved before:")
     for cell in MOVED:
         each = [cells.contest(data, cell) for data in both]
-        shown = words(*(contest.first for contest in each if contest.first))
-        print(f"  {label(cell)}: {shown}, called {[contest.called for contest in each]}")
+        standings = words(*(contest.first for contest in each if contest.first))
+        print(f"  {label(cell)}: {standings}, called {[contest.called for contest in each]}")
     calls = sum(cells.contest(first, cell).called + cells.safest(first, cell)[1] for cell in asked)
     called, different = sum(map(bool, winners + safe)), sum(len(pair) > 1 for pair in winners + safe)
     return {
@@ -90,13 +90,13 @@ def compare(first: xr.DataTree, second: xr.DataTree) -> dict[str, Any]:
 
 def compare_prices(first: pricing.Prices, second: pricing.Prices) -> None:
     """The ratios of prices and calls at the usual tolerance."""
-    for what, part in (("prices", 0), ("calls", 1)):
+    for quantity, part in (("prices", 0), ("calls", 1)):
         mine, theirs = (np.array([known.at(name, np.array([pricing.TOLERANCE]))[part][0] for name in first.names])
                         for known in (first, second))  # fmt: skip
         good = (mine > 0.0) & (theirs > 0.0)
         ratio = theirs[good] / mine[good]
         low, middle, high = np.quantile(ratio, (0.1, 0.5, 0.9))
-        print(f"{what}, second over first: median {middle:.3f}, 80 % from {low:.3f} to {high:.3f}, all from "
+        print(f"{quantity}, second over first: median {middle:.3f}, 80 % from {low:.3f} to {high:.3f}, all from "
               f"{ratio.min():.3f} to {ratio.max():.3f}")  # fmt: skip
     print(f"marked: {first.marked} and {second.marked}")
 

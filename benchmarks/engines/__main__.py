@@ -24,8 +24,8 @@ def main() -> None:
     settings, missing = load(tuple(options.only))
     facts, rows = circumstances(), [row(setting) for setting in settings]
     if options.add and (stored := netcdf.read_json(file)):
-        anew = {(entry["engine"], entry["version"]) for entry in rows}
-        rows = [entry for entry in stored["rows"] if (entry["engine"], entry["version"]) not in anew] + rows
+        added = {(entry["engine"], entry["version"]) for entry in rows}
+        rows = [entry for entry in stored["rows"] if (entry["engine"], entry["version"]) not in added] + rows
         missing = [*stored["missing"], *missing]
     versions: dict[str, list[str]] = {}
     for entry in rows:

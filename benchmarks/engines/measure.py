@@ -34,9 +34,9 @@ def mapped(scene: Scene, method: str, h: float, steps: int) -> Path:
 def difference(first: Path, second: Path) -> np.ndarray:
     """Row by row, shape (rows,)."""
     q, p = first.attitude, second.attitude
-    turned = np.minimum(np.abs(q - p).max(axis=1), np.abs(q + p).max(axis=1))
+    turns = np.minimum(np.abs(q - p).max(axis=1), np.abs(q + p).max(axis=1))
     rates = np.abs(first.velocity - second.velocity).max(axis=1) / np.linalg.norm(first.velocity[0])
-    return np.asarray(np.maximum(turned, rates))
+    return np.asarray(np.maximum(turns, rates))
 
 
 def axis_error(scene: Scene, path: Path, h: float) -> float:

@@ -13,7 +13,7 @@ NAME = "live-engines"  # of the findings; `engines` is the study of the maps
 UNRUN = "YADE is not run: its map is held by its formula and a reference value alone."
 HEADER = (
     "engine", "version", "setting", "body", "map", "axis error (rad)",
-    *(f"{name}: {what}" for name in STEPS for what in ("one step", f"{COMPARED} steps")), "same map",
+    *(f"{name}: {suffix}" for name in STEPS for suffix in ("one step", f"{COMPARED} steps")), "same map",
 )  # fmt: skip
 HOW_TO_READ = (
     "Each engine steps one body with a fixed centre in the torque mgl k x e, taken at the start of the step (Exudyn: "
@@ -33,14 +33,14 @@ def _number(row: dict[str, Any], key: str) -> str:
 
 def cells(row: dict[str, Any]) -> list[str]:
     """One line of the table."""
-    differences = [_number(row, f"{name}_{what}") for name in STEPS for what in ("step", "steps")]
+    differences = [_number(row, f"{name}_{suffix}") for name in STEPS for suffix in ("step", "steps")]
     same = "yes" if agrees(row) else row.get("failed") or ("no" if row["method"] else "none in the catalogue")
     start = [str(row[key]) for key in ("engine", "version", "name", "held", "method")]
     return [*start, _number(row, "goldstein_axis"), *differences, same]
 
 
-def _largest(rows: Sequence[dict[str, Any]], what: str) -> str:
-    return f"{max((row[f'{name}_{what}'] for row in rows for name in STEPS), default=0.0):.0e}"
+def _largest(rows: Sequence[dict[str, Any]], suffix: str) -> str:
+    return f"{max((row[f'{name}_{suffix}'] for row in rows for name in STEPS), default=0.0):.0e}"
 
 
 def few(names: Sequence[str], noun: str) -> str:

@@ -194,7 +194,7 @@ def measure(peers: Sequence[Peer], scenes: Sequence[str] = SCENES) -> xr.Dataset
     facts = circumstances()
     for name in scenes:
         scene = symtop.scene(name)
-        entries = ours(scene, _tell) + [entry for peer in peers if (entry := _searched(scene, peer)) is not None]
+        entries = ours(scene, _tell) + [entry for peer in peers if (entry := _points_of(scene, peer)) is not None]
         rows = [(peer, point, *ready(scene, peer, point.setting)) for peer, points in entries for point in points]
         ends = [end_error(scene, peer, loop) for peer, _, _, loop in rows]
         functions = [function for _, _, whole, loop in rows for function in (whole, loop.call)]
@@ -212,10 +212,10 @@ def measure(peers: Sequence[Peer], scenes: Sequence[str] = SCENES) -> xr.Dataset
                 "force_evaluations": [point.evaluations for point in points],
                 "timing": [[results[2 * i + k] for i in places] for k in range(len(CALLS))],
             }
-    return _combined(list(scenes), about, cells).assign_attrs(facts)
+    return _dataset(list(scenes), about, cells).assign_attrs(facts)
 
 
-def _searched(scene: Scene, peer: Peer) -> tuple[Peer, list[Point]] | None:
+def _points_of(scene: Scene, peer: Peer) -> tuple[Peer, list[Point]] | None:
     start = time.perf_counter()
     try:
         points = worth_timing(search(scene, peer.method))
@@ -228,7 +228,7 @@ def _searched(scene: Scene, peer: Peer) -> tuple[Peer, list[Point]] | None:
     return peer, points
 
 
-def _combined(scenes: list[str], about: dict[str, Peer], cells: dict[tuple[str, str], dict[str, Any]]) -> xr.Dataset:
+def _dataset(scenes: list[str], about: dict[str, Peer], cells: dict[tuple[str, str], dict[str, Any]]) -> xr.Dataset:
     names = list(about)
     shape = len(scenes), len(names), max((len(cell["axis"]) for cell in cells.values()), default=0)
     dims, call_dims = ("scene", "variant", "setting"), ("call", "scene", "variant", "setting")

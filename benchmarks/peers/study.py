@@ -133,7 +133,7 @@ STUDY = Study(
 
 def findings(data: xr.Dataset, many: list[together.Row], results: Path, missing: list[str]) -> dict[str, Any]:
     """Draw, and say what was measured, with the runs of many tops at once."""
-    drawn = runner.findings_of(
+    result = runner.findings_of(
         STUDY, data, results, style.publish, failures=missing, cases=data["seconds"].count().item()
     )
     tables = [*summary.tables(data), *([together.table(many)] if many else [])]
@@ -142,4 +142,4 @@ def findings(data: xr.Dataset, many: list[together.Row], results: Path, missing:
         summary.HOW_TO_READ, tables, answer=summary.answer(data), further=summary.pairs(data),
         captions={"fronts": caption(data)},
     )  # fmt: skip
-    return drawn | {"page": page["page"], "together": [row._asdict() for row in many], **measured(data)}
+    return result | {"page": page["page"], "together": [row._asdict() for row in many], **measured(data)}

@@ -199,13 +199,13 @@ def score(data: xr.Dataset, call: str, mine: Sequence[str]) -> Score:
 def _wins(data: xr.Dataset) -> list[str]:
     """Which libraries are faster than those that need no more than a library and than our fastest, and how often."""
     lines = []
-    for who, rows in (("methods on f(t, y) alone", general(data)), ("of all", groups(data).get(OURS, []))):
+    for group, rows in (("methods on f(t, y) alone", general(data)), ("of all", groups(data).get(OURS, []))):
         scores = {words: each for call, words in NAMES.items() if (each := score(data, call, rows)).compared}
         faster = [library for tally in scores.values() for library in tally.faster]
         ahead = [f"{tally.ahead} of {tally.compared}" for tally in scores.values()]
         if scores:
             lines.append(f"{listed(faster) if faster else 'No library'} {'are' if faster[1:] else 'is'} faster than "
-                        f"symtop's fastest {who} ({', '.join(fastest(data, rows))}); symtop is faster in "
+                        f"symtop's fastest {group} ({', '.join(fastest(data, rows))}); symtop is faster in "
                         f"{' and '.join(ahead)} comparisons ({' and '.join(scores)}), level in "
                         f"{' and '.join(str(tally.level) for tally in scores.values())}."
                         )  # fmt: skip
@@ -273,7 +273,7 @@ def _callbacks(data: xr.Dataset) -> list[str]:
 def _cells(data: xr.Dataset, scene: str, target: float, rows: Sequence[str], ours: Sequence[str]) -> list[str]:
     cells = []
     for call in NAMES:
-        theirs, mine = (best_of(data, call, scene, some, target) for some in (rows, ours))
+        theirs, mine = (best_of(data, call, scene, names, target) for names in (rows, ours))
         if theirs is None:
             cells += ["", "not reached", ""]
             continue
@@ -299,19 +299,19 @@ def tables(data: xr.Dataset) -> list[Table]:
             cells = _cells(data, scene, target, [row], ours)
             if cells[1] != "not reached":
                 by_row.append([scene, f"{target:.0e}", row, cells[1], cells[2], cells[4], cells[5]])
-    over = []
+    by_library = []
     for name, rows in known.items():
         first = data.sel(variant=rows[0])
         public, inner = (range_of(span(data, call, ours, rows)) for call in NAMES)
         if name != OURS:
-            over.append([name, str(first["chart"].values), str(first["language"].values), public, inner])
+            by_library.append([name, str(first["chart"].values), str(first["language"].values), public, inner])
     keys = ("package", "version", "chart", "language", "implementation", "shows", "formulation")
     settings = [[str(row), *(str(data[key].sel(variant=row).values) for key in keys)] for row in data["variant"].values]
     return [
         Table(
             f"Both ratios: the time over symtop's ({_fixed(data)})",
             ["library", "chart", "right-hand side", NAMES["public"], NAMES["inner"]],
-            over,
+            by_library,
         ),
         Table(
             "Both comparisons, the fastest variant of each library",

@@ -69,8 +69,8 @@ def fixed(name: str, chart: str, numbers: Array, steps: int) -> Call:
 
 def coarsest(name: str, chart: str, numbers: Array, error: float) -> int | None:
     """The fewest steps of the ladder with which a method is at least as accurate; None if none are enough."""
-    some = numbers[:: max(1, len(numbers) // FEW)]
-    return next((n for n in map(int, lanes.LADDER) if worst(fixed(name, chart, some, n), some) <= error), None)
+    sample = numbers[:: max(1, len(numbers) // FEW)]
+    return next((n for n in map(int, lanes.LADDER) if worst(fixed(name, chart, sample, n), sample) <= error), None)
 
 
 def batched(numbers: Array, tolerance: float) -> Call:

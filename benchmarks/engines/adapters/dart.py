@@ -32,15 +32,15 @@ def _run(dart: Any, held: str, body: Body, h: float, steps: int) -> Path:
     turn = Rotation.from_matrix(body.rotation).as_rotvec()
     joint.setPositions(turn if pinned else np.concatenate([turn, np.zeros(3)]))
     joint.setVelocities(body.velocity_body if pinned else np.concatenate([body.velocity, np.zeros(3)]))
-    past = Recorder()
+    recorder = Recorder()
     for step in range(steps + 1):
         q = quaternion(node.getWorldTransform().rotation())
-        past.add(q, node.getAngularVelocity())
+        recorder.add(q, node.getAngularVelocity())
         if step < steps:
             if not pinned:
                 node.addExtTorque(torque(body.mgl, q), False)
             world.step()
-    return past.path()
+    return recorder.path()
 
 
 def settings() -> list[Setting]:

@@ -39,7 +39,7 @@ def _torque(drake: Any, body: Body, plant: Any, index: Any) -> Any:
 
 
 def _run(drake: Any, body: Body, h: float, steps: int) -> Path:
-    builder, plant, past = drake.DiagramBuilder(), drake.MultibodyPlant(h), Recorder()
+    builder, plant, recorder = drake.DiagramBuilder(), drake.MultibodyPlant(h), Recorder()
     inertia = drake.RotationalInertia(body.I1, body.I1, body.I3)
     link = plant.AddRigidBody("top", drake.SpatialInertia.MakeFromCentralInertia(1.0, np.zeros(3), inertia))
     plant.mutable_gravity_field().set_gravity_vector([0, 0, 0])
@@ -52,12 +52,12 @@ def _run(drake: Any, body: Body, h: float, steps: int) -> Path:
     context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     plant.SetPositions(context, np.concatenate([body.attitude, np.zeros(3)]))
     plant.SetVelocities(context, np.concatenate([body.velocity, np.zeros(3)]))
-    past.add(body.attitude, body.velocity)
+    recorder.add(body.attitude, body.velocity)
     simulator.Initialize()
     for step in range(1, steps + 1):
         simulator.AdvanceTo((step - 0.5) * h)
-        past.add(plant.GetPositions(context)[:4], plant.GetVelocities(context)[:3])
-    return past.path()
+        recorder.add(plant.GetPositions(context)[:4], plant.GetVelocities(context)[:3])
+    return recorder.path()
 
 
 def settings() -> list[Setting]:

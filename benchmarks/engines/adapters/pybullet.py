@@ -49,7 +49,7 @@ def _free(bullet: Any, body: Body, start: list[float]) -> int:
 
 
 def _run(bullet: Any, held: str, body: Body, h: float, steps: int) -> Path:
-    client, past, pinned = bullet.connect(bullet.DIRECT), Recorder(), held == JOINT
+    client, recorder, pinned = bullet.connect(bullet.DIRECT), Recorder(), held == JOINT
     try:
         bullet.setTimeStep(h)
         bullet.setGravity(0, 0, -body.mgl / body.arm if pinned else 0)
@@ -60,14 +60,14 @@ def _run(bullet: Any, held: str, body: Body, h: float, steps: int) -> Path:
                 q, w = np.roll(link[5], 1), link[7]
             else:
                 q, w = np.roll(bullet.getBasePositionAndOrientation(top)[1], 1), bullet.getBaseVelocity(top)[1]
-            past.add(q, w)
+            recorder.add(q, w)
             if step < steps:
                 if not pinned:
                     bullet.applyExternalTorque(top, -1, torque(body.mgl, q), bullet.WORLD_FRAME)
                 bullet.stepSimulation()
     finally:
         bullet.disconnect(client)
-    return past.path()
+    return recorder.path()
 
 
 def settings() -> list[Setting]:

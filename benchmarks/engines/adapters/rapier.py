@@ -14,7 +14,7 @@ SUBSTEPS = 4  # the default
 
 
 def _run(rapier: Any, gyroscopic: bool, body: Body, h: float, steps: int) -> Path:
-    vector, past = rapier.Vec3, Recorder()
+    vector, recorder = rapier.Vec3, Recorder()
     world = rapier.PhysicsWorld(gravity=vector(0, 0, 0))
     world.integration_parameters.dt = h
     world.integration_parameters.num_solver_iterations = SUBSTEPS
@@ -27,12 +27,12 @@ def _run(rapier: Any, gyroscopic: bool, body: Body, h: float, steps: int) -> Pat
         top = world.rigid_bodies[key]
         q, w = top.rotation, top.angvel
         attitude = np.array([q.w, q.i, q.j, q.k])
-        past.add(attitude, (w.x, w.y, w.z))
+        recorder.add(attitude, (w.x, w.y, w.z))
         if step < steps:
             top.reset_torques(True)  # they persist
             top.add_torque(vector(*torque(body.mgl, attitude)), True)
             world.step()
-    return past.path()
+    return recorder.path()
 
 
 def settings() -> list[Setting]:
