@@ -61,8 +61,8 @@ class Bodies:
     @cached_property
     def truth(self) -> tuple[Array, Array]:
         """Quaternions (n, samples, 4), and their largest bounds (n,)."""
-        each = [self._motion(scene, times) for scene, times in zip(self.scenes, self.times, strict=True)]
-        return np.stack([quaternion for quaternion, _ in each]), np.array([bound for _, bound in each])
+        pairs = [self._motion(scene, times) for scene, times in zip(self.scenes, self.times, strict=True)]
+        return np.stack([quaternion for quaternion, _ in pairs]), np.array([bound for _, bound in pairs])
 
     @staticmethod
     def _motion(scene: Scene, times: Array) -> tuple[Array, float]:
@@ -115,12 +115,12 @@ class Bodies:
             free = (weight == 0.0).all(axis=-1)
             drift = lifted - start
             moved = np.where(free, np.linalg.norm(drift, axis=-1), np.abs(drift[..., 2]))
-            each = {
+            errors = {
                 "axis": axis_distance(*axes), "attitude": attitude_distance(q, true),
                 "energy": np.abs(0.5 * (M * M / moments).sum(axis=-1) + (weight * up).sum(axis=-1) - energy) / scale,
                 MOMENTA: moved / np.linalg.norm(start, axis=-1),
             }  # fmt: skip
-        return {name: np.where(np.isfinite(values), values, np.inf) for name, values in each.items()}
+        return {name: np.where(np.isfinite(values), values, np.inf) for name, values in errors.items()}
 
 
 def unit(quaternions: Array) -> Array:

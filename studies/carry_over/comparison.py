@@ -118,10 +118,10 @@ def bootstrap_tau(
     if first.names != second.names:
         both_errors = np.append(first.errors[rows[0]], second.errors[rows[1]])
         price = factors(both_errors, DRAWS)[:, : len(rows[0])], factors(both_errors, DRAWS)[:, len(rows[0]) :]
-    both = np.intersect1d(bodies, others)
+    common = np.intersect1d(bodies, others)
     for k in range(draws):
         if paired:
-            draw = both[generator.integers(both.size, size=both.size)]
+            draw = common[generator.integers(common.size, size=common.size)]
             pair = draw, draw
         else:
             pair = tuple(part[generator.integers(part.size, size=part.size)] for part in (bodies, others))
@@ -274,8 +274,8 @@ def price_factors(data: xr.DataTree) -> dict[str, float]:
     pairs = {
         name: base[label(name)] for name in map(str, group_of(data, "short")["variant"].values) if label(name) in base
     }
-    at = np.array([1e-8])
-    return {name: float(tariff.at(name, at)[0][0] / tariff.at(variant, at)[0][0]) for name, variant in pairs.items()}
+    tol = np.array([1e-8])
+    return {name: float(tariff.at(name, tol)[0][0] / tariff.at(variant, tol)[0][0]) for name, variant in pairs.items()}
 
 
 # ---- wrong runs and errors -------------------------------------------------------------------------------------------

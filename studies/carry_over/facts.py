@@ -47,15 +47,15 @@ def worst_tau(data: xr.DataTree, family: str) -> by.Interval:
 
 def long_tau(data: xr.DataTree, family: str) -> tuple[float, int]:
     """The least tau over all targets in the long runs, and the number of bodies that it is computed from."""
-    each = {target: by.tau(data, family, target, span="long").value for target in ASKED}
-    target = min(ASKED, key=lambda target: float(np.nan_to_num(each[target], nan=math.inf)))
-    return each[target], by.judged_bodies(by.costs(data, family, target, span="long")).size
+    taus = {target: by.tau(data, family, target, span="long").value for target in ASKED}
+    target = min(ASKED, key=lambda target: float(np.nan_to_num(taus[target], nan=math.inf)))
+    return taus[target], by.judged_bodies(by.costs(data, family, target, span="long")).size
 
 
-def least(each: list[by.Interval]) -> by.Interval:
+def least(intervals: list[by.Interval]) -> by.Interval:
     """The least value, low end and high end of all, each by itself, as which interval is the lowest may be noise."""
-    known = [interval for interval in each if not math.isnan(interval.value)]
-    return by.Interval(*(min(ends) for ends in zip(*known, strict=True))) if known else each[0]
+    known = [interval for interval in intervals if not math.isnan(interval.value)]
+    return by.Interval(*(min(ends) for ends in zip(*known, strict=True))) if known else intervals[0]
 
 
 def tau_words(tau: by.Interval) -> str:
@@ -65,9 +65,9 @@ def tau_words(tau: by.Interval) -> str:
 
 def worst_winner(data: xr.DataTree, family: str) -> by.Interval:
     """Cost of methods within `LEVEL` of the winner on tops, over the least on each body: the most of all targets."""
-    each = [by.transferred(data, family, target, best=name)
+    ratios = [by.transferred(data, family, target, best=name)
             for target in ASKED for name in by.cheapest(data, SYMMETRIC, target)]  # fmt: skip
-    return max((ratio for ratio in each if not math.isnan(ratio.value)), key=lambda ratio: ratio.value,
+    return max((ratio for ratio in ratios if not math.isnan(ratio.value)), key=lambda ratio: ratio.value,
                default=by.Interval(*(math.nan,) * 3))  # fmt: skip
 
 
@@ -93,12 +93,12 @@ class PooledFactors(NamedTuple):
         return by.worst((word, by.PARTLY)) if self.beyond > (1.0 - MOST_OF) * self.asked else word
 
 
-def pooled(each: list[dict[str, float]]) -> PooledFactors:
+def pooled(groups: list[dict[str, float]]) -> PooledFactors:
     """Factors of all methods and targets together."""
-    values = np.array([value for factors in each for value in factors.values()])
-    within = values[np.isfinite(values)]
-    ends = (float(np.median(within)), float(np.quantile(within, MOST_OF))) if within.size else (math.nan, math.nan)
-    return PooledFactors(*ends, values.size - within.size, values.size)
+    values = np.array([value for factors in groups for value in factors.values()])
+    finite = values[np.isfinite(values)]
+    ends = (float(np.median(finite)), float(np.quantile(finite, MOST_OF))) if finite.size else (math.nan, math.nan)
+    return PooledFactors(*ends, values.size - finite.size, values.size)
 
 
 def steps(data: xr.DataTree, family: str, span: str = "short") -> PooledFactors:
@@ -263,8 +263,8 @@ LINES = {
 
 def carry(data: xr.DataTree) -> pd.DataFrame:
     """The main table: a row for each verdict, a column for each kind of body, with number and verdict in a cell."""
-    each = {family: cells(data, family) for family in SHOWN}
-    rows = [{ANSWER: text} | {words(family): sentence(*each[family][line]) for family in SHOWN}
+    by_family = {family: cells(data, family) for family in SHOWN}
+    rows = [{ANSWER: text} | {words(family): sentence(*by_family[family][line]) for family in SHOWN}
             for line, text in LINES.items()]  # fmt: skip
     prices = np.array([*by.price_factors(data).values()])
     if prices.size:
@@ -328,8 +328,8 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     values |= {"own_tau_low": min(taus), "own_tau_high": max(taus)}
     heavy = [worst_tau(data, family).value for family in OTHERS if family not in (CHAOTIC, FREE)]
     values["heavy_tau"] = min(heavy, default=None)
-    each = [by.tau(data, family, target) for family in OTHERS for target in ASKED]
-    known = [tau for tau in each if math.isfinite(tau.value) and math.isfinite(tau.low)]
+    intervals = [by.tau(data, family, target) for family in OTHERS for target in ASKED]
+    known = [tau for tau in intervals if math.isfinite(tau.value) and math.isfinite(tau.low)]
     values |= {"taus": len(known), "outside": sum(not tau.low <= tau.value <= tau.high for tau in known)}
     values["checked"] = CHECKED
     values |= dict(zip(("silent_3_low", "silent_3_most", "silent_3_four"), silent_orders(data, "0.3"), strict=True))
@@ -430,10 +430,10 @@ def step_table(data: xr.DataTree) -> pd.DataFrame:
     rows = []
     for target in ASKED:
         before, ratios = by.safest(data, SYMMETRIC, target), by.own_factors(data, SYMMETRIC, target)
-        each = {family: by.step_factors(data, family, target) for family in OTHERS}
+        by_family = {family: by.step_factors(data, family, target) for family in OTHERS}
         rows += [
             [label(name), target, before[name].setting, ratios.get(name, math.nan),
-             *(each[family][name] for family in OTHERS)]
+             *(by_family[family][name] for family in OTHERS)]
             for name in by.fixed_steps(data) if np.isfinite(before[name].setting)
         ]  # fmt: skip
     header = ["method", "error", "steps at epsilon 0", "over those in the top's chart", *map(words, OTHERS)]
@@ -479,16 +479,16 @@ def limit_table(data: xr.DataTree) -> pd.DataFrame:
         "share of steps that resonate": lambda values: np.nanmean(values, axis=1),
     }
     for (title, average), name in zip(measures.items(), ("limit", "grown"), strict=True):
-        each = {family: by.steady(data, name, family) for family in FAMILIES}
+        tables = {family: by.steady(data, name, family) for family in FAMILIES}
         names = map(label, map(str, data["steady"]["variant"].values)) if "steady" in data.children else []
-        columns = {words(family): average(values) for family, values in each.items() if values.size}
+        columns = {words(family): average(values) for family, values in tables.items() if values.size}
         rows += [{"measured": title, "method": method} | {name: column[k] for name, column in columns.items()}
                  for k, method in enumerate(names)]  # fmt: skip
     for place, level in enumerate(LEVELS) if "engines" in data.children else ():
         for name, title in (("error", "median error of the axis, rad"), ("lost", "share lost in the first period")):
-            each = {family: by.engine_errors(data, family, place, name) for family in FAMILIES}
-            for k, method in enumerate(each[SYMMETRIC].names):
+            tables = {family: by.engine_errors(data, family, place, name) for family in FAMILIES}
+            for k, method in enumerate(tables[SYMMETRIC].names):
                 line = {"measured": f"{title}, {number(FIRST * 2**level, 2)} steps a period", "method": label(method)}
                 middle = np.nanmedian if name == "error" else np.nanmean
-                rows.append(line | {words(family): float(middle(costs.values[k])) for family, costs in each.items()})
+                rows.append(line | {words(family): float(middle(costs.values[k])) for family, costs in tables.items()})
     return pd.DataFrame(rows)

@@ -35,8 +35,8 @@ def draw_rankings(data: xr.DataTree) -> Any:
     """Tau of each family and target with its interval, and the ceiling as a band."""
     figure, ((axis,),) = style.panels(1, 1, height=2.9)
     for k, (target, color, mark) in enumerate(zip(ASKED, COLORS, MARKS, strict=True)):
-        each, places = [by.tau(data, family, target) for family in OTHERS], np.arange(len(FAMILIES)) + 0.18 * (k - 1)
-        middle, low, high = (np.array([getattr(tau, name) for tau in each]) for name in ("value", "low", "high"))
+        taus, places = [by.tau(data, family, target) for family in OTHERS], np.arange(len(FAMILIES)) + 0.18 * (k - 1)
+        middle, low, high = (np.array([getattr(tau, name) for tau in taus]) for name in ("value", "low", "high"))
         axis.vlines(places[1:], low, high, color=color, lw=1.6)
         shape: dict[str, Any] = {"ls": "none", "marker": mark, "ms": 5, "color": color}
         axis.plot(places[1:], middle, **shape, label=f"axis to 1e-{decades(target)} rad")
@@ -61,9 +61,9 @@ def draw_steps(data: xr.DataTree) -> Any:
     for k, (target, color) in enumerate(zip(ASKED, COLORS, strict=True)):
         for place, family in enumerate(OTHERS):
             values = np.array([*by.step_factors(data, family, target).values()])
-            at = place + 0.25 * (k - 1) + shift.uniform(-0.08, 0.08, values.size)
+            x = place + 0.25 * (k - 1) + shift.uniform(-0.08, 0.08, values.size)
             options = {"label": f"axis to 1e-{decades(target)} rad"} if place == 0 else {}
-            axis.plot(at, values, ls="none", marker=MARKS[k], ms=3, alpha=0.6, color=color, **options)
+            axis.plot(x, values, ls="none", marker=MARKS[k], ms=3, alpha=0.6, color=color, **options)
             beyond = int(np.isinf(values).sum())
             if beyond:
                 axis.annotate(f"+{beyond}", (place + 0.25 * (k - 1), 1.0), xycoords=axis.get_xaxis_transform(),

@@ -91,8 +91,8 @@ def upright(family: str, count: int, seed: int) -> Upright:
 
 def displaced(variant: Integrator, rows: Array, h: Array, marks: NDArray[np.int64]) -> Array:
     """y at the marks of runs of rows (m, 14) by steps h (m,), (m, marks, 4); NaN after a failure."""
-    every = np.broadcast_to(marks, (len(h), marks.size)).copy()
-    states = variant.solvers[BODY].many(rows, h, every).states  # type: ignore[attr-defined]
+    all_marks = np.broadcast_to(marks, (len(h), marks.size)).copy()
+    states = variant.solvers[BODY].many(rows, h, all_marks).states  # type: ignore[attr-defined]
     with np.errstate(all="ignore"):  # a run may have blown up
         up = np.stack(vertical(*np.moveaxis(states[..., :4], -1, 0)), axis=-1)
         up = up / np.linalg.norm(up, axis=-1, keepdims=True)

@@ -100,13 +100,13 @@ def growth_table(variant: Integrator, count: int, doublings: int, seed: int) -> 
     Only bodies whose reference can judge the finest target up to the last time count: for others, many of which turn
     chaotic, the difference may be the error of the reference.
     """
-    at = FIRST_TIME * 2.0 ** np.arange(doublings)
+    times = FIRST_TIME * 2.0 ** np.arange(doublings)
     steps = GROWN[variant.method]
     medians, judged = np.full((2, len(REGULAR), doublings), np.nan), np.zeros(len(REGULAR))
     for row, (kind, epsilon) in enumerate(REGULAR.values()):
         scenes = scenes_of(body_population(count, seed=seed, kind=kind, epsilon=epsilon))
-        bodies = Bodies(scenes, [kind] * count, float(at[-1]))
-        fine = at[:, np.newaxis] * np.linspace(0.55, 1.0, 10)  # the largest error of the last half of each time
+        bodies = Bodies(scenes, [kind] * count, float(times[-1]))
+        fine = times[:, np.newaxis] * np.linspace(0.55, 1.0, 10)  # the largest error of the last half of each time
         marks = np.unique(np.rint(fine.ravel() * steps).astype(np.int64))
         bodies.marks, bodies.times = marks, marks * (bodies.period / steps)[:, np.newaxis]
         known = np.flatnonzero(bodies.truth[1] <= CLEAR * min(ASKED))
@@ -114,7 +114,7 @@ def growth_table(variant: Integrator, count: int, doublings: int, seed: int) -> 
         if not known.size:
             continue
         errors = bodies.errors_at(run_steps(variant, bodies, known, float(steps), marks).states, known)
-        for k, time in enumerate(at):
+        for k, time in enumerate(times):
             near = (marks <= np.rint(time * steps)) & (marks > 0.5 * time * steps)
             for place, name in enumerate(("attitude", "energy")):
                 medians[place, row, k] = np.median(grain(errors[name][:, near].max(axis=1)))
@@ -122,7 +122,7 @@ def growth_table(variant: Integrator, count: int, doublings: int, seed: int) -> 
         f"error_{name}": (("family", "time"), medians[k]) for k, name in enumerate(("attitude", "energy"))
     }
     data["judged"] = "family", judged
-    return xr.Dataset(data, {"family": list(REGULAR), "time": at}).assign(_traits(variant))
+    return xr.Dataset(data, {"family": list(REGULAR), "time": times}).assign(_traits(variant))
 
 
 def about(families: dict[str, Bodies], *, long: bool) -> xr.Dataset:

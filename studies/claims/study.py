@@ -24,8 +24,8 @@ def cases(quick: bool) -> list[Case]:
     """A case for each integrator and scene, for each integrator on a free body, and for each planted false claim."""
     methods = integrators().values()
     bodies = [Case(facts.FREE, method.name, {"quick": True}) for method in methods if BODY in method.solvers]
-    every = [Case(name, method.name, {"quick": quick}) for name in grid_scenes(LEFT_OUT) for method in methods]
-    return bodies + every + planted.cases(quick)
+    tops = [Case(name, method.name, {"quick": quick}) for name in grid_scenes(LEFT_OUT) for method in methods]
+    return bodies + tops + planted.cases(quick)
 
 
 def measure(case: Case) -> xr.Dataset:

@@ -170,9 +170,9 @@ def efficiencies(data: xr.Dataset, error: float) -> dict[tuple[str, str], Effici
             continue
         cell, order = data.sel(scene=name, variant=label), declared_order(label) or round(fit.slope)
         used, steps = fit.used, cell["step_size"].values[fit.used]
-        each = np.median((evaluations_a_nutation(cell, name)[used] * steps) / scene(name).nutation_period)
+        per_step = np.median((evaluations_a_nutation(cell, name)[used] * steps) / scene(name).nutation_period)
         constant = np.median(cell[MAIN].values[used] / steps**order)
-        work = float(each * scene(name).nutation_period * (constant / error) ** (1.0 / order))
+        work = float(per_step * scene(name).nutation_period * (constant / error) ** (1.0 / order))
         works[name, label] = Efficiency(work, True)
     return works
 
@@ -194,11 +194,11 @@ def named_variants(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
 
     If there are few variants, or none of these methods, all variants, but no attitude chart beside an axis chart.
     """
-    every = list(map(str, data["variant"].values))
-    names = [name for name in every if split_name(name)[0] in NAMED]
-    if len(every) <= FEW or not names:
+    options = list(map(str, data["variant"].values))
+    names = [name for name in options if split_name(name)[0] in NAMED]
+    if len(options) <= FEW or not names:
         names = [
-            name for name in every if name.replace("[attitude]", "[axis]") not in every or "[attitude]" not in name
+            name for name in options if name.replace("[attitude]", "[axis]") not in options or "[attitude]" not in name
         ]
     else:
         names = [name for name in names if name.endswith("[axis]") or f"{split_name(name)[0]}[axis]" not in names]

@@ -224,8 +224,8 @@ def advised(data: xr.DataTree, others: Sequence[str]) -> dict[str, list[float]]:
 
 def reached(data: xr.DataTree, target: float) -> dict[str, Safe]:
     """By variant the safe choice for a target on natural tops, of all classes; those that reach it."""
-    each = (safest(data, Cell("short", "axis", target, NATURAL, needs))[0] for needs in CLASSES[:-1])
-    return {choice.name: choice for choices in each for choice in choices if np.isfinite(choice.seconds)}
+    lists = (safest(data, Cell("short", "axis", target, NATURAL, needs))[0] for needs in CLASSES[:-1])
+    return {choice.name: choice for choices in lists for choice in choices if np.isfinite(choice.seconds)}
 
 
 def fewest(data: xr.DataTree, cell: Cell) -> str | None:

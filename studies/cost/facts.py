@@ -111,9 +111,9 @@ def winners_facts(data: xr.DataTree) -> dict[str, Any]:
     for needs in CLASSES[:-1]:
         values |= _safe_facts(needs.replace("-", "_"), data, Cell("short", "axis", AT, NATURAL, needs))
     values["kicks_serve"] = serves(values["kicks"]) if values["kicks_seconds"] else ""
-    both = [row for row in cells.winners(data) if row["needs"] != "this-top" and row["safe"] and row["hindsight"]]
-    values["cells"] = len(both) or None
-    values["same"] = sum(row["safe"].name == row["hindsight"].name for row in both) if both else None
+    rows = [row for row in cells.winners(data) if row["needs"] != "this-top" and row["safe"] and row["hindsight"]]
+    values["cells"] = len(rows) or None
+    values["same"] = sum(row["safe"].name == row["hindsight"].name for row in rows) if rows else None
     return values
 
 
@@ -224,12 +224,12 @@ def slower(data: xr.DataTree) -> list[dict[str, str]]:
 
     A cell has the evaluations in the place of the time; no row if the winners have the fewest already.
     """
-    each = {target: cells.fewest_calls(data, Cell("short", "axis", target, NATURAL, CLASSES[0]))
+    by_target = {target: cells.fewest_calls(data, Cell("short", "axis", target, NATURAL, CLASSES[0]))
             for target in cells.targets(data)}  # fmt: skip
-    known = {target: fewest for target, fewest in each.items() if fewest is not None}
+    known = {target: fewest for target, fewest in by_target.items() if fewest is not None}
     price = max((fewest.price for fewest in known.values()), default=0.0)
     line = {"you can supply": f"{NEEDS[CLASSES[0]]} that takes {at_most(US * price, 1, 'us')} longer"}
-    for target in each:
+    for target in by_target:
         line[f"1e-{decades(target)} rad"] = over(data)
     for target, (best, evaluations, _) in known.items():
         words = f"{best.name}, {setting_words(best.name, best.setting)}, {count(evaluations)} evaluations"
@@ -265,10 +265,10 @@ def have(data: xr.DataTree) -> pd.DataFrame:
     return pd.DataFrame(rows)
 
 
-def winners(data: xr.DataTree, each: list[dict[str, Any]]) -> pd.DataFrame:
+def winners(data: xr.DataTree, results: list[dict[str, Any]]) -> pd.DataFrame:
     """Cells, one a row: the safe choice with its time, and the winner in hindsight with its share."""
     marked, rows = prices(data).marked, []
-    for cell in each:
+    for cell in results:
         safe, best = cell["safe"], cell["hindsight"]
         row = {
             **({"quantity": cell["quantity"]} if cell["quantity"] != "axis" else {}),

@@ -143,13 +143,13 @@ def together(variant: Integrator, tops: Tops, requests: Sequence[Asked]) -> list
     for setting, ends, _ in requests:
         whole = np.maximum(np.rint(places(ends).ravel() * setting), 1).astype(np.int64)
         marks.append(np.maximum.accumulate(whole))
-    each, n = [np.unique(part) for part in marks], len(tops.period)
-    longest = max((part.size for part in each), default=0)
-    if any(part[-1] < longest for part in each):  # a run with fewer steps than `longest` samples
+    unique, n = [np.unique(part) for part in marks], len(tops.period)
+    longest = max((part.size for part in unique), default=0)
+    if any(part[-1] < longest for part in unique):  # a run with fewer steps than `longest` samples
         return [samples for request in requests for samples in together(variant, tops, [request])]
     if not requests:
         return []
-    table = np.stack([filled(part, longest) for part in each])
+    table = np.stack([filled(part, longest) for part in unique])
     h = np.stack([steps_of(tops, request.setting) for request in requests])
     runs = stepped(variant, np.tile(tops.numbers, (len(requests), 1)), h.ravel(), np.repeat(table, n, axis=0))
     samples = []
@@ -176,12 +176,12 @@ def errors(chart: str, tops: Tops, samples: Samples, times: Array) -> dict[str, 
             rate = -np.sin(view.theta) * view.p_theta / I1
         else:
             rate = (view.momentum[..., 0] * axis[..., 1] - view.momentum[..., 1] * axis[..., 0]) / I1
-        each = {
+        quantities = {
             "axis": charts.axis_distance(axis, tops.forms.axis(times)),
             "energy": np.abs(view.energy - tops.energy[:, np.newaxis]) / tops.energy_scale[:, np.newaxis],
             "shape": shape(tops, axis[..., 2], rate),
         }
-    return {name: np.where(np.isfinite(values), values, np.inf) for name, values in each.items()}
+    return {name: np.where(np.isfinite(values), values, np.inf) for name, values in quantities.items()}
 
 
 def shape(tops: Tops, u: Array, rate: Array) -> Array:
@@ -191,9 +191,9 @@ def shape(tops: Tops, u: Array, rate: Array) -> Array:
     a, b, beta = p_psi / I1, p_phi / I1, 2.0 * mgl / I1
     alpha = (2.0 * tops.energy[:, np.newaxis] - p_psi**2 / I3) / I1
     omega = 2.0 * math.pi / tops.period[:, np.newaxis]
-    off = rate**2 - (1.0 - u * u) * (alpha - beta * u) + (b - a * u) ** 2
+    gap = rate**2 - (1.0 - u * u) * (alpha - beta * u) + (b - a * u) ** 2
     slope = 2.0 * a * (b - a * u) - 2.0 * u * (alpha - beta * u) - beta * (1.0 - u * u)
-    return np.asarray(np.abs(off) / np.hypot(slope, 2.0 * omega * rate))
+    return np.asarray(np.abs(gap) / np.hypot(slope, 2.0 * omega * rate))
 
 
 def measured(variant: Integrator, tops: Tops, requests: Sequence[Asked]) -> list[tuple[Array, Array]]:
@@ -202,8 +202,8 @@ def measured(variant: Integrator, tops: Tops, requests: Sequence[Asked]) -> list
     """
     (chart,), results = variant.charts(), []
     for (setting, ends, _), (samples, times) in zip(requests, run(variant, tops, requests), strict=True):
-        each = errors(chart, tops, samples, times)
-        largest = np.stack([each[name].reshape(len(times), len(ends), SAMPLES).max(axis=2).T for name in QUANTITIES])
+        by_name = errors(chart, tops, samples, times)
+        largest = np.stack([by_name[name].reshape(len(times), len(ends), SAMPLES).max(axis=2).T for name in QUANTITIES])
         if variant.fixed_step and setting < LEAST_STEPS:
             largest[1:] = np.inf
         results.append((largest, np.where(samples.ended, samples.evaluations / ends[-1], np.nan)))
@@ -380,13 +380,13 @@ def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
         panel = diagram(data, quantity)
         for target in CHECKED_TARGETS:
             for horizon in CHECKED_AT:
-                at = panel.place(target, horizon)
-                if not panel.predicted[at] or not np.isfinite(panel.ratio[at]):
+                cell = panel.place(target, horizon)
+                if not panel.predicted[cell] or not np.isfinite(panel.ratio[cell]):
                     continue
-                pair, settings, dearest = (int(panel.winner[at]), int(panel.second[at])), [], 0.0
+                pair, settings, dearest = (int(panel.winner[cell]), int(panel.second[cell])), [], 0.0
                 for row in pair:
                     table = runs_of(data, panel.names[row])
-                    fine = min(int(np.median(panel.levels[row][at])), table.sizes["setting"] - 1)
+                    fine = min(int(np.median(panel.levels[row][cell])), table.sizes["setting"] - 1)
                     settings.append(table["setting_value"].values[[max(fine - 1, 0), fine]].tolist())
                     dearest = max(dearest, float(np.nanmax(table["work"].values[fine])) * horizon)
                 runs = [[panel.names[row] for row in pair], settings]

@@ -275,8 +275,8 @@ def typical_work(variant: Integrator, record: Climb, tops: Any) -> Array:
         work[level, left] = ratio * work[level - 1, left]
     limit = [np.isfinite(setting_of(variant, level)) for level in range(LEVELS)]
     kinds = [tops.known & (tops.kinds == kind) for kind in range(len(KINDS))]
-    each = [np.median(work[:, chosen], axis=1) if chosen.any() else np.full(LEVELS, np.nan) for chosen in kinds]
-    return np.where(np.array(limit)[:, np.newaxis], np.stack(each, axis=1), np.nan)
+    medians = [np.median(work[:, chosen], axis=1) if chosen.any() else np.full(LEVELS, np.nan) for chosen in kinds]
+    return np.where(np.array(limit)[:, np.newaxis], np.stack(medians, axis=1), np.nan)
 
 
 def growth_of_work(variant: Integrator) -> float:
@@ -304,11 +304,11 @@ def guarded_runs(variant: Integrator, tops: Tops, record: Climb, guarded: int, b
     """
     (chart,) = variant.charts()
     data = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured", "whole")}
-    each = [
+    halves = [
         np.flatnonzero(tops.known & part)
         for part in (tops.kinds < KINDS.index(NATURAL), tops.kinds == KINDS.index(NATURAL))
     ]
-    chosen = np.concatenate([each[0][: guarded // 2], each[1][: guarded // 2]])
+    chosen = np.concatenate([halves[0][: guarded // 2], halves[1][: guarded // 2]])
     for place, (top, start) in enumerate(tops.members(chosen)):
         member = chosen[place]
         scene = Scene(f"member-{member}", top, start, horizon=float(tops.times[member, -1]))

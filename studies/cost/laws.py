@@ -116,9 +116,9 @@ def fit(horizons: Array, errors: Array, limit: float = 2.0, *, drifts: bool = Fa
 def walk(energy: Array, evaluations: Array) -> Array:
     """w (members,): the least energy error over sqrt(evaluations), of arrays (settings, horizons, members)."""
     with np.errstate(all="ignore"):
-        each = energy / np.sqrt(evaluations)
-    each = np.where(np.isfinite(each) & (each > 0.0), each, np.inf)
-    return np.asarray(each.min(axis=(0, 1)))
+        w = energy / np.sqrt(evaluations)
+    w = np.where(np.isfinite(w) & (w > 0.0), w, np.inf)
+    return np.asarray(w.min(axis=(0, 1)))
 
 
 def rounding(quantity: str, w: Array, horizons: Array, evaluations: Array) -> Array:

@@ -112,10 +112,10 @@ def slopes(names: list[str], rounds: int, batch: float) -> list[tuple[str, float
               for name in names for tolerance in tolerances_of(integrator(name))}  # fmt: skip
     if HEYOKA in names:
         makers[SAMPLED, TOLERANCE] = functools.partial(run_of, integrator(HEYOKA), TOLERANCE, own=False)
-    each = {key: [make(nutations) for nutations in LENGTHS] for key, make in makers.items()}
-    times = timings([call for pair in each.values() for call, _ in pair], rounds, batch, warm=True)
+    runs = {key: [make(nutations) for nutations in LENGTHS] for key, make in makers.items()}
+    times = timings([call for pair in runs.values() for call, _ in pair], rounds, batch, warm=True)
     rows = []
-    for (key, ((_, n_short), (_, n_long))), short, long in zip(each.items(), times[::2], times[1::2], strict=True):
+    for (key, ((_, n_short), (_, n_long))), short, long in zip(runs.items(), times[::2], times[1::2], strict=True):
         if n_long > n_short:  # a run that fails early has no slope
             price = (long.best - short.best) / (n_long - n_short)
             rows.append((*key, price, short.best - n_short * price))
@@ -133,8 +133,8 @@ def measured(names: list[str], rounds: int, batch: float) -> xr.Dataset:
         if name == SAMPLED:
             sampled[names.index(HEYOKA)] = slope
             continue
-        at = TOLERANCES.index(tolerance) if len(tolerances_of(integrator(name))) > 1 else slice(None)
-        price[names.index(name), at], call[names.index(name), at] = slope, max(intercept, 0.0)
+        column = TOLERANCES.index(tolerance) if len(tolerances_of(integrator(name))) > 1 else slice(None)
+        price[names.index(name), column], call[names.index(name), column] = slope, max(intercept, 0.0)
     data = {"price": (("variant", "priced_at"), price), "call": (("variant", "priced_at"), call)}
     return xr.Dataset(data | {"sampled": ("variant", sampled)}, {"variant": names, "priced_at": list(TOLERANCES)})
 
@@ -153,12 +153,12 @@ class Prices(NamedTuple):
     def at(self, name: str, tolerances: Array) -> tuple[Array, Array]:
         """Price and call at each tolerance, interpolated in logarithms; NaN is a variant with a step."""
         row, x = self.names.index(name), -np.log(TOLERANCES)
-        at = np.where(np.isfinite(tolerances), -np.log(np.where(tolerances > 0.0, tolerances, 1.0)), x[-1])
+        u = np.where(np.isfinite(tolerances), -np.log(np.where(tolerances > 0.0, tolerances, 1.0)), x[-1])
         known = np.isfinite(self.price[row])  # of a run that fails at a loose tolerance there is none
         if not known.any():
-            return np.full(at.shape, np.nan), np.full(at.shape, np.nan)
-        price = np.exp(np.interp(at, x[known], np.log(self.price[row, known])))
-        return price, np.interp(at, x[known], self.call[row, known])
+            return np.full(u.shape, np.nan), np.full(u.shape, np.nan)
+        price = np.exp(np.interp(u, x[known], np.log(self.price[row, known])))
+        return price, np.interp(u, x[known], self.call[row, known])
 
 
 def quartile_spread(samples: Array, axis: int = -1) -> Array:
@@ -200,15 +200,15 @@ def prices(data: xr.DataTree) -> Prices:
     of_batch = [str(name).partition("-")[0] for name in group["scene"].values]
     places = [[k for k, name in enumerate(of_batch) if name == batch] for batch in BATCHES]
     batches = [group.isel(scene=chosen) for chosen in places if chosen]
-    each = [combined(batch["price"].values, batch["call"].values) for batch in batches]
-    spreads = np.stack([quiet_median(spread) for *_, spread in each])  # (batches, variants)
+    results = [combined(batch["price"].values, batch["call"].values) for batch in batches]
+    spreads = np.stack([quiet_median(spread) for *_, spread in results])  # (batches, variants)
     best = np.argmin(spreads, axis=0)
 
     def chosen(parts: list[Array]) -> Array:
         return np.stack([parts[batch][row] for row, batch in enumerate(best)])
 
-    price, error = chosen([middle for middle, *_ in each]), chosen([quiet_median(error) for *_, error, _ in each])
-    call = chosen([call for _, call, *_ in each])
+    price, error = chosen([middle for middle, *_ in results]), chosen([quiet_median(error) for *_, error, _ in results])
+    call = chosen([call for _, call, *_ in results])
     with np.errstate(all="ignore"):
         ratio = group["sampled"].values / group["price"].sel(priced_at=TOLERANCE, method="nearest").values
     spread = np.array([spreads[batch, row] for row, batch in enumerate(best)])

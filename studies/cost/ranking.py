@@ -132,8 +132,8 @@ def hindsight(names: Sequence[str], costs: Array, errors: Array, marked: Sequenc
     lucky = np.random.default_rng(3).integers(len(names), size=DRAWS)
     shares = np.zeros((DRAWS, len(names)))
     for draw, factor in enumerate(factors(errors)):
-        each, _ = wins(ratio[near] * factor[near, np.newaxis])
-        shares[draw, near] = each @ weights[draw, :-1] / total
+        wins_, _ = wins(ratio[near] * factor[near, np.newaxis])
+        shares[draw, near] = wins_ @ weights[draw, :-1] / total
         shares[draw, lucky[draw]] += weights[draw, -1] / total
     middle, half = won.mean(axis=1), level.mean(axis=1)
     low, high = np.quantile(shares, ENDS, axis=0)

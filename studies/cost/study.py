@@ -77,14 +77,14 @@ def follow_up(data: xr.DataTree) -> list[Case]:
     plan = (QUICK if quick else FULL)[LONG]
     known = prices(data)
     quiet = [name for name in known.names if name not in known.marked]
-    again = [*known.marked, *quiet[:: max(len(quiet) // COMPANY, 1)]] if known.marked else []
+    names = [*known.marked, *quiet[:: max(len(quiet) // COMPANY, 1)]] if known.marked else []
     short = (QUICK if quick else FULL)[SHORT]
     options = {"members": short["natural"], "seed": SEED + 1, "nutations": short["nutations"]}
     settings = cells.advised(data, [*facts.HAVE, *figures.FAMILIAR])
     return [
         *(Case("tops", name, plan, group=LONG) for name in cells.contenders(data)),
         *(Case(NATURAL, name, options | {"start": start}, group=SAFE) for name, start in settings.items()),
-        *(timing(again, BATCHES[1], quick=quick) if again else []),
+        *(timing(names, BATCHES[1], quick=quick) if names else []),
         *(Case("natural", f"check-{place:02d}", settings, group=CHECKS)
           for place, settings in enumerate(far.chosen(data, CHECKED[quick]) if FAR in data.children else ())),
     ]  # fmt: skip

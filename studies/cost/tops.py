@@ -176,23 +176,23 @@ class Tops:
         `attitude` is left out where the chart does not show it.
         """
         parts = [slice(begin, begin + TOGETHER) for begin in range(0, max(len(chosen), 1), TOGETHER)]
-        each = [self._errors(chart, samples.states[part], samples.momenta[part], chosen[part]) for part in parts]
-        return {name: np.concatenate([part[name] for part in each]) for name in each[0]}
+        pieces = [self._errors(chart, samples.states[part], samples.momenta[part], chosen[part]) for part in parts]
+        return {name: np.concatenate([part[name] for part in pieces]) for name in pieces[0]}
 
     def _errors(self, chart: str, states: Array, momenta: Array, chosen: NDArray[np.int64]) -> dict[str, Array]:
         """The errors of a few members."""
         p_phi, p_psi = momenta[..., 0], momenta[..., 1]
         view = View(chart, together(self.numbers[chosen]), states, p_phi, p_psi)
         with np.errstate(all="ignore"):  # a run may have blown up
-            each = {"axis": charts.axis_distance(view.axis, self.truth[0][chosen])}
+            errors = {"axis": charts.axis_distance(view.axis, self.truth[0][chosen])}
             if chart != "axis":
-                each["attitude"] = charts.attitude_distance(view.quaternion, self.truth[1][chosen])
+                errors["attitude"] = charts.attitude_distance(view.quaternion, self.truth[1][chosen])
             change = np.abs(view.energy - self.energy[chosen, np.newaxis])
-            each["energy"] = change / self.energy_scale[chosen, np.newaxis]
+            errors["energy"] = change / self.energy_scale[chosen, np.newaxis]
             start = [part[chosen, np.newaxis] for part in self.momenta[:2]]
             scale = np.maximum(np.maximum(np.abs(start[0]), np.abs(start[1])), TINY)
-            each[MOMENTA] = np.maximum(np.abs(p_phi - start[0]), np.abs(p_psi - start[1])) / scale
-            largest = {name: values.max(axis=1) for name, values in each.items()}
+            errors[MOMENTA] = np.maximum(np.abs(p_phi - start[0]), np.abs(p_psi - start[1])) / scale
+            largest = {name: values.max(axis=1) for name, values in errors.items()}
         return {name: np.where(np.isfinite(values), values, np.inf) for name, values in largest.items()}
 
 
@@ -215,8 +215,8 @@ def natural(members: int, seed: int) -> Array:
 
 def named() -> dict[str, Array]:
     """The nine numbers of each scene of the catalogue that has a nutation and repeats no other."""
-    each = {name: scenes.scene(name) for name in grid_scenes(LEFT_OUT)}
-    chosen = {name: scene for name, scene in each.items() if math.isfinite(scene.nutation_period)}
+    catalogue = {name: scenes.scene(name) for name in grid_scenes(LEFT_OUT)}
+    chosen = {name: scene for name, scene in catalogue.items() if math.isfinite(scene.nutation_period)}
     return {name: np.array(flat(scene.top, scene.start)) for name, scene in chosen.items()}
 
 

@@ -44,7 +44,7 @@ NAMES = {  # of the facts of each group
 
 def facts(data: xr.DataTree) -> dict[str, Any]:
     """The settings of the runs, and how constants and phase changed; changes are relative."""
-    answers: dict[str, Any] = dict.fromkeys(" ".join(NAMES.values()).split()) | {
+    values: dict[str, Any] = dict.fromkeys(" ".join(NAMES.values()).split()) | {
         "rounding": RUN_ROUNDING,  # the largest change that a million steps of rounding explain
         "per_nutation": PER_NUTATION,  # steps of the long runs
         "lost_phase": LOST,  # rad
@@ -52,8 +52,8 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     measures = {HISTORIES: of_histories, WINDOWS: of_windows, ROUNDINGS: of_walks, HORIZONS: of_losses}
     for group, of_group in measures.items():
         if group in data:
-            answers |= of_group(data[group].to_dataset())
-    return answers
+            values |= of_group(data[group].to_dataset())
+    return values
 
 
 def of_histories(histories: xr.Dataset) -> dict[str, Any]:

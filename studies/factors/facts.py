@@ -64,8 +64,8 @@ def noisy(data: xr.Dataset) -> tuple[int, int]:
 
 def compared(data: xr.Dataset) -> pd.DataFrame:
     """The times that are compared: all, or none if too many are noisy because the machine was busy."""
-    frame, (loud, every) = timed(data), noisy(data)
-    return frame.iloc[:0] if loud > NOISY_SHARE * every else frame
+    frame, (noisy_count, count) = timed(data), noisy(data)
+    return frame.iloc[:0] if noisy_count > NOISY_SHARE * count else frame
 
 
 def fastest(part: pd.DataFrame, call: str = KERNEL, language: str | None = None, tie: float = TIE) -> pd.Series | None:
@@ -125,9 +125,9 @@ def pairs(frame: pd.DataFrame) -> pd.DataFrame:
     frames = []
     for factor, before, after in STEPS if len(frame) else ():
         columns = [*GOAL, *(name for name in FACTORS if name != factor)]
-        both = frame[frame[factor] == before].merge(frame[frame[factor] == after], on=columns)
-        frames.append(both[columns].assign(factor=factor, before=before, after=after,
-                                       ratio=both["seconds_x"] / both["seconds_y"]))  # fmt: skip
+        joined = frame[frame[factor] == before].merge(frame[frame[factor] == after], on=columns)
+        frames.append(joined[columns].assign(factor=factor, before=before, after=after,
+                                       ratio=joined["seconds_x"] / joined["seconds_y"]))  # fmt: skip
     return pd.concat(frames) if frames else pd.DataFrame(columns=["factor", "before", "after", "ratio"])
 
 
@@ -168,25 +168,25 @@ def against_scipy(frame: pd.DataFrame) -> pd.DataFrame:
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """The waterfall, the largest effect of each factor, SciPy, the charts, and the noise of the times."""
-    every, frame, (loud, count) = timed(data), compared(data), noisy(data)
-    part, beside, ratios = first_goal(frame), against_scipy(frame), charts(frame)
-    answers: dict[str, Any] = {
-        "busy": every.shape != frame.shape or None,
-        "times": count, "loud": loud, "noisy": NOISY, "usual_spread": every["spread"].median(),
+    times, frame, (loud, count) = timed(data), compared(data), noisy(data)
+    part, scipy, ratios = first_goal(frame), against_scipy(frame), charts(frame)
+    values: dict[str, Any] = {
+        "busy": times.shape != frame.shape or None,
+        "times": count, "loud": loud, "noisy": NOISY, "usual_spread": times["spread"].median(),
         "again": int((data["seconds_tries"] > 1).sum()),
-        "samples": SAMPLES, "tie": TIE, "near": LEAST, "near_share": (every["axis"] >= LEAST * every["target"]).mean(),
+        "samples": SAMPLES, "tie": TIE, "near": LEAST, "near_share": (times["axis"] >= LEAST * times["target"]).mean(),
     }  # fmt: skip
     for name, call_first in (("late", False), ("first", True)):
         bars = waterfall(part, call_first=call_first)
-        answers |= {f"{name}_{factor}": bars["times faster"][bars["factor"] == factor].max() for factor in FACTORS}
-    answers |= _ends(part, waterfall(part), bars)
+        values |= {f"{name}_{factor}": bars["times faster"][bars["factor"] == factor].max() for factor in FACTORS}
+    values |= _ends(part, waterfall(part), bars)
     for name, column in (("user", "times, as called"), ("author", "times, kernels")):
-        answers |= {f"{name}_least": beside[column].min(), f"{name}_most": beside[column].max()}
+        values |= {f"{name}_least": scipy[column].min(), f"{name}_most": scipy[column].max()}
     in_all = ratios.dropna()  # medians of one set of methods
     for chart in CHARTS:
         middles = in_all.groupby("family")[f"{chart} / axis"].median()
-        answers |= {f"{chart}_{family.replace('-', '_').lower()}": middles.get(family) for family in FAMILIES}
-    return answers
+        values |= {f"{chart}_{family.replace('-', '_').lower()}": middles.get(family) for family in FAMILIES}
+    return values
 
 
 def _ends(part: pd.DataFrame, bars: pd.DataFrame, bare: pd.DataFrame) -> dict[str, Any]:
@@ -209,7 +209,7 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     frame = compared(data)
     reasons = data["reason"].to_dataframe().reset_index().query(f"{'reason'} != ''")
     times = {"axis": "error reached (rad)", "seconds": "time (s)", "force_evaluations": "force evaluations"}
-    every = pd.concat([timed(data).drop(columns=FACTORS[:3], errors="ignore"), reasons]).rename(columns=times)
-    frames = {"effects": effects(frame), "scipy": against_scipy(frame), "charts": charts(frame), "times": every}
+    all_times = pd.concat([timed(data).drop(columns=FACTORS[:3], errors="ignore"), reasons]).rename(columns=times)
+    frames = {"effects": effects(frame), "scipy": against_scipy(frame), "charts": charts(frame), "times": all_times}
     names = {"horizon": "nutations", "target": "axis error (rad)", "before": "from", "after": "to", "count": "pairs"}
     return {name: table.rename(columns=names) for name, table in frames.items()}

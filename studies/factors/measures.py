@@ -101,8 +101,8 @@ def settled_times(plan: Runs, processes: int) -> tuple[Array, Array]:
         loud = np.flatnonzero(quartile_spread(times) > NOISY)
         if not loud.size:
             break
-        again = timed(plan._replace(runs=[plan.runs[i] for i in loud]), processes)
-        times[loud] = np.sort(np.hstack([times[loud], again]))[:, :processes]
+        repeat = timed(plan._replace(runs=[plan.runs[i] for i in loud]), processes)
+        times[loud] = np.sort(np.hstack([times[loud], repeat]))[:, :processes]
         tries[loud] += 1
     return times, tries
 
@@ -123,16 +123,16 @@ def factorial(
     for goal in goals:
         part = [cell for cell in grid if cell.language in goal.languages]
         settled = settle(scene, part, goal)
-        at = horizons.index(goal.nutations), targets.index(goal.target)
+        index = horizons.index(goal.nutations), targets.index(goal.target)
         for cell, trial in settled.items():
             if trial.why:
-                reasons[(grid.index(cell), *at)] = trial.why
+                reasons[(grid.index(cell), *index)] = trial.why
                 continue
             for name, value in zip(names, (trial.setting, trial.error, trial.bound, trial.evaluations), strict=True):
-                numbers[name][(grid.index(cell), *at)] = value
+                numbers[name][(grid.index(cell), *index)] = value
             for call in goal.calls:
                 if caller(scene, cell, call, trial.setting, trial.horizon) is not None:
-                    places.append((grid.index(cell), *at, CALLS.index(call)))
+                    places.append((grid.index(cell), *index, CALLS.index(call)))
                     runs.append((cell.name, call, trial.setting, trial.horizon))
     times, counts = settled_times(Runs(scene, runs, rounds, batch), processes)
     for place, sample, width, count in zip(places, times, quartile_spread(times), counts, strict=True):

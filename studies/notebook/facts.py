@@ -75,13 +75,13 @@ def solver_facts(data: xr.Dataset, discrete: xr.Dataset) -> dict[str, Any]:
     names = order_two(runs)
     for scene, part in PARTS.items():
         limit, largest = float(solver["energy_largest"].sel(scene=scene)), discrete["energy_largest"].sel(scene=scene)
-        since = [better_from(data, scene, name) for name in names]
+        times = [better_from(data, scene, name) for name in names]
         values |= {
             f"{part}_end": notebook_end(data, scene),  # s
             f"{part}_energy": limit,  # the solver's largest relative energy error to the notebook's end
             # variants with a larger error than the solver to then, of `compared`; with a smaller one in the end
             f"{part}_behind": int((largest.sel(variant=names) > limit).sum()) if names else None,
-            f"{part}_ahead": sum(map(math.isfinite, since)) if names else None,
+            f"{part}_ahead": sum(map(math.isfinite, times)) if names else None,
             f"{part}_long": energy_until(data, scene, SOLVER, values["long"]),  # the solver's error to then
             f"{part}_turned": turned(data, scene),  # degrees
         }
@@ -121,10 +121,10 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     for name in present(data):
         for scene in map(str, data["scene"].values):
             run = data.sel(scene=scene, variant=name)
-            since = better_from(data, scene, name) if name != SOLVER and SOLVER in data["variant"].values else math.inf
+            start = better_from(data, scene, name) if name != SOLVER and SOLVER in data["variant"].values else math.inf
             errors = [float(run[f"{constant}_largest"]) for constant in CONSTANTS]
             rows.append([name, scene, str(run["outcome"].values), notebook_end(data, scene), *errors,
-                         energy_until(data, scene, name, last), since if since < math.inf else math.nan])  # fmt: skip
+                         energy_until(data, scene, name, last), start if start < math.inf else math.nan])  # fmt: skip
     header = ["variant", "scene", "outcome", "end of the notebook (s)"]
     header += [*(f"error of {constant} to then" for constant in CONSTANTS), f"error of energy to {last:g} s"]
     header.append("energy better than lsoda's from (s)")

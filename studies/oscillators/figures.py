@@ -25,10 +25,10 @@ LOOKS = {name: style.Look(style.ORANGE, "v") if name == "mcmillan" else style.lo
 def pictures(data: xr.Dataset) -> list[Picture]:
     """The figure of friction, then that of the exact map, if these were measured."""
     figures = []
-    for draw, every, names in (
+    for draw, oscillators, names in (
         (draw_orders, OSCILLATORS, SYMBOLS), (draw_maps, QUARTICS, MAPS),
     ):  # fmt: skip
-        scenes = [name for name in every if name in data["scene"]]
+        scenes = [name for name in oscillators if name in data["scene"]]
         variants = [name for name in names if name in data["variant"]]
         if scenes and variants:
             figures.append(draw(data, scenes, variants))

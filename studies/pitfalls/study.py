@@ -71,8 +71,8 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     """Largest errors of the axis (rad) and of the energy (relative) in each, and when the run at the pole ended."""
     keys = "steps", "without", "without_energy", "needed", "falling", "falling_energy", "ended"
     known: dict[str, Any] = dict.fromkeys(keys) | _warning_counts(data)
-    if (without := run_of(data, TERM, WITHOUT)) is not None:
-        last = without.isel(setting=-1)
+    if (runs := run_of(data, TERM, WITHOUT)) is not None:
+        last = runs.isel(setting=-1)
         known |= {"steps": float(last["steps"]), "without": float(last["axis"].max()),  # rad
                   "without_energy": float(last["energy"].max())}  # fmt: skip
     if (term := run_of(data, TERM, WITH)) is not None:
@@ -123,7 +123,7 @@ def lines(data: xr.Dataset) -> list[list[tuple[str, str, Any, Any]]]:
         if (runs := run_of(data, POLE, name)) is not None:
             late = runs.isel(setting=0, sample=slice(1, None))
             curves[2].append((label, color, late["time"].values, late["axis"].values))
-    return [[(label, color, x[y > 0.0], y[y > 0.0]) for label, color, x, y in each] for each in curves]
+    return [[(label, color, x[y > 0.0], y[y > 0.0]) for label, color, x, y in panel] for panel in curves]
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
@@ -132,9 +132,9 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     figure.set_figheight(2.2)  # inches; the front page shows it among others
     titles = ("no gyroscopic term", "energy kept, motion wrong", "a pole in Euler's angles")
     curves = lines(data)
-    for place, (axis, title, each) in enumerate(zip(axes[0], titles, curves, strict=True)):
+    for place, (axis, title, panel) in enumerate(zip(axes[0], titles, curves, strict=True)):
         axis.set(title=title, yscale="log", xlabel="nutations", ylabel="error of the axis (rad)")
-        for label, color, x, y in each:
+        for label, color, x, y in panel:
             axis.plot(x, y, color=color, marker="" if place else "o", ms=2.5)
             if label == ENDED:
                 axis.plot(x[-1], y[-1], "X", color=color, ms=7)
@@ -143,8 +143,8 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     axes[0, 0].set(xscale="log", xlabel="steps a nutation")
     axes[0, 1].set_ylabel("error")
     few_ticks(*axes[0], most=5)
-    for axis, each in zip(axes[0], curves, strict=True):
-        label_lines(axis, each)
+    for axis, panel in zip(axes[0], curves, strict=True):
+        label_lines(axis, panel)
     return [Picture("three", figure)]
 
 

@@ -82,11 +82,11 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     kernels, charts = [], []
     for scene, rule, cell in cells(data, "seconds_per_step"):
         for step in range(cell.sizes["twin_step"]):
-            at = cell.isel(twin_step=step)
-            seconds, counts = (at[name].sel(kernel=["reduced", "unreduced"]).values
+            row = cell.isel(twin_step=step)
+            seconds, counts = (row[name].sel(kernel=["reduced", "unreduced"]).values
                              for name in ("seconds_per_step", "iterations_per_step"))  # fmt: skip
             time, work = seconds[1] / seconds[0], counts[1] / counts[0]
-            kernels.append([scene, rule, float(at["twin_step_size"]), time, work, time / work, *seconds, *counts])
+            kernels.append([scene, rule, float(row["twin_step_size"]), time, work, time / work, *seconds, *counts])
     for scene, method, cell in cells(data, "seconds"):
         for ratio in chart_ratios(cell):
             name = f"{method}[{ratio.chart}]"

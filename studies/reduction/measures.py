@@ -76,9 +76,9 @@ def time_to_error(base: xr.Dataset, other: xr.Dataset) -> float:
     curves = [np.log([table[name].values[judged(table)] for name in ("axis", "seconds")]) for table in (base, other)]
     (x, before), (y, after) = (curve[:, np.argsort(curve[0])] for curve in curves)
     low, high = max(u.min(initial=np.inf) for u in (x, y)), min(u.max(initial=-np.inf) for u in (x, y))
-    at = np.concatenate([x, y])
-    at = at[(at > low - SAME) & (at < high + SAME)]
-    return math.exp(np.median(np.interp(at, y, after) - np.interp(at, x, before))) if at.size else math.nan
+    grid = np.concatenate([x, y])
+    grid = grid[(grid > low - SAME) & (grid < high + SAME)]
+    return math.exp(np.median(np.interp(grid, y, after) - np.interp(grid, x, before))) if grid.size else math.nan
 
 
 def chart_ratios(cell: xr.Dataset) -> list[Ratio]:

@@ -81,16 +81,16 @@ def timed(data: xr.Dataset) -> xr.Dataset:
 def charts(data: xr.Dataset) -> list[Chart]:
     """Every run: two costs and four errors to choose from, a panel a scene and run length."""
     data, names = timed(data), list(map(str, data["variant"].values))
-    every, marks = {}, {}
+    series, marks = {}, {}
     for scene, length in product(map(str, data["scene"].values), data["nutations"].values):
         cell, title = data.sel(scene=scene, nutations=length), f"{scene} | {length:g} nutations"
-        every[title] = [Series(name, _points(cell.sel(variant=name))) for name in names if name != REFERENCE]
+        series[title] = [Series(name, _points(cell.sel(variant=name))) for name in names if name != REFERENCE]
         if REFERENCE in names:
             runs = cell.sel(variant=REFERENCE)
             marks[title] = (float(runs["seconds"].min()), float(runs["axis_bound"].min()))
     costs = {name: place for place, name in enumerate(COSTS)}
     errors = {name: len(COSTS) + place for place, name in enumerate(ERRORS)}
-    return [Chart("runs", "Error against cost of every run", costs, errors, every, ("scene", "run length"), marks)]
+    return [Chart("runs", "Error against cost of every run", costs, errors, series, ("scene", "run length"), marks)]
 
 
 def _points(cell: xr.Dataset) -> list[tuple[float | str | None, ...]]:

@@ -27,15 +27,15 @@ NAMES = (  # of all facts that are measured
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """Up to which setting methods are accurate, how they fail, and the mechanisms. Steps of maps are in nutations."""
-    answers: dict[str, Any] = dict.fromkeys(NAMES)
-    answers |= {"periods": PERIODS, "slow": SLOW, "fast": FAST, "near": NEAR, "barely": BARELY, "lost": LOST,
+    values: dict[str, Any] = dict.fromkeys(NAMES)
+    values |= {"periods": PERIODS, "slow": SLOW, "fast": FAST, "near": NEAR, "barely": BARELY, "lost": LOST,
               "common": COMMON, "tried": MOST}  # fmt: skip
     if family := next(iter(families(data)), None):
-        answers |= atlas_facts(data, family)
+        values |= atlas_facts(data, family)
     for scene, variable, read in READ:
         if measured(data, scene, variable):
-            answers |= read(data.sel(scene=scene))
-    return answers
+            values |= read(data.sel(scene=scene))
+    return values
 
 
 def atlas_facts(data: xr.Dataset, family: str) -> dict[str, Any]:
@@ -75,8 +75,8 @@ def pole_facts(part: xr.Dataset) -> dict[str, Any]:
         if halves is not None and method.control == "step_size":
             halved[method.charts() == ("angles",)].append(halves)
     groups = {"angles": halved[True], "others": halved[False]}
-    answers = {name: len(group) for name, group in groups.items() if group}
-    return answers | {f"{name}_halved": sum(groups[name]) for name in answers}
+    values = {name: len(group) for name, group in groups.items() if group}
+    return values | {f"{name}_halved": sum(groups[name]) for name in values}
 
 
 def resonance_facts(part: xr.Dataset) -> dict[str, Any]:
@@ -113,13 +113,13 @@ def separatrix_facts(part: xr.Dataset) -> dict[str, Any]:
 def sampling_facts(part: xr.Dataset) -> dict[str, Any]:
     """Energy errors sampled once a nutation against true ones, and the solver's part in that of the midpoint rule."""
     hidden, ratios = sampled(part)
-    answers: dict[str, Any] = {"sampled": len(hidden) + len(ratios), "hidden": len(hidden),
+    values: dict[str, Any] = {"sampled": len(hidden) + len(ratios), "hidden": len(hidden),
                                "small": sum(ratio > 10.0 for ratio in ratios.values())}  # fmt: skip
     if "plain_energy" in part:
         rule = part.dropna("variant", how="all", subset=["one_iteration_energy"]).isel(variant=0)
-        answers |= {"one_iteration": float(rule["one_iteration_energy"]),
+        values |= {"one_iteration": float(rule["one_iteration_energy"]),
                   "solved": float(rule["plain_energy"][-1])}  # fmt: skip
-    return answers
+    return values
 
 
 READ = (

@@ -63,8 +63,8 @@ def survives(
             run = solver.many(numbers, h.ravel(), np.tile(marks, (len(starts), 1)))
             theta, well = View(chart, scene.top, run.states).theta, run.outcome == OUTCOMES.index("ok")
         else:
-            each = zip(starts, h.ravel().tolist(), strict=True)
-            runs = [_run(method, scene, start, Plan.steps(step, marks)) for start, step in each]
+            pairs = zip(starts, h.ravel().tolist(), strict=True)
+            runs = [_run(method, scene, start, Plan.steps(step, marks)) for start, step in pairs]
             theta, well = np.stack([view.theta for _, view in runs]), np.array([outcome == "ok" for outcome, _ in runs])
         away = np.abs(theta - centres.reshape(-1, 1)).max(axis=1)
         stays: NDArray[np.bool_] = well & (away <= RUNS_AWAY * displacements.ravel())

@@ -207,8 +207,8 @@ class _Descent:
     def _run(self, rows: NDArray[np.int64], columns: slice) -> None:
         """Run and judge some scenes at neighbouring settings."""
         if self.solver is None:
-            each = [one_by_one(self.runs, self.chart, self.scenes[row], columns) for row in rows]
-            results = Made(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
+            row_runs = [one_by_one(self.runs, self.chart, self.scenes[row], columns) for row in rows]
+            results = Made(*(np.concatenate(parts) for parts in zip(*row_runs, strict=True)))
         else:
             results = together(self.runs, self.solver, columns, self.tops[rows], self.truth.periods[rows])
         verdicts = judge_runs(self.truth.part(rows), self.runs.phases[columns], self.followed[columns], *results)
