@@ -121,17 +121,17 @@ def examine(kind: str, count: int, first: int) -> ErrorSummary:
     return ErrorSummary(motion, constants, arithmetic, broken)
 
 
-def _pieces(each: int) -> Iterator[tuple[str, int, int]]:
+def _pieces(count: int) -> Iterator[tuple[str, int, int]]:
     """Pieces of work of about a second: family, count, number of the first top."""
-    for first in range(0, each, PIECE):
+    for first in range(0, count, PIECE):
         for kind in REGIMES:
-            yield kind, min(PIECE, each - first), first
+            yield kind, min(PIECE, count - first), first
 
 
-def measure(each: int = EACH, jobs: int = 2, *, verbose: bool = False) -> ErrorSummary:
+def measure(count: int = EACH, jobs: int = 2, *, verbose: bool = False) -> ErrorSummary:
     """Examine this many tops of each family in this many processes."""
     closed_form.compile_now()
-    total, pieces = ErrorSummary(np.zeros((3, 4)), np.zeros(5), Counter(), []), list(_pieces(each))
+    total, pieces = ErrorSummary(np.zeros((3, 4)), np.zeros(5), Counter(), []), list(_pieces(count))
     with ProcessPoolExecutor(jobs) as pool:
         work = zip(*pieces, strict=True)
         for number, part in enumerate(map(examine, *work) if jobs == 1 else pool.map(examine, *work), 1):
@@ -162,8 +162,8 @@ def lines(total: ErrorSummary) -> list[str]:
 def main() -> int:
     """Measure and print; exit code 1 if a top exceeds its allowance."""
     words = sys.argv[1:]
-    each, jobs = int(words[0]) if words else EACH, int(words[1]) if words[1:] else 2
-    total = measure(each, jobs, verbose=True)
+    count, jobs = int(words[0]) if words else EACH, int(words[1]) if words[1:] else 2
+    total = measure(count, jobs, verbose=True)
     print("\n".join([*lines(total), *total.broken]))
     return 1 if total.broken else 0
 

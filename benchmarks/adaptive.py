@@ -70,8 +70,8 @@ def measure(
     shown = state if form.present is None else form.present(par, plan.times, state[None])[0]
     gap = float(np.max(np.abs(shown - run.states[-1])) / np.max(np.abs(shown)))
     kernel, loop = timings([lambda: solver(scene.top, scene.start, plan), theirs], batches=batches, batch=2e-3)
-    each = kernel.best / run.force_evaluations * 1e9, loop.best / work * 1e9
-    return Row(chart, tolerance, (run.steps, steps), (run.force_evaluations, work), each, gap)
+    nanoseconds = kernel.best / run.force_evaluations * 1e9, loop.best / work * 1e9
+    return Row(chart, tolerance, (run.steps, steps), (run.force_evaluations, work), nanoseconds, gap)
 
 
 if __name__ == "__main__":

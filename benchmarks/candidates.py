@@ -109,27 +109,27 @@ def prices(quantity: str) -> dict[str, tuple[float, float]]:
     """
     scene = symtop.scene("goldstein")
     known = advise._usable(advise._Question(scene, PRICED, quantity, scene.horizon, advise.OF_ANY))
-    each = [method for method in map(integrator, known) if quantity not in (method.conserves or ())]
+    methods = [method for method in map(integrator, known) if quantity not in (method.conserves or ())]
     runs = []
     for horizon in (scene.horizon, SHORT * scene.nutation_period):
         step = functools.partial(likely_step, scene, horizon=horizon, accuracy=PRICED)
-        pairs = [(method, step(method) if method.fixed_step else PRICED) for method in each]
+        pairs = [(method, step(method) if method.fixed_step else PRICED) for method in methods]
         attempts = [settings.attempt(scene, method, setting, horizon, quantity) for method, setting in pairs]
         seconds = np.array(settings.seconds(scene, attempts, quantity, horizon))
         runs.append((seconds, [attempt.evaluations for attempt in attempts]))
     (long, n_long), (short, n_short) = runs
     price = (long - short) / np.subtract(n_long, n_short)
     call = np.maximum(short - price * n_short, 0.0)
-    return {method.name: pair for method, *pair in zip(each, price.tolist(), call.tolist(), strict=True)}  # type: ignore[misc]
+    return {method.name: pair for method, *pair in zip(methods, price.tolist(), call.tolist(), strict=True)}  # type: ignore[misc]
 
 
 def costs(question: advise._Question, advised: symtop.Advice, menu: list[str]) -> dict[str, float]:
     """Seconds of the candidates that meet the accuracy and may be the cheapest, of the table's, and of `ADVISED`."""
     scene, accuracy, quantity = question.scene, advise.MARGIN * question.accuracy, question.quantity
-    each, first = prices(quantity), ranking.cheapest((), quantity, accuracy, 100.0)
+    tariffs, first = prices(quantity), ranking.cheapest((), quantity, accuracy, 100.0)
     attempts, seconds = dict[str, settings.Attempt](), dict[str, float]()
-    for name in sorted(each, key=lambda name: (name not in first, -(integrator(name).order or 0))):
-        price, call = each[name]
+    for name in sorted(tariffs, key=lambda name: (name not in first, -(integrator(name).order or 0))):
+        price, call = tariffs[name]
         patience = math.inf if name in menu else min(PATIENCE * min(seconds.values(), default=math.inf) / price, MOST)
         attempt = settings.search(scene, integrator(name), accuracy, quantity, scene.horizon, patience=patience)
         if not attempt.why:
@@ -165,11 +165,11 @@ def excess(count: int) -> list[Row]:
     for scene, quantity, accuracy in scenes(count):
         advised = symtop.recommend(scene, accuracy=accuracy, quantity=quantity)
         question = advise._Question(scene, accuracy, quantity, scene.horizon, ())
-        each = costs(question, advised, menu := advise._menu(question))
-        if each:
+        seconds = costs(question, advised, menu := advise._menu(question))
+        if seconds:
             words = f"{scene.name} {quantity} {accuracy:.1e} over {scene.horizon / scene.nutation_period:.3g} nutations"
-            best = min(each, key=each.__getitem__)
-            ratios = {name: cost / each[best] for name, cost in each.items()}
+            best = min(seconds, key=seconds.__getitem__)
+            ratios = {name: cost / seconds[best] for name, cost in seconds.items()}
             table_ratio = min((ratios[name] for name in menu if name in ratios), default=math.inf)
             rows.append(Row(words, str(advised.integrator), best, ratios.get(ADVISED, math.inf), table_ratio))
     return rows

@@ -146,10 +146,10 @@ def calls() -> list[Call]:
         def alone(name: str = method) -> object:
             return symtop.simulate(scene, name, step_size=h, horizon=STEPS * h, samples=2, observe="axis", guard=False)
 
-        each = timings([lambda: together(*SHORT), lambda: together(*LONG), alone], ALL_ROUNDS, batch=0.0)
+        results = timings([lambda: together(*SHORT), lambda: together(*LONG), alone], ALL_ROUNDS, batch=0.0)
         n0, n1 = SHORT[0] * SHORT[1], LONG[0] * LONG[1]
-        short, long = (timing.best / CALLED for timing in each[:2])
-        rows.append(Call(method, short - n0 * (long - short) / (n1 - n0), long / n1, each[2].best / STEPS))
+        short, long = (timing.best / CALLED for timing in results[:2])
+        rows.append(Call(method, short - n0 * (long - short) / (n1 - n0), long / n1, results[2].best / STEPS))
     return rows
 
 

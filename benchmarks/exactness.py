@@ -109,10 +109,10 @@ def of_edges() -> Iterator[str]:
         ("a separatrix, up and to the next climb", separatrix.top, separatrix.start, separatrix.horizon / 2.0),
     ]
     method, steps = symtop.integrator(METHOD), 4
-    for words, top, at, h in cases:
-        states = method.solvers["attitude"](top, at, Plan.steps(h, [steps])).states
-        precise = PreciseForm(top, at, digits=DIGITS)
-        parts = exact_map(top, at, h).parts
+    for words, top, start, h in cases:
+        states = method.solvers["attitude"](top, start, Plan.steps(h, [steps])).states
+        precise = PreciseForm(top, start, digits=DIGITS)
+        parts = exact_map(top, start, h).parts
         yield f"{words:<52}{attitude_error(precise, states[0], h, steps):8.0e}{parts:6.0f} parts"
 
 

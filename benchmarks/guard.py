@@ -226,8 +226,8 @@ def ablation(name: str, count: int) -> Table:
     ways |= {f"less: {check}": values for check, values in CHECKS.items()}
     for threshold, factor in itertools.product(THRESHOLDS, (0.5, 2.0)):
         value = getattr(guard, threshold)
-        each = value if isinstance(value, dict) else dict(enumerate(np.atleast_1d(value).tolist()))
-        scaled = {key: type(part)(factor * part) for key, part in each.items()}
+        entries = value if isinstance(value, dict) else dict(enumerate(np.atleast_1d(value).tolist()))
+        scaled = {key: type(part)(factor * part) for key, part in entries.items()}
         ways[f"{threshold} times {factor:g}"] = {threshold: scaled[0] if isinstance(value, float | int) else scaled}
     tallies, total = {way: np.zeros(4, dtype=int) for way in ways}, np.zeros(4, dtype=int)
     for k in range(count):
@@ -240,8 +240,8 @@ def ablation(name: str, count: int) -> Table:
             with mock.patch.multiple(guard, **values):
                 expected = guard.forecast(scene, method, chart, plan, motion)
                 warned = guard.trouble(motion, method, chart, plan, expected) is not None
-            off = abs(math.log10(np.clip(expected.axis_error, 1e-4, 1.0) / np.clip(error, 1e-4, 1.0))) > 1.0
-            tallies[way] += np.logical_and(kinds, (not warned, warned, not warned, off))
+            wrong_size = abs(math.log10(np.clip(expected.axis_error, 1e-4, 1.0) / np.clip(error, 1e-4, 1.0))) > 1.0
+            tallies[way] += np.logical_and(kinds, (not warned, warned, not warned, wrong_size))
     header = ["the guard", "wrong: silent", "right: warned of", "ended early: silent", "size off by ten"]
     rows = [[way, *map("{} of {}".format, counts, total)] for way, counts in tallies.items()]
     return Table(f"{count} {name}", header, rows)
@@ -356,10 +356,10 @@ def page(results: Path) -> None:
     facts, known = measured.circumstances(), {name: kept(name) for name in SAMPLERS}
     header = ["runs", "guard", "ended early", *PARTS]
     rows = list[list[str]]()
-    for name, every in known.items():
-        parts = {"all": every}
+    for name, all_runs in known.items():
+        parts = {"all": all_runs}
         for field in ("whole", "control", *(("periods",) if name == "tops" else ()), "stratum", "needs"):
-            groups = grouped(every, field).items()
+            groups = grouped(all_runs, field).items()
             parts |= {value if field == "whole" else f"{field} {value}": runs for value, runs in groups}
         for guarded in ("exact", "series") if name == "tops" else ("series",):
             rows += [[f"{name}: {part}", guarded, *counts(runs, guarded)] for part, runs in parts.items()]

@@ -38,12 +38,12 @@ def main() -> None:
     ends = far.horizons()[far.horizons() <= 1.0001 * options.nutations]
     ((errors, work),) = far.measured(integrator(NAME), tops, [far.Asked(STEPS, ends, np.inf)])
     ((fine, work_2),) = far.measured(integrator(NAME), tops, [far.Asked(FINE, ends[ends <= 1.0001 * FITTED], np.inf)])
-    every = far.horizons()
-    known = np.full((len(far.QUANTITIES), 2, every.size, TOPS), np.nan)
+    times = far.horizons()
+    known = np.full((len(far.QUANTITIES), 2, times.size, TOPS), np.nan)
     fitted = ends <= 1.0001 * FITTED
     known[:, 0, : ends.size][:, fitted] = errors[:, fitted]
     known[:, 1, : fine.shape[1]], drifts = fine, far.drifts_of(integrator(NAME))
-    prediction = far.predicted(known, np.stack([work, work_2]), every, far.grain_of(tops), drifts=drifts)["error"][:, 0]
+    prediction = far.predicted(known, np.stack([work, work_2]), times, far.grain_of(tops), drifts=drifts)["error"][:, 0]
     later = [horizon for horizon in 10.0 ** np.arange(5, 9) if horizon <= 1.0001 * ends[-1]]
     lines, ratios, parts = [], [], []
     for place, quantity in enumerate(far.QUANTITIES):

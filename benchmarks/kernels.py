@@ -98,8 +98,8 @@ def measure() -> list[Row]:
         counts.append(steps)
         calls += [lambda kernel=kernel, n=steps: twin.ours(kernel, n), *(lambda o=o, n=steps: o(n) for o in others)]
     timed = timings(calls, batches=BATCHES, batch=BATCH)
-    each = list(zip(twins, counts, timed[::3], timed[1::3], timed[2::3], strict=True))
-    verlet = next(ours.best / steps for key, steps, ours, *_ in each if key == ("stormer-verlet", "angles"))
+    rows = list(zip(twins, counts, timed[::3], timed[1::3], timed[2::3], strict=True))
+    verlet = next(ours.best / steps for key, steps, ours, *_ in rows if key == ("stormer-verlet", "angles"))
     return [
         Row(
             *key,
@@ -111,7 +111,7 @@ def measure() -> list[Row]:
             gaps[key],
             ours.best / steps / verlet,
         )
-        for key, steps, ours, theirs, unfused in each
+        for key, steps, ours, theirs, unfused in rows
     ]
 
 

@@ -160,9 +160,9 @@ def steps() -> list[Row]:
         solvers[key] = solver
         probe = timings([partial(twin.ours, kernel, kernels.CHECKED)], batches=3, batch=kernels.BATCH)[0]
         length = kernels.within(kernel, int(CALL / probe.best * kernels.CHECKED))
-        each = kernels.within(kernel, max(200, FASTER * length // MEMBERS))
-        counts.append((length, each * MEMBERS))
-        calls += [partial(twin.ours, kernel, length), together(solver, MEMBERS, kernel.h, each, SCENES[key[1] == BODY])]
+        lane = kernels.within(kernel, max(200, FASTER * length // MEMBERS))
+        counts.append((length, lane * MEMBERS))
+        calls += [partial(twin.ours, kernel, length), together(solver, MEMBERS, kernel.h, lane, SCENES[key[1] == BODY])]
     timed = timings(calls, batches=BATCHES, batch=BATCH)
     rows = []
     for key, (length, total), alone, beside in zip(solvers, counts, timed[::2], timed[1::2], strict=True):

@@ -71,15 +71,15 @@ def compare(first: xr.DataTree, second: xr.DataTree) -> dict[str, Any]:
         ]
         print("\n".join(lines) or "  none")
     shares = [(cell, pair) for cell in asked for pair in shares_of(*(cells.contest(data, cell) for data in both))]
-    apart = [(cell, pair) for cell, pair in shares if pair[0].low > pair[1].high or pair[1].low > pair[0].high]
-    overlap = 1.0 - len(apart) / max(len(shares), 1)
+    disjoint = [(cell, pair) for cell, pair in shares if pair[0].low > pair[1].high or pair[1].low > pair[0].high]
+    overlap = 1.0 - len(disjoint) / max(len(shares), 1)
     print(f"shares that overlap: {overlap:.1%} of {len(shares)} (goal {OVERLAP:.0%}); the first that do not:")
-    print("\n".join(f"  {label(cell)}: {words(*pair)}" for cell, pair in apart[:SHOWN]))
+    print("\n".join(f"  {label(cell)}: {words(*pair)}" for cell, pair in disjoint[:SHOWN]))
     print("cells that moved before:")
     for cell in MOVED:
-        each = [cells.contest(data, cell) for data in both]
-        standings = words(*(contest.first for contest in each if contest.first))
-        print(f"  {label(cell)}: {standings}, called {[contest.called for contest in each]}")
+        contests = [cells.contest(data, cell) for data in both]
+        standings = words(*(contest.first for contest in contests if contest.first))
+        print(f"  {label(cell)}: {standings}, called {[contest.called for contest in contests]}")
     calls = sum(cells.contest(first, cell).called + cells.safest(first, cell)[1] for cell in asked)
     called, different = sum(map(bool, winners + safe)), sum(len(pair) > 1 for pair in winners + safe)
     return {
@@ -118,9 +118,9 @@ def shares_of(first: Contest, second: Contest) -> list[tuple[Standing, Standing]
     return [pair for pair in pairs if pair[0].share or pair[1].share]
 
 
-def words(*each: Standing) -> str:
+def words(*standings: Standing) -> str:
     """Shares with their intervals."""
-    return ", ".join(f"{entry.name} {entry.share:.3f} ({entry.low:.3f} to {entry.high:.3f})" for entry in each)
+    return ", ".join(f"{entry.name} {entry.share:.3f} ({entry.low:.3f} to {entry.high:.3f})" for entry in standings)
 
 
 def by_hand(data: xr.DataTree) -> dict[str, float]:

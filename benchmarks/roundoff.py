@@ -40,7 +40,7 @@ def main() -> None:
         assert inside(solver) is solver
         par, rule, state = solver.setup(spheroid.top, spheroid.start, h)
         run = long_run(spheroid, name, steps=int(options.steps), step_size=h, quiet=True)
-        alone = run["modified_energy_mean"].values
+        drifts = run["modified_energy_mean"].values
         size = 2 if chart == "angles" else 6
         wide = np.array(state[:size], dtype=WIDE)
         momenta = spheroid.top.momenta(spheroid.start)
@@ -58,7 +58,7 @@ def main() -> None:
             drift = float((energies[0] - energies[1]) / spheroid.energy_scale)
             theta = pair[:, 0] if chart == "angles" else np.arccos(pair[:, 2])
             if place % 6 == 0 or end == ends[-1]:
-                print(f"{name:<16}{end:>12}{drift:>12.1e}{alone[place]:>12.1e}{float(theta[0] - theta[1]):>12.1e}")
+                print(f"{name:<16}{end:>12}{drift:>12.1e}{drifts[place]:>12.1e}{float(theta[0] - theta[1]):>12.1e}")
 
 
 if __name__ == "__main__":

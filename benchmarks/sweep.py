@@ -63,8 +63,8 @@ def measure(count: int = STARTS, certified: int = CERTIFIED) -> SweepTimes:
         start = time.perf_counter()
         for scene in sample:
             symtop.reference(scene, [HORIZON], certify="integration")
-        each = (time.perf_counter() - start) / len(sample)
-    return SweepTimes(len(starts), seconds, float(np.median(errors)), bound, each * len(starts))
+        certificate = (time.perf_counter() - start) / len(sample)
+    return SweepTimes(len(starts), seconds, float(np.median(errors)), bound, certificate * len(starts))
 
 
 def lines(swept: SweepTimes) -> list[str]:

@@ -49,10 +49,10 @@ def run(command: Sequence[str], setting: str, held: str, body: Body, h: float, s
 
 def of_npm(name: str, engine: str, package: str, rows: Sequence[tuple[str, str, str]]) -> list[Setting]:
     """The settings (name, held, method) of an engine whose driver is `node/NAME.mjs`; OSError without the package."""
-    node, at = _program("node"), PACKAGES / "node_modules" / package / "package.json"
-    if not at.is_file():
+    node, file = _program("node"), PACKAGES / "node_modules" / package / "package.json"
+    if not file.is_file():
         raise OSError(f"the npm package {package} is not installed in {PACKAGES.relative_to(HERE.parents[1])}")
-    version = json.loads(at.read_text(encoding="utf-8"))["version"]
+    version = json.loads(file.read_text(encoding="utf-8"))["version"]
     command = (node, str(HERE / "node" / "top.mjs"), name, str(PACKAGES))
     return [
         Setting(engine, version, label, held, method, functools.partial(run, command, label, held))

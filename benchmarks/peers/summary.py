@@ -102,8 +102,8 @@ def span(
     data: xr.Dataset, call: str, mine: Sequence[str], theirs: Sequence[str], least: int = 0
 ) -> tuple[float, float] | None:
     """The least and the largest ratio, their time over ours, over scenes and judged accuracies."""
-    each = ratios(data, call, mine, theirs, least)
-    return (min(each), max(each)) if each else None
+    values = ratios(data, call, mine, theirs, least)
+    return (min(values), max(values)) if values else None
 
 
 def printed(value: float) -> str:
@@ -200,7 +200,7 @@ def _wins(data: xr.Dataset) -> list[str]:
     """Which libraries are faster than those that need no more than a library and than our fastest, and how often."""
     lines = []
     for group, rows in (("methods on f(t, y) alone", general(data)), ("of all", groups(data).get(OURS, []))):
-        scores = {words: each for call, words in NAMES.items() if (each := score(data, call, rows)).compared}
+        scores = {words: result for call, words in NAMES.items() if (result := score(data, call, rows)).compared}
         faster = [library for tally in scores.values() for library in tally.faster]
         ahead = [f"{tally.ahead} of {tally.compared}" for tally in scores.values()]
         if scores:

@@ -125,9 +125,9 @@ def _cell(count: int, tolerance: float, solvers: Iterable[str]) -> list[Row]:
             calls[f"{name}[{chart}], lanes"] = fixed(name, chart, numbers, steps)
     calls |= {f"diffrax {solver}, vmap": vmapped(solver, numbers, tolerance) for solver in solvers}
     errors = {name: worst(call, numbers) for name, call in calls.items()}  # compiles, too
-    each = timings([*calls.values()], ROUNDS, batch=0.0, warm=True)
+    results = timings([*calls.values()], ROUNDS, batch=0.0, warm=True)
     return [Row(name, count, tolerance, errors[name], call()[1], timing.best / count)
-            for (name, call), timing in zip(calls.items(), each, strict=True)]  # fmt: skip
+            for (name, call), timing in zip(calls.items(), results, strict=True)]  # fmt: skip
 
 
 def table(rows: list[Row]) -> Table:

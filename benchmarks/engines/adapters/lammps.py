@@ -51,12 +51,12 @@ def _run(lammps: Any, style: str, body: Body, h: float, steps: int) -> Path:
 def _columns(engine: Any, arms: Any) -> tuple[Any, Any]:
     """The body's axes in space, one a row, and their derivatives, from the atoms."""
     order = np.argsort(engine.extract_atom("id")[0:6])
-    each = []
+    parts = []
     for name in ("x", "v"):
         values = engine.extract_atom(name)
         rows = np.array([[values[i][k] for k in range(3)] for i in order])
-        each.append((rows[::2] - rows[1::2]) / (2.0 * arms[:, None]))
-    return each[0], each[1]
+        parts.append((rows[::2] - rows[1::2]) / (2.0 * arms[:, None]))
+    return parts[0], parts[1]
 
 
 def settings() -> list[Setting]:
