@@ -39,7 +39,7 @@ LINES = (at.PHI_LINE, at.PSI_LINE, at.PHI_TURNS, at.DOWN_TURNS, at.UP_TURNS)
 MARKS = (at.ARITHMETIC, at.RATE_ERROR, at.VALUE_ERROR)
 
 
-class Examined(NamedTuple):
+class ErrorSummary(NamedTuple):
     """Largest errors of many tops, and the arithmetic that they needed."""
 
     motion: Array  # (nutations, quantities), largest errors
@@ -71,13 +71,13 @@ def short(top: SymmetricTop, start: Angles) -> tuple[Array, int]:
 def deviation(ours: Array, true: Array) -> Array:
     """Errors of constants, in the order of `CONSTANTS`."""
 
-    def apart(place: int) -> float:
+    def gap(place: int) -> float:
         return float(abs((ours[place] - true[place]) + (ours[place + 1] - true[place + 1])))
 
     largest = max(abs(true[place]) for place in LINES) or 1.0
-    rate = apart(at.QUARTERS) / (abs(true[at.QUARTERS]) or 1.0)
-    means = max(apart(place) for place in LINES) / largest
-    starts = max(apart(place + 2) / max(1.0, abs(true[place + 2])) for place in LINES)
+    rate = gap(at.QUARTERS) / (abs(true[at.QUARTERS]) or 1.0)
+    means = max(gap(place) for place in LINES) / largest
+    starts = max(gap(place + 2) / max(1.0, abs(true[place + 2])) for place in LINES)
     pairs = {place + k for place in (*LINES, at.QUARTERS) for k in range(4)} | set(MARKS)
     units = 0.0
     for place in set(range(at.SIZE)) - pairs:
@@ -85,7 +85,7 @@ def deviation(ours: Array, true: Array) -> Array:
         if x != y and not (math.isnan(x) and math.isnan(y)):
             noise = 1e-29 * max(1.0, largest)  # allowed for numbers that vanish exactly, such as b - a u at a cusp
             units = max(units, max(abs(x - y) - noise, 0.0) / math.ulp(y))
-    return np.array([rate, apart(at.QUARTERS + 2), means, starts, units])
+    return np.array([rate, gap(at.QUARTERS + 2), means, starts, units])
 
 
 def motion_errors(form: ClosedForm, precise: PreciseForm) -> tuple[Array, Array]:
@@ -93,7 +93,7 @@ def motion_errors(form: ClosedForm, precise: PreciseForm) -> tuple[Array, Array]
     period = form.nutation_period if math.isfinite(form.nutation_period) else 1.0
     times = period * np.array(NUTATIONS)
     motion, axis, ctx = form(times), form.axis(times), context(DIGITS)
-    found, allowed = np.zeros((3, 4)), np.full((3, 4), 1e-15)
+    errors, allowed = np.zeros((3, 4)), np.full((3, 4), 1e-15)
     for i, time in enumerate(times):
         true = precise(float(time))
         theta, phi, psi = map(ctx.convert, true[:3])
@@ -101,71 +101,71 @@ def motion_errors(form: ClosedForm, precise: PreciseForm) -> tuple[Array, Array]
         last = EPSILON * np.abs([float(phi), float(psi)])
         turns = abs(ctx.mpf(motion.phi[i]) - phi) - last[0], abs(ctx.mpf(motion.psi[i]) - psi) - last[1]
         tilt = max(abs(ctx.mpf(x) - y) for x, y in zip(axis[i], place, strict=True))
-        found[i] = [max(float(error), 0.0) for error in (abs(ctx.mpf(motion.theta[i]) - theta), *turns, tilt)]
+        errors[i] = [max(float(error), 0.0) for error in (abs(ctx.mpf(motion.theta[i]) - theta), *turns, tilt)]
         allowed[i, 0] = 1e-15 if theta < 2.0 else 2.0 * math.ulp(math.pi)
-    return found, allowed
+    return errors, allowed
 
 
-def examine(kind: str, count: int, first: int) -> Examined:
+def examine(kind: str, count: int, first: int) -> ErrorSummary:
     """Examine some tops of one family."""
     motion, constants, arithmetic, broken = np.zeros((3, 4)), np.zeros(5), Counter[str](), []
     for top, start in tops(count, SEED, [kind], first):
         form, precise = ClosedForm(top, start), PreciseForm(top, start, digits=DIGITS)
-        found, allowed = motion_errors(form, precise)
+        errors, allowed = motion_errors(form, precise)
         ours, _ = short(top, start)
-        apart = deviation(ours, precise_constants(top, start, precise))
-        if not ((found <= allowed).all() and (apart <= LIMITS).all() and apart[0] <= ours[at.RATE_ERROR]):
-            broken.append(f"{kind}: {top} {start} {found.tolist()} {apart.tolist()}")
-        motion, constants = np.maximum(motion, found), np.maximum(constants, apart)
+        gaps = deviation(ours, precise_constants(top, start, precise))
+        if not ((errors <= allowed).all() and (gaps <= LIMITS).all() and gaps[0] <= ours[at.RATE_ERROR]):
+            broken.append(f"{kind}: {top} {start} {errors.tolist()} {gaps.tolist()}")
+        motion, constants = np.maximum(motion, errors), np.maximum(constants, gaps)
         arithmetic[form.provenance.arithmetic] += 1
-    return Examined(motion, constants, arithmetic, broken)
+    return ErrorSummary(motion, constants, arithmetic, broken)
 
 
-def _pieces(each: int) -> Iterator[tuple[str, int, int]]:
+def _pieces(count: int) -> Iterator[tuple[str, int, int]]:
     """Pieces of work of about a second: family, count, number of the first top."""
-    for first in range(0, each, PIECE):
+    for first in range(0, count, PIECE):
         for kind in REGIMES:
-            yield kind, min(PIECE, each - first), first
+            yield kind, min(PIECE, count - first), first
 
 
-def measure(each: int = EACH, jobs: int = 2, *, said: bool = False) -> Examined:
+def measure(count: int = EACH, jobs: int = 2, *, verbose: bool = False) -> ErrorSummary:
     """Examine this many tops of each family in this many processes."""
     closed_form.compile_now()
-    total, pieces = Examined(np.zeros((3, 4)), np.zeros(5), Counter(), []), list(_pieces(each))
+    total, pieces = ErrorSummary(np.zeros((3, 4)), np.zeros(5), Counter(), []), list(_pieces(count))
     with ProcessPoolExecutor(jobs) as pool:
         work = zip(*pieces, strict=True)
         for number, part in enumerate(map(examine, *work) if jobs == 1 else pool.map(examine, *work), 1):
-            total = Examined(
+            total = ErrorSummary(
                 np.maximum(total.motion, part.motion), np.maximum(total.constants, part.constants),
                 total.arithmetic + part.arithmetic, total.broken + part.broken,
             )  # fmt: skip
-            if said:
+            if verbose:
                 print(f"\r{number} of {len(pieces)} pieces", end="", file=sys.stderr, flush=True)
-    if said:
+    if verbose:
         print(file=sys.stderr)
     return total
 
 
-def lines(found: Examined) -> list[str]:
+def lines(total: ErrorSummary) -> list[str]:
     """The tables."""
-    head = f"{'largest error of ' + str(found.tops) + ' tops':<48}" + "".join(f"{name:>12}" for name in QUANTITIES)
+    head = f"{'largest error of ' + str(total.tops) + ' tops':<48}" + "".join(f"{name:>12}" for name in QUANTITIES)
     rows = [
         f"{f'at {nutations:g} nutations (rad; phi, psi beyond 1 ulp)':<48}" + "".join(f"{x:>12.2g}" for x in row)
-        for nutations, row in zip(NUTATIONS, found.motion, strict=True)
+        for nutations, row in zip(NUTATIONS, total.motion, strict=True)
     ]
-    constants = [f"{name:<48}{x:>12.2g}" for name, x in zip(CONSTANTS, found.constants, strict=True)]
-    shares = [f"{f'constants in {name}':<48}{count:>12}{found.share(name):>12.2%}"
-              for name, count in found.arithmetic.most_common()]  # fmt: skip
-    return [head, *rows, "", *constants, "", *shares, f"{'beyond its allowance':<48}{len(found.broken):>12}"]
+    constants = [f"{name:<48}{x:>12.2g}" for name, x in zip(CONSTANTS, total.constants, strict=True)]
+    shares = [f"{f'constants in {name}':<48}{count:>12}{total.share(name):>12.2%}"
+              for name, count in total.arithmetic.most_common()]  # fmt: skip
+    return [head, *rows, "", *constants, "", *shares, f"{'beyond its allowance':<48}{len(total.broken):>12}"]
 
 
 def main() -> int:
     """Measure and print; exit code 1 if a top exceeds its allowance."""
     words = sys.argv[1:]
-    each, jobs = int(words[0]) if words else EACH, int(words[1]) if words[1:] else 2
-    found = measure(each, jobs, said=True)
-    print("\n".join([*lines(found), *found.broken]))
-    return 1 if found.broken else 0
+    count, jobs = int(words[0]) if words else EACH, int(words[1]) if words[1:] else 2
+    total = measure(count, jobs, verbose=True)
+    print("\n".join([*lines(total), *total.broken]))
+    return 1 if total.broken else 0
 
 
 if __name__ == "__main__":

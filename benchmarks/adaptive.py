@@ -64,14 +64,14 @@ def measure(
     end = nutations * scene.nutation_period
     solver, plan = symtop.integrator("dop853-compiled").solvers[chart], Plan.until([end], tolerance)
     theirs = in_c(chart, scene, tolerance, end)
-    mine, (state, steps, work) = solver(scene.top, scene.start, plan), theirs()
+    run, (state, steps, work) = solver(scene.top, scene.start, plan), theirs()
     form = FORMULATIONS[chart]
     par, _ = form.prepare(scene.top, scene.start)
     shown = state if form.present is None else form.present(par, plan.times, state[None])[0]
-    gap = float(np.max(np.abs(shown - mine.states[-1])) / np.max(np.abs(shown)))
-    ours, other = timings([lambda: solver(scene.top, scene.start, plan), theirs], batches=batches, batch=2e-3)
-    each = ours.best / mine.force_evaluations * 1e9, other.best / work * 1e9
-    return Row(chart, tolerance, (mine.steps, steps), (mine.force_evaluations, work), each, gap)
+    gap = float(np.max(np.abs(shown - run.states[-1])) / np.max(np.abs(shown)))
+    kernel, loop = timings([lambda: solver(scene.top, scene.start, plan), theirs], batches=batches, batch=2e-3)
+    nanoseconds = kernel.best / run.force_evaluations * 1e9, loop.best / work * 1e9
+    return Row(chart, tolerance, (run.steps, steps), (run.force_evaluations, work), nanoseconds, gap)
 
 
 if __name__ == "__main__":

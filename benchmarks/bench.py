@@ -23,7 +23,7 @@ class Results(NamedTuple):
     startup: Mapping[str, float]
     closed_form: Sequence[truth.Row]
     accuracy: float  # rad, of the attitude that `targets` meet
-    targets: Sequence[targets.Reached]
+    targets: Sequence[targets.MethodCost]
     parts: Sequence[whole_run.Item]
     one_step: Mapping[str, float]
     ensemble: Sequence[ensemble.Item]
@@ -46,7 +46,7 @@ def verdict(results: Results) -> list[str]:
     run, one_step = whole_run.verdict(results.parts, results.one_step)
     return [
         *kernels.verdict(results.kernels), *lanes.verdict(results.lanes), *ensemble.verdict(results.ensemble),
-        *ensemble.said_of(results.ensemble_calls), run, one_step,
+        *ensemble.call_sentences(results.ensemble_calls), run, one_step,
     ]  # fmt: skip
 
 

@@ -49,8 +49,8 @@ def residuals(scene: symtop.Scene, name: str, parts: float, ends: list[int]) -> 
         length = float((np.linalg.norm(L, axis=1) / known[1] - 1.0).mean())
         rows.append((energy, length if scene.top.free else float(((L[:, 2] - known[0]) / known[1]).mean())))
     names = "energy", "|L|" if scene.top.free else "p_phi"
-    spent = (time.perf_counter() - began) / at.k * 1e9
-    return dict(zip(names, np.array(rows).T, strict=True)), spent
+    cost = (time.perf_counter() - began) / at.k * 1e9
+    return dict(zip(names, np.array(rows).T, strict=True)), cost
 
 
 def main() -> None:
@@ -65,16 +65,16 @@ def main() -> None:
     for name in SCENES:
         for method in options.methods:
             parts = RUNS[method]
-            rng, own = np.random.default_rng(1), symtop.scene(name, bodies=True)
-            starts = [changed(own.start, rng) for _ in range(options.starts)]
-            residuals(own, method, parts, ends[:1])  # compiles
-            runs = [residuals(symtop.Scene(name, own.top, at, own.horizon), method, parts, ends) for at in starts]
+            rng, scene = np.random.default_rng(1), symtop.scene(name, bodies=True)
+            starts = [changed(scene.start, rng) for _ in range(options.starts)]
+            residuals(scene, method, parts, ends[:1])  # compiles
+            runs = [residuals(symtop.Scene(name, scene.top, at, scene.horizon), method, parts, ends) for at in starts]
             for constant in runs[0][0]:
                 rms = np.sqrt(np.mean([values[constant] ** 2 for values, _ in runs], axis=0))
                 late = np.array(ends) > ends[-1] / 10.0**DECADES
                 fit = power_law(np.array(ends, dtype=float)[late], rms[late])
-                spent = min(spent for _, spent in runs)
-                print(f"{name:<14}{method:<16}{constant:<10}{rms[-1]:>15.1e}{fit!s:>18}{spent:>11.0f}", flush=True)
+                cost = min(cost for _, cost in runs)
+                print(f"{name:<14}{method:<16}{constant:<10}{rms[-1]:>15.1e}{fit!s:>18}{cost:>11.0f}", flush=True)
 
 
 if __name__ == "__main__":

@@ -76,8 +76,8 @@ def table(data: xr.DataTree) -> list[str]:
         group = data[span].to_dataset().isel(scene=0)
         price, names = prices.sel(variant=group["variant"].values), group["variant"].values
         seconds = (group["cost"] * price["price"] + price["call"]).fillna(np.inf)
-        asked = itertools.product(group["quantity"].values, group["target"].values, CLASSES, (False, True))
-        for quantity, target, need, general in asked:
+        cases = itertools.product(group["quantity"].values, group["target"].values, CLASSES, (False, True))
+        for quantity, target, need, general in cases:
             rows = np.isin(group["needs"].values, CLASSES[need]) & ((group["general"].values == 1.0) | (not general))
             costs = seconds.sel(quantity=quantity, target=target).transpose("variant", "member").values[rows]
             chosen = [str(names[rows][place]) for place in cover(costs, MENU)] if rows.any() else []
@@ -88,9 +88,9 @@ def table(data: xr.DataTree) -> list[str]:
 
 def scenes(count: int) -> "list[tuple[symtop.Scene, str, float]]":
     """Drawn scenes, each with a quantity and an accuracy that the reference can judge, below the nutation's width."""
-    drawn = symtop.population(2 * count, seed=SEED)
+    members = symtop.population(2 * count, seed=SEED)
     rng, chosen = np.random.default_rng(SEED), list[tuple[symtop.Scene, str, float]]()
-    for k, row in enumerate(np.stack([drawn[name].values for name in symtop.model.top.NUMBERS], axis=1).tolist()):
+    for k, row in enumerate(np.stack([members[name].values for name in symtop.model.top.NUMBERS], axis=1).tolist()):
         spans, accuracies = (np.exp(rng.uniform(*np.log(ends))) for ends in (SPANS, ACCURACIES))
         top, start, quantity = symtop.SymmetricTop(*row[:3]), symtop.Angles(*row[3:]), QUANTITIES[k % len(QUANTITIES)]
         period = top.nutation_period(start)
@@ -109,39 +109,40 @@ def prices(quantity: str) -> dict[str, tuple[float, float]]:
     """
     scene = symtop.scene("goldstein")
     known = advise._usable(advise._Question(scene, PRICED, quantity, scene.horizon, advise.OF_ANY))
-    each = [one for one in map(integrator, known) if quantity not in (one.conserves or ())]
+    methods = [method for method in map(integrator, known) if quantity not in (method.conserves or ())]
     runs = []
     for horizon in (scene.horizon, SHORT * scene.nutation_period):
         step = functools.partial(likely_step, scene, horizon=horizon, accuracy=PRICED)
-        asked = [(one, step(one) if one.fixed_step else PRICED) for one in each]
-        mets = [settings.attempt(scene, one, setting, horizon, quantity) for one, setting in asked]
-        runs.append((np.array(settings.seconds(scene, mets, quantity, horizon)), [met.evaluations for met in mets]))
-    (long, many), (short, few) = runs
-    price = (long - short) / np.subtract(many, few)
-    call = np.maximum(short - price * few, 0.0)
-    return {one.name: pair for one, *pair in zip(each, price.tolist(), call.tolist(), strict=True)}  # type: ignore[misc]
+        pairs = [(method, step(method) if method.fixed_step else PRICED) for method in methods]
+        attempts = [settings.attempt(scene, method, setting, horizon, quantity) for method, setting in pairs]
+        seconds = np.array(settings.seconds(scene, attempts, quantity, horizon))
+        runs.append((seconds, [attempt.evaluations for attempt in attempts]))
+    (long, n_long), (short, n_short) = runs
+    price = (long - short) / np.subtract(n_long, n_short)
+    call = np.maximum(short - price * n_short, 0.0)
+    return {method.name: pair for method, *pair in zip(methods, price.tolist(), call.tolist(), strict=True)}  # type: ignore[misc]
 
 
 def costs(question: advise._Question, advised: symtop.Advice, menu: list[str]) -> dict[str, float]:
     """Seconds of the candidates that meet the accuracy and may be the cheapest, of the table's, and of `ADVISED`."""
     scene, accuracy, quantity = question.scene, advise.MARGIN * question.accuracy, question.quantity
-    each, first = prices(quantity), ranking.cheapest((), quantity, accuracy, 100.0)
-    mets, spent = dict[str, settings.Attempt](), dict[str, float]()
-    for name in sorted(each, key=lambda name: (name not in first, -(integrator(name).order or 0))):
-        price, call = each[name]
-        most = math.inf if name in menu else min(PATIENCE * min(spent.values(), default=math.inf) / price, MOST)
-        met = settings.search(scene, integrator(name), accuracy, quantity, scene.horizon, patience=most)
-        if not met.why:
-            mets[name] = met
-            part = settings.at_accuracy(met.integrator, met.error / accuracy)
-            spent[name] = met.evaluations * price * part + call
-    least = min(spent.values(), default=math.inf)
-    near = {name: met for name, met in mets.items() if spent[name] <= NEXT * least or name in menu}
-    for name, met in near.items():
-        found = settings.search(
-            scene, met.integrator, accuracy, quantity, scene.horizon, met.setting, least=advise.CLOSE
+    tariffs, first = prices(quantity), ranking.cheapest((), quantity, accuracy, 100.0)
+    attempts, seconds = dict[str, settings.Attempt](), dict[str, float]()
+    for name in sorted(tariffs, key=lambda name: (name not in first, -(integrator(name).order or 0))):
+        price, call = tariffs[name]
+        patience = math.inf if name in menu else min(PATIENCE * min(seconds.values(), default=math.inf) / price, MOST)
+        attempt = settings.search(scene, integrator(name), accuracy, quantity, scene.horizon, patience=patience)
+        if not attempt.why:
+            attempts[name] = attempt
+            part = settings.at_accuracy(attempt.integrator, attempt.error / accuracy)
+            seconds[name] = attempt.evaluations * price * part + call
+    least = min(seconds.values(), default=math.inf)
+    near = {name: attempt for name, attempt in attempts.items() if seconds[name] <= NEXT * least or name in menu}
+    for name, attempt in near.items():
+        retry = settings.search(
+            scene, attempt.integrator, accuracy, quantity, scene.horizon, attempt.setting, least=advise.CLOSE
         )  # fmt: skip
-        near[name] = met if found.why else found
+        near[name] = attempt if retry.why else retry
     if advised.integrator is not None:
         setting = float(advised.step_size or advised.tolerance or math.nan)
         near[ADVISED] = settings.attempt(scene, integrator(advised.integrator), setting, scene.horizon, quantity)
@@ -164,22 +165,22 @@ def excess(count: int) -> list[Row]:
     for scene, quantity, accuracy in scenes(count):
         advised = symtop.recommend(scene, accuracy=accuracy, quantity=quantity)
         question = advise._Question(scene, accuracy, quantity, scene.horizon, ())
-        each = costs(question, advised, menu := advise._menu(question))
-        if each:
+        seconds = costs(question, advised, menu := advise._menu(question))
+        if seconds:
             words = f"{scene.name} {quantity} {accuracy:.1e} over {scene.horizon / scene.nutation_period:.3g} nutations"
-            best = min(each, key=each.__getitem__)
-            over = {name: cost / each[best] for name, cost in each.items()}
-            named = min((over[name] for name in menu if name in over), default=math.inf)
-            rows.append(Row(words, str(advised.integrator), best, over.get(ADVISED, math.inf), named))
+            best = min(seconds, key=seconds.__getitem__)
+            ratios = {name: cost / seconds[best] for name, cost in seconds.items()}
+            table_ratio = min((ratios[name] for name in menu if name in ratios), default=math.inf)
+            rows.append(Row(words, str(advised.integrator), best, ratios.get(ADVISED, math.inf), table_ratio))
     return rows
 
 
 def main() -> int:
     """Make the table, or check the advice."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.candidates", description=__doc__.partition("\n")[0])
-    of = parser.add_subparsers(dest="action", required=True)
-    of.add_parser("make", help="write the table").add_argument("study", type=Path, help="dataset of the study cost")
-    of.add_parser("check", help="try the advice").add_argument("scenes", type=int, help="how many to draw")
+    modes = parser.add_subparsers(dest="action", required=True)
+    modes.add_parser("make", help="write the table").add_argument("study", type=Path, help="dataset of the study cost")
+    modes.add_parser("check", help="try the advice").add_argument("scenes", type=int, help="how many to draw")
     arguments = parser.parse_args()
     if arguments.action == "check" and arguments.scenes < 1:
         parser.error(f"scenes must be at least 1, not {arguments.scenes}")
@@ -195,12 +196,12 @@ def main() -> int:
     for row in sorted(rows, key=lambda row: -row.advice):
         if row.advice > TIE:
             print(f"{row.question}: {row.advised} costs {row.advice:.2f} times {row.best}, the table's {row.table:.2f}")
-    advice, named = (np.mean([getattr(row, name) <= TIE for row in rows]) for name in ("advice", "table"))
+    advice, menu = (np.mean([getattr(row, name) <= TIE for row in rows]) for name in ("advice", "table"))
     print(f"at most {TIE} times the best of all candidates, on {len(rows)} scenes:")
     print(
-        f"  {named:.1%} of the table's methods, {advice:.1%} of the advice, which settings and times of one run decide"
+        f"  {menu:.1%} of the table's methods, {advice:.1%} of the advice, which settings and times of one run decide"
     )
-    return int(named < SHARE)
+    return int(menu < SHARE)
 
 
 if __name__ == "__main__":

@@ -51,12 +51,12 @@ def largest_errors(path: Path) -> tuple[float, float]:
         raise SymtopError(f"{path} must be a history with the columns of the check case: {error}") from error
     times = table["time"].to_numpy()
     quaternion, rates = truth(times)
-    turned = np.radians(table["longitude_deg"].to_numpy()) + EARTH * times
-    east = Rotation.from_rotvec(turned[:, None] * [-1.0, 0.0, 0.0])
+    longitude = np.radians(table["longitude_deg"].to_numpy()) + EARTH * times
+    east = Rotation.from_rotvec(longitude[:, None] * [-1.0, 0.0, 0.0])
     local = east * Rotation.from_quat(np.roll(quaternion, -1, axis=-1))
     published = Rotation.from_euler("ZYX", table[ANGLES].to_numpy(), degrees=True)
-    apart = attitude_distance(published.as_quat(), local.as_quat())
-    return float(np.degrees(apart.max())), float(np.abs(table[RATES].to_numpy() - rates).max())
+    angles = attitude_distance(published.as_quat(), local.as_quat())
+    return float(np.degrees(angles.max())), float(np.abs(table[RATES].to_numpy() - rates).max())
 
 
 def main() -> None:

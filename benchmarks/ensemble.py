@@ -56,7 +56,7 @@ def measure() -> list[Item]:
     horizon, steps = NUTATIONS * period, np.full(MEMBERS, NUTATIONS * PER_NUTATION)
     plan, solver = schedule(period, horizon, SAMPLES, steps), row.solvers[CHART]
     assert isinstance(solver, FixedStep)
-    asked: dict[str, Any] = {"per_nutation": PER_NUTATION, "nutations": NUTATIONS, "samples": SAMPLES, "quiet": True}
+    options: dict[str, Any] = {"per_nutation": PER_NUTATION, "nutations": NUTATIONS, "samples": SAMPLES, "quiet": True}
 
     def one_by_one(*, guard: bool) -> Callable[[], None]:
         chosen = np.linspace(0, MEMBERS - 1, ALONE).astype(int)
@@ -78,13 +78,11 @@ def measure() -> list[Item]:
         """A function that makes `times` as many steps and returns the last state only."""
         return lambda: solver.many(numbers, plan.step_size, times * plan.marks[:, -1:])
 
-    def whole(threads: int, shown: tuple[str, ...] | None) -> Callable[[], object]:
-        return lambda: symtop.ensemble(tops, row, threads=threads, variables=shown, **asked)
+    def whole(threads: int, variables: tuple[str, ...] | None) -> Callable[[], object]:
+        return lambda: symtop.ensemble(tops, row, threads=threads, variables=variables, **options)
 
-    shown, angles = (
-        Job(row, CHART, numbers, horizon, steps, None, SAMPLES, None, names) for names in (SHOWN, ("phi",))
-    )
-    runs = shown._runs(plan)
+    job, phi_job = (Job(row, CHART, numbers, horizon, steps, None, SAMPLES, None, names) for names in (SHOWN, ("phi",)))
+    runs = job._runs(plan)
     cell = (
         CHART,
         together(numbers),
@@ -104,18 +102,18 @@ def measure() -> list[Item]:
         "of it: the steps": (lambda: solver.many(numbers, plan.step_size, plan.marks), MEMBERS),
         "once the steps": (stepped(1), MEMBERS),
         "twice the steps": (stepped(2), MEMBERS),
-        "of it: axis and energy": (lambda: shown._observables(View(*cell), plan.times), MEMBERS),
-        "of it: phi, with its closed form": (lambda: angles._observables(View(*cell), plan.times), MEMBERS),
+        "of it: axis and energy": (lambda: job._observables(View(*cell), plan.times), MEMBERS),
+        "of it: phi, with its closed form": (lambda: phi_job._observables(View(*cell), plan.times), MEMBERS),
     }
     best = dict.fromkeys(calls, np.inf)
     caller = np.inf
     for _ in range(ROUNDS):
         for name, (call, count) in calls.items():
-            begun, own = time.perf_counter(), time.thread_time()
+            wall, cpu = time.perf_counter(), time.thread_time()
             call()
-            best[name] = min(best[name], (time.perf_counter() - begun) / count)
+            best[name] = min(best[name], (time.perf_counter() - wall) / count)
             if name == f"{WHOLE}, {cores()} threads" and cores() > 1:
-                caller = min(caller, (time.thread_time() - own) / count)
+                caller = min(caller, (time.thread_time() - cpu) / count)
     best[STEPS_ALONE] = best.pop("twice the steps") - best.pop("once the steps")
     if caller < np.inf:
         best[CALLER] = caller
@@ -148,14 +146,14 @@ def calls() -> list[Call]:
         def alone(name: str = method) -> object:
             return symtop.simulate(scene, name, step_size=h, horizon=STEPS * h, samples=2, observe="axis", guard=False)
 
-        each = timings([lambda: together(*SHORT), lambda: together(*LONG), alone], ALL_ROUNDS, batch=0.0)
-        few, many = SHORT[0] * SHORT[1], LONG[0] * LONG[1]
-        short, long = (timing.best / CALLED for timing in each[:2])
-        rows.append(Call(method, short - few * (long - short) / (many - few), long / many, each[2].best / STEPS))
+        results = timings([lambda: together(*SHORT), lambda: together(*LONG), alone], ALL_ROUNDS, batch=0.0)
+        n0, n1 = SHORT[0] * SHORT[1], LONG[0] * LONG[1]
+        short, long = (timing.best / CALLED for timing in results[:2])
+        rows.append(Call(method, short - n0 * (long - short) / (n1 - n0), long / n1, results[2].best / STEPS))
     return rows
 
 
-def said_of(rows: Sequence[Call]) -> list[str]:
+def call_sentences(rows: Sequence[Call]) -> list[str]:
     """Sentences: the times of the calls of a user."""
     return [
         f"`symtop.ensemble` of {CALLED} tops, {row.method}, two samples of the axis, {cores()} cores: "
@@ -167,15 +165,15 @@ def said_of(rows: Sequence[Call]) -> list[str]:
 
 def verdict(items: Sequence[Item]) -> list[str]:
     """Sentences: how much faster an ensemble is, and the limit that its steps alone set."""
-    took = {item.name: item for item in items}
+    by_name = {item.name: item for item in items}
     fast = max((item for item in items if item.name.startswith(WHOLE)), key=lambda item: item.ratio)
-    said = (
+    text = (
         f"{MEMBERS} tops, {NUTATIONS * PER_NUTATION} steps of {METHOD}[{CHART}]: `ensemble` is {fast.ratio:.0f} times "
         "faster than as many calls of `simulate`"
     )
-    if STEPS_ALONE in took:
-        said += f"; the steps alone, on {cores()} cores, bound that at {cores() * took[STEPS_ALONE].ratio:.0f} times"
-    return [f"{said}."]
+    if STEPS_ALONE in by_name:
+        text += f"; the steps alone, on {cores()} cores, bound that at {cores() * by_name[STEPS_ALONE].ratio:.0f} times"
+    return [f"{text}."]
 
 
 def table(items: Sequence[Item]) -> Table:
@@ -191,7 +189,7 @@ def table(items: Sequence[Item]) -> Table:
 def main() -> None:
     """Measure and print."""
     items = measure()
-    print("\n".join([table(items).text, *verdict(items), *said_of(calls())]))
+    print("\n".join([table(items).text, *verdict(items), *call_sentences(calls())]))
 
 
 if __name__ == "__main__":

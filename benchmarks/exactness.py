@@ -76,18 +76,18 @@ def random_tops(count: int, seed: int = SEED) -> Iterator[tuple[SymmetricTop, An
 
 def of_random_tops(count: int = TOPS) -> np.ndarray:
     """Errors after two nutations, shape (tops, steps), over the radians that phi and psi have turned."""
-    method, found = symtop.integrator(METHOD), []
+    method, rows = symtop.integrator(METHOD), []
     for top, start in random_tops(count):
         form = symtop.model.exact.closed_form.ClosedForm(top, start)
-        turned = 1.0 + 2.0 * (abs(form.phi_per_period) + abs(form.psi_per_period))
+        angle = 1.0 + 2.0 * (abs(form.phi_per_period) + abs(form.psi_per_period))
         row = []
         for steps in STEPS[:4]:
             h = form.nutation_period / steps
             marks = np.unique(np.linspace(1, round(2 * steps), MARKS).astype(int))
             states = method.solvers["attitude"](top, start, Plan.steps(h, marks)).states
-            row.append(charts.attitude_distance(states[:, :4], form.quaternion(h * marks)).max() / turned)
-        found.append(row)
-    return np.array(found)
+            row.append(charts.attitude_distance(states[:, :4], form.quaternion(h * marks)).max() / angle)
+        rows.append(row)
+    return np.array(rows)
 
 
 def of_edges() -> Iterator[str]:
@@ -109,10 +109,10 @@ def of_edges() -> Iterator[str]:
         ("a separatrix, up and to the next climb", separatrix.top, separatrix.start, separatrix.horizon / 2.0),
     ]
     method, steps = symtop.integrator(METHOD), 4
-    for words, top, at, h in cases:
-        states = method.solvers["attitude"](top, at, Plan.steps(h, [steps])).states
-        precise = PreciseForm(top, at, digits=DIGITS)
-        parts = exact_map(top, at, h).parts
+    for words, top, start, h in cases:
+        states = method.solvers["attitude"](top, start, Plan.steps(h, [steps])).states
+        precise = PreciseForm(top, start, digits=DIGITS)
+        parts = exact_map(top, start, h).parts
         yield f"{words:<52}{attitude_error(precise, states[0], h, steps):8.0e}{parts:6.0f} parts"
 
 
@@ -133,14 +133,14 @@ def constants_of(steps: float, marks: np.ndarray, loop: Loop | None = None) -> n
     assert isinstance(solver, FixedStep)
     if loop is not None:
         solver = dataclasses.replace(solver, loop=loop)
-    done = solver(scene.top, scene.start, Plan.steps(scene.nutation_period / steps, marks))
-    e, L = done.states[:, :3], done.states[:, 3:]
+    run = solver(scene.top, scene.start, Plan.steps(scene.nutation_period / steps, marks))
+    e, L = run.states[:, :3], run.states[:, 3:]
     L0 = charts.space_state("axis", scene.top, scene.start)[3:]
     start = 0.5 * (L0 @ L0) / scene.top.I1 + scene.top.mgl * math.cos(scene.start.theta)
     energy = 0.5 * (L * L).sum(axis=1) / scene.top.I1 + scene.top.mgl * e[:, 2]
     momenta = scene.top.momenta(scene.start)
-    kept = energy / start, done.p_psi / momenta.p_psi, done.p_phi / momenta.p_phi, np.linalg.norm(e, axis=1)
-    return np.array(kept) - 1.0
+    ratios = energy / start, run.p_psi / momenta.p_psi, run.p_phi / momenta.p_phi, np.linalg.norm(e, axis=1)
+    return np.array(ratios) - 1.0
 
 
 def walkers(marks: np.ndarray, loop: Loop | None = None) -> np.ndarray:
@@ -158,33 +158,33 @@ def of_constants() -> Iterator[str]:
         for name, row, middle, unsure in zip(("energy", "p_psi", "p_phi"), spread, mean, deviation, strict=False):
             slope = np.polyfit(np.log(marks), np.log(np.maximum(row, LAST_PLACE)), 1)[0]
             yield f"{name}, {words}: rms {row[0]:.1e} at {marks[0]:.0e} steps to {row[-1]:.1e} at {marks[-1]:.0e}"
-            off = abs(middle[-1]) / max(unsure[-1], LAST_PLACE)
-            yield f"    exponent {slope:.2f}, mean {middle[-1]:+.1e}, {off:.1f} standard errors"
+            ratio = abs(middle[-1]) / max(unsure[-1], LAST_PLACE)
+            yield f"    exponent {slope:.2f}, mean {middle[-1]:+.1e}, {ratio:.1f} standard errors"
 
 
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description="Errors of exact-discrete against fifty digits")
     parser.add_argument("parts", nargs="*", help=f"of {', '.join(PARTS)}")
-    wanted = parser.parse_args().parts or PARTS[:3]
-    if not set(wanted) <= set(PARTS):
-        parser.error(f"parts must be of {', '.join(PARTS)}, not {' '.join(wanted)}")
-    if "scenes" in wanted:
+    parts = parser.parse_args().parts or PARTS[:3]
+    if not set(parts) <= set(PARTS):
+        parser.error(f"parts must be of {', '.join(PARTS)}, not {' '.join(parts)}")
+    if "scenes" in parts:
         print("error of the attitude, rad, after " + ", ".join(f"{count:,}" for count in NUTATIONS) + " nutations")
         for line in of_scenes():
             print(line, flush=True)
         print(f"left out: {', '.join(LEFT_OUT)}, whose nutation never ends; see the edges")
-    if "tops" in wanted:
+    if "tops" in parts:
         errors = of_random_tops()
         print(f"\n{TOPS} random tops, two nutations, error over the angle turned: median, 99.9 %, largest")
         for steps, column in zip(STEPS, errors.T, strict=False):
             quantiles = (np.median(column), np.quantile(column, 0.999), column.max())
             print(f"{steps:7.2f} steps a nutation" + "".join(f"{value:10.0e}" for value in quantiles))
-    if "edges" in wanted:
+    if "edges" in parts:
         print("\nno step is refused; at the edges, error of the attitude after four steps, rad, and parts of a step")
         for line in of_edges():
             print(line, flush=True)
-    if "constants" in wanted:
+    if "constants" in parts:
         print(f"\nconstants of spheroid over {WALK:.0e} steps, {WALKERS} runs")
         for line in of_constants():
             print(line, flush=True)

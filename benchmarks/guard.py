@@ -103,8 +103,8 @@ class Run(NamedTuple):
 def tops(k: int) -> tuple[Scene, random.Random]:
     """Top k: strata in turn."""
     names = [*STRATA]
-    drawn = _population(names[k % len(names)], k // len(names) // CHUNK)
-    member = drawn.isel(member=k // len(names) % CHUNK)
+    members = _population(names[k % len(names)], k // len(names) // CHUNK)
+    member = members.isel(member=k // len(names) % CHUNK)
     numbers = {name: float(member[name]) for name in member.data_vars if name != "stratum"}
     top = SymmetricTop(*(numbers.pop(name) for name in ("I1", "I3", "mgl")))
     return Scene(f"{names[k % len(names)]}.{k}", top, Angles(**numbers), 1.0), random.Random(f"{SEEDS['tops']}/{k}")
@@ -123,8 +123,8 @@ def _bodies(block: int) -> list[Scene]:
 def bodies(k: int) -> tuple[Scene, random.Random]:
     """Body k of the sampler of symtop."""
     scene = _bodies(k // CHUNK)[k % CHUNK]
-    named = f"{scene.name.rpartition('-')[0]}.{k}"
-    return Scene(named, scene.top, scene.start, 1.0), random.Random(f"{SEEDS['bodies']}/{k}")
+    name = f"{scene.name.rpartition('-')[0]}.{k}"
+    return Scene(name, scene.top, scene.start, 1.0), random.Random(f"{SEEDS['bodies']}/{k}")
 
 
 def hostile(k: int) -> tuple[Scene, random.Random]:
@@ -186,24 +186,24 @@ def drawn(name: str, k: int) -> tuple[Scene, Integrator, str, Plan, float, float
     return scene, method, chart, plan, setting, periods
 
 
-def made(scene: Scene, method: Integrator, chart: str, plan: Plan) -> tuple[str, float]:
+def outcome_and_error(scene: Scene, method: Integrator, chart: str, plan: Plan) -> tuple[str, float]:
     """The outcome of a run and its largest error, rad."""
     run = solve(method, chart, scene.top, scene.start, plan)
     good = run.outcome == "ok"
-    return run.outcome, float(np.max(_off(scene, chart, plan.times, run.states))) if good else math.inf
+    return run.outcome, float(np.max(_errors(scene, chart, plan.times, run.states))) if good else math.inf
 
 
-def one(name: str, k: int) -> Run:
+def run_of(name: str, k: int) -> Run:
     """Draw and make run k."""
     (scene, method, chart, plan, setting, periods), of_top = drawn(name, k), name == "tops"
     series, whole = score(Integrated(scene), method, chart, plan)
     exact, whole = score(Exact(scene), method, chart, plan) if of_top else (math.nan, whole)
-    outcome, error = made(scene, method, chart, plan)
+    outcome, error = outcome_and_error(scene, method, chart, plan)
     return Run(k, scene.name.split(".")[0], method.name, method.needs, chart, str(method.control), setting, periods,
                whole, outcome, error, exact, series)  # fmt: skip
 
 
-def _off(scene: Scene, chart: str, times: Any, states: Any) -> Any:
+def _errors(scene: Scene, chart: str, times: Any, states: Any) -> Any:
     """Errors of states against the truth, rad."""
     if not scene.of_body:
         return axis_distance(axes(chart, states), closed_form(scene).axis(times))
@@ -225,14 +225,14 @@ def ablation(name: str, count: int) -> Table:
     ways: dict[str, dict[str, Any]] = {"as it is": {"EXPECTED": guard.EXPECTED}}
     ways |= {f"less: {check}": values for check, values in CHECKS.items()}
     for threshold, factor in itertools.product(THRESHOLDS, (0.5, 2.0)):
-        was = getattr(guard, threshold)
-        each = was if isinstance(was, dict) else dict(enumerate(np.atleast_1d(was).tolist()))
-        other = {key: type(part)(factor * part) for key, part in each.items()}
-        ways[f"{threshold} times {factor:g}"] = {threshold: other[0] if isinstance(was, float | int) else other}
-    counted, total = {way: np.zeros(4, dtype=int) for way in ways}, np.zeros(4, dtype=int)
+        value = getattr(guard, threshold)
+        entries = value if isinstance(value, dict) else dict(enumerate(np.atleast_1d(value).tolist()))
+        scaled = {key: type(part)(factor * part) for key, part in entries.items()}
+        ways[f"{threshold} times {factor:g}"] = {threshold: scaled[0] if isinstance(value, float | int) else scaled}
+    tallies, total = {way: np.zeros(4, dtype=int) for way in ways}, np.zeros(4, dtype=int)
     for k in range(count):
         scene, method, chart, plan, *_ = drawn(name, k)
-        outcome, error = made(scene, method, chart, plan)
+        outcome, error = outcome_and_error(scene, method, chart, plan)
         motion, good = (Exact if name == "tops" else Integrated)(scene), outcome == "ok"
         kinds = good and error > guard.EXPECTED, good and error <= guard.EXPECTED, not good, good
         total += kinds
@@ -240,17 +240,17 @@ def ablation(name: str, count: int) -> Table:
             with mock.patch.multiple(guard, **values):
                 expected = guard.forecast(scene, method, chart, plan, motion)
                 warned = guard.trouble(motion, method, chart, plan, expected) is not None
-            off = abs(math.log10(np.clip(expected.axis_error, 1e-4, 1.0) / np.clip(error, 1e-4, 1.0))) > 1.0
-            counted[way] += np.logical_and(kinds, (not warned, warned, not warned, off))
+            wrong_size = abs(math.log10(np.clip(expected.axis_error, 1e-4, 1.0) / np.clip(error, 1e-4, 1.0))) > 1.0
+            tallies[way] += np.logical_and(kinds, (not warned, warned, not warned, wrong_size))
     header = ["the guard", "wrong: silent", "right: warned of", "ended early: silent", "size off by ten"]
-    rows = [[way, *map("{} of {}".format, counts, total)] for way, counts in counted.items()]
+    rows = [[way, *map("{} of {}".format, counts, total)] for way, counts in tallies.items()]
     return Table(f"{count} {name}", header, rows)
 
 
 def chunk(name: str, first: int) -> list[Run]:
     """Make `CHUNK` runs from number `first` on."""
     with warnings.catch_warnings(action="ignore"):
-        return [one(name, k) for k in range(first, first + CHUNK)]
+        return [run_of(name, k) for k in range(first, first + CHUNK)]
 
 
 def kept(name: str) -> list[Run]:
@@ -269,8 +269,8 @@ def kept(name: str) -> list[Run]:
 def make(name: str, count: int, workers: int) -> None:
     """Make the runs that are missing."""
     TABLES.mkdir(parents=True, exist_ok=True)
-    done = {run.k // CHUNK for run in kept(name)}
-    missing = [place for place in range(math.ceil(count / CHUNK)) if place not in done]
+    chunks = {run.k // CHUNK for run in kept(name)}
+    missing = [place for place in range(math.ceil(count / CHUNK)) if place not in chunks]
     with ProcessPoolExecutor(workers) as pool, (TABLES / f"guard-{name}.csv").open("a") as file:
         for runs in pool.map(functools.partial(chunk, name), [place * CHUNK for place in missing]):
             csv.writer(file).writerows(runs)
@@ -286,27 +286,27 @@ PARTS = {  # ranges of the error of runs that did not end early
 def counts(runs: list[Run], guarded: str) -> list[str]:
     """Texts "warnings of runs", for the runs that ended early and for each of `PARTS`."""
     ended = [run for run in runs if run.outcome != "ok"]
-    rest = [run for run in runs if run.outcome == "ok"]
-    parts = [ended, *([run for run in rest if low < run.error <= high] for low, high in PARTS.values())]
+    finished = [run for run in runs if run.outcome == "ok"]
+    parts = [ended, *([run for run in finished if low < run.error <= high] for low, high in PARTS.values())]
     return [f"{sum(getattr(run, guarded) > guard.EXPECTED for run in part)} of {len(part)}" for part in parts]
 
 
 def curve(runs: list[Run], guarded: str) -> tuple[Any, Any]:
     """Fractions of right and of wrong runs that are warned of, for every limit of the score."""
-    rest = [run for run in runs if run.outcome == "ok"]
-    score_of, wrong = np.array([[getattr(run, guarded), run.error > guard.EXPECTED] for run in rest]).T
+    finished = [run for run in runs if run.outcome == "ok"]
+    score_of, wrong = np.array([[getattr(run, guarded), run.error > guard.EXPECTED] for run in finished]).T
     order = np.argsort(-score_of, kind="stable")
     wrong = wrong[order] > 0.0
     return np.cumsum(~wrong) / max((~wrong).sum(), 1), np.cumsum(wrong) / max(wrong.sum(), 1)
 
 
-def grouped(runs: list[Run], by: str) -> dict[str, list[Run]]:
-    """Runs grouped by the value of their field `by`."""
+def grouped(runs: list[Run], field: str) -> dict[str, list[Run]]:
+    """Runs grouped by the value of a field."""
     parts: dict[str, list[Run]] = {}
     for run in runs:
-        value = getattr(run, by)
-        name = ("the whole run tried" if value else "a piece tried") if by == "whole" else str(value)
-        parts.setdefault(f"{value:g}" if by == "periods" else name, []).append(run)
+        value = getattr(run, field)
+        name = ("the whole run tried" if value else "a piece tried") if field == "whole" else str(value)
+        parts.setdefault(f"{value:g}" if field == "periods" else name, []).append(run)
     return dict(sorted(parts.items()))
 
 
@@ -328,8 +328,8 @@ def draw(known: dict[str, list[Run]], target: Path) -> None:
         for label, runs, guarded, color in lines:
             false, hits = curve(runs, guarded)
             axis.plot(np.maximum(false, 1e-4), hits, color=color, label=label)
-            rest = [run for run in runs if run.outcome == "ok"]
-            last = sum(getattr(run, guarded) > guard.EXPECTED for run in rest) - 1
+            finished = [run for run in runs if run.outcome == "ok"]
+            last = sum(getattr(run, guarded) > guard.EXPECTED for run in finished) - 1
             axis.plot(max(false[last], 1e-4), hits[last], "o", color=color)
         axis.set(
             xscale="log", xlim=(1e-4, 1.2), ylim=(0.9, 1.003), title=title, xlabel="share of correct runs\nwarned of"
@@ -356,18 +356,18 @@ def page(results: Path) -> None:
     facts, known = measured.circumstances(), {name: kept(name) for name in SAMPLERS}
     header = ["runs", "guard", "ended early", *PARTS]
     rows = list[list[str]]()
-    for name, every in known.items():
-        parts = {"all": every}
-        for by in ("whole", "control", *(("periods",) if name == "tops" else ()), "stratum", "needs"):
-            named = grouped(every, by).items()
-            parts |= {value if by == "whole" else f"{by} {value}": some for value, some in named}
+    for name, all_runs in known.items():
+        parts = {"all": all_runs}
+        for field in ("whole", "control", *(("periods",) if name == "tops" else ()), "stratum", "needs"):
+            groups = grouped(all_runs, field).items()
+            parts |= {value if field == "whole" else f"{field} {value}": runs for value, runs in groups}
         for guarded in ("exact", "series") if name == "tops" else ("series",):
             rows += [[f"{name}: {part}", guarded, *counts(runs, guarded)] for part, runs in parts.items()]
     table = Table("Runs that the guard warned of, of all, by the error that they had", header, rows)
     print("\n".join(" | ".join(row) for row in [header, *rows]))
     summary = list[list[str]]()
-    shown = {"tops": known["tops"], "bodies": known["bodies"], "hostile bodies": known["hostile"]}
-    for name, runs in shown.items():
+    populations = {"tops": known["tops"], "bodies": known["bodies"], "hostile bodies": known["hostile"]}
+    for name, runs in populations.items():
         for guarded in ("exact", "series") if name == "tops" else ("series",):
             summary.append(summed(name, runs, guarded))
     draw(known, results / "figures" / "guard-curves.png")
@@ -391,8 +391,8 @@ def written(summary: list[list[str]], table: Table, **others: Any) -> dict[str, 
         [table], answer=ANSWER.format(silent=silent, false=false, limit=guard.EXPECTED),
         captions={"curves": (CAPTION, alt)}, **others,
     )  # fmt: skip
-    counted = [dict(zip(table.header, row, strict=True)) for row in table.rows]
-    return words | {"pictures": [{"name": "curves", "file": "guard-curves.png"}], "counts": counted}
+    rows = [dict(zip(table.header, row, strict=True)) for row in table.rows]
+    return words | {"pictures": [{"name": "curves", "file": "guard-curves.png"}], "counts": rows}
 
 
 def main() -> None:
@@ -402,18 +402,18 @@ def main() -> None:
     parser.add_argument("count", type=int, nargs="?", default=CHUNK)
     parser.add_argument("--workers", type=int, default=2)
     parser.add_argument("--ablate", action="store_true", help="sizes are compared between 1e-4 and 1 rad")
-    asked = parser.parse_args()
-    if asked.name == "page":
+    options = parser.parse_args()
+    if options.name == "page":
         page(Path("results"))
         return
-    if asked.ablate:
+    if options.ablate:
         warnings.simplefilter("ignore")
-        print(ablation(asked.name, asked.count).text)
+        print(ablation(options.name, options.count).text)
         return
-    make(asked.name, asked.count, asked.workers)
-    for guarded in ("exact", "series") if asked.name == "tops" else ("series",):
-        print(pages.Table(asked.name, SUMMED, [summed(asked.name, kept(asked.name), guarded)]).text)
-    for run in kept(asked.name):
+    make(options.name, options.count, options.workers)
+    for guarded in ("exact", "series") if options.name == "tops" else ("series",):
+        print(pages.Table(options.name, SUMMED, [summed(options.name, kept(options.name), guarded)]).text)
+    for run in kept(options.name):
         if run.outcome == "ok" and run.error > 10.0 * guard.EXPECTED and not run.series > guard.EXPECTED:
             print("silent and grossly wrong:", run)
 

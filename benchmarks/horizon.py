@@ -37,31 +37,31 @@ def main() -> None:
     facts, tops = measured.circumstances(), far.tops_of(TOPS, SEED)
     ends = far.horizons()[far.horizons() <= 1.0001 * options.nutations]
     ((errors, work),) = far.measured(integrator(NAME), tops, [far.Asked(STEPS, ends, np.inf)])
-    ((fine, more),) = far.measured(integrator(NAME), tops, [far.Asked(FINE, ends[ends <= 1.0001 * FITTED], np.inf)])
-    every = far.horizons()
-    seen = np.full((len(far.QUANTITIES), 2, every.size, TOPS), np.nan)
+    ((fine, work_2),) = far.measured(integrator(NAME), tops, [far.Asked(FINE, ends[ends <= 1.0001 * FITTED], np.inf)])
+    times = far.horizons()
+    known = np.full((len(far.QUANTITIES), 2, times.size, TOPS), np.nan)
     fitted = ends <= 1.0001 * FITTED
-    seen[:, 0, : ends.size][:, fitted] = errors[:, fitted]
-    seen[:, 1, : fine.shape[1]], drifts = fine, far.drifts_of(integrator(NAME))
-    prediction = far.predicted(seen, np.stack([work, more]), every, far.grain_of(tops), drifts=drifts)["error"][:, 0]
+    known[:, 0, : ends.size][:, fitted] = errors[:, fitted]
+    known[:, 1, : fine.shape[1]], drifts = fine, far.drifts_of(integrator(NAME))
+    prediction = far.predicted(known, np.stack([work, work_2]), times, far.grain_of(tops), drifts=drifts)["error"][:, 0]
     later = [horizon for horizon in 10.0 ** np.arange(5, 9) if horizon <= 1.0001 * ends[-1]]
     lines, ratios, parts = [], [], []
     for place, quantity in enumerate(far.QUANTITIES):
         largest = np.maximum.accumulate(errors[place], axis=0)
         lines.append([quantity])
-        judged = []
+        counts = []
         for horizon in later:
-            mine = largest[int(np.argmin(np.abs(ends - horizon)))]
-            ratio = mine / prediction.sel(quantity=quantity).sel(horizon=horizon, method="nearest").values
-            good = ratio[(mine < laws.SATURATED) & np.isfinite(ratio)]
+            error = largest[int(np.argmin(np.abs(ends - horizon)))]
+            ratio = error / prediction.sel(quantity=quantity).sel(horizon=horizon, method="nearest").values
+            good = ratio[(error < laws.SATURATED) & np.isfinite(ratio)]
             ratios += good.tolist()
-            judged.append(str(good.size))
+            counts.append(str(good.size))
             lines[-1].append(
                 f"{np.median(good):.3g} ({good.min():.3g} to {good.max():.3g}), {counted(good.size, 'top')}"
                 if good.size
                 else "none"
             )
-        parts.append(f"of the {quantity} on {listed(judged if len({*judged}) > 1 else judged[:1])}")
+        parts.append(f"of the {quantity} on {listed(counts if len({*counts}) > 1 else counts[:1])}")
     title = f"Measured over predicted error of {NAME}, median (least to most) of the tops whose motion is not lost"
     table = Table(title, ["quantity", *(f"{horizon:.0e} nutations" for horizon in later)], lines)
     print("\n".join(" | ".join(line) for line in [table.header, *lines]))

@@ -40,9 +40,9 @@ def main():
     print("| refuted by | wrong methods | caught | resolution |\n|---|---|---|---|")
     for line, group in groupby(sorted(rows, key=lambda row: row[0]), key=lambda row: row[0]):
         of_line = list(group)
-        least, most = (choose(row[2] for row in of_line) for choose in (min, max))
+        low, high = (choose(row[2] for row in of_line) for choose in (min, max))
         passing = ", ".join(row[3] for row in of_line if not row[1])
-        print(f"| {line} | {len(of_line)} | {sum(row[1] for row in of_line)} | {least:.0e} to {most:.0e} |", passing)
+        print(f"| {line} | {len(of_line)} | {sum(row[1] for row in of_line)} | {low:.0e} to {high:.0e} |", passing)
     bad = []
     for name, (claims, options) in right.CLAIMS.items():
         ledger, cost = ledger_of(step_of(name, right), claims, options, quick=quick)

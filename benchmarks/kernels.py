@@ -80,26 +80,26 @@ def kernels() -> dict[tuple[str, str], twin.Kernel]:
     return {key: kernel(key) for key in keys()}
 
 
-def within(one: twin.Kernel, steps: int) -> int:
+def within(kernel: twin.Kernel, steps: int) -> int:
     """So many steps, or fewer where the run ends before: `euler` leaves its chart, a twin that fuses a little later."""
-    reached = one.march(one.par, one.rule, one.state, one.h, np.array([steps])).steps
+    reached = kernel.march(kernel.par, kernel.rule, kernel.state, kernel.h, np.array([steps])).steps
     return steps if reached == steps else int(0.9 * reached)
 
 
 def measure() -> list[Row]:
     """Compare every kernel with the result of its C twin, then time all of them."""
-    twins = {key: one for key, one in kernels().items() if one.march in twin.FAMILIES}
-    gaps = {key: twin.difference(one, CHECKED) for key, one in twins.items()}
+    twins = {key: kernel for key, kernel in kernels().items() if kernel.march in twin.FAMILIES}
+    gaps = {key: twin.difference(kernel, CHECKED) for key, kernel in twins.items()}
     calls, counts = [], []
-    for one in twins.values():
-        others = [twin.Twin(one, flags) for flags in (twin.FAST, twin.EXACT)]
-        probe = timings([lambda other=others[0]: other(CHECKED)], batches=3, batch=BATCH)[0]
-        steps = within(one, max(CHECKED, int(CALL / probe.best * CHECKED)))
+    for kernel in twins.values():
+        others = [twin.Twin(kernel, flags) for flags in (twin.FAST, twin.EXACT)]
+        probe = timings([lambda first=others[0]: first(CHECKED)], batches=3, batch=BATCH)[0]
+        steps = within(kernel, max(CHECKED, int(CALL / probe.best * CHECKED)))
         counts.append(steps)
-        calls += [lambda one=one, n=steps: twin.ours(one, n), *(lambda o=o, n=steps: o(n) for o in others)]
+        calls += [lambda kernel=kernel, n=steps: twin.ours(kernel, n), *(lambda o=o, n=steps: o(n) for o in others)]
     timed = timings(calls, batches=BATCHES, batch=BATCH)
-    each = list(zip(twins, counts, timed[::3], timed[1::3], timed[2::3], strict=True))
-    verlet = next(ours.best / steps for key, steps, ours, *_ in each if key == ("stormer-verlet", "angles"))
+    rows = list(zip(twins, counts, timed[::3], timed[1::3], timed[2::3], strict=True))
+    verlet = next(ours.best / steps for key, steps, ours, *_ in rows if key == ("stormer-verlet", "angles"))
     return [
         Row(
             *key,
@@ -111,7 +111,7 @@ def measure() -> list[Row]:
             gaps[key],
             ours.best / steps / verlet,
         )
-        for key, steps, ours, theirs, unfused in each
+        for key, steps, ours, theirs, unfused in rows
     ]
 
 
@@ -135,7 +135,7 @@ def verdict(rows: Sequence[Row]) -> list[str]:
     slow = [f"{row.name}[{row.chart}] {row.unfused:.2f}" for row in rows if row.unfused > LIMIT]
     worst = max(rows, key=lambda row: row.ratio)
     same = sum(row.difference == 0.0 for row in rows)
-    said = [
+    sentences = [
         (
             f"{len(rows) - len(slow)} of {len(rows)} kernels are within {LIMIT:g} times a C twin that fuses no multiply"
             f" and add{'; slower are ' if slow else ''}{', '.join(slow)}."
@@ -147,9 +147,9 @@ def verdict(rows: Sequence[Row]) -> list[str]:
         f"{same} of {len(rows)} twins that fuse nothing return the same bits after {CHECKED} steps.",
     ]
     for name in ("midpoint", "trapezoidal"):
-        said += [
+        sentences += [
             f"A step of {name}, solved to rounding, takes as long as {row.verlet_steps:.2f} steps of stormer-verlet."
             for row in rows
             if row.name == name
         ]
-    return said
+    return sentences

@@ -135,8 +135,8 @@ def solver_of(name: str, chart: str) -> FixedStep:
 
 def together(solver: FixedStep, count: int, h: float, steps: int, scene: str = kernels.SCENE) -> Any:
     """A function that runs `count` members for this many steps."""
-    given = members(count, scene), np.full(count, h), np.full((count, 1), steps)
-    return lambda: solver.many(*given, compiling=True)
+    arguments = members(count, scene), np.full(count, h), np.full((count, 1), steps)
+    return lambda: solver.many(*arguments, compiling=True)
 
 
 def on_bodies() -> dict[tuple[str, str], twin.Kernel]:
@@ -159,15 +159,15 @@ def steps() -> list[Row]:
             continue
         solvers[key] = solver
         probe = timings([partial(twin.ours, kernel, kernels.CHECKED)], batches=3, batch=kernels.BATCH)[0]
-        one = kernels.within(kernel, int(CALL / probe.best * kernels.CHECKED))
-        each = kernels.within(kernel, max(200, FASTER * one // MEMBERS))
-        counts.append((one, each * MEMBERS))
-        calls += [partial(twin.ours, kernel, one), together(solver, MEMBERS, kernel.h, each, SCENES[key[1] == BODY])]
+        length = kernels.within(kernel, int(CALL / probe.best * kernels.CHECKED))
+        lane = kernels.within(kernel, max(200, FASTER * length // MEMBERS))
+        counts.append((length, lane * MEMBERS))
+        calls += [partial(twin.ours, kernel, length), together(solver, MEMBERS, kernel.h, lane, SCENES[key[1] == BODY])]
     timed = timings(calls, batches=BATCHES, batch=BATCH)
     rows = []
-    for key, (one, many), alone, beside in zip(solvers, counts, timed[::2], timed[1::2], strict=True):
-        gain, *spread = (many / one * value for value in kernels.ratio(alone, beside))
-        rows.append(Row(*key, alone.best / one * 1e9, beside.best / many * 1e9, gain, *spread))
+    for key, (length, total), alone, beside in zip(solvers, counts, timed[::2], timed[1::2], strict=True):
+        gain, *spread = (total / length * value for value in kernels.ratio(alone, beside))
+        rows.append(Row(*key, alone.best / length * 1e9, beside.best / total * 1e9, gain, *spread))
     return rows
 
 
@@ -177,10 +177,10 @@ def threads() -> list[Threads]:
     for (name, chart), steps in THREADED.items():
         piece = together(solver_of(name, chart), MEMBERS, h, steps)
 
-        def all_of_them(count: int, piece: Any = piece) -> list[Any]:
+        def run_pieces(count: int, piece: Any = piece) -> list[Any]:
             return list(in_threads(lambda _: piece(), range(PIECES), count))
 
-        one, two = timings([partial(all_of_them, count) for count in (1, 2)], batches=BATCHES, batch=BATCH)
+        one, two = timings([partial(run_pieces, count) for count in (1, 2)], batches=BATCHES, batch=BATCH)
         rows.append(Threads(name, chart, *kernels.ratio(one, two)))
     return rows
 
@@ -211,12 +211,12 @@ class Batches:
         """The last states, in batches; the last of them repeats the last top where tops do not fill it."""
         batch, wide, steps, ended = self.batch, self.wide, 0, np.empty_like(self.states)
         for i in range(0, len(ended), wide):
-            these = np.minimum(np.arange(i, i + wide), len(ended) - 1)
+            indices = np.minimum(np.arange(i, i + wide), len(ended) - 1)
             batch.set_time(0.0)
-            batch.state[:], batch.pars[:] = self.states[these].T, self.pars[these].T
+            batch.state[:], batch.pars[:] = self.states[indices].T, self.pars[indices].T
             batch.propagate_until(HORIZON)
-            ended[these] = batch.state.T
-            steps += sum(made for *_, made in batch.propagate_res)
+            ended[indices] = batch.state.T
+            steps += sum(count for *_, count in batch.propagate_res)
         self.steps_a_top = steps / (-(-len(ended) // wide) * wide)
         return ended
 
@@ -240,7 +240,7 @@ def batches() -> list[Batch]:
 
 def verdict(measured: Measured) -> list[str]:
     """Sentences: how much faster lanes are, compared with threads and heyoka's batches."""
-    said = []
+    sentences = []
     for kind in (*LEAST, WIDE):
         rows = sorted((row for row in measured.rows if kind_of(*row[:2]) == kind), key=lambda row: row.ratio)
         if not rows:
@@ -250,20 +250,20 @@ def verdict(measured: Measured) -> list[str]:
         if limit is not None:
             enough = sum(row.ratio >= limit for row in rows)
             fast = f"{enough} of {len(rows)} methods make at least {limit:g} times the steps of their kernel for one"
-        said.append(
+        sentences.append(
             f"In lanes on one core, {kind}: {fast}; {rows[len(rows) // 2].ratio:.1f} times in the median, "
             f"and {least.ratio:.1f} times with {least.name}[{least.chart}], the least."
         )
-    said += [
+    sentences += [
         f"Two threads run {row.name}[{row.chart}] in lanes {row.ratio:.2f} times as fast." for row in measured.threads
     ]
-    said += [
+    sentences += [
         f"heyoka's batch mode at a tolerance of {row.tolerance:g} takes {row.batch * 1e6:.1f} us a top to t = "
         f"{HORIZON:g}, and {row.alone * 1e6:.1f} us alone; {RIVAL[0]}[{RIVAL[1]}] in lanes takes "
         f"{row.in_lanes * 1e6:.1f} us to the same error of {row.error:.0e}."
         for row in measured.batches
     ]
-    return said
+    return sentences
 
 
 def tables(measured: Measured) -> list[Table]:

@@ -42,8 +42,8 @@ def choices(data: xr.DataTree) -> list[dict[str, Any]]:
     """Of each cell the seconds of its safe choices, the fastest first, and whether its lead is called."""
     table = []
     for (needs, keeping), target in itertools.product(cells.ROWS, cells.targets(data)):
-        each, called = cells.safest(data, Cell("short", "axis", target, NATURAL, needs), keeping)
-        seconds = {one.name: one.seconds for one in each if one.seconds <= NEAR * each[0].seconds < math.inf}
+        safes, called = cells.safest(data, Cell("short", "axis", target, NATURAL, needs), keeping)
+        seconds = {safe.name: safe.seconds for safe in safes if safe.seconds <= NEAR * safes[0].seconds < math.inf}
         if seconds:
             table.append({"needs": needs, "keeping": keeping, "target": target, "called": called, "seconds": seconds})
     return table
@@ -60,17 +60,17 @@ class Pair(NamedTuple):
     differing: list[list[str]]  # rows: the cell, both choices, what each costs on the other machine
 
 
-def compare(one: list[dict[str, Any]], other: list[dict[str, Any]]) -> Pair:
+def compare(first: list[dict[str, Any]], second: list[dict[str, Any]]) -> Pair:
     """What two machines choose, and what the choice of each costs on the other."""
-    theirs = {_cell(row): row for row in other}
-    pairs = [(row, theirs[_cell(row)]) for row in one if _cell(row) in theirs]
-    apart = [pair for pair in pairs if _first(pair[0]) != _first(pair[1])]
+    theirs = {_cell(row): row for row in second}
+    pairs = [(row, theirs[_cell(row)]) for row in first if _cell(row) in theirs]
+    differing = [pair for pair in pairs if _first(pair[0]) != _first(pair[1])]
     clear = [pair for pair in pairs if pair[0]["called"] or pair[1]["called"]]
-    costs = [(_cost(a, b), _cost(b, a)) for a, b in apart]
-    rows = [[_words(a), _first(a), _first(b), _times(there), _times(here)]
-            for (a, b), (there, here) in zip(apart, costs, strict=True)]  # fmt: skip
-    known = [cost for both in costs for cost in both if not math.isnan(cost)]
-    return Pair(len(pairs), len(pairs) - len(apart), len(clear), sum(pair not in apart for pair in clear),
+    costs = [(_cost(a, b), _cost(b, a)) for a, b in differing]
+    rows = [[_words(a), _first(a), _first(b), _times(on_second), _times(on_first)]
+            for (a, b), (on_second, on_first) in zip(differing, costs, strict=True)]  # fmt: skip
+    known = [cost for pair in costs for cost in pair if not math.isnan(cost)]
+    return Pair(len(pairs), len(pairs) - len(differing), len(clear), sum(pair not in differing for pair in clear),
                 max(known, default=math.nan), rows)  # fmt: skip
 
 
@@ -78,9 +78,9 @@ def _first(row: dict[str, Any]) -> str:
     return next(iter(row["seconds"]))
 
 
-def _cost(chosen: dict[str, Any], there: dict[str, Any]) -> float:
+def _cost(chosen: dict[str, Any], machine: dict[str, Any]) -> float:
     """What a choice costs on another machine, in units of the best there; NaN if no other price is kept."""
-    seconds = there["seconds"]
+    seconds = machine["seconds"]
     return seconds.get(_first(chosen), math.inf) / min(seconds.values()) if len(seconds) > 1 else math.nan
 
 
@@ -113,12 +113,12 @@ def main() -> int:
         content = {"processor": str(data.attrs["processor"]), "choices": choices(data)}
         netcdf.write_json(KEPT / f"{options.name}.json", content)
     kept = [json.loads(file.read_text(encoding="utf-8")) for file in sorted(KEPT.glob("*.json"))]
-    pairs = [(one, other, compare(one["choices"], other["choices"]))
-             for one, other in itertools.combinations(kept, 2)]  # fmt: skip
+    pairs = [(first, second, compare(first["choices"], second["choices"]))
+             for first, second in itertools.combinations(kept, 2)]  # fmt: skip
     if not pairs:
         print("machines: two machines have to be kept to compare them")
         return 1
-    first, second, pair = min(pairs, key=lambda each: each[2].same)  # that agree least
+    first, second, pair = min(pairs, key=lambda triple: triple[2].same)  # that agree least
     names = first["processor"], second["processor"]
     costs = ["the first's choice on the second", "the second's choice on the first"]
     known = [k for k in range(2) if any(row[3 + k] != UNKNOWN for row in pair.differing)]

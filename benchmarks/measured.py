@@ -22,12 +22,12 @@ def circumstances() -> dict[str, Any]:
 def record(facts: Mapping[str, Any], command: str, versions: Mapping[str, str] | None = None) -> dict[str, Any]:
     """The record in findings: a sentence, the command and the provenance; `versions`: those of other packages."""
     core = json.loads(facts["dependencies"])
-    given = {name: core[name] for name in ("heyoka", "numba", "numpy", "scipy")} | dict(versions or {})
+    libraries = {name: core[name] for name in ("heyoka", "numba", "numpy", "scipy")} | dict(versions or {})
     sentence = (
         f"Measured on {facts['measured']} with symtop {facts['symtop_version']}, revision {facts['symtop_revision']}, "
         f"on {facts['processor']} ({facts['cores']} cores, load {float(facts['load_before']):.2f} before), "
         f"{facts['platform']}, Python {facts['python_version']}; "
-        f"{', '.join(f'{name} {version}' for name, version in sorted(given.items()))}. "
+        f"{', '.join(f'{name} {version}' for name, version in sorted(libraries.items()))}. "
         f"The studies do not measure it again; `{command}` does."
     )
     return {

@@ -41,22 +41,22 @@ def findings(
         f'{{% call figure("{figure}", title={title!r}, alt={alt!r}) %}}{_raw(caption)}{{% endcall %}}'
         for figure, (caption, alt) in (captions or {}).items()
     ]
-    shown = [_raw(f"**{one.title}**{_count(one)}\n\n{table(one.header, one.rows[:ROWS])}") for one in tables[:TABLES]]
-    listed, more = (
-        _raw(table(said.header, said.rows) if isinstance(said, Table) else "\n".join(f"- {one}" for one in said))
-        for said in (sentences, further)
+    shown = [_raw(f"**{tab.title}**{_count(tab)}\n\n{table(tab.header, tab.rows[:ROWS])}") for tab in tables[:TABLES]]
+    listed, details = (
+        _raw(table(part.header, part.rows) if isinstance(part, Table) else "\n".join(f"- {line}" for line in part))
+        for part in (sentences, further)
     )
     reading = _raw(f"**How to read it.** {how_to_read}")
     first = [_raw(answer)] if answer else []
-    page = "\n\n".join(["# {{ question }}", *first, listed, *figures, reading, *([more] if further else []), *shown])
+    page = "\n\n".join(["# {{ question }}", *first, listed, *figures, reading, *([details] if further else []), *shown])
     return {
         "study": name, "title": title, "question": question, "facts": {}, "tables": [], "charts": [], "pictures": [],
         "failures": [], "quick": False, "page": page, **others,
     }  # fmt: skip
 
 
-def _count(one: Table) -> str:
-    return f" (the first {ROWS} of {len(one.rows)} rows)" if len(one.rows) > ROWS else ""
+def _count(table: Table) -> str:
+    return f" (the first {ROWS} of {len(table.rows)} rows)" if len(table.rows) > ROWS else ""
 
 
 def _raw(text: str) -> str:

@@ -45,12 +45,12 @@ SHOWN = 20
 
 def every_cell(data: xr.DataTree) -> Iterator[Cell]:
     """All cells that the study judges."""
-    asked = [("axis", tops, needs) for tops in POPULATIONS for needs in cells.CLASSES]
-    asked += [(quantity, NATURAL, GENERAL) for quantity in ("attitude", "energy")]
-    for quantity, tops, needs in asked:
+    groups = [("axis", tops, needs) for tops in POPULATIONS for needs in cells.CLASSES]
+    groups += [(quantity, NATURAL, GENERAL) for quantity in ("attitude", "energy")]
+    for quantity, tops, needs in groups:
         yield from cells.cells(data, quantity, tops, needs)
     for kind in KINDS[:-2]:
-        yield from (one for one in cells.cells(data, "axis", kind) if one.horizon == "short")
+        yield from (cell for cell in cells.cells(data, "axis", kind) if cell.horizon == "short")
 
 
 def label(cell: Cell) -> str:
@@ -71,15 +71,15 @@ def compare(first: xr.DataTree, second: xr.DataTree) -> dict[str, Any]:
         ]
         print("\n".join(lines) or "  none")
     shares = [(cell, pair) for cell in asked for pair in shares_of(*(cells.contest(data, cell) for data in both))]
-    apart = [(cell, pair) for cell, pair in shares if pair[0].low > pair[1].high or pair[1].low > pair[0].high]
-    overlap = 1.0 - len(apart) / max(len(shares), 1)
+    disjoint = [(cell, pair) for cell, pair in shares if pair[0].low > pair[1].high or pair[1].low > pair[0].high]
+    overlap = 1.0 - len(disjoint) / max(len(shares), 1)
     print(f"shares that overlap: {overlap:.1%} of {len(shares)} (goal {OVERLAP:.0%}); the first that do not:")
-    print("\n".join(f"  {label(cell)}: {words(*pair)}" for cell, pair in apart[:SHOWN]))
+    print("\n".join(f"  {label(cell)}: {words(*pair)}" for cell, pair in disjoint[:SHOWN]))
     print("cells that moved before:")
     for cell in MOVED:
-        each = [cells.contest(data, cell) for data in both]
-        shown = words(*(one.first for one in each if one.first))
-        print(f"  {label(cell)}: {shown}, called {[one.called for one in each]}")
+        contests = [cells.contest(data, cell) for data in both]
+        standings = words(*(contest.first for contest in contests if contest.first))
+        print(f"  {label(cell)}: {standings}, called {[contest.called for contest in contests]}")
     calls = sum(cells.contest(first, cell).called + cells.safest(first, cell)[1] for cell in asked)
     called, different = sum(map(bool, winners + safe)), sum(len(pair) > 1 for pair in winners + safe)
     return {
@@ -88,22 +88,22 @@ def compare(first: xr.DataTree, second: xr.DataTree) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def compare_prices(one: pricing.Prices, other: pricing.Prices) -> None:
+def compare_prices(first: pricing.Prices, second: pricing.Prices) -> None:
     """The ratios of prices and calls at the usual tolerance."""
-    for what, part in (("prices", 0), ("calls", 1)):
-        mine, theirs = (np.array([known.at(name, np.array([pricing.TOLERANCE]))[part][0] for name in one.names])
-                        for known in (one, other))  # fmt: skip
+    for quantity, part in (("prices", 0), ("calls", 1)):
+        mine, theirs = (np.array([known.at(name, np.array([pricing.TOLERANCE]))[part][0] for name in first.names])
+                        for known in (first, second))  # fmt: skip
         good = (mine > 0.0) & (theirs > 0.0)
         ratio = theirs[good] / mine[good]
         low, middle, high = np.quantile(ratio, (0.1, 0.5, 0.9))
-        print(f"{what}, second over first: median {middle:.3f}, 80 % from {low:.3f} to {high:.3f}, all from "
+        print(f"{quantity}, second over first: median {middle:.3f}, 80 % from {low:.3f} to {high:.3f}, all from "
               f"{ratio.min():.3f} to {ratio.max():.3f}")  # fmt: skip
-    print(f"marked: {one.marked} and {other.marked}")
+    print(f"marked: {first.marked} and {second.marked}")
 
 
 def winners_of(pair: tuple[Contest, ...]) -> set[str]:
     """The winners of a cell in hindsight, if both runs call one."""
-    return {one.first.name for one in pair if one.first} if all(one.called for one in pair) else set()
+    return {run.first.name for run in pair if run.first} if all(run.called for run in pair) else set()
 
 
 def safe_of(pair: tuple[tuple[list[Safe], bool], ...]) -> set[str]:
@@ -111,16 +111,16 @@ def safe_of(pair: tuple[tuple[list[Safe], bool], ...]) -> set[str]:
     return {choices[0].name for choices, _ in pair} if all(called for _, called in pair) else set()
 
 
-def shares_of(one: Contest, other: Contest) -> list[tuple[Standing, Standing]]:
+def shares_of(first: Contest, second: Contest) -> list[tuple[Standing, Standing]]:
     """The standings in both runs of each variant that wins on some top in one of them."""
-    there = {standing.name: standing for standing in other.standings}
-    pairs = [(standing, there[standing.name]) for standing in one.standings if standing.name in there]
+    by_name = {standing.name: standing for standing in second.standings}
+    pairs = [(standing, by_name[standing.name]) for standing in first.standings if standing.name in by_name]
     return [pair for pair in pairs if pair[0].share or pair[1].share]
 
 
-def words(*each: Standing) -> str:
+def words(*standings: Standing) -> str:
     """Shares with their intervals."""
-    return ", ".join(f"{one.name} {one.share:.3f} ({one.low:.3f} to {one.high:.3f})" for one in each)
+    return ", ".join(f"{entry.name} {entry.share:.3f} ({entry.low:.3f} to {entry.high:.3f})" for entry in standings)
 
 
 def by_hand(data: xr.DataTree) -> dict[str, float]:
@@ -129,10 +129,10 @@ def by_hand(data: xr.DataTree) -> dict[str, float]:
     for name in BY_HAND:
         call, evaluations = pricing.run_of(integrator(name), pricing.TOLERANCE, LENGTH)
         once = min(timeit.repeat(call, number=20, repeat=50)) / 20
-        price, rest = (float(part[0]) for part in known.at(name, np.array([pricing.TOLERANCE])))
-        whole = evaluations * price + rest
+        price, base = (float(part[0]) for part in known.at(name, np.array([pricing.TOLERANCE])))
+        whole = evaluations * price + base
         ratios[name] = whole / once
-        print(f"{name:26} {evaluations:7.0f} f x {1e9 * price:6.2f} ns + {1e6 * rest:4.1f} us = {1e6 * whole:8.1f} us; "
+        print(f"{name:26} {evaluations:7.0f} f x {1e9 * price:6.2f} ns + {1e6 * base:4.1f} us = {1e6 * whole:8.1f} us; "
               f"timeit {1e6 * once:8.1f} us, ratio {whole / once:.3f}")  # fmt: skip
     return ratios
 
@@ -147,23 +147,23 @@ def bare_heyoka(data: xr.DataTree) -> float:
     *e, lx, ly, lz = hy.make_vars("ex", "ey", "ez", "lx", "ly", "lz")
     inverse, weight = hy.par[0], hy.par[1]
     turns = [ly * e[2] - lz * e[1], lz * e[0] - lx * e[2], lx * e[1] - ly * e[0]]
-    system = [*((one, inverse * turn) for one, turn in zip(e, turns, strict=True)),
+    system = [*((x, inverse * turn) for x, turn in zip(e, turns, strict=True)),
               (lx, -weight * e[1]), (ly, weight * e[0]), (lz, hy.expression(0.0))]  # fmt: skip
     state, _ = start_numbers("axis", "double", top, start)
-    one = hy.taylor_adaptive(system, list(map(float, state)), tol=pricing.TOLERANCE, pars=[1.0 / top.I1, top.mgl])
-    values = np.array(one.state)
+    stepper = hy.taylor_adaptive(system, list(map(float, state)), tol=pricing.TOLERANCE, pars=[1.0 / top.I1, top.mgl])
+    values = np.array(stepper.state)
 
     def run(nutations: float) -> float:
-        one.time = 0.0
-        one.state[:] = values
-        return float(one.propagate_until(nutations * period)[3] * one.order)
+        stepper.time = 0.0
+        stepper.state[:] = values
+        return float(stepper.propagate_until(nutations * period)[3] * stepper.order)
 
-    few, most = (run(length) for length in pricing.LENGTHS)
+    n_short, n_long = (run(length) for length in pricing.LENGTHS)
     slopes = []
     for _ in range(5):
         short, long = (min(timeit.repeat(lambda length=length: run(length), number=10, repeat=20)) / 10
                        for length in pricing.LENGTHS)  # fmt: skip
-        slopes.append((long - short) / (most - few))
+        slopes.append((long - short) / (n_long - n_short))
     bare, known = float(np.median(slopes)), pricing.prices(data)
     price = float(known.at(pricing.HEYOKA, np.array([pricing.TOLERANCE]))[0][0])
     print(f"heyoka: {1e9 * price:.2f} ns in the study, {1e9 * bare:.2f} ns bare, ratio {price / bare:.3f}; with dense "

@@ -40,25 +40,25 @@ def main() -> None:
         assert inside(solver) is solver
         par, rule, state = solver.setup(spheroid.top, spheroid.start, h)
         run = long_run(spheroid, name, steps=int(options.steps), step_size=h, quiet=True)
-        alone = run["modified_energy_mean"].values
+        drifts = run["modified_energy_mean"].values
         size = 2 if chart == "angles" else 6
         wide = np.array(state[:size], dtype=WIDE)
         momenta = spheroid.top.momenta(spheroid.start)
         top = np.array([spheroid.top.I1, spheroid.top.mgl, momenta.north, momenta.south], dtype=WIDE)
         step, function = np.array([h], dtype=WIDE), maps[name.replace("-", "_")]
-        at, done = solver.loop.start(par, rule, state, h), 0
+        at, last = solver.loop.start(par, rule, state, h), 0
         for place, end in enumerate(ends):
             _, at = solver.loop.advance(par, rule, at, h, np.array([end]))
             function(top.ctypes.data_as(ctypes.c_void_p), wide.ctypes.data_as(ctypes.c_void_p),
-                     ctypes.c_longdouble(step[0]), ctypes.c_long(end - done))  # fmt: skip
-            done = end
+                     ctypes.c_longdouble(step[0]), ctypes.c_long(end - last))  # fmt: skip
+            last = end
             ours = np.array(at.state[:size], dtype=WIDE) + np.array(at.low[:size], dtype=WIDE)
             pair = np.stack([ours, wide])
             energies = modified_energy(spheroid, name, chart, pair, h)
             drift = float((energies[0] - energies[1]) / spheroid.energy_scale)
             theta = pair[:, 0] if chart == "angles" else np.arccos(pair[:, 2])
             if place % 6 == 0 or end == ends[-1]:
-                print(f"{name:<16}{end:>12}{drift:>12.1e}{alone[place]:>12.1e}{float(theta[0] - theta[1]):>12.1e}")
+                print(f"{name:<16}{end:>12}{drift:>12.1e}{drifts[place]:>12.1e}{float(theta[0] - theta[1]):>12.1e}")
 
 
 if __name__ == "__main__":

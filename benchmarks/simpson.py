@@ -76,7 +76,7 @@ def conservation(scene: Scene) -> list[Point]:
 def reduced(scene: Scene) -> Point:
     """Order of the difference from RK4 on the reduced top; of the midpoint rule's as the control."""
     horizon = NUTATIONS * scene.nutation_period
-    apart: dict[str, list[float]] = {SIMPSON: [], MIDPOINT: []}
+    differences: dict[str, list[float]] = {SIMPSON: [], MIDPOINT: []}
     for count in PER_NUTATION:
         states = {
             name: symtop.simulate(
@@ -84,9 +84,9 @@ def reduced(scene: Scene) -> Point:
             )["theta"].values
             for name in (SIMPSON, MIDPOINT, CLASSICAL)
         }
-        for name, gaps in apart.items():
+        for name, gaps in differences.items():
             gaps.append(float(np.abs(states[name] - states[CLASSICAL]).max()))
-    orders = [power_law(1.0 / np.array(PER_NUTATION), gaps).slope for gaps in apart.values()]
+    orders = [power_law(1.0 / np.array(PER_NUTATION), gaps).slope for gaps in differences.values()]
     return Point(f"order of the difference from {CLASSICAL}[angles]", *orders, MIDPOINT)
 
 
@@ -108,7 +108,7 @@ def cost(scene: Scene) -> list[Cost]:
         bare_run(scene, method, method.chart_for("axis"), scene.nutation_period / count, horizon)
         for method, count in zip(methods, chosen, strict=True)
     ]
-    return [Cost(row, count, one.best) for row, count, one in zip(ROWS, chosen, timings(calls), strict=True)]
+    return [Cost(row, count, timing.best) for row, count, timing in zip(ROWS, chosen, timings(calls), strict=True)]
 
 
 def main() -> None:
@@ -118,10 +118,10 @@ def main() -> None:
           f"{PER_NUTATION[0]} steps for what is conserved")  # fmt: skip
     for point in points(scene):
         print(f"{point.name:40} {SIMPSON} {point.simpson:9.3g}   {point.of} {point.control:9.3g}")
-    each = cost(scene)
+    costs = cost(scene)
     print(f"inclination to {ACCURACY:g} rad over {NUTATIONS:g} nutations: steps a nutation, time, over {SIMPSON}")
-    for one in each:
-        print(f"{one.row:26} {one.per_nutation:7g} {1e6 * one.seconds:9.1f} us {one.seconds / each[0].seconds:7.2f}")
+    for run in costs:
+        print(f"{run.row:26} {run.per_nutation:7g} {1e6 * run.seconds:9.1f} us {run.seconds / costs[0].seconds:7.2f}")
 
 
 if __name__ == "__main__":

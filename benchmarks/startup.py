@@ -16,9 +16,9 @@ FIRST = f"import symtop; symtop.simulate('spheroid', 'midpoint', step_size={STEP
 def _process(code: str, cache: str | None = None) -> float:
     """Seconds of a new Python process."""
     environment = os.environ | ({"SYMTOP_CACHE": cache} if cache else {})
-    begun = time.perf_counter()
+    start = time.perf_counter()
     subprocess.run([sys.executable, "-W", "ignore", "-c", code], check=True, env=environment, stdout=subprocess.DEVNULL)
-    return time.perf_counter() - begun
+    return time.perf_counter() - start
 
 
 def measure(repeats: int = 3) -> dict[str, float]:

@@ -23,7 +23,7 @@ METHOD, STEP, HORIZON = "strang[axis]", 0.02, 8.0
 STARTS, CERTIFIED = 1000, 20
 
 
-class Swept(NamedTuple):
+class SweepTimes(NamedTuple):
     """Seconds of a sweep and the errors of its runs."""
 
     starts: int
@@ -46,28 +46,28 @@ def scenes(count: int) -> list[symtop.Scene]:
     ]
 
 
-def measure(count: int = STARTS, certified: int = CERTIFIED) -> Swept:
+def measure(count: int = STARTS, certified: int = CERTIFIED) -> SweepTimes:
     """Run the sweep once, kernels compiled, and certify a few of its starts."""
     closed_form.compile_now()
     for scene in scenes(2):
         symtop.errors(symtop.simulate(scene, METHOD, step_size=STEP))
     starts = scenes(count)
-    begun = time.perf_counter()
-    shown = [symtop.errors(symtop.simulate(scene, METHOD, step_size=STEP)) for scene in starts]
-    seconds = time.perf_counter() - begun
-    errors = [float(one["axis"].max()) for one in shown]
-    bound = max(float(one["axis_bound"].max()) for one in shown)
+    start = time.perf_counter()
+    tables = [symtop.errors(symtop.simulate(scene, METHOD, step_size=STEP)) for scene in starts]
+    seconds = time.perf_counter() - start
+    errors = [float(data["axis"].max()) for data in tables]
+    bound = max(float(data["axis_bound"].max()) for data in tables)
     with tempfile.TemporaryDirectory() as cache:
         os.environ["SYMTOP_CACHE"] = cache
-        some = starts[:: max(1, count // certified)]
-        begun = time.perf_counter()
-        for scene in some:
+        sample = starts[:: max(1, count // certified)]
+        start = time.perf_counter()
+        for scene in sample:
             symtop.reference(scene, [HORIZON], certify="integration")
-        each = (time.perf_counter() - begun) / len(some)
-    return Swept(len(starts), seconds, float(np.median(errors)), bound, each * len(starts))
+        certificate = (time.perf_counter() - start) / len(sample)
+    return SweepTimes(len(starts), seconds, float(np.median(errors)), bound, certificate * len(starts))
 
 
-def lines(swept: Swept) -> list[str]:
+def lines(swept: SweepTimes) -> list[str]:
     """The numbers."""
     return [
         f"{swept.starts} starts of {HORIZON / STEP:.0f} steps of {METHOD} with truth and errors: {swept.seconds:.2f} s",

@@ -33,15 +33,15 @@ def steps_needed(method: symtop.Integrator, scene: symtop.Scene, chart: str, acc
     fewest = None
     for steps in LADDER[::-1]:
         state = method.solvers[chart](scene.top, scene.start, plan_of(int(steps))).states[-1]
-        turned = chart == "angles"
-        found = charts.quaternion_from_angles(state[0], state[2], state[3]) if turned else state[:4]
-        if not charts.attitude_distance(found, true) <= accuracy:
+        in_angles = chart == "angles"
+        quaternion = charts.quaternion_from_angles(state[0], state[2], state[3]) if in_angles else state[:4]
+        if not charts.attitude_distance(quaternion, true) <= accuracy:
             return fewest
         fewest = int(steps)
     return fewest
 
 
-class Reached(NamedTuple):
+class MethodCost(NamedTuple):
     """Steps and time of one method to the accuracy."""
 
     name: str
@@ -50,30 +50,30 @@ class Reached(NamedTuple):
     verlet_steps: float
 
 
-def measure(accuracy: float = ACCURACY) -> list[Reached]:
+def measure(accuracy: float = ACCURACY) -> list[MethodCost]:
     """Find the steps, time the runs; the fastest method first."""
     scene = symtop.scene("spheroid")
-    found = {}
+    solvers = {}
     for method in methods().values():
         chart = "attitude" if "attitude" in method.solvers else "angles"
         if method.fixed_step and chart in method.solvers:
             steps = steps_needed(method, scene, chart, accuracy)
             if steps is not None:
-                found[method.name] = (method.solvers[chart], steps)
+                solvers[method.name] = (method.solvers[chart], steps)
     verlet = symtop.integrator("stormer-verlet").solvers["angles"]
     base = 20_000
     calls = [lambda: verlet(scene.top, scene.start, plan_of(base))]
-    calls += [lambda s=solve, n=steps: s(scene.top, scene.start, plan_of(n)) for solve, steps in found.values()]
+    calls += [lambda s=solve, n=steps: s(scene.top, scene.start, plan_of(n)) for solve, steps in solvers.values()]
     step, *times = (timing.best for timing in timings(calls, batches=40, batch=1e-3))
     step /= base
     rows = [
-        Reached(name, steps, seconds, seconds / step)
-        for (name, (_, steps)), seconds in zip(found.items(), times, strict=True)
+        MethodCost(name, steps, seconds, seconds / step)
+        for (name, (_, steps)), seconds in zip(solvers.items(), times, strict=True)
     ]
     return sorted(rows, key=lambda row: row.seconds)
 
 
-def table(rows: Sequence[Reached], accuracy: float) -> Table:
+def table(rows: Sequence[MethodCost], accuracy: float) -> Table:
     """Every method that meets the accuracy."""
     return Table(
         f"Time to an attitude error of {accuracy:g} on spheroid at t = {HORIZON:g}",

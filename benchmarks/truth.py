@@ -35,64 +35,64 @@ class Row(NamedTuple):
 
 def _tops(arithmetic: str, count: int) -> list[tuple[SymmetricTop, Angles]]:
     """Tops whose constants come from this arithmetic: generic ones, and precessions that are all but steady."""
-    random, drawn = np.random.default_rng(1), []
-    while len(drawn) < count:
+    random, tops = np.random.default_rng(1), []
+    while len(tops) < count:
         I1, mgl, theta, turn, spin = (float(x) for x in random.uniform(0.2, 2.5, 5))
         if arithmetic == "quad-double":
             spin = (I1 * turn**2 * np.cos(theta) + mgl) / (0.7 * I1 * turn) - turn * np.cos(theta)
         pair = SymmetricTop(I1, 0.7 * I1, mgl), Angles(theta, 0.1, 0.2, 0.0, turn, float(spin))
         if ClosedForm(*pair).provenance.arithmetic == arithmetic:
-            drawn.append(pair)
-    return drawn
+            tops.append(pair)
+    return tops
 
 
-def _each(name: str, calls: list[float]) -> Row:
+def _row(name: str, calls: list[float]) -> Row:
     return Row(name, float(np.median(calls)), float(np.quantile(calls, 0.99)))
 
 
 def _timed(tops: list[tuple[SymmetricTop, Angles]]) -> list[float]:
     """Seconds of set-up and one sample of the axis, once for each top, after a round that is not counted."""
-    when, clock = np.array([1.25]), time.perf_counter
-    taken = []
+    moment, clock = np.array([1.25]), time.perf_counter
+    times = []
     for _ in range(2):
-        taken = []
+        times = []
         for top, start in tops:
-            begun = clock()
-            ClosedForm(top, start).axis(when)
-            taken.append(clock() - begun)
-    return taken
+            before = clock()
+            ClosedForm(top, start).axis(moment)
+            times.append(clock() - before)
+    return times
 
 
 def measure() -> list[Row]:
     """Set-up and one sample in each arithmetic, then one sample among many."""
     closed_form.compile_now()
     rows = [
-        _each(f"set-up and one sample, {kind}", _timed(_tops(kind, COUNT))) for kind in ("double-double", "quad-double")
+        _row(f"set-up and one sample, {kind}", _timed(_tops(kind, COUNT))) for kind in ("double-double", "quad-double")
     ]
     long = []
     for scene in (sleeping(2.05), sleeping(2.05), spinning(3.0), steady(5.0)):  # the first imports mpmath
-        begun = time.perf_counter()
+        before = time.perf_counter()
         PreciseForm(scene.top, scene.start, digits=40)
-        long.append(time.perf_counter() - begun)
-    rows.append(_each("set-up in 40 digits, for comparison", long[1:]))
+        long.append(time.perf_counter() - before)
+    rows.append(_row("set-up in 40 digits, for comparison", long[1:]))
     form, times = ClosedForm(*_tops("double-double", 1)[0]), np.linspace(0.0, 1e3, MANY)
     views = {"axis": form.axis, "quaternion": form.quaternion, "angles and rates": form, "state": form.state}
-    taken = timings([lambda view=view: view(times) for view in views.values()], batches=BATCHES)
+    results = timings([lambda view=view: view(times) for view in views.values()], batches=BATCHES)
     rows += [
         Row(f"one sample among many, {name}", timing.best / MANY, max(timing.samples) / MANY)
-        for name, timing in zip(views, taken, strict=True)
+        for name, timing in zip(views, results, strict=True)
     ]
-    return rows + _of_many()
+    return rows + _rows_of_many()
 
 
-def _free() -> dict[str, tuple[Callable[[], object], int]]:
+def _free_body_calls() -> dict[str, tuple[Callable[[], object], int]]:
     """Calls of the kernels of the free body, on random bodies of which no two moments are nearly equal."""
     for kernel in (free_body._build, free_body._fill):
         kernel.compile()
     build, fill, random = free_body._build.compiled, free_body._fill.compiled, np.random.default_rng(2)
     shares = random.uniform(0.2, 1.0, (COUNT, 3))  # of the mass along each axis, squared
     moments, momenta = shares.sum(axis=1, keepdims=True) - shares, random.normal(size=(COUNT, 3))
-    rows = [free_body.checked_body(one, (1, 0, 0, 0), L, (0, 0, 0)) for one, L in zip(moments, momenta, strict=True)]
+    rows = [free_body.checked_body(row, (1, 0, 0, 0), L, (0, 0, 0)) for row, L in zip(moments, momenta, strict=True)]
     constants, times, out = np.zeros(free_body.SIZE), np.linspace(0.0, 1e3, MANY), np.empty((MANY, 7))
     return {
         "constants of a free body": (lambda: [build(row, constants) for row in rows], COUNT),
@@ -100,7 +100,7 @@ def _free() -> dict[str, tuple[Callable[[], object], int]]:
     }
 
 
-def _of_many() -> list[Row]:
+def _rows_of_many() -> list[Row]:
     """Times per top of the forms of many tops at once, and the time of a reference that is cached."""
     numbers = np.array([flat(*pair) for pair in _tops("double-double", COUNT)])
     forms, times = ClosedForms(numbers), np.linspace(0.0, 20.0, 11)
@@ -108,12 +108,12 @@ def _of_many() -> list[Row]:
         "constants of one top among many": (lambda: ClosedForms(numbers), COUNT),
         "one sample of one top among many, axis": (lambda: forms.axis(times), COUNT * times.size),
         "reference of spheroid at 1001 times to 1e5": (lambda: reference("spheroid", FAR), 1),
-        **_free(),
+        **_free_body_calls(),
     }
-    taken = timings([call for call, _ in calls.values()], batches=BATCHES)
+    results = timings([call for call, _ in calls.values()], batches=BATCHES)
     return [
         Row(name, timing.best / share, max(timing.samples) / share)
-        for (name, (_, share)), timing in zip(calls.items(), taken, strict=True)
+        for (name, (_, share)), timing in zip(calls.items(), results, strict=True)
     ]
 
 

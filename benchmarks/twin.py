@@ -65,8 +65,8 @@ def _macros(rule: Any, chart: str = "") -> dict[str, int]:
     }
     lengths |= {"counts": "STAGES"} if hasattr(rule, "counts") else {"mu": "STAGES"}
     rows = {"a": "b"}  # a tableau is as long as its weights
-    found = {macro: len(getattr(rule, rows.get(row, row))) for row, macro in lengths.items() if hasattr(rule, row)}
-    return found | ({chart: 1} if chart else {})
+    macros = {macro: len(getattr(rule, rows.get(row, row))) for row, macro in lengths.items() if hasattr(rule, row)}
+    return macros | ({chart: 1} if chart else {})
 
 
 PROJECTED = "dop853-projected", "vern9-projected"
@@ -124,8 +124,8 @@ def library(name: str, macros: tuple[tuple[str, int], ...], flags: Sequence[str]
 def numbers(record: Any) -> list[float]:
     """A record of numbers and tuples as the flat row of doubles that the C structs are."""
     if isinstance(record, gauss.GaussRule):
-        stages, most = len(record.b), max(gauss.STAGES)
-        square = [(0, most - stages), (0, most - stages)]
+        stages, longest = len(record.b), max(gauss.STAGES)
+        square = [(0, longest - stages), (0, longest - stages)]
         padded = (np.pad(record.mu, square), np.pad(record.b, square[:1]), np.pad(record.predict, square))
         return [float(stages), *(float(value) for part in padded for value in part.ravel())]
     if isinstance(record, np.ndarray):
@@ -151,11 +151,11 @@ class Twin:
     def __call__(self, steps: int) -> tuple[np.ndarray, int]:
         """The state after `steps` steps, in the kernel's own variables, and the work."""
         state, work = self._start.copy(), ctypes.c_long()
-        done = self._march(
+        reached = self._march(
             self._par.ctypes.data, self._rule.ctypes.data, state.ctypes.data, self.kernel.h, steps, ctypes.byref(work)
         )
-        if done != steps:
-            raise RuntimeError(f"the C twin stopped after {done} of {steps} steps")
+        if reached != steps:
+            raise RuntimeError(f"the C twin stopped after {reached} of {steps} steps")
         return state, work.value
 
     def shown(self, steps: int) -> tuple[np.ndarray, int]:
@@ -166,8 +166,8 @@ class Twin:
 
 def ours(kernel: Kernel, steps: int) -> tuple[np.ndarray, int]:
     """The state and the work after `steps` steps of the Python kernel."""
-    done = kernel.march(kernel.par, kernel.rule, kernel.state, kernel.h, np.array([steps]))
-    return done.states[-1], done.work
+    run = kernel.march(kernel.par, kernel.rule, kernel.state, kernel.h, np.array([steps]))
+    return run.states[-1], run.work
 
 
 def difference(kernel: Kernel, steps: int, flags: Sequence[str] = EXACT) -> float:

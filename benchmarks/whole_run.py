@@ -42,8 +42,8 @@ def measure() -> list[Item]:
     h = scene.horizon / STEPS
     plan, _ = make_plan(scene, method, h, None, horizon=scene.horizon, samples=501)
     run = solve(method, CHART, scene.top, scene.start, plan)
-    shown, form = Trajectory.of_run(scene, CHART, plan, run), closed_form(scene)
-    axes, columns = shown.axis[:300], shown.columns
+    trajectory, form = Trajectory.of_run(scene, CHART, plan, run), closed_form(scene)
+    axes, columns = trajectory.axis[:300], trajectory.columns
     attributes: dict[str, Any] = dict(symtop.simulate(scene, method, step_size=h).attrs)
     del attributes["title"]
     calls: dict[str, Callable[[], object]] = {

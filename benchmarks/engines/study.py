@@ -13,7 +13,7 @@ NAME = "live-engines"  # of the findings; `engines` is the study of the maps
 UNRUN = "YADE is not run: its map is held by its formula and a reference value alone."
 HEADER = (
     "engine", "version", "setting", "body", "map", "axis error (rad)",
-    *(f"{name}: {what}" for name in STEPS for what in ("one step", f"{COMPARED} steps")), "same map",
+    *(f"{name}: {suffix}" for name in STEPS for suffix in ("one step", f"{COMPARED} steps")), "same map",
 )  # fmt: skip
 HOW_TO_READ = (
     "Each engine steps one body with a fixed centre in the torque mgl k x e, taken at the start of the step (Exudyn: "
@@ -27,20 +27,20 @@ HOW_TO_READ = (
 )
 
 
-def _number(made: dict[str, Any], key: str) -> str:
-    return f"{made[key]:.1e}" if key in made else ""
+def _number(row: dict[str, Any], key: str) -> str:
+    return f"{row[key]:.1e}" if key in row else ""
 
 
-def cells(made: dict[str, Any]) -> list[str]:
+def cells(row: dict[str, Any]) -> list[str]:
     """One line of the table."""
-    differences = [_number(made, f"{name}_{what}") for name in STEPS for what in ("step", "steps")]
-    same = "yes" if agrees(made) else made.get("failed") or ("no" if made["method"] else "none in the catalogue")
-    start = [str(made[key]) for key in ("engine", "version", "name", "held", "method")]
-    return [*start, _number(made, "goldstein_axis"), *differences, same]
+    differences = [_number(row, f"{name}_{suffix}") for name in STEPS for suffix in ("step", "steps")]
+    same = "yes" if agrees(row) else row.get("failed") or ("no" if row["method"] else "none in the catalogue")
+    start = [str(row[key]) for key in ("engine", "version", "name", "held", "method")]
+    return [*start, _number(row, "goldstein_axis"), *differences, same]
 
 
-def _largest(rows: Sequence[dict[str, Any]], what: str) -> str:
-    return f"{max((made[f'{name}_{what}'] for made in rows for name in STEPS), default=0.0):.0e}"
+def _largest(rows: Sequence[dict[str, Any]], suffix: str) -> str:
+    return f"{max((row[f'{name}_{suffix}'] for row in rows for name in STEPS), default=0.0):.0e}"
 
 
 def few(names: Sequence[str], noun: str) -> str:
@@ -50,33 +50,33 @@ def few(names: Sequence[str], noun: str) -> str:
 
 def verdict(rows: Sequence[dict[str, Any]]) -> list[str]:
     """How many settings have the map of the catalogue, to what, and which have not."""
-    said, compared = [], [made for made in rows if made["method"]]
+    sentences, compared = [], [row for row in rows if row["method"]]
     for precision, single in (("double", False), ("single", True)):
-        part = [made for made in compared if (integrator(made["method"]).precision == "single") is single]
-        same = [made for made in part if agrees(made)]
+        part = [row for row in compared if (integrator(row["method"]).precision == "single") is single]
+        same = [row for row in part if agrees(row)]
         if part:
-            said.append(
+            sentences.append(
                 f"{len(same)} of {len(part)} settings in {precision} precision step by the map of the catalogue: they "
                 f"differ by at most {_largest(same, 'step')} after one step and {_largest(same, 'steps')} within "
                 f"{COMPARED}."
             )
-    others = [f"{made['engine']} ({made['name']}, {made['held']})" for made in compared if not agrees(made)]
-    none = [made for made in rows if not made["method"]]
+    others = [f"{row['engine']} ({row['name']}, {row['held']})" for row in compared if not agrees(row)]
+    none = [row for row in rows if not row["method"]]
     if others:
-        said.append(f"Not the map: {few(others, 'setting')}.")
+        sentences.append(f"Not the map: {few(others, 'setting')}.")
     if none:
-        engines = list(dict.fromkeys(made["engine"] for made in none))
-        said.append(
+        engines = list(dict.fromkeys(row["engine"] for row in none))
+        sentences.append(
             f"{counted(len(none), 'setting')} of {few(engines, 'engine')} ran without a map in the catalogue, and "
             "show their error alone in the table."
         )
-    return said
+    return sentences
 
 
 def findings(rows: Sequence[dict[str, Any]], missing: Sequence[str], record: Mapping[str, Any]) -> dict[str, Any]:
     """What the report wants, and the numbers themselves."""
-    failed = [f"{made['engine']} ({made['name']}): {made['failed']}" for made in rows if "failed" in made]
-    table = Table("Engines against their maps", HEADER, [cells(made) for made in rows])
+    failed = [f"{row['engine']} ({row['name']}): {row['failed']}" for row in rows if "failed" in row]
+    table = Table("Engines against their maps", HEADER, [cells(row) for row in rows])
     return pages.findings(
         NAME, "Engines against their maps", "Are the maps of the catalogue those that the engines take?", verdict(rows),
         HOW_TO_READ, [table], failures=[*missing, *failed], cases=len(rows),

@@ -35,12 +35,12 @@ def distributions() -> dict[str, str]:
 
 def load(adapters: tuple[str, ...] = ADAPTERS) -> tuple[list[Peer], list[str]]:
     """All solvers that are installed here, and one sentence for each package that is not."""
-    found, missing = [], []
+    peers, missing = [], []
     for name in adapters:
         module = importlib.import_module(f"benchmarks.peers.adapters.{name}")
         distribution = getattr(module, "DISTRIBUTION", module.PACKAGE)
         try:
-            found += [Peer(module.PACKAGE, method, language, distribution) for method, language in module.peers()]
+            peers += [Peer(module.PACKAGE, method, language, distribution) for method, language in module.peers()]
         except (ImportError, OSError) as error:  # OSError: a shared library that does not load
             missing.append(f"{module.PACKAGE} is not installed here and was skipped: {error}.")
-    return found, missing
+    return peers, missing

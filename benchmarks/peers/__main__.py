@@ -22,23 +22,23 @@ def main() -> None:
     parser.add_argument("--only", nargs="+", default=list(ADAPTERS), help="these libraries")
     parser.add_argument("--redraw", action="store_true", help="use the stored dataset")
     options = parser.parse_args()
-    file, told = options.results / "peers.nc", options.results / "peers.json"
+    file, page = options.results / "peers.nc", options.results / "peers.json"
     if options.redraw:
-        data, stored = netcdf.read(file), netcdf.read_json(told) or {}
+        data, stored = netcdf.read(file), netcdf.read_json(page) or {}
         many = [together.Row(**row) for row in stored.get("together", [])]
         missing = stored.get("failures", [])
     else:
         peers, missing = load(tuple(options.only))
         for sentence in missing:
             print(sentence)
-        own = netcdf.read_columns(Path(__file__).parent / "columns.tsv")
-        data = columns.described(measure(peers, options.scenes), own=own)
+        own_columns = netcdf.read_columns(Path(__file__).parent / "columns.tsv")
+        data = columns.described(measure(peers, options.scenes), own=own_columns)
         data = netcdf.describe(data, STUDY.title, question=STUDY.question)
         netcdf.write(data, file)
         many = together.measure(SOLVERS if any(peer.package == DIFFRAX for peer in peers) else ())
-    netcdf.write_json(told, findings(data, many, options.results, missing))
-    said = [*summary.pairs(data), *summary.verdict(data), ""]
-    print("\n".join([summary.tables(data)[1].text, *said, together.table(many).text, *together.verdict(many)]))
+    netcdf.write_json(page, findings(data, many, options.results, missing))
+    sentences = [*summary.pairs(data), *summary.verdict(data), ""]
+    print("\n".join([summary.tables(data)[1].text, *sentences, together.table(many).text, *together.verdict(many)]))
 
 
 if __name__ == "__main__":

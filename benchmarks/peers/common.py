@@ -84,15 +84,15 @@ class Library:
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         """The public call as a solver of the registry; samples that are missing or not finite are a failure."""
         motion = self.public(top, start, plan)
-        shown = np.full((plan.times.size, charts.DIMENSIONS[self.chart]), np.nan)
+        states = np.full((plan.times.size, charts.DIMENSIONS[self.chart]), np.nan)
         count = min(len(motion.states), plan.times.size)
         if count:
-            shown[:count] = self.states_of(top, start, np.asarray(motion.states, dtype=float)[:count])
-        good = np.isfinite(shown).all(axis=1)
+            states[:count] = self.states_of(top, start, np.asarray(motion.states, dtype=float)[:count])
+        good = np.isfinite(states).all(axis=1)
         reached = plan.horizon if good.all() else float(plan.times[good][-1]) if good.any() else 0.0
         blank = np.zeros(plan.times.size)  # only the axis is judged here
         outcome = "ok" if good.all() else "not_finite"
-        return Run(shown, blank, blank, int(motion.steps), int(motion.evaluations), 0, outcome, reached)
+        return Run(states, blank, blank, int(motion.steps), int(motion.evaluations), 0, outcome, reached)
 
 
 def start_of(top: SymmetricTop, start: Angles) -> Array:

@@ -9,7 +9,7 @@ ROOT = Path(__file__).resolve().parents[2]
 PINS = [ROOT / "constraints.txt", Path(__file__).resolve().parent / "constraints.txt"]
 
 
-def wanted() -> list[str]:
+def requirements() -> list[str]:
     """The requirements of the extra `peers`."""
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     return list(project["optional-dependencies"]["peers"])
@@ -20,7 +20,7 @@ def main() -> None:
     pins = [word for path in PINS for word in ("--constraint", str(path))]
     pip = [sys.executable, "-m", "pip", "install", "--quiet", "--disable-pip-version-check", *pins]
     subprocess.run([*pip, "--editable", str(ROOT)], check=True)
-    for requirement in wanted():
+    for requirement in requirements():
         if subprocess.run([*pip, requirement], check=False).returncode:
             print(f"symtop: {requirement} does not install here and is left out")
 

@@ -68,13 +68,13 @@ def accuracy(scene: Scene, method: Integrator, setting: float) -> Point:
     plan, _ = make_plan(scene, method, **method.given(setting), horizon=horizon, samples=SAMPLES)
     solve: Any = method.solvers[chart]
     run = None
-    begun = time.process_time()
+    start = time.process_time()
     if hasattr(solve, "own_steps"):
         times, states = solve.own_steps(scene.top, scene.start, plan)
-        elapsed, axis = time.process_time() - begun, states[:, :3]
+        elapsed, axis = time.process_time() - start, states[:, :3]
     else:
         times, run = plan.times, solve(scene.top, scene.start, plan)
-        elapsed, axis = time.process_time() - begun, Trajectory.of_run(scene, chart, plan, run).axis
+        elapsed, axis = time.process_time() - start, Trajectory.of_run(scene, chart, plan, run).axis
     truth = reference(scene, times, precision="closed-form")
     error = float(np.max(charts.axis_distance(axis, truth["axis"].values)))
     failed = not math.isfinite(error) or (run is not None and run.outcome != "ok")
@@ -130,9 +130,9 @@ def worth_timing(points: Sequence[Point], targets: Sequence[float] = TARGETS) ->
 def ready(scene: Scene, peer: Peer, setting: float) -> tuple[Callable[[], Any], Inner]:
     """Both calls of a solver at a setting, from the start to the horizon."""
     method, horizon = peer.method, PERIODS * scene.nutation_period
-    given = method.given(setting)
-    sampled, _ = make_plan(scene, method, **given, horizon=horizon, samples=SHOWN)
-    bare, _ = make_plan(scene, method, **given, horizon=horizon, samples=2)
+    options = method.given(setting)
+    sampled, _ = make_plan(scene, method, **options, horizon=horizon, samples=SHOWN)
+    bare, _ = make_plan(scene, method, **options, horizon=horizon, samples=2)
     library = method.solvers[peer.chart]
     if isinstance(library, Library):
         return lambda: library.public(scene.top, scene.start, sampled), library.inner(scene.top, scene.start, bare)
@@ -194,29 +194,29 @@ def measure(peers: Sequence[Peer], scenes: Sequence[str] = SCENES) -> xr.Dataset
     facts = circumstances()
     for name in scenes:
         scene = symtop.scene(name)
-        entries = ours(scene, _tell) + [found for peer in peers if (found := _searched(scene, peer)) is not None]
+        entries = ours(scene, _tell) + [entry for peer in peers if (entry := _points_of(scene, peer)) is not None]
         rows = [(peer, point, *ready(scene, peer, point.setting)) for peer, points in entries for point in points]
         ends = [end_error(scene, peer, loop) for peer, _, _, loop in rows]
         functions = [function for _, _, whole, loop in rows for function in (whole, loop.call)]
         _tell(f"{name}: timing {len(functions)} calls of {len(entries)} solvers")
-        taken = timings(functions, batches=BATCHES, batch=BATCH)
+        results = timings(functions, batches=BATCHES, batch=BATCH)
         for peer, points in entries:
             about[peer.row] = peer
-            mine = [i for i, row in enumerate(rows) if row[0] is peer]
+            places = [i for i, row in enumerate(rows) if row[0] is peer]
             cells[name, peer.row] = {
                 "axis": [point.error for point in points],
                 "axis_bound": [point.bound for point in points],
-                "end_error": [ends[i] for i in mine],
+                "end_error": [ends[i] for i in places],
                 "control_setting": [point.setting for point in points],
                 "steps": [point.steps for point in points],
                 "force_evaluations": [point.evaluations for point in points],
-                "timing": [[taken[2 * i + k] for i in mine] for k in range(len(CALLS))],
+                "timing": [[results[2 * i + k] for i in places] for k in range(len(CALLS))],
             }
-    return _combined(list(scenes), about, cells).assign_attrs(facts)
+    return _dataset(list(scenes), about, cells).assign_attrs(facts)
 
 
-def _searched(scene: Scene, peer: Peer) -> tuple[Peer, list[Point]] | None:
-    begun = time.perf_counter()
+def _points_of(scene: Scene, peer: Peer) -> tuple[Peer, list[Point]] | None:
+    start = time.perf_counter()
     try:
         points = worth_timing(search(scene, peer.method))
         for point in points:
@@ -224,14 +224,14 @@ def _searched(scene: Scene, peer: Peer) -> tuple[Peer, list[Point]] | None:
     except Exception as error:  # noqa: BLE001  (somebody else's solver must not take the others down)
         _tell(f"{scene.name}: {peer.row} failed, {type(error).__name__}: {error}")
         return None
-    _tell(f"{scene.name}: {peer.row} searched in {time.perf_counter() - begun:.1f} s")
+    _tell(f"{scene.name}: {peer.row} searched in {time.perf_counter() - start:.1f} s")
     return peer, points
 
 
-def _combined(scenes: list[str], about: dict[str, Peer], cells: dict[tuple[str, str], dict[str, Any]]) -> xr.Dataset:
+def _dataset(scenes: list[str], about: dict[str, Peer], cells: dict[tuple[str, str], dict[str, Any]]) -> xr.Dataset:
     names = list(about)
     shape = len(scenes), len(names), max((len(cell["axis"]) for cell in cells.values()), default=0)
-    one, each = ("scene", "variant", "setting"), ("call", "scene", "variant", "setting")
+    dims, call_dims = ("scene", "variant", "setting"), ("call", "scene", "variant", "setting")
     plain = [key for key in next(iter(cells.values())) if key != "timing"]
     values = {key: np.full(shape, np.nan) for key in plain}
     timed = {key: np.full((len(CALLS), *shape), np.nan) for key in ("seconds", "first_call", "reliable")}
@@ -256,9 +256,9 @@ def _combined(scenes: list[str], about: dict[str, Peer], cells: dict[tuple[str, 
         "shows": [shown_by(peer) for peer in about.values()],
     }
     return xr.Dataset(
-        {key: (one, array) for key, array in values.items()}
-        | {key: (each, array) for key, array in timed.items()}
-        | {"seconds_samples": ((*each, "batch"), samples)}
+        {key: (dims, array) for key, array in values.items()}
+        | {key: (call_dims, array) for key, array in timed.items()}
+        | {"seconds_samples": ((*call_dims, "batch"), samples)}
         | {key: ("variant", column) for key, column in words.items()},
         coords={"call": list(CALLS), "scene": scenes, "variant": names},
     )

@@ -24,8 +24,8 @@ TAYLOR_LANGUAGE = "LLVM by heyoka, inside the stepper"
 
 def public(scene: Scene, method: Integrator, setting: float, horizon: float) -> Callable[[], Any]:
     """`simulate` with its defaults, at most a sample a step, momenta, energy, the guard; only the axis is asked for."""
-    name, given = method.name, method.given(setting)
-    return lambda: symtop.simulate(scene, name, horizon=horizon, observe="axis", **given)
+    name, options = method.name, method.given(setting)
+    return lambda: symtop.simulate(scene, name, horizon=horizon, observe="axis", **options)
 
 
 def inner(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Inner:

@@ -32,8 +32,8 @@ def pictures(data: xr.Dataset) -> list[Picture]:
         for place, name in enumerate(names):
             ratios, color = spans[name][k], SPOKEN if name.startswith(SOLVE_IVP) else OTHER
             over_all = summary.ratios(data, call, ours, known[name])
-            for each, at, face in ((ratios, place - 0.12, color), (over_all, place + 0.18, "white")):
-                axis.plot(each, [at] * len(each), "o-", color=color, mfc=face, ms=4.0, lw=1.2)
+            for values, height, face in ((ratios, place - 0.12, color), (over_all, place + 0.18, "white")):
+                axis.plot(values, [height] * len(values), "o-", color=color, mfc=face, ms=4.0, lw=1.2)
             nearest, farthest = min(nearest, *ratios, *over_all), max(farthest, *over_all)
             axis.annotate(
                 summary.range_of((min(ratios), max(ratios))), (1.02, place), xycoords=("axes fraction", "data"),
@@ -64,24 +64,24 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 
 def caption(data: xr.Dataset) -> tuple[str, str]:
     """Caption of the figure, and its text for those who cannot see it."""
-    known, said = summary.groups(data), summary.facts(data)
+    known, facts = summary.groups(data), summary.facts(data)
     gains, of_all = (_gains(data, known, rows) for rows in (summary.general(data), known.get(OURS, [])))
-    alone = ", which is made of this top's equations and serves no other body" if said["of_this_top"] else ""
-    apart = ", ".join(
+    clause = ", which is made of this top's equations and serves no other body" if facts["of_this_top"] else ""
+    engines = ", ".join(
         f"{name} ({' and '.join(map(_range, spans))})"
         for name in ENGINES
         if name in known and all(spans := _spans(data, known[name]))
     )
     words = (
         f"SciPy's solve_ivp takes {gains[0]} as long as symtop's fastest on f(t, y) alone at the left, {gains[1]} at "
-        f"the right; over {said['fastest']}{alone} (open), {' and '.join(of_all)}. "
+        f"the right; over {facts['fastest']}{clause} (open), {' and '.join(of_all)}. "
     ) if gains else ""  # fmt: skip
     words += (
         "Left of the blue line the library's fastest batch is faster than symtop's. After a comma stands the language "
         "of the right-hand side. All step (e, L), but arkode-sprk and the variants [angles] Euler's angles. symtop "
         "with heyoka is taylor, heyoka's stepper called by symtop. "
-        + (f"Not drawn, since they model bodies and take no equations: {apart}. " if apart else "")
-        + f"Measured was symtop {said['version']}."
+        + (f"Not drawn, since they model bodies and take no equations: {engines}. " if engines else "")
+        + f"Measured was symtop {facts['version']}."
     )
     return words, "Dot plots of the time of each library over that of symtop, a panel for each call, a line a library."
 
@@ -107,8 +107,8 @@ def _gains(data: xr.Dataset, known: dict[str, list[str]], mine: Sequence[str]) -
     """How many times as long as `mine` SciPy's solve_ivp takes in both calls, whatever it was given; or nothing."""
     scipys = [name for name in known if name.startswith(SOLVE_IVP)]
     spans = [[summary.ratios(data, call, mine, known[name]) for call in NAMES] for name in scipys]
-    calls = [[ratio for one in spans for ratio in one[k]] for k in range(len(NAMES))]
-    return [_range(each) for each in calls] if all(calls) else []
+    calls = [[ratio for span in spans for ratio in span[k]] for k in range(len(NAMES))]
+    return [_range(ratios) for ratios in calls] if all(calls) else []
 
 
 def measured(data: xr.Dataset) -> dict[str, Any]:
@@ -133,13 +133,13 @@ STUDY = Study(
 
 def findings(data: xr.Dataset, many: list[together.Row], results: Path, missing: list[str]) -> dict[str, Any]:
     """Draw, and say what was measured, with the runs of many tops at once."""
-    drawn = runner.findings_of(
+    result = runner.findings_of(
         STUDY, data, results, style.publish, failures=missing, cases=data["seconds"].count().item()
     )
     tables = [*summary.tables(data), *([together.table(many)] if many else [])]
-    said = pages.findings(
+    page = pages.findings(
         STUDY.name, STUDY.title, STUDY.question, [*summary.verdict(data), *together.verdict(many)],
         summary.HOW_TO_READ, tables, answer=summary.answer(data), further=summary.pairs(data),
         captions={"fronts": caption(data)},
     )  # fmt: skip
-    return drawn | {"page": said["page"], "together": [row._asdict() for row in many], **measured(data)}
+    return result | {"page": page["page"], "together": [row._asdict() for row in many], **measured(data)}

@@ -44,13 +44,13 @@ def groups(data: xr.Dataset) -> dict[str, list[str]]:
     """Variants by group: ours first, then heyoka's, then by package."""
     packages = data["package"].values.astype(str).tolist()
     kinds = list(zip(packages, data["chart"].values.astype(str), data["language"].values.astype(str), strict=True))
-    several = {one for one in packages if len({kind for kind in kinds if kind[0] == one}) > 1} - {OURS, HEYOKA}
-    found: dict[str, list[str]] = {}
+    several = {name for name in packages if len({kind for kind in kinds if kind[0] == name}) > 1} - {OURS, HEYOKA}
+    variants: dict[str, list[str]] = {}
     for kind, row in zip(kinds, data["variant"].values.astype(str).tolist(), strict=True):
         package, chart, language = kind
         name = f"{package}[{chart}], {SHORT.get(language, language)}" if package in several else package
-        found.setdefault(name, []).append(row)
-    return {name: found[name] for name in sorted(found, key=lambda name: (name != OURS, name != HEYOKA, name))}
+        variants.setdefault(name, []).append(row)
+    return {name: variants[name] for name in sorted(variants, key=lambda name: (name != OURS, name != HEYOKA, name))}
 
 
 def best_of(data: xr.Dataset, call: str, scene: str, rows: Sequence[str], target: float, least: int = 0) -> Best | None:
@@ -69,8 +69,8 @@ def best_of(data: xr.Dataset, call: str, scene: str, rows: Sequence[str], target
 
 def standing(mine: Best, theirs: Best) -> str:
     """Whether all batches of the one are faster than all of the other, however little: ahead, behind or level."""
-    ours, other = mine.timing.samples, theirs.timing.samples
-    return "ahead" if max(ours) < min(other) else "behind" if max(other) < min(ours) else "level"
+    ours, others = mine.timing.samples, theirs.timing.samples
+    return "ahead" if max(ours) < min(others) else "behind" if max(others) < min(ours) else "level"
 
 
 def shown(seconds: float) -> str:
@@ -86,24 +86,24 @@ def both(
 ) -> list[tuple[str, Best, Best]]:
     """Our best, of at least so many steps, and theirs, on every scene and at every judged accuracy that both reach."""
     return [
-        (f"{scene} at {number(target)}", ours, other)
+        (f"{scene} at {number(target)}", ours, rival)
         for scene, target in itertools.product(data["scene"].values.astype(str), JUDGED)
         if (ours := best_of(data, call, scene, mine, target, least)) is not None
-        and (other := best_of(data, call, scene, theirs, target)) is not None
+        and (rival := best_of(data, call, scene, theirs, target)) is not None
     ]
 
 
 def ratios(data: xr.Dataset, call: str, mine: Sequence[str], theirs: Sequence[str], least: int = 0) -> list[float]:
     """Their times over ours."""
-    return [other.timing.best / ours.timing.best for _, ours, other in both(data, call, mine, theirs, least)]
+    return [rival.timing.best / ours.timing.best for _, ours, rival in both(data, call, mine, theirs, least)]
 
 
 def span(
     data: xr.Dataset, call: str, mine: Sequence[str], theirs: Sequence[str], least: int = 0
 ) -> tuple[float, float] | None:
     """The least and the largest ratio, their time over ours, over scenes and judged accuracies."""
-    each = ratios(data, call, mine, theirs, least)
-    return (min(each), max(each)) if each else None
+    values = ratios(data, call, mine, theirs, least)
+    return (min(values), max(values)) if values else None
 
 
 def printed(value: float) -> str:
@@ -123,16 +123,16 @@ def verdict(data: xr.Dataset) -> list[str]:
 
 def answer(data: xr.Dataset) -> str:
     """What one gains and what one loses, before the details."""
-    said = facts(data)
-    won, lost, of = (sum(said[f"general_{key}_{call}"] for call in NAMES) for key in ("behind", "ahead", "compared"))
-    scipy = [said[f"general_scipy_{call}"] for call in NAMES]
+    numbers = facts(data)
+    won, lost, n = (sum(numbers[f"general_{key}_{call}"] for call in NAMES) for key in ("behind", "ahead", "compared"))
+    scipy = [numbers[f"general_scipy_{call}"] for call in NAMES]
     slower = (
         f"With SciPy's solve_ivp a user waits {scipy[0]} times as long, and the inner loop of an author takes "
         f"{scipy[1]} times as long. "
     )
     return (
         "You gain equations of any kind, where symtop has tops and rigid bodies alone, and seldom speed: of "
-        f"{of} comparisons with symtop's fastest on f(t, y) alone the other library is faster in {won} and slower in "
+        f"{n} comparisons with symtop's fastest on f(t, y) alone the other library is faster in {won} and slower in "
         f"{lost}. {'' if 'not reached' in scipy else slower}You lose the exact motion, by which symtop tells the error "
         "of a run, and the guard, which warns of a wrong one."
     )
@@ -142,9 +142,9 @@ def pairs(data: xr.Dataset) -> list[str]:
     """Both ratios against SciPy and heyoka; what a callback costs."""
     known = groups(data)
     scipys = sorted((name for name in known if name.partition("[")[0] == "scipy"), key=lambda name: "[angles" in name)
-    said = [_both(data, known, name) for name in (*scipys, HEYOKA) if name in known]
-    fixed = [f"All ratios: {_fixed(data)}; in angles or on (e, L) as each says."] if said else []
-    return [*said, *fixed, *_callbacks(data)]
+    sentences = [_both(data, known, name) for name in (*scipys, HEYOKA) if name in known]
+    fixed = [f"All ratios: {_fixed(data)}; in angles or on (e, L) as each says."] if sentences else []
+    return [*sentences, *fixed, *_callbacks(data)]
 
 
 def _fixed(data: xr.Dataset) -> str:
@@ -188,69 +188,69 @@ def score(data: xr.Dataset, call: str, mine: Sequence[str]) -> Score:
     for name, rows in groups(data).items():
         if name in (OURS, HEYOKA, *ENGINES):
             continue
-        for place, own, theirs in both(data, call, mine, rows):
-            word = standing(own, theirs)
+        for place, ours, rival in both(data, call, mine, rows):
+            word = standing(ours, rival)
             counts[word] += 1
             if word == "behind":
-                faster.append(f"{name} ({printed(own.timing.best / theirs.timing.best)} times, {NAMES[call]}, {place})")
+                faster.append(f"{name} ({printed(ours.timing.best / rival.timing.best)} times, {NAMES[call]}, {place})")
     return Score(**counts, faster=faster)
 
 
 def _wins(data: xr.Dataset) -> list[str]:
     """Which libraries are faster than those that need no more than a library and than our fastest, and how often."""
-    said = []
-    for who, rows in (("methods on f(t, y) alone", general(data)), ("of all", groups(data).get(OURS, []))):
-        stands = {words: each for call, words in NAMES.items() if (each := score(data, call, rows)).compared}
-        faster = [library for one in stands.values() for library in one.faster]
-        ahead = [f"{one.ahead} of {one.compared}" for one in stands.values()]
-        if stands:
-            said.append(f"{listed(faster) if faster else 'No library'} {'are' if faster[1:] else 'is'} faster than "
-                        f"symtop's fastest {who} ({', '.join(fastest(data, rows))}); symtop is faster in "
-                        f"{' and '.join(ahead)} comparisons ({' and '.join(stands)}), level in "
-                        f"{' and '.join(str(one.level) for one in stands.values())}."
+    lines = []
+    for group, rows in (("methods on f(t, y) alone", general(data)), ("of all", groups(data).get(OURS, []))):
+        scores = {words: result for call, words in NAMES.items() if (result := score(data, call, rows)).compared}
+        faster = [library for tally in scores.values() for library in tally.faster]
+        ahead = [f"{tally.ahead} of {tally.compared}" for tally in scores.values()]
+        if scores:
+            lines.append(f"{listed(faster) if faster else 'No library'} {'are' if faster[1:] else 'is'} faster than "
+                        f"symtop's fastest {group} ({', '.join(fastest(data, rows))}); symtop is faster in "
+                        f"{' and '.join(ahead)} comparisons ({' and '.join(scores)}), level in "
+                        f"{' and '.join(str(tally.level) for tally in scores.values())}."
                         )  # fmt: skip
-    return said
+    return lines
 
 
 def _samples(data: xr.Dataset) -> list[str]:
     """How SciPy stands to those of our public calls that return as many samples."""
-    said = facts(data)
+    numbers = facts(data)
     words = (
         f"Where solve_ivp returns {SHOWN} samples, symtop's fastest on f(t, y) alone return one a step, "
-        f"{said.get('samples')}: a call of solve_ivp (numba, on (e, L)) takes {said['general_scipy_public']} times as "
-        f"long as theirs, and {said.get('filled')} times as long as symtop's fastest with {SHOWN} samples."
+        f"{numbers.get('samples')}: a call of solve_ivp (numba, on (e, L)) takes {numbers['general_scipy_public']} "
+        f"times as long as theirs, and {numbers.get('filled')} times as long as symtop's fastest with {SHOWN} samples."
     )
-    return [words] if "samples" in said else []
+    return [words] if "samples" in numbers else []
 
 
 def fastest(data: xr.Dataset, rows: Sequence[str]) -> list[str]:
     """Those of some variants that are the fastest of them somewhere."""
     places = itertools.product(NAMES, data["scene"].values.astype(str), JUDGED)
     best = (best_of(data, call, scene, rows, target) for call, scene, target in places)
-    return sorted({one.row for one in best if one is not None})
+    return sorted({choice.row for choice in best if choice is not None})
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """Numbers that pages quote."""
     known, simple = groups(data), general(data)
     ours, scipy = known.get(OURS, []), known.get("scipy[axis], numba", [])
-    own = fastest(data, ours)
-    needs = [method.needs for row in own if (method := methods().get(row.partition("[")[0])) is not None]
-    said: dict[str, Any] = {
-        "version": data.attrs["symtop_version"], "fastest": _coded(own), "general": _coded(fastest(data, simple)),
+    leaders = fastest(data, ours)
+    needs = [method.needs for row in leaders if (method := methods().get(row.partition("[")[0])) is not None]
+    numbers: dict[str, Any] = {
+        "version": data.attrs["symtop_version"], "fastest": _coded(leaders), "general": _coded(fastest(data, simple)),
         "of_this_top": bool(needs) and set(needs) == {"this-top"},
     }  # fmt: skip
-    if shown := [one.steps + 1.0 for _, one, _ in both(data, "public", simple, scipy)]:
-        said["samples"] = range_of((min(shown), max(shown)))
-        said["filled"] = range_of(span(data, "public", ours, scipy, SHOWN - 1))
+    if shown := [best.steps + 1.0 for _, best, _ in both(data, "public", simple, scipy)]:
+        numbers["samples"] = range_of((min(shown), max(shown)))
+        numbers["filled"] = range_of(span(data, "public", ours, scipy, SHOWN - 1))
     for call in NAMES:
-        said[f"heyoka_{call}"] = range_of(span(data, call, simple, known.get(HEYOKA, [])))
+        numbers[f"heyoka_{call}"] = range_of(span(data, call, simple, known.get(HEYOKA, [])))
         for kind, rows in (("", ours), ("general_", simple)):
             stands = score(data, call, rows)
-            said |= {f"{kind}{key}_{call}": getattr(stands, key) for key in ("ahead", "level", "behind", "compared")}
-            said[f"{kind}faster_{call}"] = listed(stands.faster) if stands.faster else ""
-            said[f"{kind}scipy_{call}"] = range_of(span(data, call, rows, scipy))
-    return said
+            numbers |= {f"{kind}{key}_{call}": getattr(stands, key) for key in ("ahead", "level", "behind", "compared")}
+            numbers[f"{kind}faster_{call}"] = listed(stands.faster) if stands.faster else ""
+            numbers[f"{kind}scipy_{call}"] = range_of(span(data, call, rows, scipy))
+    return numbers
 
 
 def _coded(rows: Sequence[str]) -> str:
@@ -273,7 +273,7 @@ def _callbacks(data: xr.Dataset) -> list[str]:
 def _cells(data: xr.Dataset, scene: str, target: float, rows: Sequence[str], ours: Sequence[str]) -> list[str]:
     cells = []
     for call in NAMES:
-        theirs, mine = (best_of(data, call, scene, some, target) for some in (rows, ours))
+        theirs, mine = (best_of(data, call, scene, names, target) for names in (rows, ours))
         if theirs is None:
             cells += ["", "not reached", ""]
             continue
@@ -299,19 +299,19 @@ def tables(data: xr.Dataset) -> list[Table]:
             cells = _cells(data, scene, target, [row], ours)
             if cells[1] != "not reached":
                 by_row.append([scene, f"{target:.0e}", row, cells[1], cells[2], cells[4], cells[5]])
-    over = []
+    by_library = []
     for name, rows in known.items():
-        one = data.sel(variant=rows[0])
+        first = data.sel(variant=rows[0])
         public, inner = (range_of(span(data, call, ours, rows)) for call in NAMES)
         if name != OURS:
-            over.append([name, str(one["chart"].values), str(one["language"].values), public, inner])
+            by_library.append([name, str(first["chart"].values), str(first["language"].values), public, inner])
     keys = ("package", "version", "chart", "language", "implementation", "shows", "formulation")
-    given = [[str(row), *(str(data[key].sel(variant=row).values) for key in keys)] for row in data["variant"].values]
+    settings = [[str(row), *(str(data[key].sel(variant=row).values) for key in keys)] for row in data["variant"].values]
     return [
         Table(
             f"Both ratios: the time over symtop's ({_fixed(data)})",
             ["library", "chart", "right-hand side", NAMES["public"], NAMES["inner"]],
-            over,
+            by_library,
         ),
         Table(
             "Both comparisons, the fastest variant of each library",
@@ -336,7 +336,7 @@ def tables(data: xr.Dataset) -> list[Table]:
                 "public call shows",
                 "formulation",
             ],
-            given,
+            settings,
         ),
     ]
 

@@ -62,13 +62,13 @@ class Vector:
 
 def function(library: ctypes.CDLL, name: str, *arguments: Any, returns: Any = c_int) -> Any:
     """A function of a library with its types; one that returns a code raises RuntimeError if that is negative."""
-    found = getattr(library, name)
-    found.argtypes, found.restype = list(arguments), returns
+    symbol = getattr(library, name)
+    symbol.argtypes, symbol.restype = list(arguments), returns
     if returns is not c_int:
-        return found
+        return symbol
 
     def call(*values: Any) -> None:
-        _check(found(*values), name)
+        _check(symbol(*values), name)
 
     return call
 

@@ -63,14 +63,14 @@ def neighbours(count: int) -> Array:
 def fixed(name: str, chart: str, numbers: Array, steps: int) -> Call:
     """A method in lanes."""
     solver, count = lanes.solver_of(name, chart), len(numbers)
-    given = numbers, np.full(count, HORIZON / steps), np.full((count, 1), steps)
-    return lambda: (solver.many(*given, compiling=True).states[:, 0, :3], float(steps))
+    arguments = numbers, np.full(count, HORIZON / steps), np.full((count, 1), steps)
+    return lambda: (solver.many(*arguments, compiling=True).states[:, 0, :3], float(steps))
 
 
 def coarsest(name: str, chart: str, numbers: Array, error: float) -> int | None:
     """The fewest steps of the ladder with which a method is at least as accurate; None if none are enough."""
-    some = numbers[:: max(1, len(numbers) // FEW)]
-    return next((n for n in map(int, lanes.LADDER) if worst(fixed(name, chart, some, n), some) <= error), None)
+    sample = numbers[:: max(1, len(numbers) // FEW)]
+    return next((n for n in map(int, lanes.LADDER) if worst(fixed(name, chart, sample, n), sample) <= error), None)
 
 
 def batched(numbers: Array, tolerance: float) -> Call:
@@ -86,10 +86,10 @@ def vmapped(solver: str, numbers: Array, tolerance: float) -> Call:
     states, inverse = np.array([on_axis(*top)[1] for top in members_of(numbers)]), 1.0 / numbers[:, 0]
     run = adapter.many_tops(solver)
     put = jax.numpy.asarray
-    given = put(states), put([0.0, HORIZON]), (put(inverse), put(numbers[:, 2])), put(tolerance)
+    arguments = put(states), put([0.0, HORIZON]), (put(inverse), put(numbers[:, 2])), put(tolerance)
 
     def call() -> tuple[Array, float]:
-        ends, steps = run(*given)
+        ends, steps = run(*arguments)
         return np.asarray(ends)[:, -1, :3], float(np.mean(steps))
 
     return call
@@ -125,9 +125,9 @@ def _cell(count: int, tolerance: float, solvers: Iterable[str]) -> list[Row]:
             calls[f"{name}[{chart}], lanes"] = fixed(name, chart, numbers, steps)
     calls |= {f"diffrax {solver}, vmap": vmapped(solver, numbers, tolerance) for solver in solvers}
     errors = {name: worst(call, numbers) for name, call in calls.items()}  # compiles, too
-    each = timings([*calls.values()], ROUNDS, batch=0.0, warm=True)
+    results = timings([*calls.values()], ROUNDS, batch=0.0, warm=True)
     return [Row(name, count, tolerance, errors[name], call()[1], timing.best / count)
-            for (name, call), timing in zip(calls.items(), each, strict=True)]  # fmt: skip
+            for (name, call), timing in zip(calls.items(), results, strict=True)]  # fmt: skip
 
 
 def table(rows: list[Row]) -> Table:
@@ -145,10 +145,10 @@ def table(rows: list[Row]) -> Table:
 
 def verdict(rows: list[Row]) -> list[str]:
     """How lanes stand beside the others, by tolerance, with the most tops."""
-    said = []
-    most = max((row.members for row in rows), default=0)
+    sentences = []
+    largest = max((row.members for row in rows), default=0)
     for tolerance in TOLERANCES:
-        cell = [row for row in rows if (row.members, row.tolerance) == (most, tolerance)]
+        cell = [row for row in rows if (row.members, row.tolerance) == (largest, tolerance)]
         ours = min((row for row in cell if row.name.endswith("lanes")), key=lambda row: row.seconds, default=None)
         if ours is None:
             continue
@@ -157,12 +157,12 @@ def verdict(rows: list[Row]) -> list[str]:
         beside = " and ".join(
             f"{row.name} takes {row.seconds / ours.seconds:.3g} times as long (error {row.error:.0e})" for row in ends
         )
-        told = {0: "", 1: f" {beside}."}.get(len(others), f" Of {len(others)} others {beside}.")
-        said.append(
-            f"{most:,} tops on one core at {tolerance:g}: {ours.name}, takes {ours.seconds * 1e6:.1f} us a top and "
-            f"{ours.nanoseconds:.1f} ns a step to an error of {ours.error:.0e}.{told}"
+        comparison = {0: "", 1: f" {beside}."}.get(len(others), f" Of {len(others)} others {beside}.")
+        sentences.append(
+            f"{largest:,} tops on one core at {tolerance:g}: {ours.name}, takes {ours.seconds * 1e6:.1f} us a top and "
+            f"{ours.nanoseconds:.1f} ns a step to an error of {ours.error:.0e}.{comparison}"
         )
-    return said
+    return sentences
 
 
 if __name__ == "__main__":

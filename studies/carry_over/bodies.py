@@ -48,7 +48,7 @@ class Bodies:
 
     def __init__(self, scenes: list[Scene], strata: list[str], periods: float) -> None:
         self.scenes, self.strata, self.periods = scenes, strata, periods
-        self.period = np.array([one.top.nutation_period(one.start) for one in scenes])
+        self.period = np.array([scene.top.nutation_period(scene.start) for scene in scenes])
         self.marks = sample_marks(math.ceil(periods * FIRST))
         self.times = self.marks * (self.period / FIRST)[:, np.newaxis]
         self.kinds = np.zeros(len(scenes), dtype=np.int64)  # one kind
@@ -61,8 +61,8 @@ class Bodies:
     @cached_property
     def truth(self) -> tuple[Array, Array]:
         """Quaternions (n, samples, 4), and their largest bounds (n,)."""
-        each = [self._motion(scene, times) for scene, times in zip(self.scenes, self.times, strict=True)]
-        return np.stack([quaternion for quaternion, _ in each]), np.array([bound for _, bound in each])
+        pairs = [self._motion(scene, times) for scene, times in zip(self.scenes, self.times, strict=True)]
+        return np.stack([quaternion for quaternion, _ in pairs]), np.array([bound for _, bound in pairs])
 
     @staticmethod
     def _motion(scene: Scene, times: Array) -> tuple[Array, float]:
@@ -77,17 +77,17 @@ class Bodies:
     @cached_property
     def numbers(self) -> tuple[Array, ...]:
         """Moments, centre, weight's vector, M at the start (n, 3); energy, its scale (n,); L at the start (n, 3)."""
-        bodies = [(one.top, one.start) for one in self.scenes]
+        bodies = [(scene.top, scene.start) for scene in self.scenes]
         parts = [[getattr(body, name) for body, _ in bodies] for name in ("moments", "centre", "torque")]
         momentum = np.array([body.momentum(start) for body, start in bodies])
         energy, scale = ([getattr(body, name)(start) for body, start in bodies] for name in ("energy", "energy_scale"))
-        turned = rotated(np.array([start.quaternion for _, start in bodies]), momentum)
-        return *map(np.array, parts), momentum, np.array(energy), np.array(scale), turned
+        lifted = rotated(np.array([start.quaternion for _, start in bodies]), momentum)
+        return *map(np.array, parts), momentum, np.array(energy), np.array(scale), lifted
 
     @cached_property
     def rows(self) -> Array:
         """Bodies and starts as rows of 14 numbers, (n, 14)."""
-        return np.array([one.top.flat(one.start) for one in self.scenes])
+        return np.array([scene.top.flat(scene.start) for scene in self.scenes])
 
     def asked(self, targets: Any) -> dict[str, NDArray[np.bool_]]:
         """Which targets are asked of which members, (targets, n)."""
@@ -99,9 +99,9 @@ class Bodies:
         """The body and the start of each chosen member."""
         return ((self.scenes[k].top, self.scenes[k].start) for k in chosen.tolist())
 
-    def errors(self, _: str, shown: Any, chosen: NDArray[np.int64]) -> dict[str, Array]:
+    def errors(self, _: str, samples: Any, chosen: NDArray[np.int64]) -> dict[str, Array]:
         """Largest error of each quantity of the chosen members' runs, (chosen,); inf after a failure."""
-        return {name: values.max(axis=1) for name, values in self.errors_at(shown.states, chosen).items()}
+        return {name: values.max(axis=1) for name, values in self.errors_at(samples.states, chosen).items()}
 
     def errors_at(self, states: Array, chosen: NDArray[np.int64]) -> dict[str, Array]:
         """The error of each quantity at each sample, (chosen, samples); inf after a failure."""
@@ -111,16 +111,16 @@ class Bodies:
             q, M = states[..., :4], states[..., 4:]  # an error of |q| counts in energy and momenta
             up, lifted = np.stack(vertical(*np.moveaxis(q, -1, 0)), axis=-1), rotated(q, M)
             q = unit(q)
-            axes = (rotated(one, np.broadcast_to(centre, M.shape)) for one in (q, true))
+            axes = (rotated(quaternion, np.broadcast_to(centre, M.shape)) for quaternion in (q, true))
             free = (weight == 0.0).all(axis=-1)
             drift = lifted - start
             moved = np.where(free, np.linalg.norm(drift, axis=-1), np.abs(drift[..., 2]))
-            each = {
+            errors = {
                 "axis": axis_distance(*axes), "attitude": attitude_distance(q, true),
                 "energy": np.abs(0.5 * (M * M / moments).sum(axis=-1) + (weight * up).sum(axis=-1) - energy) / scale,
                 MOMENTA: moved / np.linalg.norm(start, axis=-1),
             }  # fmt: skip
-        return {name: np.where(np.isfinite(values), values, np.inf) for name, values in each.items()}
+        return {name: np.where(np.isfinite(values), values, np.inf) for name, values in errors.items()}
 
 
 def unit(quaternions: Array) -> Array:
@@ -154,11 +154,11 @@ def bodies_of(family: str, count: int, seed: int, periods: float) -> Bodies:
 
 def as_tops(bodies: Bodies) -> Tops:
     """Bodies of epsilon = 0 as symmetric tops, with the same times."""
-    starts = [Angles.from_quaternion(one.start.quaternion, omega_body=one.start.omega_body) for one in bodies.scenes]
-    tops = [SymmetricTop(one.top.I1, one.top.I3, one.top.mgl) for one in bodies.scenes]
-    drawn = Tops(np.array([flat(*pair) for pair in zip(tops, starts, strict=True)]), bodies.periods)
-    drawn.period, drawn.marks, drawn.times = bodies.period, bodies.marks, bodies.times
-    return drawn
+    starts = [Angles.from_quaternion(body.start.quaternion, omega_body=body.start.omega_body) for body in bodies.scenes]
+    tops = [SymmetricTop(body.top.I1, body.top.I3, body.top.mgl) for body in bodies.scenes]
+    result = Tops(np.array([flat(*pair) for pair in zip(tops, starts, strict=True)]), bodies.periods)
+    result.period, result.marks, result.times = bodies.period, bodies.marks, bodies.times
+    return result
 
 
 def grain(values: Array) -> Array:

@@ -74,11 +74,11 @@ def costs(data: xr.DataTree, family: str, target: float, quantity: str = "axis",
     part = group.sel(quantity=quantity).sel(target=target, method="nearest")
     if span != "own":
         part = part.sel(family=family)
-    values, met = (part[name].transpose("variant", "member").values.astype(float) for name in ("cost", "met_at"))
+    values, met_at = (part[name].transpose("variant", "member").values.astype(float) for name in ("cost", "met_at"))
     tariff = prices(data)
     for row, name in enumerate(names):
         fixed = str(group["control"].values[row]) == "step_size"
-        price, call = tariff.at(name, np.full(met.shape[1], np.nan) if fixed else met[row])
+        price, call = tariff.at(name, np.full(met_at.shape[1], np.nan) if fixed else met_at[row])
         values[row] = values[row] * price + call
     errors = tariff.error[[tariff.names.index(name) for name in names]]
     return Costs(names, [str(needs) for needs in group["needs"].values], values, errors)
@@ -99,9 +99,9 @@ def tau_of(first: Array, second: Array) -> float:
     either = (first < UNREACHED) | (second < UNREACHED)
     if either.sum() < 3:
         return float("nan")
-    one, other = (np.sign(row[either, np.newaxis] - row[either]) for row in (first, second))
-    pairs = (one * one).sum() * (other * other).sum()
-    return float((one * other).sum() / np.sqrt(pairs)) if pairs else float("nan")
+    x, y = (np.sign(row[either, np.newaxis] - row[either]) for row in (first, second))
+    pairs = (x * x).sum() * (y * y).sum()
+    return float((x * y).sum() / np.sqrt(pairs)) if pairs else float("nan")
 
 
 def bootstrap_tau(
@@ -118,16 +118,16 @@ def bootstrap_tau(
     if first.names != second.names:
         both_errors = np.append(first.errors[rows[0]], second.errors[rows[1]])
         price = factors(both_errors, DRAWS)[:, : len(rows[0])], factors(both_errors, DRAWS)[:, len(rows[0]) :]
-    both = np.intersect1d(bodies, others)
+    common = np.intersect1d(bodies, others)
     for k in range(draws):
         if paired:
-            draw = both[generator.integers(both.size, size=both.size)]
+            draw = common[generator.integers(common.size, size=common.size)]
             pair = draw, draw
         else:
             pair = tuple(part[generator.integers(part.size, size=part.size)] for part in (bodies, others))
-        priced = (medians(part[:, drawn]) for part, drawn in zip((a, b), pair, strict=True))
+        priced = (medians(part[:, picks]) for part, picks in zip((a, b), pair, strict=True))
         # prices do not change the rank of targets that are not reached
-        taus.append(tau_of(*(np.where(one < UNREACHED, one * p[k], one) for one, p in zip(priced, price, strict=True))))
+        taus.append(tau_of(*(np.where(c < UNREACHED, c * p[k], c) for c, p in zip(priced, price, strict=True))))
     ends = np.nanquantile(taus, ENDS).tolist() if np.isfinite(taus).any() else (float("nan"),) * 2
     return Interval(value, *ends)
 
@@ -175,7 +175,7 @@ def classes(data: xr.DataTree) -> list[str]:
 
 def of_class(table: Costs, needs: str) -> list[int]:
     """Rows of a class."""
-    return [row for row, one in enumerate(table.needs) if needs in (one, ANY)]
+    return [row for row, need in enumerate(table.needs) if needs in (need, ANY)]
 
 
 @of_one_dataset
@@ -239,43 +239,43 @@ def safest(data: xr.DataTree, family: str, target: float, span: str = "short", w
     if span != "own":
         part, work = part.sel(family=family), work.sel(family=family)
     for name in map(str, group["variant"].values):
-        met = part["met_at"].sel(variant=name).values.astype(float)
-        met = met[~np.isnan(part["cost"].sel(variant=name).values) & members]
+        met_at = part["met_at"].sel(variant=name).values.astype(float)
+        met_at = met_at[~np.isnan(part["cost"].sel(variant=name).values) & members]
         fixed = integrator(name).fixed_step
         settings = np.array([setting_of(integrator(name), level) for level in range(work.sizes["level"])])
         price, call = tariff.at(name, np.full(settings.size, np.nan) if fixed else settings)
         seconds = work.sel(variant=name).values * price + call
-        ladders.append(Ladder(name, met, settings, seconds, fixed, float(tariff.error[tariff.names.index(name)])))
-    return {one.name: one for one in safe(ladders)[0]}
+        ladders.append(Ladder(name, met_at, settings, seconds, fixed, float(tariff.error[tariff.names.index(name)])))
+    return {choice.name: choice for choice in safe(ladders)[0]}
 
 
 @of_one_dataset
 def step_factors(data: xr.DataTree, family: str, target: float, span: str = "short") -> dict[str, float]:
     """By method of fixed step that serves tops, safe steps over those at epsilon = 0; inf beyond the budget."""
     before, after = (safest(data, name, target, span) for name in (SYMMETRIC, family))
-    return {name: one.setting / before[name].setting for name, one in after.items()
+    return {name: choice.setting / before[name].setting for name, choice in after.items()
             if integrator(name).fixed_step and np.isfinite(before[name].setting)}  # fmt: skip
 
 
 @of_one_dataset
 def own_factors(data: xr.DataTree, family: str, target: float, without: str = "") -> dict[str, float]:
     """By method, safe steps of a body over those of the top's own chart at epsilon = 0; inf beyond the budget."""
-    own = {integrator(name).method: one for name, one in safest(data, SYMMETRIC, target, "own").items()}
+    base = {integrator(name).method: choice for name, choice in safest(data, SYMMETRIC, target, "own").items()}
     after = safest(data, family, target, without=without)
-    return {name: one.setting / own[label(name)].setting for name, one in after.items()
-            if integrator(name).fixed_step and label(name) in own
-            and np.isfinite(own[label(name)].setting)}  # fmt: skip
+    return {name: choice.setting / base[label(name)].setting for name, choice in after.items()
+            if integrator(name).fixed_step and label(name) in base
+            and np.isfinite(base[label(name)].setting)}  # fmt: skip
 
 
 def price_factors(data: xr.DataTree) -> dict[str, float]:
     """By method, price of an evaluation in the chart of bodies over that in the top's own."""
     tariff = prices(data)
-    own = {integrator(name).method: name for name in map(str, group_of(data, "own")["variant"].values)}
+    base = {integrator(name).method: name for name in map(str, group_of(data, "own")["variant"].values)}
     pairs = {
-        name: own[label(name)] for name in map(str, group_of(data, "short")["variant"].values) if label(name) in own
+        name: base[label(name)] for name in map(str, group_of(data, "short")["variant"].values) if label(name) in base
     }
-    at = np.array([1e-8])
-    return {name: float(tariff.at(name, at)[0][0] / tariff.at(other, at)[0][0]) for name, other in pairs.items()}
+    tol = np.array([1e-8])
+    return {name: float(tariff.at(name, tol)[0][0] / tariff.at(variant, tol)[0][0]) for name, variant in pairs.items()}
 
 
 # ---- wrong runs and errors -------------------------------------------------------------------------------------------
@@ -328,8 +328,8 @@ def exponents(data: xr.DataTree) -> dict[tuple[str, str, str], float]:
 
 def exponent(time: Array, error: Array, quantity: str) -> float:
     """The slope of log error over log time; NaN where the error is rounding or has the size of the motion."""
-    most, least = (0.3, 1e-11) if quantity == "attitude" else (0.3, 1e-13)
-    good = np.isfinite(error) & (error < most) & (error > least)
+    high, low = (0.3, 1e-11) if quantity == "attitude" else (0.3, 1e-13)
+    good = np.isfinite(error) & (error < high) & (error > low)
     return float(np.polyfit(np.log(time[good]), np.log(error[good]), 1)[0]) if good.sum() >= 3 else float("nan")
 
 
@@ -354,11 +354,11 @@ def steady(data: xr.DataTree, name: str, family: str) -> Array:
 
 def limit_factors(data: xr.DataTree, family: str) -> Array:
     """Linear limits over those of the same draws at epsilon = 0, (methods, bodies); NaN of an unstable rotation."""
-    first, other = (steady(data, "limit", name) for name in (SYMMETRIC, family))
-    if not other.size:
-        return other
-    ratio = np.nan_to_num(other, nan=MOST) / np.where(first == 0.0, np.nan, np.nan_to_num(first, nan=MOST))
-    return np.where(other == 0.0, np.nan, ratio)
+    before, after = (steady(data, "limit", name) for name in (SYMMETRIC, family))
+    if not after.size:
+        return after
+    ratio = np.nan_to_num(after, nan=MOST) / np.where(before == 0.0, np.nan, np.nan_to_num(before, nan=MOST))
+    return np.where(after == 0.0, np.nan, ratio)
 
 
 def resonant(data: xr.DataTree, family: str) -> float:
@@ -370,7 +370,7 @@ def resonant(data: xr.DataTree, family: str) -> float:
 def engine_errors(data: xr.DataTree, family: str, place: int, name: str = "error") -> Costs:
     """Errors of engines' maps in the place of costs, or whether bodies are lost, at one of the two steps."""
     group = group_of(data, "engines").sel(family=family).isel(steps=place).transpose("variant", "member")
-    names = [str(one) for one in group["variant"].values]
+    names = [str(variant) for variant in group["variant"].values]
     return Costs(names, [""] * len(names), group[name].values, np.zeros(len(names)))
 
 
@@ -390,9 +390,9 @@ def lost(data: xr.DataTree, family: str, place: int) -> float:
 # ---- verdicts --------------------------------------------------------------------------------------------------------
 
 
-def ranking_verdict(one: Interval) -> str:
+def ranking_verdict(interval: Interval) -> str:
     """The verdict on an interval of tau."""
-    return NO if one.high < PART else YES if one.low >= SAME else PARTLY
+    return NO if interval.high < PART else YES if interval.low >= SAME else PARTLY
 
 
 def factor_verdict(factor: float, with_factor: float = DOUBLE) -> str:

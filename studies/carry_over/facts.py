@@ -47,27 +47,27 @@ def worst_tau(data: xr.DataTree, family: str) -> by.Interval:
 
 def long_tau(data: xr.DataTree, family: str) -> tuple[float, int]:
     """The least tau over all targets in the long runs, and the number of bodies that it is computed from."""
-    each = {target: by.tau(data, family, target, span="long").value for target in ASKED}
-    target = min(ASKED, key=lambda one: float(np.nan_to_num(each[one], nan=math.inf)))
-    return each[target], by.judged_bodies(by.costs(data, family, target, span="long")).size
+    taus = {target: by.tau(data, family, target, span="long").value for target in ASKED}
+    target = min(ASKED, key=lambda target: float(np.nan_to_num(taus[target], nan=math.inf)))
+    return taus[target], by.judged_bodies(by.costs(data, family, target, span="long")).size
 
 
-def least(each: list[by.Interval]) -> by.Interval:
+def least(intervals: list[by.Interval]) -> by.Interval:
     """The least value, low end and high end of all, each by itself, as which interval is the lowest may be noise."""
-    known = [one for one in each if not math.isnan(one.value)]
-    return by.Interval(*(min(ends) for ends in zip(*known, strict=True))) if known else each[0]
+    known = [interval for interval in intervals if not math.isnan(interval.value)]
+    return by.Interval(*(min(ends) for ends in zip(*known, strict=True))) if known else intervals[0]
 
 
-def tau_words(one: by.Interval) -> str:
+def tau_words(tau: by.Interval) -> str:
     """Tau and its interval in a table."""
-    return f"tau {number(one.value, 2)} [{number(one.low, 2)}, {number(one.high, 2)}]"
+    return f"tau {number(tau.value, 2)} [{number(tau.low, 2)}, {number(tau.high, 2)}]"
 
 
 def worst_winner(data: xr.DataTree, family: str) -> by.Interval:
     """Cost of methods within `LEVEL` of the winner on tops, over the least on each body: the most of all targets."""
-    each = [by.transferred(data, family, target, best=name)
+    ratios = [by.transferred(data, family, target, best=name)
             for target in ASKED for name in by.cheapest(data, SYMMETRIC, target)]  # fmt: skip
-    return max((one for one in each if not math.isnan(one.value)), key=lambda one: one.value,
+    return max((ratio for ratio in ratios if not math.isnan(ratio.value)), key=lambda ratio: ratio.value,
                default=by.Interval(*(math.nan,) * 3))  # fmt: skip
 
 
@@ -89,16 +89,16 @@ class PooledFactors(NamedTuple):
     @property
     def verdict(self) -> str:
         """The verdict on the upper end; "in part" at best where so many exceed the budget that this is not known."""
-        told = by.factor_verdict(self.most)
-        return by.worst((told, by.PARTLY)) if self.beyond > (1.0 - MOST_OF) * self.asked else told
+        word = by.factor_verdict(self.most)
+        return by.worst((word, by.PARTLY)) if self.beyond > (1.0 - MOST_OF) * self.asked else word
 
 
-def pooled(each: list[dict[str, float]]) -> PooledFactors:
+def pooled(groups: list[dict[str, float]]) -> PooledFactors:
     """Factors of all methods and targets together."""
-    values = np.array([value for one in each for value in one.values()])
-    within = values[np.isfinite(values)]
-    ends = (float(np.median(within)), float(np.quantile(within, MOST_OF))) if within.size else (math.nan, math.nan)
-    return PooledFactors(*ends, values.size - within.size, values.size)
+    values = np.array([value for factors in groups for value in factors.values()])
+    finite = values[np.isfinite(values)]
+    ends = (float(np.median(finite)), float(np.quantile(finite, MOST_OF))) if finite.size else (math.nan, math.nan)
+    return PooledFactors(*ends, values.size - finite.size, values.size)
 
 
 def steps(data: xr.DataTree, family: str, span: str = "short") -> PooledFactors:
@@ -148,9 +148,9 @@ def over(share: float, before: float) -> float:
 
 def silent_words(data: xr.DataTree, family: str) -> str:
     """Shares of wrong runs that keep energy and momenta, in a table."""
-    mean, tops = (percent(silent_share(data, one), 1) for one in (family, SYMMETRIC))
-    low, most, four = silent_orders(data, family)
-    span = f"{100.0 * low:.0f} to {percent(most)}"
+    mean, tops = (percent(silent_share(data, kind), 1) for kind in (family, SYMMETRIC))
+    low, high, four = silent_orders(data, family)
+    span = f"{100.0 * low:.0f} to {percent(high)}"
     return f"{mean} of runs, {tops} of tops' (order 2: {span}, from order 4 on at most {percent(four, 1)})"
 
 
@@ -158,7 +158,7 @@ def exponent_gaps(data: xr.DataTree, family: str) -> dict[str, float]:
     """By method and quantity the difference of an exponent of growth from that at epsilon = 0, where both are known."""
     exponents = by.exponents(data)
     gaps = {f"{name}, {quantity}": abs(value - exponents[name, SYMMETRIC, quantity])
-            for (name, one, quantity), value in exponents.items() if one == family}  # fmt: skip
+            for (name, kind, quantity), value in exponents.items() if kind == family}  # fmt: skip
     return {name: gap for name, gap in gaps.items() if not math.isnan(gap)}
 
 
@@ -178,8 +178,8 @@ def order_gap(data: xr.DataTree, family: str, claimed: bool = False) -> tuple[fl
 
     With `claimed`, below the declared order, or below the one at epsilon = 0 where that is lower.
     """
-    gaps = [(min(first, (integrator(name).order or math.inf) if claimed else math.inf) - one, name)
-            for name, kind, one, first in by.orders(data) if kind == family]  # fmt: skip
+    gaps = [(min(base, (integrator(name).order or math.inf) if claimed else math.inf) - order, name)
+            for name, kind, order, base in by.orders(data) if kind == family]  # fmt: skip
     return max((gap for gap in gaps if not math.isnan(gap[0])), default=(math.nan, ""))
 
 
@@ -221,23 +221,23 @@ def engine_cell(data: xr.DataTree, family: str) -> tuple[str, str]:
         *(by.factor_verdict(over(share, before), SEVERAL) for share, before in lost),
     ]
     shares = f"{percent(lost[0][0], 0)}, {percent(lost[0][1], 0)} of tops"
-    return f"{tau_words(min(taus, key=lambda one: one.value))}; lost at once {shares}", by.worst(verdicts)
+    return f"{tau_words(min(taus, key=lambda tau: tau.value))}; lost at once {shares}", by.worst(verdicts)
 
 
 def cells(data: xr.DataTree, family: str) -> dict[str, tuple[str, str]]:
     """By row of the table the number of a family and its verdict; no number where nothing was measured."""
     tau, best = worst_tau(data, family), worst_winner(data, family)
-    taken, own = steps(data, family), own_steps(data, family)
+    ratios, own_ratios = steps(data, family), own_steps(data, family)
     share, before = silent_share(data, family), silent_share(data, SYMMETRIC)
     order, first = max(order_gap(data, family, claimed=True)[0], 0.0), first_steps(data, family)
     lost = f", {first.count(math.inf)} of {len(first)} cases over budget" * (math.inf in first)
-    but = f"; without needles {own_steps(data, family, NEEDLE).words}" if family == FREE else ""
+    needles = f"; without needles {own_steps(data, family, NEEDLE).words}" if family == FREE else ""
     own_tau = least([by.own_tau(data, family, target) for target in ASKED])
     return {
         "ranking": (tau_words(tau), by.ranking_verdict(tau)),
         "own ranking": (f"tau {number(own_tau.value, 2)}", by.ranking_verdict(own_tau)),
         "winner": (f"cost up to {at_most(best.value, 3)} times the best", by.factor_verdict(best.value)),
-        "steps": (taken.words, taken.verdict), "own": (own.words + but, own.verdict),
+        "steps": (ratios.words, ratios.verdict), "own": (own_ratios.words + needles, own_ratios.verdict),
         "first": (f"up to {at_most(most_within(first), 3)} times{lost}" + ", without needles" * (family == FREE),
                   by.factor_verdict(max(first, default=math.nan))),
         "silent": (silent_words(data, family), by.factor_verdict(over(share, before), SEVERAL)),
@@ -263,8 +263,8 @@ LINES = {
 
 def carry(data: xr.DataTree) -> pd.DataFrame:
     """The main table: a row for each verdict, a column for each kind of body, with number and verdict in a cell."""
-    each = {family: cells(data, family) for family in SHOWN}
-    rows = [{ANSWER: text} | {words(family): sentence(*each[family][line]) for family in SHOWN}
+    by_family = {family: cells(data, family) for family in SHOWN}
+    rows = [{ANSWER: text} | {words(family): sentence(*by_family[family][line]) for family in SHOWN}
             for line, text in LINES.items()]  # fmt: skip
     prices = np.array([*by.price_factors(data).values()])
     if prices.size:
@@ -278,11 +278,11 @@ def short(data: xr.DataTree) -> pd.DataFrame:
     """The table of the front page: ranking, steps, and wrong runs that keep energy and momenta."""
     columns: dict[str, list[str]] = {ANSWER: ["ranking by cost", "safe steps", "wrong, energy and momenta kept"]}
     for family in ("0.3", FREE):
-        tau, taken = worst_tau(data, family), own_steps(data, family)
-        share, before = (silent_share(data, one) for one in (family, SYMMETRIC))
-        times = f"median {number(taken.middle, 3)} times, {taken.beyond} of {taken.asked} cases over budget"
+        tau, ratios = worst_tau(data, family), own_steps(data, family)
+        share, before = (silent_share(data, kind) for kind in (family, SYMMETRIC))
+        times = f"median {number(ratios.middle, 3)} times, {ratios.beyond} of {ratios.asked} cases over budget"
         columns[words(family)] = [
-            sentence(f"tau {number(tau.value, 2)}", by.ranking_verdict(tau)), sentence(times, taken.verdict),
+            sentence(f"tau {number(tau.value, 2)}", by.ranking_verdict(tau)), sentence(times, ratios.verdict),
             sentence(f"{percent(share, 1)} of runs, {percent(before, 1)} on tops",
                      by.factor_verdict(over(share, before), SEVERAL)),
         ]  # fmt: skip
@@ -300,7 +300,7 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     A number of a family has its `key` in its name; the page quotes some of them.
     """
     about = data["bodies"].to_dataset().isel(variant=0).sel(scene="short")
-    answers: dict[str, Any] = dict.fromkeys(IN_PART) | {
+    values: dict[str, Any] = dict.fromkeys(IN_PART) | {
         "bodies": data["short"].sizes["member"], "methods": data["short"].sizes["variant"],
         "long_bodies": data["long"].sizes["member"] if "long" in data.children else None,
         "long_methods": data["long"].sizes["variant"] if "long" in data.children else None,
@@ -314,46 +314,45 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     }  # fmt: skip
     for family in ("0.1", "0.3"):
         growth = about["growth"].sel(family=family).dropna("member").values
-        answers[f"chaos_{key(family)}"] = float((growth > by.CHAOS).mean()) if growth.size else None
+        values[f"chaos_{key(family)}"] = float((growth > by.CHAOS).mean()) if growth.size else None
     known = {label(str(name)) for name in data["short"]["variant"].values}
-    tried = [code(name) for name in FIRST_TRIED if name in known]
-    answers["first_tried"] = listed(tried) if tried else None
+    names = [code(name) for name in FIRST_TRIED if name in known]
+    values["first_tried"] = listed(names) if names else None
     for family in OTHERS:
-        answers |= _of_family(data, family)
-    answers["silent_0"] = silent_share(data, SYMMETRIC)
+        values |= _family_facts(data, family)
+    values["silent_0"] = silent_share(data, SYMMETRIC)
     prices = np.array([*by.price_factors(data).values()])
     if prices.size:
-        answers |= {"price": float(np.median(prices)), "price_high": prices.max()}
+        values |= {"price": float(np.median(prices)), "price_high": prices.max()}
     taus = [by.own_tau(data, SYMMETRIC, target).value for target in ASKED]
-    answers |= {"own_tau_low": min(taus), "own_tau_high": max(taus)}
+    values |= {"own_tau_low": min(taus), "own_tau_high": max(taus)}
     heavy = [worst_tau(data, family).value for family in OTHERS if family not in (CHAOTIC, FREE)]
-    answers["heavy_tau"] = min(heavy, default=None)
-    each = [by.tau(data, family, target) for family in OTHERS for target in ASKED]
-    known = [one for one in each if math.isfinite(one.value) and math.isfinite(one.low)]
-    answers |= {"taus": len(known), "outside": sum(not one.low <= one.value <= one.high for one in known)}
-    answers["checked"] = CHECKED
-    answers |= dict(zip(("silent_3_low", "silent_3_most", "silent_3_four"), silent_orders(data, "0.3"), strict=True))
+    values["heavy_tau"] = min(heavy, default=None)
+    intervals = [by.tau(data, family, target) for family in OTHERS for target in ASKED]
+    known = [tau for tau in intervals if math.isfinite(tau.value) and math.isfinite(tau.low)]
+    values |= {"taus": len(known), "outside": sum(not tau.low <= tau.value <= tau.high for tau in known)}
+    values["checked"] = CHECKED
+    values |= dict(zip(("silent_3_low", "silent_3_most", "silent_3_four"), silent_orders(data, "0.3"), strict=True))
     if "growth" in data.children:
         judged = data["growth"]["judged"].isel(scene=0)
-        answers |= {f"growth_{key(family)}_judged": float(judged.sel(family=family).min()) for family in ("0.1", "0.3")}
+        values |= {f"growth_{key(family)}_judged": float(judged.sel(family=family).min()) for family in ("0.1", "0.3")}
     if "engines" in data.children:
-        answers |= {f"lost_{key(family)}": by.lost(data, family, 0) for family in (SYMMETRIC, "0.3")}
-        answers |= {"engines": data["engines"].sizes["variant"], "engine_steps": float(data["engines"]["steps"][0])}
+        values |= {f"lost_{key(family)}": by.lost(data, family, 0) for family in (SYMMETRIC, "0.3")}
+        values |= {"engines": data["engines"].sizes["variant"], "engine_steps": float(data["engines"]["steps"][0])}
     if "steady" in data.children:
-        answers["grid"] = float(data["steady"]["grid"].max())
+        values["grid"] = float(data["steady"]["grid"].max())
     return {
-        name: None if isinstance(value, float) and not math.isfinite(value) else value
-        for name, value in answers.items()
+        name: None if isinstance(value, float) and not math.isfinite(value) else value for name, value in values.items()
     }
 
 
-def _of_family(data: xr.DataTree, family: str) -> dict[str, Any]:
+def _family_facts(data: xr.DataTree, family: str) -> dict[str, Any]:
     place, order = key(family), order_gap(data, family)
     within, known = exponents_within(data, family)
-    taken = steps(data, family)
-    answers: dict[str, Any] = dict.fromkeys(name.format(place) for name in OF_FAMILY_IN_PART) | {
-        f"tau_{place}": worst_tau(data, family).value, f"steps_{place}_high": taken.most,
-        f"steps_{place}_beyond": taken.beyond, f"steps_{place}_asked": taken.asked,
+    ratios = steps(data, family)
+    values: dict[str, Any] = dict.fromkeys(name.format(place) for name in OF_FAMILY_IN_PART) | {
+        f"tau_{place}": worst_tau(data, family).value, f"steps_{place}_high": ratios.most,
+        f"steps_{place}_beyond": ratios.beyond, f"steps_{place}_asked": ratios.asked,
         f"first_{place}": most_within(first_steps(data, family)), f"silent_{place}": silent_share(data, family),
         f"growth_{place}_of": exponent_gap(data, family)[1] or None,
         f"growth_{place}_within": within, f"growth_{place}_told": known,
@@ -362,15 +361,15 @@ def _of_family(data: xr.DataTree, family: str) -> dict[str, Any]:
     ratio = by.limit_factors(data, family)
     if ratio.size:
         least = np.nanquantile(ratio, 1.0 - MOST_OF, axis=1)
-        answers[f"limit_{place}_low"], answers[f"limit_{place}_least"] = limit_ends(data, family)[0], float(least.min())
-        answers[f"limit_{place}_of"] = label(str(data["steady"]["variant"].values[int(np.argmin(least))]))
-    for name, kind, seen, first in by.orders(data) if order[1] else ():
+        values[f"limit_{place}_low"], values[f"limit_{place}_least"] = limit_ends(data, family)[0], float(least.min())
+        values[f"limit_{place}_of"] = label(str(data["steady"]["variant"].values[int(np.argmin(least))]))
+    for name, kind, measured, base in by.orders(data) if order[1] else ():
         if (name, kind) == (order[1], family):
-            answers |= {f"order_{place}_seen": seen, f"order_{place}_top": first}
-            answers[f"order_{place}_declared"] = integrator(name).order
+            values |= {f"order_{place}_seen": measured, f"order_{place}_top": base}
+            values[f"order_{place}_declared"] = integrator(name).order
     if "long" in data.children:
-        answers[f"long_tau_{place}"], answers[f"long_of_{place}"] = long_tau(data, family)
-    return answers
+        values[f"long_tau_{place}"], values[f"long_of_{place}"] = long_tau(data, family)
+    return values
 
 
 def key(family: str) -> str:
@@ -393,14 +392,14 @@ def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
 def rankings(data: xr.DataTree) -> pd.DataFrame:
     """Tau by family, target and quantity, with the ceiling (`comparison.ceiling`), also for the long runs."""
     rows = []
-    for span in [one for one in by.SPANS if one in data.children]:
+    for span in [span for span in by.SPANS if span in data.children]:
         for quantity in ("axis", "attitude"):
             for target in ASKED:
                 top = by.ceiling(data, target, quantity, span)
                 for family in OTHERS:
-                    one = by.tau(data, family, target, quantity, span)
-                    asked = by.judged_bodies(by.costs(data, family, target, quantity, span)).size
-                    rows.append([span, quantity, target, words(family), asked, *one, top.value, top.low,
+                    tau = by.tau(data, family, target, quantity, span)
+                    count = by.judged_bodies(by.costs(data, family, target, quantity, span)).size
+                    rows.append([span, quantity, target, words(family), count, *tau, top.value, top.low,
                                  by.own_tau(data, family, target).value if (span, quantity) == ("short", "axis")
                                  else math.nan])  # fmt: skip
     header = ["runs", "quantity", "error", "bodies", "asked", "tau", "low", "high", "ceiling", "ceiling low",
@@ -415,9 +414,9 @@ def winners(data: xr.DataTree) -> pd.DataFrame:
         for target in ASKED:
             for family in FAMILIES:
                 best, ratio = by.winner(data, family, target, needs), by.transferred(data, family, target, needs)
-                choices = [one for name, one in by.safest(data, family, target).items()
-                           if needs in (integrator(name).needs, ANY) and np.isfinite(one.seconds)]  # fmt: skip
-                safest = min(choices, key=lambda one: one.seconds, default=None)
+                choices = [choice for name, choice in by.safest(data, family, target).items()
+                           if needs in (integrator(name).needs, ANY) and np.isfinite(choice.seconds)]  # fmt: skip
+                safest = min(choices, key=lambda choice: choice.seconds, default=None)
                 rows.append([NEEDS.get(needs, needs), target, words(family), label(best) if best else "",
                              label(safest.name) if safest else "", safest.setting if safest else math.nan,
                              duration(safest.seconds) if safest else "", ratio.value, ratio.high])  # fmt: skip
@@ -430,11 +429,11 @@ def step_table(data: xr.DataTree) -> pd.DataFrame:
     """Safe steps a natural period by method and target, and the factors of families."""
     rows = []
     for target in ASKED:
-        before, own = by.safest(data, SYMMETRIC, target), by.own_factors(data, SYMMETRIC, target)
-        each = {family: by.step_factors(data, family, target) for family in OTHERS}
+        before, ratios = by.safest(data, SYMMETRIC, target), by.own_factors(data, SYMMETRIC, target)
+        by_family = {family: by.step_factors(data, family, target) for family in OTHERS}
         rows += [
-            [label(name), target, before[name].setting, own.get(name, math.nan),
-             *(each[family][name] for family in OTHERS)]
+            [label(name), target, before[name].setting, ratios.get(name, math.nan),
+             *(by_family[family][name] for family in OTHERS)]
             for name in by.fixed_steps(data) if np.isfinite(before[name].setting)
         ]  # fmt: skip
     header = ["method", "error", "steps at epsilon 0", "over those in the top's chart", *map(words, OTHERS)]
@@ -479,17 +478,17 @@ def limit_table(data: xr.DataTree) -> pd.DataFrame:
         "linear limit, h omega": lambda values: np.nanmedian(np.nan_to_num(values, nan=MOST), axis=1),
         "share of steps that resonate": lambda values: np.nanmean(values, axis=1),
     }
-    for (title, of), name in zip(measures.items(), ("limit", "grown"), strict=True):
-        each = {family: by.steady(data, name, family) for family in FAMILIES}
+    for (title, average), name in zip(measures.items(), ("limit", "grown"), strict=True):
+        tables = {family: by.steady(data, name, family) for family in FAMILIES}
         names = map(label, map(str, data["steady"]["variant"].values)) if "steady" in data.children else []
-        columns = {words(family): of(values) for family, values in each.items() if values.size}
-        rows += [{"measured": title, "method": one} | {name: column[k] for name, column in columns.items()}
-                 for k, one in enumerate(names)]  # fmt: skip
+        columns = {words(family): average(values) for family, values in tables.items() if values.size}
+        rows += [{"measured": title, "method": method} | {name: column[k] for name, column in columns.items()}
+                 for k, method in enumerate(names)]  # fmt: skip
     for place, level in enumerate(LEVELS) if "engines" in data.children else ():
         for name, title in (("error", "median error of the axis, rad"), ("lost", "share lost in the first period")):
-            each = {family: by.engine_errors(data, family, place, name) for family in FAMILIES}
-            for k, one in enumerate(each[SYMMETRIC].names):
-                line = {"measured": f"{title}, {number(FIRST * 2**level, 2)} steps a period", "method": label(one)}
+            tables = {family: by.engine_errors(data, family, place, name) for family in FAMILIES}
+            for k, method in enumerate(tables[SYMMETRIC].names):
+                line = {"measured": f"{title}, {number(FIRST * 2**level, 2)} steps a period", "method": label(method)}
                 middle = np.nanmedian if name == "error" else np.nanmean
-                rows.append(line | {words(family): float(middle(costs.values[k])) for family, costs in each.items()})
+                rows.append(line | {words(family): float(middle(costs.values[k])) for family, costs in tables.items()})
     return pd.DataFrame(rows)

@@ -35,15 +35,15 @@ def draw_rankings(data: xr.DataTree) -> Any:
     """Tau of each family and target with its interval, and the ceiling as a band."""
     figure, ((axis,),) = style.panels(1, 1, height=2.9)
     for k, (target, color, mark) in enumerate(zip(ASKED, COLORS, MARKS, strict=True)):
-        each, places = [by.tau(data, family, target) for family in OTHERS], np.arange(len(FAMILIES)) + 0.18 * (k - 1)
-        middle, low, high = (np.array([getattr(one, name) for one in each]) for name in ("value", "low", "high"))
+        taus, places = [by.tau(data, family, target) for family in OTHERS], np.arange(len(FAMILIES)) + 0.18 * (k - 1)
+        middle, low, high = (np.array([getattr(tau, name) for tau in taus]) for name in ("value", "low", "high"))
         axis.vlines(places[1:], low, high, color=color, lw=1.6)
         shape: dict[str, Any] = {"ls": "none", "marker": mark, "ms": 5, "color": color}
         axis.plot(places[1:], middle, **shape, label=f"axis to 1e-{decades(target)} rad")
-        own = [by.own_tau(data, family, target).value for family in FAMILIES]
-        axis.plot(places, own, **shape, mfc="white")
+        own_taus = [by.own_tau(data, family, target).value for family in FAMILIES]
+        axis.plot(places, own_taus, **shape, mfc="white")
     tops = [by.ceiling(data, target) for target in ASKED]
-    low, high = min(one.low for one in tops), max(one.high for one in tops)
+    low, high = min(ceiling.low for ceiling in tops), max(ceiling.high for ceiling in tops)
     axis.axhspan(low, high, color=style.GREY, alpha=0.25, lw=0, label="between halves of the tops")
     axis.plot(
         [], [], ls="none", marker="o", mfc="white", color=style.GREY, label="open: ranked by the top's own kernels"
@@ -61,9 +61,9 @@ def draw_steps(data: xr.DataTree) -> Any:
     for k, (target, color) in enumerate(zip(ASKED, COLORS, strict=True)):
         for place, family in enumerate(OTHERS):
             values = np.array([*by.step_factors(data, family, target).values()])
-            at = place + 0.25 * (k - 1) + shift.uniform(-0.08, 0.08, values.size)
-            named = {"label": f"axis to 1e-{decades(target)} rad"} if place == 0 else {}
-            axis.plot(at, values, ls="none", marker=MARKS[k], ms=3, alpha=0.6, color=color, **named)
+            x = place + 0.25 * (k - 1) + shift.uniform(-0.08, 0.08, values.size)
+            options = {"label": f"axis to 1e-{decades(target)} rad"} if place == 0 else {}
+            axis.plot(x, values, ls="none", marker=MARKS[k], ms=3, alpha=0.6, color=color, **options)
             beyond = int(np.isinf(values).sum())
             if beyond:
                 axis.annotate(f"+{beyond}", (place + 0.25 * (k - 1), 1.0), xycoords=axis.get_xaxis_transform(),
@@ -86,7 +86,7 @@ def draw_steps(data: xr.DataTree) -> Any:
 def draw_silent(data: xr.DataTree) -> Any:
     """Share of runs at `STEPS` steps a period that are wrong with energy and momenta kept, a line a method."""
     figure, ((axis,),) = style.panels(1, 1, height=2.9)
-    names = [one for one in NAMED if one in by.fixed_steps(data)]
+    names = [name for name in NAMED if name in by.fixed_steps(data)]
     none = 50.0 / by.group_of(data, "short").sizes["member"]  # half a body
     for k, name in enumerate(names):  # side by side, as many methods are wrong on no body
         shares, look = [max(100.0 * by.silent(data, name, family), none) for family in FAMILIES], style.line(name)

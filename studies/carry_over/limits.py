@@ -91,13 +91,13 @@ def upright(family: str, count: int, seed: int) -> Upright:
 
 def displaced(variant: Integrator, rows: Array, h: Array, marks: NDArray[np.int64]) -> Array:
     """y at the marks of runs of rows (m, 14) by steps h (m,), (m, marks, 4); NaN after a failure."""
-    every = np.broadcast_to(marks, (len(h), marks.size)).copy()
-    states = variant.solvers[BODY].many(rows, h, every).states  # type: ignore[attr-defined]
+    all_marks = np.broadcast_to(marks, (len(h), marks.size)).copy()
+    states = variant.solvers[BODY].many(rows, h, all_marks).states  # type: ignore[attr-defined]
     with np.errstate(all="ignore"):  # a run may have blown up
         up = np.stack(vertical(*np.moveaxis(states[..., :4], -1, 0)), axis=-1)
         up = up / np.linalg.norm(up, axis=-1, keepdims=True)
-        turned = np.where(up[..., 2:] < 0.0, 2.0 * np.sign(up[..., :2]), up[..., :2])  # beyond the horizontal
-        return np.concatenate([turned, states[..., 4:6]], axis=-1)
+        tilt = np.where(up[..., 2:] < 0.0, 2.0 * np.sign(up[..., :2]), up[..., :2])  # beyond the horizontal
+        return np.concatenate([tilt, states[..., 4:6]], axis=-1)
 
 
 def radius(variant: Integrator, bodies: Upright, h: Array) -> Array:
@@ -105,8 +105,8 @@ def radius(variant: Integrator, bodies: Upright, h: Array) -> Array:
     n, k = h.shape
     momentum = bodies.moments[:, 2] * np.abs(bodies.spin) + np.sqrt(np.abs(bodies.weight) * bodies.moments[:, 0])
     size = np.stack([np.ones(n), np.ones(n), momentum, momentum], axis=1)
-    aside = NUDGE * size[:, :, np.newaxis] * np.eye(4)  # (n, displacement, 4)
-    many = np.repeat(bodies.rows(aside), k, axis=0).reshape(-1, 14)
+    shifts = NUDGE * size[:, :, np.newaxis] * np.eye(4)  # (n, displacement, 4)
+    many = np.repeat(bodies.rows(shifts), k, axis=0).reshape(-1, 14)
     ends = displaced(variant, many, np.repeat(h.ravel(), 4), np.array([1]))[:, 0].reshape(n, k, 4, 4)
     slopes = np.swapaxes(ends, -1, -2) / NUDGE  # (n, k, y', displacement)
     slopes /= size[:, np.newaxis, :, np.newaxis]
@@ -123,8 +123,8 @@ def limits(variant: Integrator, bodies: Upright, omega: Array, grid: float) -> A
     low, high = phases[np.maximum(first - 1, 0)], phases[first]
     for _ in range(BISECTIONS):
         middle = 0.5 * (low + high)
-        over = radius(variant, bodies, (middle / omega)[:, np.newaxis])[:, 0] > 1.0 + GROWING
-        low, high = np.where(over, low, middle), np.where(over, middle, high)
+        beyond = radius(variant, bodies, (middle / omega)[:, np.newaxis])[:, 0] > 1.0 + GROWING
+        low, high = np.where(beyond, low, middle), np.where(beyond, middle, high)
     return np.where(grows.any(axis=1), high, np.nan)
 
 
@@ -134,48 +134,48 @@ def reach(bodies: Upright, y: Array) -> tuple[Array, Array, NDArray[np.bool_]]:
     parts = np.linalg.solve(modes, y[..., np.newaxis].astype(complex))[..., 0]
     ways = modes[:, :2] * parts[:, np.newaxis]  # Gamma of each mode, whose real part runs round an ellipse
     squares = np.sum(np.abs(ways) ** 2, axis=1) + np.abs(np.sum(ways * ways, axis=1))  # 2 (its longer half axis)^2
-    most = np.sqrt(0.5 * squares).sum(axis=1)
+    tilt = np.sqrt(0.5 * squares).sum(axis=1)
     omega = np.abs(values.imag).max(axis=1)
-    return omega, most, np.abs(values.real).max(axis=1) < UNSTABLE * omega
+    return omega, tilt, np.abs(values.real).max(axis=1) < UNSTABLE * omega
 
 
-def grown(variant: Integrator, bodies: Upright, h: Array, y: Array, most: Array) -> NDArray[np.bool_]:
-    """Which steps h (n, k) take a tilt of y (n, 4) more than `FACTOR` times as far as `most` (n,)."""
+def grown(variant: Integrator, bodies: Upright, h: Array, y: Array, tilt: Array) -> NDArray[np.bool_]:
+    """Which steps h (n, k) take a tilt of y (n, 4) more than `FACTOR` times as far as `tilt` (n,)."""
     rows = np.repeat(bodies.rows(y[:, np.newaxis])[:, 0], h.shape[1], axis=0)
     out = displaced(variant, rows, h.ravel(), np.arange(1, STEPS + 1))
     far = np.hypot(out[..., 0], out[..., 1]).max(axis=1).reshape(h.shape)
-    return ~(far <= FACTOR * most[:, np.newaxis])
+    return ~(far <= FACTOR * tilt[:, np.newaxis])
 
 
 def steady_table(variant: Integrator, count: int, seed: int, grid: float, places: int) -> xr.Dataset:
     """Limits and shares of grown steps of a method, by family and member."""
-    found = np.full((2, len(STEADY), count), np.nan)
+    table = np.full((2, len(STEADY), count), np.nan)
     turn = 2.0 * math.pi * np.random.default_rng(seed + 1).uniform(size=count)
     y = TILT * np.stack([np.cos(turn), np.sin(turn), 0.0 * turn, 0.0 * turn], axis=1)
     for row, family in enumerate(STEADY):
         bodies = upright(family, count, seed)
-        omega, most, stable = reach(bodies, y)
+        omega, tilt, stable = reach(bodies, y)
         limit = limits(variant, bodies, omega, grid)
         h = np.where(np.isnan(limit), MOST, limit)[:, np.newaxis] * (np.arange(places) + 0.5) / places
-        share = grown(variant, bodies, h / omega[:, np.newaxis], y, most).mean(axis=1)
-        found[:, row] = np.where(stable, limit, 0.0), np.where(stable, share, np.nan)
-    over = ("family", "member")
-    data: dict[str, Any] = {"limit": (over, found[0]), "grown": (over, found[1]), "grid": ((), grid)}
+        share = grown(variant, bodies, h / omega[:, np.newaxis], y, tilt).mean(axis=1)
+        table[:, row] = np.where(stable, limit, 0.0), np.where(stable, share, np.nan)
+    dims = ("family", "member")
+    data: dict[str, Any] = {"limit": (dims, table[0]), "grown": (dims, table[1]), "grid": ((), grid)}
     return xr.Dataset(data, {"family": list(STEADY)})
 
 
-def engine_table(variant: Integrator, drawn: dict[str, Bodies]) -> xr.Dataset:
+def engine_table(variant: Integrator, families: dict[str, Bodies]) -> xr.Dataset:
     """The largest error of the axis, and whether it is above `WRONG` in the first period, by family, level, member."""
-    count = len(next(iter(drawn.values())).period)
-    found = np.full((2, len(drawn), len(LEVELS), count), np.nan)
-    for row, bodies in enumerate(drawn.values()):
+    count = len(next(iter(families.values())).period)
+    table = np.full((2, len(families), len(LEVELS), count), np.nan)
+    for row, bodies in enumerate(families.values()):
         known = np.flatnonzero(bodies.known)
         early = bodies.times[known] <= bodies.period[known, np.newaxis]
         for place, level in enumerate(LEVELS):
             run = run_level(variant, bodies, known, level, math.inf)
             error = bodies.errors_at(run.states, known)["axis"]
-            found[0, row, place, known] = error.max(axis=1)
-            found[1, row, place, known] = np.where(early, error, 0.0).max(axis=1) > WRONG
-    over = ("family", "steps", "member")
-    return xr.Dataset({"error": (over, found[0]), "lost": (over, found[1])},
-                      {"family": list(drawn), "steps": [FIRST * 2**level for level in LEVELS]})  # fmt: skip
+            table[0, row, place, known] = error.max(axis=1)
+            table[1, row, place, known] = np.where(early, error, 0.0).max(axis=1) > WRONG
+    dims = ("family", "steps", "member")
+    return xr.Dataset({"error": (dims, table[0]), "lost": (dims, table[1])},
+                      {"family": list(families), "steps": [FIRST * 2**level for level in LEVELS]})  # fmt: skip

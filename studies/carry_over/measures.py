@@ -41,18 +41,18 @@ REGULAR: dict[str, tuple[str, float | None]] = {
 FIRST_TIME = 5.0  # natural periods
 
 
-def table(variant: Integrator, drawn: dict[str, Bodies], budget: float) -> xr.Dataset:
+def table(variant: Integrator, families: dict[str, Bodies], budget: float) -> xr.Dataset:
     """One method on all families."""
-    parts = [_family(variant, bodies, budget) for bodies in drawn.values()]
-    return xr.concat(parts, dim="family").assign_coords(family=list(drawn)).assign(_traits(variant))
+    parts = [_family(variant, bodies, budget) for bodies in families.values()]
+    return xr.concat(parts, dim="family").assign_coords(family=list(families)).assign(_traits(variant))
 
 
-def own_table(variant: Integrator, drawn: dict[str, Bodies], budget: float) -> xr.Dataset:
+def own_table(variant: Integrator, families: dict[str, Bodies], budget: float) -> xr.Dataset:
     """A method in a chart of the top, on the bodies of epsilon = 0."""
-    tops = as_tops(drawn[SYMMETRIC])
-    asked = {"axis": drawn[SYMMETRIC].asked(TARGETS)["axis"] & tops.known}
-    done = climb(variant, tops, asked, budget)
-    return _costs(variant, done, asked, tops).assign(_traits(variant))
+    tops = as_tops(families[SYMMETRIC])
+    asked = {"axis": families[SYMMETRIC].asked(TARGETS)["axis"] & tops.known}
+    record = climb(variant, tops, asked, budget)
+    return _costs(variant, record, asked, tops).assign(_traits(variant))
 
 
 def _traits(variant: Integrator) -> dict[str, Any]:
@@ -60,26 +60,26 @@ def _traits(variant: Integrator) -> dict[str, Any]:
     return {name: ((), value) for name, value in numbers.items()}
 
 
-def _costs(variant: Integrator, done: Climb, asked: dict[str, Any], bodies: Any) -> xr.Dataset:
-    work = {"work": ("level", typical_work(variant, done, bodies)[:, 0])}
+def _costs(variant: Integrator, record: Climb, asked: dict[str, Any], bodies: Any) -> xr.Dataset:
+    work = {"work": ("level", typical_work(variant, record, bodies)[:, 0])}
     coords = {"quantity": list(asked), "target": list(TARGETS)}
-    return xr.Dataset(costs_of(variant, done, asked, list(asked)) | work, coords)
+    return xr.Dataset(costs_of(variant, record, asked, list(asked)) | work, coords)
 
 
 def _family(variant: Integrator, bodies: Bodies, budget: float) -> xr.Dataset:
     asked = bodies.asked(TARGETS)
-    done = climb(variant, bodies, asked, budget, run_level)
-    status = verdicts(done)[list(STATUS)].astype(np.float32)
-    order = observed_order(done.errors["attitude"]) if variant.fixed_step else np.nan
-    return _costs(variant, done, asked, bodies).assign(status=(("kept", "member"), status), order=((), order))
+    record = climb(variant, bodies, asked, budget, run_level)
+    status = verdicts(record)[list(STATUS)].astype(np.float32)
+    order = observed_order(record.errors["attitude"]) if variant.fixed_step else np.nan
+    return _costs(variant, record, asked, bodies).assign(status=(("kept", "member"), status), order=((), order))
 
 
-def verdicts(done: Climb) -> Array:
+def verdicts(record: Climb) -> Array:
     """The status of each member at each level, (LEVELS, n); one that left the ladder with an accurate run is right."""
-    ran, error = np.isfinite(done.work), done.errors["axis"]
-    kept = done.ended & (done.errors["energy"] <= KEPT) & (done.errors[MOMENTA] <= KEPT)
+    ran, error = np.isfinite(record.work), record.errors["axis"]
+    kept = record.ended & (record.errors["energy"] <= KEPT) & (record.errors[MOMENTA] <= KEPT)
     status = np.where(error <= WRONG, 1.0, np.where(kept, 3.0, 2.0))
-    return np.where(ran, status, np.where(done.settled, 1.0, 0.0))
+    return np.where(ran, status, np.where(record.settled, 1.0, 0.0))
 
 
 def observed_order(errors: Array) -> float:
@@ -90,8 +90,8 @@ def observed_order(errors: Array) -> float:
         steep = np.log2(errors[:-1] / errors[1:])
     both = inside[:-1] & inside[1:]
     last = both.shape[0] - 1 - np.argmax(both[::-1], axis=0)
-    found = both.any(axis=0)
-    return float(np.median(steep[last, np.arange(errors.shape[1])][found])) if found.any() else float("nan")
+    known = both.any(axis=0)
+    return float(np.median(steep[last, np.arange(errors.shape[1])][known])) if known.any() else float("nan")
 
 
 def growth_table(variant: Integrator, count: int, doublings: int, seed: int) -> xr.Dataset:
@@ -100,13 +100,13 @@ def growth_table(variant: Integrator, count: int, doublings: int, seed: int) -> 
     Only bodies whose reference can judge the finest target up to the last time count: for others, many of which turn
     chaotic, the difference may be the error of the reference.
     """
-    at = FIRST_TIME * 2.0 ** np.arange(doublings)
+    times = FIRST_TIME * 2.0 ** np.arange(doublings)
     steps = GROWN[variant.method]
     medians, judged = np.full((2, len(REGULAR), doublings), np.nan), np.zeros(len(REGULAR))
     for row, (kind, epsilon) in enumerate(REGULAR.values()):
         scenes = scenes_of(body_population(count, seed=seed, kind=kind, epsilon=epsilon))
-        bodies = Bodies(scenes, [kind] * count, float(at[-1]))
-        fine = at[:, np.newaxis] * np.linspace(0.55, 1.0, 10)  # the largest error of the last half of each time
+        bodies = Bodies(scenes, [kind] * count, float(times[-1]))
+        fine = times[:, np.newaxis] * np.linspace(0.55, 1.0, 10)  # the largest error of the last half of each time
         marks = np.unique(np.rint(fine.ravel() * steps).astype(np.int64))
         bodies.marks, bodies.times = marks, marks * (bodies.period / steps)[:, np.newaxis]
         known = np.flatnonzero(bodies.truth[1] <= CLEAR * min(ASKED))
@@ -114,7 +114,7 @@ def growth_table(variant: Integrator, count: int, doublings: int, seed: int) -> 
         if not known.size:
             continue
         errors = bodies.errors_at(run_steps(variant, bodies, known, float(steps), marks).states, known)
-        for k, time in enumerate(at):
+        for k, time in enumerate(times):
             near = (marks <= np.rint(time * steps)) & (marks > 0.5 * time * steps)
             for place, name in enumerate(("attitude", "energy")):
                 medians[place, row, k] = np.median(grain(errors[name][:, near].max(axis=1)))
@@ -122,28 +122,28 @@ def growth_table(variant: Integrator, count: int, doublings: int, seed: int) -> 
         f"error_{name}": (("family", "time"), medians[k]) for k, name in enumerate(("attitude", "energy"))
     }
     data["judged"] = "family", judged
-    return xr.Dataset(data, {"family": list(REGULAR), "time": at}).assign(_traits(variant))
+    return xr.Dataset(data, {"family": list(REGULAR), "time": times}).assign(_traits(variant))
 
 
-def about(drawn: dict[str, Bodies], *, long: bool) -> xr.Dataset:
+def about(families: dict[str, Bodies], *, long: bool) -> xr.Dataset:
     """Of each family: growth of a disturbance over ten periods, error bounds of the references, a check of these."""
-    n = len(next(iter(drawn.values())).period)
-    grown, bounds = np.full((len(drawn), n), np.nan), np.full((len(drawn), n), np.nan)
-    strata, gap, known = np.full((len(drawn), n), "", dtype="U16"), np.full(len(drawn), np.nan), []
-    for row, bodies in enumerate(drawn.values()):
+    n = len(next(iter(families.values())).period)
+    grown, bounds = np.full((len(families), n), np.nan), np.full((len(families), n), np.nan)
+    strata, gap, known = np.full((len(families), n), "", dtype="U16"), np.full(len(families), np.nan), []
+    for row, bodies in enumerate(families.values()):
         strata[row], bounds[row] = bodies.strata, bodies.truth[1]
         if not long and not bodies.scenes[0].top.free:
-            grown[row] = growth(np.array([one.top.flat(one.start) for one in bodies.scenes]))
+            grown[row] = growth(np.array([scene.top.flat(scene.start) for scene in bodies.scenes]))
         chosen = [k for k in range(min(CHECKED, n)) if not bodies.scenes[k].top.free and bodies.known[k]]
-        off = [_checked(bodies, k) for k in chosen] if have_heyoka() else []
-        gap[row] = max(off, default=np.nan)
+        ratios = [_checked(bodies, k) for k in chosen] if have_heyoka() else []
+        gap[row] = max(ratios, default=np.nan)
         known.append(float(bodies.asked(TARGETS)["axis"][2].mean()))
-    over = ("family", "member")
+    dims = ("family", "member")
     data: dict[str, Any] = {
-        "growth": (over, grown), "truth_bound": (over, bounds), "stratum": (over, strata),
+        "growth": (dims, grown), "truth_bound": (dims, bounds), "stratum": (dims, strata),
         "off_bound": ("family", gap), "judged": ("family", known),
     }  # fmt: skip
-    return xr.Dataset(data, {"family": list(drawn)})
+    return xr.Dataset(data, {"family": list(families)})
 
 
 def _checked(bodies: Bodies, k: int) -> float:
@@ -151,6 +151,6 @@ def _checked(bodies: Bodies, k: int) -> float:
     body, start = bodies.scenes[k].top, bodies.scenes[k].start
     motion = HeavyBody(body.moments, body.torque, start.quaternion, body.momentum(start), body.momentum_lo(start))
     exact = motion.samples(bodies.times[k])  # NaN from where it is not known
-    there = np.isfinite(exact.bound)
-    gap = attitude_distance(bodies.truth[0][k][there], unit(exact.quaternion[there]))
-    return float((gap / (bodies.truth[1][k] + exact.bound[there])).max(initial=0.0))
+    known = np.isfinite(exact.bound)
+    gap = attitude_distance(bodies.truth[0][k][known], unit(exact.quaternion[known]))
+    return float((gap / (bodies.truth[1][k] + exact.bound[known])).max(initial=0.0))

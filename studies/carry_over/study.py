@@ -86,36 +86,36 @@ QUICK: dict[str, dict[str, Any]] = {
 def of_bodies() -> list[Integrator]:
     """The compiled methods with a step or a tolerance in the chart `body`, in that chart alone."""
     return [
-        integrator(f"{name}[{BODY}]") for name, one in methods().items()
-        if BODY in one.solvers and one.implementation == "compiled" and one.control and name not in LEFT_OUT
+        integrator(f"{name}[{BODY}]") for name, method in methods().items()
+        if BODY in method.solvers and method.implementation == "compiled" and method.control and name not in LEFT_OUT
     ]  # fmt: skip
 
 
 def of_tops() -> list[Integrator]:
     """The same methods in their smallest chart that shows the axis of a top."""
-    rows = [integrator(one.method) for one in of_bodies()]
-    return [one.variant(one.chart_for("axis")) for one in rows if one.charts()]
+    rows = [integrator(variant.method) for variant in of_bodies()]
+    return [row.variant(row.chart_for("axis")) for row in rows if row.charts()]
 
 
 def of_engines() -> list[str]:
     """The maps of engines that step a body without symmetry."""
-    return [name for name, one in engines().items() if BODY in one.solvers]
+    return [name for name, engine in engines().items() if BODY in engine.solvers]
 
 
 def grid(*, quick: bool = False) -> list[Case]:
     """Every method on all bodies over ten periods, on the tops; growth; steady bodies; engines; prices; bodies."""
-    asked, bodies, tops = QUICK if quick else FULL, of_bodies(), of_tops()
+    settings, bodies, tops = QUICK if quick else FULL, of_bodies(), of_tops()
     timing = {
-        "integrators": [one.name for one in (*bodies, *tops)], "rounds": 1 if quick else 4,
+        "integrators": [variant.name for variant in (*bodies, *tops)], "rounds": 1 if quick else 4,
         "batch": 0.0002 if quick else 0.002,
     }  # fmt: skip
     return [
-        *(Case("bodies", one.name, asked[SHORT], group=SHORT) for one in bodies),
-        *(Case("tops", one.name, asked[SHORT], group=OWN) for one in tops),
-        *(Case(span, "exact", asked[span], group=BODIES) for span in (SHORT, LONG)),
-        *(Case("regular", f"{name}[{BODY}]", asked[GROWTH], group=GROWTH) for name in GROWN),
-        *(Case("upright", f"{name}[{BODY}]", asked[STEADY], group=STEADY) for name in GROWN),
-        *(Case("bodies", f"{name}[{BODY}]", asked[ENGINES], group=ENGINES) for name in of_engines()),
+        *(Case("bodies", variant.name, settings[SHORT], group=SHORT) for variant in bodies),
+        *(Case("tops", variant.name, settings[SHORT], group=OWN) for variant in tops),
+        *(Case(span, "exact", settings[span], group=BODIES) for span in (SHORT, LONG)),
+        *(Case("regular", f"{name}[{BODY}]", settings[GROWTH], group=GROWTH) for name in GROWN),
+        *(Case("upright", f"{name}[{BODY}]", settings[STEADY], group=STEADY) for name in GROWN),
+        *(Case("bodies", f"{name}[{BODY}]", settings[ENGINES], group=ENGINES) for name in of_engines()),
         *(Case(f"{BATCHES[0]}-{k}", "together", timing, timed=True, group=PRICES)
           for k in range(1 if quick else PROCESSES)),
     ]  # fmt: skip
@@ -123,26 +123,26 @@ def grid(*, quick: bool = False) -> list[Case]:
 
 def follow_up(data: xr.DataTree) -> list[Case]:
     """The long runs of the methods whose cost is near the least of their class."""
-    asked = FULL if data[SHORT].sizes["member"] >= FULL[SHORT]["count"] else QUICK
-    return [Case("bodies", name, asked[LONG], group=LONG) for name in comparison.contenders(data)]
+    settings = FULL if data[SHORT].sizes["member"] >= FULL[SHORT]["count"] else QUICK
+    return [Case("bodies", name, settings[LONG], group=LONG) for name in comparison.contenders(data)]
 
 
 def measure(case: Case) -> xr.Dataset:
     """The table of a method on bodies or tops, growth, limits, engines, prices, or facts about bodies."""
-    asked = case.settings
+    settings = case.settings
     if case.group == PRICES:
-        return measured(asked["integrators"], asked["rounds"], asked["batch"])
+        return measured(settings["integrators"], settings["rounds"], settings["batch"])
     if case.group == GROWTH:
-        return growth_table(integrator(case.integrator), asked["count"], asked["doublings"], asked["seed"])
+        return growth_table(integrator(case.integrator), settings["count"], settings["doublings"], settings["seed"])
     if case.group == STEADY:
-        return steady_table(integrator(case.integrator), **asked)
-    drawn = {name: bodies_of(name, asked["count"], asked["seed"], asked["periods"]) for name in FAMILIES}
+        return steady_table(integrator(case.integrator), **settings)
+    families = {name: bodies_of(name, settings["count"], settings["seed"], settings["periods"]) for name in FAMILIES}
     if case.group == BODIES:
-        return about(drawn, long=case.scene == LONG).assign(periods=asked["periods"])
+        return about(families, long=case.scene == LONG).assign(periods=settings["periods"])
     if case.group == ENGINES:
-        return engine_table(integrator(case.integrator), drawn)
-    of = own_table if case.group == OWN else table
-    return of(integrator(case.integrator), drawn, asked["budget"])
+        return engine_table(integrator(case.integrator), families)
+    make = own_table if case.group == OWN else table
+    return make(integrator(case.integrator), families, settings["budget"])
 
 
 STUDY = Study(

@@ -49,9 +49,9 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     """How many claims have each verdict, how many planted false claims are refuted, and the steps of the long runs."""
     data, false = parts(data)
     refuted = caught(false)
-    every = ledger(data)
-    unsaid = (every["declared"] == "") & (every["verdict"] == "undecided")  # nothing is declared there
-    entries, bodies = by_kind(every[~unsaid])
+    table = ledger(data)
+    unsaid = (table["declared"] == "") & (table["verdict"] == "undecided")  # nothing is declared there
+    entries, bodies = by_kind(table[~unsaid])
     count, on_body = Counter(entries["verdict"]), Counter(bodies["verdict"])
     steps = data["steps_run"].sel(scene=SCENE).to_series()
     steps = steps[steps > 0].astype(int)
@@ -71,7 +71,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "open_claim": open_claim,  # that most of the undecided findings are on
         "open_most": open_most,
         "open_why": open_why,  # the reason that most of these have
-        "unsaid": len(by_kind(every[unsaid])[0]),  # undecided findings on what is not declared
+        "unsaid": len(by_kind(table[unsaid])[0]),  # undecided findings on what is not declared
         "runs": len(steps) or None,
         "usual": usual,  # steps of a long run
         "usual_runs": usual_runs,
@@ -86,5 +86,5 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     data, false = parts(data)
     lies = false[false["claim"] == false["integrator"].map(LIES)]
     entries, bodies = by_kind(ledger(data))
-    named = {"ledger": entries, "planted": lies.drop(columns=["scene", "family"]), "body": bodies}
-    return {name: part.assign(claim=part["claim"].map(claim_name)) for name, part in named.items() if len(part)}
+    frames = {"ledger": entries, "planted": lies.drop(columns=["scene", "family"]), "body": bodies}
+    return {name: part.assign(claim=part["claim"].map(claim_name)) for name, part in frames.items() if len(part)}

@@ -52,6 +52,6 @@ def findings(name: str, quick: bool) -> list[dict[str, Any]]:
 def measured(case: Case) -> xr.Dataset:
     """The findings on one of them. A fresh process loads it, so that other cases of this process are not affected."""
     each = fresh_process.call(findings, case.integrator, case.settings["quick"])
-    columns = {name: [np.nan if one[name] is None else one[name] for one in each] for name in Finding._fields}
+    columns = {name: [np.nan if row[name] is None else row[name] for row in each] for name in Finding._fields}
     claims = columns.pop("claim")
     return xr.Dataset({name: ("claim", values) for name, values in columns.items()}, coords={"claim": claims})

@@ -24,8 +24,8 @@ def cases(quick: bool) -> list[Case]:
     """A case for each integrator and scene, for each integrator on a free body, and for each planted false claim."""
     methods = integrators().values()
     bodies = [Case(facts.FREE, method.name, {"quick": True}) for method in methods if BODY in method.solvers]
-    every = [Case(name, method.name, {"quick": quick}) for name in grid_scenes(LEFT_OUT) for method in methods]
-    return bodies + every + planted.cases(quick)
+    tops = [Case(name, method.name, {"quick": quick}) for name in grid_scenes(LEFT_OUT) for method in methods]
+    return bodies + tops + planted.cases(quick)
 
 
 def measure(case: Case) -> xr.Dataset:
@@ -33,11 +33,11 @@ def measure(case: Case) -> xr.Dataset:
     if case.integrator in planted.LIES:
         return planted.measured(case)
     where = scene(case.scene, bodies=True)
-    found = judge(integrator(case.integrator), where, quick=case.settings["quick"]).dataset().assign(chart="every")
+    data = judge(integrator(case.integrator), where, quick=case.settings["quick"]).dataset().assign(chart="every")
     if where.of_body:  # a body has other claims: put each in its place among all
-        blank = {name: "" for name, column in found.data_vars.items() if column.dtype.kind == "U"}
-        found = found.reindex(claim=facts.EVERY, fill_value=blank).assign(chart=BODY)
-    return found
+        blank = {name: "" for name, column in data.data_vars.items() if column.dtype.kind == "U"}
+        data = data.reindex(claim=facts.EVERY, fill_value=blank).assign(chart=BODY)
+    return data
 
 
 STUDY = Study(

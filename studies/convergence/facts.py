@@ -32,16 +32,16 @@ from .measures import (
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """How many orders are confirmed, the work within each order, and how errors compare with tolerances."""
-    words = [one.verdict for one in judged(data).values()]
+    words = [judgement.verdict for judgement in judged(data).values()]
     part, _ = named_variants(data)
-    every = cheapest(data).query("ranked")
-    spans = every.groupby("order")["work"].agg(lambda works: works.max() / works.min())
+    ranked = cheapest(data).query("ranked")
+    spans = ranked.groupby("order")["work"].agg(lambda works: works.max() / works.min())
     span_order = int(spans.idxmax()) if len(spans) else None
-    alike = every[every["order"] == span_order]  # the least work first
+    alike = ranked[ranked["order"] == span_order]  # the least work first
     (span_best, span_least), (span_worst, span_most) = map(first, (alike, alike[::-1]))
-    shown = orders(data)["verdict"]
-    met = {name: values for name, values in ratios(data).items() if values.size}
-    together = np.concatenate([np.full(1, np.nan), *met.values()])
+    verdicts = orders(data)["verdict"]
+    known = {name: values for name, values in ratios(data).items() if values.size}
+    all_ratios = np.concatenate([np.full(1, np.nan), *known.values()])
     return {
         "scenes": ", ".join(map(str, data["scene"].values)),
         "scene": str(part["scene"].values),
@@ -50,9 +50,9 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "beside": BESIDE,
         "pairs": len(words) or None,  # of a variant and a scene
         **{word: words.count(word) if words else None for word in ("confirmed", "refuted", "undecided")},
-        "higher": int((shown == "higher").sum()),
-        "lower": int((shown == "lower").sum()),
-        "wrong": int((shown == WRONG).sum()),
+        "higher": int((verdicts == "higher").sum()),
+        "lower": int((verdicts == "lower").sum()),
+        "wrong": int((verdicts == WRONG).sum()),
         "unknown": stepping(data).sizes["variant"] - len({name for _, name in efficiencies(data, TARGET)}),
         "span": float(spans.max()) if len(spans) else None,  # most work over least within an order
         "span_order": span_order,
@@ -63,10 +63,10 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "history_tolerance": HISTORY_TOLERANCE,
         "large": LARGE,  # rad
         "ratio_asked": int(np.isfinite(data["tolerance"].values).sum()) or None,  # runs at a tolerance
-        "ratio_runs": sum(values.size for values in met.values()),  # of these
-        "ratio_middle": float(np.nanmedian(together)) if met else None,  # error over tolerance
-        "ratio_most": float(np.nanmax(together)) if met else None,
-        "ratio_most_variant": max(met, key=lambda name: met[name].max(), default=None),
+        "ratio_runs": sum(values.size for values in known.values()),  # of these
+        "ratio_middle": float(np.nanmedian(all_ratios)) if known else None,  # error over tolerance
+        "ratio_most": float(np.nanmax(all_ratios)) if known else None,
+        "ratio_most_variant": max(known, key=lambda name: known[name].max(), default=None),
     }
 
 
@@ -83,9 +83,9 @@ def cheapest(data: xr.Dataset) -> pd.DataFrame:
     works, enough = efficiencies(data, TARGET), min(LEAST_SCENES, data.sizes["scene"])
     rows = []
     for name, label in merged(stepping(data), MAIN).items():
-        every = [one for (_, variant), one in works.items() if variant == name]
-        if every:
-            known, foreseen = [one.work for one in every], sum(one.foreseen for one in every)
+        costs = [cost for (_, variant), cost in works.items() if variant == name]
+        if costs:
+            known, foreseen = [cost.work for cost in costs], sum(cost.foreseen for cost in costs)
             work = float(np.median(known)), min(known), max(known), len(known), foreseen
             rows.append([label, declared_order(name), *work, len(known) >= enough])
     header = ["variant", "order", "work", "least", "most", "scenes", "of these extrapolated", "ranked"]
@@ -104,14 +104,14 @@ def orders(data: xr.Dataset) -> pd.DataFrame:
     """Every order with its verdict, those that are not confirmed first."""
     ends, rows = fits(data, MAIN, at_end=True), []
     for pair, (word, slopes) in judged(data).items():
-        measured = [part for name in (MAIN, *OTHERS) for part in _order(slopes.get(name))]
-        off = "higher" if MAIN in slopes and slopes[MAIN].slope > declared_order(pair[1]) else "lower"
-        shown = off if word == "refuted" else word  # a claim is judged by more than this run: see the ledger
-        rows.append([*pair, declared_order(pair[1]), shown, *measured, ends[pair].constant])
+        numbers = [part for name in (MAIN, *OTHERS) for part in _order(slopes.get(name))]
+        side = "higher" if MAIN in slopes and slopes[MAIN].slope > declared_order(pair[1]) else "lower"
+        verdict = side if word == "refuted" else word  # a claim is judged by more than this run: see the ledger
+        rows.append([*pair, declared_order(pair[1]), verdict, *numbers, ends[pair].constant])
     names = [part for name in (MAIN, *OTHERS) for part in (f"order in {name}", f"+- in {name}")]
-    every = pd.DataFrame(rows, columns=["scene", "variant", "declared", "verdict", *names, "C at the end (rad/s^p)"])
+    table = pd.DataFrame(rows, columns=["scene", "variant", "declared", "verdict", *names, "C at the end (rad/s^p)"])
     rank = {WRONG: -1, "lower": 0, "higher": 1, "undecided": 2}
-    return every.sort_values("verdict", key=lambda column: column.map(lambda word: rank.get(word, 3)), kind="stable")
+    return table.sort_values("verdict", key=lambda column: column.map(lambda word: rank.get(word, 3)), kind="stable")
 
 
 def _order(fit: Any) -> tuple[float, float]:

@@ -43,12 +43,12 @@ def pictures(data: xr.Dataset) -> list[Picture]:
 def _named(data: xr.Dataset) -> Picture:
     """Panels on one scene: error against the step, against the tolerance, against work; energy over time."""
     part, labels = named_variants(data)
-    paid = part["force_evaluations"] * scene(str(part["scene"].values)).nutation_period / part["horizon"]
-    part = part.assign(work=paid.where(paid > 0.0))
-    shown = [kind for kind in ("step_size", "tolerance", "work") if np.isfinite(part[kind]).any()]
-    shown += ["energy"] if "history_time" in part and np.isfinite(part["history_time"]).any() else []
-    figure, axes = grid(len(shown), 2, height=2.3)
-    for kind, axis in zip(shown, axes, strict=True):
+    work = part["force_evaluations"] * scene(str(part["scene"].values)).nutation_period / part["horizon"]
+    part = part.assign(work=work.where(work > 0.0))
+    kinds = [kind for kind in ("step_size", "tolerance", "work") if np.isfinite(part[kind]).any()]
+    kinds += ["energy"] if "history_time" in part and np.isfinite(part["history_time"]).any() else []
+    figure, axes = grid(len(kinds), 2, height=2.3)
+    for kind, axis in zip(kinds, axes, strict=True):
         axis.set(xscale="log", yscale="log", xlabel=PANELS[kind][0], title=PANELS[kind][1])
         if kind == "energy":
             axis.set_ylabel("energy error\n/ energy of the nutation")
@@ -62,8 +62,8 @@ def _named(data: xr.Dataset) -> Picture:
             order = order[np.isfinite(x[order]) & np.isfinite(y[order])]
             if order.size:
                 axis.plot(x[order], y[order], **line(name), label=label)
-    if "tolerance" in shown:  # where error and tolerance are equal: wide, since lines cross it
-        axis, ends = axes[shown.index("tolerance")], np.array([1e-20, 1e2])
+    if "tolerance" in kinds:  # where error and tolerance are equal: wide, since lines cross it
+        axis, ends = axes[kinds.index("tolerance")], np.array([1e-20, 1e2])
         limits = axis.get_xlim(), axis.get_ylim()
         axis.plot(ends, ends, color="#9EC9E8", lw=5.0, alpha=0.8, zorder=0.5)
         axis.text(0.97, 0.06, "pale: error = tolerance", transform=axis.transAxes, ha="right", fontsize=7.5)
@@ -87,35 +87,35 @@ def _history(cell: xr.Dataset) -> tuple[Any, Any]:
 def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Picture:
     """One row for each variant, grouped by order: the work for `TARGET`, over the scenes."""
     labels, scenes = merged(stepping(data), MAIN), [str(name) for name in data["scene"].values]
-    known = {name: [works[one, name] for one in scenes if (one, name) in works] for name in labels}
-    middle = {name: float(np.median([one.work for one in part])) for name, part in known.items() if part}
-    few = {name: len(known[name]) < min(LEAST_SCENES, len(scenes)) for name in middle}  # they are not ranked
+    known = {name: [works[scene, name] for scene in scenes if (scene, name) in works] for name in labels}
+    middle = {name: float(np.median([cost.work for cost in part])) for name, part in known.items() if part}
+    unranked = {name: len(known[name]) < min(LEAST_SCENES, len(scenes)) for name in middle}  # they are not ranked
     groups: dict[int, list[str]] = {}
-    for name in sorted(middle, key=lambda name: (few[name], middle[name])):
+    for name in sorted(middle, key=lambda name: (unranked[name], middle[name])):
         groups.setdefault(declared_order(name) or 0, []).append(name)
-    lines = [one for power in sorted(groups)
-             for one in (f"order {power}" if power else "no order declared", *groups[power])]  # fmt: skip
-    heads = [place for place, one in enumerate(lines) if one not in middle]
+    lines = [line for power in sorted(groups)
+             for line in (f"order {power}" if power else "no order declared", *groups[power])]  # fmt: skip
+    heads = [place for place, line in enumerate(lines) if line not in middle]
     cut = min(heads, key=lambda place: abs(2 * place - len(lines)))
     halves = [half for half in (lines[:cut], lines[cut:]) if half]
-    ranked = [[name for name in group if not few[name]] or group for power, group in groups.items() if power]
+    ranked = [[name for name in group if not unranked[name]] or group for power, group in groups.items() if power]
     widest = max(((group[0], group[-1]) for group in ranked), key=lambda ends: middle[ends[1]] / middle[ends[0]],
                  default=())  # fmt: skip
-    most = max(map(len, halves))
-    figure, axes = panels(1, len(halves), height=0.135 * most + 0.3, sharex=True)
+    longest = max(map(len, halves))
+    figure, axes = panels(1, len(halves), height=0.135 * longest + 0.3, sharex=True)
     for axis, half in zip(axes[0], halves, strict=True):
         for place, name in enumerate(half):
             if name in middle:
-                values = [one.work for one in known[name]]
-                face = "white" if 2 * sum(one.foreseen for one in known[name]) > len(values) else BLUE
+                values = [cost.work for cost in known[name]]
+                face = "white" if 2 * sum(cost.foreseen for cost in known[name]) > len(values) else BLUE
                 axis.plot([min(values), max(values)], [place, place], color=BLUE, lw=1.2)
-                x, mark = (values, "|") if few[name] else (middle[name], "o")
+                x, mark = (values, "|") if unranked[name] else (middle[name], "o")
                 axis.plot(x, np.full(np.shape(x), place), mark, color=BLUE, mfc=face, ms=5.0)
             if name in widest:
                 axis.annotate(number(middle[name]), (max(values), place), (6, 0), textcoords="offset points",
                               va="center", fontsize=7.5, weight="bold")  # fmt: skip
         axis.set(xscale="log", xlabel="force evaluations\na nutation")
-        rows(axis, [labels.get(one, one) for one in half], most)
+        rows(axis, [labels.get(line, line) for line in half], longest)
         for tick, name in zip(axis.get_yticklabels(), half, strict=True):
             if name not in middle:
                 tick.set(weight="bold", fontsize=8.0)
@@ -123,7 +123,7 @@ def _constants(data: xr.Dataset, works: dict[tuple[str, str], Efficiency]) -> Pi
     axes[0, 0].plot([], [], "o", ms=5.0, label=f"median over up to {len(scenes)} scenes", **dark)
     axes[0, 0].plot([], [], color=BLUE, lw=1.2, label="least to largest of the scenes")
     axes[0, 0].plot([], [], "o", ms=5.0, mfc="white", label="open: extrapolated on most scenes", **dark)
-    if any(few.values()):
+    if any(unranked.values()):
         axes[0, 0].plot([], [], "|", ms=5.0, label=f"known on fewer than {LEAST_SCENES} scenes: not ranked", **dark)
     legend_below(figure, axes)
     return Picture("constants", figure)

@@ -105,7 +105,7 @@ def merged(data: xr.Dataset, quantity: str) -> dict[str, str]:
     labels: dict[str, str] = {}
     for name in map(str, data["variant"].values):
         method, chart = split_name(name)
-        twin = next((one for one in labels if split_name(one)[0] == method and _same(data, one, name, quantity)), None)
+        twin = next((key for key in labels if split_name(key)[0] == method and _same(data, key, name, quantity)), None)
         if twin is None:
             labels[name] = name
         else:
@@ -115,10 +115,10 @@ def merged(data: xr.Dataset, quantity: str) -> dict[str, str]:
 
 def _same(data: xr.Dataset, first: str, second: str, quantity: str) -> bool:
     """Do two variants have the same errors, wherever these are above rounding?"""
-    one, other = (data[quantity].sel(variant=name).values for name in (first, second))
+    x, y = (data[quantity].sel(variant=name).values for name in (first, second))
     limit = ABOVE_BOUND * data[f"{quantity}_bound"].sel(variant=first).values
-    seen = np.isfinite(one) & np.isfinite(other) & (one > np.maximum(limit, EPSILON))
-    return bool(seen.any() and np.all(np.abs(one[seen] - other[seen]) <= SAME * one[seen]))
+    seen = np.isfinite(x) & np.isfinite(y) & (x > np.maximum(limit, EPSILON))
+    return bool(seen.any() and np.all(np.abs(x[seen] - y[seen]) <= SAME * x[seen]))
 
 
 def evaluations_a_nutation(cell: xr.Dataset, name: str) -> np.ndarray:
@@ -160,21 +160,21 @@ def efficiencies(data: xr.Dataset, error: float) -> dict[tuple[str, str], Effici
     that C h^p = error takes E T (C / error)^(1/p) of them in a nutation T. E is the median over the steps of the fit;
     an implicit method iterates more at longer steps, and needs more there.
     """
-    foretold = {}
+    works = {}
     for (name, label), fit in fits(data, MAIN).items():
         work = _between(data.sel(scene=name, variant=label), name, error)
         if np.isfinite(work):
-            foretold[name, label] = Efficiency(work, False)
+            works[name, label] = Efficiency(work, False)
             continue
         if not (np.isfinite(fit.slope) and fit.used.any()):
             continue
         cell, order = data.sel(scene=name, variant=label), declared_order(label) or round(fit.slope)
         used, steps = fit.used, cell["step_size"].values[fit.used]
-        each = np.median((evaluations_a_nutation(cell, name)[used] * steps) / scene(name).nutation_period)
+        per_step = np.median((evaluations_a_nutation(cell, name)[used] * steps) / scene(name).nutation_period)
         constant = np.median(cell[MAIN].values[used] / steps**order)
-        work = float(each * scene(name).nutation_period * (constant / error) ** (1.0 / order))
-        foretold[name, label] = Efficiency(work, True)
-    return foretold
+        work = float(per_step * scene(name).nutation_period * (constant / error) ** (1.0 / order))
+        works[name, label] = Efficiency(work, True)
+    return works
 
 
 def _between(cell: xr.Dataset, name: str, error: float) -> float:
@@ -194,11 +194,11 @@ def named_variants(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
 
     If there are few variants, or none of these methods, all variants, but no attitude chart beside an axis chart.
     """
-    every = list(map(str, data["variant"].values))
-    names = [name for name in every if split_name(name)[0] in NAMED]
-    if len(every) <= FEW or not names:
+    options = list(map(str, data["variant"].values))
+    names = [name for name in options if split_name(name)[0] in NAMED]
+    if len(options) <= FEW or not names:
         names = [
-            name for name in every if name.replace("[attitude]", "[axis]") not in every or "[attitude]" not in name
+            name for name in options if name.replace("[attitude]", "[axis]") not in options or "[attitude]" not in name
         ]
     else:
         names = [name for name in names if name.endswith("[axis]") or f"{split_name(name)[0]}[axis]" not in names]
@@ -208,7 +208,7 @@ def named_variants(data: xr.Dataset) -> tuple[xr.Dataset, dict[str, str]]:
 def ratios(data: xr.Dataset) -> dict[str, np.ndarray]:
     """Axis errors over tolerances of every adaptive variant on all scenes, above rounding and below `LARGE`."""
     by_name: dict[str, list[np.ndarray]] = {}
-    for (on, name), fit in tolerance_fits(data).items():
-        cell = data.sel(scene=on, variant=name)
+    for (scene_name, name), fit in tolerance_fits(data).items():
+        cell = data.sel(scene=scene_name, variant=name)
         by_name.setdefault(name, []).append((cell[MAIN] / cell["tolerance"]).values[fit.used])
     return {name: np.concatenate(parts) for name, parts in by_name.items()}

@@ -118,11 +118,11 @@ def costs(data: xr.DataTree, cell: Cell, unit: str = SECONDS) -> Costs:
     values = np.where(np.isnan(values), np.inf, values)[np.ix_(rows, tops)]
     if unit == EVALUATIONS:
         return Costs(names, values, np.zeros(len(names)))
-    met = on_tops(part["met_at"], mask)[np.ix_(rows, tops)]
+    met_at = on_tops(part["met_at"], mask)[np.ix_(rows, tops)]
     fixed = part["control"].values[rows] == "step_size"
     tariff = prices(data)
     for row, name in enumerate(names):
-        price, call = tariff.at(name, np.full(met.shape[1], np.nan) if fixed[row] else met[row])
+        price, call = tariff.at(name, np.full(met_at.shape[1], np.nan) if fixed[row] else met_at[row])
         values[row] = values[row] * price + call
     return Costs(names, values, tariff.error[[tariff.names.index(name) for name in names]])
 
@@ -142,13 +142,13 @@ def safest(data: xr.DataTree, cell: Cell, keeping: bool = False) -> tuple[list[S
     for name in costs(data, cell).names:
         if keeping and not (integrator(name).conserves or frozenset()) >= {"energy", "p_phi", "p_psi"}:
             continue
-        one = group.sel(variant=name)
-        met = one["met_at"].sel(quantity=cell.quantity, target=cell.target).values[: mask.size].astype(float)
-        settings, fixed = one["setting"].values, str(one["control"].values) == "step_size"
+        runs = group.sel(variant=name)
+        met_at = runs["met_at"].sel(quantity=cell.quantity, target=cell.target).values[: mask.size].astype(float)
+        settings, fixed = runs["setting"].values, str(runs["control"].values) == "step_size"
         price, call = tariff.at(name, np.full(settings.size, np.nan) if fixed else settings)
         work = mean_work(data, cell, name)
         error = float(tariff.error[tariff.names.index(name)])
-        reached = met[mask][wide] * served_over_interpolated(data, cell, name)
+        reached = met_at[mask][wide] * served_over_interpolated(data, cell, name)
         ladders.append(Ladder(name, reached, settings, work * price + call, fixed, error))
     return safe(ladders, tariff.marked)
 
@@ -177,29 +177,29 @@ class FewestCalls(NamedTuple):
 
 def fewest_calls(data: xr.DataTree, cell: Cell) -> FewestCalls | None:
     """The safe choice if evaluations are expensive; None if no choice reaches the error."""
-    choices = [one for one in safest(data, cell)[0] if np.isfinite(one.seconds)]
+    choices = [choice for choice in safest(data, cell)[0] if np.isfinite(choice.seconds)]
     counts = []
-    for one in choices:
-        settings = data[cell.horizon]["setting"].isel(scene=0).sel(variant=one.name).values
-        there = np.isfinite(settings)
-        order = np.argsort(settings[there])
-        x, work = np.log(settings[there][order]), np.log(mean_work(data, cell, one.name)[there][order])
-        counts.append(math.exp(float(np.interp(math.log(one.setting), x, work))))
+    for choice in choices:
+        settings = data[cell.horizon]["setting"].isel(scene=0).sel(variant=choice.name).values
+        known = np.isfinite(settings)
+        order = np.argsort(settings[known])
+        x, work = np.log(settings[known][order]), np.log(mean_work(data, cell, choice.name)[known][order])
+        counts.append(math.exp(float(np.interp(math.log(choice.setting), x, work))))
     if not counts:
         return None
     best, least = choices[int(np.argmin(counts))], min(counts)
-    others = [(best.seconds - one.seconds) / (count - least) for one, count in zip(choices, counts, strict=True)
+    others = [(best.seconds - choice.seconds) / (count - least) for choice, count in zip(choices, counts, strict=True)
               if count > least]  # fmt: skip
     return FewestCalls(best, least, max([0.0, *others]))
 
 
 def served_over_interpolated(data: xr.DataTree, cell: Cell, name: str) -> float:
     """The safe setting confirmed on other tops over the interpolated one; 1 where no other tops were run."""
-    there = (cell.horizon, cell.quantity, cell.tops) == ("short", "axis", NATURAL) and CONFIRMED in data.children
-    if not there or name not in data[CONFIRMED]["variant"].values:
+    confirmed = (cell.horizon, cell.quantity, cell.tops) == ("short", "axis", NATURAL) and CONFIRMED in data.children
+    if not confirmed or name not in data[CONFIRMED]["variant"].values:
         return 1.0
-    one = data[CONFIRMED].to_dataset().isel(scene=0).sel(variant=name, target=cell.target)
-    ratio = float(one["served"] / one["interpolated"])
+    row = data[CONFIRMED].to_dataset().isel(scene=0).sel(variant=name, target=cell.target)
+    ratio = float(row["served"] / row["interpolated"])
     return 1.0 if math.isnan(ratio) else ratio
 
 
@@ -209,23 +209,23 @@ def advised(data: xr.DataTree, others: Sequence[str]) -> dict[str, list[float]]:
     For variants within `WITHIN` of the cheapest of their class, also of those that keep every constant, the cheapest
     where f is dear, and the `others`.
     """
-    asked: dict[str, list[float]] = {}
+    settings: dict[str, list[float]] = {}
     for place, target in enumerate(targets(data)):
         dear = fewest_calls(data, Cell("short", "axis", target, NATURAL, CLASSES[0]))
-        wanted = [*others, *([dear.best.name] if dear else [])]
+        extra = [*others, *([dear.best.name] if dear else [])]
         for needs, keeping in [*((needs, False) for needs in CLASSES), (CLASSES[0], True)]:
             choices = safest(data, Cell("short", "axis", target, NATURAL, needs), keeping)[0]
-            for one in choices:
-                near = one.seconds <= WITHIN * choices[0].seconds or one.name in wanted
-                if near and math.isfinite(one.seconds):
-                    asked.setdefault(one.name, [math.nan] * len(targets(data)))[place] = one.setting
-    return dict(sorted(asked.items()))
+            for choice in choices:
+                near = choice.seconds <= WITHIN * choices[0].seconds or choice.name in extra
+                if near and math.isfinite(choice.seconds):
+                    settings.setdefault(choice.name, [math.nan] * len(targets(data)))[place] = choice.setting
+    return dict(sorted(settings.items()))
 
 
 def reached(data: xr.DataTree, target: float) -> dict[str, Safe]:
     """By variant the safe choice for a target on natural tops, of all classes; those that reach it."""
-    each = (safest(data, Cell("short", "axis", target, NATURAL, needs))[0] for needs in CLASSES[:-1])
-    return {one.name: one for choices in each for one in choices if np.isfinite(one.seconds)}
+    lists = (safest(data, Cell("short", "axis", target, NATURAL, needs))[0] for needs in CLASSES[:-1])
+    return {choice.name: choice for choices in lists for choice in choices if np.isfinite(choice.seconds)}
 
 
 def fewest(data: xr.DataTree, cell: Cell) -> str | None:
@@ -257,10 +257,10 @@ def contenders(data: xr.DataTree) -> list[str]:
                     table = costs(data, Cell("short", quantity, target, tops, needs))
                     best = table.values.min(axis=0, initial=np.inf)
                     alone = (quantity == "attitude") & (chart.sel(variant=table.names).values == "attitude")
-                    most = np.where(alone, CLOSER, WITHIN)[:, np.newaxis] * best
-                    near = (table.values <= most) & np.isfinite(table.values)
+                    limit = np.where(alone, CLOSER, WITHIN)[:, np.newaxis] * best
+                    near = (table.values <= limit) & np.isfinite(table.values)
                     enough = near.sum(axis=1) > OFTEN * max(best.size, 1)
-                    names |= {name for name, one in zip(table.names, enough, strict=True) if one}
+                    names |= {name for name, passes in zip(table.names, enough, strict=True) if passes}
     return [str(name) for name in data["short"]["variant"].values if str(name) in names]
 
 
@@ -284,14 +284,14 @@ def winners(data: xr.DataTree) -> list[dict[str, Any]]:
 def winner(data: xr.DataTree, cell: Cell) -> dict[str, Any]:
     """One cell in both protocols."""
     choices, called = safest(data, cell)
-    judged = contest(data, cell)
+    result = contest(data, cell)
     best = choices[0] if choices and np.isfinite(choices[0].seconds) else None
     return {
         "quantity": cell.quantity, "tops": cell.tops, "needs": cell.needs,
         "nutations": nutations(data, cell.horizon), "target": cell.target,
         "asked": int(asked_tops(data, cell).sum()), "safe": best,
-        "safe_called": called, "hindsight": judged.first, "hindsight_called": judged.called,
-        "solved": judged.solved,
+        "safe_called": called, "hindsight": result.first, "hindsight_called": result.called,
+        "solved": result.solved,
     }  # fmt: skip
 
 
@@ -329,9 +329,9 @@ def guard_counts(data: xr.DataTree) -> pd.DataFrame:
     runs = runs[(runs["control"] == "tolerance") | (runs["chart"] != "attitude")]
     kinds = {"wrong": runs["measured"] > WRONG, "right": runs["measured"] <= EXPECTED}
     kinds["between"] = ~kinds["wrong"] & ~kinds["right"]
-    warned = {f"{name}_warned": one & (runs["foretold"] > EXPECTED) for name, one in kinds.items()}
-    counted = pd.DataFrame({**kinds, **warned, "wrong_seen": kinds["wrong"] & (runs["watched"] > KEPT)})
+    warned = {f"{name}_warned": mask & (runs["foretold"] > EXPECTED) for name, mask in kinds.items()}
+    columns = pd.DataFrame({**kinds, **warned, "wrong_seen": kinds["wrong"] & (runs["watched"] > KEPT)})
     adaptive = np.where(runs["control"] == "tolerance", "adaptive", "fixed step, " + runs["chart"])
     return (
-        counted.assign(variants=adaptive, whole=runs["whole"] > 0.0).groupby(["variants", "whole"]).sum().reset_index()
+        columns.assign(variants=adaptive, whole=runs["whole"] > 0.0).groupby(["variants", "whole"]).sum().reset_index()
     )

@@ -41,14 +41,14 @@ def share_served(variant: Integrator, numbers: Array, nutations: float, setting:
     """The share of the tops, rows (n, 9), with an axis error of at most `target`, of those of which it is asked."""
     fixed, (chart,) = variant.fixed_step, variant.solvers
     tops = Tops(numbers, nutations, first=setting if fixed else DENSE, samples=SAMPLES)
-    asked = np.flatnonzero(tops.asked([target])["axis"][0])
+    members = np.flatnonzero(tops.asked([target])["axis"][0])
     if fixed:
-        marks = np.broadcast_to(tops.marks, (asked.size, tops.marks.size))
-        runs = stepped(variant, tops.numbers[asked], tops.period[asked] / setting, marks)
+        marks = np.broadcast_to(tops.marks, (members.size, tops.marks.size))
+        runs = stepped(variant, tops.numbers[members], tops.period[members] / setting, marks)
     else:
-        runs = at_tolerance(variant, tops, asked, setting, math.inf)
-    error = np.where(runs.outcome == 0, tops.errors(chart, runs, asked)["axis"], np.inf)
-    return float(np.mean(error <= target)) if asked.size else math.nan
+        runs = at_tolerance(variant, tops, members, setting, math.inf)
+    error = np.where(runs.outcome == 0, tops.errors(chart, runs, members)["axis"], np.inf)
+    return float(np.mean(error <= target)) if members.size else math.nan
 
 
 def confirm(variant: Integrator, members: int, seed: int, nutations: float, start: Sequence[float]) -> xr.Dataset:
@@ -67,4 +67,4 @@ def confirm(variant: Integrator, members: int, seed: int, nutations: float, star
                 setting = math.inf
         served[place] = setting
     variables = {"interpolated": np.array(start), "served": served, "share": share}
-    return xr.Dataset({name: ("target", one) for name, one in variables.items()}, {"target": list(TARGETS)})
+    return xr.Dataset({name: ("target", values) for name, values in variables.items()}, {"target": list(TARGETS)})

@@ -95,29 +95,29 @@ def over(data: xr.DataTree) -> str:
 
 def winners_facts(data: xr.DataTree) -> dict[str, Any]:
     """Safe choices for any body and each class; where counts of evaluations mislead; agreement of both protocols."""
-    named: dict[str, Any] = {"safe_called": 0}
+    values: dict[str, Any] = {"safe_called": 0}
     misled: list[tuple[Any, ...]] = []
     for target in cells.targets(data):
         cell, place = Cell("short", "axis", target, NATURAL), decades(target)
-        one, fewest = cells.winner(data, cell), cells.fewest(data, cell)
-        named["safe_called"] += bool(one["safe"] and one["safe_called"])
-        named |= _safe(f"safe_{place}", data, cell)
-        if safe := one["safe"]:
-            misled += [(counted.seconds / safe.seconds, target, fewest, counted.seconds, safe.name, safe.seconds)
-                       for counted in cells.safest(data, cell)[0] if counted.name == fewest]  # fmt: skip
+        winner, fewest = cells.winner(data, cell), cells.fewest(data, cell)
+        values["safe_called"] += bool(winner["safe"] and winner["safe_called"])
+        values |= _safe_facts(f"safe_{place}", data, cell)
+        if safe := winner["safe"]:
+            misled += [(choice.seconds / safe.seconds, target, fewest, choice.seconds, safe.name, safe.seconds)
+                       for choice in cells.safest(data, cell)[0] if choice.name == fewest]  # fmt: skip
     keys = "misled", "misled_at", "fewest", "fewest_seconds", "instead", "instead_seconds"
-    most = max((row for row in misled if 1.0 < row[0] < np.inf), default=(None,) * len(keys))
-    named |= dict(zip(keys, most, strict=True))
+    worst = max((row for row in misled if 1.0 < row[0] < np.inf), default=(None,) * len(keys))
+    values |= dict(zip(keys, worst, strict=True))
     for needs in CLASSES[:-1]:
-        named |= _safe(needs.replace("-", "_"), data, Cell("short", "axis", AT, NATURAL, needs))
-    named["kicks_serve"] = serves(named["kicks"]) if named["kicks_seconds"] else ""
-    both = [one for one in cells.winners(data) if one["needs"] != "this-top" and one["safe"] and one["hindsight"]]
-    named["cells"] = len(both) or None
-    named["same"] = sum(one["safe"].name == one["hindsight"].name for one in both) if both else None
-    return named
+        values |= _safe_facts(needs.replace("-", "_"), data, Cell("short", "axis", AT, NATURAL, needs))
+    values["kicks_serve"] = serves(values["kicks"]) if values["kicks_seconds"] else ""
+    rows = [row for row in cells.winners(data) if row["needs"] != "this-top" and row["safe"] and row["hindsight"]]
+    values["cells"] = len(rows) or None
+    values["same"] = sum(row["safe"].name == row["hindsight"].name for row in rows) if rows else None
+    return values
 
 
-def _safe(key: str, data: xr.DataTree, cell: Cell) -> dict[str, Any]:
+def _safe_facts(key: str, data: xr.DataTree, cell: Cell) -> dict[str, Any]:
     best = cells.winner(data, cell)["safe"]
     name = best.name if best else NOTHING if cells.costs(data, cell).names else None
     return {key: name, f"{key}_seconds": best and best.seconds}
@@ -136,11 +136,11 @@ def silent_facts(data: xr.DataTree) -> dict[str, Any]:
     names = "quoted_steps", "natural_wrong", "natural_silent", "worst_kind", "worst_wrong", "worst_silent"
     if QUOTED not in data["short"]["variant"].values:
         return dict.fromkeys(names)
-    one = cells.health(data, QUOTED)
-    at = int(np.argmin(np.abs(one.setting - FINE)))
-    wrong, silent = (part[at] / np.maximum(one.drawn, 1.0) for part in (one.wrong, one.silent))
+    health = cells.health(data, QUOTED)
+    level = int(np.argmin(np.abs(health.setting - FINE)))
+    wrong, silent = (part[level] / np.maximum(health.drawn, 1.0) for part in (health.wrong, health.silent))
     natural, worst = KINDS.index(NATURAL), int(np.argmax(wrong[:-1]))
-    values = one.setting[at], wrong[natural], silent[natural], KINDS[worst], wrong[worst], silent[worst]
+    values = health.setting[level], wrong[natural], silent[natural], KINDS[worst], wrong[worst], silent[worst]
     return dict(zip(names, values, strict=True))
 
 
@@ -158,26 +158,26 @@ def far_facts(data: xr.DataTree) -> dict[str, Any]:
     names = [f"map_{quantity}{end}" for quantity in far.QUANTITIES for end in ends]
     names += ["map_tops", "map_methods", "predicted", "checks", "checks_runs", "checks_told", "checks_longest"]
     names += ["checks_low", "checks_middle", "checks_high"]  # error of a run, measured over predicted
-    named: dict[str, Any] = dict.fromkeys(names)
+    values: dict[str, Any] = dict.fromkeys(names)
     if "far" not in data.children:
-        return named
+        return values
     reached = predicted = 0
     for quantity in far.QUANTITIES:
         panel = far.diagram(data, quantity)
-        there = panel.winner >= 0
-        reached, predicted = reached + int(there.sum()), predicted + int((panel.predicted & there).sum())
+        known = panel.winner >= 0
+        reached, predicted = reached + int(known.sum()), predicted + int((panel.predicted & known).sum())
         splits = np.isin(panel.winner, [k for k, name in enumerate(panel.names) if integrator(name).needs == "kicks"])
-        named[f"map_{quantity}_clear"] = float((panel.ratio[there] >= far.TIE).mean()) if there.any() else None
+        values[f"map_{quantity}_clear"] = float((panel.ratio[known] >= far.TIE).mean()) if known.any() else None
         for end, part in (("short", panel.horizons <= SHORT_RUN), ("long", panel.horizons >= LONG_RUN)):
-            if there[:, part].any():
-                named[f"map_{quantity}_{end}"] = float(splits[:, part][there[:, part]].mean())
-    named |= {"map_tops": data["far"].sizes["member"], "map_methods": data["far"].sizes["variant"]}
-    named |= {"predicted": predicted / reached if reached else None}
+            if known[:, part].any():
+                values[f"map_{quantity}_{end}"] = float(splits[:, part][known[:, part]].mean())
+    values |= {"map_tops": data["far"].sizes["member"], "map_methods": data["far"].sizes["variant"]}
+    values |= {"predicted": predicted / reached if reached else None}
     checks = far.checks(data)
-    ran = checks.drop_duplicates(["quantity", "target", "horizon"])
-    named |= dict(zip(names[-3:], checks["ratio"].quantile([0.1, 0.5, 0.9]), strict=True))
-    return named | {"checks": len(ran) or None, "checks_runs": len(checks), "checks_told": int(checks["told"].sum()),
-                    "checks_longest": ran["horizon"].max()}  # fmt: skip
+    cases = checks.drop_duplicates(["quantity", "target", "horizon"])
+    values |= dict(zip(names[-3:], checks["ratio"].quantile([0.1, 0.5, 0.9]), strict=True))
+    return values | {"checks": len(cases) or None, "checks_runs": len(checks), "checks_told": int(checks["told"].sum()),
+                    "checks_longest": cases["horizon"].max()}  # fmt: skip
 
 
 # ---- tables ----------------------------------------------------------------------------------------------------------
@@ -207,7 +207,7 @@ def use(data: xr.DataTree) -> pd.DataFrame:
         for target in cells.targets(data):
             cell = Cell("short", "axis", target, NATURAL, needs)
             choices, called = cells.safest(data, cell, keeping)
-            best = next((one for one in choices if np.isfinite(one.seconds)), None)
+            best = next((choice for choice in choices if np.isfinite(choice.seconds)), None)
             words = over(data) if cells.asked_tops(data, cell).any() else "not asked"
             if best is not None:
                 words = f"{'' if called else '~ '}{best.name}{serves(best.name)}, "
@@ -224,12 +224,12 @@ def slower(data: xr.DataTree) -> list[dict[str, str]]:
 
     A cell has the evaluations in the place of the time; no row if the winners have the fewest already.
     """
-    each = {target: cells.fewest_calls(data, Cell("short", "axis", target, NATURAL, CLASSES[0]))
+    by_target = {target: cells.fewest_calls(data, Cell("short", "axis", target, NATURAL, CLASSES[0]))
             for target in cells.targets(data)}  # fmt: skip
-    known = {target: one for target, one in each.items() if one is not None}
-    price = max((one.price for one in known.values()), default=0.0)
+    known = {target: fewest for target, fewest in by_target.items() if fewest is not None}
+    price = max((fewest.price for fewest in known.values()), default=0.0)
     line = {"you can supply": f"{NEEDS[CLASSES[0]]} that takes {at_most(US * price, 1, 'us')} longer"}
-    for target in each:
+    for target in by_target:
         line[f"1e-{decades(target)} rad"] = over(data)
     for target, (best, evaluations, _) in known.items():
         words = f"{best.name}, {setting_words(best.name, best.setting)}, {count(evaluations)} evaluations"
@@ -246,8 +246,8 @@ def keeps(name: str) -> str:
     words = {claim: declared(method, claim) for claim in ("p_phi", "p_psi", "axis_length", "energy")}
     if method.needs in ("derivative", "expression") and "angles" not in method.charts():
         words["p_phi"] = "kept"
-    told = {"axis_length": "|e|"}
-    kept = [told.get(claim, claim) for claim, word in words.items() if word == "kept"]
+    symbols = {"axis_length": "|e|"}
+    kept = [symbols.get(claim, claim) for claim, word in words.items() if word == "kept"]
     return ", ".join(kept + ["energy bounded"] * (words["energy"] == "bounded")) or "nothing exactly"
 
 
@@ -256,34 +256,34 @@ def have(data: xr.DataTree) -> pd.DataFrame:
     rows = [{"you have": name} for name in HAVE if name in data["short"]["variant"].values]
     for target in cells.targets(data)[:3]:
         known = cells.reached(data, target)
-        best = min((one.seconds for one in known.values() if integrator(one.name).general), default=np.nan)
+        best = min((choice.seconds for choice in known.values() if integrator(choice.name).general), default=np.nan)
         for row in rows:
-            one = known.get(row["you have"])
-            row[f"1e-{decades(target)} rad"] = over(data) if one is None else (
-                f"{setting_words(one.name, one.setting)}, {duration(one.seconds)}, {number(one.seconds / best)} times"
-            )  # fmt: skip
+            choice = known.get(row["you have"])
+            row[f"1e-{decades(target)} rad"] = over(data) if choice is None else (
+                f"{setting_words(choice.name, choice.setting)}, {duration(choice.seconds)}, "
+                f"{number(choice.seconds / best)} times")  # fmt: skip
     return pd.DataFrame(rows)
 
 
-def winners(data: xr.DataTree, each: list[dict[str, Any]]) -> pd.DataFrame:
+def winners(data: xr.DataTree, results: list[dict[str, Any]]) -> pd.DataFrame:
     """Cells, one a row: the safe choice with its time, and the winner in hindsight with its share."""
     marked, rows = prices(data).marked, []
-    for one in each:
-        safe, best = one["safe"], one["hindsight"]
+    for cell in results:
+        safe, best = cell["safe"], cell["hindsight"]
         row = {
-            **({"quantity": one["quantity"]} if one["quantity"] != "axis" else {}),
-            "tops": one["tops"], "needs": one["needs"], "nutations": one["nutations"], "error": one["target"],
-            "asked (tops)": one["asked"], "solved (tops)": one["solved"],
-            "safe": safe.name if safe else NOTHING if one["asked"] else "not asked",
+            **({"quantity": cell["quantity"]} if cell["quantity"] != "axis" else {}),
+            "tops": cell["tops"], "needs": cell["needs"], "nutations": cell["nutations"], "error": cell["target"],
+            "asked (tops)": cell["asked"], "solved (tops)": cell["solved"],
+            "safe": safe.name if safe else NOTHING if cell["asked"] else "not asked",
             "setting": setting_words(safe.name, safe.setting) if safe else "",
         }  # fmt: skip
         for key, name in (("time", "seconds"), ("low", "low"), ("high", "high")):
             row[f"{key} (us)"] = US * value if np.isfinite(value := getattr(safe, name, np.nan)) else np.nan
-        row |= {"safe lead": lead(one["safe_called"], safe, marked),
-                "hindsight": best.name if best else NOTHING if one["asked"] else "not asked"}  # fmt: skip
+        row |= {"safe lead": lead(cell["safe_called"], safe, marked),
+                "hindsight": best.name if best else NOTHING if cell["asked"] else "not asked"}  # fmt: skip
         shares = {"share": "share", "share low": "low", "share high": "high", "level": "level", "meets": "met"}
         row |= {key: getattr(best, name, np.nan) for key, name in shares.items()}
-        rows.append(row | {"hindsight lead": lead(one["hindsight_called"], best, marked)})
+        rows.append(row | {"hindsight lead": lead(cell["hindsight_called"], best, marked)})
     return pd.DataFrame(rows)
 
 
@@ -321,11 +321,11 @@ def silent(data: xr.DataTree) -> pd.DataFrame:
     """Shares of all tops of a kind with wrong, silent and dropped runs, for well-known methods."""
     rows = []
     for name in (name for name in KNOWN if name in data["short"]["variant"].values):
-        one = cells.health(data, name)
-        for at in (int(np.argmin(np.abs(one.setting - steps))) for steps in STEPS):
+        runs = cells.health(data, name)
+        for level in (int(np.argmin(np.abs(runs.setting - steps))) for steps in STEPS):
             for k, kind in enumerate(KINDS[:-1]):
-                shares = (part[at, k] / max(one.drawn[k], 1.0) for part in (one.wrong, one.silent, one.dropped))
-                rows.append([name, one.setting[at], kind, int(one.drawn[k]), *shares])
+                shares = (part[level, k] / max(runs.drawn[k], 1.0) for part in (runs.wrong, runs.silent, runs.dropped))
+                rows.append([name, runs.setting[level], kind, int(runs.drawn[k]), *shares])
     header = ["variant", "steps a nutation", "kind of top", "tops", "wrong", "silent", "dropped"]
     return pd.DataFrame(rows, columns=header)
 

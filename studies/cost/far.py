@@ -90,8 +90,8 @@ def tops_of(members: int, seed: int) -> Tops:
 
 def candidates() -> list[str]:
     """The variants of `CANDIDATES` that this machine has: heyoka's Taylor series may be missing."""
-    there = {variant.name for variant in variants()}
-    return [name for name in CANDIDATES if name in there]
+    names = {variant.name for variant in variants()}
+    return [name for name in CANDIDATES if name in names]
 
 
 def steps_of(tops: Tops, per_nutation: float) -> Array:
@@ -122,43 +122,43 @@ class Asked(NamedTuple):
     budget: float  # force evaluations
 
 
-def run(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Samples, Array]]:
+def run(variant: Integrator, tops: Tops, requests: Sequence[Asked]) -> list[tuple[Samples, Array]]:
     """The runs of all tops with each setting, and the times (n, samples) of their samples.
 
     Those of a fixed step go side by side, the settings too, in one call.
     """
     if variant.fixed_step:
-        return together(variant, tops, wanted)
-    made = []
-    for setting, ends, budget in wanted:
+        return together(variant, tops, requests)
+    samples = []
+    for setting, ends, budget in requests:
         times = places(ends).ravel() * tops.period[:, np.newaxis]
-        done = in_turn(variant, tops.numbers, [Plan.until(one, setting, budget) for one in times])
-        made.append((Samples(done.states, done.momenta, done.work, done.outcome == 0), times))
-    return made
+        runs = in_turn(variant, tops.numbers, [Plan.until(row, setting, budget) for row in times])
+        samples.append((Samples(runs.states, runs.momenta, runs.work, runs.outcome == 0), times))
+    return samples
 
 
-def together(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Samples, Array]]:
+def together(variant: Integrator, tops: Tops, requests: Sequence[Asked]) -> list[tuple[Samples, Array]]:
     """The runs of a fixed step, in one call, which needs equally many samples of all; extra samples are dropped."""
     marks = []
-    for setting, ends, _ in wanted:
+    for setting, ends, _ in requests:
         whole = np.maximum(np.rint(places(ends).ravel() * setting), 1).astype(np.int64)
         marks.append(np.maximum.accumulate(whole))
-    each, n = [np.unique(one) for one in marks], len(tops.period)
-    most = max((one.size for one in each), default=0)
-    if any(one[-1] < most for one in each):  # a run with fewer steps than `most` samples
-        return [made for asked in wanted for made in together(variant, tops, [asked])]
-    if not wanted:
+    unique, n = [np.unique(part) for part in marks], len(tops.period)
+    longest = max((part.size for part in unique), default=0)
+    if any(part[-1] < longest for part in unique):  # a run with fewer steps than `longest` samples
+        return [samples for request in requests for samples in together(variant, tops, [request])]
+    if not requests:
         return []
-    shown = np.stack([filled(one, most) for one in each])
-    h = np.stack([steps_of(tops, asked.setting) for asked in wanted])
-    done = stepped(variant, np.tile(tops.numbers, (len(wanted), 1)), h.ravel(), np.repeat(shown, n, axis=0))
-    made = []
-    for k, (one, seen) in enumerate(zip(marks, shown, strict=True)):
-        rows, columns = slice(k * n, (k + 1) * n), np.searchsorted(seen, one)
-        states, momenta = done.states[rows, columns], done.momenta[rows, columns]
-        parts = Samples(states, momenta, done.work[rows], done.outcome[rows] == 0)
-        made.append((parts, one * h[k][:, np.newaxis]))
-    return made
+    table = np.stack([filled(part, longest) for part in unique])
+    h = np.stack([steps_of(tops, request.setting) for request in requests])
+    runs = stepped(variant, np.tile(tops.numbers, (len(requests), 1)), h.ravel(), np.repeat(table, n, axis=0))
+    samples = []
+    for k, (part, row) in enumerate(zip(marks, table, strict=True)):
+        rows, columns = slice(k * n, (k + 1) * n), np.searchsorted(row, part)
+        states, momenta = runs.states[rows, columns], runs.momenta[rows, columns]
+        parts = Samples(states, momenta, runs.work[rows], runs.outcome[rows] == 0)
+        samples.append((parts, part * h[k][:, np.newaxis]))
+    return samples
 
 
 def filled(marks: NDArray[np.int64], count: int) -> NDArray[np.int64]:
@@ -167,21 +167,21 @@ def filled(marks: NDArray[np.int64], count: int) -> NDArray[np.int64]:
     return np.union1d(marks, free)
 
 
-def errors(chart: str, tops: Tops, shown: Samples, times: Array) -> dict[str, Array]:
+def errors(chart: str, tops: Tops, samples: Samples, times: Array) -> dict[str, Array]:
     """Each quantity at each sample, (n, samples); inf where a run has failed."""
-    view = View(chart, chunks.together(tops.numbers), shown.states, shown.momenta[..., 0], shown.momenta[..., 1])
+    view = View(chart, chunks.together(tops.numbers), samples.states, samples.momenta[..., 0], samples.momenta[..., 1])
     with np.errstate(all="ignore"):
         axis, I1 = view.axis, view.top.I1
         if chart == "angles":
             rate = -np.sin(view.theta) * view.p_theta / I1
         else:
             rate = (view.momentum[..., 0] * axis[..., 1] - view.momentum[..., 1] * axis[..., 0]) / I1
-        each = {
+        quantities = {
             "axis": charts.axis_distance(axis, tops.forms.axis(times)),
             "energy": np.abs(view.energy - tops.energy[:, np.newaxis]) / tops.energy_scale[:, np.newaxis],
             "shape": shape(tops, axis[..., 2], rate),
         }
-    return {name: np.where(np.isfinite(values), values, np.inf) for name, values in each.items()}
+    return {name: np.where(np.isfinite(values), values, np.inf) for name, values in quantities.items()}
 
 
 def shape(tops: Tops, u: Array, rate: Array) -> Array:
@@ -191,23 +191,23 @@ def shape(tops: Tops, u: Array, rate: Array) -> Array:
     a, b, beta = p_psi / I1, p_phi / I1, 2.0 * mgl / I1
     alpha = (2.0 * tops.energy[:, np.newaxis] - p_psi**2 / I3) / I1
     omega = 2.0 * math.pi / tops.period[:, np.newaxis]
-    off = rate**2 - (1.0 - u * u) * (alpha - beta * u) + (b - a * u) ** 2
+    gap = rate**2 - (1.0 - u * u) * (alpha - beta * u) + (b - a * u) ** 2
     slope = 2.0 * a * (b - a * u) - 2.0 * u * (alpha - beta * u) - beta * (1.0 - u * u)
-    return np.asarray(np.abs(off) / np.hypot(slope, 2.0 * omega * rate))
+    return np.asarray(np.abs(gap) / np.hypot(slope, 2.0 * omega * rate))
 
 
-def measured(variant: Integrator, tops: Tops, wanted: Sequence[Asked]) -> list[tuple[Array, Array]]:
+def measured(variant: Integrator, tops: Tops, requests: Sequence[Asked]) -> list[tuple[Array, Array]]:
     """For each setting, the largest errors (quantities, horizons, n) of the stretches, inf after a failure, and
     evaluations a nutation.
     """
-    (chart,), made = variant.charts(), []
-    for (setting, ends, _), (shown, times) in zip(wanted, run(variant, tops, wanted), strict=True):
-        each = errors(chart, tops, shown, times)
-        largest = np.stack([each[name].reshape(len(times), len(ends), SAMPLES).max(axis=2).T for name in QUANTITIES])
+    (chart,), results = variant.charts(), []
+    for (setting, ends, _), (samples, times) in zip(requests, run(variant, tops, requests), strict=True):
+        by_name = errors(chart, tops, samples, times)
+        largest = np.stack([by_name[name].reshape(len(times), len(ends), SAMPLES).max(axis=2).T for name in QUANTITIES])
         if variant.fixed_step and setting < LEAST_STEPS:
             largest[1:] = np.inf
-        made.append((largest, np.where(shown.ended, shown.evaluations / ends[-1], np.nan)))
-    return made
+        results.append((largest, np.where(samples.ended, samples.evaluations / ends[-1], np.nan)))
+    return results
 
 
 def ladder(variant: Integrator, tops: Tops, levels: int, steps: float, budget: float) -> xr.Dataset:
@@ -221,27 +221,27 @@ def ladder(variant: Integrator, tops: Tops, levels: int, steps: float, budget: f
     far, n = horizons(), len(tops.period)
     seen, work = np.full((len(QUANTITIES), levels, far.size, n), np.nan), np.full((levels, n), np.nan)
     reach, values = np.full(levels, np.nan), np.full(levels, np.nan)
-    wanted: dict[int, Asked] = {}
+    requests: dict[int, Asked] = {}
     for level in range(levels):
         setting = setting_of(variant, level)
         if math.isnan(setting):
             break
-        ((tried, first),) = measured(
+        ((first_errors, first),) = measured(
             variant, tops, [Asked(setting, far[:1], math.inf if variant.fixed_step else budget)]
         )
-        taken = float(np.nanmedian(first)) if np.isfinite(first).any() else math.nan
-        if math.isnan(taken):
+        typical = float(np.nanmedian(first)) if np.isfinite(first).any() else math.nan
+        if math.isnan(typical):
             values[level], reach[level], seen[:, level, 0] = setting, far[0], np.inf
             continue
-        longest = min(budget / taken, steps / setting if variant.fixed_step else math.inf, 1.0001e6)
+        longest = min(budget / typical, steps / setting if variant.fixed_step else math.inf, 1.0001e6)
         if longest < far[laws.FEWEST]:
             break
-        wanted[level] = Asked(setting, far[far <= longest], 10.0 * budget)
-        if np.median(tried[:, 0], axis=1).max() < DONE:
+        requests[level] = Asked(setting, far[far <= longest], 10.0 * budget)
+        if np.median(first_errors[:, 0], axis=1).max() < DONE:
             break
-    for (level, asked), shown in zip(wanted.items(), measured(variant, tops, list(wanted.values())), strict=True):
-        values[level], reach[level] = asked.setting, asked.ends[-1]
-        seen[:, level, : asked.ends.size], work[level] = shown
+    for (level, request), pair in zip(requests.items(), measured(variant, tops, list(requests.values())), strict=True):
+        values[level], reach[level] = request.setting, request.ends[-1]
+        seen[:, level, : request.ends.size], work[level] = pair
     grain = grain_of(tops)
     return predicted(seen, work, far, grain, drifts=drifts_of(variant)).assign(
         setting_value=("setting", values), reach=("setting", reach), chart=((), variant.charts()[0]),
@@ -309,13 +309,13 @@ class Diagram(NamedTuple):
 
 def runs_of(data: xr.DataTree, name: str) -> xr.Dataset:
     """The runs of a variant: without padding; errors are infinite for runs that failed or have no growth law."""
-    one = data["far"].to_dataset().isel(scene=0).sel(variant=name)
-    one = one.isel(setting=np.flatnonzero(np.isfinite(one["setting_value"].values)))
-    dead = np.isnan(one["work"]).all("member")  # all failed: there is no more to measure
+    runs = data["far"].to_dataset().isel(scene=0).sel(variant=name)
+    runs = runs.isel(setting=np.flatnonzero(np.isfinite(runs["setting_value"].values)))
+    dead = np.isnan(runs["work"]).all("member")  # all failed: there is no more to measure
     work = "setting", "member"
-    filled_in = work_of(one["work"].transpose(*work).values, one["setting_value"].values, integrator(name).fixed_step)
-    return one.assign(
-        error=one["error"].fillna(np.inf), reach=one["reach"].where(~dead, np.inf), work=(work, filled_in)
+    filled_in = work_of(runs["work"].transpose(*work).values, runs["setting_value"].values, integrator(name).fixed_step)
+    return runs.assign(
+        error=runs["error"].fillna(np.inf), reach=runs["reach"].where(~dead, np.inf), work=(work, filled_in)
     )
 
 
@@ -348,15 +348,15 @@ def diagram(data: xr.DataTree, quantity: str) -> Diagram:
     """The panel of a quantity."""
     names, costs, unseen, levels = variants_of(data, quantity), [], [], []
     for name in names:
-        one = runs_of(data, name)
-        errors = one["error"].sel(quantity=quantity).transpose("setting", "horizon", "member").values.astype(float)
-        work = one["work"].values * price_of(data, name, one["setting_value"].values)[:, np.newaxis]
+        runs = runs_of(data, name)
+        errors = runs["error"].sel(quantity=quantity).transpose("setting", "horizon", "member").values.astype(float)
+        work = runs["work"].values * price_of(data, name, runs["setting_value"].values)[:, np.newaxis]
         seconds = np.stack([cost_to_reach(work, errors[:, k], TARGETS) for k in range(errors.shape[1])], axis=1)
         places = np.arange(len(work))[:, np.newaxis, np.newaxis]
         level = np.stack([np.where(errors <= target, -1, places).max(axis=0) for target in TARGETS]) + 1
         costs.append(np.median(seconds, axis=2))
         levels.append(level)
-        reach, far = one["reach"].values, one["horizon"].values
+        reach, far = runs["reach"].values, runs["horizon"].values
         fine = np.minimum(level, len(reach) - 1)
         shorter = np.minimum(reach[fine], reach[np.maximum(level - 1, 0)])
         unseen.append((shorter < 0.999 * far[:, np.newaxis]).mean(axis=2) > 0.5)
@@ -375,48 +375,48 @@ def diagram(data: xr.DataTree, quantity: str) -> Diagram:
 
 def chosen(data: xr.DataTree, limit: float) -> list[dict[str, Any]]:
     """Settings of the checks: predicted cells at some targets and horizons, runs of at most `limit` evaluations."""
-    asked: list[dict[str, Any]] = []
+    cases: list[dict[str, Any]] = []
     for quantity in QUANTITIES[:2]:
         panel = diagram(data, quantity)
         for target in CHECKED_TARGETS:
             for horizon in CHECKED_AT:
-                at = panel.place(target, horizon)
-                if not panel.predicted[at] or not np.isfinite(panel.ratio[at]):
+                cell = panel.place(target, horizon)
+                if not panel.predicted[cell] or not np.isfinite(panel.ratio[cell]):
                     continue
-                pair, settings, dearest = (int(panel.winner[at]), int(panel.second[at])), [], 0.0
+                pair, settings, dearest = (int(panel.winner[cell]), int(panel.second[cell])), [], 0.0
                 for row in pair:
-                    one = runs_of(data, panel.names[row])
-                    fine = min(int(np.median(panel.levels[row][at])), one.sizes["setting"] - 1)
-                    settings.append(one["setting_value"].values[[max(fine - 1, 0), fine]].tolist())
-                    dearest = max(dearest, float(np.nanmax(one["work"].values[fine])) * horizon)
+                    table = runs_of(data, panel.names[row])
+                    fine = min(int(np.median(panel.levels[row][cell])), table.sizes["setting"] - 1)
+                    settings.append(table["setting_value"].values[[max(fine - 1, 0), fine]].tolist())
+                    dearest = max(dearest, float(np.nanmax(table["work"].values[fine])) * horizon)
                 runs = [[panel.names[row] for row in pair], settings]
-                if dearest <= limit and all([one["integrators"], one["settings"]] != runs for one in asked):
-                    asked.append({
+                if dearest <= limit and all([case["integrators"], case["settings"]] != runs for case in cases):
+                    cases.append({
                         "integrators": [panel.names[row] for row in pair], "quantity": quantity, "target": target,
                         "horizon": horizon, "settings": settings, "seed": data["far"].attrs.get("seed", 1),
                     })  # fmt: skip
-    return asked
+    return cases
 
 
-def check(asked: Any) -> xr.Dataset:
+def check(case: Any) -> xr.Dataset:
     """Largest ``errors`` of the first `CHECKED_TOPS` natural tops in the runs that decide a cell, over ``rank`` (the
     winner and the next variant), ``side`` (the coarser and the finer setting) and ``member``.
     """
-    tops, far = tops_of(CHECKED_TOPS, asked["seed"]), horizons()
-    ends = far[far <= 1.0001 * asked["horizon"]]
-    place = QUANTITIES.index(asked["quantity"])
+    tops, far = tops_of(CHECKED_TOPS, case["seed"]), horizons()
+    ends = far[far <= 1.0001 * case["horizon"]]
+    place = QUANTITIES.index(case["quantity"])
     errors = np.full((2, 2, CHECKED_TOPS), np.nan)
-    for rank, (name, pair) in enumerate(zip(asked["integrators"], asked["settings"], strict=True)):
+    for rank, (name, pair) in enumerate(zip(case["integrators"], case["settings"], strict=True)):
         runs = measured(integrator(name), tops, [Asked(setting, ends, np.inf) for setting in pair])
-        errors[rank] = [one[place].max(axis=0) for one, _ in runs]
+        errors[rank] = [error[place].max(axis=0) for error, _ in runs]
     return xr.Dataset(
         {
             "errors": (("rank", "side", "member"), errors),
-            "setting_value": (("rank", "side"), np.array(asked["settings"])),
-            "contender": ("rank", list(asked["integrators"])),
-            "quantity": ((), asked["quantity"]),
-            "target": ((), asked["target"]),
-            "checked_horizon": ((), asked["horizon"]),
+            "setting_value": (("rank", "side"), np.array(case["settings"])),
+            "contender": ("rank", list(case["integrators"])),
+            "quantity": ((), case["quantity"]),
+            "target": ((), case["target"]),
+            "checked_horizon": ((), case["horizon"]),
         }
     )
 
@@ -430,15 +430,15 @@ def checks(data: xr.DataTree) -> pd.DataFrame:
     names, rows = ["quantity", "target", "horizon", "winner", "next", "told", "ratio"], []
     group = data["checks"].to_dataset().isel(scene=0) if "checks" in data.children else None
     for name in () if group is None else group["variant"].values:
-        one = group.sel(variant=name)
-        quantity, target, horizon = str(one["quantity"].values), float(one["target"]), float(one["checked_horizon"])
-        pair, errors = list(map(str, one["contender"].values)), one["errors"].transpose("rank", "side", "member").values
+        row = group.sel(variant=name)
+        quantity, target, horizon = str(row["quantity"].values), float(row["target"]), float(row["checked_horizon"])
+        pair, errors = list(map(str, row["contender"].values)), row["errors"].transpose("rank", "side", "member").values
         cell = [quantity, target, horizon, *pair]
         for rank, side in np.ndindex(2, 2):
-            runs, setting = runs_of(data, pair[rank]), float(one["setting_value"][rank, side])
+            runs, setting = runs_of(data, pair[rank]), float(row["setting_value"][rank, side])
             level = int(np.argmin(np.abs(np.log(runs["setting_value"].values / setting))))
-            told = runs["error"].sel(quantity=quantity).isel(setting=level).sel(horizon=horizon, method="nearest")
-            for error, foretold in zip(errors[rank, side].tolist(), told.values.tolist(), strict=False):
-                ratio = error / foretold if max(error, foretold) < 1.0 else math.nan
-                rows.append([*cell, (error <= target) == (foretold <= target), ratio])
+            foreseen = runs["error"].sel(quantity=quantity).isel(setting=level).sel(horizon=horizon, method="nearest")
+            for error, prediction in zip(errors[rank, side].tolist(), foreseen.values.tolist(), strict=False):
+                ratio = error / prediction if max(error, prediction) < 1.0 else math.nan
+                rows.append([*cell, (error <= target) == (prediction <= target), ratio])
     return pd.DataFrame(rows, columns=names).astype({"told": bool, "ratio": float})

@@ -45,27 +45,27 @@ TITLES = {
 
 def pictures(data: xr.DataTree) -> list[Picture]:
     """All figures."""
-    drawn = {"accuracy": draw_accuracy, "run-lengths-evaluations": draw_run_lengths}
-    drawn |= {"map": draw_map} if "far" in data.children else {}
-    return [Picture(name, draw(data)) for name, draw in drawn.items()]
+    draws = {"accuracy": draw_accuracy, "run-lengths-evaluations": draw_run_lengths}
+    draws |= {"map": draw_map} if "far" in data.children else {}
+    return [Picture(name, draw(data)) for name, draw in draws.items()]
 
 
 def draw_accuracy(data: xr.DataTree) -> Any:
     """Error against the seconds of a safe run: the fastest for any body at each error, and well-known methods."""
-    each = {target: cells.reached(data, target) for target in cells.targets(data)}
-    every = list(dict.fromkeys(name for known in each.values() for name in known))
+    by_target = {target: cells.reached(data, target) for target in cells.targets(data)}
+    names = list(dict.fromkeys(name for known in by_target.values() for name in known))
     figure, axes = panels(1, 1, height=4.0)
     axis, ends = axes[0, 0], []
-    for name in chosen(every, [*FAMILIAR, *_safe_names(data)], len(FAMILIAR)):
+    for name in chosen(names, [*FAMILIAR, *_safe_names(data)], len(FAMILIAR)):
         points = [(1e6 * known[name].seconds, target, 1e6 * known[name].low, 1e6 * known[name].high)
-                  for target, known in each.items() if name in known]  # fmt: skip
+                  for target, known in by_target.items() if name in known]  # fmt: skip
         x, y, low, high = np.array(points).T
-        look, whom = style.line(name), " (this top)" if integrator(name).needs == TOP else serves(name)
+        look, suffix = style.line(name), " (this top)" if integrator(name).needs == TOP else serves(name)
         axis.plot(x, y, lw=1.6, zorder=3, **look)
         axis.hlines(y, low, high, color=look["color"], lw=3.0, alpha=0.35, zorder=2)
-        ends.append((f"{name.removesuffix('[axis]')}{whom}", look["color"], x, y))
+        ends.append((f"{name.removesuffix('[axis]')}{suffix}", look["color"], x, y))
     axis.set(xscale="log", yscale="log", ylim=(2e-13, 5e-3), ylabel="axis error that 95 % of the tops keep (rad)")
-    axis.set_yticks(list(each), [f"$10^{{{math.log10(target):.0f}}}$" for target in each])
+    axis.set_yticks(list(by_target), [f"$10^{{{math.log10(target):.0f}}}$" for target in by_target])
     axis.yaxis.minorticks_off()
     axis.set_xlabel("time of a safe run: evaluations × price + call (µs)")
     low, high = axis.get_xlim()
@@ -78,24 +78,24 @@ def _safe_names(data: xr.DataTree) -> list[str]:
     """The cheapest safe choice for any body at each error, and of those that use f(t, y) alone."""
     asked = [Cell("short", "axis", target, NATURAL, needs)
              for needs in (GENERAL, "derivative") for target in cells.targets(data)]  # fmt: skip
-    return list(dict.fromkeys(one.name for cell in asked for one in cells.safest(data, cell)[0][:1]))
+    return list(dict.fromkeys(choice.name for cell in asked for choice in cells.safest(data, cell)[0][:1]))
 
 
 def draw_run_lengths(data: xr.DataTree) -> Any:
     """The share of natural tops that each variant solves within a number of force evaluations, a panel per target."""
-    asked = [Cell("short", "axis", target, NATURAL) for target in cells.targets(data)]
-    each = [cells.costs(data, cell, EVALUATIONS) for cell in asked]
-    firsts = filter(None, (cells.fewest(data, cell) for cell in asked))
-    every = list(dict.fromkeys(name for taken in each for name in taken.names))
-    rows = chosen(every, list(dict.fromkeys([*_safe_names(data), *firsts, *BESIDE]))[:NAMED], NAMED)
+    panel_cells = [Cell("short", "axis", target, NATURAL) for target in cells.targets(data)]
+    tables = [cells.costs(data, cell, EVALUATIONS) for cell in panel_cells]
+    firsts = filter(None, (cells.fewest(data, cell) for cell in panel_cells))
+    names = list(dict.fromkeys(name for table in tables for name in table.names))
+    rows = chosen(names, list(dict.fromkeys([*_safe_names(data), *firsts, *BESIDE]))[:NAMED], NAMED)
     labels = "force evaluations of a run", "share of tops solved"
-    figure, axes = grid(len(asked), 2, labels, height=2.3, sharex=True, sharey=True)
-    named = [taken.values[taken.names.index(name)] for taken in each for name in rows if name in taken.names]
-    ends = [np.quantile(part[np.isfinite(part)], LATEST) for part in named if np.isfinite(part).any()]
-    cheapest = min((float(taken.values.min()) for taken in each if taken.values.size), default=1.0)
+    figure, axes = grid(len(panel_cells), 2, labels, height=2.3, sharex=True, sharey=True)
+    curves = [table.values[table.names.index(name)] for table in tables for name in rows if name in table.names]
+    ends = [np.quantile(part[np.isfinite(part)], LATEST) for part in curves if np.isfinite(part).any()]
+    cheapest = min((float(table.values.min()) for table in tables if table.values.size), default=1.0)
     budgets = np.geomspace(0.9 * cheapest, 1.5 * max(ends, default=10.0 * cheapest), 400)
-    for axis, cell, taken in zip(axes, asked, each, strict=True):
-        for name, costs in zip(taken.names, taken.values, strict=True):
+    for axis, cell, table in zip(axes, panel_cells, tables, strict=True):
+        for name, costs in zip(table.names, table.values, strict=True):
             share = run_lengths(costs, budgets)
             if name in rows:
                 axis.plot(budgets, share, markevery=(5 * rows.index(name), len(budgets) // MARKS), lw=1.6, zorder=3,
@@ -105,7 +105,7 @@ def draw_run_lengths(data: xr.DataTree) -> Any:
         axis.axhline(HALF, color="black", lw=0.8, ls=(0, (1, 2)), zorder=2)
         axis.set(xscale="log", ylim=(0.0, 1.03), title=f"axis error below $10^{{{np.log10(cell.target):.0f}}}$ rad")
         axis.yaxis.set_major_formatter(lambda value, _: f"{100.0 * value:.0f} %")
-    if len(every) > len(rows):
+    if len(names) > len(rows):
         axes[0].plot([], [], color=style.GREY, lw=0.8, label="all other methods for any body")
     few_ticks(*axes, most=5)
     style.legend_below(figure, axes)
@@ -114,12 +114,12 @@ def draw_run_lengths(data: xr.DataTree) -> Any:
 
 def draw_map(data: xr.DataTree) -> Any:
     """Three panels: the cheapest variant for every allowed error and run length."""
-    each = {quantity: far.diagram(data, quantity) for quantity in far.QUANTITIES}
-    won = Counter(panel.names[k] for panel in each.values() for k in panel.winner.ravel() if k >= 0)
+    diagrams = {quantity: far.diagram(data, quantity) for quantity in far.QUANTITIES}
+    won = Counter(panel.names[k] for panel in diagrams.values() for k in panel.winner.ravel() if k >= 0)
     colors = _colors([name for name, _ in won.most_common(MOST_KEYS)])
     colors |= {name: REST for name in won if name not in colors}
     figure, axes = panels(1, len(far.QUANTITIES), height=3.6, sharex=True, sharey=True)
-    for axis, (quantity, panel) in zip(axes[0], each.items(), strict=True):
+    for axis, (quantity, panel) in zip(axes[0], diagrams.items(), strict=True):
         _panel(axis, panel, colors)
         axis.set(title=TITLES[quantity], xlabel="run length (nutations)")
     axes[0][0].set_ylabel("largest error allowed")
@@ -135,8 +135,8 @@ def _colors(names: list[str]) -> dict[str, str]:
     """A colour for each variant: its own, or an unused one if a variant with more cells has that."""
     colors: dict[str, str] = {}
     for name in names:
-        every = [style.look(name).color, *LEFT, *style.SHADES["engine"], *style.SHADES["other"]]
-        colors[name] = next((color for color in every if color not in colors.values()), style.GREY)
+        palette = [style.look(name).color, *LEFT, *style.SHADES["engine"], *style.SHADES["other"]]
+        colors[name] = next((color for color in palette if color not in colors.values()), style.GREY)
     return colors
 
 

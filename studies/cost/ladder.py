@@ -114,8 +114,8 @@ def at_tolerance(variant: Integrator, tops: Tops, chosen: Members, tolerance: fl
     times, solver = tops.times[chosen], next(iter(variant.solvers.values()))
     if isinstance(solver, Adaptive):
         n, samples = times.shape
-        done, _ = solver.many(tops.numbers[chosen], np.full(n, tolerance), times, np.full(n, samples), budget)
-        return of_length_one(variant, Level(done.states, done.momenta, done.work.astype(float), done.outcome))
+        runs, _ = solver.many(tops.numbers[chosen], np.full(n, tolerance), times, np.full(n, samples), budget)
+        return of_length_one(variant, Level(runs.states, runs.momenta, runs.work.astype(float), runs.outcome))
     plans = [Plan.until(row_times, tolerance, budget) for row_times in times]
     return one_by_one(variant, tops.members(chosen), plans)
 
@@ -162,7 +162,7 @@ def climb(
     n, (chart,) = len(tops.period), variant.solvers
     names = (*asked, *(name for name in ("axis", "energy", MOMENTA) if name not in asked))
     blank = np.full((LEVELS, n), np.nan)
-    done = Climb(blank.copy(), {name: blank.copy() for name in names}, np.zeros((LEVELS, n), bool), np.zeros(n, bool))
+    record = Climb(blank.copy(), {name: blank.copy() for name in names}, np.zeros((LEVELS, n), bool), np.zeros(n, bool))
     everyone = np.flatnonzero(tops.known)
     for block in [everyone] if variant.fixed_step else np.array_split(everyone, -(-everyone.size // BLOCK) or 1):
         live = block
@@ -170,38 +170,38 @@ def climb(
             if not live.size or math.isnan(setting_of(variant, level)):
                 break
             runs = run(variant, tops, live, level, budget)
-            shown = tops.errors(chart, runs, live)
-            good = (runs.outcome == 0) & np.isfinite(shown["axis"])
-            done.work[level, live], done.ended[level, live] = runs.work, good
-            for name, values in done.errors.items():
-                values[level, live] = np.where(good, shown[name], np.inf)
-            stay, settled = _stay(variant, done, asked, live, level, budget)
-            done.settled[live] = settled
+            errors = tops.errors(chart, runs, live)
+            good = (runs.outcome == 0) & np.isfinite(errors["axis"])
+            record.work[level, live], record.ended[level, live] = runs.work, good
+            for name, values in record.errors.items():
+                values[level, live] = np.where(good, errors[name], np.inf)
+            stay, settled = _next_members(variant, record, asked, live, level, budget)
+            record.settled[live] = settled
             live = live[stay]
-    return done
+    return record
 
 
-def _stay(
-    variant: Integrator, done: Climb, asked: dict[str, NDArray[np.bool_]], live: Members, level: int, budget: float
+def _next_members(
+    variant: Integrator, record: Climb, asked: dict[str, NDArray[np.bool_]], live: Members, level: int, budget: float
 ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:  # fmt: skip
     """Which of the live members go on to the next setting, and which have an accurate run."""
-    work, good = done.work[level, live], done.ended[level, live]
+    work, good = record.work[level, live], record.ended[level, live]
     typical = float(np.max(work[good], initial=1.0))  # a run that failed early has not shown what the next one costs
     work = np.where(good, work, typical)
     ratio, falls = growth_of_work(variant), 2.0 ** float(variant.order or 1) if variant.fixed_step else 10.0
     left = np.floor(np.log(budget / np.maximum(work, 1.0)) / math.log(ratio))
-    settled = done.errors["axis"][level, live] <= ASYMPTOTIC
+    settled = record.errors["axis"][level, live] <= ASYMPTOTIC
     worth = ~settled
     for name, targets in asked.items():
-        error = np.maximum(done.errors[name][level, live], 1e-300)
-        before = done.errors[name][level - 1, live] if level else np.full(live.size, np.inf)
+        error = np.maximum(record.errors[name][level, live], 1e-300)
+        before = record.errors[name][level - 1, live] if level else np.full(live.size, np.inf)
         open_targets = targets[:, live] & (error > np.asarray(TARGETS)[:, np.newaxis])
         following = np.max(np.where(open_targets, np.asarray(TARGETS)[:, np.newaxis], 0.0), axis=0)
         with np.errstate(all="ignore"):
             gain = np.clip(before / error, falls, 1e4)
             gain = np.where(np.isfinite(before), gain, 1e4)
             foreseen = error * gain**-left / FORGIVEN
-        earlier = before if variant.fixed_step or level < 2 else done.errors[name][level - 2, live]
+        earlier = before if variant.fixed_step or level < 2 else record.errors[name][level - 2, live]
         stuck = (error < NEAR_ROUNDING) & (error > earlier / FLAT)
         worth |= (following > 0.0) & ~stuck & ((foreseen <= following) | (error > ASYMPTOTIC))
     return worth & (left >= 1.0), settled
@@ -217,56 +217,56 @@ def stored(values: Array) -> Array:
 def table(variant: Integrator, tops: Tops, budget: float, *, twin: bool, guarded: int) -> xr.Dataset:
     """The dataset of one variant over one horizon."""
     asked = {name: mask for name, mask in tops.asked(TARGETS).items() if name in quantities_of(variant, twin)}
-    done = climb(variant, tops, asked, budget)
+    record = climb(variant, tops, asked, budget)
     scenes = tops.kinds == KINDS.index(SCENE)
     energy_from = round(math.log2(LEAST_STEPS / FIRST)) if variant.fixed_step else 0
     data: dict[str, Any] = {
-        **costs_of(variant, done, asked, ASKED, {"energy": energy_from}),
-        "work": (("level", "kind"), typical_work(variant, done, tops)),
-        **{name: (("level", "kind"), values) for name, values in _healthy(done, tops).items()},
+        **costs_of(variant, record, asked, ASKED, {"energy": energy_from}),
+        "work": (("level", "kind"), typical_work(variant, record, tops)),
+        **{name: (("level", "kind"), values) for name, values in _outcome_counts(record, tops).items()},
         "drawn": ("kind", [float((tops.known & (tops.kinds == kind)).sum()) for kind in range(len(KINDS))]),
-        "scene_error": (("level", "named"), stored(done.errors["axis"][:, scenes])),
-        "scene_work": (("level", "named"), done.work[:, scenes]),
+        "scene_error": (("level", "named"), stored(record.errors["axis"][:, scenes])),
+        "scene_work": (("level", "named"), record.work[:, scenes]),
         "chart": ((), variant.charts()[0]),
         "control": ((), variant.control or ""),
         "needs": ((), variant.needs or ""),
         "general": ((), float(variant.general or False)),
         "budget": ((), budget),
-        "made": ((), float(np.isfinite(done.work).sum())),
-        "evaluated": ((), float(np.nansum(done.work))),
+        "made": ((), float(np.isfinite(record.work).sum())),
+        "evaluated": ((), float(np.nansum(record.work))),
     }
     if guarded:
         data |= {
             name: (("level", "guarded"), stored(values))
-            for name, values in guarded_runs(variant, tops, done, guarded, budget).items()
+            for name, values in guarded_runs(variant, tops, record, guarded, budget).items()
         }
     return xr.Dataset(data, coords={"quantity": list(ASKED), "target": list(TARGETS), "kind": list(KINDS)})
 
 
 def costs_of(
-    variant: Integrator, done: Climb, asked: dict[str, NDArray[np.bool_]], names: Sequence[str],
+    variant: Integrator, record: Climb, asked: dict[str, NDArray[np.bool_]], names: Sequence[str],
     firsts: dict[str, int] | None = None,
 ) -> dict[str, Any]:  # fmt: skip
     """The variables ``cost``, ``met_at`` and ``setting``; `firsts` gives the first level that counts for a quantity."""
     settings = np.array([setting_of(variant, level) for level in range(LEVELS)])
-    set_to = np.where(np.isfinite(done.work), settings[:, np.newaxis], np.nan)
-    costs, met = (np.full((len(names), len(TARGETS), done.work.shape[1]), np.nan, np.float32) for _ in range(2))
+    set_to = np.where(np.isfinite(record.work), settings[:, np.newaxis], np.nan)
+    costs, met_at = (np.full((len(names), len(TARGETS), record.work.shape[1]), np.nan, np.float32) for _ in range(2))
     for place, name in enumerate(names):
         if name in asked:
             first = (firsts or {}).get(name, 0)
-            for into, values in ((costs, done.work), (met, set_to)):
-                reached = cost_to_reach(values[first:], done.errors[name][first:], TARGETS)
-                into[place] = np.where(asked[name], stored(reached), np.nan)
+            for array, values in ((costs, record.work), (met_at, set_to)):
+                reached = cost_to_reach(values[first:], record.errors[name][first:], TARGETS)
+                array[place] = np.where(asked[name], stored(reached), np.nan)
     over = "quantity", "target", "member"
-    return {"cost": (over, costs), "met_at": (over, met), "setting": ("level", settings)}
+    return {"cost": (over, costs), "met_at": (over, met_at), "setting": ("level", settings)}
 
 
-def typical_work(variant: Integrator, done: Climb, tops: Any) -> Array:
+def typical_work(variant: Integrator, record: Climb, tops: Any) -> Array:
     """Force evaluations of the median top of each kind, (LEVELS, kinds); NaN below the least tolerance of a variant.
 
     The work of a top that left the ladder is extrapolated by the growth of the work of those that stayed.
     """
-    work = done.work.copy()
+    work = record.work.copy()
     for level in range(1, LEVELS):
         left = np.isnan(work[level])
         with np.errstate(all="ignore"):
@@ -275,8 +275,8 @@ def typical_work(variant: Integrator, done: Climb, tops: Any) -> Array:
         work[level, left] = ratio * work[level - 1, left]
     limit = [np.isfinite(setting_of(variant, level)) for level in range(LEVELS)]
     kinds = [tops.known & (tops.kinds == kind) for kind in range(len(KINDS))]
-    each = [np.median(work[:, chosen], axis=1) if chosen.any() else np.full(LEVELS, np.nan) for chosen in kinds]
-    return np.where(np.array(limit)[:, np.newaxis], np.stack(each, axis=1), np.nan)
+    medians = [np.median(work[:, chosen], axis=1) if chosen.any() else np.full(LEVELS, np.nan) for chosen in kinds]
+    return np.where(np.array(limit)[:, np.newaxis], np.stack(medians, axis=1), np.nan)
 
 
 def growth_of_work(variant: Integrator) -> float:
@@ -284,43 +284,43 @@ def growth_of_work(variant: Integrator) -> float:
     return 2.0 if variant.fixed_step else 10.0 ** (1.0 / (variant.order or 20))
 
 
-def _healthy(done: Climb, tops: Tops) -> dict[str, Array]:
+def _outcome_counts(record: Climb, tops: Tops) -> dict[str, Array]:
     """Numbers of members judged, wrong, ended `ok` and silent failures, (LEVELS, kinds)."""
-    ran, error = np.isfinite(done.work), done.errors["axis"]
-    right_later = done.settled & ~ran & tops.known  # left before with an accurate run
+    ran, error = np.isfinite(record.work), record.errors["axis"]
+    right_later = record.settled & ~ran & tops.known  # left before with an accurate run
     wrong = ran & ~(error <= WRONG)
-    silent = wrong & done.ended & (done.errors["energy"] <= KEPT) & (done.errors[MOMENTA] <= KEPT)
-    counted = {"runs": ran | right_later, "wrong": wrong, "ended": done.ended | right_later, "silent": silent}
+    silent = wrong & record.ended & (record.errors["energy"] <= KEPT) & (record.errors[MOMENTA] <= KEPT)
+    masks = {"runs": ran | right_later, "wrong": wrong, "ended": record.ended | right_later, "silent": silent}
     return {
         name: np.stack([mask[:, tops.kinds == kind].sum(axis=1) for kind in range(len(KINDS))], axis=1).astype(float)
-        for name, mask in counted.items()
+        for name, mask in masks.items()
     }
 
 
-def guarded_runs(variant: Integrator, tops: Tops, done: Climb, guarded: int, budget: float) -> dict[str, Array]:
+def guarded_runs(variant: Integrator, tops: Tops, record: Climb, guarded: int, budget: float) -> dict[str, Array]:
     """Axis errors by the guard's forecast and of the runs, and errors of constants, of the first members.
 
     Arrays (LEVELS, guarded). The error of a run that ends early is infinite, in the forecast and in the run.
     """
     (chart,) = variant.charts()
-    seen = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured", "whole")}
-    each = [
+    data = {name: np.full((LEVELS, guarded), np.nan) for name in ("foretold", "watched", "measured", "whole")}
+    halves = [
         np.flatnonzero(tops.known & part)
         for part in (tops.kinds < KINDS.index(NATURAL), tops.kinds == KINDS.index(NATURAL))
     ]
-    chosen = np.concatenate([each[0][: guarded // 2], each[1][: guarded // 2]])
+    chosen = np.concatenate([halves[0][: guarded // 2], halves[1][: guarded // 2]])
     for place, (top, start) in enumerate(tops.members(chosen)):
         member = chosen[place]
         scene = Scene(f"member-{member}", top, start, horizon=float(tops.times[member, -1]))
         for level in range(GUARDED_LEVELS):
-            if math.isfinite(done.work[level, member]):
+            if math.isfinite(record.work[level, member]):
                 if variant.fixed_step:
                     plan = Plan.steps(float(tops.period[member]) / FIRST * 0.5**level, tops.marks << level)
                 else:
                     plan = Plan.until(tops.times[member], setting_of(variant, level), budget)
                 expected = forecast(scene, variant, chart, plan)
-                seen["foretold"][level, place] = expected.axis_error if expected.outcome == "ok" else math.inf
-                seen["whole"][level, place] = expected.whole
-                seen["watched"][level, place] = max(done.errors[name][level, member] for name in ("energy", MOMENTA))
-                seen["measured"][level, place] = done.errors["axis"][level, member]
-    return seen
+                data["foretold"][level, place] = expected.axis_error if expected.outcome == "ok" else math.inf
+                data["whole"][level, place] = expected.whole
+                data["watched"][level, place] = max(record.errors[name][level, member] for name in ("energy", MOMENTA))
+                data["measured"][level, place] = record.errors["axis"][level, member]
+    return data

@@ -65,13 +65,13 @@ class Laws(NamedTuple):
         return np.asarray(terms[:, 0] + np.where(np.isnan(terms[:, 1]), 0.0, terms[:, 1]))
 
 
-def fit(horizons: Array, errors: Array, most: float = 2.0, *, drifts: bool = False) -> Laws:
+def fit(horizons: Array, errors: Array, limit: float = 2.0, *, drifts: bool = False) -> Laws:
     """Laws of errors (n, horizons), NaN where a run was not measured; NaN where too few points are left.
 
-    `most` is the largest power that can be, `drifts` whether it is known to come.
+    `limit` is the largest power that can be, `drifts` whether it is known to come.
     """
     n = len(errors)
-    doubt, share = (0.5 if most == 1.0 else LOOSE, 0.0) if drifts else (DOUBT, SHARE)
+    doubt, share = (0.5 if limit == 1.0 else LOOSE, 0.0) if drifts else (DOUBT, SHARE)
     good = np.isfinite(errors) & (errors > 0.0) & (errors < SATURATED)
     last = np.max(np.where(good, horizons, 0.0), axis=1)
     good &= horizons >= last[:, np.newaxis] * 10.0**-DECADES
@@ -89,7 +89,7 @@ def fit(horizons: Array, errors: Array, most: float = 2.0, *, drifts: bool = Fal
             x = columns(power)
             a = x.sum(axis=1) / (x * x).sum(axis=1)
             misfit = ((a[:, np.newaxis] * x - good) ** 2).sum(axis=1)
-            better = enough & (misfit < best) & (power <= most)
+            better = enough & (misfit < best) & (power <= limit)
             powers[better], coefficients[better] = (power, np.nan), np.stack([a, a * np.nan], axis=1)[better]
             best = np.where(better, misfit, best)
         for low, high in PAIRS:
@@ -97,13 +97,13 @@ def fit(horizons: Array, errors: Array, most: float = 2.0, *, drifts: bool = Fal
             xx, yy, xy, x1, y1 = ((p * q).sum(axis=1) for p, q in ((x, x), (y, y), (x, y), (x, good), (y, good)))
             det = xx * yy - xy * xy
             a, b = (yy * x1 - xy * y1) / det, (xx * y1 - xy * x1) / det
-            rest = ((a[:, np.newaxis] * x + b[:, np.newaxis] * y - good) ** 2).sum(axis=1)
+            misfit = ((a[:, np.newaxis] * x + b[:, np.newaxis] * y - good) ** 2).sum(axis=1)
             carried = b * last**high / (a * last**low + b * last**high)
-            error = np.sqrt(rest / (count - 2) / det)
+            error = np.sqrt(misfit / (count - 2) / det)
             clear = (a > times * np.sqrt(yy) * error) & (b > times * np.sqrt(xx) * error)
-            better = enough & (rest < best) & clear & (carried >= share) & (high <= most)
+            better = enough & (misfit < best) & clear & (carried >= share) & (high <= limit)
             powers[better], coefficients[better] = (low, high), np.stack([a, b], axis=1)[better]
-            best = np.where(better, rest, best)
+            best = np.where(better, misfit, best)
         u, v = np.log(horizons) * good, np.log(np.where(good, errors, 1.0))
         du = np.where(good, u - (u.sum(axis=1) / count)[:, np.newaxis], 0.0)
         slope = (du * v).sum(axis=1) / (du * du).sum(axis=1)
@@ -116,9 +116,9 @@ def fit(horizons: Array, errors: Array, most: float = 2.0, *, drifts: bool = Fal
 def walk(energy: Array, evaluations: Array) -> Array:
     """w (members,): the least energy error over sqrt(evaluations), of arrays (settings, horizons, members)."""
     with np.errstate(all="ignore"):
-        each = energy / np.sqrt(evaluations)
-    each = np.where(np.isfinite(each) & (each > 0.0), each, np.inf)
-    return np.asarray(each.min(axis=(0, 1)))
+        w = energy / np.sqrt(evaluations)
+    w = np.where(np.isfinite(w) & (w > 0.0), w, np.inf)
+    return np.asarray(w.min(axis=(0, 1)))
 
 
 def rounding(quantity: str, w: Array, horizons: Array, evaluations: Array) -> Array:
@@ -127,16 +127,16 @@ def rounding(quantity: str, w: Array, horizons: Array, evaluations: Array) -> Ar
     return np.asarray(walked * 2.0 * math.pi * horizons / math.sqrt(3.0) if quantity == "axis" else walked)
 
 
-def least(errors: Array, told: Array, noise: Array) -> Array:
+def least(errors: Array, law: Array, noise: Array) -> Array:
     """Factors (n,) that limit the `noise` (n, horizons) of each run to what its measured errors allow.
 
-    If the law `told` fits the errors within a relative misfit m, noise in quadrature is at most sqrt(2 m) of the last.
+    If the law `law` fits the errors within a relative misfit m, noise in quadrature is at most sqrt(2 m) of the last.
     """
     measured = np.isfinite(errors) & (errors > 0.0)
     last = np.max(np.where(measured, np.arange(errors.shape[1]), 0), axis=1)[:, np.newaxis]
     with np.errstate(all="ignore"):
         late = measured & (np.arange(errors.shape[1]) > last - DECADES * LATE)
-        misfit = np.max(np.where(late, np.abs(errors / told - 1.0), 0.0), axis=1)
+        misfit = np.max(np.where(late, np.abs(errors / law - 1.0), 0.0), axis=1)
         room = np.sqrt(np.minimum(2.0 * np.where(np.isfinite(misfit), misfit, 1.0), 1.0))
         largest = np.max(np.where(measured, errors, 0.0), axis=1)
         ratio = room * largest / np.take_along_axis(noise, last, axis=1)[:, 0]

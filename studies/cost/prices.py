@@ -71,8 +71,8 @@ Call = tuple[Callable[[], object], float]  # with its number of force evaluation
 @functools.cache
 def timed_top() -> tuple[SymmetricTop, Angles, float]:
     """The top that is timed, its start and its nutation period."""
-    drawn = population(DRAWN, seed=0, kind=KIND)
-    numbers = np.stack([drawn[name].values for name in NUMBERS], axis=1)
+    members = population(DRAWN, seed=0, kind=KIND)
+    numbers = np.stack([members[name].values for name in NUMBERS], axis=1)
     forms = ClosedForms(numbers)
     low, high = forms.theta_range.T
     chosen = int(np.flatnonzero((low > CLEAR) & (high < np.pi - CLEAR))[0])
@@ -83,8 +83,8 @@ def timed_top() -> tuple[SymmetricTop, Angles, float]:
 @functools.cache
 def timed_body() -> tuple[RigidBody, Attitude, float]:
     """The body without symmetry that is timed, its start and its natural period."""
-    one = body_scenes()["heavy-brick"]
-    return one.top, one.start, one.time_scale()
+    scene = body_scenes()["heavy-brick"]
+    return scene.top, scene.start, scene.time_scale()
 
 
 def tolerances_of(variant: Integrator) -> tuple[float, ...]:
@@ -112,14 +112,14 @@ def slopes(names: list[str], rounds: int, batch: float) -> list[tuple[str, float
               for name in names for tolerance in tolerances_of(integrator(name))}  # fmt: skip
     if HEYOKA in names:
         makers[SAMPLED, TOLERANCE] = functools.partial(run_of, integrator(HEYOKA), TOLERANCE, own=False)
-    each = {key: [make(nutations) for nutations in LENGTHS] for key, make in makers.items()}
-    taken = timings([call for pair in each.values() for call, _ in pair], rounds, batch, warm=True)
-    answers = []
-    for (key, ((_, few), (_, most))), short, long in zip(each.items(), taken[::2], taken[1::2], strict=True):
-        if most > few:  # a run that fails early has no slope
-            price = (long.best - short.best) / (most - few)
-            answers.append((*key, price, short.best - few * price))
-    return answers
+    runs = {key: [make(nutations) for nutations in LENGTHS] for key, make in makers.items()}
+    times = timings([call for pair in runs.values() for call, _ in pair], rounds, batch, warm=True)
+    rows = []
+    for (key, ((_, n_short), (_, n_long))), short, long in zip(runs.items(), times[::2], times[1::2], strict=True):
+        if n_long > n_short:  # a run that fails early has no slope
+            price = (long.best - short.best) / (n_long - n_short)
+            rows.append((*key, price, short.best - n_short * price))
+    return rows
 
 
 def measured(names: list[str], rounds: int, batch: float) -> xr.Dataset:
@@ -129,12 +129,12 @@ def measured(names: list[str], rounds: int, batch: float) -> xr.Dataset:
     """
     price, call = (np.full((len(names), len(TOLERANCES)), np.nan) for _ in range(2))
     sampled = np.full(len(names), np.nan)
-    for name, tolerance, slope, rest in fresh_process.call(slopes, names, rounds, batch):
+    for name, tolerance, slope, intercept in fresh_process.call(slopes, names, rounds, batch):
         if name == SAMPLED:
             sampled[names.index(HEYOKA)] = slope
             continue
-        at = TOLERANCES.index(tolerance) if len(tolerances_of(integrator(name))) > 1 else slice(None)
-        price[names.index(name), at], call[names.index(name), at] = slope, max(rest, 0.0)
+        column = TOLERANCES.index(tolerance) if len(tolerances_of(integrator(name))) > 1 else slice(None)
+        price[names.index(name), column], call[names.index(name), column] = slope, max(intercept, 0.0)
     data = {"price": (("variant", "priced_at"), price), "call": (("variant", "priced_at"), call)}
     return xr.Dataset(data | {"sampled": ("variant", sampled)}, {"variant": names, "priced_at": list(TOLERANCES)})
 
@@ -153,12 +153,12 @@ class Prices(NamedTuple):
     def at(self, name: str, tolerances: Array) -> tuple[Array, Array]:
         """Price and call at each tolerance, interpolated in logarithms; NaN is a variant with a step."""
         row, x = self.names.index(name), -np.log(TOLERANCES)
-        at = np.where(np.isfinite(tolerances), -np.log(np.where(tolerances > 0.0, tolerances, 1.0)), x[-1])
+        u = np.where(np.isfinite(tolerances), -np.log(np.where(tolerances > 0.0, tolerances, 1.0)), x[-1])
         known = np.isfinite(self.price[row])  # of a run that fails at a loose tolerance there is none
         if not known.any():
-            return np.full(at.shape, np.nan), np.full(at.shape, np.nan)
-        price = np.exp(np.interp(at, x[known], np.log(self.price[row, known])))
-        return price, np.interp(at, x[known], self.call[row, known])
+            return np.full(u.shape, np.nan), np.full(u.shape, np.nan)
+        price = np.exp(np.interp(u, x[known], np.log(self.price[row, known])))
+        return price, np.interp(u, x[known], self.call[row, known])
 
 
 def quartile_spread(samples: Array, axis: int = -1) -> Array:
@@ -198,20 +198,20 @@ def prices(data: xr.DataTree) -> Prices:
     group = data["prices"].to_dataset().transpose("scene", "variant", "priced_at")
     names = [str(name) for name in group["variant"].values]
     of_batch = [str(name).partition("-")[0] for name in group["scene"].values]
-    places = [[k for k, one in enumerate(of_batch) if one == batch] for batch in BATCHES]
+    places = [[k for k, name in enumerate(of_batch) if name == batch] for batch in BATCHES]
     batches = [group.isel(scene=chosen) for chosen in places if chosen]
-    each = [combined(batch["price"].values, batch["call"].values) for batch in batches]
-    spreads = np.stack([quiet_median(spread) for *_, spread in each])  # (batches, variants)
+    results = [combined(batch["price"].values, batch["call"].values) for batch in batches]
+    spreads = np.stack([quiet_median(spread) for *_, spread in results])  # (batches, variants)
     best = np.argmin(spreads, axis=0)
 
     def chosen(parts: list[Array]) -> Array:
         return np.stack([parts[batch][row] for row, batch in enumerate(best)])
 
-    price, error = chosen([middle for middle, *_ in each]), chosen([quiet_median(error) for *_, error, _ in each])
-    call = chosen([rest for _, rest, *_ in each])
+    price, error = chosen([middle for middle, *_ in results]), chosen([quiet_median(error) for *_, error, _ in results])
+    call = chosen([call for _, call, *_ in results])
     with np.errstate(all="ignore"):
         ratio = group["sampled"].values / group["price"].sel(priced_at=TOLERANCE, method="nearest").values
     spread = np.array([spreads[batch, row] for row, batch in enumerate(best)])
-    marked = [name for name, one in zip(names, spread, strict=True) if not one <= NOISY]
+    marked = [name for name, value in zip(names, spread, strict=True) if not value <= NOISY]
     return Prices(names, price, call, np.minimum(error, 1.0), spread, marked,
                   float(np.nanmedian(ratio)) if np.isfinite(ratio).any() else np.nan)  # fmt: skip

@@ -74,8 +74,8 @@ def slowdowns(costs: Array) -> Array:
 
 def run_lengths(costs: Array, budgets: Array) -> Array:
     """The share of tops solved within each budget: an empirical distribution, NaN costs (not asked) left out."""
-    asked = np.sort(costs[~np.isnan(costs)])
-    return np.searchsorted(asked, budgets, side="right") / max(asked.size, 1)
+    known = np.sort(costs[~np.isnan(costs)])
+    return np.searchsorted(known, budgets, side="right") / max(known.size, 1)
 
 
 def factors(errors: Array, draws: int = DRAWS) -> Array:
@@ -132,8 +132,8 @@ def hindsight(names: Sequence[str], costs: Array, errors: Array, marked: Sequenc
     lucky = np.random.default_rng(3).integers(len(names), size=DRAWS)
     shares = np.zeros((DRAWS, len(names)))
     for draw, factor in enumerate(factors(errors)):
-        each, _ = wins(ratio[near] * factor[near, np.newaxis])
-        shares[draw, near] = each @ weights[draw, :-1] / total
+        wins_, _ = wins(ratio[near] * factor[near, np.newaxis])
+        shares[draw, near] = wins_ @ weights[draw, :-1] / total
         shares[draw, lucky[draw]] += weights[draw, -1] / total
     middle, half = won.mean(axis=1), level.mean(axis=1)
     low, high = np.quantile(shares, ENDS, axis=0)
@@ -174,30 +174,30 @@ def _rank(n: int) -> int:
 
 def safe(ladders: Sequence[Ladder], marked: Sequence[str] = ()) -> tuple[list[Safe], bool]:
     """The safe choices of all variants, cheapest first, and whether the lead of the first is called."""
-    factor = factors(np.array([one.error for one in ladders]))
-    answers, draws = [], []
-    for one, prices in zip(ladders, factor.T, strict=True):
-        fine = np.log(np.where(one.met_at > 0.0, one.met_at, np.inf)) * (1.0 if one.fixed else -1.0)
-        fine = np.where(np.isfinite(one.met_at) & (one.met_at > 0.0), fine, np.inf)
+    factor = factors(np.array([ladder.error for ladder in ladders]))
+    choices, draws = [], []
+    for ladder, prices in zip(ladders, factor.T, strict=True):
+        fine = np.log(np.where(ladder.met_at > 0.0, ladder.met_at, np.inf)) * (1.0 if ladder.fixed else -1.0)
+        fine = np.where(np.isfinite(ladder.met_at) & (ladder.met_at > 0.0), fine, np.inf)
         by_setting, n = np.argsort(fine), fine.size
         many = bootstrap_counts(n)[:, np.append(by_setting, n)].cumsum(axis=1) >= _rank(n + 1)
         fine = np.append(fine[by_setting], np.inf)
         chosen = np.append(fine[max(_rank(n), 1) - 1], fine[many.argmax(axis=1)])
-        there = np.isfinite(one.seconds) & np.isfinite(one.settings)
-        x = np.log(one.settings[there]) * (1.0 if one.fixed else -1.0)
+        known = np.isfinite(ladder.seconds) & np.isfinite(ladder.settings)
+        x = np.log(ladder.settings[known]) * (1.0 if ladder.fixed else -1.0)
         costs = np.full(len(chosen), np.inf)
-        if there.any():
+        if known.any():
             within = np.isfinite(chosen) & (chosen <= x[-1] + 1e-9)
-            costs[within] = np.exp(np.interp(np.asarray(chosen)[within], x, np.log(one.seconds[there])))
+            costs[within] = np.exp(np.interp(np.asarray(chosen)[within], x, np.log(ladder.seconds[known])))
         sample = costs[1:] * prices
-        setting = math.exp(chosen[0] if one.fixed else -chosen[0]) if np.isfinite(costs[0]) else math.inf
+        setting = math.exp(chosen[0] if ladder.fixed else -chosen[0]) if np.isfinite(costs[0]) else math.inf
         ends = np.quantile(sample, ENDS, method="nearest")
-        answers.append(Safe(one.name, setting, float(costs[0]), float(ends[0]), float(ends[1])))
+        choices.append(Safe(ladder.name, setting, float(costs[0]), float(ends[0]), float(ends[1])))
         draws.append(sample)
-    order = sorted(range(len(answers)), key=lambda place: answers[place].seconds)
-    if not order or not math.isfinite(answers[order[0]].seconds):
-        return [answers[place] for place in order], False
+    order = sorted(range(len(choices)), key=lambda place: choices[place].seconds)
+    if not order or not math.isfinite(choices[order[0]].seconds):
+        return [choices[place] for place in order], False
     table = np.array(draws)
-    rest = np.delete(table, order[0], axis=0).min(axis=0, initial=np.inf)
-    called = bool(np.mean(table[order[0]] < rest) >= SURE and answers[order[0]].name not in marked)
-    return [answers[place] for place in order], called
+    others = np.delete(table, order[0], axis=0).min(axis=0, initial=np.inf)
+    called = bool(np.mean(table[order[0]] < others) >= SURE and choices[order[0]].name not in marked)
+    return [choices[place] for place in order], called

@@ -55,17 +55,17 @@ def has_twin(variant: Integrator) -> bool:
 
 def timing(names: list[str], batch: str, *, quick: bool) -> list[Case]:
     """One case for each process of a batch that times the variants."""
-    asked = {"integrators": names, "rounds": 2 if quick else 4, "batch": 0.0005 if quick else 0.001}
+    settings = {"integrators": names, "rounds": 2 if quick else 4, "batch": 0.0005 if quick else 0.001}
     processes = range(ENOUGH if quick else PROCESSES)
-    return [Case(f"{batch}-{k}", "together", asked, timed=True, group=PRICES) for k in processes]
+    return [Case(f"{batch}-{k}", "together", settings, timed=True, group=PRICES) for k in processes]
 
 
 def grid(*, quick: bool = False) -> list[Case]:
     """Every variant over ten nutations, the tops themselves, the prices, and the candidates of the phase diagram."""
-    asked, names = QUICK if quick else FULL, [variant.name for variant in compiled_variants()]
+    settings, names = QUICK if quick else FULL, [variant.name for variant in compiled_variants()]
     return [
-        *(Case("tops", name, asked[SHORT], group=SHORT) for name in names),
-        *(Case(span, "exact", asked[span], group=TOPS) for span in (SHORT, LONG)),
+        *(Case("tops", name, settings[SHORT], group=SHORT) for name in names),
+        *(Case(span, "exact", settings[span], group=TOPS) for span in (SHORT, LONG)),
         *timing(names, BATCHES[0], quick=quick),
         *(Case("natural", name, FAR_QUICK if quick else FAR_FULL, group=FAR) for name in far.candidates()),
     ]
@@ -74,17 +74,17 @@ def grid(*, quick: bool = False) -> list[Case]:
 def follow_up(data: xr.DataTree) -> list[Case]:
     """Long runs of possible winners, recommended settings on other tops, noisy prices again, checks of the map."""
     quick = cells.members(data, SHORT) < FULL[SHORT]["natural"]
-    asked = (QUICK if quick else FULL)[LONG]
+    plan = (QUICK if quick else FULL)[LONG]
     known = prices(data)
     quiet = [name for name in known.names if name not in known.marked]
-    again = [*known.marked, *quiet[:: max(len(quiet) // COMPANY, 1)]] if known.marked else []
+    names = [*known.marked, *quiet[:: max(len(quiet) // COMPANY, 1)]] if known.marked else []
     short = (QUICK if quick else FULL)[SHORT]
-    other = {"members": short["natural"], "seed": SEED + 1, "nutations": short["nutations"]}
+    options = {"members": short["natural"], "seed": SEED + 1, "nutations": short["nutations"]}
     settings = cells.advised(data, [*facts.HAVE, *figures.FAMILIAR])
     return [
-        *(Case("tops", name, asked, group=LONG) for name in cells.contenders(data)),
-        *(Case(NATURAL, name, other | {"start": start}, group=SAFE) for name, start in settings.items()),
-        *(timing(again, BATCHES[1], quick=quick) if again else []),
+        *(Case("tops", name, plan, group=LONG) for name in cells.contenders(data)),
+        *(Case(NATURAL, name, options | {"start": start}, group=SAFE) for name, start in settings.items()),
+        *(timing(names, BATCHES[1], quick=quick) if names else []),
         *(Case("natural", f"check-{place:02d}", settings, group=CHECKS)
           for place, settings in enumerate(far.chosen(data, CHECKED[quick]) if FAR in data.children else ())),
     ]  # fmt: skip
@@ -92,22 +92,22 @@ def follow_up(data: xr.DataTree) -> list[Case]:
 
 def measure(case: Case) -> xr.Dataset:
     """The table of a variant, of its settings, of the tops, of the prices, or of the phase diagram."""
-    asked = case.settings
+    settings = case.settings
     if case.group == PRICES:
-        return measured(asked["integrators"], asked["rounds"], asked["batch"])
+        return measured(settings["integrators"], settings["rounds"], settings["batch"])
     if case.group == CHECKS:
-        return far.check(asked)
+        return far.check(settings)
     if case.group == FAR:
-        tops = far.tops_of(asked["members"], asked["seed"])
-        return far.ladder(integrator(case.integrator), tops, asked["levels"], asked["steps"], asked["budget"])
+        tops = far.tops_of(settings["members"], settings["seed"])
+        return far.ladder(integrator(case.integrator), tops, settings["levels"], settings["steps"], settings["budget"])
     if case.group == SAFE:
-        return confirm(integrator(case.integrator), **asked)
-    drawn = tops_of(asked["strata"], asked["natural"], asked["seed"], asked["nutations"])
+        return confirm(integrator(case.integrator), **settings)
+    tops = tops_of(settings["strata"], settings["natural"], settings["seed"], settings["nutations"])
     if case.group == TOPS:
-        return about_tops(drawn).assign(nutations=asked["nutations"])
+        return about_tops(tops).assign(nutations=settings["nutations"])
     row = integrator(case.integrator)
-    return table(row, drawn, asked["budget"], twin=has_twin(row), guarded=asked["guarded"]).assign(
-        nutations=asked["nutations"]
+    return table(row, tops, settings["budget"], twin=has_twin(row), guarded=settings["guarded"]).assign(
+        nutations=settings["nutations"]
     )
 
 

@@ -170,29 +170,29 @@ class Tops:
                 self._members[k] = member
             yield member
 
-    def errors(self, chart: str, shown: Samples, chosen: NDArray[np.int64]) -> dict[str, Array]:
+    def errors(self, chart: str, samples: Samples, chosen: NDArray[np.int64]) -> dict[str, Array]:
         """Largest error of each quantity of the chosen members' runs, (chosen,); inf after a failure.
 
         `attitude` is left out where the chart does not show it.
         """
         parts = [slice(begin, begin + TOGETHER) for begin in range(0, max(len(chosen), 1), TOGETHER)]
-        each = [self._errors(chart, shown.states[part], shown.momenta[part], chosen[part]) for part in parts]
-        return {name: np.concatenate([part[name] for part in each]) for name in each[0]}
+        pieces = [self._errors(chart, samples.states[part], samples.momenta[part], chosen[part]) for part in parts]
+        return {name: np.concatenate([part[name] for part in pieces]) for name in pieces[0]}
 
     def _errors(self, chart: str, states: Array, momenta: Array, chosen: NDArray[np.int64]) -> dict[str, Array]:
         """The errors of a few members."""
         p_phi, p_psi = momenta[..., 0], momenta[..., 1]
         view = View(chart, together(self.numbers[chosen]), states, p_phi, p_psi)
         with np.errstate(all="ignore"):  # a run may have blown up
-            each = {"axis": charts.axis_distance(view.axis, self.truth[0][chosen])}
+            errors = {"axis": charts.axis_distance(view.axis, self.truth[0][chosen])}
             if chart != "axis":
-                each["attitude"] = charts.attitude_distance(view.quaternion, self.truth[1][chosen])
-            off = np.abs(view.energy - self.energy[chosen, np.newaxis])
-            each["energy"] = off / self.energy_scale[chosen, np.newaxis]
+                errors["attitude"] = charts.attitude_distance(view.quaternion, self.truth[1][chosen])
+            change = np.abs(view.energy - self.energy[chosen, np.newaxis])
+            errors["energy"] = change / self.energy_scale[chosen, np.newaxis]
             start = [part[chosen, np.newaxis] for part in self.momenta[:2]]
             scale = np.maximum(np.maximum(np.abs(start[0]), np.abs(start[1])), TINY)
-            each[MOMENTA] = np.maximum(np.abs(p_phi - start[0]), np.abs(p_psi - start[1])) / scale
-            largest = {name: values.max(axis=1) for name, values in each.items()}
+            errors[MOMENTA] = np.maximum(np.abs(p_phi - start[0]), np.abs(p_psi - start[1])) / scale
+            largest = {name: values.max(axis=1) for name, values in errors.items()}
         return {name: np.where(np.isfinite(values), values, np.inf) for name, values in largest.items()}
 
 
@@ -204,9 +204,9 @@ def natural(members: int, seed: int) -> Array:
     spin = np.where(draw[3] < 0.5, -2.0, 2.0) * 2.0 ** (9.0 * draw[2] - 4.0)  # I3 w3
     speed, way = 2.0 * draw[4], 2.0 * np.pi * draw[5]
     phi_dot = speed * np.sin(way) / np.sin(theta)
-    one = np.ones(members)
+    ones = np.ones(members)
     columns = {
-        "I1": one, "I3": ratio, "mgl": one, "theta": theta, "phi": np.pi * (2.0 * draw[6] - 1.0),
+        "I1": ones, "I3": ratio, "mgl": ones, "theta": theta, "phi": np.pi * (2.0 * draw[6] - 1.0),
         "psi": np.pi * (2.0 * draw[7] - 1.0), "theta_dot": speed * np.cos(way), "phi_dot": phi_dot,
         "psi_dot": spin / ratio - phi_dot * np.cos(theta),
     }  # fmt: skip
@@ -215,16 +215,16 @@ def natural(members: int, seed: int) -> Array:
 
 def named() -> dict[str, Array]:
     """The nine numbers of each scene of the catalogue that has a nutation and repeats no other."""
-    each = {name: scenes.scene(name) for name in grid_scenes(LEFT_OUT)}
-    chosen = {name: one for name, one in each.items() if math.isfinite(one.nutation_period)}
-    return {name: np.array(flat(one.top, one.start)) for name, one in chosen.items()}
+    catalogue = {name: scenes.scene(name) for name in grid_scenes(LEFT_OUT)}
+    chosen = {name: scene for name, scene in catalogue.items() if math.isfinite(scene.nutation_period)}
+    return {name: np.array(flat(scene.top, scene.start)) for name, scene in chosen.items()}
 
 
 @functools.lru_cache(maxsize=3)
 def tops_of(strata: int, natural_tops: int, seed: int, nutations: float) -> Tops:
     """Tops of both populations and the named scenes; cached, as every variant runs the same."""
-    drawn = population(strata, seed=seed)
-    parts = np.stack([drawn[name].values for name in NUMBERS], axis=1), natural(natural_tops, seed), [*named().values()]
-    places = [KINDS.index(name) for name in drawn["stratum"].values]
+    draws = population(strata, seed=seed)
+    parts = np.stack([draws[name].values for name in NUMBERS], axis=1), natural(natural_tops, seed), [*named().values()]
+    places = [KINDS.index(name) for name in draws["stratum"].values]
     kinds = [*places, *[KINDS.index(NATURAL)] * natural_tops, *[KINDS.index(SCENE)] * len(parts[2])]
     return Tops(np.concatenate([np.reshape(part, (-1, len(NUMBERS))) for part in parts]), nutations, np.array(kinds))

@@ -44,7 +44,7 @@ NAMES = {  # of the facts of each group
 
 def facts(data: xr.DataTree) -> dict[str, Any]:
     """The settings of the runs, and how constants and phase changed; changes are relative."""
-    answers: dict[str, Any] = dict.fromkeys(" ".join(NAMES.values()).split()) | {
+    values: dict[str, Any] = dict.fromkeys(" ".join(NAMES.values()).split()) | {
         "rounding": RUN_ROUNDING,  # the largest change that a million steps of rounding explain
         "per_nutation": PER_NUTATION,  # steps of the long runs
         "lost_phase": LOST,  # rad
@@ -52,22 +52,22 @@ def facts(data: xr.DataTree) -> dict[str, Any]:
     measures = {HISTORIES: of_histories, WINDOWS: of_windows, ROUNDINGS: of_walks, HORIZONS: of_losses}
     for group, of_group in measures.items():
         if group in data:
-            answers |= of_group(data[group].to_dataset())
-    return answers
+            values |= of_group(data[group].to_dataset())
+    return values
 
 
 def of_histories(histories: xr.Dataset) -> dict[str, Any]:
     """A million steps of every variant."""
     fate, phases, length = fates(histories), phases_by_energy(histories), shares(histories)
-    own = histories["own_tolerance"].max("scene").values > 0.0
-    given = histories["tolerance"].max("scene").values[~own]
+    default = histories["own_tolerance"].max("scene").values > 0.0
+    tolerances = histories["tolerance"].max("scene").values[~default]
     kept = fate[list(CONSTANTS)].isin(HELD)
     lost = fate["energy_largest"][fate["energy"].isin(BEHAVIOURS[2:])]
     return {
         "nutations": float(histories["nutations"].max()),
         "steps": float(histories["steps_a_nutation"].max()),
-        "tolerance": float(np.nanmax(given)) if np.isfinite(given).any() else None,
-        "own": int(own.sum()),  # variants that ran at their own tolerance, the rounding of the arithmetic
+        "tolerance": float(np.nanmax(tolerances)) if np.isfinite(tolerances).any() else None,
+        "own": int(default.sum()),  # variants that ran at their own tolerance, the rounding of the arithmetic
         "variants": len(fate),
         "holding": int(kept.all(axis=1).sum()),
         "shortened": int((length < WHOLE).sum()),
@@ -109,12 +109,12 @@ def of_walks(ensembles: xr.Dataset) -> dict[str, Any]:
 def of_losses(horizons: xr.Dataset) -> dict[str, Any]:
     """How well a short run predicts when the phase is lost."""
     lost, short = loss_table(horizons), float(horizons["short"].max())
-    off = np.abs(lost["predicted / measured"] - 1.0)
+    misses = np.abs(lost["predicted / measured"] - 1.0)
     return {
         "lost_short": short,  # nutations
         "lost_later": float(lost["measured (nutations)"].median() / short),  # times as late as the short run ends
-        "lost_hits": int((off <= CLOSE).sum()),
-        "lost_hit_most": float(off[off <= CLOSE].max()),
+        "lost_hits": int((misses <= CLOSE).sum()),
+        "lost_hit_most": float(misses[misses <= CLOSE].max()),
         "lost_count": len(lost),
     }
 
@@ -122,12 +122,12 @@ def of_losses(horizons: xr.Dataset) -> dict[str, Any]:
 def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
     """How many variants keep or lose each constant; every variant; losses of phase."""
     groups = {name: group.to_dataset() for name, group in data.children.items()}
-    made: dict[str, pd.DataFrame] = {}
+    frames: dict[str, pd.DataFrame] = {}
     if HISTORIES in groups:
-        made |= {"behaviours": behaviour_table(groups[HISTORIES]), "variants": variant_table(groups[HISTORIES])}
+        frames |= {"behaviours": behaviour_table(groups[HISTORIES]), "variants": variant_table(groups[HISTORIES])}
     if HORIZONS in groups:
-        made["losses"] = loss_table(groups[HORIZONS])
-    return made
+        frames["losses"] = loss_table(groups[HORIZONS])
+    return frames
 
 
 def behaviour_table(histories: xr.Dataset) -> pd.DataFrame:
@@ -144,7 +144,7 @@ def behaviour_table(histories: xr.Dataset) -> pd.DataFrame:
 
 def variant_table(histories: xr.Dataset) -> pd.DataFrame:
     """Every variant over all scenes, sorted by the change of the energy, the largest first."""
-    names = {f"{one}_largest": f"change of {one}" for one in CONSTANTS}
+    names = {f"{name}_largest": f"change of {name}" for name in CONSTANTS}
     table = fates(histories).rename(columns=names).replace(dict.fromkeys(CONSTANTS, MEANING))
     table["phase error (rad)"] = histories["phase_largest"].max("scene").values
     powers = histories["phase_exponent"]

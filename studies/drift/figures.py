@@ -25,8 +25,8 @@ NOTE = {"fontsize": LEAST_TEXT, "color": "#444444"}
 
 def pictures(data: xr.DataTree) -> list[Picture]:
     """The figures of every group that was measured."""
-    drawn = {HISTORIES: (_residuals,), ROUNDINGS: (_rounding,)}
-    return [draw(data[group].to_dataset()) for group, draws in drawn.items() if group in data for draw in draws]
+    functions = {HISTORIES: (_residuals,), ROUNDINGS: (_rounding,)}
+    return [draw(data[group].to_dataset()) for group, draws in functions.items() if group in data for draw in draws]
 
 
 def envelope(t: np.ndarray, r: np.ndarray) -> tuple[list[float], list[float]]:

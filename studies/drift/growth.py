@@ -118,10 +118,10 @@ def horizon(time: ArrayLike, error: ArrayLike, tolerance: float) -> Horizon:
 def lost_at(time: ArrayLike, error: ArrayLike, tolerance: float) -> float:
     """When |error| first reached `tolerance`, between means over short stretches; NaN if it never did, or at once."""
     t, e = _means(time, error)
-    over = np.abs(e) >= tolerance
-    if not over.any() or over[0]:
+    beyond = np.abs(e) >= tolerance
+    if not beyond.any() or beyond[0]:
         return math.nan
-    k = int(np.argmax(over))
+    k = int(np.argmax(beyond))
     share = (tolerance - abs(e[k - 1])) / (abs(e[k]) - abs(e[k - 1]))
     return float(t[k - 1] + share * (t[k] - t[k - 1]))
 
@@ -137,7 +137,7 @@ def _means(time: ArrayLike, error: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
 def columns_fitted(columns: Array, values: Array) -> tuple[Array, Array]:
     """Coefficients (m,) of columns (n, m) in values (n,), and their standard errors."""
     coefficients = np.linalg.lstsq(columns, values, rcond=None)[0]
-    rest = values - columns @ coefficients
+    residual = values - columns @ coefficients
     freedom = values.size - columns.shape[1]
-    variances = float(rest @ rest) / freedom * np.linalg.inv(columns.T @ columns).diagonal()
+    variances = float(residual @ residual) / freedom * np.linalg.inv(columns.T @ columns).diagonal()
     return np.asarray(coefficients), np.asarray(np.sqrt(variances))

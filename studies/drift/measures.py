@@ -41,7 +41,7 @@ def worst_behaviour(histories: xr.Dataset, name: str) -> str:
         return FAILED
     columns = (histories[f"{name}_{part}"].values for part in ("largest", "exponent", "exponent_interval"))
     grains = [grain(str(scene_name), name) for scene_name in histories["scene"].values]
-    behaviours = (behaviour(*map(float, one)) for one in zip(*columns, grains, strict=True))
+    behaviours = (behaviour(*map(float, row)) for row in zip(*columns, grains, strict=True))
     return max(behaviours, key=BEHAVIOURS.index)
 
 
@@ -58,9 +58,9 @@ def fates(histories: xr.Dataset) -> pd.DataFrame:
     """
     lines = pd.DataFrame(index=list(map(str, histories["variant"].values)))
     for name in CONSTANTS:
-        asked = histories[["outcome", *(f"{name}_{part}" for part in ("largest", "exponent", "exponent_interval"))]]
-        lines[name] = [worst_behaviour(asked.isel(variant=k), name) for k in range(len(lines))]
-        lines[f"{name}_largest"] = asked[f"{name}_largest"].max("scene").values
+        columns = histories[["outcome", *(f"{name}_{part}" for part in ("largest", "exponent", "exponent_interval"))]]
+        lines[name] = [worst_behaviour(columns.isel(variant=k), name) for k in range(len(lines))]
+        lines[f"{name}_largest"] = columns[f"{name}_largest"].max("scene").values
     return lines
 
 
@@ -68,8 +68,8 @@ def phases_by_energy(histories: xr.Dataset) -> dict[str, Array]:
     """Growth exponents of the phase error of all runs, by what the energy does: "bounded", "lost" or "kept"."""
     groups: dict[str, list[float]] = {"bounded": [], "lost": [], "kept": []}
     for name in histories["scene"].values:  # a variant may keep the energy on one scene and lose it on another
-        one = histories.sel(scene=[name])
-        for word, slope in zip(fates(one)["energy"], one["phase_exponent"].squeeze("scene").values, strict=True):
+        part = histories.sel(scene=[name])
+        for word, slope in zip(fates(part)["energy"], part["phase_exponent"].squeeze("scene").values, strict=True):
             if word != FAILED and np.isfinite(slope):
                 groups[word if word in HELD else "lost"].append(float(slope))
     return {word: np.array(slopes) for word, slopes in groups.items()}

@@ -49,8 +49,8 @@ def steps_for(scene: Scene, method: Integrator, target: float) -> float:
         return lost if good else math.inf, run.attrs["force_evaluations"]
 
     first, ends = period / FIRST.get(order, 12.37), (period / MOST, period / FEWEST)
-    step, why = seek(trial, first, LOST, ends, float(order), least=CLOSE)
-    return MOST if why else period / step
+    step, reason = seek(trial, first, LOST, ends, float(order), least=CLOSE)
+    return MOST if reason else period / step
 
 
 def phase_loss(

@@ -57,7 +57,7 @@ def members(scene: Scene, count: int) -> list[Scene]:
 
 def gauges_of(scenes: Sequence[Scene], method: Integrator, per_nutation: float) -> list[Gauge]:
     """The gauge of each long run, fitted to its beginning; the same for compensated and for plain sums."""
-    return [gauge_of(one, method, one.nutation_period / per_nutation) for one in scenes]
+    return [gauge_of(scene, method, scene.nutation_period / per_nutation) for scene in scenes]
 
 
 def side_by_side(
@@ -73,15 +73,15 @@ def side_by_side(
     if not compensated:
         assert isinstance(solver.loop, Loop)  # noqa: S101
         solver = replace(solver, loop=solver.loop.plain)
-    h = np.array([one.nutation_period / per_nutation for one in scenes])
+    h = np.array([scene.nutation_period / per_nutation for scene in scenes])
     ends = windows_until(steps)
     stretches = [scattered(begin, end) for begin, end in pairwise([0, *ends])]
     marks, cuts = np.concatenate(stretches), np.cumsum([0, *map(len, stretches)])
-    done = solver.many(np.array([flat(one.top, one.start) for one in scenes]), h, np.tile(marks, (len(scenes), 1)))
+    run = solver.many(np.array([flat(scene.top, scene.start) for scene in scenes]), h, np.tile(marks, (len(scenes), 1)))
     rows = np.empty((len(scenes), len(ends), len(QUANTITIES), 3))
     for i, gauge in enumerate(gauges):
         for k, (first, last) in enumerate(pairwise(cuts)):
-            part = gauge(done.states[i, first:last], done.momenta[i, first:last], shown=True)
+            part = gauge(run.states[i, first:last], run.momenta[i, first:last], shown=True)
             rows[i, k] = np.reshape(summary(part), (-1, 3))
     return np.array(ends, dtype=float), {name: rows[:, :, q] for q, name in enumerate(QUANTITIES)}
 
@@ -108,8 +108,8 @@ def rounding(scene: Scene, method: Integrator, steps: int, per_nutation: float, 
     gauges = gauges_of(scenes, method, per_nutation)
     for prefix, compensated, many in (("", True, count), ("plain_", False, PLAIN_MEMBERS)):
         chosen = scenes[:many], gauges[:many]
-        ends, seen = side_by_side(*chosen, method, steps, per_nutation, compensated=compensated)
-        elapsed, drifts = elapsed_steps(ends), seen["modified_energy"][..., MEAN]
+        ends, quantities = side_by_side(*chosen, method, steps, per_nutation, compensated=compensated)
+        elapsed, drifts = elapsed_steps(ends), quantities["modified_energy"][..., MEAN]
         grown = ensemble_growth(elapsed, drifts, ends[0])
         columns["elapsed"] = ("window", elapsed)
         columns[f"{prefix}drift"] = ((f"{prefix}member", "window"), drifts)
@@ -117,7 +117,7 @@ def rounding(scene: Scene, method: Integrator, steps: int, per_nutation: float, 
         columns[f"{prefix}end"] = float(grown.rms[-1])
         columns[f"{prefix}exponent"], columns[f"{prefix}exponent_interval"] = grown.fit.slope, grown.fit.interval
         for momentum in ("p_phi", "p_psi") if compensated else ():
-            columns[momentum] = float(np.abs(seen[momentum]).max())
+            columns[momentum] = float(np.abs(quantities[momentum]).max())
     late = elapsed > 0.1 * elapsed[-1]
     for prefix in ("", "plain_"):
         walks = columns[f"{prefix}drift"][1][:PLAIN_MEMBERS, late]
@@ -133,8 +133,8 @@ def run_history(
 
     The last two are NaN for a method without them; ``own_tolerance`` is true for one that ran at its own default.
     """
-    given: dict[str, Any] = {"step_size": step_size, "tolerance": tolerance}
-    data = history(scene, method, horizon=horizon, samples=samples, **{k: v for k, v in given.items() if v is not None})
+    args: dict[str, Any] = {"step_size": step_size, "tolerance": tolerance}
+    data = history(scene, method, horizon=horizon, samples=samples, **{k: v for k, v in args.items() if v is not None})
     used = method.check_tolerance(tolerance) if method.adaptive else math.nan
     return data.assign(
         nutations=horizon / scene.nutation_period,

@@ -60,7 +60,7 @@ def grid(
     variants = smallest_charts("nutation")
     return [
         *(Case(name, row.name, history_settings(scene(name), row, steps), group=HISTORIES)
-          for name in grid_scenes(left_out, lambda one: math.isfinite(one.nutation_period))
+          for name in grid_scenes(left_out, lambda scene: math.isfinite(scene.nutation_period))
           for row in variants),
         *(Case(LONG, row.name, settings, group=group) for row in variants if row.modified_energy
           for group, settings in ((WINDOWS, long_run), (ROUNDINGS, ensemble))),

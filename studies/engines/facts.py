@@ -59,8 +59,8 @@ def lines(data: xr.DataTree) -> pd.DataFrame:
     """One row for each variant, by name; errors in rad, `share` of followed tops, `group` the order of its map."""
     groups = (group for key, group in data.children.items() if key != "bodies")
     names = dict.fromkeys(str(name) for group in groups for name in group["variant"].values)
-    every = pd.DataFrame(_lines(data, names or {BESIDE: None})).set_index("variant", drop=False)
-    return every if names else every.iloc[:0]
+    table = pd.DataFrame(_lines(data, names or {BESIDE: None})).set_index("variant", drop=False)
+    return table if names else table.iloc[:0]
 
 
 def _lines(data: xr.DataTree, names: dict[str, None]) -> Iterator[dict[str, Any]]:
@@ -69,7 +69,7 @@ def _lines(data: xr.DataTree, names: dict[str, None]) -> Iterator[dict[str, Any]
         part = (count > BETWEEN[0]) & (count < BETWEEN[1]) & (error > ROUNDING)
         order, least = slope(count[part], error[part]), int(np.argmin(error)) if error.size else None
         single, term = entry.precision == "single", not split_name(name)[0].startswith("no-gyro")
-        off = np.degrees(read(data, "population", "off", scene="population", variant=name))
+        angles = np.degrees(read(data, "population", "off", scene="population", variant=name))
         yield {
             "variant": name, "summary": entry.summary, "engine": entry.family == "engine", "single": single,
             "term": term, "order": order, "group": 0.0 if not term else 1.0 if single else max(1.0, np.round(order)),
@@ -80,74 +80,74 @@ def _lines(data: xr.DataTree, names: dict[str, None]) -> Iterator[dict[str, Any]
             "slow_level": frame(data, "level_axis", name), "fast_level": frame(data, "level_axis", name, FAST),
             "energy": frame(data, "frame_energy", name, long=True), "spin": frame(data, "frame_spin", name, long=True),
             "spherical": frame(data, "frame_spherical", name),
-            "share": math.nan if np.isnan(off).any() else np.mean(off <= NEAR),
+            "share": math.nan if np.isnan(angles).any() else np.mean(angles <= NEAR),
         }  # fmt: skip
 
 
 def on_bodies(data: xr.DataTree) -> pd.DataFrame:
     """One row for each variant: largest attitude errors (rad) on each free body at each rate; order; engine or not."""
     names = [str(name) for name in data["bodies"]["variant"].values] if "bodies" in data.children else []
-    every = pd.DataFrame(index=pd.Index(names, name="variant"))
+    table = pd.DataFrame(index=pd.Index(names, name="variant"))
     entries = [integrator(name) for name in names]
-    every["order"] = [0.0 if one.method.startswith("no-gyro") else float(one.order or math.nan) for one in entries]
-    every["engine"] = [one.family == "engine" and one.precision == "double" for one in entries]
-    for one in BODIES:
+    table["order"] = [0.0 if row.method.startswith("no-gyro") else float(row.order or math.nan) for row in entries]
+    table["engine"] = [row.family == "engine" and row.precision == "double" for row in entries]
+    for body in BODIES:
         for rate in FREQUENCIES:
-            every[f"{one}, 1/{rate:g} s"] = [
-                float(read(data, "bodies", "attitude", scene=one, variant=name, rate=rate)) for name in names
+            table[f"{body}, 1/{rate:g} s"] = [
+                float(read(data, "bodies", "attitude", scene=body, variant=name, rate=rate)) for name in names
             ]
-    return every
+    return table
 
 
 def facts(data: xr.DataTree) -> dict[str, Any]:
     """The best and the worst maps, at equal steps and equal cost; the effect of the gyroscopic term. Errors in rad."""
-    every = lines(data)
-    maps = every[every["engine"] & ~every["single"]]
-    turned, without = maps[maps["term"]], maps[~maps["term"]]
-    floors = every[every["single"] & every["term"]]["best"]
-    beside = every.loc[BESIDE] if BESIDE in every.index else dict.fromkeys(every.columns)
+    table = lines(data)
+    maps = table[table["engine"] & ~table["single"]]
+    with_term, without_term = maps[maps["term"]], maps[~maps["term"]]
+    floors = table[table["single"] & table["term"]]["best"]
+    reference = table.loc[BESIDE] if BESIDE in table.index else dict.fromkeys(table.columns)
     members = read(data, "population", "steps_a_nutation")
     bodies = on_bodies(data)
-    racket, case = (bodies[bodies["engine"] & (bodies["order"] > 0)][f"{one}, 1/{USUAL:g} s"] for one in BODIES)
+    racket, case = (bodies[bodies["engine"] & (bodies["order"] > 0)][f"{body}, 1/{USUAL:g} s"] for body in BODIES)
     still = bodies[bodies["engine"] & (bodies["order"] == 0)][[f"{BODIES[1]}, 1/{rate:g} s" for rate in FREQUENCIES]]
     long = {name: maps[name].abs()[maps["slow"].notna()] for name in ("energy", "spin")}
-    answers: dict[str, Any] = {
+    numbers: dict[str, Any] = {
         "slow": SLOW, "fast": FAST, "fast_nutation": scene(FAST).nutation_period,  # s
-        "beside": BESIDE, "beside_fast_level": beside["fast_level"], "beside_share": beside["share"],
+        "beside": BESIDE, "beside_fast_level": reference["fast_level"], "beside_share": reference["share"],
         "near": NEAR, "usual": USUAL, "short": HORIZON, "long": long_time(data),  # s
         "maps": len(maps) or None,  # of engines, in double precision
         "members": members.shape[-1] if members.ndim else None,
-        "wall": without["best"].min(),  # without the term, at any step
-        "spherical": without["spherical"].max(),  # from the spherical top, which they follow
+        "wall": without_term["best"].min(),  # without the term, at any step
+        "spherical": without_term["spherical"].max(),  # from the spherical top, which they follow
         "share_least": maps["share"].min(), "share_most": maps["share"].max(),
         "singles": floors.count() or None, "single_best": floors.min(),
-        "lost": int((turned["fast_level"] > LOST).sum()) if turned["fast_level"].notna().any() else None,
+        "lost": int((with_term["fast_level"] > LOST).sum()) if with_term["fast_level"].notna().any() else None,
         "racket": BODIES[0], "case": BODIES[1], "body_maps": int(case.count()) or None,
         "racket_best": racket.min(), "racket_worst": racket.max(),
         "case_best": case.min(), "case_worst": case.max(), "case_wall": still.min(axis=None),
         "case_best_variant": case.idxmin() if case.count() else None,
         "case_worst_variant": case.idxmax() if case.count() else None,
-        "turned": len(turned) or None,  # maps with the term
-        "lacking": len(without), "in_single": int((every["engine"] & every["single"]).sum()),
-        "every": int(every["engine"].sum()) or None,
+        "turned": len(with_term) or None,  # maps with the term
+        "lacking": len(without_term), "in_single": int((table["engine"] & table["single"]).sum()),
+        "every": int(table["engine"].sum()) or None,
         "limit": LOST, "kept": KEPT,
         # a run that ended early has no energy or spin
         **{f"{name}_lost": int((~(sizes <= KEPT)).sum()) if len(sizes) else None for name, sizes in long.items()},
     }  # fmt: skip
-    for name, values, pick in (("best", turned["slow"], "min"), ("worst", turned["slow"], "max"),
+    for name, values, pick in (("best", with_term["slow"], "min"), ("worst", with_term["slow"], "max"),
                                ("level_fast", maps["fast_level"], "min")):  # fmt: skip
         known = values.dropna()
-        answers |= {
+        numbers |= {
             name: getattr(known, pick)(),
             f"{name}_variant": getattr(known, f"idx{pick}")() if len(known) else None,
         }
-    return answers
+    return numbers
 
 
 def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
     """Errors by the order of a map; every map at the usual step; errors on free bodies."""
-    every = lines(data).sort_values("slow", kind="stable")
-    groups = every[every["engine"] & ~every["single"]].groupby("group")
+    table = lines(data).sort_values("slow", kind="stable")
+    groups = table[table["engine"] & ~table["single"]].groupby("group")
     columns = {"slow": f"error on {SLOW} (rad)", "fast": f"error on {FAST} (rad)", "share": "share of tops followed"}
     ranges = groups[list(columns)].agg(["min", "max"])
     ranges.columns = pd.Index([f"{columns[name]}, {'least' if pick == 'min' else 'most'}" for name, pick in ranges])
@@ -164,5 +164,5 @@ def tables(data: xr.DataTree) -> dict[str, pd.DataFrame]:
     return {
         "bodies": bodies,
         "orders": orders[["measured order", "maps", *ranges.columns]],
-        "maps": every[list(names)].rename(columns=names),
+        "maps": table[list(names)].rename(columns=names),
     }

@@ -42,8 +42,8 @@ def color(row: pd.Series) -> str:
 
 def key(figure: Any, shades: Iterable[str]) -> None:
     """The legend of the colours in a figure, below it."""
-    said = ["no gyroscopic term", *(f"order {order:g}" for order in COLORS if order), "no engine, for comparison"]
-    for label, shade in zip(said, [*COLORS.values(), OURS], strict=True):
+    labels = ["no gyroscopic term", *(f"order {order:g}" for order in COLORS if order), "no engine, for comparison"]
+    for label, shade in zip(labels, [*COLORS.values(), OURS], strict=True):
         if shade in shades:
             figure.axes[0].plot([], [], "s", color=shade, ms=6, label=label)
     style.legend_below(figure, figure.axes)
@@ -84,18 +84,18 @@ def draw_error(data: xr.DataTree, known: pd.DataFrame, colors: dict[str, str]) -
 
 def draw_cost(data: xr.DataTree, known: pd.DataFrame, colors: dict[str, str]) -> Picture:
     """Axis errors at as many evaluations of the torque a second: a line a variant, a panel a scene."""
-    there = [one for one in SCENES if np.isfinite(read(data, "tops", "level_axis", scene=one)).any()]
+    scenes = [name for name in SCENES if np.isfinite(read(data, "tops", "level_axis", scene=name)).any()]
     names = list(known.sort_values(["slow_level", "fast_level"], kind="stable").index)
-    figure, axes = style.panels(1, len(there), height=0.15 * len(names) + 0.9, sharex=True, sharey=True)
-    for axis, at in zip(axes[0], there, strict=True):
+    figure, axes = style.panels(1, len(scenes), height=0.15 * len(names) + 0.9, sharex=True, sharey=True)
+    for axis, top in zip(axes[0], scenes, strict=True):
         for place, name in enumerate(names):
-            off = read(data, "tops", "level_axis", scene=at, variant=name, rate=list(FREQUENCIES), horizon=HORIZON)
+            off = read(data, "tops", "level_axis", scene=top, variant=name, rate=list(FREQUENCIES), horizon=HORIZON)
             heights = [place + shift for shift in APART]  # so that none covers another one of the same error
             axis.plot(off, heights, color=colors[name], lw=0.9, zorder=2)
             for value, height, mark in zip(off, heights, MARKS, strict=True):
                 axis.plot(value, height, marker=mark, ms=3.6, color=colors[name], mec="white", mew=0.3, zorder=3)
         axis.axvline(np.pi, color=style.GREY, lw=0.9, ls=(0, (1, 2)), zorder=1)
-        axis.set(xscale="log", xlabel=ERROR, title=f"scene {at}")
+        axis.set(xscale="log", xlabel=ERROR, title=f"scene {top}")
         rows(axis, names)
     for rate, mark in zip(FREQUENCIES, MARKS, strict=True):
         axes[0, 0].plot([], [], marker=mark, ms=4, color=OURS, ls="", label=f"{rate:g} evaluations a second")

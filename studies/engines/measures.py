@@ -37,26 +37,26 @@ WINDING = 32  # samples a nutation that the azimuth is followed by
 NUMBERS = ("axis", "spherical", "energy", "spin", "precession", "forces")
 
 
-def axis_angle(one: np.ndarray, other: np.ndarray) -> np.ndarray:
+def axis_angle(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """The angle between unit vectors, shape (..., 3) to (...); pi where a run has ended."""
-    angle = np.arctan2(np.linalg.norm(np.cross(one, other), axis=-1), np.sum(one * other, axis=-1))
+    angle = np.arctan2(np.linalg.norm(np.cross(first, second), axis=-1), np.sum(first * second, axis=-1))
     return np.where(np.isfinite(angle), angle, math.pi)
 
 
 def azimuth(e: np.ndarray) -> float:
     """The angle (rad) that axes of shape (n, 3) have run through about the vertical; NaN where a run has ended."""
-    turned = np.unwrap(np.arctan2(e[:, 1], e[:, 0]))
-    return float(turned[-1] - turned[0])
+    angles = np.unwrap(np.arctan2(e[:, 1], e[:, 0]))
+    return float(angles[-1] - angles[0])
 
 
-def judged(there: Scene, variant: Integrator, h: float, horizon: float) -> dict[str, float]:
+def judged(scene: Scene, variant: Integrator, h: float, horizon: float) -> dict[str, float]:
     """The errors of one run (see the head of this module), by name, and its number of steps."""
-    chart, top = variant.charts()[0], there.top
+    chart, top = variant.charts()[0], scene.top
     steps = max(SAMPLES, round(horizon / h))
-    between = max(1, min(math.ceil(WINDING * horizon / (there.nutation_period * SAMPLES)), steps // SAMPLES))
+    between = max(1, min(math.ceil(WINDING * horizon / (scene.nutation_period * SAMPLES)), steps // SAMPLES))
     marks = np.rint(np.linspace(0.0, steps, SAMPLES * between + 1)).astype(int)
-    run = solve(variant, chart, top, there.start, Plan.steps(h, marks))
-    form, ball = (ClosedForms([flat(one, there.start)]) for one in (top, SymmetricTop(top.I1, top.I1, top.mgl)))
+    run = solve(variant, chart, top, scene.start, Plan.steps(h, marks))
+    form, ball = (ClosedForms([flat(body, scene.start)]) for body in (top, SymmetricTop(top.I1, top.I1, top.mgl)))
     with np.errstate(over="ignore", invalid="ignore"):  # a run that flies apart
         e, spin = axis_of(chart, run.states), space_momenta(chart, run.states)[1]
         energy = space_energy(top, e, run.states[:, -3:], spin)
@@ -73,33 +73,33 @@ def judged(there: Scene, variant: Integrator, h: float, horizon: float) -> dict[
     }
 
 
-def ladder(there: Scene, variant: Integrator, most: float) -> xr.Dataset:
-    """The axis error within `HORIZON` against steps a nutation, with at most `most` steps in a run."""
-    counts = PER_NUTATION[PER_NUTATION * HORIZON / there.nutation_period <= most]
-    runs = [judged(there, variant, there.nutation_period / count, HORIZON) for count in counts]
-    return xr.Dataset({"axis": ("per_nutation", [one["axis"] for one in runs])}, coords={"per_nutation": counts})
+def ladder(scene: Scene, variant: Integrator, max_steps: float) -> xr.Dataset:
+    """The axis error within `HORIZON` against steps a nutation, with at most `max_steps` steps in a run."""
+    counts = PER_NUTATION[PER_NUTATION * HORIZON / scene.nutation_period <= max_steps]
+    runs = [judged(scene, variant, scene.nutation_period / count, HORIZON) for count in counts]
+    return xr.Dataset({"axis": ("per_nutation", [run["axis"] for run in runs])}, coords={"per_nutation": counts})
 
 
-def frames(there: Scene, variant: Integrator, horizons: tuple[float, float]) -> xr.Dataset:
+def frames(scene: Scene, variant: Integrator, horizons: tuple[float, float]) -> xr.Dataset:
     """Errors after a short and a long time, at `FREQUENCIES` steps a second, and as many evaluations of the torque."""
 
     def at(rates: Sequence[float]) -> list[list[dict[str, float]]]:
-        return [[judged(there, variant, 1.0 / rate, horizon) for horizon in horizons] for rate in rates]
+        return [[judged(scene, variant, 1.0 / rate, horizon) for horizon in horizons] for rate in rates]
 
     runs = at(FREQUENCIES)
-    a_step = max(1, *(round(one["forces"] / one["steps"]) for part in runs for one in part))
+    a_step = max(1, *(round(run["forces"] / run["steps"]) for part in runs for run in part))
     level = runs if a_step == 1 else at([rate / a_step for rate in FREQUENCIES])
-    shown = {f"frame_{name}": [[one[name] for one in part] for part in runs] for name in NUMBERS}
-    shown["level_axis"] = [[one["axis"] for one in part] for part in level]
-    table = xr.Dataset({name: (("rate", "horizon"), values) for name, values in shown.items()})
+    columns = {f"frame_{name}": [[run[name] for run in part] for part in runs] for name in NUMBERS}
+    columns["level_axis"] = [[run["axis"] for run in part] for part in level]
+    table = xr.Dataset({name: (("rate", "horizon"), values) for name, values in columns.items()})
     return table.assign(forces_a_step=float(a_step)).assign_coords(rate=list(FREQUENCIES), horizon=list(horizons))
 
 
-def followed(there: Scene, variant: Integrator) -> xr.Dataset:
+def followed(scene: Scene, variant: Integrator) -> xr.Dataset:
     """The largest errors on a body without symmetry within `HORIZON`, at each of `FREQUENCIES`; pi after a failure."""
     rows = {"attitude": [], "axis": [], "energy": []}
     for rate in FREQUENCIES:
-        run = simulate(there, variant, step_size=1.0 / rate, horizon=HORIZON, samples=SAMPLES + 1, guard=False)
+        run = simulate(scene, variant, step_size=1.0 / rate, horizon=HORIZON, samples=SAMPLES + 1, guard=False)
         wrong = errors(run)
         for name, row in rows.items():
             value = float(wrong[name].max(skipna=False))

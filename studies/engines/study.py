@@ -39,10 +39,10 @@ def cases(quick: bool) -> list[Case]:
     """One case a variant and scene, and one a variant for the population."""
     chosen = QUICK if quick else ORDINARY
     plan, names = {"steps": chosen["steps"], "long": chosen["long"]}, variant_names()
-    runs = [Case(one, name, plan, group="tops") for one in SCENES for name in names]
+    runs = [Case(scene, name, plan, group="tops") for scene in SCENES for name in names]
     many = {"members": chosen["members"], "seed": SEED}
     free = *(f"{name}[{BODY}]" for name, entry in engines().items() if BODY in entry.solvers), *ON_BODIES
-    bodies = [Case(one, name, {}, group="bodies") for one in BODIES for name in free]
+    bodies = [Case(body, name, {}, group="bodies") for body in BODIES for name in free]
     return [*runs, *(Case("population", name, many, group="population") for name in names), *bodies]
 
 
@@ -64,8 +64,8 @@ def measure(case: Case) -> xr.Dataset:
         return followed(scene(case.scene, bodies=True), row)
     tops, true, per_nutation = _members(chosen["members"], chosen["seed"])
     run = ensemble(tops, row, step_size=FRAME, horizon=HORIZON, samples=2, threads=1, quiet=True)
-    off = axis_angle(run["axis"].values[:, -1], true)
-    return xr.Dataset({"off": ("member", off), "steps_a_nutation": ("member", per_nutation)})
+    angles = axis_angle(run["axis"].values[:, -1], true)
+    return xr.Dataset({"off": ("member", angles), "steps_a_nutation": ("member", per_nutation)})
 
 
 STUDY = Study(

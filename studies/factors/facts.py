@@ -64,8 +64,8 @@ def noisy(data: xr.Dataset) -> tuple[int, int]:
 
 def compared(data: xr.Dataset) -> pd.DataFrame:
     """The times that are compared: all, or none if too many are noisy because the machine was busy."""
-    frame, (loud, every) = timed(data), noisy(data)
-    return frame.iloc[:0] if loud > NOISY_SHARE * every else frame
+    frame, (noisy_count, count) = timed(data), noisy(data)
+    return frame.iloc[:0] if noisy_count > NOISY_SHARE * count else frame
 
 
 def fastest(part: pd.DataFrame, call: str = KERNEL, language: str | None = None, tie: float = TIE) -> pd.Series | None:
@@ -73,10 +73,10 @@ def fastest(part: pd.DataFrame, call: str = KERNEL, language: str | None = None,
 
     So noise does not decide which chart the waterfall shows; the targets need the axis only.
     """
-    taken = part[(part["call"] == call) & (part["language"] == (language or part["language"]))]
-    level = taken[taken["seconds"] <= (1.0 + tie) * taken["seconds"].min()]
+    table = part[(part["call"] == call) & (part["language"] == (language or part["language"]))]
+    level = table[table["seconds"] <= (1.0 + tie) * table["seconds"].min()]
     return min((row for _, row in level.iterrows()), default=None,
-               key=lambda one: (SMALLEST_FIRST["axis"].index(one["chart"]), one["seconds"]))  # fmt: skip
+               key=lambda row: (SMALLEST_FIRST["axis"].index(row["chart"]), row["seconds"]))  # fmt: skip
 
 
 def waterfall(part: pd.DataFrame, *, call_first: bool = False) -> pd.DataFrame:
@@ -122,13 +122,13 @@ def first_goal(frame: pd.DataFrame) -> pd.DataFrame:
 
 def pairs(frame: pd.DataFrame) -> pd.DataFrame:
     """The ratio of every pair of times that differ in one factor alone, for the changes in `STEPS`."""
-    answers = []
+    frames = []
     for factor, before, after in STEPS if len(frame) else ():
-        held = [*GOAL, *(other for other in FACTORS if other != factor)]
-        both = frame[frame[factor] == before].merge(frame[frame[factor] == after], on=held)
-        answers.append(both[held].assign(factor=factor, before=before, after=after,
-                                       ratio=both["seconds_x"] / both["seconds_y"]))  # fmt: skip
-    return pd.concat(answers) if answers else pd.DataFrame(columns=["factor", "before", "after", "ratio"])
+        columns = [*GOAL, *(name for name in FACTORS if name != factor)]
+        joined = frame[frame[factor] == before].merge(frame[frame[factor] == after], on=columns)
+        frames.append(joined[columns].assign(factor=factor, before=before, after=after,
+                                       ratio=joined["seconds_x"] / joined["seconds_y"]))  # fmt: skip
+    return pd.concat(frames) if frames else pd.DataFrame(columns=["factor", "before", "after", "ratio"])
 
 
 def effects(frame: pd.DataFrame) -> pd.DataFrame:
@@ -156,11 +156,11 @@ def against_scipy(frame: pd.DataFrame) -> pd.DataFrame:
         for scheme in SCIPYS:
             theirs = part[(part["method"] == scheme) & (part["language"] == SCIPY_PYTHON)]
             user, inner = (fastest(theirs, call, tie=0.0) for call in (SOLVE_IVP, KERNEL))
-            ours, own = (fastest(part, call, COMPILED) for call in (SIMULATE, KERNEL))
-            if user is not None and inner is not None and ours is not None and own is not None:
+            ours, kernel = (fastest(part, call, COMPILED) for call in (SIMULATE, KERNEL))
+            if user is not None and inner is not None and ours is not None and kernel is not None:
                 rows.append([*goal, scheme, user["variant"], user["seconds"], ours["variant"], ours["seconds"],
-                             user["seconds"] / ours["seconds"], own["variant"],
-                             inner["seconds"] / own["seconds"]])  # fmt: skip
+                             user["seconds"] / ours["seconds"], kernel["variant"],
+                             inner["seconds"] / kernel["seconds"]])  # fmt: skip
     header = [*GOAL, "method", "SciPy's", "solve_ivp (s)", "fastest, as called", "simulate (s)", "times, as called",
               "fastest kernel", "times, kernels"]  # fmt: skip
     return pd.DataFrame(rows, columns=header)
@@ -168,25 +168,25 @@ def against_scipy(frame: pd.DataFrame) -> pd.DataFrame:
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """The waterfall, the largest effect of each factor, SciPy, the charts, and the noise of the times."""
-    every, frame, (loud, count) = timed(data), compared(data), noisy(data)
-    part, beside, ratios = first_goal(frame), against_scipy(frame), charts(frame)
-    answers: dict[str, Any] = {
-        "busy": every.shape != frame.shape or None,
-        "times": count, "loud": loud, "noisy": NOISY, "usual_spread": every["spread"].median(),
+    times, frame, (loud, count) = timed(data), compared(data), noisy(data)
+    part, scipy, ratios = first_goal(frame), against_scipy(frame), charts(frame)
+    values: dict[str, Any] = {
+        "busy": times.shape != frame.shape or None,
+        "times": count, "loud": loud, "noisy": NOISY, "usual_spread": times["spread"].median(),
         "again": int((data["seconds_tries"] > 1).sum()),
-        "samples": SAMPLES, "tie": TIE, "near": LEAST, "near_share": (every["axis"] >= LEAST * every["target"]).mean(),
+        "samples": SAMPLES, "tie": TIE, "near": LEAST, "near_share": (times["axis"] >= LEAST * times["target"]).mean(),
     }  # fmt: skip
     for name, call_first in (("late", False), ("first", True)):
         bars = waterfall(part, call_first=call_first)
-        answers |= {f"{name}_{factor}": bars["times faster"][bars["factor"] == factor].max() for factor in FACTORS}
-    answers |= _ends(part, waterfall(part), bars)
+        values |= {f"{name}_{factor}": bars["times faster"][bars["factor"] == factor].max() for factor in FACTORS}
+    values |= _ends(part, waterfall(part), bars)
     for name, column in (("user", "times, as called"), ("author", "times, kernels")):
-        answers |= {f"{name}_least": beside[column].min(), f"{name}_most": beside[column].max()}
+        values |= {f"{name}_least": scipy[column].min(), f"{name}_most": scipy[column].max()}
     in_all = ratios.dropna()  # medians of one set of methods
     for chart in CHARTS:
         middles = in_all.groupby("family")[f"{chart} / axis"].median()
-        answers |= {f"{chart}_{family.replace('-', '_').lower()}": middles.get(family) for family in FAMILIES}
-    return answers
+        values |= {f"{chart}_{family.replace('-', '_').lower()}": middles.get(family) for family in FAMILIES}
+    return values
 
 
 def _ends(part: pd.DataFrame, bars: pd.DataFrame, bare: pd.DataFrame) -> dict[str, Any]:
@@ -209,7 +209,7 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     frame = compared(data)
     reasons = data["reason"].to_dataframe().reset_index().query(f"{'reason'} != ''")
     times = {"axis": "error reached (rad)", "seconds": "time (s)", "force_evaluations": "force evaluations"}
-    every = pd.concat([timed(data).drop(columns=FACTORS[:3], errors="ignore"), reasons]).rename(columns=times)
-    made = {"effects": effects(frame), "scipy": against_scipy(frame), "charts": charts(frame), "times": every}
+    all_times = pd.concat([timed(data).drop(columns=FACTORS[:3], errors="ignore"), reasons]).rename(columns=times)
+    frames = {"effects": effects(frame), "scipy": against_scipy(frame), "charts": charts(frame), "times": all_times}
     names = {"horizon": "nutations", "target": "axis error (rad)", "before": "from", "after": "to", "count": "pairs"}
-    return {name: table.rename(columns=names) for name, table in made.items()}
+    return {name: table.rename(columns=names) for name, table in frames.items()}

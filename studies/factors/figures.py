@@ -32,18 +32,18 @@ def draw_waterfall(orders: list[pd.DataFrame]) -> Picture:
         seconds = bars["time (s)"].to_numpy()
         names = []
         for place, bar in enumerate(bars.to_dict("records")):
-            color, now = COLORS[bar["factor"]], seconds[place]
+            color, time = COLORS[bar["factor"]], seconds[place]
             if place:
-                axis.plot([seconds[place - 1], now], [place, place], color=color, lw=2.0)
+                axis.plot([seconds[place - 1], time], [place, place], color=color, lw=2.0)
                 axis.plot([seconds[place - 1]] * 2, [place - 1, place], color=style.GREY, lw=0.7, zorder=1)
-            axis.plot(now, place, "o", color=color, ms=5.0, zorder=3)
+            axis.plot(time, place, "o", color=color, ms=5.0, zorder=3)
             ratio = bar["times faster"]
             level = place and max(ratio, 1.0 / ratio) <= 1.0 + max(bars["spread"].iloc[place - 1 : place + 1])
             change = (
                 "" if not place else "no change beyond noise, " if level
                 else f"{number(max(ratio, 1.0 / ratio), 3)} times {'faster' if ratio > 1.0 else 'slower'}, "
             )  # fmt: skip
-            axis.annotate(change + duration(now), (max(now, seconds[max(place - 1, 0)]), place), (7, 0),
+            axis.annotate(change + duration(time), (max(time, seconds[max(place - 1, 0)]), place), (7, 0),
                           textcoords="offset points", va="center", fontsize=style.LEAST_TEXT)  # fmt: skip
             names.append(
                 f"{bar['factor']}: {bar['from']} to {bar['to']}" if place else f"{bar['variant']}, {bar['call']}"

@@ -53,10 +53,10 @@ def settle(scene: Scene, grid: Sequence[Cell], goal: Goal) -> dict[Cell, setting
         leader = leaders.get(pair)
         if leader is None:
             plan = {"patience": patience, "least": LEAST}
-            met = settings.search(scene, cell.method, goal.target, "axis", horizon, **plan)
-            if met.why == settings.STOPPED:  # the error of an adaptive method need not fall with every finer tolerance
-                met = settings.search(scene, cell.method, goal.target, "axis", horizon, FINER * goal.target, **plan)
-            settled[cell] = leaders[pair] = met
+            trial = settings.search(scene, cell.method, goal.target, "axis", horizon, **plan)
+            if trial.why == settings.STOPPED:  # an adaptive method's error need not fall with every finer tolerance
+                trial = settings.search(scene, cell.method, goal.target, "axis", horizon, FINER * goal.target, **plan)
+            settled[cell] = leaders[pair] = trial
         elif leader.why:
             settled[cell] = leader
         elif leader.evaluations > patience:
@@ -75,36 +75,36 @@ class Runs(NamedTuple):
     batch: float  # seconds
 
 
-def least_times(asked: Runs) -> list[float]:
+def least_times(plan: Runs) -> list[float]:
     """In this process: the least time of each run, in seconds."""
     known = {cell.name: cell for cell in cells()}
-    functions: Any = [caller(asked.scene, known[name], *run) for name, *run in asked.runs]
-    for name, call, setting, horizon in asked.runs:
-        brief: Any = caller(asked.scene, known[name], call, min(setting, WARM * horizon), WARM * horizon)
+    functions: Any = [caller(plan.scene, known[name], *run) for name, *run in plan.runs]
+    for name, call, setting, horizon in plan.runs:
+        brief: Any = caller(plan.scene, known[name], call, min(setting, WARM * horizon), WARM * horizon)
         first_call(brief)
-    taken = timings(functions, asked.rounds, asked.batch, warm=True, patience=ENOUGH, least=1)
-    return [timing.best for timing in taken]
+    times = timings(functions, plan.rounds, plan.batch, warm=True, patience=ENOUGH, least=1)
+    return [timing.best for timing in times]
 
 
-def timed(asked: Runs, processes: int) -> Array:
+def timed(plan: Runs, processes: int) -> Array:
     """The least time of every run in each of some fresh processes, (runs, processes)."""
-    return np.array([fresh_process.call(least_times, asked) for _ in range(processes)]).T
+    return np.array([fresh_process.call(least_times, plan) for _ in range(processes)]).T
 
 
-def settled_times(asked: Runs, processes: int) -> tuple[Array, Array]:
+def settled_times(plan: Runs, processes: int) -> tuple[Array, Array]:
     """As `timed`, and how often each time was measured.
 
     Noisy times are measured again by as many processes; of all, the least are kept, as many as before.
     """
-    taken, tries = timed(asked, processes), np.ones(len(asked.runs))
+    times, tries = timed(plan, processes), np.ones(len(plan.runs))
     for _ in range(TRIES - 1):
-        loud = np.flatnonzero(quartile_spread(taken) > NOISY)
+        loud = np.flatnonzero(quartile_spread(times) > NOISY)
         if not loud.size:
             break
-        again = timed(asked._replace(runs=[asked.runs[i] for i in loud]), processes)
-        taken[loud] = np.sort(np.hstack([taken[loud], again]))[:, :processes]
+        repeat = timed(plan._replace(runs=[plan.runs[i] for i in loud]), processes)
+        times[loud] = np.sort(np.hstack([times[loud], repeat]))[:, :processes]
         tries[loud] += 1
-    return taken, tries
+    return times, tries
 
 
 def factorial(
@@ -123,20 +123,20 @@ def factorial(
     for goal in goals:
         part = [cell for cell in grid if cell.language in goal.languages]
         settled = settle(scene, part, goal)
-        at = horizons.index(goal.nutations), targets.index(goal.target)
-        for cell, met in settled.items():
-            if met.why:
-                reasons[(grid.index(cell), *at)] = met.why
+        index = horizons.index(goal.nutations), targets.index(goal.target)
+        for cell, trial in settled.items():
+            if trial.why:
+                reasons[(grid.index(cell), *index)] = trial.why
                 continue
-            for name, value in zip(names, (met.setting, met.error, met.bound, met.evaluations), strict=True):
-                numbers[name][(grid.index(cell), *at)] = value
+            for name, value in zip(names, (trial.setting, trial.error, trial.bound, trial.evaluations), strict=True):
+                numbers[name][(grid.index(cell), *index)] = value
             for call in goal.calls:
-                if caller(scene, cell, call, met.setting, met.horizon) is not None:
-                    places.append((grid.index(cell), *at, CALLS.index(call)))
-                    runs.append((cell.name, call, met.setting, met.horizon))
-    times, often = settled_times(Runs(scene, runs, rounds, batch), processes)
-    for place, taken, wide, count in zip(places, times, quartile_spread(times), often, strict=True):
-        samples[place], spread[place], tries[place] = taken, wide, count
+                if caller(scene, cell, call, trial.setting, trial.horizon) is not None:
+                    places.append((grid.index(cell), *index, CALLS.index(call)))
+                    runs.append((cell.name, call, trial.setting, trial.horizon))
+    times, counts = settled_times(Runs(scene, runs, rounds, batch), processes)
+    for place, sample, width, count in zip(places, times, quartile_spread(times), counts, strict=True):
+        samples[place], spread[place], tries[place] = sample, width, count
     dims = ("variant", "horizon", "target")
     table = xr.Dataset(
         {name: (dims, values) for name, values in numbers.items()}

@@ -54,17 +54,17 @@ def solver(chart: str, step: Step) -> Solver:
             evaluations += 1
             return np.array(form.field(par, place))
 
-        states, done, outcome = np.full((plan.marks.size, y.size), np.nan), 0, OK
+        states, steps, outcome = np.full((plan.marks.size, y.size), np.nan), 0, OK
         for sample, mark in enumerate(plan.marks):
-            while done < mark:
+            while steps < mark:
                 y = step(f, par, y, plan.step_size)
-                done += 1
+                steps += 1
             if not np.isfinite(y).all():
                 outcome = NOT_FINITE
                 break
             states[sample] = y
-        work = evaluations if step is rk4_step else done
-        return as_run(form, par, plan.times, states, done, work, outcome, done * plan.step_size)
+        work = evaluations if step is rk4_step else steps
+        return as_run(form, par, plan.times, states, steps, work, outcome, steps * plan.step_size)
 
     return solve
 

@@ -30,7 +30,7 @@ BATCH = (0.0015, 0.001)  # seconds, in full and quick
 
 def cases(quick: bool) -> list[Case]:
     """One case for each scene: times that are compared are measured together."""
-    names = grid_scenes(TAGS if quick else ALL_BUT_TWO, lambda one: math.isfinite(one.nutation_period))
+    names = grid_scenes(TAGS if quick else ALL_BUT_TWO, lambda scene: math.isfinite(scene.nutation_period))
     settings = {
         "schemes": list(QUICK) if quick else None,
         "goals": [list(goal) for goal in (GOALS[:1] if quick else GOALS)],

@@ -27,8 +27,8 @@ Rates = Callable[[float, Any], Any]
 
 def six_variables(scene: Scene) -> tuple[float, ...]:
     """The start as (phi, theta, psi, phi', theta', psi')."""
-    at = scene.start
-    return at.phi, at.theta, at.psi, at.phi_dot, at.theta_dot, at.psi_dot
+    start = scene.start
+    return start.phi, start.theta, start.psi, start.phi_dot, start.theta_dot, start.psi_dot
 
 
 def hard_way(scene: Scene) -> Rates:
@@ -92,9 +92,9 @@ class Cubic(NamedTuple):
 
 def nutation_cubic(scene: Scene) -> Cubic:
     """alpha, beta, a, b of a scene's own start."""
-    top, at = scene.top, scene.start
-    momenta, beta = top.momenta(at), 2.0 * top.mgl / top.I1
-    alpha = at.theta_dot**2 + (at.phi_dot * math.sin(at.theta)) ** 2 + beta * math.cos(at.theta)
+    top, start = scene.top, scene.start
+    momenta, beta = top.momenta(start), 2.0 * top.mgl / top.I1
+    alpha = start.theta_dot**2 + (start.phi_dot * math.sin(start.theta)) ** 2 + beta * math.cos(start.theta)
     return Cubic(alpha, beta, momenta.p_psi / top.I1, momenta.p_phi / top.I1)
 
 

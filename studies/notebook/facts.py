@@ -34,7 +34,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     runs = present(data)
     discrete = data.sel(variant=[name for name in runs if name != SOLVER])
     lost = discrete[MOMENTA].to_dataarray().max(("variable", "scene"), skipna=False)
-    drawn = lost.sel(variant=[name for name in DRAWN if name in runs])
+    shown = lost.sel(variant=[name for name in DRAWN if name in runs])
     changes = powers(data)
     return {
         "tolerance": SOLVER_TOLERANCE,  # of the solver
@@ -45,8 +45,8 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "compared": len(order_two(runs)) or None,
         "discrete": discrete.sizes["variant"] or None,
         "momenta_kept": int((lost < KEPT).sum()) if lost.size else None,  # variants
-        "momenta": float(drawn.max()) if drawn.size else None,  # largest relative change of one by those of the figure
-        **of_the_solver(data, discrete),
+        "momenta": float(shown.max()) if shown.size else None,  # largest relative change of one by those of the figure
+        **solver_facts(data, discrete),
         "power_least": changes["energy"].min(), "power_most": changes["energy"].max(),
         "modified_least": changes["modified"].min(), "modified_most": changes["modified"].max(),
     }  # fmt: skip
@@ -57,13 +57,13 @@ def order_two(runs: Iterable[str]) -> list[str]:
     return [name for name in map(str, runs) if integrator(name).order == 2 and "-unreduced[" not in name]
 
 
-def of_the_solver(data: xr.Dataset, discrete: xr.Dataset) -> dict[str, Any]:
+def solver_facts(data: xr.Dataset, discrete: xr.Dataset) -> dict[str, Any]:
     """The facts that need the notebook's solver: derivations, paths, alpha, and its energy error against others'."""
     if SOLVER not in data["variant"].values:
         parts = (f"{part}_{name}" for part in PARTS.values() for name in BY_PART)
         return dict.fromkeys((*OF_SOLVER, *parts))
     solver, runs = data.sel(variant=SOLVER), discrete["variant"].values
-    answers: dict[str, Any] = {
+    values: dict[str, Any] = {
         "followed": float(np.abs(solver["hard_theta"] - solver["true_theta"]).sel(scene="spheroid").max()),
         "ways": float(solver["ways_gap"].max()),  # rad
         "energies": float(solver["energy_gap"].max()),  # relative
@@ -72,21 +72,21 @@ def of_the_solver(data: xr.Dataset, discrete: xr.Dataset) -> dict[str, Any]:
         "alpha_rate": float(solver["alpha_rate"].sel(scene="goldstein")),  # rad/s
         "long": float(data["long_time"].max()),  # s
     }
-    named = order_two(runs)
+    names = order_two(runs)
     for scene, part in PARTS.items():
         limit, largest = float(solver["energy_largest"].sel(scene=scene)), discrete["energy_largest"].sel(scene=scene)
-        since = [better_from(data, scene, name) for name in named]
-        answers |= {
+        times = [better_from(data, scene, name) for name in names]
+        values |= {
             f"{part}_end": notebook_end(data, scene),  # s
             f"{part}_energy": limit,  # the solver's largest relative energy error to the notebook's end
             # variants with a larger error than the solver to then, of `compared`; with a smaller one in the end
-            f"{part}_behind": int((largest.sel(variant=named) > limit).sum()) if named else None,
-            f"{part}_ahead": sum(map(math.isfinite, since)) if named else None,
-            f"{part}_long": energy_until(data, scene, SOLVER, answers["long"]),  # the solver's error to then
+            f"{part}_behind": int((largest.sel(variant=names) > limit).sum()) if names else None,
+            f"{part}_ahead": sum(map(math.isfinite, times)) if names else None,
+            f"{part}_long": energy_until(data, scene, SOLVER, values["long"]),  # the solver's error to then
             f"{part}_turned": turned(data, scene),  # degrees
         }
-    first, second = (answers[f"{part}_turned"] for part in PARTS.values())
-    return answers | {"both_turned": first if round(first) == round(second) else None}
+    first, second = (values[f"{part}_turned"] for part in PARTS.values())
+    return values | {"both_turned": first if round(first) == round(second) else None}
 
 
 def present(data: xr.Dataset) -> list[str]:
@@ -98,9 +98,9 @@ def present(data: xr.Dataset) -> list[str]:
 def turned(data: xr.Dataset, scene: str) -> float:
     """The angle about the vertical, in degrees, that best turns the true path of the axis into the notebook's."""
     run = data.sel(scene=scene, variant=SOLVER)
-    drawn = axis_from_angles(run["hard_theta"].values, run["hard_phi"].values + 0.5 * math.pi)
+    hard = axis_from_angles(run["hard_theta"].values, run["hard_phi"].values + 0.5 * math.pi)
     true = axis_from_angles(run["true_theta"].values, run["true_phi"].values)
-    flat = [path[:, 0] + 1j * path[:, 1] for path in (drawn, true)]
+    flat = [path[:, 0] + 1j * path[:, 1] for path in (hard, true)]
     return math.degrees(cmath.phase(complex(np.nansum(flat[0] * flat[1].conj()))))
 
 
@@ -121,11 +121,11 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     for name in present(data):
         for scene in map(str, data["scene"].values):
             run = data.sel(scene=scene, variant=name)
-            since = better_from(data, scene, name) if name != SOLVER and SOLVER in data["variant"].values else math.inf
+            start = better_from(data, scene, name) if name != SOLVER and SOLVER in data["variant"].values else math.inf
             errors = [float(run[f"{constant}_largest"]) for constant in CONSTANTS]
             rows.append([name, scene, str(run["outcome"].values), notebook_end(data, scene), *errors,
-                         energy_until(data, scene, name, last), since if since < math.inf else math.nan])  # fmt: skip
+                         energy_until(data, scene, name, last), start if start < math.inf else math.nan])  # fmt: skip
     header = ["variant", "scene", "outcome", "end of the notebook (s)"]
-    header += [*(f"error of {one} to then" for one in CONSTANTS), f"error of energy to {last:g} s"]
+    header += [*(f"error of {constant} to then" for constant in CONSTANTS), f"error of energy to {last:g} s"]
     header.append("energy better than lsoda's from (s)")
     return {"kept": pd.DataFrame(rows, columns=header)}

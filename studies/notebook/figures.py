@@ -15,8 +15,8 @@ from .measures import MIDPOINT, MODIFIED, SOLVER
 def pictures(data: xr.Dataset) -> list[Picture]:
     """The energy of the solver and of methods of order two; the modified energy."""
     runs = data["variant"].values
-    drawn = [draw_energy(data)] if any(name in runs for name in (SOLVER, *DRAWN)) else []
-    return [*drawn, draw_modified_energy(data)] if any(name in runs for name in MODIFIED) else drawn
+    figures = [draw_energy(data)] if any(name in runs for name in (SOLVER, *DRAWN)) else []
+    return [*figures, draw_modified_energy(data)] if any(name in runs for name in MODIFIED) else figures
 
 
 def draw_energy(data: xr.Dataset) -> Picture:
@@ -31,9 +31,9 @@ def draw_energy(data: xr.Dataset) -> Picture:
             line = style.line(name, 0.8) | {"markevery": 0.12, "label": name}
             wide = line | {"marker": "", "lw": 2.4, "ls": "-"}
             axis.plot(run["long_time"], run["long_energy"], **(wide if name == SOLVER else line))
-            since = better_from(data, scene, name) if SOLVER in names and name != SOLVER else math.inf
-            if 0.0 < since < math.inf:
-                axis.plot(since, energy_until(data, scene, name, since), "o", **ring)
+            start = better_from(data, scene, name) if SOLVER in names and name != SOLVER else math.inf
+            if 0.0 < start < math.inf:
+                axis.plot(start, energy_until(data, scene, name, start), "o", **ring)
         axis.set(xscale="log", yscale="log", title=f"scene {scene}")
         end = notebook_end(data, scene)
         axis.axvline(end, color=style.GREY, lw=1.4, zorder=1)

@@ -30,8 +30,8 @@ def long_energy(scene: Scene, name: str, setting: float, horizon: float) -> xr.D
     run = integrate(scene, method, observe="nutation", samples=SAMPLES, horizon=horizon, **control)
     largest = np.fmax.accumulate(np.abs(residuals(scene, run)["energy"]))
     times = np.geomspace(FIRST, horizon, TIMES)
-    seen = np.maximum(np.searchsorted(run.time, times * (1.0 + 1e-12), side="right") - 1, 0)
-    values = np.where(times <= run.reached_time * (1.0 + 1e-12), largest[seen], math.nan)
+    indices = np.maximum(np.searchsorted(run.time, times * (1.0 + 1e-12), side="right") - 1, 0)
+    values = np.where(times <= run.reached_time * (1.0 + 1e-12), largest[indices], math.nan)
     columns: dict[str, Any] = {"long_time": ("long", times), "long_energy": ("long", values)}
     return xr.Dataset(columns)
 

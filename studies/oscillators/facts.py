@@ -91,12 +91,12 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
             rows.append([oscillator.damping, oscillator.regime, rule, *slopes, energy])
     header = ["b", "regime", "rule", "order of x", "order of the rate of decay", f"energy error to T = {LONG:g}"]
     damped = pd.DataFrame(rows, columns=header).sort_values(header[4], kind="stable")
-    shown, rows = (160.3, 20.3, 4.37, 2.1), []
+    steps_shown, rows = (160.3, 20.3, 4.37, 2.1), []
     for method, name in product(MAPS, QUARTICS):
         errors, oscillator = data[ERROR].sel(scene=name, variant=method).values, oscillator_of(name)
         slope = math.nan if method == MAPS[0] else quartic_order(data, name, method).slope
         if np.isfinite(errors).any():
             rows.append([method, name, float(oscillator.sigma), float(oscillator.b), slope,
-                         *(float(errors[STEPS.index(steps)]) for steps in shown)])  # fmt: skip
-    header = ["map", "oscillator", "sigma", "b", "order", *(f"error at T/{steps:g}" for steps in shown)]
+                         *(float(errors[STEPS.index(steps)]) for steps in steps_shown)])  # fmt: skip
+    header = ["map", "oscillator", "sigma", "b", "order", *(f"error at T/{steps:g}" for steps in steps_shown)]
     return {"damped": damped, "quartic": pd.DataFrame(rows, columns=header)}

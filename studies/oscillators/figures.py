@@ -24,20 +24,21 @@ LOOKS = {name: style.Look(style.ORANGE, "v") if name == "mcmillan" else style.lo
 
 def pictures(data: xr.Dataset) -> list[Picture]:
     """The figure of friction, then that of the exact map, if these were measured."""
-    drawn = []
-    for draw, every, names in (
+    figures = []
+    for draw, oscillators, names in (
         (draw_orders, OSCILLATORS, SYMBOLS), (draw_maps, QUARTICS, MAPS),
     ):  # fmt: skip
-        scenes, there = [one for one in every if one in data["scene"]], [one for one in names if one in data["variant"]]
-        if scenes and there:
-            drawn.append(draw(data, scenes, there))
-    return drawn
+        scenes = [name for name in oscillators if name in data["scene"]]
+        variants = [name for name in names if name in data["variant"]]
+        if scenes and variants:
+            figures.append(draw(data, scenes, variants))
+    return figures
 
 
 def draw_orders(data: xr.Dataset, _: list[str], names: list[str]) -> Picture:
     """Errors of the position and of the rate of decay against the step, at critical damping and beside it."""
     figure, axes = style.panels(1, len(ORDERS), height=2.9, sharex=True, sharey=True)
-    for axis, (name, error, what) in zip(axes[0], ORDERS, strict=True):
+    for axis, (name, error, title) in zip(axes[0], ORDERS, strict=True):
         for line, method in enumerate(names):
             run, marker = data.sel(scene=name, variant=method), SYMBOLS[method]
             color = style.PURPLE if method == ONE_SIDED else style.look(method).color
@@ -49,7 +50,7 @@ def draw_orders(data: xr.Dataset, _: list[str], names: list[str]) -> Picture:
                       transform=axis.transAxes, color=style.ink(color), fontsize=7.5, weight="bold")  # fmt: skip
         oscillator = OSCILLATORS[name]
         axis.set(xscale="log", yscale="log", xlabel=r"step ($\sqrt{m/k}$)")
-        axis.set_title(f"{what}\nb = {oscillator.damping:g}, {oscillator.regime}")
+        axis.set_title(f"{title}\nb = {oscillator.damping:g}, {oscillator.regime}")
     axes[0, 0].set_ylabel("error")
     style.few_ticks(*axes.flat, most=6)
     return Picture("orders", figure)

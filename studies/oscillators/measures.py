@@ -96,8 +96,8 @@ def _rk45_at_cost(oscillator: Oscillator, evaluations: int, times: Array) -> tup
     for _ in range(9):
         middle = 0.5 * (low + high)
         low, high = (middle, high) if run(middle).nfev > evaluations else (low, middle)
-    done = run(high)
-    return done.y[0], done.y[1], int(done.nfev)
+    solution = run(high)
+    return solution.y[0], solution.y[1], int(solution.nfev)
 
 
 def notebook_history(oscillator: Oscillator, h: float, horizon: float) -> xr.Dataset:

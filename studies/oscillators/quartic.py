@@ -167,13 +167,13 @@ def true_path(oscillator: Quartic, times: Sequence[float] | Array) -> Array:
     """Positions at increasing times by Taylor series in fixed point, complex."""
     stride = _fixed(oscillator.period) // PER_PERIOD  # the unit of time of a series
     pulls = tuple(n * _fixed(pull) * stride**2 >> 2 * BITS for n, pull in ((2, oscillator.sigma), (3, oscillator.b)))
-    x, v = ([_fixed(one.real), _fixed(one.imag)] for one in (oscillator.position, oscillator.velocity))
-    terms, begun, path = _terms(pulls, x, [part * stride >> BITS for part in v]), 0, []
+    x, v = ([_fixed(z.real), _fixed(z.imag)] for z in (oscillator.position, oscillator.velocity))
+    terms, t0, path = _terms(pulls, x, [part * stride >> BITS for part in v]), 0, []
     for t in map(_fixed, map(float, times)):
-        while t - begun > stride:
-            terms = _terms(pulls, *([sum(n**k * one for n, one in enumerate(part)) for part in terms] for k in (0, 1)))
-            begun += stride
-        after = ((t - begun) << BITS) // stride
+        while t - t0 > stride:
+            terms = _terms(pulls, *([sum(n**k * a for n, a in enumerate(part)) for part in terms] for k in (0, 1)))
+            t0 += stride
+        after = ((t - t0) << BITS) // stride
         path.append(complex(*(math.ldexp(_sum(part, after), -BITS) for part in terms)))
     return np.array(path)
 
@@ -188,8 +188,8 @@ def _terms(pulls: Sequence[int], x: Sequence[int], v: Sequence[int]) -> tuple[li
     for n in range(ORDER - 1):
         backward = [part[n::-1] for part in (real, imaginary)]
         squares.append(_product(real, backward[0]) + _product(imaginary, backward[1]))
-        for part, turned in zip((real, imaginary), backward, strict=True):
-            force = pulls[0] * _product(squares, turned) + pulls[1] * turned[0]
+        for part, row in zip((real, imaginary), backward, strict=True):
+            force = pulls[0] * _product(squares, row) + pulls[1] * row[0]
             part.append((force >> BITS) // ((n + 1) * (n + 2)))
     return real, imaginary
 

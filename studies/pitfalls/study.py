@@ -51,11 +51,11 @@ def measure(case: Case) -> xr.Dataset:
         run = integrate(on, variant, step_size=on.nutation_period / steps, horizon=nutations * on.nutation_period,
                         samples=SAMPLES, observe="axis", guard=sentences.append)  # fmt: skip
         wrong = errors_against(on, run, reference(on, run.time, precision="closed-form"))
-        there = (run.time <= run.reached_time) | (run.outcome == "ok")
-        one: dict[str, Any] = {name: ("sample", np.where(there, wrong[name], np.nan)) for name in ("axis", "energy")}
-        one |= {"time": ("sample", run.time / on.nutation_period), "outcome": run.outcome, "steps": steps,
+        valid = (run.time <= run.reached_time) | (run.outcome == "ok")
+        row: dict[str, Any] = {name: ("sample", np.where(valid, wrong[name], np.nan)) for name in ("axis", "energy")}
+        row |= {"time": ("sample", run.time / on.nutation_period), "outcome": run.outcome, "steps": steps,
                 "warned": float(bool(sentences))}  # fmt: skip
-        parts.append(xr.Dataset(one))
+        parts.append(xr.Dataset(row))
     return xr.concat(parts, "setting")
 
 
@@ -63,16 +63,16 @@ def run_of(data: xr.Dataset, on: str, name: str) -> xr.Dataset | None:
     """The runs of a variant on a scene, if they were made."""
     if on not in data["scene"].values or name not in data["variant"].values:
         return None
-    one = data.sel(scene=on, variant=name).dropna("setting", how="all", subset=["axis"])
-    return one if one.sizes["setting"] else None
+    runs = data.sel(scene=on, variant=name).dropna("setting", how="all", subset=["axis"])
+    return runs if runs.sizes["setting"] else None
 
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """Largest errors of the axis (rad) and of the energy (relative) in each, and when the run at the pole ended."""
     keys = "steps", "without", "without_energy", "needed", "falling", "falling_energy", "ended"
-    known: dict[str, Any] = dict.fromkeys(keys) | _warned(data)
-    if (without := run_of(data, TERM, WITHOUT)) is not None:
-        last = without.isel(setting=-1)
+    known: dict[str, Any] = dict.fromkeys(keys) | _warning_counts(data)
+    if (runs := run_of(data, TERM, WITHOUT)) is not None:
+        last = runs.isel(setting=-1)
         known |= {"steps": float(last["steps"]), "without": float(last["axis"].max()),  # rad
                   "without_energy": float(last["energy"].max())}  # fmt: skip
     if (term := run_of(data, TERM, WITH)) is not None:
@@ -85,13 +85,13 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     return known
 
 
-def _warned(data: xr.Dataset) -> dict[str, int]:
+def _warning_counts(data: xr.Dataset) -> dict[str, int]:
     """How many runs were wrong or ended early, how many were not, and in how many of each the guard warned."""
-    made = np.isfinite(data["steps"])
-    bad = ((data["axis"].max("sample") > WRONG) | (data["outcome"] != "ok")) & made
+    ran = np.isfinite(data["steps"])
+    bad = ((data["axis"].max("sample") > WRONG) | (data["outcome"] != "ok")) & ran
     warned = data["warned"] > 0.0
-    counts = {"bad": bad, "bad_warned": bad & warned, "good": made & ~bad, "good_warned": made & ~bad & warned}
-    return {name: int(one.sum()) for name, one in counts.items()}
+    counts = {"bad": bad, "bad_warned": bad & warned, "good": ran & ~bad, "good_warned": ran & ~bad & warned}
+    return {name: int(mask.sum()) for name, mask in counts.items()}
 
 
 def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
@@ -99,8 +99,8 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     parts = []
     for on in map(str, data["scene"].values):
         for name in map(str, data["variant"].values):
-            if (one := run_of(data, on, name)) is not None:
-                worst = one[["steps", "outcome", "warned"]].assign(one[["axis", "energy"]].max("sample"))
+            if (runs := run_of(data, on, name)) is not None:
+                worst = runs[["steps", "outcome", "warned"]].assign(runs[["axis", "energy"]].max("sample"))
                 worst["warned"] = worst["warned"].astype(bool)
                 parts.append(worst.isel(setting=slice(None, None, -1)).to_pandas().assign(scene=on, variant=name))
     names = {"steps": "steps a nutation", "axis": "axis error (rad)", "energy": "energy error / energy of the nutation",
@@ -113,17 +113,17 @@ def lines(data: xr.Dataset) -> list[list[tuple[str, str, Any, Any]]]:
     """Name, colour, x and y of the lines of each panel."""
     curves: list[list[tuple[str, str, Any, Any]]] = [[], [], []]
     for name, color in ((WITHOUT, VERMILLION), (WITH, BLUE), (RIGHT, GREEN)):
-        if (one := run_of(data, TERM, name)) is not None:
-            curves[0].append((LABELS[name], color, one["steps"].values, one["axis"].max("sample").values))
-    if (one := run_of(data, FALLING, ANGLES)) is not None:
-        late = one.isel(setting=0, sample=slice(1, None))
+        if (runs := run_of(data, TERM, name)) is not None:
+            curves[0].append((LABELS[name], color, runs["steps"].values, runs["axis"].max("sample").values))
+    if (runs := run_of(data, FALLING, ANGLES)) is not None:
+        late = runs.isel(setting=0, sample=slice(1, None))
         for key, color, label in (("axis", VERMILLION, "axis (rad)"), ("energy", BLUE, "energy (relative)")):
             curves[1].append((label, color, late["time"].values, late[key].values))
     for name, color, label in ((ANGLES, VERMILLION, ENDED), (AXIS, GREEN, "in the axis")):
-        if (one := run_of(data, POLE, name)) is not None:
-            late = one.isel(setting=0, sample=slice(1, None))
+        if (runs := run_of(data, POLE, name)) is not None:
+            late = runs.isel(setting=0, sample=slice(1, None))
             curves[2].append((label, color, late["time"].values, late["axis"].values))
-    return [[(label, color, x[y > 0.0], y[y > 0.0]) for label, color, x, y in each] for each in curves]
+    return [[(label, color, x[y > 0.0], y[y > 0.0]) for label, color, x, y in panel] for panel in curves]
 
 
 def pictures(data: xr.Dataset) -> list[Picture]:
@@ -131,10 +131,10 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     figure, axes = panels(1, 3)
     figure.set_figheight(2.2)  # inches; the front page shows it among others
     titles = ("no gyroscopic term", "energy kept, motion wrong", "a pole in Euler's angles")
-    drawn = lines(data)
-    for place, (axis, title, each) in enumerate(zip(axes[0], titles, drawn, strict=True)):
+    curves = lines(data)
+    for place, (axis, title, panel) in enumerate(zip(axes[0], titles, curves, strict=True)):
         axis.set(title=title, yscale="log", xlabel="nutations", ylabel="error of the axis (rad)")
-        for label, color, x, y in each:
+        for label, color, x, y in panel:
             axis.plot(x, y, color=color, marker="" if place else "o", ms=2.5)
             if label == ENDED:
                 axis.plot(x[-1], y[-1], "X", color=color, ms=7)
@@ -143,8 +143,8 @@ def pictures(data: xr.Dataset) -> list[Picture]:
     axes[0, 0].set(xscale="log", xlabel="steps a nutation")
     axes[0, 1].set_ylabel("error")
     few_ticks(*axes[0], most=5)
-    for axis, each in zip(axes[0], drawn, strict=True):
-        label_lines(axis, each)
+    for axis, panel in zip(axes[0], curves, strict=True):
+        label_lines(axis, panel)
     return [Picture("three", figure)]
 
 

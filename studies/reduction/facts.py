@@ -18,12 +18,12 @@ def cells(data: xr.Dataset, variable: str) -> list[tuple[str, str, xr.Dataset]]:
     """Scene, integrator and data of the cells in which a variable was measured."""
     if variable not in data:
         return []
-    there = np.isfinite(data[variable]).any([dim for dim in data[variable].dims if dim not in ("scene", "variant")])
+    known = np.isfinite(data[variable]).any([dim for dim in data[variable].dims if dim not in ("scene", "variant")])
     return [
         (str(scene), str(name), data.sel(scene=scene, variant=name))
         for scene in data["scene"].values
         for name in data["variant"].values
-        if there.sel(scene=scene, variant=name)
+        if known.sel(scene=scene, variant=name)
     ]
 
 
@@ -31,14 +31,14 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     """Which rules commute with the reduction (rad), how far an unreduced form is from its kernel, times of charts."""
     gaps, kernels, charts = tables(data).values()
     compared = cells(data, "theta_gap")
-    same, apart = (gaps[(gaps[WORST] < COMMUTES) == wanted] for wanted in (True, False))
+    same, apart = (gaps[(gaps[WORST] < COMMUTES) == commutes] for commutes in (True, False))
     ends = {"least": apart["power of h"].min(), "most": apart["power of h"].max()}
     return {
         "charts_periods": CHART_PERIODS,  # nutations
         "compared_steps": COMPARED_STEPS,
         "as_fast": AS_FAST - 1.0,
         "spread": float(data["spread"].median()) if "spread" in data else None,
-        **{f"{chart}_{name}": one for chart in ("angles", "attitude") for name, one in against(charts, chart).items()},
+        **{f"{chart}_{key}": fact for chart in ("angles", "attitude") for key, fact in against(charts, chart).items()},
         "commuting": listed(same["rule"]),
         "commuting_gap": same[WORST].max(),
         "others": listed(apart["rule"]),
@@ -82,20 +82,20 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     kernels, charts = [], []
     for scene, rule, cell in cells(data, "seconds_per_step"):
         for step in range(cell.sizes["twin_step"]):
-            at = cell.isel(twin_step=step)
-            seconds, done = (at[name].sel(kernel=["reduced", "unreduced"]).values
+            row = cell.isel(twin_step=step)
+            seconds, counts = (row[name].sel(kernel=["reduced", "unreduced"]).values
                              for name in ("seconds_per_step", "iterations_per_step"))  # fmt: skip
-            time, more = seconds[1] / seconds[0], done[1] / done[0]
-            kernels.append([scene, rule, float(at["twin_step_size"]), time, more, time / more, *seconds, *done])
+            time, work = seconds[1] / seconds[0], counts[1] / counts[0]
+            kernels.append([scene, rule, float(row["twin_step_size"]), time, work, time / work, *seconds, *counts])
     for scene, method, cell in cells(data, "seconds"):
-        for one in chart_ratios(cell):
-            name = f"{method}[{one.chart}]"
-            charts.append([scene, name, one.base, one.time, one.error, one.to_error])
+        for ratio in chart_ratios(cell):
+            name = f"{method}[{ratio.chart}]"
+            charts.append([scene, name, ratio.base, ratio.time, ratio.error, ratio.to_error])
     header = ["scene", "rule", "step (s)", "time (ratio)", "iterations (ratio)", "time of an iteration (ratio)",
               "a step, reduced (s)", "unreduced (s)", "iterations a step, reduced", "unreduced"]  # fmt: skip
-    over = ["scene", "variant", "against", "time (ratio)", "axis error (ratio)", RATIO]
+    columns = ["scene", "variant", "against", "time (ratio)", "axis error (ratio)", RATIO]
     return {
         "commutation": commutation(data),
         "kernels": pd.DataFrame(kernels, columns=header),
-        "charts": pd.DataFrame(charts, columns=over).sort_values(RATIO, ascending=False, kind="stable"),
+        "charts": pd.DataFrame(charts, columns=columns).sort_values(RATIO, ascending=False, kind="stable"),
     }

@@ -14,15 +14,15 @@ from .measures import COMMUTES, commutation_order
 
 def pictures(data: xr.Dataset) -> list[Picture]:
     """Reducing first against reducing last, against the step, a panel a scene."""
-    measured = cells(data, "commutation_gap")
-    names = list(dict.fromkeys(scene for scene, *_ in measured))
+    rows = cells(data, "commutation_gap")
+    names = list(dict.fromkeys(scene for scene, *_ in rows))
     if not names:
         return []
     labels = ("step size (s)", "difference between reducing\nfirst and last, in $\\theta$ (rad)")
     figure, axes = style.grid(len(names), 2, labels, height=2.7, sharey="row")
     places = dict(zip(names, axes, strict=True))
     lowest: dict[tuple[str, int], float] = {}  # of the lines of each power, where its guide goes
-    for scene, rule, cell in measured:
+    for scene, rule, cell in rows:
         gap = cell["commutation_gap"].values
         places[scene].plot(cell["commutation_step_size"], np.maximum(gap, SMALLEST), **style.line(rule), label=rule)
         if np.nanmax(gap) > COMMUTES and np.isfinite(order := commutation_order(cell)):

@@ -45,9 +45,9 @@ def chart_table(
     """
     columns, charts = ["axis", "theta", "energy", "axis_bound", "steps"], method.charts()
     runs = [bare_run(scene, method, chart, setting, horizon) for chart in charts for setting in settings]
-    taken = np.array([(timing.best, timing.spread) for timing in timings(runs, batches, BATCH)])
+    times = np.array([(timing.best, timing.spread) for timing in timings(runs, batches, BATCH)])
     tables = []
-    for chart, (seconds, spread) in zip(charts, taken.reshape(len(charts), -1, 2).swapaxes(1, 2), strict=True):
+    for chart, (seconds, spread) in zip(charts, times.reshape(len(charts), -1, 2).swapaxes(1, 2), strict=True):
         errors = error_table(scene, method.variant(chart), settings, horizon, observe="axis")[columns].astype(float)
         tables.append(errors.assign({"seconds": ("setting", seconds), "spread": ("setting", spread)}))
     return xr.concat(tables, "chart").assign_coords(chart=list(charts)).reindex(chart=list(CHARTS))
@@ -75,10 +75,10 @@ def time_to_error(base: xr.Dataset, other: xr.Dataset) -> float:
     """
     curves = [np.log([table[name].values[judged(table)] for name in ("axis", "seconds")]) for table in (base, other)]
     (x, before), (y, after) = (curve[:, np.argsort(curve[0])] for curve in curves)
-    low, high = max(one.min(initial=np.inf) for one in (x, y)), min(one.max(initial=-np.inf) for one in (x, y))
-    at = np.concatenate([x, y])
-    at = at[(at > low - SAME) & (at < high + SAME)]
-    return math.exp(np.median(np.interp(at, y, after) - np.interp(at, x, before))) if at.size else math.nan
+    low, high = max(u.min(initial=np.inf) for u in (x, y)), min(u.max(initial=-np.inf) for u in (x, y))
+    grid = np.concatenate([x, y])
+    grid = grid[(grid > low - SAME) & (grid < high + SAME)]
+    return math.exp(np.median(np.interp(grid, y, after) - np.interp(grid, x, before))) if grid.size else math.nan
 
 
 def chart_ratios(cell: xr.Dataset) -> list[Ratio]:
@@ -129,7 +129,7 @@ def unreduced_cost(scene: Scene, name: str, step_sizes: Sequence[float], batches
     """Seconds and iterations a step of a kernel and its unreduced form; dimensions ``kernel``, ``twin_step``."""
     pair = [integrator(label) for label in (name, unreduced_forms()[name])]
     runs = [bare_run(scene, method, "angles", step, TIMED_STEPS * step) for method in pair for step in step_sizes]
-    work = np.array([(done.steps, done.newton_iterations) for done in (run() for run in runs)], float)
+    work = np.array([(run.steps, run.newton_iterations) for run in (call() for call in runs)], float)
     steps, iterations = work.T.reshape(2, 2, -1)
     seconds = np.array([timing.best for timing in timings(runs, batches)]).reshape(2, -1)
     dims = ("kernel", "twin_step")

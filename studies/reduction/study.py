@@ -25,7 +25,7 @@ FIRST = "spheroid"
 def cases(quick: bool) -> list[Case]:
     """Compiled methods with several charts (first scene), with an unreduced form, with a reduced-first step."""
     grid = []
-    for name in grid_scenes(TAGS if quick else ALL_BUT_TWO, lambda one: math.isfinite(one.nutation_period)):
+    for name in grid_scenes(TAGS if quick else ALL_BUT_TWO, lambda scene: math.isfinite(scene.nutation_period)):
         start, period = scene(name), scene(name).nutation_period
         several = [
             method

@@ -26,9 +26,9 @@ def shown(data: xr.Dataset) -> xr.Dataset:
 
 def cost(cell: xr.Dataset, target: float) -> float:
     """Seconds of a run whose axis error is at most the target, by `cost_to_reach`; or inf."""
-    error, paid = cell["axis"].values, cell["seconds"].values
-    good = np.isfinite(error) & np.isfinite(paid) & (error > 0.0)
-    columns = paid[good, np.newaxis], error[good, np.newaxis]
+    error, seconds = cell["axis"].values, cell["seconds"].values
+    good = np.isfinite(error) & np.isfinite(seconds) & (error > 0.0)
+    columns = seconds[good, np.newaxis], error[good, np.newaxis]
     return float(cost_to_reach(*columns, [target])[0, 0]) if good.any() else math.inf
 
 
@@ -43,7 +43,7 @@ def costs(data: xr.Dataset, target: float) -> dict[str, float]:
     part = shown(data)
     names = [str(name) for name in part["variant"].values if split_name(str(name))[0] != REFERENCE]
     known = {name: cost(part.sel(variant=name), target) for name in names}
-    return dict(sorted(((name, one) for name, one in known.items() if one < math.inf), key=lambda item: item[1]))
+    return dict(sorted(((name, time) for name, time in known.items() if time < math.inf), key=lambda item: item[1]))
 
 
 def on_f_alone(name: str) -> bool:
@@ -55,27 +55,27 @@ def on_f_alone(name: str) -> bool:
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """The fastest methods on f(t, y) alone at each error (s); DOP853 relative to them; SciPy's RK45 to the compiled."""
     part = shown(data)
-    answers: dict[str, Any] = {
+    values: dict[str, Any] = {
         "scene": str(part["scene"].values), "nutations": float(part["nutations"]),
         "scenes": ", ".join(map(str, data["scene"].values)),
         "lengths": " and ".join(f"{length:g}" for length in data["nutations"].values),
         "variants": data.sizes["variant"] - 1,
     }  # fmt: skip
     for target in TARGETS:
-        first = next(((name, one) for name, one in costs(data, target).items() if on_f_alone(name)), (None, None))
-        answers |= {
+        first = next(((name, time) for name, time in costs(data, target).items() if on_f_alone(name)), (None, None))
+        values |= {
             f"fastest_{-math.log10(target):.0f}": first[0],
             f"fastest_{-math.log10(target):.0f}_seconds": first[1],
         }
-    taken, known = costs(data, 1e-6), BESIDE in costs(data, 1e-9)
+    times, known = costs(data, 1e-6), BESIDE in costs(data, 1e-9)
     spread = part["seconds_spread"].values
-    both = SCIPY in taken and SAME in taken and (spread > NOISY).sum() <= BUSY * np.isfinite(spread).sum()
-    return answers | {
+    both = SCIPY in times and SAME in times and (spread > NOISY).sum() <= BUSY * np.isfinite(spread).sum()
+    return values | {
         "spread": float(np.nanmedian(spread)),
         "noisy": int((spread > NOISY).sum()),
         "timed": int(np.isfinite(spread).sum()),
-        "scipy": taken[SCIPY] / taken[SAME] if both else None,  # times as long, at 1e-6 rad
-        "beside": costs(data, 1e-9)[BESIDE] / answers["fastest_9_seconds"] if known else None,
+        "scipy": times[SCIPY] / times[SAME] if both else None,  # times as long, at 1e-6 rad
+        "beside": costs(data, 1e-9)[BESIDE] / values["fastest_9_seconds"] if known else None,
     }
 
 

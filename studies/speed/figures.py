@@ -81,24 +81,24 @@ def timed(data: xr.Dataset) -> xr.Dataset:
 def charts(data: xr.Dataset) -> list[Chart]:
     """Every run: two costs and four errors to choose from, a panel a scene and run length."""
     data, names = timed(data), list(map(str, data["variant"].values))
-    every, marks = {}, {}
+    series, marks = {}, {}
     for scene, length in product(map(str, data["scene"].values), data["nutations"].values):
         cell, title = data.sel(scene=scene, nutations=length), f"{scene} | {length:g} nutations"
-        every[title] = [Series(name, _points(cell.sel(variant=name))) for name in names if name != REFERENCE]
+        series[title] = [Series(name, _points(cell.sel(variant=name))) for name in names if name != REFERENCE]
         if REFERENCE in names:
-            one = cell.sel(variant=REFERENCE)
-            marks[title] = (float(one["seconds"].min()), float(one["axis_bound"].min()))
+            runs = cell.sel(variant=REFERENCE)
+            marks[title] = (float(runs["seconds"].min()), float(runs["axis_bound"].min()))
     costs = {name: place for place, name in enumerate(COSTS)}
     errors = {name: len(COSTS) + place for place, name in enumerate(ERRORS)}
-    return [Chart("runs", "Error against cost of every run", costs, errors, every, ("scene", "run length"), marks)]
+    return [Chart("runs", "Error against cost of every run", costs, errors, series, ("scene", "run length"), marks)]
 
 
 def _points(cell: xr.Dataset) -> list[tuple[float | str | None, ...]]:
     """Costs and errors of each run to three digits, None where one is missing, and the setting as text."""
     columns = [cell[key].values for key in (*COSTS.values(), *ERRORS.values())]
-    made = []
+    points = []
     for k in np.flatnonzero(np.isfinite(cell["seconds"].values)):
         numbers = [float(f"{column[k]:.3g}") if np.isfinite(column[k]) else None for column in columns]
         step, tolerance = (float(cell[key].values[k]) for key in ("step_size", "tolerance"))
-        made.append((*numbers, f"step {step:.3g} s" if np.isfinite(step) else f"tolerance {tolerance:.1g}"))
-    return made
+        points.append((*numbers, f"step {step:.3g} s" if np.isfinite(step) else f"tolerance {tolerance:.1g}"))
+    return points

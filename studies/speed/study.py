@@ -41,18 +41,18 @@ def cases(quick: bool) -> list[Case]:
     """Every method of `METHODS` in the registry, in its charts, and the closed form, on every scene."""
     names = [f"{name}[{chart}]" for name, charts in METHODS.items() if name in integrators() for chart in charts]
     names.insert(0, REFERENCE)
-    asked = {"lengths": LENGTHS[:1] if quick else LENGTHS, "settings": 7 if quick else SETTINGS}
-    return [Case(place, name, asked) for place in (SCENES[:1] if quick else SCENES) for name in names]
+    settings = {"lengths": LENGTHS[:1] if quick else LENGTHS, "settings": 7 if quick else SETTINGS}
+    return [Case(place, name, settings) for place in (SCENES[:1] if quick else SCENES) for name in names]
 
 
 def follow_up(data: xr.Dataset) -> list[Case]:
     """One case for each scene, which times all its runs together, `without` those that have no error."""
     names, lengths = data["variant"].values.tolist(), data["nutations"].values.tolist()
-    asked = {"lengths": lengths, "settings": data.sizes["setting"], "integrators": names}
+    settings = {"lengths": lengths, "settings": data.sizes["setting"], "integrators": names}
     ended = (data["axis"].notnull() | data["attitude"].notnull()).transpose("scene", "variant", "nutations", "setting")
-    without = [np.argwhere(~on.values).tolist() for on in ended]  # places of runs, in the order of the last three
+    without = [np.argwhere(~mask.values).tolist() for mask in ended]  # places of runs, in the order of the last three
     return [
-        Case(str(place), "together", asked | {"without": places}, timed=True)
+        Case(str(place), "together", settings | {"without": places}, timed=True)
         for place, places in zip(data["scene"].values, without, strict=True)
     ]
 
@@ -94,7 +94,7 @@ def times(on: Scene, variants: list[Integrator], length: float, ended: Array) ->
     columns = {name: np.full(ended.shape, np.nan) for name in ("seconds", "seconds_spread")}
     for name, column in columns.items():
         for place, (*_, rows) in enumerate(cells):
-            column[place, : len(rows)] = [one.get(name, np.nan) for one in rows]
+            column[place, : len(rows)] = [row.get(name, np.nan) for row in rows]
     coordinates = {"variant": [variant.name for variant in variants]}
     return xr.Dataset({name: (("variant", "setting"), column) for name, column in columns.items()}, coordinates)
 

@@ -108,7 +108,7 @@ def maps(data: xr.Dataset, scene: str) -> dict[str, OutcomeMap]:
         return {}
     part = data[["outcome", "parameter_value", "control", "knob_name"]].sel(scene=scene)
     read = {str(name): map_of(part.sel(variant=name)) for name in data["variant"].values}
-    return {name: one for name, one in read.items() if one is not None}
+    return {name: map_ for name, map_ in read.items() if map_ is not None}
 
 
 def methods_of(data: xr.Dataset) -> dict[str, Integrator]:
@@ -122,9 +122,9 @@ def families(data: xr.Dataset) -> list[str]:
     return [str(name) for name in data["scene"].values if str(name) not in MECHANISMS]
 
 
-def halved_by_pole(one: OutcomeMap | None) -> bool | None:
+def halved_by_pole(map_: OutcomeMap | None) -> bool | None:
     """Is the median reach at gaps of `NEAR` and less below half of that at `FAR` and more? None with nothing to set."""
-    if one is None or one.control == "none":
+    if map_ is None or map_.control == "none":
         return None
-    limits, gaps = one.reach, one.parameter
+    limits, gaps = map_.reach, map_.parameter
     return bool(np.median(limits[gaps <= NEAR]) < 0.5 * np.median(limits[gaps >= FAR]))

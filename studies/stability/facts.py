@@ -27,44 +27,44 @@ NAMES = (  # of all facts that are measured
 
 def facts(data: xr.Dataset) -> dict[str, Any]:
     """Up to which setting methods are accurate, how they fail, and the mechanisms. Steps of maps are in nutations."""
-    answers: dict[str, Any] = dict.fromkeys(NAMES)
-    answers |= {"periods": PERIODS, "slow": SLOW, "fast": FAST, "near": NEAR, "barely": BARELY, "lost": LOST,
+    values: dict[str, Any] = dict.fromkeys(NAMES)
+    values |= {"periods": PERIODS, "slow": SLOW, "fast": FAST, "near": NEAR, "barely": BARELY, "lost": LOST,
               "common": COMMON, "tried": MOST}  # fmt: skip
     if family := next(iter(families(data)), None):
-        answers |= atlas_facts(data, family)
+        values |= atlas_facts(data, family)
     for scene, variable, read in READ:
         if measured(data, scene, variable):
-            answers |= read(data.sel(scene=scene))
-    return answers
+            values |= read(data.sel(scene=scene))
+    return values
 
 
 def atlas_facts(data: xr.Dataset, family: str) -> dict[str, Any]:
     """The shares and reaches of the maps over the spin of one family."""
-    shown, known = maps(data, family), methods_of(data)
-    steps = {name: one for name, one in shown.items()
-             if one.control == "step_size" and not (name in known and known[name].exact_steps)}  # fmt: skip
-    made = np.concatenate([one.made.ravel() for one in shown.values()])
-    answers = {
+    family_maps, known = maps(data, family), methods_of(data)
+    steps = {name: map_ for name, map_ in family_maps.items()
+             if map_.control == "step_size" and not (name in known and known[name].exact_steps)}  # fmt: skip
+    ran = np.concatenate([map_.made.ravel() for map_ in family_maps.values()])
+    values = {
         "family": family,
-        "silent": float(pd.Series([one.silent for one in shown.values()]).median()),  # of the inaccurate runs
-        "cells": made.size,
-        "settled": 1.0 - made.mean(),  # share that was not run
+        "silent": float(pd.Series([map_.silent for map_ in family_maps.values()]).median()),  # of the inaccurate runs
+        "cells": ran.size,
+        "settled": 1.0 - ran.mean(),  # share that was not run
         **{name: int(data[name].sel(scene=family).sum()) for name in ("checks", "refuted")},
     }
     if steps:
         for kind in ("fast", "slow"):
-            known = {name: reach for name, one in steps.items() if np.isfinite(reach := one.usual_reach[kind])}
+            known = {name: reach for name, map_ in steps.items() if np.isfinite(reach := map_.usual_reach[kind])}
             if known:  # settings are a grid: there are ties
-                most = max(known.values())
-                best = [f"`{name}`" for name, reach in known.items() if reach == most]
-                answers |= {f"{kind}_variant": abridged(best), f"{kind}_reach": most}
-        reaches = [one.usual_reach for one in steps.values()]
-        answers |= {"stepped": len(steps), "shortest": min(float(one.settings[0]) for one in steps.values()),
+                largest = max(known.values())
+                best = [f"`{name}`" for name, reach in known.items() if reach == largest]
+                values |= {f"{kind}_variant": abridged(best), f"{kind}_reach": largest}
+        reaches = [map_.usual_reach for map_ in steps.values()]
+        values |= {"stepped": len(steps), "shortest": min(float(map_.settings[0]) for map_ in steps.values()),
                   "slow_none": sum(reach["slow"] == 0.0 for reach in reaches),
                   "slow_shorter": sum(reach["slow"] < reach["fast"] for reach in reaches)}  # fmt: skip
     if QUOTED in steps:
-        answers |= {"quoted_fast": steps[QUOTED].usual_reach["fast"], "quoted_fails": steps[QUOTED].failure.setting}
-    return answers
+        values |= {"quoted_fast": steps[QUOTED].usual_reach["fast"], "quoted_fails": steps[QUOTED].failure.setting}
+    return values
 
 
 def pole_facts(part: xr.Dataset) -> dict[str, Any]:
@@ -75,8 +75,8 @@ def pole_facts(part: xr.Dataset) -> dict[str, Any]:
         if halves is not None and method.control == "step_size":
             halved[method.charts() == ("angles",)].append(halves)
     groups = {"angles": halved[True], "others": halved[False]}
-    answers = {name: len(group) for name, group in groups.items() if group}
-    return answers | {f"{name}_halved": sum(groups[name]) for name in answers}
+    values = {name: len(group) for name, group in groups.items() if group}
+    return values | {f"{name}_halved": sum(groups[name]) for name in values}
 
 
 def resonance_facts(part: xr.Dataset) -> dict[str, Any]:
@@ -90,16 +90,16 @@ def resonance_facts(part: xr.Dataset) -> dict[str, Any]:
 
 def sleeping_facts(part: xr.Dataset) -> dict[str, Any]:
     """The spin from which a top sleeps at the longest step, and how far all of them are from theory."""
-    answers: dict[str, Any] = {"sleep_step": float(part["sleeping_step"].max())}
+    values: dict[str, Any] = {"sleep_step": float(part["sleeping_step"].max())}
     misses_ = []
     for name, method in methods_of(part).items():
         cell = part.sel(variant=name).dropna("rung", subset=["sleeping_threshold"])
         if method.sleeps_from is not None and cell.sizes["rung"]:
             steps, spins = (cell[key].values for key in ("sleeping_step", "sleeping_threshold"))
-            misses_ += [abs(one - method.sleeps_from(float(h))) for h, one in zip(steps, spins, strict=True)]
+            misses_ += [abs(spin - method.sleeps_from(float(h))) for h, spin in zip(steps, spins, strict=True)]
             if split_name(name)[0] in ("strang", "cayley"):
-                answers[f"{split_name(name)[0]}_sleeps"] = float(spins[-1])
-    return answers | {"sleep_miss": max(misses_, default=None)}
+                values[f"{split_name(name)[0]}_sleeps"] = float(spins[-1])
+    return values | {"sleep_miss": max(misses_, default=None)}
 
 
 def separatrix_facts(part: xr.Dataset) -> dict[str, Any]:
@@ -113,13 +113,13 @@ def separatrix_facts(part: xr.Dataset) -> dict[str, Any]:
 def sampling_facts(part: xr.Dataset) -> dict[str, Any]:
     """Energy errors sampled once a nutation against true ones, and the solver's part in that of the midpoint rule."""
     hidden, ratios = sampled(part)
-    answers: dict[str, Any] = {"sampled": len(hidden) + len(ratios), "hidden": len(hidden),
+    values: dict[str, Any] = {"sampled": len(hidden) + len(ratios), "hidden": len(hidden),
                                "small": sum(ratio > 10.0 for ratio in ratios.values())}  # fmt: skip
     if "plain_energy" in part:
         rule = part.dropna("variant", how="all", subset=["one_iteration_energy"]).isel(variant=0)
-        answers |= {"one_iteration": float(rule["one_iteration_energy"]),
+        values |= {"one_iteration": float(rule["one_iteration_energy"]),
                   "solved": float(rule["plain_energy"][-1])}  # fmt: skip
-    return answers
+    return values
 
 
 READ = (
@@ -138,15 +138,15 @@ def atlas_table(data: xr.Dataset) -> pd.DataFrame:
     """A row for each family and variant; steps are in nutation periods."""
     rows: list[dict[str, Any]] = []
     for family in families(data):
-        for name, one in maps(data, family).items():
+        for name, map_ in maps(data, family).items():
             limit = data["linear_limit"].sel(scene=family, variant=name) if "linear_limit" in data else None
             rows.append({
-                "variant": name, "scene": family, "set": one.control.replace("step_size", "step"),
-                "accurate (%)": 100.0 * one.accurate,
-                "accurate up to, fast tops": one.usual_reach["fast"],
-                "accurate up to, slow tops": one.usual_reach["slow"],
-                "fails from": one.failure.setting, "fails mostly by": SAID.get(one.failure.kind, ""),
-                "ended early (%)": 100.0 * one.early, "wrong without an error (%)": 100.0 * one.silent,
+                "variant": name, "scene": family, "set": map_.control.replace("step_size", "step"),
+                "accurate (%)": 100.0 * map_.accurate,
+                "accurate up to, fast tops": map_.usual_reach["fast"],
+                "accurate up to, slow tops": map_.usual_reach["slow"],
+                "fails from": map_.failure.setting, "fails mostly by": SAID.get(map_.failure.kind, ""),
+                "ended early (%)": 100.0 * map_.early, "wrong without an error (%)": 100.0 * map_.silent,
                 "small nutations grow from": None if limit is None else float(limit.min()),
             })  # fmt: skip
     place = {"step": 0, "tolerance": 1, "none": 2}
@@ -169,9 +169,9 @@ LIMITS = {  # header: scene, variable
 
 def limits_table(data: xr.Dataset) -> pd.DataFrame:
     """Limits of every fixed-step variant, the least linear limit first; of several step sizes those of the longest."""
-    there = {key: one for key, one in LIMITS.items() if one[0] in data["scene"].values and one[1] in data}
+    known = {key: limit for key, limit in LIMITS.items() if limit[0] in data["scene"].values and limit[1] in data}
     columns = {
-        key: data[name].sel(scene=scene).transpose("variant", ...).values for key, (scene, name) in there.items()
+        key: data[name].sel(scene=scene).transpose("variant", ...).values for key, (scene, name) in known.items()
     }
     table = pd.DataFrame({"variant": data["variant"].values.astype(str)} | {
         key: values if values.ndim == 1 else values[:, -1] for key, values in columns.items()

@@ -52,7 +52,7 @@ def survives(
 
     Arrays over runs, which are made in one call where the method has one, in lanes if it can.
     """
-    centres, displacements, h = np.broadcast_arrays(*(np.asarray(one, float) for one in (centres, displacements, h)))
+    centres, displacements, h = np.broadcast_arrays(*(np.asarray(x, float) for x in (centres, displacements, h)))
     momenta, chart = scene.top.momenta(scene.start), method.chart_for("axis")
     starts = [with_momenta(scene.top, theta, momenta) for theta in (centres + displacements).ravel().tolist()]
     marks = np.unique(np.linspace(0, steps, 400).astype(np.int64))
@@ -60,12 +60,12 @@ def survives(
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
         if isinstance(solver, FixedStep) and not solver.in_python:
             numbers = np.array([flat(scene.top, start) for start in starts])
-            done = solver.many(numbers, h.ravel(), np.tile(marks, (len(starts), 1)))
-            theta, well = View(chart, scene.top, done.states).theta, done.outcome == OUTCOMES.index("ok")
+            run = solver.many(numbers, h.ravel(), np.tile(marks, (len(starts), 1)))
+            theta, well = View(chart, scene.top, run.states).theta, run.outcome == OUTCOMES.index("ok")
         else:
-            each = zip(starts, h.ravel().tolist(), strict=True)
-            runs = [_run(method, scene, start, Plan.steps(one, marks)) for start, one in each]
-            theta, well = np.stack([seen.theta for _, seen in runs]), np.array([outcome == "ok" for outcome, _ in runs])
+            pairs = zip(starts, h.ravel().tolist(), strict=True)
+            runs = [_run(method, scene, start, Plan.steps(step, marks)) for start, step in pairs]
+            theta, well = np.stack([view.theta for _, view in runs]), np.array([outcome == "ok" for outcome, _ in runs])
         away = np.abs(theta - centres.reshape(-1, 1)).max(axis=1)
         stays: NDArray[np.bool_] = well & (away <= RUNS_AWAY * displacements.ravel())
     return stays.reshape(h.shape)
@@ -78,14 +78,14 @@ def surviving_displacements(method: Integrator, scene: Scene, h: Sequence[float]
     method has none that four steps can find, nothing survives; where h is NaN there is nothing to measure.
     """
     step, tried = np.asarray(h, float), np.geomspace(LEAST, MOST, TRIED)
-    centre = np.array([trace(method, scene, one).theta if math.isfinite(one) else math.nan for one in step.tolist()])
-    there = np.flatnonzero(np.isfinite(centre))
+    centre = np.array([trace(method, scene, x).theta if math.isfinite(x) else math.nan for x in step.tolist()])
+    known = np.flatnonzero(np.isfinite(centre))
     good, bad = np.where(np.isfinite(step), 0.0, math.nan), np.full(step.shape, math.nan)
-    if there.size:
-        lost = ~survives(method, scene, centre[there, np.newaxis], tried, step[there, np.newaxis], steps)
+    if known.size:
+        lost = ~survives(method, scene, centre[known, np.newaxis], tried, step[known, np.newaxis], steps)
         first = np.where(lost.any(axis=1), lost.argmax(axis=1), tried.size)
-        good[there] = np.where(first > 0, tried[np.maximum(first - 1, 0)], 0.0)
-        bad[there] = np.append(tried, math.nan)[first]
+        good[known] = np.where(first > 0, tried[np.maximum(first - 1, 0)], 0.0)
+        bad[known] = np.append(tried, math.nan)[first]
     sought = np.flatnonzero((good > 0.0) & np.isfinite(bad))
     for _ in range(HALVINGS if sought.size else 0):
         middle = np.sqrt(good[sought] * bad[sought])
@@ -119,19 +119,19 @@ def separatrix_horizon(method: Integrator, scene: Scene, setting: float) -> Hori
     else:
         plan = Plan.until(np.linspace(0.0, LONGEST, 1601) / rate, setting)
     times = plan.times
-    outcome, seen = _run(method, scene, scene.start, plan)
+    outcome, view = _run(method, scene, scene.start, plan)
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
-        error = charts.axis_distance(seen.axis, closed_form(scene).axis(times))
+        error = charts.axis_distance(view.axis, closed_form(scene).axis(times))
     early = float(error[np.searchsorted(times, SEEN / rate * (1.0 - 1e-12))])
-    past = np.flatnonzero(error > LOST)
-    reached = float(times[past[0]]) if past.size else math.nan
+    late = np.flatnonzero(error > LOST)
+    reached = float(times[late[0]]) if late.size else math.nan
     predicted = (SEEN + math.log(LOST / early)) / rate if early > 0.0 else math.nan
-    return Horizon(early, reached, predicted, float(outcome != "ok" and not past.size))
+    return Horizon(early, reached, predicted, float(outcome != "ok" and not late.size))
 
 
 def sampled_energy_error(method: Integrator, scene: Scene, steps: int, periods: int) -> tuple[float, float]:
     """Largest |E - E0| seen once a nutation, and at every step; `steps` make one nutation."""
     plan = Plan.steps(scene.nutation_period / steps, np.arange(steps * periods + 1))
-    _, seen = _run(method, scene, scene.start, plan)
-    error = np.abs(seen.energy - scene.top.energy(scene.start))
+    _, view = _run(method, scene, scene.start, plan)
+    error = np.abs(view.energy - scene.top.energy(scene.start))
     return float(error[steps::steps].max()), float(error.max())

@@ -42,40 +42,40 @@ OTHERS = {"color": style.GREY, "alpha": 0.5, "zorder": 1, "label": "all others, 
 def pictures(data: xr.Dataset) -> Iterator[Picture]:
     """The maps of the first family, and the mechanisms that were measured."""
     for family in families(data)[:1]:
-        shown = {name: one for name, one in maps(data, family).items() if one.control in SETTINGS}
-        if shown:
-            yield Picture("atlas", _atlas(data.sel(scene=family), _chosen(shown)))
-    there = [draw for scene, variable, draw in MECHANISMS if measured(data, scene, variable)]
-    if there:
-        figure, axes = style.grid(len(there), 2, height=2.4)
-        for axis, draw in zip(axes, there, strict=True):
+        panels = {name: map_ for name, map_ in maps(data, family).items() if map_.control in SETTINGS}
+        if panels:
+            yield Picture("atlas", _atlas(data.sel(scene=family), _chosen(panels)))
+    draws = [draw for scene, variable, draw in MECHANISMS if measured(data, scene, variable)]
+    if draws:
+        figure, axes = style.grid(len(draws), 2, height=2.4)
+        for axis, draw in zip(axes, draws, strict=True):
             draw(axis, data)
         style.few_ticks(*axes, most=5)
         style.legend_below(figure, axes)
         yield Picture("mechanisms", figure)
 
 
-def _chosen(shown: Mapping[str, OutcomeMap]) -> dict[str, OutcomeMap]:
+def _chosen(panels: Mapping[str, OutcomeMap]) -> dict[str, OutcomeMap]:
     """The known variants, or all if these are few; those with a step first."""
-    names = chosen(list(shown), KNOWN, MOST)
-    return {name: shown[name] for name in sorted(names, key=lambda name: list(SETTINGS).index(shown[name].control))}
+    names = chosen(list(panels), KNOWN, MOST)
+    return {name: panels[name] for name in sorted(names, key=lambda name: list(SETTINGS).index(panels[name].control))}
 
 
-def _atlas(part: xr.Dataset, shown: Mapping[str, OutcomeMap]) -> Any:
+def _atlas(part: xr.Dataset, panels: Mapping[str, OutcomeMap]) -> Any:
     """One panel for each variant: spin upwards, step or tolerance to the right; each control begins a row."""
     places: dict[int, str] = {}
     for control in SETTINGS:
         first = -(-(max(places, default=-1) + 1) // COLUMNS) * COLUMNS
-        places |= dict(enumerate((name for name, one in shown.items() if one.control == control), first))
+        places |= dict(enumerate((name for name, map_ in panels.items() if map_.control == control), first))
     figure, axes = style.panels(max(places) // COLUMNS + 1, COLUMNS, height=1.35)
     for place, axis in enumerate(axes.flat):
         axis.set_visible(place in places)
     for place, name in places.items():
-        one, axis = shown[name], axes.flat[place]
-        codes = np.where(one.outcome == WRONG, len(JUDGED) + 1, np.minimum(one.outcome, len(JUDGED)))
-        codes = np.where(one.made, codes, len(OUTCOMES) - 1)
+        map_, axis = panels[name], axes.flat[place]
+        codes = np.where(map_.outcome == WRONG, len(JUDGED) + 1, np.minimum(map_.outcome, len(JUDGED)))
+        codes = np.where(map_.made, codes, len(OUTCOMES) - 1)
         axis.imshow(codes, cmap=ListedColormap(list(OUTCOMES.values())), vmin=-0.5, vmax=len(OUTCOMES) - 0.5,
-                    extent=(*_ends(one.settings), *_ends(one.parameter)), origin="lower", aspect="auto",
+                    extent=(*_ends(map_.settings), *_ends(map_.parameter)), origin="lower", aspect="auto",
                     interpolation="nearest")  # fmt: skip
         limits = axis.axis()
         for variable, (_, dash) in LINES.items():
@@ -90,12 +90,12 @@ def _atlas(part: xr.Dataset, shown: Mapping[str, OutcomeMap]) -> Any:
             side.set_major_locator(MaxNLocator(3, integer=True))
             side.set_major_formatter(lambda power, _: f"{10.0**power:g}" if power > -3 else f"$10^{{{power:.0f}}}$")
         axis.set_title(
-            "{}\n[{}] accurate {:.0f} %".format(*split_name(name), 100.0 * one.accurate), fontsize=style.LEAST_TEXT
+            "{}\n[{}] accurate {:.0f} %".format(*split_name(name), 100.0 * map_.accurate), fontsize=style.LEAST_TEXT
         )
         axis.tick_params(labelsize=style.LEAST_TEXT)
         below = places.get(place + COLUMNS)
-        if below is None or shown[below].control != one.control:
-            axis.set_xlabel(SETTINGS[one.control], fontsize=style.LEAST_TEXT)
+        if below is None or panels[below].control != map_.control:
+            axis.set_xlabel(SETTINGS[map_.control], fontsize=style.LEAST_TEXT)
         if place % COLUMNS == 0:
             axis.set_ylabel("spin $r$", fontsize=style.LEAST_TEXT)
     handles: list[Any] = [Patch(color=color, label=label) for label, color in OUTCOMES.items()]
@@ -114,16 +114,16 @@ def _ends(values: Any) -> tuple[float, float]:
 def _lines(axis: Any, part: xr.Dataset, x: str, y: str, dots: bool = False) -> None:
     """A line, or dots, for each variant; if there are many, those not in `NAMED` are grey and without a label."""
     variants = list(map(str, part["variant"].values))
-    named = chosen(variants, NAMED, len(NAMED))
+    names = chosen(variants, NAMED, len(NAMED))
     for name in variants:
-        across, up = (part[key].sel(variant=name).values for key in (x, y))
-        order = np.argsort(across)
-        across, up = across[order], up[order]
-        good = np.isfinite(across) & np.isfinite(up)
+        u, v = (part[key].sel(variant=name).values for key in (x, y))
+        order = np.argsort(u)
+        u, v = u[order], v[order]
+        good = np.isfinite(u) & np.isfinite(v)
         if good.any():
             looks = style.line(name) | {"label": name, "markevery": max(1, int(good.sum()) // 8), "zorder": 3}
-            looks = looks if name in named else OTHERS | {"lw": 0.6, "marker": "." if dots else "", "ms": 3.0}
-            axis.plot(across[good], up[good], **(looks | ({"ls": "none", "markevery": 1} if dots else {})))
+            looks = looks if name in names else OTHERS | {"lw": 0.6, "marker": "." if dots else "", "ms": 3.0}
+            axis.plot(u[good], v[good], **(looks | ({"ls": "none", "markevery": 1} if dots else {})))
 
 
 def _pole(axis: Any, data: xr.Dataset) -> None:

@@ -118,10 +118,10 @@ def _limit_of_growth(method: Integrator, scene: Scene, grid: np.ndarray) -> floa
     """The step of a grid at which small nutations first grow by `GROWING`, for a method that need not be symmetric."""
     frequency, last = scene.top.nutation_frequency(scene.top.momenta(scene.start)), math.nan
     for h in map(float, grid):
-        over = _growing(method, scene, h, frequency)
-        if math.isnan(over):
+        growth = _growing(method, scene, h, frequency)
+        if math.isnan(growth):
             return math.nan
-        if over > 0.0:
+        if growth > 0.0:
             return _edge(lambda x: _growing(method, scene, x, frequency), last, h, lost=-1.0)
         last = h
     return math.nan

@@ -191,8 +191,8 @@ def _kernel() -> Any:  # noqa: C901  (one loop, read in one piece)
                 if ended != 0:
                     verdict[i, k] = ended + WRONG_REGIME
                     continue
-                most = math.inf if followed[k] else scene[7]
-                error[i, k] = axis_error(constants[i], scene[3], phases[k], run, count, most)
+                limit = math.inf if followed[k] else scene[7]
+                error[i, k] = axis_error(constants[i], scene[3], phases[k], run, count, limit)
                 if error[i, k] <= scene[7]:
                     verdict[i, k] = 0
                 elif strays(scene, run, kept, count):

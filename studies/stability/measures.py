@@ -32,11 +32,11 @@ PAST_RESONANCE = 1.05  # times the resonant step: beyond the resonance, where di
 def map_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.Dataset:
     """An outcome map over a family of scenes and the control, with the linear limits of a fixed step over it."""
     parameters, ladder = settings["parameters"], settings["ladder"]
-    shown = []
+    columns = []
     if name == "grazing":
         nearest = np.abs(np.log(np.asarray(ladder, float) / settings["shown"]))
-        shown = [int(np.argmin(nearest)) if method.control else 0]
-    runs = outcome_map(name, parameters, method, ladder, settings["periods"], shown)
+        columns = [int(np.argmin(nearest)) if method.control else 0]
+    runs = outcome_map(name, parameters, method, ladder, settings["periods"], columns)
     table: dict[str, Any] = {
         "outcome": (("parameter", "setting"), np.where(runs.made, runs.verdict, np.uint8(SETTLED))),
         "checks": float(runs.checks),
@@ -46,7 +46,7 @@ def map_table(name: str, method: Integrator, settings: Mapping[str, Any]) -> xr.
         "knob_name": method.control or "none",
         "grid": f"{len(ladder)} x {len(parameters)}",
     }
-    for column in shown:
+    for column in columns:
         table["shown_knob"] = float(ladder[column])
         table["grazing_error"] = ("parameter", runs.axis_error[:, column])
     if method.fixed_step and settings.get("limits"):
@@ -79,8 +79,8 @@ def resonance_table(name: str, method: Integrator, settings: Mapping[str, Any]) 
     scene = scenes.scene(name)
     omega = scene.top.nutation_frequency(scene.top.momenta(scene.start))
     phases = np.asarray(settings["phases"], float)
-    sought = np.linspace(0.02, SOUGHT_PHASE, SOUGHT_STEPS) / omega
-    (limit, third), window = linear_limits(method, scene, sought), narrow_window(method, scene, sought)
+    grid = np.linspace(0.02, SOUGHT_PHASE, SOUGHT_STEPS) / omega
+    (limit, third), window = linear_limits(method, scene, grid), narrow_window(method, scene, grid)
     steps = [*(phases / omega).tolist(), third, PAST_RESONANCE * third]
     *surviving, at_third, past_third = surviving_displacements(method, scene, steps, settings["steps"]).tolist()
     columns: dict[str, Any] = {
@@ -184,8 +184,8 @@ def narrow_window(method: Integrator, scene: Scene, grid: np.ndarray) -> Window:
             break
         if abs(first.trace) <= abs(before.trace) >= max(NEARLY, abs(at.trace)):
             close = np.linspace(earlier, h, TRIED + 1)
-            tried = [trace(method, scene, x) for x in close.tolist()]
-            lost = np.flatnonzero([not surpasses(one, one.doubt) <= 0.0 for one in tried])
+            traces = [trace(method, scene, x) for x in close.tolist()]
+            lost = np.flatnonzero([not surpasses(value, value.doubt) <= 0.0 for value in traces])
             if lost.size:
                 return Window(float(close[lost[0] - 1]), float(close[lost[-1] + 1]))
         earlier, last, first, before = last, h, before, at

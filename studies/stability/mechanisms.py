@@ -48,8 +48,8 @@ def resonant(part: xr.Dataset) -> dict[str, float]:
     """By variant the resonant step (h omega): linearly stable, but small displacements run away, and none just past."""
     phases = {}
     for name, cell in variants_with(part, "third_turn_phase").items():
-        at, past = float(cell["surviving_at_third_turn"]), float(cell["surviving_past_third_turn"])
-        if past > REVIVAL * at and NEXT * at < BARELY:
+        before, after = float(cell["surviving_at_third_turn"]), float(cell["surviving_past_third_turn"])
+        if after > REVIVAL * before and NEXT * before < BARELY:
             phases[name] = float(cell["third_turn_phase"])
     return phases
 

@@ -127,8 +127,8 @@ def together(runs: RowPlan, solver: FixedStep, columns: slice, tops: Array, peri
     """
     marks, settings = np.array(runs.marks[columns]), runs.settings[columns]
     h = np.outer(periods, settings)
-    done = solver.many(np.repeat(tops, len(settings), axis=0), h.ravel(), np.tile(marks, (len(tops), 1)))
-    return Made(*(values.reshape(*h.shape, *values.shape[1:]) for values in (done.states, done.momenta, done.outcome)))
+    run = solver.many(np.repeat(tops, len(settings), axis=0), h.ravel(), np.tile(marks, (len(tops), 1)))
+    return Made(*(values.reshape(*h.shape, *values.shape[1:]) for values in (run.states, run.momenta, run.outcome)))
 
 
 def group_below(runs: RowPlan, end: int, n: int, alone: Collection[int]) -> int:
@@ -207,12 +207,12 @@ class _Descent:
     def _run(self, rows: NDArray[np.int64], columns: slice) -> None:
         """Run and judge some scenes at neighbouring settings."""
         if self.solver is None:
-            each = [one_by_one(self.runs, self.chart, self.scenes[row], columns) for row in rows]
-            made = Made(*(np.concatenate(parts) for parts in zip(*each, strict=True)))
+            row_runs = [one_by_one(self.runs, self.chart, self.scenes[row], columns) for row in rows]
+            results = Made(*(np.concatenate(parts) for parts in zip(*row_runs, strict=True)))
         else:
-            made = together(self.runs, self.solver, columns, self.tops[rows], self.truth.periods[rows])
-        seen = judge_runs(self.truth.part(rows), self.runs.phases[columns], self.followed[columns], *made)
-        self.judged.verdict[rows, columns], self.judged.axis_error[rows, columns] = seen
+            results = together(self.runs, self.solver, columns, self.tops[rows], self.truth.periods[rows])
+        verdicts = judge_runs(self.truth.part(rows), self.runs.phases[columns], self.followed[columns], *results)
+        self.judged.verdict[rows, columns], self.judged.axis_error[rows, columns] = verdicts
         self.made[rows, columns] = True
 
     def _settle(self, rows: NDArray[np.int64], columns: slice) -> None:

@@ -73,11 +73,11 @@ def solver_sweep(rule: Quadrature, scene: Scene, h: float, steps: int, tolerance
     """A discrete Lagrangian of this package, its iteration stopped at `tolerance` of the increment (inf: after one)."""
     par, state = on_angles(scene.top, scene.start)
     marks = np.unique(np.linspace(0, steps, SAMPLES).astype(np.int64))
-    done = discrete_lagrangian.march(par, rule._replace(tolerance=tolerance), state, h, marks)
+    run = discrete_lagrangian.march(par, rule._replace(tolerance=tolerance), state, h, marks)
     momenta = scene.top.momenta(scene.start)
     with np.errstate(all="ignore"):
-        lost = np.abs(done.momenta[1:] - np.array([momenta.p_phi, momenta.p_psi]))
-    return SolverError(_energy_error(scene, done.states), float(np.nanmax(lost)), done.work / max(done.steps, 1))
+        lost = np.abs(run.momenta[1:] - np.array([momenta.p_phi, momenta.p_psi]))
+    return SolverError(_energy_error(scene, run.states), float(np.nanmax(lost)), run.work / max(run.steps, 1))
 
 
 def _energy_error(scene: Scene, states: np.ndarray) -> float:

@@ -16,7 +16,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
     """How well each source is known (rad), how many bounds hold, and how many published values are met."""
     bounds, broken, ratio = bound_ratios(data)
     published = published_values()
-    printed = [one for one in published if one.kind == "printed"]
+    printed = [value for value in published if value.kind == "printed"]
     worst = at_worst(data, ("double, axis", "double, attitude"))
     return {
         "digits": DIGITS,
@@ -30,8 +30,8 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "quadruple": largest(data, ("quadruple, attitude",)),  # rad, its distance from the closed form in 45 digits
         "published": len(published),
         "printed": len(printed),
-        "printed_met": sum(one.reproduced for one in printed),
-        "printed_trajectory": sum(one.tests == TRAJECTORY for one in printed),
+        "printed_met": sum(value.reproduced for value in printed),
+        "printed_trajectory": sum(value.tests == TRAJECTORY for value in printed),
     }
 
 
@@ -63,8 +63,8 @@ def tables(data: xr.Dataset) -> dict[str, pd.DataFrame]:
     )
     header = ["source", "quantity", "published", "ours", "to the last digit", "kind", "tests"]
     values = pd.DataFrame(
-        [[one.source, one.quantity, one.published, one.ours, one.reproduced, one.kind, one.tests]
-         for one in published_values()],
+        [[value.source, value.quantity, value.published, value.ours, value.reproduced, value.kind, value.tests]
+         for value in published_values()],
         columns=header,
     )  # fmt: skip
     return {"sources": ends, "published": values}

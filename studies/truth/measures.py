@@ -49,8 +49,8 @@ def source_errors(scene: Scene, source: str, horizons: list[float]) -> xr.Datase
         distances = (distance(axis, true_axis(scene, float(t))) for axis, t in zip(path, times, strict=True))
         columns[ERROR].append(max(distances))
         if claims:
-            judged = reference(scene, times) if run is None else judged_integration(scene, times, precision, run)
-            bound = judged["axis_error_bound"].max()
+            truth = reference(scene, times) if run is None else judged_integration(scene, times, precision, run)
+            bound = truth["axis_error_bound"].max()
         columns[BOUND].append(float(bound))
     return xr.Dataset({name: ("horizon", values) for name, values in columns.items()}, coords={"horizon": horizons})
 

@@ -22,25 +22,25 @@ def _run(dart: Any, held: str, body: Body, h: float, steps: int) -> Path:
     world.setTimeStep(h)
     world.setGravity([0, 0, -body.mgl / arm if pinned else 0])
     if pinned:
-        made = skeleton.createBallJointAndBodyNodePair
-        joint, node = made(None, dart.dynamics.BallJointProperties(), dart.dynamics.BodyNodeProperties())
+        make = skeleton.createBallJointAndBodyNodePair
+        joint, node = make(None, dart.dynamics.BallJointProperties(), dart.dynamics.BodyNodeProperties())
     else:
-        made = skeleton.createFreeJointAndBodyNodePair
-        joint, node = made(None, dart.dynamics.FreeJointProperties(), dart.dynamics.BodyNodeProperties())
+        make = skeleton.createFreeJointAndBodyNodePair
+        joint, node = make(None, dart.dynamics.FreeJointProperties(), dart.dynamics.BodyNodeProperties())
     node.setInertia(dart.dynamics.Inertia(1.0, [0, 0, arm], np.diag([across, across, body.I3])))
     world.addSkeleton(skeleton)
     turn = Rotation.from_matrix(body.rotation).as_rotvec()
     joint.setPositions(turn if pinned else np.concatenate([turn, np.zeros(3)]))
     joint.setVelocities(body.velocity_body if pinned else np.concatenate([body.velocity, np.zeros(3)]))
-    past = Recorder()
+    recorder = Recorder()
     for step in range(steps + 1):
         q = quaternion(node.getWorldTransform().rotation())
-        past.add(q, node.getAngularVelocity())
+        recorder.add(q, node.getAngularVelocity())
         if step < steps:
             if not pinned:
                 node.addExtTorque(torque(body.mgl, q), False)
             world.step()
-    return past.path()
+    return recorder.path()
 
 
 def settings() -> list[Setting]:

@@ -39,25 +39,25 @@ def _torque(drake: Any, body: Body, plant: Any, index: Any) -> Any:
 
 
 def _run(drake: Any, body: Body, h: float, steps: int) -> Path:
-    builder, plant, past = drake.DiagramBuilder(), drake.MultibodyPlant(h), Recorder()
+    builder, plant, recorder = drake.DiagramBuilder(), drake.MultibodyPlant(h), Recorder()
     inertia = drake.RotationalInertia(body.I1, body.I1, body.I3)
-    made = plant.AddRigidBody("top", drake.SpatialInertia.MakeFromCentralInertia(1.0, np.zeros(3), inertia))
+    link = plant.AddRigidBody("top", drake.SpatialInertia.MakeFromCentralInertia(1.0, np.zeros(3), inertia))
     plant.mutable_gravity_field().set_gravity_vector([0, 0, 0])
     plant.Finalize()
     builder.AddSystem(plant)
-    push = builder.AddSystem(_torque(drake, body, plant, made.index()))
+    push = builder.AddSystem(_torque(drake, body, plant, link.index()))
     builder.Connect(plant.get_state_output_port(), push.get_input_port())
     builder.Connect(push.get_output_port(), plant.get_applied_spatial_force_input_port())
     simulator = drake.Simulator(builder.Build())
     context = plant.GetMyMutableContextFromRoot(simulator.get_mutable_context())
     plant.SetPositions(context, np.concatenate([body.attitude, np.zeros(3)]))
     plant.SetVelocities(context, np.concatenate([body.velocity, np.zeros(3)]))
-    past.add(body.attitude, body.velocity)
+    recorder.add(body.attitude, body.velocity)
     simulator.Initialize()
     for step in range(1, steps + 1):
         simulator.AdvanceTo((step - 0.5) * h)
-        past.add(plant.GetPositions(context)[:4], plant.GetVelocities(context)[:3])
-    return past.path()
+        recorder.add(plant.GetPositions(context)[:4], plant.GetVelocities(context)[:3])
+    return recorder.path()
 
 
 def settings() -> list[Setting]:

@@ -15,14 +15,14 @@ ENGINE = "Exudyn"
 def _run(exudyn: Any, scheme: str, body: Body, h: float, steps: int) -> Path:
     from exudyn.utilities import MarkerNodeRigid, RigidBodyInertia, Torque
 
-    system, past = exudyn.SystemContainer().AddSystem(), Recorder()
+    system, recorder = exudyn.SystemContainer().AddSystem(), Recorder()
     inertia = RigidBodyInertia(mass=1, inertiaTensor=np.diag([body.I1, body.I1, body.I3]), com=[0, 0, 0])
-    made = system.CreateRigidBody(
+    result = system.CreateRigidBody(
         inertia=inertia, nodeType=exudyn.NodeType.RotationRotationVector, referencePosition=[0, 0, 0],
         referenceRotationMatrix=body.rotation, initialAngularVelocity=body.velocity.tolist(), gravity=[0, 0, 0],
         returnDict=True,
     )  # fmt: skip
-    node, kinds = made["nodeNumber"], exudyn.OutputVariableType
+    node, kinds = result["nodeNumber"], exudyn.OutputVariableType
 
     def load(system: Any, time: float, vector: Any) -> list[float]:
         del time, vector
@@ -32,21 +32,21 @@ def _run(exudyn: Any, scheme: str, body: Body, h: float, steps: int) -> Path:
     def note(system: Any, time: float) -> bool:
         del time
         turn = np.array(system.GetNodeOutput(node, kinds.RotationMatrix)).reshape(3, 3)
-        past.add(quaternion(turn), system.GetNodeOutput(node, kinds.AngularVelocity))
+        recorder.add(quaternion(turn), system.GetNodeOutput(node, kinds.AngularVelocity))
         return True
 
     marker = system.AddMarker(MarkerNodeRigid(nodeNumber=node))
     system.AddLoad(Torque(markerNumber=marker, loadVector=[0, 0, 0], loadVectorUserFunction=load))
     system.SetPostStepUserFunction(note)
     system.Assemble()
-    chosen = exudyn.SimulationSettings()
-    chosen.timeIntegration.numberOfSteps, chosen.timeIntegration.endTime = steps, steps * h
-    chosen.timeIntegration.verboseMode = 0
-    chosen.timeIntegration.explicitIntegration.useLieGroupIntegration = True
-    chosen.solutionSettings.writeSolutionToFile = False
-    past.add(body.attitude, body.velocity)
-    system.SolveDynamic(chosen, solverType=getattr(exudyn.DynamicSolverType, scheme), storeSolver=False)
-    path = past.path()
+    options = exudyn.SimulationSettings()
+    options.timeIntegration.numberOfSteps, options.timeIntegration.endTime = steps, steps * h
+    options.timeIntegration.verboseMode = 0
+    options.timeIntegration.explicitIntegration.useLieGroupIntegration = True
+    options.solutionSettings.writeSolutionToFile = False
+    recorder.add(body.attitude, body.velocity)
+    system.SolveDynamic(options, solverType=getattr(exudyn.DynamicSolverType, scheme), storeSolver=False)
+    path = recorder.path()
     return Path(path.attitude[-steps - 1 :], path.velocity[-steps - 1 :])
 
 

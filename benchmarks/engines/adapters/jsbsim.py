@@ -33,7 +33,7 @@ XML = """<?xml version="1.0"?>
 
 
 def _run(jsbsim: Any, attitude: int, rate: int, body: Body, h: float, steps: int) -> Path:
-    engine, past = jsbsim.FGFDMExec(None), Recorder()
+    engine, recorder = jsbsim.FGFDMExec(None), Recorder()
     engine.set_debug_level(0)
     with tempfile.TemporaryDirectory() as folder:
         place = File(folder) / "aircraft" / "top"
@@ -58,10 +58,10 @@ def _run(jsbsim: Any, attitude: int, rate: int, body: Body, h: float, steps: int
     for step in range(steps + 1):
         if step:
             engine.run()
-        now = S @ np.array(state.get_Tl2b()).T @ S
+        axes = S @ np.array(state.get_Tl2b()).T @ S
         rates = np.array([engine[f"velocities/{name}i-rad_sec"] for name in "pqr"])
-        past.add(quaternion(now), now @ (S @ rates))
-    return past.path()
+        recorder.add(quaternion(axes), axes @ (S @ rates))
+    return recorder.path()
 
 
 def settings() -> list[Setting]:
@@ -75,6 +75,6 @@ def settings() -> list[Setting]:
         ("Buss2, AB2", BUSS_2, ADAMS_BASHFORTH_2, "jsbsim-buss2"),
     )
     return [
-        Setting(ENGINE, version, name, FREE, method, functools.partial(_run, jsbsim, one, other))
-        for name, one, other, method in rows
+        Setting(ENGINE, version, name, FREE, method, functools.partial(_run, jsbsim, attitude, rate))
+        for name, attitude, rate, method in rows
     ]

@@ -28,7 +28,7 @@ def _run(lammps: Any, style: str, body: Body, h: float, steps: int) -> Path:
     arms = np.array([a, a, c])
     sites = np.repeat(np.diag(arms), 2, axis=0) * np.array([1, -1] * 3)[:, None]
     places, force = sites @ body.rotation.T, float(body.mgl / (2.0 * c))
-    engine, past = lammps.lammps(cmdargs=["-screen", "none", "-log", "none", "-nocite"]), Recorder()
+    engine, recorder = lammps.lammps(cmdargs=["-screen", "none", "-log", "none", "-nocite"]), Recorder()
     try:
         engine.commands_list(list(SETUP))
         rates = np.cross(body.velocity, places)
@@ -41,22 +41,22 @@ def _run(lammps: Any, style: str, body: Body, h: float, steps: int) -> Path:
         for step in range(steps + 1):
             if step:
                 engine.command("run 1 pre no post no")
-            columns, turned = _columns(engine, arms)
-            past.add(quaternion(columns.T), 0.5 * np.cross(columns, turned).sum(axis=0))
+            columns, derivatives = _columns(engine, arms)
+            recorder.add(quaternion(columns.T), 0.5 * np.cross(columns, derivatives).sum(axis=0))
     finally:
         engine.close()
-    return past.path()
+    return recorder.path()
 
 
 def _columns(engine: Any, arms: Any) -> tuple[Any, Any]:
     """The body's axes in space, one a row, and their derivatives, from the atoms."""
     order = np.argsort(engine.extract_atom("id")[0:6])
-    each = []
+    parts = []
     for name in ("x", "v"):
         values = engine.extract_atom(name)
         rows = np.array([[values[i][k] for k in range(3)] for i in order])
-        each.append((rows[::2] - rows[1::2]) / (2.0 * arms[:, None]))
-    return each[0], each[1]
+        parts.append((rows[::2] - rows[1::2]) / (2.0 * arms[:, None]))
+    return parts[0], parts[1]
 
 
 def settings() -> list[Setting]:

@@ -34,16 +34,16 @@ def _run(mujoco: Any, integrator: str, held: str, body: Body, h: float, steps: i
     text = XML.format(gravity=gravity, joint=JOINTS[held], arm=arm, across=across, along=body.I3)
     model = mujoco.MjModel.from_xml_string(text)
     model.opt.timestep, model.opt.integrator = h, int(getattr(mujoco.mjtIntegrator, f"mjINT_{integrator.upper()}"))
-    data, past = mujoco.MjData(model), Recorder()
+    data, recorder = mujoco.MjData(model), Recorder()
     q, v = (slice(0, 4), slice(0, 3)) if pinned else (slice(3, 7), slice(3, 6))
     data.qpos[q], data.qvel[v] = body.attitude, body.velocity_body
     for step in range(steps + 1):
-        past.add(data.qpos[q], matrix(data.qpos[q]) @ data.qvel[v])
+        recorder.add(data.qpos[q], matrix(data.qpos[q]) @ data.qvel[v])
         if step < steps:
             if not pinned:
                 data.xfrc_applied[1, 3:6] = torque(body.mgl, data.qpos[q])
             mujoco.mj_step(model, data)
-    return past.path()
+    return recorder.path()
 
 
 def settings() -> list[Setting]:

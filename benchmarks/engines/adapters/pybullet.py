@@ -28,46 +28,46 @@ def _on_joint(bullet: Any, body: Body, start: list[float]) -> int:
     with tempfile.TemporaryDirectory() as folder:
         file = File(folder) / "top.urdf"
         file.write_text(URDF.format(arm=body.arm, across=body.across, along=body.I3), encoding="utf-8")
-        made = bullet.loadURDF(str(file), useFixedBase=True, flags=bullet.URDF_USE_INERTIA_FROM_FILE)
-    bullet.changeDynamics(made, 0, linearDamping=0, angularDamping=0, jointDamping=0, maxJointVelocity=FAST)
+        top = bullet.loadURDF(str(file), useFixedBase=True, flags=bullet.URDF_USE_INERTIA_FROM_FILE)
+    bullet.changeDynamics(top, 0, linearDamping=0, angularDamping=0, jointDamping=0, maxJointVelocity=FAST)
     bullet.setJointMotorControlMultiDof(
-        made, 0, bullet.POSITION_CONTROL, targetPosition=[0, 0, 0, 1], positionGain=0, velocityGain=0, force=[0, 0, 0]
+        top, 0, bullet.POSITION_CONTROL, targetPosition=[0, 0, 0, 1], positionGain=0, velocityGain=0, force=[0, 0, 0]
     )
-    bullet.resetJointStateMultiDof(made, 0, start, body.velocity_body.tolist())
-    return int(made)
+    bullet.resetJointStateMultiDof(top, 0, start, body.velocity_body.tolist())
+    return int(top)
 
 
 def _free(bullet: Any, body: Body, start: list[float]) -> int:
     shape = bullet.createCollisionShape(bullet.GEOM_SPHERE, radius=0.001)
-    made = bullet.createMultiBody(1, shape, baseOrientation=start)
+    top = bullet.createMultiBody(1, shape, baseOrientation=start)
     bullet.changeDynamics(
-        made, -1, localInertiaDiagonal=[body.I1, body.I1, body.I3], linearDamping=0, angularDamping=0,
+        top, -1, localInertiaDiagonal=[body.I1, body.I1, body.I3], linearDamping=0, angularDamping=0,
         maxJointVelocity=FAST, activationState=bullet.ACTIVATION_STATE_DISABLE_SLEEPING,
     )  # fmt: skip
-    bullet.resetBaseVelocity(made, [0, 0, 0], body.velocity.tolist())
-    return int(made)
+    bullet.resetBaseVelocity(top, [0, 0, 0], body.velocity.tolist())
+    return int(top)
 
 
 def _run(bullet: Any, held: str, body: Body, h: float, steps: int) -> Path:
-    client, past, pinned = bullet.connect(bullet.DIRECT), Recorder(), held == JOINT
+    client, recorder, pinned = bullet.connect(bullet.DIRECT), Recorder(), held == JOINT
     try:
         bullet.setTimeStep(h)
         bullet.setGravity(0, 0, -body.mgl / body.arm if pinned else 0)
-        made = (_on_joint if pinned else _free)(bullet, body, np.roll(body.attitude, -1).tolist())
+        top = (_on_joint if pinned else _free)(bullet, body, np.roll(body.attitude, -1).tolist())
         for step in range(steps + 1):
             if pinned:
-                link = bullet.getLinkState(made, 0, computeLinkVelocity=1, computeForwardKinematics=1)
+                link = bullet.getLinkState(top, 0, computeLinkVelocity=1, computeForwardKinematics=1)
                 q, w = np.roll(link[5], 1), link[7]
             else:
-                q, w = np.roll(bullet.getBasePositionAndOrientation(made)[1], 1), bullet.getBaseVelocity(made)[1]
-            past.add(q, w)
+                q, w = np.roll(bullet.getBasePositionAndOrientation(top)[1], 1), bullet.getBaseVelocity(top)[1]
+            recorder.add(q, w)
             if step < steps:
                 if not pinned:
-                    bullet.applyExternalTorque(made, -1, torque(body.mgl, q), bullet.WORLD_FRAME)
+                    bullet.applyExternalTorque(top, -1, torque(body.mgl, q), bullet.WORLD_FRAME)
                 bullet.stepSimulation()
     finally:
         bullet.disconnect(client)
-    return past.path()
+    return recorder.path()
 
 
 def settings() -> list[Setting]:

@@ -14,25 +14,25 @@ SUBSTEPS = 4  # the default
 
 
 def _run(rapier: Any, gyroscopic: bool, body: Body, h: float, steps: int) -> Path:
-    vector, past = rapier.Vec3, Recorder()
+    vector, recorder = rapier.Vec3, Recorder()
     world = rapier.PhysicsWorld(gravity=vector(0, 0, 0))
     world.integration_parameters.dt = h
     world.integration_parameters.num_solver_iterations = SUBSTEPS
     inertia = rapier.MassProperties(rapier.Point3(0.0, 0.0, 0.0), 1.0, vector(body.I1, body.I1, body.I3))
     turn = rapier.Rotation3(*body.attitude.tolist()).scaled_axis
-    made = rapier.RigidBody.dynamic().rotation(turn).angvel(vector(*body.velocity.tolist()))
-    made = made.additional_mass_properties(inertia).can_sleep(False).gyroscopic_forces(gyroscopic)
-    key = world.add_body(made)
+    builder = rapier.RigidBody.dynamic().rotation(turn).angvel(vector(*body.velocity.tolist()))
+    builder = builder.additional_mass_properties(inertia).can_sleep(False).gyroscopic_forces(gyroscopic)
+    key = world.add_body(builder)
     for step in range(steps + 1):
-        one = world.rigid_bodies[key]
-        q, w = one.rotation, one.angvel
+        top = world.rigid_bodies[key]
+        q, w = top.rotation, top.angvel
         attitude = np.array([q.w, q.i, q.j, q.k])
-        past.add(attitude, (w.x, w.y, w.z))
+        recorder.add(attitude, (w.x, w.y, w.z))
         if step < steps:
-            one.reset_torques(True)  # they persist
-            one.add_torque(vector(*torque(body.mgl, attitude)), True)
+            top.reset_torques(True)  # they persist
+            top.add_torque(vector(*torque(body.mgl, attitude)), True)
             world.step()
-    return past.path()
+    return recorder.path()
 
 
 def settings() -> list[Setting]:

@@ -51,7 +51,7 @@ class Solver:
             self.owned.append((function(library.core, "SUNMatDestroy", c_void_p, returns=None), jacobian))
         self.restart = function(cvode, "CVodeReInit", c_void_p, c_double, c_void_p)
         self.go = function(cvode, "CVode", c_void_p, c_double, c_void_p, c_void_p, c_int)
-        self._counts = [function(cvode, f"CVodeGetNum{what}", c_void_p, c_void_p) for what in ("Steps", "RhsEvals")]
+        self._counts = [function(cvode, f"CVodeGetNum{name}", c_void_p, c_void_p) for name in ("Steps", "RhsEvals")]
         self._free = function(cvode, "CVodeFree", c_void_p, returns=None)
 
     def advance(self, time: float) -> None:

@@ -33,7 +33,7 @@ class Chain(Library):
     def __init__(self, scheme: str) -> None:
         self.scheme = scheme
 
-    def _built(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[Any, Any, Any]:
+    def _simulator_of(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[Any, Any, Any]:
         from pydrake.systems.analysis import ResetIntegratorFromFlags, Simulator
 
         plant = _plant(top)
@@ -48,7 +48,7 @@ class Chain(Library):
     def _steps(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[list[float], list[Any]]:
         from pydrake.systems.framework import EventStatus
 
-        simulator, plant, _ = self._built(top, start, plan)
+        simulator, plant, _ = self._simulator_of(top, start, plan)
         times: list[float] = []
         rows: list[Any] = []
 
@@ -76,7 +76,7 @@ class Chain(Library):
 
     def inner(self, top: SymmetricTop, start: Angles, plan: Plan) -> Inner:
         """Put the context back to the start and advance to the horizon."""
-        simulator, plant, context = self._built(top, start, plan)
+        simulator, plant, context = self._simulator_of(top, start, plan)
         state, horizon = _begin(start), plan.horizon
 
         def call() -> Any:

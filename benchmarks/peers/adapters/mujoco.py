@@ -42,7 +42,7 @@ class Ball(Library):
         self.mujoco, self.code = mujoco, INTEGRATORS[name][0]
         self.stages = 4 if name == "RK4" else 1
 
-    def _built(self, top: SymmetricTop, step: float) -> tuple[Any, Any]:
+    def _model_and_data(self, top: SymmetricTop, step: float) -> tuple[Any, Any]:
         arm = 0.1 * top.I1**0.5
         text = XML.format(gravity=-top.mgl / arm, step=step, arm=arm, across=top.I1 - arm * arm, along=top.I3)
         model = self.mujoco.MjModel.from_xml_string(text)
@@ -51,19 +51,19 @@ class Ball(Library):
 
     def public(self, top: SymmetricTop, start: Angles, plan: Plan) -> Motion:
         """Compile the model and step it from sample to sample."""
-        model, data = self._built(top, plan.step_size)
+        model, data = self._model_and_data(top, plan.step_size)
         data.qpos[:], data.qvel[:] = _begin(top, start)
-        rows, done = np.empty((plan.times.size, 7)), 0
+        rows, steps = np.empty((plan.times.size, 7)), 0
         for row, mark in zip(rows, plan.marks.tolist(), strict=True):
-            if mark > done:
-                self.mujoco.mj_step(model, data, nstep=mark - done)
-                done = mark
+            if mark > steps:
+                self.mujoco.mj_step(model, data, nstep=mark - steps)
+                steps = mark
             row[:4], row[4:] = data.qpos, data.qvel
-        return Motion(rows, done, done * self.stages)
+        return Motion(rows, steps, steps * self.stages)
 
     def inner(self, top: SymmetricTop, start: Angles, plan: Plan) -> Inner:
         """Put the data back to the start and make all steps in one call."""
-        model, data = self._built(top, plan.step_size)
+        model, data = self._model_and_data(top, plan.step_size)
         (position, velocity), steps, step = _begin(top, start), int(plan.marks[-1]), self.mujoco.mj_step
 
         def call() -> Any:

@@ -64,7 +64,7 @@ class Rebound(Library):
         for offset in self.offsets:
             ctypes.c_double.from_address(state + offset).value = tolerance
 
-    def _ready(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[Any, Any]:
+    def _simulation_of(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[Any, Any]:
         simulation, holder = self.begin(top, start)
         self.renew(simulation, plan.tolerance)
         self.write(holder, self.first(top, start))
@@ -77,7 +77,7 @@ class Rebound(Library):
         return Motion(rows, len(times) - 1)
 
     def _steps(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[list[float], list[list[float]]]:
-        simulation, holder = self._ready(top, start, plan)
+        simulation, holder = self._simulation_of(top, start, plan)
         times, rows = [0.0], [self.read(holder)]
         while simulation.t + simulation.dt < plan.horizon and len(times) < MOST_STEPS:
             simulation.steps(1)
@@ -97,7 +97,7 @@ class Rebound(Library):
 
     def inner(self, top: SymmetricTop, start: Angles, plan: Plan) -> Inner:
         """Put a simulation back to the start and go to the horizon in one call."""
-        simulation, holder = self._ready(top, start, plan)
+        simulation, holder = self._simulation_of(top, start, plan)
         state, tolerance, horizon = self.first(top, start), plan.tolerance, plan.horizon
 
         def call() -> Any:

@@ -33,19 +33,19 @@ class Sundae(Library):
     def __init__(self, cvode: types.ModuleType, family: str) -> None:
         self.cvode, self.family = cvode, family
 
-    def _built(self, top: SymmetricTop, tolerance: float) -> Any:
+    def _solver_of(self, top: SymmetricTop, tolerance: float) -> Any:
         field = _with_signature(common.filling_field(top))
         return self.cvode.CVODE(field, method=self.family, rtol=tolerance, atol=tolerance, max_num_steps=MOST_STEPS)
 
     def public(self, top: SymmetricTop, start: Angles, plan: Plan) -> Motion:
         """Build the solver and call it with the sample times."""
         times = common.with_start(plan)
-        solution = self._built(top, plan.tolerance).solve(times, common.start_of(top, start))
+        solution = self._solver_of(top, plan.tolerance).solve(times, common.start_of(top, start))
         return Motion(solution.y[times.size - plan.times.size :], 0, solution.nfev)
 
     def inner(self, top: SymmetricTop, start: Angles, plan: Plan) -> Inner:
         """Start a solver again and go to the horizon in one call."""
-        solver, state, horizon = self._built(top, plan.tolerance), common.start_of(top, start), plan.horizon
+        solver, state, horizon = self._solver_of(top, plan.tolerance), common.start_of(top, start), plan.horizon
 
         def call() -> Any:
             solver.init_step(0.0, state)
