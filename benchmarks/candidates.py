@@ -30,7 +30,7 @@ import symtop
 from symtop import advise
 from symtop.core import netcdf
 from symtop.measure import ranking, settings
-from symtop.measure.ranking import MENU
+from symtop.measure.ranking import MENU_SIZE
 from symtop.methods.framework.registry import NEEDS, integrator
 from symtop.run.simulation import likely_step
 
@@ -80,7 +80,7 @@ def table(data: xr.DataTree) -> list[str]:
         for quantity, target, need, general in cases:
             rows = np.isin(group["needs"].values, CLASSES[need]) & ((group["general"].values == 1.0) | (not general))
             costs = seconds.sel(quantity=quantity, target=target).transpose("variant", "member").values[rows]
-            chosen = [str(names[rows][place]) for place in cover(costs, MENU)] if rows.any() else []
+            chosen = [str(names[rows][place]) for place in cover(costs, MENU_SIZE)] if rows.any() else []
             key = f"{float(group['nutations'].max()):g}", quantity, f"{target:g}", need, "yes" if general else "no"
             lines += ["\t".join((*key, " ".join(chosen)))] if chosen else []
     return lines
@@ -125,7 +125,7 @@ def prices(quantity: str) -> dict[str, tuple[float, float]]:
 
 def costs(question: advise._Question, advised: symtop.Advice, menu: list[str]) -> dict[str, float]:
     """Seconds of the candidates that meet the accuracy and may be the cheapest, of the table's, and of `ADVISED`."""
-    scene, accuracy, quantity = question.scene, advise.MARGIN * question.accuracy, question.quantity
+    scene, accuracy, quantity = question.scene, advise.SAMPLE_MARGIN * question.accuracy, question.quantity
     tariffs, first = prices(quantity), ranking.cheapest((), quantity, accuracy, 100.0)
     attempts, seconds = dict[str, settings.Attempt](), dict[str, float]()
     for name in sorted(tariffs, key=lambda name: (name not in first, -(integrator(name).order or 0))):
@@ -140,7 +140,7 @@ def costs(question: advise._Question, advised: symtop.Advice, menu: list[str]) -
     near = {name: attempt for name, attempt in attempts.items() if seconds[name] <= NEXT * least or name in menu}
     for name, attempt in near.items():
         retry = settings.search(
-            scene, attempt.integrator, accuracy, quantity, scene.horizon, attempt.setting, least=advise.CLOSE
+            scene, attempt.integrator, accuracy, quantity, scene.horizon, attempt.setting, least=advise.CLOSE_TO_TARGET
         )  # fmt: skip
         near[name] = attempt if retry.why else retry
     if advised.integrator is not None:

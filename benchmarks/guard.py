@@ -41,7 +41,7 @@ from symtop.report import style
 from symtop.run import guard
 from symtop.run.ensemble.bodies import body_population, scenes_of
 from symtop.run.ensemble.population import STRATA, population
-from symtop.run.motion import Exact, Integrated, Motion
+from symtop.run.motion import ExactMotion, IntegratedMotion, Motion
 from symtop.run.simulation import make_plan
 
 CHUNK = 100
@@ -68,17 +68,17 @@ CHECKS: dict[str, dict[str, Any]] = {  # what is set in `symtop.run.guard` to sw
     "small nutations grow": {"_instability": lambda *_: None},
     "errors grow beyond the probe": {"grown": lambda probe, *_, **__: float(probe.error.max())},
     "errors grow as an exponential": {"exponential": lambda *_: 0.0},
-    "errors grow by a least part": {"LEAST_GROWTH": 0.0}, "rounding grows as n^1.5": {"ROUNDED": 0.0},
-    "symmetric methods, too": {"WORTH": math.inf}, "the motion amplifies errors": {"_amplified": lambda *_: 0.0},
-    "and the tolerance": {"_grown_tolerance": lambda *_: 0.0}, "luck at a pole": {"CLOSE": 0.0},
-    "the length of q drifts": {"_length_lost": lambda *_: None}, "tilt beside a pole": {"BESIDE": 0.0},
-    "long probes at a pole": {"THROUGH": 1.0}, "a least probe": {"AT_LEAST": 0.0},
+    "errors grow by a least part": {"LEAST_GROWTH": 0.0}, "rounding grows as n^1.5": {"ROUNDED_ERROR": 0.0},
+    "symmetric methods, too": {"STABILITY_ERROR": math.inf},
+    "the motion amplifies errors": {"_amplified": lambda *_: 0.0}, "and the tolerance": {"_grown_tolerance": lambda *_: 0.0}, "luck at a pole": {"CLOSE_TO_POLE": 0.0},
+    "the length of q drifts": {"_length_lost": lambda *_: None}, "tilt beside a pole": {"BESIDE_POLE": 0.0},
+    "long probes at a pole": {"POLE_FACTOR": 1.0}, "a least probe": {"LEAST_PROBE": 0.0},
 }  # fmt: skip
 THRESHOLDS = (
-    *("STEPS", "AT_LEAST", "AT_MOST", "SHARE", "MOST_PROBED", "ROUNDED", "AFFORDED", "THROUGH", "MOST_WORK", "LOOSE"),
-    *("LEAST_GROWTH", "COMMITTED", "CLOSE", "PASSING", "WORTH", "RESOLVED", "SMALL_TURN", "NONLINEAR", "BESIDE"),
-    "FASTER",
-)
+    "PROBE_STEPS", "LEAST_PROBE", "LONGEST_PROBE", "PROBE_SHARE", "MOST_PROBED", "ROUNDED_ERROR", "PROBE_EVALUATIONS",
+    "POLE_FACTOR", "MOST_WORK", "LOOSE_TOLERANCE", "LEAST_GROWTH", "OCCASIONAL", "CLOSE_TO_POLE", "PASSING_ERROR",
+    "STABILITY_ERROR", "RESOLVED_TURN", "SMALL_TURN", "NONLINEAR_SHARE", "BESIDE_POLE", "FASTER",
+)  # fmt: skip
 SUMMED = ["runs", "guard", "wrong: silent", "worst silent (rad)", "correct: warned of", "ended early: warned of"]
 
 
@@ -178,7 +178,7 @@ def drawn(name: str, k: int) -> tuple[Scene, Integrator, str, Plan, float, float
     if method.implementation == "python" or method.speed < 0.1:  # seconds to minutes over more
         periods = min(periods, 10.0)
     if name == "hostile":
-        periods = min(periods, 2.0 * math.pi * MOST_TURNS / (Integrated(scene).fast * period))
+        periods = min(periods, 2.0 * math.pi * MOST_TURNS / (IntegratedMotion(scene).fast * period))
     horizon, setting = periods * period, steps if method.fixed_step else max(tolerance, method.least_tolerance)
     control = {"step_size": min(period / steps, horizon)} if method.fixed_step else {"tolerance": setting}
     scene = Scene(scene.name, scene.top, scene.start, horizon)
@@ -196,8 +196,8 @@ def outcome_and_error(scene: Scene, method: Integrator, chart: str, plan: Plan) 
 def run_of(name: str, k: int) -> Run:
     """Draw and make run k."""
     (scene, method, chart, plan, setting, periods), of_top = drawn(name, k), name == "tops"
-    series, whole = score(Integrated(scene), method, chart, plan)
-    exact, whole = score(Exact(scene), method, chart, plan) if of_top else (math.nan, whole)
+    series, whole = score(IntegratedMotion(scene), method, chart, plan)
+    exact, whole = score(ExactMotion(scene), method, chart, plan) if of_top else (math.nan, whole)
     outcome, error = outcome_and_error(scene, method, chart, plan)
     return Run(k, scene.name.split(".")[0], method.name, method.needs, chart, str(method.control), setting, periods,
                whole, outcome, error, exact, series)  # fmt: skip
@@ -233,7 +233,7 @@ def ablation(name: str, count: int) -> Table:
     for k in range(count):
         scene, method, chart, plan, *_ = drawn(name, k)
         outcome, error = outcome_and_error(scene, method, chart, plan)
-        motion, good = (Exact if name == "tops" else Integrated)(scene), outcome == "ok"
+        motion, good = (ExactMotion if name == "tops" else IntegratedMotion)(scene), outcome == "ok"
         kinds = good and error > guard.EXPECTED, good and error <= guard.EXPECTED, not good, good
         total += kinds
         for way, values in ways.items():

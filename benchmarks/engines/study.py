@@ -7,7 +7,7 @@ from benchmarks import pages
 from benchmarks.engines.measure import COMPARED, COUNT, LEVEL, STEPS, agrees
 from benchmarks.pages import Table
 from symtop.methods.framework.registry import integrator
-from symtop.report.formats import FEW, counted
+from symtop.report.formats import MOST_NAMES, counted
 
 NAME = "live-engines"  # of the findings; `engines` is the study of the maps
 UNRUN = "YADE is not run: its map is held by its formula and a reference value alone."
@@ -45,7 +45,7 @@ def _largest(rows: Sequence[dict[str, Any]], suffix: str) -> str:
 
 def few(names: Sequence[str], noun: str) -> str:
     """The names, if they are few; otherwise how many there are."""
-    return ", ".join(names) if len(names) <= FEW else counted(len(names), noun)
+    return ", ".join(names) if len(names) <= MOST_NAMES else counted(len(names), noun)
 
 
 def verdict(rows: Sequence[dict[str, Any]]) -> list[str]:

@@ -30,7 +30,7 @@ from symtop.model.charts import Array, attitude_distance, axis_distance
 from symtop.model.scenes import Scene
 from symtop.model.top import Angles, SymmetricTop, flat
 from symtop.run.ensemble.bodies import body_population, scenes_of
-from symtop.run.motion import CHECK, FINE, Integrated
+from symtop.run.motion import CHECK_TOLERANCE, FINE_TOLERANCE, IntegratedMotion
 from symtop.run.reference.truth import reference
 
 SYMMETRIC, FREE, CHAOTIC = "0", "free", "chaotic"
@@ -69,8 +69,8 @@ class Bodies:
         if scene.top.free:
             exact = reference(scene, times)
             return exact["quaternion"].values, float(exact["attitude_error_bound"].max())
-        motion = Integrated(scene)
-        true, check = (unit(motion.states(times, tolerance)[:, :4]) for tolerance in (FINE, CHECK))
+        motion = IntegratedMotion(scene)
+        true, check = (unit(motion.states(times, tolerance)[:, :4]) for tolerance in (FINE_TOLERANCE, CHECK_TOLERANCE))
         gap = attitude_distance(check, true).max()
         return true, 4.0 * float(gap) + FLOOR if np.isfinite(gap) else math.inf
 

@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import xarray as xr
 
-from symtop.measure.order import BESIDE
+from symtop.measure.order import CONFIRMED_BEYOND
 
 from .measures import (
     HISTORY_TOLERANCE,
@@ -47,7 +47,7 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         "scene": str(part["scene"].values),
         "target": TARGET,  # rad
         "least_scenes": LEAST_SCENES,
-        "beside": BESIDE,
+        "beside": CONFIRMED_BEYOND,
         "pairs": len(words) or None,  # of a variant and a scene
         **{word: words.count(word) if words else None for word in ("confirmed", "refuted", "undecided")},
         "higher": int((verdicts == "higher").sum()),

@@ -36,7 +36,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from symtop.measure.settings import FLAT, LEAST_STEPS, NEAR_ROUNDING, TARGETS
+from symtop.measure.settings import FLAT_GAIN, LEAST_STEPS, NEAR_ROUNDING, TARGETS
 from symtop.methods.framework.adaptive import Adaptive
 from symtop.methods.framework.calling import solve
 from symtop.methods.framework.lanes import members_of
@@ -202,7 +202,7 @@ def _next_members(
             gain = np.where(np.isfinite(before), gain, 1e4)
             foreseen = error * gain**-left / FORGIVEN
         earlier = before if variant.fixed_step or level < 2 else record.errors[name][level - 2, live]
-        stuck = (error < NEAR_ROUNDING) & (error > earlier / FLAT)
+        stuck = (error < NEAR_ROUNDING) & (error > earlier / FLAT_GAIN)
         worth |= (following > 0.0) & ~stuck & ((foreseen <= following) | (error > ASYMPTOTIC))
     return worth & (left >= 1.0), settled
 

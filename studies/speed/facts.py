@@ -8,7 +8,7 @@ import pandas as pd
 import xarray as xr
 from symtop_studies.cost.ranking import cost_to_reach
 
-from symtop.measure.timing import NOISY
+from symtop.measure.timing import NOISY_SPREAD
 from symtop.methods.framework.registry import integrator, integrators, split_name
 from symtop.runner.study import REFERENCE
 
@@ -69,10 +69,10 @@ def facts(data: xr.Dataset) -> dict[str, Any]:
         }
     times, known = costs(data, 1e-6), BESIDE in costs(data, 1e-9)
     spread = part["seconds_spread"].values
-    both = SCIPY in times and SAME in times and (spread > NOISY).sum() <= BUSY * np.isfinite(spread).sum()
+    both = SCIPY in times and SAME in times and (spread > NOISY_SPREAD).sum() <= BUSY * np.isfinite(spread).sum()
     return values | {
         "spread": float(np.nanmedian(spread)),
-        "noisy": int((spread > NOISY).sum()),
+        "noisy": int((spread > NOISY_SPREAD).sum()),
         "timed": int(np.isfinite(spread).sum()),
         "scipy": times[SCIPY] / times[SAME] if both else None,  # times as long, at 1e-6 rad
         "beside": costs(data, 1e-9)[BESIDE] / values["fastest_9_seconds"] if known else None,

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from symtop.measure.verdicts import DRIFT, FEWEST, GROWING, NO_GAP, ROUNDING, barriers
+from symtop.measure.verdicts import DRIFT_ERROR, FEWEST_SAMPLES, GROWING_RATIO, NO_GAP, ROUNDING, barriers
 from symtop.methods.framework.plan import NOT_FINITE, NOT_NORMALISED, OUTCOMES, off_length
 from symtop.methods.framework.space import axis_of as of_quaternion
 from symtop.model.charts import DIMENSIONS, Array
@@ -29,7 +29,7 @@ BOUNDED_BUT_WRONG, DRIFTING, WRONG_REGIME, WRONG = 1, 2, 3, len(VERDICTS) - 1
 EARLY = "ended early"
 SAID = dict(zip(JUDGED, ("accurate", "bounded energy, wrong motion", "energy drifts", "crosses a turning point"),
                 strict=True)) | {name: f"{EARLY}: {name.replace('_', ' ')}" for name in OUTCOMES[1:]}  # fmt: skip
-SAID["wrong"] = f"wrong motion, energy error below {100.0 * DRIFT:g} %"
+SAID["wrong"] = f"wrong motion, energy error below {100.0 * DRIFT_ERROR:g} %"
 
 
 class Judged(NamedTuple):
@@ -162,7 +162,7 @@ def _kernel() -> Any:  # noqa: C901  (one loop, read in one piece)
     def by_energy(scene, states, momenta, count):  # type: ignore[no-untyped-def]
         """The verdict by whether the energy error grows and passes the bound; few samples are not said to grow."""
         half = count // 2
-        before = half if half >= FEWEST else count
+        before = half if half >= FEWEST_SAMPLES else count
         start, early, late = energy_of(scene, states[0], momenta[0, 0], momenta[0, 1]), 0.0, 0.0
         for j in range(count):
             error = abs(energy_of(scene, states[j], momenta[j, 0], momenta[j, 1]) - start) / scene[8]
@@ -170,9 +170,9 @@ def _kernel() -> Any:  # noqa: C901  (one loop, read in one piece)
                 early = error
             if j >= half and error > late:
                 late = error
-        if not (late <= DRIFT or late <= GROWING * early):
+        if not (late <= DRIFT_ERROR or late <= GROWING_RATIO * early):
             return DRIFTING
-        return WRONG if late > max(GROWING * early, scene[11]) else BOUNDED_BUT_WRONG
+        return WRONG if late > max(GROWING_RATIO * early, scene[11]) else BOUNDED_BUT_WRONG
 
     def judge_all(  # type: ignore[no-untyped-def]
         constants, scenes, phases, counts, followed, states, momenta, outcome, verdict, error
