@@ -28,7 +28,7 @@ class Results(NamedTuple):
     one_step: Mapping[str, float]
     ensemble: Sequence[ensemble.Item]
     ensemble_calls: Sequence[ensemble.Call]
-    lanes: lanes.Measured
+    lanes: lanes.LaneTimes
 
 
 def tables(results: Results) -> list[Table]:

@@ -36,8 +36,8 @@ def main() -> None:
         parser.error(f"--nutations must be at least {10.0 * FITTED:g}, not {options.nutations:g}")
     facts, tops = measured.circumstances(), far.tops_of(TOPS, SEED)
     ends = far.horizons()[far.horizons() <= 1.0001 * options.nutations]
-    ((errors, work),) = far.measured(integrator(NAME), tops, [far.Asked(STEPS, ends, np.inf)])
-    ((fine, work_2),) = far.measured(integrator(NAME), tops, [far.Asked(FINE, ends[ends <= 1.0001 * FITTED], np.inf)])
+    ((errors, work),) = far.measured(integrator(NAME), tops, [far.Request(STEPS, ends, np.inf)])
+    ((fine, work_2),) = far.measured(integrator(NAME), tops, [far.Request(FINE, ends[ends <= 1.0001 * FITTED], np.inf)])
     times = far.horizons()
     known = np.full((len(far.QUANTITIES), 2, times.size, TOPS), np.nan)
     fitted = ends <= 1.0001 * FITTED

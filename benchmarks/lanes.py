@@ -90,7 +90,7 @@ class Batch(NamedTuple):
     in_lanes: float
 
 
-class Measured(NamedTuple):
+class LaneTimes(NamedTuple):
     """All measurements of this benchmark."""
 
     rows: Sequence[Row]
@@ -238,7 +238,7 @@ def batches() -> list[Batch]:
     return rows
 
 
-def verdict(measured: Measured) -> list[str]:
+def verdict(measured: LaneTimes) -> list[str]:
     """Sentences: how much faster lanes are, compared with threads and heyoka's batches."""
     sentences = []
     for kind in (*LEAST, WIDE):
@@ -266,7 +266,7 @@ def verdict(measured: Measured) -> list[str]:
     return sentences
 
 
-def tables(measured: Measured) -> list[Table]:
+def tables(measured: LaneTimes) -> list[Table]:
     """The tables of the report."""
     return [
         Table(
@@ -298,9 +298,9 @@ def tables(measured: Measured) -> list[Table]:
     ]  # fmt: skip
 
 
-def measure() -> Measured:
+def measure() -> LaneTimes:
     """Measure steps, threads and batches."""
-    return Measured(steps(), threads(), batches())
+    return LaneTimes(steps(), threads(), batches())
 
 
 if __name__ == "__main__":

@@ -114,7 +114,7 @@ def setting_of(variant: Integrator, level: int) -> float:
     return tolerance if tolerance >= variant.least_tolerance else math.nan
 
 
-class Asked(NamedTuple):
+class Request(NamedTuple):
     """A request for runs of all tops with one setting: steps a nutation or a tolerance, and the horizons."""
 
     setting: float
@@ -122,7 +122,7 @@ class Asked(NamedTuple):
     budget: float  # force evaluations
 
 
-def run(variant: Integrator, tops: Tops, requests: Sequence[Asked]) -> list[tuple[Samples, Array]]:
+def run(variant: Integrator, tops: Tops, requests: Sequence[Request]) -> list[tuple[Samples, Array]]:
     """The runs of all tops with each setting, and the times (n, samples) of their samples.
 
     Those of a fixed step go side by side, the settings too, in one call.
@@ -137,7 +137,7 @@ def run(variant: Integrator, tops: Tops, requests: Sequence[Asked]) -> list[tupl
     return samples
 
 
-def together(variant: Integrator, tops: Tops, requests: Sequence[Asked]) -> list[tuple[Samples, Array]]:
+def together(variant: Integrator, tops: Tops, requests: Sequence[Request]) -> list[tuple[Samples, Array]]:
     """The runs of a fixed step, in one call, which needs equally many samples of all; extra samples are dropped."""
     marks = []
     for setting, ends, _ in requests:
@@ -196,7 +196,7 @@ def shape(tops: Tops, u: Array, rate: Array) -> Array:
     return np.asarray(np.abs(gap) / np.hypot(slope, 2.0 * omega * rate))
 
 
-def measured(variant: Integrator, tops: Tops, requests: Sequence[Asked]) -> list[tuple[Array, Array]]:
+def measured(variant: Integrator, tops: Tops, requests: Sequence[Request]) -> list[tuple[Array, Array]]:
     """For each setting, the largest errors (quantities, horizons, n) of the stretches, inf after a failure, and
     evaluations a nutation.
     """
@@ -221,13 +221,13 @@ def ladder(variant: Integrator, tops: Tops, levels: int, steps: float, budget: f
     far, n = horizons(), len(tops.period)
     seen, work = np.full((len(QUANTITIES), levels, far.size, n), np.nan), np.full((levels, n), np.nan)
     reach, values = np.full(levels, np.nan), np.full(levels, np.nan)
-    requests: dict[int, Asked] = {}
+    requests: dict[int, Request] = {}
     for level in range(levels):
         setting = setting_of(variant, level)
         if math.isnan(setting):
             break
         ((first_errors, first),) = measured(
-            variant, tops, [Asked(setting, far[:1], math.inf if variant.fixed_step else budget)]
+            variant, tops, [Request(setting, far[:1], math.inf if variant.fixed_step else budget)]
         )
         typical = float(np.nanmedian(first)) if np.isfinite(first).any() else math.nan
         if math.isnan(typical):
@@ -236,7 +236,7 @@ def ladder(variant: Integrator, tops: Tops, levels: int, steps: float, budget: f
         longest = min(budget / typical, steps / setting if variant.fixed_step else math.inf, 1.0001e6)
         if longest < far[laws.FEWEST]:
             break
-        requests[level] = Asked(setting, far[far <= longest], 10.0 * budget)
+        requests[level] = Request(setting, far[far <= longest], 10.0 * budget)
         if np.median(first_errors[:, 0], axis=1).max() < DONE:
             break
     for (level, request), pair in zip(requests.items(), measured(variant, tops, list(requests.values())), strict=True):
@@ -407,7 +407,7 @@ def check(case: Any) -> xr.Dataset:
     place = QUANTITIES.index(case["quantity"])
     errors = np.full((2, 2, CHECKED_TOPS), np.nan)
     for rank, (name, pair) in enumerate(zip(case["integrators"], case["settings"], strict=True)):
-        runs = measured(integrator(name), tops, [Asked(setting, ends, np.inf) for setting in pair])
+        runs = measured(integrator(name), tops, [Request(setting, ends, np.inf) for setting in pair])
         errors[rank] = [error[place].max(axis=0) for error, _ in runs]
     return xr.Dataset(
         {

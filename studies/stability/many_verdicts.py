@@ -32,14 +32,14 @@ SAID = dict(zip(JUDGED, ("accurate", "bounded energy, wrong motion", "energy dri
 SAID["wrong"] = f"wrong motion, energy error below {100.0 * DRIFT_ERROR:g} %"
 
 
-class Judged(NamedTuple):
+class RunVerdicts(NamedTuple):
     """Verdicts on runs, (scenes, settings) or one row of them."""
 
     verdict: NDArray[np.uint8]  # index into VERDICTS
     axis_error: Array  # rad, largest over the run; NaN if it ended early
 
     @classmethod
-    def empty(cls, scenes: int, settings: int) -> "Judged":
+    def empty(cls, scenes: int, settings: int) -> "RunVerdicts":
         """Arrays for the runs of n scenes at m settings, to be filled in."""
         return cls(np.zeros((scenes, settings), np.uint8), np.full((scenes, settings), math.nan))
 
@@ -78,7 +78,7 @@ def _numbers(scene: Scene) -> tuple[float, ...]:
 def judge_runs(
     truth: Truths, phases: Array, followed: NDArray[np.bool_], states: Array, momenta: Array,
     outcome: NDArray[np.int64],
-) -> Judged:  # fmt: skip
+) -> RunVerdicts:  # fmt: skip
     """Verdicts on the runs of m scenes at each of n settings.
 
     `phases` (n, samples) are the times of the samples in nutation periods, NaN beyond the last of a run; `states`
@@ -87,7 +87,7 @@ def judge_runs(
     finite, or a quaternion that is not of length one, counts as ended there. The error of an inaccurate run is the
     first, counted from its end, that is too large; at the settings `followed` (n,) it is the largest.
     """
-    judged = Judged.empty(*outcome.shape)
+    judged = RunVerdicts.empty(*outcome.shape)
     counts = np.isfinite(phases).sum(axis=1)
     if states.shape[-1] == DIMENSIONS["attitude"]:
         outcome = np.where(off_length("attitude", states).any(axis=-1), NOT_NORMALISED, outcome)

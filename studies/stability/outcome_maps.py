@@ -38,7 +38,7 @@ from symtop.model.scenes import Scene
 from symtop.model.top import Angles, flat
 from symtop.run.simulation import sample_times
 
-from .many_verdicts import Judged, judge_runs, truths
+from .many_verdicts import RunVerdicts, judge_runs, truths
 
 NOT_RUN, SETTLED = 255, 254  # stored where a map has no run, and where a run was not made as it would be accurate
 SAMPLES = 49  # of a run
@@ -94,7 +94,7 @@ def row_plan(method: Integrator, settings: Sequence[float], periods: float) -> R
     return RowPlan(method, tuple(settings), tuple(marks), phases)
 
 
-class Made(NamedTuple):
+class RowRuns(NamedTuple):
     """The runs of some rows of a map at some of its settings; NaN after a failure."""
 
     states: Array  # (rows, settings, samples, dimension)
@@ -102,7 +102,7 @@ class Made(NamedTuple):
     outcome: NDArray[np.int64]  # (rows, settings), indices into OUTCOMES
 
 
-def one_by_one(runs: RowPlan, chart: str, scene: Scene, columns: slice = slice(None)) -> Made:
+def one_by_one(runs: RowPlan, chart: str, scene: Scene, columns: slice = slice(None)) -> RowRuns:
     """The runs of one row by one call of the solver each; NaN beyond the last sample of a run, too."""
     period, settings, phases, marks = (
         scene.nutation_period, runs.settings[columns], runs.phases[columns], runs.marks[columns]
@@ -116,10 +116,10 @@ def one_by_one(runs: RowPlan, chart: str, scene: Scene, columns: slice = slice(N
         states[0, k, :count] = run.states
         momenta[0, k, :count, 0], momenta[0, k, :count, 1] = run.p_phi, run.p_psi
         outcome[0, k] = OUTCOMES.index(run.outcome)
-    return Made(states, momenta, outcome)
+    return RowRuns(states, momenta, outcome)
 
 
-def together(runs: RowPlan, solver: FixedStep, columns: slice, tops: Array, periods: Array) -> Made:
+def together(runs: RowPlan, solver: FixedStep, columns: slice, tops: Array, periods: Array) -> RowRuns:
     """The runs of all rows at settings that are sampled equally often, in one call, to the same bits.
 
     `tops` (rows, 9) as `flat` has them, `periods` (rows,) of their nutations: two bisections each, which are not
@@ -128,7 +128,7 @@ def together(runs: RowPlan, solver: FixedStep, columns: slice, tops: Array, peri
     marks, settings = np.array(runs.marks[columns]), runs.settings[columns]
     h = np.outer(periods, settings)
     run = solver.many(np.repeat(tops, len(settings), axis=0), h.ravel(), np.tile(marks, (len(tops), 1)))
-    return Made(*(values.reshape(*h.shape, *values.shape[1:]) for values in (run.states, run.momenta, run.outcome)))
+    return RowRuns(*(values.reshape(*h.shape, *values.shape[1:]) for values in (run.states, run.momenta, run.outcome)))
 
 
 def group_below(runs: RowPlan, end: int, n: int, alone: Collection[int]) -> int:
@@ -155,7 +155,7 @@ def _samples(runs: RowPlan, k: int) -> int:
     return runs.marks[k].size if runs.marks else SAMPLES
 
 
-class Mapped(NamedTuple):
+class MapVerdicts(NamedTuple):
     """A map of n scenes and m settings."""
 
     verdict: NDArray[np.uint8]  # (n, m), index into VERDICTS; accurate where nothing was run
@@ -183,12 +183,12 @@ class _Descent:
         self.followed[slice(None) if followed is None else list(followed)] = True
         checks = np.linspace(0, m - 1, CHECKED).round().astype(int)
         self.of_all = frozenset(np.union1d(np.flatnonzero(self.followed), checks).tolist())  # where all scenes are run
-        self.judged, self.made = Judged.empty(n, m), np.zeros((n, m), dtype=bool)
+        self.judged, self.made = RunVerdicts.empty(n, m), np.zeros((n, m), dtype=bool)
         self.factor = SETTLED_STEPS if method.fixed_step else SETTLED_TOLERANCES
         self.since, self.accurate = np.full(n, math.nan), np.zeros(n, dtype=np.int64)  # how long a scene has been so
         self.settled, self.refuted, self.checks = np.zeros(n, dtype=bool), np.zeros(n, dtype=bool), 0
 
-    def descend(self) -> Mapped:
+    def descend(self) -> MapVerdicts:
         """Run every setting that has to be run."""
         end = len(self.runs.settings)
         while end > 0:
@@ -202,13 +202,13 @@ class _Descent:
             end = first
         for k in np.flatnonzero(~self.made[self.refuted].all(axis=0)):
             self._run(np.flatnonzero(self.refuted & ~self.made[:, k]), slice(k, k + 1))
-        return Mapped(*self.judged, self.made, self.checks, int(self.refuted.sum()))
+        return MapVerdicts(*self.judged, self.made, self.checks, int(self.refuted.sum()))
 
     def _run(self, rows: NDArray[np.int64], columns: slice) -> None:
         """Run and judge some scenes at neighbouring settings."""
         if self.solver is None:
             row_runs = [one_by_one(self.runs, self.chart, self.scenes[row], columns) for row in rows]
-            results = Made(*(np.concatenate(parts) for parts in zip(*row_runs, strict=True)))
+            results = RowRuns(*(np.concatenate(parts) for parts in zip(*row_runs, strict=True)))
         else:
             results = together(self.runs, self.solver, columns, self.tops[rows], self.truth.periods[rows])
         verdicts = judge_runs(self.truth.part(rows), self.runs.phases[columns], self.followed[columns], *results)
@@ -231,7 +231,7 @@ class _Descent:
 def outcome_map(
     name: str, parameters: Sequence[float], method: Integrator, settings: Sequence[float], periods: float,
     followed: Sequence[int] | None = None,
-) -> Mapped:  # fmt: skip
+) -> MapVerdicts:  # fmt: skip
     """Run and judge a whole map of the family of scenes called `name`: a row a scene, a column a setting, growing.
 
     Every scene is run at the settings `followed`, all if it is None; there axis errors are the largest of a run. At

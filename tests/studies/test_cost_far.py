@@ -49,7 +49,7 @@ def test_a_law_predicts_a_measured_horizon_that_was_left_out_of_the_fit(name):
     ends = FAR[FAR <= 1.0001e4]
     factor = 2.0 if name == "series[axis]" else 1.2  # at order 16 a factor of 2 in the error is one of 1.04 in the step
     setting = {"srkn-14-6[axis]": 13.11, "series[axis]": 11.3}.get(name, 140.0)
-    ((errors, _),) = runs.measured(row, tops, [runs.Asked(setting, ends, np.inf)])
+    ((errors, _),) = runs.measured(row, tops, [runs.Request(setting, ends, np.inf)])
     for place, quantity in enumerate(runs.QUANTITIES):
         full = np.append(errors[place, :, 0], np.full(FAR.size - ends.size, np.nan))[np.newaxis]  # of one run
         short = np.where(SHORT, full, np.nan)
@@ -62,7 +62,7 @@ def test_rounding_is_not_predicted_above_what_the_run_has_shown():
     """A fast top, whose nutation has little energy: its walk overstates that of the axis 10^5 times."""
     row, tops = symtop.integrator("srkn-19-8[axis]"), runs.tops_of(1, 1)
     ends = FAR[FAR <= 1.0001e4]
-    ((errors, work),) = runs.measured(row, tops, [runs.Asked(17.48, ends, np.inf)])
+    ((errors, work),) = runs.measured(row, tops, [runs.Request(17.48, ends, np.inf)])
     short = np.full((len(runs.QUANTITIES), 1, FAR.size, 1), np.nan)
     short[:, 0, : ends.size] = np.where(SHORT[: ends.size, np.newaxis], errors, np.nan)
     grain = runs.grain_of(tops)
@@ -107,7 +107,7 @@ def test_a_drift_below_an_oscillation_is_found_and_a_wrong_law_would_not_predict
     walk = laws.rounding("energy", 1e-16, FAR, 100.0 * FAR)
     np.testing.assert_allclose(walk, 1e-15 * np.sqrt(FAR))
     np.testing.assert_allclose(laws.rounding("axis", 1e-16, FAR, 100.0 * FAR) / walk, 2 * np.pi * FAR / np.sqrt(3))
-    tops, request = one_top(), runs.Asked(140.0, FAR[FAR <= 1.0001e4], np.inf)
+    tops, request = one_top(), runs.Request(140.0, FAR[FAR <= 1.0001e4], np.inf)
     ((errors, _),) = runs.measured(symtop.integrator("rk4[axis]"), tops, [request])
     energy = errors[1, :, 0]
     assert energy[-1] > 5.0 * energy[8]  # what a bounded law says at 10^3 is off by that at 10^4
@@ -118,8 +118,8 @@ def test_settings_side_by_side_show_what_each_shows_by_itself(name):
     """To the last bit: settings of unlike lengths, one of them with fewer steps than another has samples."""
     row, tops = symtop.integrator(name), runs.tops_of(4, 1)
     settings = (4.37, 17.48, 34.96) if row.fixed_step else (1e-4, 1e-6)
-    requests = [runs.Asked(setting, FAR[: 9 - 2 * k], 1e6) for k, setting in enumerate(settings)]
-    for batch in (requests, [*requests, runs.Asked(settings[0], FAR[:1], 1e6)]):
+    requests = [runs.Request(setting, FAR[: 9 - 2 * k], 1e6) for k, setting in enumerate(settings)]
+    for batch in (requests, [*requests, runs.Request(settings[0], FAR[:1], 1e6)]):
         expected = [result for request in batch for result in runs.measured(row, tops, [request])]
         for mine, theirs in zip(runs.measured(row, tops, batch), expected, strict=True):
             for first, second in zip(mine, theirs, strict=True):
