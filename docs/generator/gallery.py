@@ -42,7 +42,7 @@ def sections(report: str) -> dict[str, tuple[str, list[Figure]]]:
     first, *others = re.split(r"^## ", report, flags=re.MULTILINE)
     for title, _, text in [(FRONT, "", first), *(part.partition("\n") for part in others)]:
         shown = SHOWN.finditer(text)
-        if figures := [Figure(one["file"], one["title"] or "", one["alt"], one["caption"]) for one in shown]:
+        if figures := [Figure(entry["file"], entry["title"] or "", entry["alt"], entry["caption"]) for entry in shown]:
             with_figures[title.strip()] = (text, figures)
     return with_figures
 
@@ -60,25 +60,25 @@ def maker(file: str, root: Path = ROOT) -> tuple[str, str]:
 def markdown(report: str, tracked: set[str], root: Path = ROOT) -> str:
     """The page below its heading; ExtensionError for a figure without a caption and for a caption without a figure."""
     parts = sections(report)
-    shown = {one.file for _, figures in parts.values() for one in figures}
+    shown = {figure.file for _, figures in parts.values() for figure in figures}
     if shown != tracked:
         raise ExtensionError(f"gallery: report and figures of docs/snapshot differ by {sorted(shown ^ tracked)}")
     lines: list[str] = []
     for title, (text, figures) in parts.items():
         lines += [f"## {title}", ""]
-        for command, code in dict.fromkeys(maker(one.file, root) for one in figures):
+        for command, code in dict.fromkeys(maker(figure.file, root) for figure in figures):
             lines += [f"Made by `{command}`; the code that draws is in `{code}`.", ""]
         if reading := re.search(r"^\*\*How to read it\.\*\*.*", text, re.MULTILINE):
             lines += [reading.group(), ""]
-        for one in figures:
-            lines += [f"**{one.title}**", ""] if one.title else []
-            lines += [f"```{{figure}} ../snapshot/figures/{one.file}", f":name: {Path(one.file).stem}"]
+        for figure in figures:
+            lines += [f"**{figure.title}**", ""] if figure.title else []
+            lines += [f"```{{figure}} ../snapshot/figures/{figure.file}", f":name: {Path(figure.file).stem}"]
             lines += [
-                f":alt: {one.alt}",
+                f":alt: {figure.alt}",
                 ":loading: lazy",
-                f":target: ../_images/{one.file}",
+                f":target: ../_images/{figure.file}",
                 "",
-                one.caption,
+                figure.caption,
                 "```",
                 "",
             ]

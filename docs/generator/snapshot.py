@@ -34,7 +34,8 @@ TABLE = "**What can you supply?"  # with which the README goes on after its firs
 QUESTIONS = "**All questions:**"  # the front page's list of pages
 FRONT = "report.md"
 HAVE = "You have one of these?"  # the title of a table of the front page
-BEGIN, FIGURE, END = "<!-- from the report -->\n", "<!-- its figure -->\n", "<!-- to here -->\n"
+BEGIN, FIGURE, GUARD, END = (f"<!-- {mark} -->\n" for mark in (
+    "from the report", "its figure", "the guard, from the report", "to here"))  # fmt: skip
 STORED_BY = {name: f"<!-- from results/{name}.json -->\n" for name in ("bench", "peers")}
 WIDTH = 118
 
@@ -89,13 +90,13 @@ def answer(report: str, question: str, *further: str) -> str:
     page = re.search(rf"^## {re.escape(question)}.*\n\n((?:(?!## ).*\n)+)", report, flags=re.MULTILINE)
     if page is None:
         sys.exit(f"snapshot: the report has no page with the question {question}")
-    said = [page[1].partition("\n")[0]]
+    paragraphs = [page[1].partition("\n")[0]]
     for begin in further:
-        one = re.search(rf"^{re.escape(begin)}(.+)$", page[1], flags=re.MULTILINE)
-        if one is None:
+        paragraph = re.search(rf"^{re.escape(begin)}(.+)$", page[1], flags=re.MULTILINE)
+        if paragraph is None:
             sys.exit(f"snapshot: the page with the question {question} has no paragraph {begin.strip()}")
-        said.append(one[1])
-    return "\n\n".join(map(wrapped, said)) + "\n"
+        paragraphs.append(paragraph[1])
+    return "\n\n".join(map(wrapped, paragraphs)) + "\n"
 
 
 def wrapped(paragraph: str) -> str:
@@ -109,8 +110,8 @@ def wrapped(paragraph: str) -> str:
 
 def titled(report: str, title: str) -> str:
     """The table with a bold title, and the paragraph below it; nothing if the report has none."""
-    found = re.search(rf"^\*\*{re.escape(title)}.*\n\n(?:\|.*\n)+\n.+$", report, flags=re.MULTILINE)
-    return "\n" + "\n\n".join(map(wrapped, found[0].split("\n\n"))) + "\n" if found else ""
+    table = re.search(rf"^\*\*{re.escape(title)}.*\n\n(?:\|.*\n)+\n.+$", report, flags=re.MULTILINE)
+    return "\n" + "\n\n".join(map(wrapped, table[0].split("\n\n"))) + "\n" if table else ""
 
 
 def beginning(report: str) -> str:
@@ -120,18 +121,19 @@ def beginning(report: str) -> str:
     return "\n\n".join(map(wrapped, text.split("\n\n"))) + "\n"
 
 
-def quote(said: str, page: str, begin: str = BEGIN) -> str:
-    """A page with what is said between two marks. SystemExit if the page has none."""
+def quote(text: str, page: str, begin: str = BEGIN) -> str:
+    """A page with a text between two marks. SystemExit if the page has none."""
     before, *rest = page.split(begin)
     if len(rest) != 1 or END not in rest[0]:
         sys.exit(f"snapshot: a page must have the line {begin.strip()} once, and {END.strip()} after it")
-    return f"{before}{begin}{said}{END}{rest[0].partition(END)[2]}"
+    return f"{before}{begin}{text}{END}{rest[0].partition(END)[2]}"
 
 
 def quoted(report: str) -> dict[tuple[str, str], str]:
     """What pages quote from the report, by their paths and the marks before it."""
-    answers = {(f"docs/{page}", BEGIN): answer(report, *asked) for page, asked in QUOTED.items()}
+    answers = {(f"docs/{page}", BEGIN): answer(report, *parts) for page, parts in QUOTED.items()}
     answers["docs/choosing.md", BEGIN] += titled(report, HAVE)
+    answers["docs/choosing.md", GUARD] = answer(report, "Does the guard need to know the solution?")
     figure, title, tables = beginning(report).partition(TABLE)
     return {("README.md", FIGURE): figure.rstrip() + "\n", ("README.md", BEGIN): title + tables, **answers}
 
@@ -142,12 +144,12 @@ def benchmark(name: str, results: Path) -> str:
     from symtop.report.template import rendered
 
     data: dict[str, Any] = json.loads((results / f"{name}.json").read_text(encoding="utf-8"))
-    given = data | {"f": data["facts"]}
+    context = data | {"f": data["facts"]}
     if name == "bench":
         many: dict[str, list[Any]] = {}
         for row in sorted(data["lanes"]["rows"], key=lambda row: row["ratio"]):
             many.setdefault(lanes.kind_of(row["name"], row["chart"]), []).append(row)
-        given |= {
+        context |= {
             "slow": [row for row in data["kernels"] if row["unfused"] > kernels.LIMIT], "limit": kernels.LIMIT,
             "fused": sum(row["ratio"] <= kernels.LIMIT for row in data["kernels"]),
             "kernel": {row["name"]: row for row in data["kernels"]},
@@ -158,16 +160,16 @@ def benchmark(name: str, results: Path) -> str:
             "pairs": [row for row in many[lanes.WIDE] if row["name"] in lanes.FIXED],
         }  # fmt: skip
     template = (ROOT / "docs" / "generator" / f"{name}.jinja").read_text(encoding="utf-8")
-    return wrapped(rendered(template, f"{name}.jinja", given).strip()) + "\n"
+    return wrapped(rendered(template, f"{name}.jinja", context).strip()) + "\n"
 
 
 if __name__ == "__main__":
     sys.path.insert(0, str(ROOT))
     snapshot = ROOT / "docs" / "snapshot"
     names = take(ROOT / "results", snapshot)
-    for (name, begin), said in quoted(whole(snapshot)).items():
+    for (name, begin), text in quoted(whole(snapshot)).items():
         page = ROOT / name
-        page.write_text(quote(said, page.read_text(encoding="utf-8"), begin), encoding="utf-8")
+        page.write_text(quote(text, page.read_text(encoding="utf-8"), begin), encoding="utf-8")
     page = ROOT / "docs" / "results.md"
     for name, begin in STORED_BY.items():
         page.write_text(quote(benchmark(name, ROOT / "results"), page.read_text("utf-8"), begin), encoding="utf-8")

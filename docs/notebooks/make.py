@@ -153,12 +153,12 @@ for name in ("stormer-verlet", "strang", "takahashi-imada", "rk4[axis]", "gauss-
 
 def outputs(source: str, names: dict[str, Any]) -> list[dict[str, Any]]:
     """What a cell prints and draws."""
-    said = io.StringIO()
-    with contextlib.redirect_stdout(said):
+    output = io.StringIO()
+    with contextlib.redirect_stdout(output):
         exec(compile(source, "cell", "exec"), names)
     shown: list[dict[str, Any]] = []
-    if said.getvalue():
-        shown.append({"output_type": "stream", "name": "stdout", "text": said.getvalue().splitlines(keepends=True)})
+    if output.getvalue():
+        shown.append({"output_type": "stream", "name": "stdout", "text": output.getvalue().splitlines(keepends=True)})
     for number in plt.get_fignums():
         picture = io.BytesIO()
         plt.figure(number).savefig(picture, dpi=80, metadata={"Software": None})
