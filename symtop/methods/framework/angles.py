@@ -74,14 +74,14 @@ def momenta_of_turns(par: Any, a: Any, d: Any, h: float, dstate: Any) -> Any:
     return 0.5 * (north + south), 0.5 * (south - north)
 
 
-def _on_angles(top: Any, at: Any) -> Any:
+def _prepare_angles(top: Any, at: Any) -> Any:
     """The discrete Legendre transform starts from p_theta = dL/dtheta'."""
     momenta = conserved(top, at)
     par = ReducedTop(top.I1, top.I3, top.mgl, momenta.p_psi, momenta.north, momenta.south)
     return par, (at.theta, top.I1 * at.theta_dot, at.phi, at.psi)
 
 
-on_angles = Preparation(_on_angles, 4, require_chart)
+on_angles = Preparation(_prepare_angles, 4, require_chart)
 LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, SciPy's limit
 
 
@@ -104,12 +104,12 @@ def field_angles(par: Any, y: Any) -> Any:
     return y[3], y[4], y[5], theta_ddot, phi_ddot, psi_ddot
 
 
-def _with_rates(top: Any, at: Any) -> Any:
+def _prepare_rates(top: Any, at: Any) -> Any:
     state = (at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot)
     return BareTop(top.I1, top.I3, top.mgl), state
 
 
-with_rates = Preparation(_with_rates, 6, require_chart)
+with_rates = Preparation(_prepare_rates, 6, require_chart)
 
 
 @register_jitable
