@@ -101,7 +101,7 @@ def stepper(chart: str, precision: str, tolerance: float) -> Any:
 
 
 @functools.lru_cache(maxsize=32)
-def _idle(chart: str, precision: str, tolerance: float) -> list[Any]:
+def _idle_steppers(chart: str, precision: str, tolerance: float) -> list[Any]:
     """The steppers of one kind that no run is using. A stepper holds the state of its run, so no two runs share one."""
     return []
 
@@ -150,9 +150,9 @@ def propagate(
     """heyoka's states, in the working precision, at increasing times, or those reached in `most` steps."""
     kind, grid = arithmetic(precision).kind, times if times[0] == 0.0 else np.concatenate([[0.0], times])
     numbers = grid if precision == "double" else np.array([kind(float(t)) for t in grid])
-    idle = _idle(chart, precision, tolerance)
+    pool = _idle_steppers(chart, precision, tolerance)
     try:
-        integrator = idle.pop()  # in one instruction: another thread may be here, too
+        integrator = pool.pop()  # in one instruction: another thread may be here, too
     except IndexError:
         integrator = stepper(chart, precision, tolerance)
     state, parameters = start_numbers(chart, precision, top, start)
@@ -163,7 +163,7 @@ def propagate(
     order, time = int(integrator.order), float(integrator.time)
     if (unit := _unit(chart, top, start)) != 1.0:
         states[:, -3:] *= kind(repr(unit))
-    idle.append(integrator)  # not after an exception, which may leave it in any state
+    pool.append(integrator)  # not after an exception, which may leave it in any state
     return Flight(states[grid.size - times.size :], int(steps), order, outcome.name, time)
 
 
@@ -182,17 +182,17 @@ class HeyokaSolver:
         count, size = len(flight.states), plan.times.size
         states = _padded(flight.states, size)
         par = BareTop(top.I1, top.I3, top.mgl) if self.chart == "angles" else None
-        whole = flight.states if self.chart in ("axis", "attitude") else states  # the others work in double
-        p_phi, p_psi = (_padded(values, size) for values in form.momenta(par, whole))
+        samples = flight.states if self.chart in ("axis", "attitude") else states  # the others work in double
+        p_phi, p_psi = (_padded(values, size) for values in form.momenta(par, samples))
         if form.present is not None:
             states = form.present(par, plan.times, states)
-        good: Any = np.isfinite(states).all(axis=1)
-        word = "ok" if good.all() and "time_limit" in flight.outcome else "not_finite"
-        if "step_limit" in flight.outcome and good[:count].all():
-            word = "out_of_budget"
-        reached = plan.horizon if word == "ok" else float(plan.times[good][-1]) if good.any() else 0.0
-        reached = flight.time if word == "out_of_budget" else reached
-        return Run(states, p_phi, p_psi, flight.steps, flight.steps * flight.order, 0, word, reached)
+        finite: Any = np.isfinite(states).all(axis=1)
+        outcome = "ok" if finite.all() and "time_limit" in flight.outcome else "not_finite"
+        if "step_limit" in flight.outcome and finite[:count].all():
+            outcome = "out_of_budget"
+        reached = plan.horizon if outcome == "ok" else float(plan.times[finite][-1]) if finite.any() else 0.0
+        reached = flight.time if outcome == "out_of_budget" else reached
+        return Run(states, p_phi, p_psi, flight.steps, flight.steps * flight.order, 0, outcome, reached)
 
     def bare(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[Callable[[], Any], int]:
         """A function that runs heyoka's own loop to the horizon, without samples, and the derivatives it computes."""
@@ -211,9 +211,9 @@ def _padded(values: Any, size: int) -> Array:
     """Values as doubles, and NaN for the times that were not reached."""
     if len(values) == size and values.dtype == np.float64:
         return values  # type: ignore[no-any-return]  # not shared with another run: no copy
-    padded = np.full((size, *values.shape[1:]), np.nan)
-    padded[: len(values)] = values
-    return padded
+    result = np.full((size, *values.shape[1:]), np.nan)
+    result[: len(values)] = values
+    return result
 
 
 # beyond double there are no vector units, and quadruple precision is software
