@@ -447,12 +447,12 @@ def bisected(
 ) -> tuple[float, float, float, float]:
     """Half of the two intervals that hold the turning cosines, `low` to `below` and `above` to `high`."""
     u, v = 0.5 * (low + below), 0.5 * (high + above)
-    beyond, past = _climb(cubic, start, u) < 0.0, _climb(cubic, start, v) < 0.0
+    beyond, past = _cubic_value(cubic, start, u) < 0.0, _cubic_value(cubic, start, v) < 0.0
     return (u if beyond else low), (below if beyond else u), (v if past else high), (above if past else v)
 
 
 @inlined
-def _climb(cubic: tuple[float, float, float, float], start: float, u: float) -> float:
+def _cubic_value(cubic: tuple[float, float, float, float], start: float, u: float) -> float:
     """u'^2 at the cosine u: the nutation cubic, negative where the axis does not go."""
     excess, beta, a, b = cubic
     lever = b - a * u

@@ -129,8 +129,8 @@ def observe_angles(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> A
 def ended_angles(y: Any) -> int:
     """OK if the state is finite and theta inside (0, pi), otherwise NOT_FINITE or LEFT_CHART."""
     # zero, or NaN where one of them is not finite: added to theta, one test covers all six without a branch
-    nothing = 0.0 * (y[1] + y[2] + y[3] + y[4] + y[5])
-    return chart_outcome(y[0] + nothing)
+    zero = 0.0 * (y[1] + y[2] + y[3] + y[4] + y[5])
+    return chart_outcome(y[0] + zero)
 
 
 # an unreduced state as (theta, p_theta, phi, psi), the angles chart of `simulate`

@@ -351,13 +351,13 @@ def integrator(name: str | Integrator) -> Integrator:
     return _variants[name][1]
 
 
-def _pickled(method: Integrator) -> Any:
+def _reduce(method: Integrator) -> Any:
     """Pickles a registered integrator by its name, as solvers exist in one process only; others field by field."""
     registered = split_name(method.name)[0] in integrators() and integrator(method.name) == method
     return (integrator, (method.name,)) if registered else object.__reduce_ex__(method, 2)
 
 
-copyreg.pickle(Integrator, _pickled)
+copyreg.pickle(Integrator, _reduce)
 
 
 @by_name

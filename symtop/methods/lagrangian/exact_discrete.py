@@ -138,16 +138,16 @@ def _step(rule: Any, state: Any, carry: Any) -> Any:
     s1, s2, f1, f2, lx1, ly1, lx2, ly2, lu1, lv1, lu2, lv2 = carry
     first_longer = s1 >= s2
     # the longer one is scaled to its right length, and p by the inverse of that factor, so that J stays the same
-    lack, lack2 = (1.0 - s1) - s2, (1.0 - s2) - s1
-    lack = lack if first_longer else lack2
-    half = 0.5 * lack
-    lack = half if abs(lack) > IDLE else 0.0
+    defect, defect2 = (1.0 - s1) - s2, (1.0 - s2) - s1
+    defect = defect if first_longer else defect2
+    half = 0.5 * defect
+    defect = half if abs(defect) > IDLE else 0.0
     # and p is corrected to fulfil sum Re(conj(Z) (W - f Z))/r = 0
     out1, out2 = x1 * u1 + y1 * v1 - f1 * s1, x2 * u2 + y2 * v2 - f2 * s2
     residual = out1 * rule.q1 + out2 * rule.q2
     # both are computed and one is selected: a branch with arithmetic in it is not vectorised
     i1, i2 = _inverse(s1), _inverse(s2)
-    e1, e2, c1, c2 = lack * i1, lack * i2, residual * rule.r1 * i1, residual * rule.r2 * i2
+    e1, e2, c1, c2 = defect * i1, defect * i2, residual * rule.r1 * i1, residual * rule.r2 * i2
     e1 = e1 if first_longer else 0.0
     e2 = 0.0 if first_longer else e2
     c1 = c1 if first_longer else 0.0

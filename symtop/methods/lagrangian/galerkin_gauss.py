@@ -241,12 +241,12 @@ _reduced = on_angles.numbers
 
 
 @register_jitable
-def _with_sums(top: Any, at: Any) -> Any:
+def _prepare_sums(top: Any, at: Any) -> Any:
     par, state = _reduced(top, at)
     return par, (*state, 0.0, 0.0)
 
 
-with_sums = Preparation(_with_sums, 6, require_chart)
+with_sums = Preparation(_prepare_sums, 6, require_chart)
 to_angles = Presentation(lambda _par, _t, y: (y[0], y[1], y[2], y[3]), 4)
 
 

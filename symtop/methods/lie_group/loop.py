@@ -181,8 +181,8 @@ def stepped(
         for j in range(W):
             state, step = column(block, 0, j, STILL), column(block, STEP, j, STILL)
             give_up(block, j, ended_space(step) != OK)
-            moved, low = accumulate(state, column(block, LOW, j, STILL), step)  # `move` takes a fifth longer here
-            put(block, 0, j, moved)
+            new, low = accumulate(state, column(block, LOW, j, STILL), step)  # `move` takes a fifth longer here
+            put(block, 0, j, new)
             put(block, LOW, j, low)
 
     def size(rule: Any) -> int:

@@ -298,7 +298,7 @@ def _sweep_lanes(  # noqa: C901  (the loops of one step, read in one piece)
     carry = stages * dimension + 1  # the L_i and the unit
     unit_at = carry_at + carry - 1
     gap_at, pull_at, last_at, live_at = range(unit_at + 1, unit_at + 5)
-    carried, state_at, top_at, weighted = (0.0,) * carry, reading(dimension), reading(tops), dot_of(stages)
+    zero_carry, state_at, top_at, weighted = (0.0,) * carry, reading(dimension), reading(tops), dot_of(stages)
     sum_of = total(lambda i: lambda increments: increments[i], stages)
 
     # number m of every L_i, of the next step's L_i, and of the state at a stage
@@ -311,7 +311,7 @@ def _sweep_lanes(  # noqa: C901  (the loops of one step, read in one piece)
         return lambda row, state, block, j: state[m] + weighted(row, increments(block, m, j))
 
     place = each(displaced, dimension)
-    renewed = each(
+    update = each(
         lambda m: lambda live, weight, slope, old: weight * slope[m] if live and m != still else old[m], dimension
     )
     increment = each(lambda m: lambda block, j: sum_of(0.0, increments(block, m, j)), dimension)
@@ -336,7 +336,7 @@ def _sweep_lanes(  # noqa: C901  (the loops of one step, read in one piece)
             for j in range(W):
                 y = place(row, state_at(block, 0, j), block, j)
                 slope, old = field(top(*top_at(table, 0, j)), y), state_at(block, row_at, j)
-                new = renewed(block[live_at * W + j] != 0.0, table[(tops + i) * W + j], slope, old)
+                new = update(block[live_at * W + j] != 0.0, table[(tops + i) * W + j], slope, old)
                 gap = 0.0 if i == 0 else block[gap_at * W + j]
                 pull = 0.0 if i == 0 else block[pull_at * W + j]
                 for m in range(first):
@@ -386,7 +386,7 @@ def _sweep_lanes(  # noqa: C901  (the loops of one step, read in one piece)
         stage_weights(rule, h, numbers)
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
-        shares, slope, values = np.empty(stages), field(par, state), carried
+        shares, slope, values = np.empty(stages), field(par, state), zero_carry
         stage_weights(rule, h, shares)
         for i in range(stages):
             for m in range(dimension):

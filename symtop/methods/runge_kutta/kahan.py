@@ -69,8 +69,8 @@ def _increment_frame(par: Any, rule: Any, state: Any, carry: Any, h: float) -> A
     d, D = _axis_step(par, state[:3], L, h)
     half = scaled(0.5 * h / par.I1, L)
     right = plus(scaled(2.0, cross(half, a)), 0.5 * h / par.I1, cross(D, a))
-    turned = plus(plus(right, 1.0, cross(half, right)), dot(half, right), half)
-    b = scaled(1.0 / (1.0 + dot(half, half)), turned)
+    numerator = plus(plus(right, 1.0, cross(half, right)), dot(half, right), half)
+    b = scaled(1.0 / (1.0 + dot(half, half)), numerator)
     return (*d, *D, *b), carry, 1, finite_outcome(d[0] + d[1] + d[2] + b[0] + b[1] + b[2])
 
 

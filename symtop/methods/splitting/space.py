@@ -70,8 +70,8 @@ def mean_square_momentum(top: Any, at: Any) -> float:
     """The mean of ``|L|^2 = 2 I1 (E - mgl u) + p_psi^2 (1 - I1/I3)`` over a nutation, to 1e-14."""
     low, high = turning_cosines(top, at)
     excess, beta, a, _ = nutation_cubic(top, at)
-    _, gained = mean_nutation(top, at, low, high)
-    mean: float = top.I1 * top.I1 * (excess + beta * (math.cos(at.theta) - low) - gained + a * a)
+    _, rise = mean_nutation(top, at, low, high)
+    mean: float = top.I1 * top.I1 * (excess + beta * (math.cos(at.theta) - low) - rise + a * a)
     return mean
 
 

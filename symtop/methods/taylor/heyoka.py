@@ -145,9 +145,9 @@ class Flight(NamedTuple):
 
 
 def propagate(
-    chart: str, precision: str, tolerance: float, top: SymmetricTop, start: Angles, times: Array, most: int = 0
+    chart: str, precision: str, tolerance: float, top: SymmetricTop, start: Angles, times: Array, max_steps: int = 0
 ) -> Flight:
-    """heyoka's states, in the working precision, at increasing times, or those reached in `most` steps."""
+    """heyoka's states, in the working precision, at increasing times, or those reached in `max_steps`."""
     kind, grid = arithmetic(precision).kind, times if times[0] == 0.0 else np.concatenate([[0.0], times])
     numbers = grid if precision == "double" else np.array([kind(float(t)) for t in grid])
     pool = _idle_steppers(chart, precision, tolerance)
@@ -159,7 +159,7 @@ def propagate(
     integrator.time = kind("0")
     integrator.state[:] = state
     integrator.pars[:] = parameters[: integrator.pars.size]  # the axis chart does not need the last one
-    outcome, _, _, steps, *_, states = integrator.propagate_grid(numbers, max_steps=most)
+    outcome, _, _, steps, *_, states = integrator.propagate_grid(numbers, max_steps=max_steps)
     order, time = int(integrator.order), float(integrator.time)
     if (unit := _unit(chart, top, start)) != 1.0:
         states[:, -3:] *= kind(repr(unit))
@@ -177,8 +177,8 @@ class HeyokaSolver:
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         """Run from the start to the horizon, samples by dense output."""
         form = FORMS[self.chart]
-        most = max(1, int(min(plan.most(MOST_STEPS[self.precision]), sys.maxsize)))  # infinity is a budget, too
-        flight = propagate(self.chart, self.precision, plan.tolerance, top, start, plan.times, most)
+        limit = max(1, int(min(plan.most(MOST_STEPS[self.precision]), sys.maxsize)))  # infinity is a budget, too
+        flight = propagate(self.chart, self.precision, plan.tolerance, top, start, plan.times, limit)
         count, size = len(flight.states), plan.times.size
         states = _padded(flight.states, size)
         par = BareTop(top.I1, top.I3, top.mgl) if self.chart == "angles" else None
@@ -230,7 +230,7 @@ def built_in() -> list[Integrator]:
         import heyoka as hy
     except ImportError:
         return []
-    wide = ["longdouble"] if np.finfo(np.longdouble).eps < EPSILON else []
+    extended = ["longdouble"] if np.finfo(np.longdouble).eps < EPSILON else []
     quad = ["quad"] if hasattr(hy, "real128") else []
     return [
         Integrator(
@@ -243,7 +243,7 @@ def built_in() -> list[Integrator]:
             reference="biscani-izzo-2021", needs="expression", general=True, inner_loop="heyoka", precision=precision,
             speed=0.002 if precision == "quad" else 1.0,
         )
-        for precision in ("double", *wide, *quad)
+        for precision in ("double", *extended, *quad)
     ]  # fmt: skip
 
 

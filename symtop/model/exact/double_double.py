@@ -196,7 +196,7 @@ PER2 = tuple((float(high), float(low)) for high, low in FACTORIALS[:, :2])
 
 
 @shared
-def _near_zero(r: float) -> tuple[DoubleDouble, DoubleDouble]:
+def _sincos_near_zero(r: float) -> tuple[DoubleDouble, DoubleDouble]:
     """sin r and cos r - 1 of a double, abs(r) <= 1/128."""
     x = two_product(r, r)
     y = x[0]
@@ -211,10 +211,10 @@ def _near_zero(r: float) -> tuple[DoubleDouble, DoubleDouble]:
 
 
 @shared
-def _by_node(high: float, low: float) -> tuple[DoubleDouble, DoubleDouble]:
+def _sincos_by_node(high: float, low: float) -> tuple[DoubleDouble, DoubleDouble]:
     """sin and cos of high + low, 0 <= high < 0.8."""
     k = int(high * NODES + 0.5) if high < 1.5 else 0  # NaN needs a node, too
-    s, c = _near_zero(high - k / NODES)
+    s, c = _sincos_near_zero(high - k / NODES)
     node_s, node_c = (float(ARCS[k, 0]), float(ARCS[k, 1])), (float(ARCS[k, 4]), float(ARCS[k, 5]))
     sine = add(add(mul(node_s, c), mul(node_c, s)), node_s)
     cosine = add(sub(mul(node_c, c), mul(node_s, s)), node_c)
@@ -236,7 +236,7 @@ def sincos(x: float) -> tuple[DoubleDouble, DoubleDouble]:
         high, low = two_sum(high, -second)
         high, low = ordered_sum(high, low + (e + (quarters * HALF_PI_REST - low_error)))
     below = high < 0.0
-    sine, cosine = _by_node(-high, -low) if below else _by_node(high, low)
+    sine, cosine = _sincos_by_node(-high, -low) if below else _sincos_by_node(high, low)
     if below:
         sine = neg(sine)
     turn = quarters % 4

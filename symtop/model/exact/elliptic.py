@@ -198,8 +198,8 @@ def imaginary_argument(sn: DoubleDouble, cn: DoubleDouble, nome: Nome) -> tuple[
         even = sub(even, sub(mul(nome.q4, c2), mul(nome.q9, c3)))
         even = add_double(even, nome.q16 * (nome.q9[0] * (twice[0] * c4 - c3[0]) - c4))  # q^25 cosh 10y is up to q^20
         odd_rate += 5.0 * nome.q6[0] * d2 - 7.0 * nome.q12[0] * (twice[0] * d2 - d1)
-        grown = 16.0 * nome.q4[0] * c[0] - 12.0 * nome.q9[0] * (4.0 * c[0] * c[0] - 1.0)
-        even_rate += 2.0 * h * cosh[0] * grown
+        term = 16.0 * nome.q4[0] * c[0] - 12.0 * nome.q9[0] * (4.0 * c[0] * c[0] - 1.0)
+        even_rate += 2.0 * h * cosh[0] * term
     theta1, theta4 = mul_double(sub(ONE, odd), h), add_double(scaled(even, -2.0), 1.0)
     residual = sub(mul(sn, theta4), mul(along, theta1))
     step = residual[0] / (along[0] * cosh[0] * odd_rate - sn[0] * even_rate)

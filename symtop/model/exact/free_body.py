@@ -118,14 +118,14 @@ def _gap(inertia: Vector, first: DoubleDouble, last: DoubleDouble) -> DoubleDoub
 
 
 @inlined
-def _odd(c: Constants, place: int, sign: float, w0: float, w1: float, w2: float, w3: float) -> None:
+def _put_odd(c: Constants, place: int, sign: float, w0: float, w1: float, w2: float, w3: float) -> None:
     """Sum of w_n sin((2n+1)x)/sin x in powers of cos 2x, or with sign -1 of cos((2n+1)x)/cos x."""
     c[place], c[place + 1] = (w0 - w2) + sign * (w1 - w3), 2.0 * (w1 + sign * w2) - 4.0 * w3
     c[place + 2], c[place + 3] = 4.0 * (w2 + sign * w3), 8.0 * w3
 
 
 @inlined
-def _even(c: Constants, place: int, w0: float, w1: float, w2: float, w3: float) -> None:
+def _put_even(c: Constants, place: int, w0: float, w1: float, w2: float, w3: float) -> None:
     """Sum of w_n cos 2nx in powers of cos 2x."""
     c[place], c[place + 1], c[place + 2], c[place + 3] = w0 - w2, w1 - 3.0 * w3, 2.0 * w2, 4.0 * w3
 
@@ -136,10 +136,10 @@ def _trigonometric(c: Constants, nome: Nome, sn: DoubleDouble, cn: DoubleDouble)
     q, w1, w2, w3 = nome.q[0], nome.q2[0], nome.q6[0], nome.q12[0]
     e1, e2, e3 = 2.0 * q, 2.0 * nome.q4[0], 2.0 * nome.q9[0]
     c[NOME] = 2.0 * math.sqrt(math.sqrt(q))
-    _odd(c, SINE, 1.0, 1.0, -w1, w2, -w3)
-    _odd(c, COSINE, -1.0, 1.0, w1, w2, w3)
-    _even(c, THETA_3, 1.0, e1, e2, e3)
-    _even(c, THETA_4, 1.0, -e1, e2, -e3)
+    _put_odd(c, SINE, 1.0, 1.0, -w1, w2, -w3)
+    _put_odd(c, COSINE, -1.0, 1.0, w1, w2, w3)
+    _put_even(c, THETA_3, 1.0, e1, e2, e3)
+    _put_even(c, THETA_4, 1.0, -e1, e2, -e3)
     start, quarter = cubic(c, THETA_4, 1.0), cubic(c, THETA_4, -1.0)
     sine = cubic(c, SINE, -1.0)
     c[A1] *= start * start / (cubic(c, COSINE, 1.0) * cubic(c, THETA_3, 1.0))
@@ -156,7 +156,7 @@ def _trigonometric(c: Constants, nome: Nome, sn: DoubleDouble, cn: DoubleDouble)
     even = add_double(even, nome.q16 * (c4 - nome.q9[0] * c5))
     odd = sub(add(mul(nome.q, s1), mul_double(mul(nome.q9, s3), 3.0)), scaled(mul(nome.q4, s2), 2.0))
     odd = add_double(odd, nome.q16 * (5.0 * nome.q9[0] * s5 - 4.0 * s4))
-    _even(c, REAL, 1.0, -e1 * c1[0], e2 * c2[0], -e3 * c3[0])
+    _put_even(c, REAL, 1.0, -e1 * c1[0], e2 * c2[0], -e3 * c3[0])
     f1, f2, f3 = e1 * s1[0], -e2 * s2[0], e3 * s3[0]  # sin 2nx/(sin x cos x)
     c[IMAG], c[IMAG + 1], c[IMAG + 2] = 2.0 * (f1 - f3), 4.0 * f2, 8.0 * f3
     return div(scaled(odd, 4.0), add_double(scaled(even, 2.0), 1.0))
@@ -172,8 +172,8 @@ def _hyperbolic(c: Constants, nome: Nome, sn: DoubleDouble, cn: DoubleDouble, sp
     s3, c3 = sub(mul(twice, s2), s1), sub(mul(twice, c2), c1)
     s4, c4 = twice[0] * s3[0] - s2[0], twice[0] * c3[0] - c2[0]
     w1, w2, w3 = nome.q2[0], nome.q6[0], nome.q12[0]
-    _odd(c, REAL, -1.0, c0[0], w1 * c1[0], w2 * c2[0], w3 * c3[0])
-    _odd(c, IMAG, 1.0, s0[0], w1 * s1[0], w2 * s2[0], w3 * s3[0])
+    _put_odd(c, REAL, -1.0, c0[0], w1 * c1[0], w2 * c2[0], w3 * c3[0])
+    _put_odd(c, IMAG, 1.0, s0[0], w1 * s1[0], w2 * s2[0], w3 * s3[0])
     even = add(add(c0, mul(nome.q2, c1)), add(mul(nome.q6, c2), mul(nome.q12, c3)))
     odd = add(s0, add(mul_double(mul(nome.q2, s1), 3.0), mul_double(mul(nome.q6, s2), 5.0)))
     odd = add_double(add(odd, mul_double(mul(nome.q12, s3), 7.0)), 9.0 * nome.q20 * s4)

@@ -57,7 +57,7 @@ def _sinh_cosh(x: float) -> tuple[float, float]:
 
 
 @inlined
-def _climbing(c: Constants, t: float) -> Wave:
+def _separatrix_wave(c: Constants, t: float) -> Wave:
     """Elementary motion on the separatrix, from the lower pole at time 0."""
     x, sign = c[at.SCALE] * t, c[at.FLOOR_SIGN]
     exp_minus = math.exp(-abs(x))
@@ -104,7 +104,7 @@ def wave(c: Constants, t: float) -> Wave:
     if c[at.KIND] == at.RESTS:
         return c[at.REST_DOWN], 1.0, 0.0, 0.0, c[at.REST_UP], 1.0, 0.0, 0.0, 0.0, c[at.REST_RATE]
     if c[at.KIND] == at.CLIMBS:
-        return _climbing(c, t)
+        return _separatrix_wave(c, t)
     quarter, offset = _phase(c, t)
     near_crown = quarter % 2.0 == 1.0
     frame = at.CROWN if near_crown else at.FLOOR
@@ -211,7 +211,7 @@ def _axis(c: Constants, t: float) -> tuple[float, float, float]:
 
 
 @inlined
-def _along(state: Any) -> float:
+def _axial_momentum(state: Any) -> float:
     """L.e of a state (q, L)."""
     w, x, y, z = state[0], state[1], state[2], state[3]
     right, back, up = 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z
@@ -245,7 +245,7 @@ def samples(c: Constants, times: Sequence[float], view: int, out: Any) -> int:
                 out[i, first], out[i, first + 1] = nutation * x + flat * y, nutation * y - flat * x
                 out[i, first + 2] = turning * across + spin * along
             if view == RUN:
-                out[i, 7], out[i, 8] = out[i, 6], _along(out[i])
+                out[i, 7], out[i, 8] = out[i, 6], _axial_momentum(out[i])
     return -1
 
 

@@ -255,7 +255,7 @@ def unknown_points() -> TurningPoints:
 
 
 @shared
-def _beyond_the_pole(w: DoubleDouble, k1: DoubleDouble, k2: DoubleDouble, lead: DoubleDouble) -> DoubleDouble:
+def _root_beyond_pole(w: DoubleDouble, k1: DoubleDouble, k2: DoubleDouble, lead: DoubleDouble) -> DoubleDouble:
     """The positive root of -w + k1 t + k2 t^2 + lead t^3, w and lead positive; not a number if Newton fails."""
     w0, a, b, c = w[0], k1[0], k2[0], lead[0]
     t = 2.0 * max(-b / c if b < 0.0 else 0.0, math.sqrt(-a / c) if a < 0.0 else 0.0, (w0 / c) ** (1.0 / 3.0))
@@ -286,7 +286,7 @@ def _beyond_the_pole(w: DoubleDouble, k1: DoubleDouble, k2: DoubleDouble, lead: 
 def _third_root(sums: Sums, passes_up: bool, through_up: bool) -> DoubleDouble:
     """g3 = u3 - 1 of a top with weight."""
     if not through_up:
-        return _beyond_the_pole(square(sums.twist_up), sums.k1, sums.k2, sums.lead)
+        return _root_beyond_pole(square(sums.twist_up), sums.k1, sums.k2, sums.lead)
     if not passes_up:
         return ZERO
     s = root(sub(square(sums.k2), scaled(mul(sums.lead, sums.k1), 4.0)))  # k1 < 0
@@ -337,7 +337,7 @@ def _roots(sums: Sums, exact: Exact, theta_dot: float) -> tuple[bool, _Roots]:
 
 
 @inlined
-def _lower(sums: Sums, exact: Exact, roots: _Roots, d2: DoubleDouble) -> DoubleDouble:
+def _lower_gap(sums: Sums, exact: Exact, roots: _Roots, d2: DoubleDouble) -> DoubleDouble:
     """d1 = 1 + u1."""
     if exact.through_down:
         return ZERO
@@ -347,7 +347,7 @@ def _lower(sums: Sums, exact: Exact, roots: _Roots, d2: DoubleDouble) -> DoubleD
 
 
 @inlined
-def _upper(sums: Sums, exact: Exact, roots: _Roots, e1: DoubleDouble) -> DoubleDouble:
+def _upper_gap(sums: Sums, exact: Exact, roots: _Roots, e1: DoubleDouble) -> DoubleDouble:
     """e2 = 1 - u2."""
     if roots.passes_up:
         return ZERO
@@ -367,7 +367,7 @@ def turning_points(sums: Sums, exact: Exact, theta_dot: float) -> TurningPoints:
     stiffness = sub(roots.full, mul(sums.lead, roots.x1))
     if not (success and twisted and d2[0] > 0.0 and e1[0] > 0.0 and stiffness[0] > 0.0):
         return unknown_points()
-    d1, e2 = _lower(sums, exact, roots, d2), _upper(sums, exact, roots, e1)
+    d1, e2 = _lower_gap(sums, exact, roots, d2), _upper_gap(sums, exact, roots, e1)
     gap = add(roots.bend, mul(sums.lead, e2))
     if not (gap[0] > 0.0 and (d1[0] > 0.0 or exact.through_down) and (e2[0] > 0.0 or roots.passes_up)):
         return unknown_points()
