@@ -167,7 +167,7 @@ def stepped(
 ) -> Lanes:  # fmt: skip
     """A map in lanes: ``part(block, table, row)`` makes one share of all lanes; `row` holds the share's numbers.
 
-    ``lay(par, rule, h, numbers)`` writes `fields` numbers of the rule, then `each` for every share.
+    ``lay(par, rule, h, numbers)`` writes `fields` numbers of the rule, then `width` for every share.
     """
     shares_at = len(carried.top._fields) + fields
     register_jitable(part)

@@ -159,7 +159,7 @@ def process_attitude(s: float, w: float, x: float, y: float, z: float, Lx: float
 
 
 def _loop(force: Any, rotate: Any, process: Any, add_spin: Any, observe: Any, dimension: int) -> Loop:
-    """The loop of a chart; `process` is the flow of G, `spun` adds the spin to a sample."""
+    """The loop of a chart; `process` is the flow of G, `add_spin` adds the spin to a sample."""
     zeros = (0.0,) * dimension
     for part in (force, rotate, process, add_spin):
         register_jitable(part)
