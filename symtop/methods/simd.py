@@ -101,13 +101,13 @@ class _Each:
         self._builder = builder
 
     def __getattr__(self, name: str) -> Any:
-        plain = getattr(self._builder, name)
+        operation = getattr(self._builder, name)
 
         def each(*values: Any) -> Any:
             lists = [value for value in values if isinstance(value, list)]
-            return [plain(*parts) for parts in zip(*values, strict=True)] if lists else plain(*values)
+            return [operation(*parts) for parts in zip(*values, strict=True)] if lists else operation(*values)
 
-        return each if name in ("fadd", "fsub", "fmul", "fneg", "fma") else plain
+        return each if name in ("fadd", "fsub", "fmul", "fneg", "fma") else operation
 
 
 class Components(Vectors):
@@ -148,7 +148,7 @@ def _paired(builder: Any, first: Any, second: Any) -> Any:
     return builder.insert_element(half, second, ir.Constant(_INDEX, 1))
 
 
-def _of_both(name: str) -> Any:
+def _pair_operation(name: str) -> Any:
     """An operation of LLVM on two values, registers of two doubles or scalars, which stand for two equal ones."""
 
     @intrinsic
@@ -166,7 +166,7 @@ class _Two(types.Type):  # type: ignore[misc]
 
     def __init__(self) -> None:
         super().__init__("two doubles")
-        self.operations = tuple(map(_of_both, ("fadd", "fsub", "fmul")))
+        self.operations = tuple(map(_pair_operation, ("fadd", "fsub", "fmul")))
 
 
 @functools.cache
@@ -179,10 +179,10 @@ register_model(_Two)(lambda manager, kind: models.PrimitiveModel(manager, kind, 
 
 
 def _overload(operation: Any, emitted: Any) -> None:
-    def chosen(a: Any, b: Any) -> Any:
+    def select(a: Any, b: Any) -> Any:
         return (lambda a, b: emitted(a, b)) if two() in (a, b) else None  # noqa: PLW0108  (numba takes functions of Python)
 
-    overload(operation, jit_options=INLINED, strict=False)(chosen)
+    overload(operation, jit_options=INLINED, strict=False)(select)
 
 
 for _operation, _emitted in zip((operator.add, operator.sub, operator.mul), two().operations, strict=True):
@@ -202,16 +202,16 @@ def side_by_side(typing, first, second):  # type: ignore[no-untyped-def]
 
 
 @intrinsic
-def apart(typing, both):  # type: ignore[no-untyped-def]
+def apart(typing, pairs):  # type: ignore[no-untyped-def]
     """The two tuples of doubles that a tuple of `two()` is made of."""
-    row = types.UniTuple(types.float64, len(both))
+    row = types.UniTuple(types.float64, len(pairs))
 
     def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         values = unpack_tuple(builder, arguments[0])
         lanes = ([builder.extract_element(value, ir.Constant(_INDEX, k)) for value in values] for k in range(2))
         return context.make_tuple(builder, signature.return_type, [*map(Vectors(builder).array, lanes)])
 
-    return types.UniTuple(row, 2)(both), emit
+    return types.UniTuple(row, 2)(pairs), emit
 
 
 @intrinsic
@@ -220,17 +220,17 @@ def combined(typing, place, terms, weights, h):  # type: ignore[no-untyped-def]
 
     Written out: a closure for each term takes twice as long to compile, a loop four times as long to run.
     """
-    used = [j for j, weight in enumerate(weights) if weight is not types.none]
+    indices = [j for j, weight in enumerate(weights) if weight is not types.none]
 
     def emit(context, builder, signature, arguments):  # type: ignore[no-untyped-def]
         result, rows, numbers, step = arguments
-        factors = [(j, builder.fmul(step, builder.extract_value(numbers, j))) for j in used]
-        as_place = _paired if place.dtype is two() else lambda _, value, __: value
+        factors = [(j, builder.fmul(step, builder.extract_value(numbers, j))) for j in indices]
+        broadcast = _paired if place.dtype is two() else lambda _, value, __: value
         for m in range(len(place)):
             total = builder.extract_value(result, m)
             for j, factor in factors:
                 term = builder.extract_value(rows, [j, m])
-                product = builder.fmul(*(as_place(builder, value, value) for value in (factor, term)))
+                product = builder.fmul(*(broadcast(builder, value, value) for value in (factor, term)))
                 total = builder.fadd(total, product)
             result = builder.insert_value(result, total, m)
         return result
@@ -268,8 +268,8 @@ def _compiled_with_item(values: Any, i: int, value: float) -> Callable[..., Any]
 
 
 @register_jitable
-def times(values: Any, by: float) -> Any:
-    """A row of doubles, each multiplied by the number `by`: a new tuple, or the same array."""
+def times(values: Any, factor: float) -> Any:
+    """A row of doubles, each multiplied by the number `factor`: a new tuple, or the same array."""
     for i in range(len(values)):
-        values = with_item(values, i, values[i] * by)
+        values = with_item(values, i, values[i] * factor)
     return values

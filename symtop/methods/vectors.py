@@ -67,18 +67,18 @@ def each(make: Callable[[int], Callable[..., Any]], count: int, i: int = 0) -> C
     """
     part = register_jitable(make(i))
     if i + 1 == count:
-        return register_jitable(lambda *given: (part(*given),))
-    rest = each(make, count, i + 1)
-    return register_jitable(lambda *given: (part(*given), *rest(*given)))
+        return register_jitable(lambda *args: (part(*args),))
+    others = each(make, count, i + 1)
+    return register_jitable(lambda *args: (part(*args), *others(*args)))
 
 
 def total(make: Callable[[int], Callable[..., Any]], count: int) -> Callable[..., Any]:
     """A function that adds ``make(i)(...)``, i < count, to its first argument in this order."""
     last = register_jitable(make(count - 1))
     if count == 1:
-        return register_jitable(lambda first, *given: first + last(*given))
+        return register_jitable(lambda first, *args: first + last(*args))
     before = total(make, count - 1)
-    return register_jitable(lambda first, *given: before(first, *given) + last(*given))
+    return register_jitable(lambda first, *args: before(first, *args) + last(*args))
 
 
 def dot_of(count: int) -> Callable[..., Any]:

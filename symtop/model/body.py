@@ -43,10 +43,10 @@ def vertical(w: Any, x: Any, y: Any, z: Any) -> tuple[Any, Any, Any]:
     return 2.0 * (x * z - w * y), 2.0 * (y * z + w * x), w * w - x * x - y * y + z * z
 
 
-def _as_stored(given: Sequence[float], scaled: Sequence[float]) -> tuple[float, ...]:
-    """`scaled`, numbers of length one; `given` if that agrees to rounding, so that a stored body is read unchanged."""
-    near = all(abs(float(old) - new) <= 2.0 * EPSILON for old, new in zip(given, scaled, strict=True))
-    return tuple(float(number) for number in (given if near else scaled))
+def _as_stored(values: Sequence[float], scaled: Sequence[float]) -> tuple[float, ...]:
+    """`scaled`, numbers of length one; `values` if that agrees to rounding, so that a stored body is read unchanged."""
+    near = all(abs(float(old) - new) <= 2.0 * EPSILON for old, new in zip(values, scaled, strict=True))
+    return tuple(float(number) for number in (values if near else scaled))
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,10 +85,10 @@ class RigidBody:
     def __post_init__(self) -> None:
         for name in ("I1", "I2", "I3"):
             object.__setattr__(self, name, bounded(name, positive(name, getattr(self, name)), 1.0 / LARGEST))
-        least, middle, most = sorted(self.moments)
-        if most > (least + middle) * (1.0 + MOMENT_SLACK):
-            name = ("I1", "I2", "I3")[self.moments.index(most)]
-            words = f"{least + middle!r}: no rigid body exceeds it, not {most!r}"
+        low, middle, high = sorted(self.moments)
+        if high > (low + middle) * (1.0 + MOMENT_SLACK):
+            name = ("I1", "I2", "I3")[self.moments.index(high)]
+            words = f"{low + middle!r}: no rigid body exceeds it, not {high!r}"
             raise SymtopError(f"{name} must be at most the sum of the other moments, {words}", name)
         object.__setattr__(self, "mgl", bounded("mgl", self.mgl))
         centre = vector("centre", self.centre, 3)
@@ -125,16 +125,16 @@ class RigidBody:
         if np.abs(inertia - inertia.T).max() > SYMMETRIC_WITHIN * np.abs(inertia).max():
             raise SymtopError("matrix must be symmetric", "matrix")
         moments, turn = np.linalg.eigh(inertia)
-        towards = np.array(vector("centre", centre, 3))
-        apart = 0 if moments[1] ** 2 > moments[0] * moments[2] else 2
-        third = int(np.argmax(np.abs(turn.T @ towards))) if mgl else apart
+        direction = np.array(vector("centre", centre, 3))
+        index = 0 if moments[1] ** 2 > moments[0] * moments[2] else 2
+        third = int(np.argmax(np.abs(turn.T @ direction))) if mgl else index
         moments, turn = np.roll(moments, 2 - third), np.roll(turn, 2 - third, axis=1)
-        turn[:, 2] *= math.copysign(1.0, turn[:, 2] @ towards)
+        turn[:, 2] *= math.copysign(1.0, turn[:, 2] @ direction)
         turn[:, 0] *= math.copysign(1.0, np.linalg.det(turn))
-        along = turn.T @ towards
+        components = turn.T @ direction
         axes = np.roll(Rotation.from_matrix(turn).as_quat(), 1)  # scalar first
         I1, I2, I3 = moments.tolist()
-        return cls(I1, I2, I3, mgl, tuple(along.tolist()), tuple(axes.tolist()))
+        return cls(I1, I2, I3, mgl, tuple(components.tolist()), tuple(axes.tolist()))
 
     @classmethod
     def from_brick(cls, mass: float, sides: Sequence[float]) -> "RigidBody":
@@ -248,5 +248,5 @@ def rotated(quaternion: Any, vectors: Any) -> Any:
     along, size = 2.0 * (x * a + y * b + z * c), w * w - x * x - y * y - z * z
     turn, twice = (y * c - z * b, z * a - x * c, x * b - y * a), 2.0 * w
     parts = zip((a, b, c), (x, y, z), turn, strict=True)
-    turned = np.stack([size * v + along * r + twice * u for v, r, u in parts], axis=-1)
-    return turned if turned.ndim > 1 else tuple(turned.tolist())
+    result = np.stack([size * v + along * r + twice * u for v, r, u in parts], axis=-1)
+    return result if result.ndim > 1 else tuple(result.tolist())

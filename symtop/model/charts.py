@@ -62,24 +62,24 @@ def space_state(chart: str, top: SymmetricTop, at: Angles) -> Array:
 # the formulas themselves, on the functions of NumPy, of `math` for a single state (four times as fast) or of mpmath
 
 
-def axis_parts(of: Any, theta: Any, phi: Any) -> tuple[Any, ...]:
+def axis_parts(lib: Any, theta: Any, phi: Any) -> tuple[Any, ...]:
     """The axis, by the sine and cosine of a module."""
-    sine = of.sin(theta)
-    return sine * of.sin(phi), -sine * of.cos(phi), of.cos(theta)
+    sine = lib.sin(theta)
+    return sine * lib.sin(phi), -sine * lib.cos(phi), lib.cos(theta)
 
 
-def quaternion_parts(of: Any, theta: Any, phi: Any, psi: Any) -> tuple[Any, ...]:
+def quaternion_parts(lib: Any, theta: Any, phi: Any, psi: Any) -> tuple[Any, ...]:
     """The quaternion, by the sine and cosine of a module."""
     half, total, difference = 0.5 * theta, 0.5 * (phi + psi), 0.5 * (phi - psi)
-    cosine, sine = of.cos(half), of.sin(half)
-    return cosine * of.cos(total), sine * of.cos(difference), sine * of.sin(difference), cosine * of.sin(total)
+    cosine, sine = lib.cos(half), lib.sin(half)
+    return cosine * lib.cos(total), sine * lib.cos(difference), sine * lib.sin(difference), cosine * lib.sin(total)
 
 
 def momentum_parts(
-    of: Any, top: SymmetricTop, theta: Any, phi: Any, theta_dot: Any, phi_dot: Any, psi_dot: Any
+    lib: Any, top: SymmetricTop, theta: Any, phi: Any, theta_dot: Any, phi_dot: Any, psi_dot: Any
 ) -> tuple[Any, ...]:
     """The angular momentum, its three terms along n, e x n and e, by the sine and cosine of a module."""
-    s, c, sin_phi, cos_phi = of.sin(theta), of.cos(theta), of.sin(phi), of.cos(phi)
+    s, c, sin_phi, cos_phi = lib.sin(theta), lib.cos(theta), lib.sin(phi), lib.cos(phi)
     nod, swing, spin = top.I1 * theta_dot, top.I1 * phi_dot * s, top.I3 * (psi_dot + phi_dot * c)
     across = spin * s - swing * c
     return nod * cos_phi + across * sin_phi, nod * sin_phi - across * cos_phi, swing * s + spin * c
@@ -131,10 +131,10 @@ def unwrapped(angle: Array, guide: Array) -> Array:
     jumps = np.nonzero(~(np.abs(step) < np.pi))  # NaN is one, too
     if jumps[0].size:  # the arithmetic of `np.unwrap`, for the few steps that jump: a third of the time
         jump = step[jumps]
-        rest = np.mod(jump + np.pi, 2.0 * np.pi) - np.pi
-        rest[(rest == -np.pi) & (jump > 0.0)] = np.pi
+        remainder = np.mod(jump + np.pi, 2.0 * np.pi) - np.pi
+        remainder[(remainder == -np.pi) & (jump > 0.0)] = np.pi
         step[...] = 0.0
-        step[jumps] = rest - jump
+        step[jumps] = remainder - jump
         lag[..., 1:] += step.cumsum(axis=-1)
     return guide + (lag - 2.0 * np.pi * np.rint(lag[..., :1] / (2.0 * np.pi)))
 
@@ -299,9 +299,9 @@ _NONE, _NO_ROOM = np.empty(0), np.empty((2, 0))
 
 
 def _read(
-    states: Any, p_psi: Any, cosine: Any, sine: Any, twice: float, excess: float, mgl: float, axis: Any, seen: Any
+    states: Any, p_psi: Any, cosine: Any, sine: Any, twice_I1: float, excess: float, mgl: float, axis: Any, out: Any
 ) -> None:
-    """Fill in axes (n, 3), and energies and p_theta in the two rows of `seen` unless empty; states (n, 6 or 7)."""
+    """Fill in axes (n, 3), and energies and p_theta in the two rows of `out` unless empty; states (n, 6 or 7)."""
     width = states.shape[1]
     for i in range(len(states)):
         if width == 7:
@@ -310,11 +310,11 @@ def _read(
             axis[i, 0], axis[i, 1], axis[i, 2] = right + right, back + back, w * w - x * x - y * y + z * z
         else:
             axis[i, 0], axis[i, 1], axis[i, 2] = states[i, 0], states[i, 1], states[i, 2]
-        if seen.shape[1] == 0:
+        if out.shape[1] == 0:
             continue
         a, b, c = states[i, width - 3], states[i, width - 2], states[i, width - 1]
-        seen[0, i] = (a * a + b * b + c * c) / twice + 0.5 * (p_psi[i] * p_psi[i]) * excess + mgl * axis[i, 2]
-        seen[1, i] = a * cosine[i] + b * sine[i]
+        out[0, i] = (a * a + b * b + c * c) / twice_I1 + 0.5 * (p_psi[i] * p_psi[i]) * excess + mgl * axis[i, 2]
+        out[1, i] = a * cosine[i] + b * sine[i]
 
 
 _reader = LazyKernel(
@@ -344,12 +344,12 @@ def readings(view: View) -> tuple[Array, Array, Array]:
     if view.chart == "angles" or not _compilable(view.states) or not _reader.ready(READING_SECONDS):
         return view.axis, view.energy, view.p_theta
     top, count = view.top, len(view.states)
-    axis, seen = np.empty((count, 3)), np.empty((2, count))
+    axis, out = np.empty((count, 3)), np.empty((2, count))
     excess = 1.0 / top.I3 - 1.0 / top.I1
     _reader.compiled(
-        view.states, np.array(view.p_psi), np.cos(view.phi), np.sin(view.phi), 2.0 * top.I1, excess, top.mgl, axis, seen
+        view.states, np.array(view.p_psi), np.cos(view.phi), np.sin(view.phi), 2.0 * top.I1, excess, top.mgl, axis, out
     )
-    return axis, seen[0], seen[1]
+    return axis, out[0], out[1]
 
 
 HALF, TURN = math.pi, 2.0 * math.pi
@@ -359,19 +359,19 @@ UNWRAP_SECONDS = 1e-5  # by which NumPy takes longer than the compiled function,
 def _unwrap(angles: Any, guides: Any, out: Any) -> None:
     for j in range(len(angles)):
         first = angles[j, 0] - guides[j, 0]
-        whole = TURN * np.rint(first / TURN)
-        out[j, 0] = guides[j, 0] + (first - whole)
-        before, taken = first, 0.0
+        turns = TURN * np.rint(first / TURN)
+        out[j, 0] = guides[j, 0] + (first - turns)
+        before, shift = first, 0.0
         for i in range(1, angles.shape[1]):
             lag = angles[j, i] - guides[j, i]
             step = lag - before
             if not abs(step) < HALF:  # NaN is one, too
-                rest = (step + HALF) % TURN - HALF
-                if rest == -HALF and step > 0.0:
-                    rest = HALF
-                taken += rest - step
+                remainder = (step + HALF) % TURN - HALF
+                if remainder == -HALF and step > 0.0:
+                    remainder = HALF
+                shift += remainder - step
             before = lag
-            out[j, i] = guides[j, i] + ((lag + taken) - whole)
+            out[j, i] = guides[j, i] + ((lag + shift) - turns)
 
 
 _unwrapper = LazyKernel(_unwrap, "(float64[:, ::1], float64[:, ::1], float64[:, ::1])", patience=1.0)

@@ -52,10 +52,10 @@ class LazyKernel:
     def load(self) -> bool:
         """Load the kernel if it or its bitcode is in the cache; returns whether the compiled function is loaded."""
         with self._lock:
-            known = self.compiled is not None or self._worth() < self.patience
-        if known:
+            cached = self.compiled is not None or self._worth() < self.patience
+        if cached:
             self.compile()
-        return known
+        return cached
 
     def _worth(self) -> float:
         """Seconds of interpreting after which to compile or load; another process may have compiled in the meantime."""
@@ -68,6 +68,6 @@ class LazyKernel:
             self._signature, _ = sigutils.normalize_signature(self.arguments)
         if self._spent >= self._look:
             self._look = 2.0 * self._spent
-            on_disk = [is_cached(self._kernel, self._signature, bitcode=which) for which in (False, True)]
+            on_disk = [is_cached(self._kernel, self._signature, bitcode=bitcode) for bitcode in (False, True)]
             self._price = 0.0 if on_disk[0] else self.patience * (GENERATING if on_disk[1] else 1.0)
         return self._price

@@ -57,8 +57,8 @@ def horizon_of(value: object) -> float:
     """
     horizon = positive("horizon", value)
     if not SHORTEST <= horizon <= LONGEST_TIME:
-        must = f"at least {SHORTEST:g}" if horizon < SHORTEST else f"at most {LONGEST_TIME:g}"
-        raise SymtopError(f"horizon must be {must}, not {horizon!r}", "horizon")
+        bound = f"at least {SHORTEST:g}" if horizon < SHORTEST else f"at most {LONGEST_TIME:g}"
+        raise SymtopError(f"horizon must be {bound}, not {horizon!r}", "horizon")
     return horizon
 
 
@@ -157,8 +157,8 @@ class Scene:
         else:
             momenta, inertia = self.top.momenta(self.start), self.top.I1
             size, turning = max(abs(momenta.p_phi), abs(momenta.p_psi)), inertia * abs(self.start.theta_dot)
-        other = max(turning, math.sqrt(abs(self.top.mgl) * inertia), TINY)
-        return size if size > STEADY_ENERGY * EPSILON * other else other
+        scale = max(turning, math.sqrt(abs(self.top.mgl) * inertia), TINY)
+        return size if size > STEADY_ENERGY * EPSILON * scale else scale
 
     def momentum_grain(self, momentum: Any) -> float:
         """How much larger rounding is in relative errors of p_phi where a run has the momenta (n, 3) in space, or None.
@@ -167,8 +167,8 @@ class Scene:
         """
         if momentum is None or not self.of_body or self.top.free:
             return 1.0
-        most = math.sqrt(2.0 * max(self.top.moments) * max(self.top.energy(self.start) + abs(self.top.mgl), 0.0))
-        return max(min(float(np.nanmax(np.abs(momentum))), most) / self.momentum_scale, 1.0)
+        limit = math.sqrt(2.0 * max(self.top.moments) * max(self.top.energy(self.start) + abs(self.top.mgl), 0.0))
+        return max(min(float(np.nanmax(np.abs(momentum))), limit) / self.momentum_scale, 1.0)
 
     def record(self) -> dict[str, str]:
         """What tables show of this scene, by column."""
@@ -263,11 +263,11 @@ def steady(spin: float) -> Scene:
     """
     top, theta, w3 = SymmetricTop(2.0, 1.0, 2.0), math.pi / 3.0, positive("spin", spin)
     momentum, weight = top.I3 * w3, top.I1 * math.cos(theta)
-    room = momentum * momentum - 4.0 * weight * top.mgl
-    if room < 0.0:
-        least = 2.0 * math.sqrt(weight * top.mgl) / top.I3
-        raise SymtopError(f"spin must be at least {least:.6g} to precess steadily, not {w3!r}")
-    precession = 2.0 * top.mgl / (momentum + math.sqrt(room))
+    discriminant = momentum * momentum - 4.0 * weight * top.mgl
+    if discriminant < 0.0:
+        lowest = 2.0 * math.sqrt(weight * top.mgl) / top.I3
+        raise SymtopError(f"spin must be at least {lowest:.6g} to precess steadily, not {w3!r}")
+    precession = 2.0 * top.mgl / (momentum + math.sqrt(discriminant))
     start = Angles(theta=theta, phi_dot=precession, psi_dot=w3 - precession * math.cos(theta))
     return Scene(f"steady-{w3:.12g}", top, start, 20.0, f"steady precession at a spin of {w3:g}", tags=["family"])
 
@@ -309,7 +309,7 @@ def _kinon_betsch() -> Scene:
 
 @functools.lru_cache(maxsize=1)
 def _catalogue() -> dict[str, Scene]:
-    usual, printed = SymmetricTop(2.0, 1.0, 2.0), "goldstein with more energy: not at rest, theta"
+    top, printed = SymmetricTop(2.0, 1.0, 2.0), "goldstein with more energy: not at rest, theta"
     # fmt: off
     catalogue = [
         Scene("spheroid", SymmetricTop(2.0, 1.0, 9.81 * 2.7386127875258306),
@@ -324,9 +324,9 @@ def _catalogue() -> dict[str, Scene]:
                "ordinary", "mild"),
         _named(spinning(10.0, 0.1), "wave", "started along its precession: the axis draws a wave",
                "ordinary", "mild", "repeats"),
-        Scene("fast", usual, Angles(theta=0.5, psi_dot=100.0), 8.0,
+        Scene("fast", top, Angles(theta=0.5, psi_dot=100.0), 8.0,
               "a very fast spin: 64 small nutations, gravity a perturbation of the free top", tags=["fast"]),
-        Scene("steady", usual, Angles(theta=math.pi / 3.0, phi_dot=1.0, psi_dot=2.5), 20.0,
+        Scene("steady", top, Angles(theta=math.pi / 3.0, phi_dot=1.0, psi_dot=2.5), 20.0,
               "exactly steady precession: whatever nutates here is error", tags=["steady"]),
         Scene("hairer-lubich-wanner", SymmetricTop(0.5, 1.0, 1.0),
               Angles(theta=math.acos(0.6), phi=2.0 * math.atan(2.0), theta_dot=0.4, phi_dot=2.5, psi_dot=-1.1), 30.0,
@@ -427,17 +427,17 @@ def all_scenes() -> dict[str, Scene]:
 @by_name
 def scene(name: str | Scene, *, bodies: bool = False) -> Scene:
     """The scene of a name, or the Scene itself; SymtopError for an unknown one, and without `bodies` for a body's."""
-    chosen = name
-    if not isinstance(chosen, Scene):
+    result = name
+    if not isinstance(result, Scene):
         if isinstance(name, (SymmetricTop, RigidBody)):
             words = f"not a {type(name).__name__}: symtop.Scene(name, top, start, horizon) makes one of it"
             raise SymtopError(f"scene must be a Scene or the name of one, {words}", "scene")
         catalogue = all_scenes()
-        chosen = catalogue[one_of("scene", name, catalogue)]
-    if chosen.of_body and not bodies:
-        words = f"{chosen.name}, a RigidBody: symtop.scene(name, bodies=True) returns it"
+        result = catalogue[one_of("scene", name, catalogue)]
+    if result.of_body and not bodies:
+        words = f"{result.name}, a RigidBody: symtop.scene(name, bodies=True) returns it"
         raise SymtopError(f"scene must be one of a SymmetricTop, not {words}", "scene")
-    return chosen
+    return result
 
 
 # energies and scales of many tops, of rows of numbers as `symtop.model.top.flat` has them
@@ -471,8 +471,8 @@ def energy_scales(numbers: Array, theta_range: Array) -> Array:
         low, high = np.where(falls, middle, low), np.where(falls, high, middle)
     lowest = 0.5 * (low + high)
     start = np.clip(numbers[:, 3], NEXT_TO_POLE, math.pi - NEXT_TO_POLE)
-    at_start, least = (effective_potential(theta, north, south, I1, mgl) for theta in (start, lowest))
-    depth = 0.5 * I1 * numbers[:, 6] ** 2 + at_start - least
+    v_start, v_lowest = (effective_potential(theta, north, south, I1, mgl) for theta in (start, lowest))
+    depth = 0.5 * I1 * numbers[:, 6] ** 2 + v_start - v_lowest
     swing = 0.5 * np.maximum(effective_stiffness(lowest, north, south, I1, mgl), 0.0)
     rounding = STEADY_ENERGY * EPSILON * (np.abs(start_energies(numbers)) + np.abs(mgl))
     scales = np.array([depth, swing, np.abs(mgl)])

@@ -177,8 +177,8 @@ class Angles:
         if omega_body is not None and omega_space is not None:
             raise SymtopError("give omega_body or omega_space, not both")
         q, name = unit("quaternion", quaternion, 4), "omega_body" if omega_space is None else "omega_space"
-        given = omega_body if omega_space is None else omega_space
-        omega = vector(name, (0.0, 0.0, 0.0) if given is None else given, 3)
+        rates = omega_body if omega_space is None else omega_space
+        omega = vector(name, (0.0, 0.0, 0.0) if rates is None else rates, 3)
         w, x, y, z = q
         theta = min(2.0 * math.atan2(math.hypot(x, y), math.hypot(w, z)), math.pi)
         total, difference = 2.0 * math.atan2(z, w), 2.0 * math.atan2(y, x)  # phi + psi and phi - psi
@@ -221,22 +221,22 @@ def flat(top: "SymmetricTop", at: Angles) -> tuple[float, ...]:
     return top.I1, top.I3, top.mgl, at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot
 
 
-def lightened(plain: Sequence[float]) -> tuple[tuple[float, ...], float]:
+def lightened(numbers: Sequence[float]) -> tuple[tuple[float, ...], float]:
     """A top or a body and a start, as `flat` has them, in a unit of mass in which momenta are near 1, and that unit.
 
     It is a power of two, which changes no digit, and 1 for momenta up to `HEAVY_MOMENTUM`: a series weighs momenta and
     a quaternion or an axis of length one in one norm, so that momenta far above 1 would hide the errors of the others.
     """
-    masses = 3 if len(plain) == len(NUMBERS) else 4
+    masses = 3 if len(numbers) == len(NUMBERS) else 4
     if masses == 4:
-        moments, rates = plain[:3], plain[11:]
+        moments, rates = numbers[:3], numbers[11:]
     else:
-        theta, _, _, theta_dot, phi_dot, psi_dot = plain[3:]
-        moments = plain[0], plain[0], plain[1]
+        theta, _, _, theta_dot, phi_dot, psi_dot = numbers[3:]
+        moments = numbers[0], numbers[0], numbers[1]
         rates = theta_dot, phi_dot * math.sin(theta), psi_dot + phi_dot * math.cos(theta)
-    size = math.hypot(*map(operator.mul, moments, rates), math.sqrt(abs(plain[masses - 1]) * max(moments)))
+    size = math.hypot(*map(operator.mul, moments, rates), math.sqrt(abs(numbers[masses - 1]) * max(moments)))
     unit = 2.0 ** math.frexp(size)[1] if size > HEAVY_MOMENTUM else 1.0
-    return (*(number / unit for number in plain[:masses]), *plain[masses:]), unit
+    return (*(number / unit for number in numbers[:masses]), *numbers[masses:]), unit
 
 
 @inlined
@@ -316,10 +316,10 @@ class SymmetricTop:
         """Polar and equatorial radius, as in `from_spheroid` without a pivot distance; SymtopError for no such body."""
         mass = positive("mass", mass)
         square = 5.0 * self.I3 / (2.0 * mass)
-        rest = 5.0 * self.I1 / mass - square
-        if rest <= 0.0:
+        polar_square = 5.0 * self.I1 / mass - square
+        if polar_square <= 0.0:
             raise SymtopError(f"no spheroid has I1 = {self.I1!r} and I3 = {self.I3!r}: I3 must be below 2 I1")
-        return math.sqrt(rest), math.sqrt(square)
+        return math.sqrt(polar_square), math.sqrt(square)
 
     def momenta(self, at: Angles) -> Momenta:
         """The conserved momenta of a state, and their pole-safe combinations."""
@@ -359,9 +359,9 @@ class SymmetricTop:
         theta = self.steady_theta(momenta)
         if theta in (0.0, math.pi):
             # x cot(x)-like limit of V'': one momentum combination vanishes, the other is 2 I3 w3
-            through = momenta.south if theta == 0.0 else momenta.north
+            momentum = momenta.south if theta == 0.0 else momenta.north
             mgl = self.mgl if theta == 0.0 else -self.mgl
-            return math.sqrt(max(through**2 / 16.0 - self.I1 * mgl, 0.0)) / self.I1
+            return math.sqrt(max(momentum**2 / 16.0 - self.I1 * mgl, 0.0)) / self.I1
         return math.sqrt(max(self.potential_curvature(theta, momenta), 0.0) / self.I1)
 
     def turning_cosines(self, at: Angles) -> tuple[float, float]:
@@ -401,9 +401,9 @@ def newton_between(
     """
     x, before = 0.5 * (below + above), math.inf
     while x != before:
-        here, rise = value(x), slope(x)
-        below, above = (x, above) if here < 0.0 else (below, x)
-        newton = x - here / rise if rise > 0.0 else math.nan
+        y, rise = value(x), slope(x)
+        below, above = (x, above) if y < 0.0 else (below, x)
+        newton = x - y / rise if rise > 0.0 else math.nan
         inside = newton if below < newton < above else 0.5 * (below + above)
         x, before = (x if abs(newton - x) <= 2.0 * math.ulp(x) else inside), x
     return x
@@ -447,12 +447,12 @@ def bisected(
 ) -> tuple[float, float, float, float]:
     """Half of the two intervals that hold the turning cosines, `low` to `below` and `above` to `high`."""
     u, v = 0.5 * (low + below), 0.5 * (high + above)
-    beyond, past = _climb(cubic, start, u) < 0.0, _climb(cubic, start, v) < 0.0
+    beyond, past = _cubic_value(cubic, start, u) < 0.0, _cubic_value(cubic, start, v) < 0.0
     return (u if beyond else low), (below if beyond else u), (v if past else high), (above if past else v)
 
 
 @inlined
-def _climb(cubic: tuple[float, float, float, float], start: float, u: float) -> float:
+def _cubic_value(cubic: tuple[float, float, float, float], start: float, u: float) -> float:
     """u'^2 at the cosine u: the nutation cubic, negative where the axis does not go."""
     excess, beta, a, b = cubic
     lever = b - a * u
@@ -489,10 +489,10 @@ def mean_nutation(top: Any, at: Any, low: float, high: float) -> tuple[float, fl
     total = excess + beta * math.cos(at.theta) + a * a
     x, y = total - beta * (2.0 * low + high), total - beta * (low + 2.0 * high)
     x, y = math.sqrt(max(x, 0.0)), math.sqrt(max(y, 0.0))
-    gained, weight = 0.5 * beta * (high - low), 1.0
+    mean, weight = 0.5 * beta * (high - low), 1.0
     while abs(x - y) > 4e-16 * x and x > 0.0 and y > 0.0:
         gap = 0.5 * (x - y)
-        gained += weight * gap * gap
+        mean += weight * gap * gap
         weight *= 2.0
         x, y = 0.5 * (x + y), math.sqrt(x * y)
-    return (y if x > 0.0 else 0.0), gained  # x = 0: a hanging top on its separatrix
+    return (y if x > 0.0 else 0.0), mean  # x = 0: a hanging top on its separatrix

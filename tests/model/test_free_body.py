@@ -243,7 +243,7 @@ def test_a_value_and_its_bound_do_not_depend_on_the_times_beside_it_or_asked_for
 def test_a_run_that_was_interrupted_is_begun_again(monkeypatch):
     steps, body = iter([True] * 100), HeavyBody(BRICK, WEIGHT, START, MOMENTUM)
     body.samples([1.0])
-    monkeypatch.setattr(heavy_body, "_heard", lambda _: next(steps))  # as Ctrl-C ends a step
+    monkeypatch.setattr(heavy_body, "_handle_interrupt", lambda _: next(steps))  # as Ctrl-C ends a step
     with pytest.raises(StopIteration):
         body.samples([30.0])
     monkeypatch.undo()

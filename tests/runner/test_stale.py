@@ -83,7 +83,7 @@ METHODS = "symtop.methods"
     (f"{METHODS}.lagrangian.discrete_lagrangian:forces", {"midpoint", "trapezoidal", "simpson-linear"}),
     (f"{METHODS}.library.scipy_ivp:compiled_field", {"rk45", "dop853", "lsoda", "radau"}),
     (f"{METHODS}.runge_kutta.explicit:later_stages", {"euler", "rk4"}),  # the watch of guards reaches what pairs are of
-    (f"{METHODS}.lie_group.generalised_alpha:_corrected", {"generalised-alpha"}),
+    (f"{METHODS}.lie_group.generalised_alpha:_correct", {"generalised-alpha"}),
     (f"{METHODS}.taylor.heyoka:propagate", {"taylor", "taylor-longdouble", "taylor-quad"}),
     ("symtop.cli.common:as_text symtop.report.page:write symtop.measure.accuracy:error_row", set()),
 ])  # fmt: skip

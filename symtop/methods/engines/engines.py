@@ -112,7 +112,7 @@ class EngineBody(NamedTuple):
     one: float = 1.0
 
 
-def _top_prepared(place_at: Callable[..., Any], size: int, *, rates: bool) -> Preparation:
+def _prepare_top(place_at: Callable[..., Any], size: int, *, rates: bool) -> Preparation:
     """A start as (e, L) or (q, L), or with `rates` w for L: the angular momentum of a body whose moments are one."""
 
     def prepare(top, at):  # type: ignore[no-untyped-def]
@@ -122,8 +122,8 @@ def _top_prepared(place_at: Callable[..., Any], size: int, *, rates: bool) -> Pr
     return Preparation(prepare, size)
 
 
-def _body_prepared(*, rates: bool) -> Preparation:
-    """`_top_prepared` of a body without symmetry: a start as (q, L), or with `rates` w for L."""
+def _prepare_body(*, rates: bool) -> Preparation:
+    """`_prepare_top` of a body without symmetry: a start as (q, L), or with `rates` w for L."""
 
     def prepare(body, at):  # type: ignore[no-untyped-def]
         q, v = (at.w, at.x, at.y, at.z), (at.M1, at.M2, at.M3)
@@ -209,7 +209,7 @@ ORIENTATION: dict[str, Callable[..., Any]] = {  # from a state, the orientation 
 pointing = by_length((3, lambda _par, e: e), (4, lambda _par, q: axis_of(*q)))  # the axis of it
 
 
-def _observing(chart: str) -> Callable[..., Any]:
+def _observer(chart: str) -> Callable[..., Any]:
     """p_phi = L_z and p_psi = L.e of a state with rates."""
     orientation = register_jitable(ORIENTATION[chart])
 
@@ -221,7 +221,7 @@ def _observing(chart: str) -> Callable[..., Any]:
     return observe
 
 
-def _presenting(chart: str) -> Callable[..., Any]:
+def _presenter(chart: str) -> Callable[..., Any]:
     """`present` of a map that carries rates: the state with L in their place."""
     orientation = register_jitable(ORIENTATION[chart])
 
@@ -232,13 +232,13 @@ def _presenting(chart: str) -> Callable[..., Any]:
 
 
 @register_jitable
-def _in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
+def _present_in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     """`present` of a body: the state with L in the axes of the body."""
     return (*state[:4], *rotated(conjugate(state[:4]), state[4:]))
 
 
-def _momentum_in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
-    w, x, y, z, b1, b2, b3 = _in_body(par, rule, state, k, h)
+def _present_momentum_in_body(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
+    w, x, y, z, b1, b2, b3 = _present_in_body(par, rule, state, k, h)
     return w, x, y, z, par.I1 * b1, par.I2 * b2, par.I3 * b3
 
 
@@ -251,14 +251,14 @@ class MapForm(NamedTuple):
 
 
 VELOCITY = {
-    "axis": MapForm(_top_prepared(e_at, 6, rates=True), _observing("axis"), _presenting("axis")),
-    "attitude": MapForm(_top_prepared(q_at, 7, rates=True), _observing("attitude"), _presenting("attitude")),
-    BODY: MapForm(_body_prepared(rates=True), _observing(BODY), _momentum_in_body),
+    "axis": MapForm(_prepare_top(e_at, 6, rates=True), _observer("axis"), _presenter("axis")),
+    "attitude": MapForm(_prepare_top(q_at, 7, rates=True), _observer("attitude"), _presenter("attitude")),
+    BODY: MapForm(_prepare_body(rates=True), _observer(BODY), _present_momentum_in_body),
 }
 ANGULAR_MOMENTUM = {
-    "axis": MapForm(_top_prepared(e_at, 6, rates=False), observe_axis),
-    "attitude": MapForm(_top_prepared(q_at, 7, rates=False), observe_attitude),
-    BODY: MapForm(_body_prepared(rates=False), observe_attitude, _in_body),
+    "axis": MapForm(_prepare_top(e_at, 6, rates=False), observe_axis),
+    "attitude": MapForm(_prepare_top(q_at, 7, rates=False), observe_attitude),
+    BODY: MapForm(_prepare_body(rates=False), observe_attitude, _present_in_body),
 }
 
 
@@ -278,8 +278,8 @@ def _gap(after: Any, before: Any) -> Any:
 def _axis_moved(par: Any, e: Any, p: Any, start: Any) -> Any:
     x, y, z = displaced(p, e)
     r, s, t = e[0] + x, e[1] + y, e[2] + z
-    lost = 0.5 * (1.0 - (r * r + s * s + t * t))  # |e| = 1 to rounding, as engines keep |q|
-    return x + lost * r, y + lost * s, z + lost * t
+    defect = 0.5 * (1.0 - (r * r + s * s + t * t))  # |e| = 1 to rounding, as engines keep |q|
+    return x + defect * r, y + defect * s, z + defect * t
 
 
 # how far the rotation p moves an axis, in double, or an attitude, from the one in a state
@@ -287,40 +287,40 @@ moved = by_length((3, _axis_moved), (4, lambda par, q, p, start: _gap(normalised
 
 
 def engine_loop(
-    step: Callable[..., Any], chart: str, carried: MapForm, reused: Callable[..., Any] = _nothing,
+    step: Callable[..., Any], chart: str, form: MapForm, first_carry: Callable[..., Any] = _nothing,
     number: Any = np.float64,
 ) -> Loop:  # fmt: skip
-    """The loop around a map; `reused` gives the first carry; `number` is its type, single only with a quaternion."""
+    """The loop around a map; `first_carry` as `Loop.begin`; `number` is its type, single only with a quaternion."""
     orientation, step = register_jitable(ORIENTATION[chart]), register_jitable(step)
     kind: Any = EngineBody if chart == BODY else EngineTop
-    numbers, zeros = (number(0.0),) * len(kind._fields), (number(0.0),) * carried.prepare.size
+    numbers, zeros = (number(0.0),) * len(kind._fields), (number(0.0),) * form.prepare.size
 
     @register_jitable
-    def narrowed(values, like):  # type: ignore[no-untyped-def]
-        for i in range(len(like)):
-            like = set_item(like, i, number(values[i]))
-        return like
+    def narrow(values, result):  # type: ignore[no-untyped-def]
+        for i in range(len(result)):
+            result = set_item(result, i, number(values[i]))
+        return result
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
-        return reused(par, orientation(state), state[-3:])
+        return first_carry(par, orientation(state), state[-3:])
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        there, y = kind(*narrowed(par, numbers)), narrowed(state, zeros)
-        p, v, carry = step(there, orientation(y), y[-3:], carry, number(h))
-        dstate = (*moved(there, y[:-3], p, state[:-3]), *_gap(v, state[-3:]))
+        params, y = kind(*narrow(par, numbers)), narrow(state, zeros)
+        p, v, carry = step(params, orientation(y), y[-3:], carry, number(h))
+        dstate = (*moved(params, y[:-3], p, state[:-3]), *_gap(v, state[-3:]))
         return dstate, carry, 1, ended_space(dstate)
 
-    return Loop(begin, increment, carried.observe, present=carried.present)
+    return Loop(begin, increment, form.observe, present=form.present)
 
 
 @register_jitable
-def _pulled(par: Any, e: Any, w: Any, h: Any) -> Any:
+def _with_torque(par: Any, e: Any, w: Any, h: Any) -> Any:
     """w + h I_s^-1 tau."""
     return plus(w, h, velocity(par, e, torque(par, e)))
 
 
 @register_jitable
-def _solved(par: Any, h: Any, columns: Any, y: Any) -> Any:
+def _solve(par: Any, h: Any, columns: Any, y: Any) -> Any:
     """x of (I + h A) x = y, the columns of A as vectors."""
     a, b, c = columns
     a, b = plus((par.I1, par.zero, par.zero), h, a), plus((par.zero, par.I2, par.zero), h, b)
@@ -340,7 +340,7 @@ def _body_implicit(par: Any, q: Any, w: Any, r: Any, h: Any) -> Any:
     back = conjugate(q)
     b = rotated(back, w)
     columns = _columns(par, b, (-par.I1 * b[0], -par.I2 * b[1], -par.I3 * b[2]))
-    return rotated(q, _solved(par, h, columns, rotated(back, r)))
+    return rotated(q, _solve(par, h, columns, rotated(back, r)))
 
 
 def _top_implicit(par: Any, e: Any, w: Any, r: Any, h: Any) -> Any:
@@ -363,12 +363,12 @@ def _rescaled(par: Any, e: Any, w: Any, h: Any) -> Any:
 
 
 def _implicit_then_torque(par: Any, e: Any, w: Any, h: Any) -> Any:
-    return _pulled(par, e, plus(w, -h, implicit(par, e, w, cross(w, momentum(par, e, w)), h)), h)
+    return _with_torque(par, e, plus(w, -h, implicit(par, e, w, cross(w, momentum(par, e, w)), h)), h)
 
 
 def _torque_then_rescaled(par: Any, e: Any, w: Any, h: Any) -> Any:
     """|L| kept by a change of w: in single precision I_s^-1 (I_s w) would round w the same way in every step."""
-    w = _pulled(par, e, w, h)
+    w = _with_torque(par, e, w, h)
     L = momentum(par, e, w)
     N = plus(L, -h, cross(w, L))
     length = np.sqrt(dot(N, N))
@@ -392,14 +392,14 @@ def _top_projected(par: Any, e: Any, L: Any, h: Any) -> Any:
 
 def _body_projected(par: Any, q: Any, L: Any, h: Any) -> Any:
     M = rotated(conjugate(q), L)
-    rest = par.zero, par.zero, par.zero
-    return rotated(q, _solved(par, h, _columns(par, rest, scaled(-par.one, M)), M))
+    zero = par.zero, par.zero, par.zero
+    return rotated(q, _solve(par, h, _columns(par, zero, scaled(-par.one, M)), M))
 
 
 projected = by_length((3, _top_projected), (4, _body_projected))
 
 
-def _kicked(rate: Callable[..., Any], turn: Callable[..., Any] = exponential) -> Callable[..., Any]:
+def _kicker(rate: Callable[..., Any], turn: Callable[..., Any] = exponential) -> Callable[..., Any]:
     """The map that changes w by ``rate(par, e, w, h)`` and turns the body by the new one."""
     register_jitable(rate)
 
@@ -426,9 +426,9 @@ SMALL_ANGLE = 1e-4  # angle below which 1/12 is the coefficient of dexp^-1 to ro
 
 
 @register_jitable
-def _advanced(q: Any, w: Any, over: Any, h: Any) -> Any:
+def _advance(q: Any, w: Any, factor: Any, h: Any) -> Any:
     """q + h (0, w) over/2."""
-    rate = product((0.0, w[0], w[1], w[2]), over)
+    rate = product((0.0, w[0], w[1], w[2]), factor)
     half = 0.5 * h
     return q[0] + half * rate[0], q[1] + half * rate[1], q[2] + half * rate[2], q[3] + half * rate[3]
 
@@ -449,11 +449,11 @@ def _leapfrog(*, published: bool) -> Callable[..., Any]:
 
     def step(par, e, L, carry, h):  # type: ignore[no-untyped-def]
         one = 1.0, 0.0, 0.0, 0.0
-        middle = _advanced(one, velocity(par, e, L), one, 0.5 * h)
+        middle = _advance(one, velocity(par, e, L), one, 0.5 * h)
         L = plus(L, 0.5 * h, torque(par, e))
         turn = normalised(par, middle)
         w = velocity(par, oriented(par, e, turn), L) if published else rotated(turn, velocity(par, e, L))
-        p = normalised(par, _advanced(one, w, middle, h))
+        p = normalised(par, _advance(one, w, middle, h))
         return p, plus(L, 0.5 * h, torque(par, oriented(par, e, p))), carry
 
     return step
@@ -463,18 +463,18 @@ def _leapfrog(*, published: bool) -> Callable[..., Any]:
 def _slope(par: Any, e: Any, p: Any, b: Any) -> Any:
     """b' of rates in the axes of the start, where the body stands p further."""
     up = rotated(conjugate(p), (0.0, 0.0, 1.0))
-    rest = plus(pulled(par, e, up), -1.0, cross(b, momentum(par, e, b)))
-    return velocity(par, e, rest)
+    net = plus(pulled(par, e, up), -1.0, cross(b, momentum(par, e, b)))
+    return velocity(par, e, net)
 
 
 @register_jitable
-def _straightened(turn: Any, b: Any) -> Any:
+def _dexp_inverse(turn: Any, b: Any) -> Any:
     """dexp^-1(turn) b = b + turn x b/2 + c turn x (turn x b), c = (1 - (a/2) cot(a/2))/a^2, a = |turn|."""
     square = dot(turn, turn)
     a = np.sqrt(square)
     c = (1.0 - 0.5 * a / np.tan(0.5 * a)) / square if a > SMALL_ANGLE else 1.0 / 12.0
-    bent = cross(turn, b)
-    return plus(plus(b, 0.5, bent), c, cross(turn, bent))
+    bracket = cross(turn, b)
+    return plus(plus(b, 0.5, bracket), c, cross(turn, bracket))
 
 
 def _kutta(*, munthe_kaas: bool) -> Callable[..., Any]:
@@ -484,12 +484,12 @@ def _kutta(*, munthe_kaas: bool) -> Callable[..., Any]:
         turns = total = scaled(0.0, b)
         rates, slopes, gain = b, total, total
         for i in range(4):
-            ahead = 0.0 if i == 0 else h if i == 3 else 0.5 * h
+            node = 0.0 if i == 0 else h if i == 3 else 0.5 * h
             weight = h / 3.0 if 0 < i < 3 else h / 6.0
-            turn = scaled(ahead, turns)
-            rates = plus(b, ahead, slopes)
+            turn = scaled(node, turns)
+            rates = plus(b, node, slopes)
             slopes = _slope(par, e, exponential(par, turn, 1.0), rates)
-            turns = _straightened(turn, rates) if munthe_kaas else rates
+            turns = _dexp_inverse(turn, rates) if munthe_kaas else rates
             total, gain = plus(total, weight, turns), plus(gain, weight, slopes)
         p = exponential(par, total, 1.0)
         return p, rotated(p, plus(b, 1.0, gain)), carry
@@ -502,9 +502,9 @@ def _three_stages(par: Any, e: Any, b: Any, h: Any) -> Any:
     """b after a time h by Shu and Osher's method, in the axes of the body, which stands still."""
     first = scaled(h, acceleration(par, e, b))
     second = scaled(h, acceleration(par, e, plus(b, 1.0, first)))
-    both = plus(first, 1.0, second)
-    third = scaled(h, acceleration(par, e, plus(b, 0.25, both)))
-    return plus(b, 1.0 / 6.0, plus(both, 4.0, third))
+    total = plus(first, 1.0, second)
+    third = scaled(h, acceleration(par, e, plus(b, 0.25, total)))
+    return plus(b, 1.0 / 6.0, plus(total, 4.0, third))
 
 
 def spiral(par: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
@@ -522,10 +522,10 @@ def explicit_euler(par: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
 
 def adams_bashforth(par: Any, e: Any, w: Any, carry: Any, h: Any) -> Any:
     """Rates by Adams and Bashforth, the attitude by Magnus; `carry` is the last acceleration, turned with the body."""
-    now = acceleration(par, e, w)
-    p = exponential(par, plus(plus(w, 0.5 * h, now), h * h / 12.0, cross(now, w)), h)
-    w = plus(plus(w, 1.5 * h, now), -0.5 * h, carry)
-    return p, rotated(p, w), rotated(p, now)
+    slope = acceleration(par, e, w)
+    p = exponential(par, plus(plus(w, 0.5 * h, slope), h * h / 12.0, cross(slope, w)), h)
+    w = plus(plus(w, 1.5 * h, slope), -0.5 * h, carry)
+    return p, rotated(p, w), rotated(p, slope)
 
 
 def _turn(k: int) -> Callable[..., Any]:
@@ -537,10 +537,10 @@ def _turn(k: int) -> Callable[..., Any]:
         x = 0.5 * h * L[k] / (par.I3 if k == 2 else par.I1)
         cos, sin = np.cos(x), np.sin(x)
         C, S = cos * cos - sin * sin, 2.0 * sin * cos
-        about = set_item(set_item(q, 0, q[0] * cos - q[a] * sin), a, q[a] * cos + q[0] * sin)
-        across = set_item(set_item(about, b, q[b] * cos + q[c] * sin), c, q[c] * cos - q[b] * sin)
+        partial = set_item(set_item(q, 0, q[0] * cos - q[a] * sin), a, q[a] * cos + q[0] * sin)
+        new = set_item(set_item(partial, b, q[b] * cos + q[c] * sin), c, q[c] * cos - q[b] * sin)
         i, j = b - 1, c - 1
-        return across, set_item(set_item(L, i, C * L[i] + S * L[j]), j, C * L[j] - S * L[i])
+        return new, set_item(set_item(L, i, C * L[i] + S * L[j]), j, C * L[j] - S * L[i])
 
     return turned
 
@@ -576,55 +576,55 @@ march_no_squish = Loop(no_carry, _increment_no_squish, observe_attitude)
 
 
 def _engine(
-    name: str, step: Callable[..., Any], order: int | None, summary: str, reference: str, keeps: str = "", *,
-    carried: Mapping[str, MapForm] = VELOCITY, reused: Callable[..., Any] = _nothing, forces: int = 1,
+    name: str, step: Callable[..., Any], order: int | None, summary: str, reference: str, momenta: str = "", *,
+    forms: Mapping[str, MapForm] = VELOCITY, first_carry: Callable[..., Any] = _nothing, forces: int = 1,
     energy_error: str | None = None, number: Any = np.float64,
 ) -> Integrator:  # fmt: skip
-    """A map in every chart (in single precision, those with a quaternion); `keeps` names the momenta it conserves."""
-    charts = [chart for chart in carried if chart != "axis" or number is np.float64]
-    loops = {chart: engine_loop(step, chart, carried[chart], reused, number) for chart in charts}
+    """A map in every chart (in single precision, those with a quaternion); `momenta` names those it conserves."""
+    charts = [chart for chart in forms if chart != "axis" or number is np.float64]
+    loops = {chart: engine_loop(step, chart, forms[chart], first_carry, number) for chart in charts}
     return Integrator(
         name=name, family=ENGINE, summary=summary, reference=reference, order=order, explicit=True, symplectic=False,
-        symmetric=False, conserves=frozenset(keeps.split()), energy_error=energy_error, needs="group", general=True,
-        solvers={at: FixedStep(loops[at], NONE, carried[at].prepare, forces, implicit=False) for at in charts},
+        symmetric=False, conserves=frozenset(momenta.split()), energy_error=energy_error, needs="group", general=True,
+        solvers={at: FixedStep(loops[at], NONE, forms[at].prepare, forces, implicit=False) for at in charts},
     )  # fmt: skip
 
 
-def _both(*given: Any, **more: Any) -> list[Integrator]:
+def _both(*args: Any, **options: Any) -> list[Integrator]:
     """A map in double and in the single precision of the engine."""
-    double, single = _engine(*given, **more), _engine(*given, **more, number=np.float32)
-    rounded = replace(
+    double, single = _engine(*args, **options), _engine(*args, **options, number=np.float32)
+    variant = replace(
         single, name=f"{single.name}-float32", summary=f"{single.summary}, in single precision", order=None,
         conserves=frozenset(), energy_error=None, precision="single",
     )  # fmt: skip
-    return [double, rounded]
+    return [double, variant]
 
 
 def built_in() -> list[Integrator]:
     """The maps in double precision, and those of engines in single precision also in single."""
     return [
-        *_both("no-gyro", _kicked(_pulled), None, "Havok, PhysX and Jolt by default: no gyroscopic term",
+        *_both("no-gyro", _kicker(_with_torque), None, "Havok, PhysX and Jolt by default: no gyroscopic term",
                "havok physx jolt", "p_psi", energy_error="bounded"),
-        _engine("no-gyro-linear", _kicked(_pulled, linear), None,
+        _engine("no-gyro-linear", _kicker(_with_torque, linear), None,
                 "cannon-es, ODE with its gyroscopic mode off: no gyroscopic term, a linear turn", "cannon-es ode",
                 "p_psi", energy_error="bounded"),
-        _engine("mujoco-euler", _kicked(lambda par, e, w, h: plus(w, h, acceleration(par, e, w))), 1,
+        _engine("mujoco-euler", _kicker(lambda par, e, w, h: plus(w, h, acceleration(par, e, w))), 1,
                 "MuJoCo Euler, PyBullet, DART: explicit gyroscopic term", "mujoco pybullet dart"),
         _engine("mujoco-implicit",
-                _kicked(lambda par, e, w, h: plus(w, h, implicit(par, e, w, moment(par, e, w), h))), 1,
+                _kicker(lambda par, e, w, h: plus(w, h, implicit(par, e, w, moment(par, e, w), h))), 1,
                 "MuJoCo implicit: one Newton step of the velocity", "mujoco", "p_psi"),
-        *_both("bullet", _kicked(_implicit_then_torque), 1,
+        *_both("bullet", _kicker(_implicit_then_torque), 1,
                "Bullet by default: implicit gyroscopic term, then the torque", "bullet", "p_psi"),
-        *_both("jolt", _kicked(lambda par, e, w, h: _pulled(par, e, _rescaled(par, e, w, h), h)), 1,
+        *_both("jolt", _kicker(lambda par, e, w, h: _with_torque(par, e, _rescaled(par, e, w, h), h)), 1,
                "Jolt with its gyroscopic term: |L| kept, then the torque", "jolt"),
-        *_both("physx", _kicked(_torque_then_rescaled), 1, "PhysX with its gyroscopic flag: the torque, then |L| kept",
+        *_both("physx", _kicker(_torque_then_rescaled), 1, "PhysX with its gyroscopic flag: the torque, then |L| kept",
                "physx"),
         *_both("rapier", substepped, 1, "Rapier by default: four substeps, |L| kept in each", "rapier"),
-        _engine("ode", _kicked(
-                    lambda par, e, w, h: _pulled(par, e, projected(par, e, momentum(par, e, w), h), h), linear), 1,
+        _engine("ode", _kicker(
+                    lambda par, e, w, h: _with_torque(par, e, projected(par, e, momentum(par, e, w), h), h), linear), 1,
                 "ODE by default: gyroscopic term implicit in the velocity", "ode lacoursiere-2006"),
         _engine("lammps-rigid", richardson, 2, "LAMMPS fix rigid: half kicks around an extrapolated rotation",
-                "lammps", "p_phi", carried=ANGULAR_MOMENTUM),
+                "lammps", "p_phi", forms=ANGULAR_MOMENTUM),
         Integrator(
             name="no-squish", family=ENGINE, summary="LAMMPS fix rigid/nve: turns about the body's axes", order=2,
             reference="miller-2002 lammps", explicit=True, symplectic=True, symmetric=True,
@@ -634,9 +634,9 @@ def built_in() -> list[Integrator]:
             },
         ),
         _engine("yade", _leapfrog(published=False), 1, "YADE: rotational leapfrog with the axes of the start of a step",
-                "yade", "p_phi", carried=ANGULAR_MOMENTUM),
+                "yade", "p_phi", forms=ANGULAR_MOMENTUM),
         _engine("fincham", _leapfrog(published=True), 2, "the rotational leapfrog as published", "fincham-1992",
-                "p_phi", carried=ANGULAR_MOMENTUM),
+                "p_phi", forms=ANGULAR_MOMENTUM),
         _engine("spiral", spiral, 2, "SPIRAL, YADE's later choice and JaxDEM's: a turn between halves of three stages",
                 "del-valle-2024", "p_psi"),
         _engine("mujoco3-rk4", _kutta(munthe_kaas=False), 2, "MuJoCo RK4 up to 3.17: stages turn by their rates",
@@ -645,5 +645,5 @@ def built_in() -> list[Integrator]:
                 "munthe-kaas-1999 mujoco exudyn", "p_psi", forces=4),
         _engine("jsbsim-default", explicit_euler, 1, "JSBSim by default: explicit Euler", "jsbsim"),
         _engine("jsbsim-buss2", adams_bashforth, 2, "JSBSim Buss2 and AB2: Adams-Bashforth and Magnus",
-                "jsbsim buss-2000", reused=acceleration),
+                "jsbsim buss-2000", first_carry=acceleration),
     ]  # fmt: skip

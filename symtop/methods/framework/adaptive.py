@@ -1,9 +1,9 @@
 """Makes a solver of the registry from a compiled loop that chooses its steps, for one run and for many.
 
-    loop(numbers, tolerance, times, budget, seen, place, states, momenta) -> (seen, steps, effort, outcome)
+    loop(numbers, tolerance, times, budget, index, place, states, momenta) -> (index, steps, effort, outcome)
 
 continues from `place`, an array of all that the next step depends on, or begins at the start in `numbers`
-(`symtop.model.top.flat`) if `seen` is negative. It fills `states` and `momenta` (p_phi, p_psi) at `times`, and ends at
+(`symtop.model.top.flat`) if `index` is negative. It fills `states` and `momenta` (p_phi, p_psi) at `times`, and ends at
 the last of them, at a failure, or at the first step with which the effort reaches `budget`. It returns the number of
 samples filled since the start, and the steps and the effort of this call. Several calls give the bits of one call.
 """
@@ -41,8 +41,8 @@ class Adaptive:
             self.check(start)
         times = np.ascontiguousarray(plan.times)
         states, momenta = np.full((times.size, self.size), np.nan), np.full((times.size, 2), np.nan)
-        made = self._run(flat(top, start), plan.tolerance, times, plan.budget, states, momenta)
-        steps, evaluations, outcome, reached = made
+        result = self._run(flat(top, start), plan.tolerance, times, plan.budget, states, momenta)
+        steps, evaluations, outcome, reached = result
         return Run(states, momenta[:, 0], momenta[:, 1], steps, evaluations, 0, OUTCOMES[outcome], reached)
 
     def limit(self, plan: Plan) -> float:
@@ -57,16 +57,16 @@ class Adaptive:
         `numbers` (n, 9), `tolerance` (n,), `times` (n, samples), of which the first `counts` (n,) are asked for. Each
         member has the bits of a run alone and fails alone. Work is in force evaluations.
         """
-        done, reached = Many.empty(len(numbers), times.shape[1], self.size), np.zeros(len(numbers))
-        out, times = refused(self.check, numbers), np.ascontiguousarray(times)
-        done.outcome[out] = LEFT_CHART
-        for i, plain in enumerate(map(tuple, numbers.tolist())):
+        runs, reached = Many.empty(len(numbers), times.shape[1], self.size), np.zeros(len(numbers))
+        outside, times = refused(self.check, numbers), np.ascontiguousarray(times)
+        runs.outcome[outside] = LEFT_CHART
+        for i, row in enumerate(map(tuple, numbers.tolist())):
             check_interrupt()
-            if not out[i]:
+            if not outside[i]:
                 samples = times[i, : counts[i]]
-                made = self._run(plain, float(tolerance[i]), samples, budget, done.states[i], done.momenta[i])
-                done.steps[i], done.work[i], done.outcome[i], reached[i] = made
-        return done, reached
+                result = self._run(row, float(tolerance[i]), samples, budget, runs.states[i], runs.momenta[i])
+                runs.steps[i], runs.work[i], runs.outcome[i], reached[i] = result
+        return runs, reached
 
     def _run(
         self, numbers: tuple[float, ...], tolerance: float, times: Array, budget: float | None, states: Array,
@@ -75,13 +75,13 @@ class Adaptive:
         """Fill in the samples: steps, force evaluations, outcome and the time that was reached."""
         loop, unit = self.loop(tolerance), self.unit(tolerance)
         numbers, mass = lightened(numbers) if self.light else (numbers, 1.0)
-        place, most = np.empty(self.room), self.most if budget is None else budget / unit
-        seen, steps, effort, outcome = -1, 0, 0, OK
-        while seen < times.size and outcome == OK and effort < most:
-            block = int(min(self.block, most - effort)) or 1
-            seen, more, work, outcome = loop(numbers, tolerance, times, block, seen, place, states, momenta)
-            steps, effort = steps + more, effort + work
-        if seen < times.size and outcome == OK:
+        place, limit = np.empty(self.room), self.most if budget is None else budget / unit
+        index, steps, effort, outcome = -1, 0, 0, OK
+        while index < times.size and outcome == OK and effort < limit:
+            block = int(min(self.block, limit - effort)) or 1
+            index, count, work, outcome = loop(numbers, tolerance, times, block, index, place, states, momenta)
+            steps, effort = steps + count, effort + work
+        if index < times.size and outcome == OK:
             outcome = OUT_OF_BUDGET
         if mass != 1.0:
             states[:, -3:] *= mass

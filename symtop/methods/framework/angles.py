@@ -74,14 +74,14 @@ def momenta_of_turns(par: Any, a: Any, d: Any, h: float, dstate: Any) -> Any:
     return 0.5 * (north + south), 0.5 * (south - north)
 
 
-def _on_angles(top: Any, at: Any) -> Any:
+def _prepare_angles(top: Any, at: Any) -> Any:
     """The discrete Legendre transform starts from p_theta = dL/dtheta'."""
     momenta = conserved(top, at)
     par = ReducedTop(top.I1, top.I3, top.mgl, momenta.p_psi, momenta.north, momenta.south)
     return par, (at.theta, top.I1 * at.theta_dot, at.phi, at.psi)
 
 
-on_angles = Preparation(_on_angles, 4, require_chart)
+on_angles = Preparation(_prepare_angles, 4, require_chart)
 LEAST_TOLERANCE = 2.3e-14  # of an adaptive method: 100 eps, SciPy's limit
 
 
@@ -104,12 +104,12 @@ def field_angles(par: Any, y: Any) -> Any:
     return y[3], y[4], y[5], theta_ddot, phi_ddot, psi_ddot
 
 
-def _with_rates(top: Any, at: Any) -> Any:
+def _prepare_rates(top: Any, at: Any) -> Any:
     state = (at.theta, at.phi, at.psi, at.theta_dot, at.phi_dot, at.psi_dot)
     return BareTop(top.I1, top.I3, top.mgl), state
 
 
-with_rates = Preparation(_with_rates, 6, require_chart)
+with_rates = Preparation(_prepare_rates, 6, require_chart)
 
 
 @register_jitable
@@ -129,8 +129,8 @@ def observe_angles(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> A
 def ended_angles(y: Any) -> int:
     """OK if the state is finite and theta inside (0, pi), otherwise NOT_FINITE or LEFT_CHART."""
     # zero, or NaN where one of them is not finite: added to theta, one test covers all six without a branch
-    nothing = 0.0 * (y[1] + y[2] + y[3] + y[4] + y[5])
-    return chart_outcome(y[0] + nothing)
+    zero = 0.0 * (y[1] + y[2] + y[3] + y[4] + y[5])
+    return chart_outcome(y[0] + zero)
 
 
 # an unreduced state as (theta, p_theta, phi, psi), the angles chart of `simulate`

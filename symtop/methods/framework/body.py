@@ -49,11 +49,11 @@ class Pose(NamedTuple):
 
 
 @register_jitable
-def unpack_body(plain: Any) -> Any:
+def unpack_body(row: Any) -> Any:
     """A body and a start, from their 14 numbers."""
-    I1, I2, I3, mgl, x, y, z = plain[:7]
+    I1, I2, I3, mgl, x, y, z = row[:7]
     body = General(1.0 / I1, 1.0 / I2, 1.0 / I3, I1, I2, I3, mgl * x, mgl * y, mgl * z)
-    w, x, y, z, w1, w2, w3 = plain[7:]
+    w, x, y, z, w1, w2, w3 = row[7:]
     return body, Pose(w, x, y, z, I1 * w1, I2 * w2, I3 * w3)
 
 
@@ -64,19 +64,19 @@ def _momenta(body: Any, at: Any) -> Any:
     return at.M1 * g1 + at.M2 * g2 + at.M3 * g3, at.M3
 
 
-def _of_top(top: Any, at: Any) -> Any:
+def _prepare_top(top: Any, at: Any) -> Any:
     w, x, y, z = q_at(at)
     a1, a3 = 1.0 / top.I1, 1.0 / top.I3
     body = General(a1, a1, a3, top.I1, top.I1, top.I3, 0.0, 0.0, top.mgl)
     return body, (w, x, y, z, *rotated((w, -x, -y, -z), L_at(top, at)))
 
 
-def _in_space(par: Any, t: float, y: Any) -> Any:
+def _momentum_in_space(par: Any, t: float, y: Any) -> Any:
     q = y[0], y[1], y[2], y[3]
     return (*q, *rotated(q, (y[4], y[5], y[6])))
 
 
-of_top, in_space = Preparation(_of_top, 7), Presentation(_in_space, 7)  # a top as (q, M), shown as (q, L)
+of_top, in_space = Preparation(_prepare_top, 7), Presentation(_momentum_in_space, 7)  # a top as (q, M), shown as (q, L)
 
 
 def prepared(numbers: Any) -> Preparation:

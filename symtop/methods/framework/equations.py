@@ -70,8 +70,8 @@ def as_run(
 ) -> Run:
     """Samples of the state that was integrated, shape (samples, dimension), with both momenta recomputed from it."""
     p_phi, p_psi = form.momenta(par, states)
-    shown = states if form.present is None else form.present(par, times, states)
-    return Run(shown, p_phi, p_psi, steps, evaluations, 0, OUTCOMES[outcome], reached)
+    samples = states if form.present is None else form.present(par, times, states)
+    return Run(samples, p_phi, p_psi, steps, evaluations, 0, OUTCOMES[outcome], reached)
 
 
 _RIGHT: dict[str, Callable[..., Any]] = {  # by chart: f(I1, I3, mgl, y)

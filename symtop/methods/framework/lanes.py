@@ -98,10 +98,10 @@ def move(add: Any, block: Any, dimension: int, j: int, dstate: Any) -> None:
 def none_left(block: Any, live: int) -> bool:
     """Is number `live` of every lane 0? Then an iteration over the block has ended in all lanes."""
     wide_vectors()
-    left = 0
+    count = 0
     for j in range(W):
-        left += block[live * W + j] != 0.0
-    return left == 0
+        count += block[live * W + j] != 0.0
+    return count == 0
 
 
 @dataclass(frozen=True)
@@ -131,11 +131,11 @@ def preparing(lanes: Lanes, begin: Any, enter: Any, kind: Any, scale: Any, prepa
     lay, begin, width = lanes.lay, lanes.begin or begin, prepare.given
     numbers, unpack, momenta_at = prepare.numbers, prepare.unpack, prepare.momenta
 
-    def fill(chosen, given, coefficients, h, marks, prepared, momenta):  # type: ignore[no-untyped-def]
+    def fill(members, rows, coefficients, h, marks, prepared, momenta):  # type: ignore[no-untyped-def]
         tops, rules, starts, carries = prepared
-        for i in range(len(chosen)):
-            m = chosen[i]
-            top, start = unpack(to_fixed_tuple(given[m], width))
+        for i in range(len(members)):
+            m = members[i]
+            top, start = unpack(to_fixed_tuple(rows[m], width))
             par, state = numbers(top, start)
             rule = scale(kind(coefficients), top, start, h[m])
             state = enter(par, rule, state, h[m])
@@ -158,9 +158,9 @@ def showing(sample: Callable[..., Any]) -> Callable[..., None]:
     """`sample` as `Lanes.show` has it."""
 
     def show(par, t, state, out):  # type: ignore[no-untyped-def]
-        shown = sample(par, t, state)
-        for q in range(len(shown)):
-            out[q] = shown[q]
+        values = sample(par, t, state)
+        for q in range(len(values)):
+            out[q] = values[q]
 
     return register_jitable(show)
 
@@ -168,8 +168,8 @@ def showing(sample: Callable[..., Any]) -> Callable[..., None]:
 def marching(lanes: Lanes, observe: Any, present: Any, write: Any) -> Any:  # noqa: C901  (one loop, read in one piece)
     """The compiled run of what `prepare` prepared, in a block whose lanes take the next member when they are free.
 
-    ``march(at, most, ...)`` goes on after `at[0]` members have entered and `at[1]` steps were made, and returns when
-    about `most` steps of members were made, or when all members have ended, with `at[1]` at -1.
+    ``march(at, limit, ...)`` goes on after `at[0]` members have entered and `at[1]` steps were made, and returns when
+    about `limit` steps of members were made, or when all members have ended, with `at[1]` at -1.
     """
     step, read, kind = lanes.step, lanes.read, lanes.top
     size, tops = lanes.dimension, len(kind._fields)
@@ -178,7 +178,7 @@ def marching(lanes: Lanes, observe: Any, present: Any, write: Any) -> Any:  # no
 
     @register_jitable
     def fill(block, table, j, i, prepared):  # type: ignore[no-untyped-def]
-        given, rules, starts, carries = prepared
+        parameters, rules, starts, carries = prepared
         for r in range(len(block) // W):
             block[r * W + j] = 0.0
         for q in range(size):
@@ -186,7 +186,7 @@ def marching(lanes: Lanes, observe: Any, present: Any, write: Any) -> Any:  # no
         for q in range(carries.shape[1]):
             block[(carry_begin + q) * W + j] = carries[i, q]
         for q in range(tops):
-            table[q * W + j] = given[i, q]
+            table[q * W + j] = parameters[i, q]
         for q in range(rules.shape[1]):
             table[(tops + q) * W + j] = rules[i, q]
 
@@ -198,26 +198,26 @@ def marching(lanes: Lanes, observe: Any, present: Any, write: Any) -> Any:  # no
             last, dstate = column(before, 0, j, state_like), column(block, 2 * size, j, state_like)
             momenta[0], momenta[1] = observe(par, rule, last, dstate, h)
 
-    def march(at, most, chosen, prepared, h, marks, done, room):  # type: ignore[no-untyped-def]  # noqa: C901
+    def march(at, limit, batch, prepared, h, marks, runs, room):  # type: ignore[no-untyped-def]  # noqa: C901
         wide_vectors()
-        states, momenta, steps, work, outcomes = done
-        block, table, before, nearest, seen, member, began = room
+        states, momenta, steps, work, outcomes = runs
+        block, table, before, next_mark, sample, member, start = room
         rules = prepared[1]
-        made, members, samples, ended_at = 0, len(chosen), marks.shape[1], len(block) - W
-        while at[1] >= 0 and made < most:
+        total, members, samples, ended_at = 0, len(batch), marks.shape[1], len(block) - W
+        while at[1] >= 0 and total < limit:
             k, target = at[1], NO_MARK
             for j in range(W):
-                if nearest[j] == NO_MARK and (at[0] < members or k == 0):
+                if next_mark[j] == NO_MARK and (at[0] < members or k == 0):
                     i = min(at[0], members - 1)  # a block that is not full has copies of its last member
                     fill(block, table, j, i, prepared)
                     if at[0] < members:
-                        at[0], member[j], began[j], seen[j], nearest[j] = i + 1, i, k, 0, k + marks[chosen[i], 0]
-                target = min(target, nearest[j])
+                        at[0], member[j], start[j], sample[j], next_mark[j] = i + 1, i, k, 0, k + marks[batch[i], 0]
+                target = min(target, next_mark[j])
             if target == NO_MARK:
                 at[1] = -1
                 break
             stop = min(target, k - k % STRETCH_STEPS + STRETCH_STEPS)
-            made += W * (stop - k)
+            total += W * (stop - k)
             while k < stop:
                 k += 1
                 if k == target:
@@ -226,19 +226,19 @@ def marching(lanes: Lanes, observe: Any, present: Any, write: Any) -> Any:  # no
                 step(block, table)
             at[1] = k
             for j in range(W):
-                m, s, spent = chosen[member[j]], seen[j], np.int64(block[(flag + 1) * W + j])
-                lost = block[flag * W + j]
-                if lost < 0.0 and nearest[j] != NO_MARK:
-                    outcomes[m], steps[m], work[m] = np.int64(-lost), np.int64(block[ended_at + j]), spent
-                if lost != 0.0:
-                    nearest[j] = NO_MARK
-                if nearest[j] == k:
-                    made_own = k - began[j]
-                    show(block, table, before, j, read(rules[member[j]]), made_own, h[m], states[m, s], momenta[m, s])
-                    seen[j] = s + 1
-                    nearest[j] = began[j] + marks[m, s + 1] if s + 1 < samples else NO_MARK
+                m, s, effort = batch[member[j]], sample[j], np.int64(block[(flag + 1) * W + j])
+                status = block[flag * W + j]
+                if status < 0.0 and next_mark[j] != NO_MARK:
+                    outcomes[m], steps[m], work[m] = np.int64(-status), np.int64(block[ended_at + j]), effort
+                if status != 0.0:
+                    next_mark[j] = NO_MARK
+                if next_mark[j] == k:
+                    own_steps = k - start[j]
+                    show(block, table, before, j, read(rules[member[j]]), own_steps, h[m], states[m, s], momenta[m, s])
+                    sample[j] = s + 1
+                    next_mark[j] = start[j] + marks[m, s + 1] if s + 1 < samples else NO_MARK
                     if s + 1 == samples:
-                        steps[m], work[m] = made_own, spent
+                        steps[m], work[m] = own_steps, effort
 
     return compile_kernel(march)
 
@@ -248,16 +248,16 @@ AT_ONCE = 8  # the longest tuple that LLVM reads without an inner loop, which wo
 
 def reading(count: int) -> Callable[..., Any]:
     """A function (array, first, j) that returns numbers `first`, `first` + 1, ... of lane j, `count` of them."""
-    like, after = (0.0,) * min(count, AT_ONCE), count - AT_ONCE
+    zeros, after = (0.0,) * min(count, AT_ONCE), count - AT_ONCE
     if after <= 0:
 
         def read(array, first, j):  # type: ignore[no-untyped-def]
-            return column(array, first, j, like)
+            return column(array, first, j, zeros)
     else:
         rest = reading(after)
 
         def read(array, first, j):  # type: ignore[no-untyped-def]
-            return column(array, first, j, like) + rest(array, first + AT_ONCE, j)
+            return column(array, first, j, zeros) + rest(array, first + AT_ONCE, j)
 
     return register_jitable(read)
 
@@ -272,13 +272,13 @@ def one_loop(
     `lay` writes `size` numbers, and a step takes `cost` units of work.
     """
     zeros, flag, carry_at = (0.0,) * dimension, 3 * dimension, 3 * dimension + 2
-    top_of, carried = reading(len(top._fields)), reading(carry)
+    top_of, carry_of = reading(len(top._fields)), reading(carry)
     register_jitable(advance)
 
     def step(block, table):  # type: ignore[no-untyped-def]
         wide_vectors()
         for j in range(W):
-            state, before = column(block, 0, j, zeros), carried(block, carry_at, j)
+            state, before = column(block, 0, j, zeros), carry_of(block, carry_at, j)
             dstate, after, outcome = advance(top(*top_of(table, 0, j)), state, before, table, j)
             block[flag * W + j] = block[flag * W + j] if outcome == OK else 1.0
             move(add, block, dimension, j, dstate)
@@ -287,7 +287,7 @@ def one_loop(
     return Lanes(step, lay, read, lambda _: size, top, dimension, carry, lambda _: cost, begin=begin)
 
 
-def loop_with_rule(advance: Callable[..., Any], rule: Any, *, top: Any, **more: Any) -> Lanes:
+def loop_with_rule(advance: Callable[..., Any], rule: Any, *, top: Any, **options: Any) -> Lanes:
     """`one_loop` over ``advance(par, rule, state, carry)``, of a rule that is a NamedTuple of numbers."""
     fields, tops = len(rule._fields), len(top._fields)
     rule_of = reading(fields)
@@ -303,7 +303,7 @@ def loop_with_rule(advance: Callable[..., Any], rule: Any, *, top: Any, **more: 
     def advance_lane(par, state, carry, table, j):  # type: ignore[no-untyped-def]
         return advance(par, rule(*rule_of(table, tops, j)), state, carry)
 
-    return one_loop(advance_lane, lay, fields, top=top, read=read, **more)
+    return one_loop(advance_lane, lay, fields, top=top, read=read, **options)
 
 
 GROUP_STEPS = 200_000  # steps between returns to Python, so that an interrupt is heard: a second of the slowest kernel
@@ -353,10 +353,10 @@ def _refuses(check: Callable[..., None], start: Any) -> bool:
     return False
 
 
-def groups(chosen: Ints, steps: Ints, most: int) -> list[Ints]:
-    """The chosen members, in order, in groups that make about `most` steps together."""
-    ends = np.cumsum(steps[chosen]) // most
-    return np.split(chosen, np.flatnonzero(np.diff(ends)) + 1) if chosen.size else []
+def groups(members: Ints, steps: Ints, limit: int) -> list[Ints]:
+    """The members, in order, in groups that make about `limit` steps together."""
+    ends = np.cumsum(steps[members]) // limit
+    return np.split(members, np.flatnonzero(np.diff(ends)) + 1) if members.size else []
 
 
 LEAST_MEMBERS = 5  # alone take as long as a block: 32 lanes, each in about a seventh of the time of a member alone
@@ -379,35 +379,35 @@ class Blocks:
         self.asked += steps
         return self.asked > FEW_STEPS or is_stored(self.march)
 
-    def run(self, members: Ints, numbers: Array, rule: Any, h: Array, marks: Ints, done: Many, most: int) -> Ints:
-        """Run members, about `most` steps a call; return those to run alone. `rule`: as it is, and as compiled."""
+    def run(self, members: Ints, numbers: Array, rule: Any, h: Array, marks: Ints, runs: Many, limit: int) -> Ints:
+        """Run members, about `limit` steps a call; return those to run alone. `rule`: as it is, and as compiled."""
         (rule, coefficients), lanes, steps = rule, self.lanes, marks[:, -1]
         counts_itself = lanes.effort(rule) == 0  # the step iterates
-        chosen, left = divided(members, steps, turns(numbers, h) if counts_itself else None)
+        queue, rest = divided(members, steps, turns(numbers, h) if counts_itself else None)
         tops, fields, dimension, carry = len(lanes.top._fields), lanes.size(rule), lanes.dimension, lanes.carry
         per_lane = 3 * dimension + 2 + carry + lanes.room(rule), tops + fields, dimension
         room = *(aligned(n * W) for n in per_lane), np.full(W, NO_MARK), *np.zeros((3, W), dtype=np.int64)
-        chosen = np.ascontiguousarray(chosen[::-1])  # the longest begin first
-        alone = [left]
-        for first in range(0, len(chosen), BATCH_MEMBERS):
-            batch = chosen[first : first + BATCH_MEMBERS]
+        queue = np.ascontiguousarray(queue[::-1])  # the longest begin first
+        alone = [rest]
+        for first in range(0, len(queue), BATCH_MEMBERS):
+            batch = queue[first : first + BATCH_MEMBERS]
             prepared = tuple(np.empty((len(batch), width)) for width in (tops, fields, dimension, carry))
-            self.prepare(batch, numbers, coefficients, h, marks, prepared, done.momenta)
+            self.prepare(batch, numbers, coefficients, h, marks, prepared, runs.momenta)
             at = np.array([0, 0])
             while at[1] >= 0:
                 check_interrupt()
-                self.march(at, most, batch, prepared, h, marks, tuple(done), room)
-            ended = (done.steps[batch] == marks[batch, -1]) | (done.outcome[batch] != OK)
-            done.work[batch[ended]] += done.steps[batch[ended]] * lanes.effort(rule)
+                self.march(at, limit, batch, prepared, h, marks, tuple(runs), room)
+            ended = (runs.steps[batch] == marks[batch, -1]) | (runs.outcome[batch] != OK)
+            runs.work[batch[ended]] += runs.steps[batch[ended]] * lanes.effort(rule)
             alone.append(batch[~ended])
         return np.concatenate(alone)
 
 
 def aligned(count: int) -> Array:
     """An array of `count` numbers at a multiple of 64 bytes: no vector of eight lies in two lines of the cache."""
-    room = np.empty(count + 7)
-    first = -(room.ctypes.data // 8) % 8
-    return room[first : first + count]
+    array = np.empty(count + 7)
+    first = -(array.ctypes.data // 8) % 8
+    return array[first : first + count]
 
 
 def turns(numbers: Array, h: Array) -> Array:
@@ -428,14 +428,14 @@ def divided(members: Ints, steps: Ints, turns: Array | None = None) -> tuple[Int
     """The members whose steps fill blocks well, in order (of `turns` where steps are `ALIKE_RATIO`), and the others."""
     if not len(members):
         return members, members
-    made = steps[members]
+    counts = steps[members]
     if turns is None:
-        order = np.argsort(made, kind="stable")
+        order = np.argsort(counts, kind="stable")
     else:
-        order = np.lexsort((turns[members], np.floor(np.log(np.maximum(made, 1)) / np.log(ALIKE_RATIO))))
-    members, made = members[order], made[order]
+        order = np.lexsort((turns[members], np.floor(np.log(np.maximum(counts, 1)) / np.log(ALIKE_RATIO))))
+    members, counts = members[order], counts[order]
     firsts = np.arange(0, len(members), W)
     sizes = np.diff(np.append(firsts, len(members)))
-    worth = np.add.reduceat(made, firsts) >= LEAST_MEMBERS * np.maximum.reduceat(made, firsts)
-    in_lanes = np.repeat(worth, sizes)
+    full = np.add.reduceat(counts, firsts) >= LEAST_MEMBERS * np.maximum.reduceat(counts, firsts)
+    in_lanes = np.repeat(full, sizes)
     return members[in_lanes], members[~in_lanes]

@@ -135,9 +135,9 @@ class Loop:
                     k += 1
                 if outcome != 0 or k < marks[j]:
                     break
-                shown = sample(par, k * h, present(par, rule, state, k, h))
-                for i in range(len(shown)):
-                    states[j, i] = shown[i]
+                values = sample(par, k * h, present(par, rule, state, k, h))
+                for i in range(len(values)):
+                    states[j, i] = values[i]
                 if k > 0:
                     momenta[0, j], momenta[1, j] = observe(par, rule, before, dstate, h)
                 j += 1
@@ -179,13 +179,13 @@ def whole_run(
 ) -> Callable[..., tuple[int, int, int]]:
     """A run in one compiled call, from plain numbers (`preparation`) to filled arrays.
 
-    ``run(plain, coefficients, h, marks, states, momenta)``, with momenta (2, samples), returns steps, work and outcome.
+    ``run(row, coefficients, h, marks, states, momenta)``, with momenta (2, samples), returns steps, work and outcome.
     """
     begin, enter, march = loop.begin, loop.enter, register_jitable(loop.marching(sample))
     numbers, unpack, momenta_at = prepare.numbers, prepare.unpack, prepare.momenta
 
-    def run(plain, coefficients, h, marks, states, momenta):  # type: ignore[no-untyped-def]
-        top, at = unpack(plain)
+    def run(row, coefficients, h, marks, states, momenta):  # type: ignore[no-untyped-def]
+        top, at = unpack(row)
         par, state = numbers(top, at)
         rule = scale(kind(coefficients), top, at, h)
         state = enter(par, rule, state, h)
@@ -248,9 +248,9 @@ class FixedStep:
         """Start to horizon, in one compiled call where that is possible."""
         whole, h, marks = self._whole, plan.step_size, plan.marks
         if whole is None or marks.item(-1) > BLOCK:
-            done = self._in_stretches(top, start, plan)
-            counts = done.steps, *self.counts(done.steps, done.work), ending(done.outcome), done.steps * h
-            return Run(done.states, done.momenta[:, 0], done.momenta[:, 1], *counts)
+            march = self._in_stretches(top, start, plan)
+            counts = march.steps, *self.counts(march.steps, march.work), ending(march.outcome), march.steps * h
+            return Run(march.states, march.momenta[:, 0], march.momenta[:, 1], *counts)
         # what follows takes as long as a run of few steps: hence no fields one at a time, no `counts`, no constructor
         run, rule, check, size, evaluations, each_step, counted = whole.alone
         if check is not None:
@@ -258,17 +258,17 @@ class FixedStep:
         samples, numbers = len(marks), flat(top, start)
         states, momenta = np.empty((samples, size)), np.empty((2, samples))
         steps, work, outcome = run(numbers, rule, h, marks, states, momenta)
-        spent, ended = work * evaluations + steps * each_step, ending(outcome)
-        fields = states, momenta[0], momenta[1], steps, spent, work * counted, ended, steps * h
+        effort, name = work * evaluations + steps * each_step, ending(outcome)
+        fields = states, momenta[0], momenta[1], steps, effort, work * counted, name, steps * h
         return tuple.__new__(Run, fields)
 
     def _in_stretches(self, top: SymmetricTop, start: Angles, plan: Plan) -> March:
         """A run with the preparation in Python, and a return to Python after every `BLOCK` steps."""
         par, rule, state = self.setup(top, start, plan.step_size)
-        done = self.loop(par, rule, state, plan.step_size, plan.marks)
+        march = self.loop(par, rule, state, plan.step_size, plan.marks)
         if plan.marks[0] == 0:
-            done.momenta[0] = top.momenta(start)[:2]
-        return done if self.present is None else done._replace(states=self.present(par, plan.times, done.states))
+            march.momenta[0] = top.momenta(start)[:2]
+        return march if self.present is None else march._replace(states=self.present(par, plan.times, march.states))
 
     def many(self, numbers: Array, h: Array, marks: Ints, *, compiling: bool = False) -> Many:
         """The runs of n members: `numbers` (n, 9) as `flat` has them, steps `h` (n,), `marks` (n, samples).
@@ -281,29 +281,29 @@ class FixedStep:
         # writable too: a kernel is compiled again for an array that is not, as a broadcast one
         numbers, h = np.require(numbers, requirements=("C", "W")), np.require(h, requirements=("C", "W"))
         marks = np.require(marks, requirements=("C", "W"))
-        whole, most = self._whole, min(many.GROUP_STEPS, BLOCK)
+        whole, limit = self._whole, min(many.GROUP_STEPS, BLOCK)
         if whole is None:
             raise SymtopError("many needs a solver whose parts all compile")
         run, rule, check, size, *_ = whole.alone
-        done, out = Many.empty(len(numbers), marks.shape[1], size), many.refused(check, numbers)
-        done.outcome[out] = LEFT_CHART
-        left = np.flatnonzero(~out)
+        runs, outside = Many.empty(len(numbers), marks.shape[1], size), many.refused(check, numbers)
+        runs.outcome[outside] = LEFT_CHART
+        members = np.flatnonzero(~outside)
         if whole.blocks is not None:
             blocks = whole.blocks()
-            if compiling or blocks.worth(int(marks[left, -1].sum())):
-                left = blocks.run(left, numbers, whole.rule, h, marks, done, most)
-        short, momenta = marks[left, -1] <= BLOCK, np.empty((2, marks.shape[1]))
-        for chosen in many.groups(left[short], marks[:, -1], most):
+            if compiling or blocks.worth(int(marks[members, -1].sum())):
+                members = blocks.run(members, numbers, whole.rule, h, marks, runs, limit)
+        short, momenta = marks[members, -1] <= BLOCK, np.empty((2, marks.shape[1]))
+        for group in many.groups(members[short], marks[:, -1], limit):
             check_interrupt()
-            plain = map(tuple, numbers[chosen].tolist())
-            for i, at, step in zip(chosen.tolist(), plain, h[chosen].tolist(), strict=True):
-                done.steps[i], done.work[i], done.outcome[i] = run(at, rule, step, marks[i], done.states[i], momenta)
-                done.momenta[i] = momenta.T
-        for i, top in zip(left[~short].tolist(), many.members_of(numbers[left[~short]]), strict=True):
+            rows = map(tuple, numbers[group].tolist())
+            for i, row, step in zip(group.tolist(), rows, h[group].tolist(), strict=True):
+                runs.steps[i], runs.work[i], runs.outcome[i] = run(row, rule, step, marks[i], runs.states[i], momenta)
+                runs.momenta[i] = momenta.T
+        for i, top in zip(members[~short].tolist(), many.members_of(numbers[members[~short]]), strict=True):
             check_interrupt()
-            alone = self._in_stretches(*top, Plan.steps(float(h[i]), marks[i]))
-            done.states[i], done.momenta[i], done.steps[i], done.work[i], done.outcome[i] = alone
-        return done
+            march = self._in_stretches(*top, Plan.steps(float(h[i]), marks[i]))
+            runs.states[i], runs.momenta[i], runs.steps[i], runs.work[i], runs.outcome[i] = march
+        return runs
 
     @property
     def in_python(self) -> bool:

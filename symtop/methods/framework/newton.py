@@ -55,17 +55,17 @@ def settled(correction: Any, last: float) -> Any:
 
 
 @register_jitable
-def newton(evaluate: Any, correct: Any, restart: Any, problem: Any, guess: Any, most: int) -> Any:
-    """Solve with at most `most` evaluations: x, the trial there, the correction left, evaluations, convergence."""
+def newton(evaluate: Any, correct: Any, restart: Any, problem: Any, guess: Any, limit: int) -> Any:
+    """Solve with at most `limit` evaluations: x, the trial there, the correction left, evaluations, convergence."""
     x, trial = guess, evaluate(problem, guess)
     evaluations, size = 1, np.inf
     while True:
         correction = correct(problem, trial, x)
         last, size = size, correction.size
         converged = settled(correction, last)
-        if converged or evaluations >= most:
+        if converged or evaluations >= limit:
             return x, trial, correction, evaluations, converged
-        x = restart(problem) if evaluations == most // 2 else correction.after
+        x = restart(problem) if evaluations == limit // 2 else correction.after
         trial = evaluate(problem, x)
         evaluations += 1
 
@@ -90,7 +90,7 @@ def newton_loop(  # noqa: C901  (the loops of one step, read in one piece)
     The next carry is the `newest` numbers of `close`, followed by this carry without as many last ones. In lanes `rule`
     is a compile-time constant of the kernel, so that a branch on it alone does not stop vectorisation.
     """
-    rest = carry - newest
+    older = carry - newest
     for function in (constants, start, equation, predict, evaluate, correct, restart, keep, close):
         register_jitable(function)
 
@@ -99,11 +99,11 @@ def newton_loop(  # noqa: C901  (the loops of one step, read in one piece)
         guess = predict(equations, carry)
         _, trial, last, work, converged = newton(evaluate, correct, restart, equations, guess, rule.iterations)
         step, fresh, outcome = close(equations, keep(trial, last))
-        return step, fresh + carry[:rest], work, outcome if converged else NOT_CONVERGED
+        return step, fresh + carry[:older], work, outcome if converged else NOT_CONVERGED
 
-    like = (0.0,) * max(dimension, carry, steady, opened, unknowns, ends, len(top._fields))
-    numbers, constant, states, carries = like[: len(top._fields)], like[:steady], like[:dimension], like[:carry]
-    opens, unknown, end, kept = like[:opened], like[:unknowns], like[:ends], like[:rest]
+    zeros = (0.0,) * max(dimension, carry, steady, opened, unknowns, ends, len(top._fields))
+    numbers, constant, states, carries = zeros[: len(top._fields)], zeros[:steady], zeros[:dimension], zeros[:carry]
+    opens, unknown, end, kept = zeros[:opened], zeros[:unknowns], zeros[:ends], zeros[:older]
     flag, work, carry_at = 3 * dimension, 3 * dimension + 1, 3 * dimension + 2
     opened_at = carry_at + carry
     x_at = opened_at + opened
@@ -119,7 +119,7 @@ def newton_loop(  # noqa: C901  (the loops of one step, read in one piece)
 
     @functools.cache
     def in_lanes(rule: Any) -> Lanes:  # noqa: C901
-        most = rule.iterations // 2
+        sweeps = rule.iterations // 2
 
         @register_jitable
         def problem(block, table, j):  # type: ignore[no-untyped-def]
@@ -138,12 +138,12 @@ def newton_loop(  # noqa: C901  (the loops of one step, read in one piece)
             equations, x, live = problem(block, table, j), column(block, x_at, j, unknown), block[live_at * W + j]
             trial = evaluate(equations, x)
             correction = correct(equations, trial, x)
-            left = 0.0 if settled(correction, block[size_at * W + j]) else live
+            live_after = 0.0 if settled(correction, block[size_at * W + j]) else live
             put(block, end_at, j, keep(trial, correction))
             for i in range(unknowns):
-                block[(x_at + i) * W + j] = correction.after[i] if left != 0.0 else x[i]
+                block[(x_at + i) * W + j] = correction.after[i] if live_after != 0.0 else x[i]
             block[size_at * W + j] = correction.size
-            block[live_at * W + j] = left
+            block[live_at * W + j] = live_after
             block[work * W + j] += live
 
         @register_jitable
@@ -152,16 +152,16 @@ def newton_loop(  # noqa: C901  (the loops of one step, read in one piece)
             step, newest, outcome = close(problem(block, table, j), column(block, end_at, j, end))
             move(accumulate, block, dimension, j, step)
             put(block, carry_at, j, newest + before)
-            ended = -float(outcome) if block[live_at * W + j] == 0.0 else 1.0
-            ended = ended if block[flag * W + j] == 0.0 else block[flag * W + j]
-            block[flag * W + j] = ended
-            block[steps_at * W + j] += 1.0 if ended == 0.0 else 0.0
+            status = -float(outcome) if block[live_at * W + j] == 0.0 else 1.0
+            status = status if block[flag * W + j] == 0.0 else block[flag * W + j]
+            block[flag * W + j] = status
+            block[steps_at * W + j] += 1.0 if status == 0.0 else 0.0
 
         def step(block, table):  # type: ignore[no-untyped-def]
             wide_vectors()
             for j in range(W):
                 open_step(block, table, j)
-            for _ in range(most):
+            for _ in range(sweeps):
                 for j in range(W):
                     attempt(block, table, j)
                 if none_left(block, live_at):

@@ -44,9 +44,9 @@ class Plan(NamedTuple):
             raise SymtopError(f"times must end after 0, not at {samples[-1] if samples.size else 'none'}")
         return cls(samples, float(samples[-1]), math.nan, np.empty(0, dtype=np.int64), tolerance, budget)
 
-    def last_of(self, whole: Any) -> float:
-        """The time of the last sample before the first at which `whole`, (samples,), is false; 0 if there is none."""
-        return float(self.times[int(np.argmin(whole)) - 1]) if whole[0] else 0.0
+    def last_of(self, mask: Any) -> float:
+        """The time of the last sample before the first at which `mask`, (samples,), is false; 0 if there is none."""
+        return float(self.times[int(np.argmin(mask)) - 1]) if mask[0] else 0.0
 
     def most(self, limit: float) -> float:
         """The budget, or if none was given, the method's own limit."""

@@ -47,9 +47,9 @@ class Start(NamedTuple):
 
 
 @register_jitable
-def unpack_top(plain: Any) -> Any:
+def unpack_top(row: Any) -> Any:
     """A top and a start, from their nine numbers."""
-    return BareTop(*plain[:3]), Start(*plain[3:])
+    return BareTop(*row[:3]), Start(*row[3:])
 
 
 @register_jitable
@@ -66,7 +66,7 @@ class Preparation:
     numbers: Callable[..., tuple[Any, Numbers]]  # (top, at): the parameters and the state; compiles
     size: int  # of the state
     check: Callable[[Any], None] | None = None  # refuses a start that the kernel cannot step: raises SymtopError
-    unpack: Callable[..., Any] = unpack_top  # (plain): the records that `numbers` takes
+    unpack: Callable[..., Any] = unpack_top  # (row): the records that `numbers` takes
     momenta: Callable[..., Any] = momenta_at  # (top, at): p_phi and p_psi
     given: int = 9  # how many plain numbers a top and a start have
 
@@ -81,22 +81,22 @@ class Preparation:
 
 
 @functools.cache
-def _made_of_fields(kind: Any) -> Callable[[Any], Any]:
+def _constructor(kind: Any) -> Callable[[Any], Any]:
     return register_jitable((lambda fields: fields) if kind is tuple else (lambda fields: kind(*fields)))
 
 
 def as_fields(rule: Any) -> tuple[Callable[[Any], Any], Any]:
     """The function that makes a rule from its fields, and the fields: a plain tuple is a faster argument."""
     kind: Any = type(rule)
-    return _made_of_fields(kind), tuple(rule)
+    return _constructor(kind), tuple(rule)
 
 
 @functools.cache
-def _on_numbers(scale: Callable[..., Any], table: Callable[[Any], Any], unpack: Callable[[Any], Any]) -> Any:
+def _compiled_scale(scale: Callable[..., Any], table: Callable[[Any], Any], unpack: Callable[[Any], Any]) -> Any:
     """`scale` by itself, compiled; `table` makes the table from plain numbers, `unpack` the top and the start."""
 
-    def scaled(plain, numbers, h):  # type: ignore[no-untyped-def]
-        top, at = unpack(plain)
+    def scaled(row, numbers, h):  # type: ignore[no-untyped-def]
+        top, at = unpack(row)
         return scale(table(numbers), top, at, h)
 
     return compile_kernel(scaled)
@@ -116,8 +116,8 @@ class ScaledRule:
 
     def __call__(self, top: SymmetricTop, at: Angles, h: float) -> Any:
         """The rule of one run."""
-        made, table = self.pack(self.rule)
-        return _on_numbers(self.scale, made, self.unpack)(flat(top, at), table, h)
+        make, table = self.pack(self.rule)
+        return _compiled_scale(self.scale, make, self.unpack)(flat(top, at), table, h)
 
 
 @dataclass(frozen=True)
@@ -133,15 +133,15 @@ class LazyRule:
 
 
 @functools.cache
-def _on_samples(sample: Callable[..., Any], kind: Any) -> Any:
-    def shown(par, times, states, out):  # type: ignore[no-untyped-def]
+def _compiled_samples(sample: Callable[..., Any], kind: Any) -> Any:
+    def fill(par, times, states, out):  # type: ignore[no-untyped-def]
         top = kind(*par)
         for i in range(len(times)):
-            seen = sample(top, times[i], states[i])
-            for m in range(len(seen)):
-                out[i, m] = seen[m]
+            values = sample(top, times[i], states[i])
+            for m in range(len(values)):
+                out[i, m] = values[m]
 
-    return compile_kernel(shown)
+    return compile_kernel(fill)
 
 
 @dataclass(frozen=True)
@@ -157,8 +157,8 @@ class Presentation:
     def __call__(self, par: Any, times: Array, states: Array) -> Array:
         """States of the chart, shape (samples, size), of states of the kernel."""
         out, kind = np.empty((len(times), self.size)), cast("Any", type(par))
-        shown = _on_samples(self.sample, kind)
-        shown(tuple(par), np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states), out)
+        fill = _compiled_samples(self.sample, kind)
+        fill(tuple(par), np.ascontiguousarray(times, dtype=float), np.ascontiguousarray(states), out)
         return out
 
 

@@ -120,11 +120,11 @@ class Integrator:
         one_of("family", self.family, FAMILIES)
         one_of("implementation", self.implementation, IMPLEMENTATIONS)
         self._check_kinds()
-        given = dict(self.solvers) if isinstance(self.solvers, Mapping) else {}
-        if not given or not set(given) <= {*DIMENSIONS} or not all(map(callable, given.values())):
+        solvers = dict(self.solvers) if isinstance(self.solvers, Mapping) else {}
+        if not solvers or not set(solvers) <= {*DIMENSIONS} or not all(map(callable, solvers.values())):
             charts = ", ".join(DIMENSIONS)
             raise SymtopError(f"solvers must map one of {charts} to a function, not {shown(self.solvers)}")
-        object.__setattr__(self, "solvers", MappingProxyType(given))
+        object.__setattr__(self, "solvers", MappingProxyType(solvers))
         errors.positive("speed", self.speed)
         if self.exact_steps and (self.order is not None or not self.fixed_step):
             raise SymtopError("exact_steps must be False for a method that has an order or no step_size")
@@ -142,9 +142,9 @@ class Integrator:
         for name, (kind, words) in KINDS.items():
             if not isinstance(getattr(self, name), kind):
                 raise SymtopError(f"{name} must be {words}, not {shown(getattr(self, name))}")
-        least, usual = errors.finite("least_tolerance", self.least_tolerance, 0.0), self.default_tolerance
-        if usual is not None and not max(least, 5e-324) <= errors.finite("default_tolerance", usual) < 1.0:
-            raise SymtopError(f"default_tolerance must be above zero, at least {least:g} and below 1, not {usual!r}")
+        lowest, default = errors.finite("least_tolerance", self.least_tolerance, 0.0), self.default_tolerance
+        if default is not None and not max(lowest, 5e-324) <= errors.finite("default_tolerance", default) < 1.0:
+            raise SymtopError(f"default_tolerance must be above zero, at least {lowest:g} and below 1, not {default!r}")
 
     def _repr_html_(self) -> str:
         return Catalogue({self.name: self})._repr_html_()
@@ -262,8 +262,8 @@ def _load_packages() -> None:
     """Integrators that installed packages announce; one that fails is named and left out."""
     for point in importlib.metadata.entry_points(group=ENTRY_POINTS):
         try:
-            announced = point.load()
-            for entry in [announced] if isinstance(announced, Integrator) else announced():
+            content = point.load()
+            for entry in [content] if isinstance(content, Integrator) else content():
                 _shipped.add(register(entry).name)
         except BaseException as error:  # (an error of a package must not disable the registry)
             if is_of_user(error):
@@ -351,21 +351,21 @@ def integrator(name: str | Integrator) -> Integrator:
     return _variants[name][1]
 
 
-def _reduced(method: Integrator) -> Any:
+def _reduce(method: Integrator) -> Any:
     """Pickles a registered integrator by its name, as solvers exist in one process only; others field by field."""
     registered = split_name(method.name)[0] in integrators() and integrator(method.name) == method
     return (integrator, (method.name,)) if registered else object.__reduce_ex__(method, 2)
 
 
-copyreg.pickle(Integrator, _reduced)
+copyreg.pickle(Integrator, _reduce)
 
 
 @by_name
 def variants(observe: str | None = None) -> list[Integrator]:
     """Each of `methods` in each of its charts, or in those that show the "nutation", the "axis" or the "attitude"."""
-    showing = None if observe is None else SMALLEST_FIRST[one_of("observe", observe, SMALLEST_FIRST)]
+    charts = None if observe is None else SMALLEST_FIRST[one_of("observe", observe, SMALLEST_FIRST)]
     pairs = ((entry, chart) for entry in methods().values() for chart in entry.charts())
-    return [entry.variant(chart) for entry, chart in pairs if showing is None or chart in showing]
+    return [entry.variant(chart) for entry, chart in pairs if charts is None or chart in charts]
 
 
 @functools.cache
@@ -380,20 +380,20 @@ def bibliography() -> dict[str, str]:
 
 def citation_keys(entry: Integrator | Scene) -> list[str]:
     """The entries that a `reference` names, if any; ``CHART:KEY`` names what an integrator takes in one chart only."""
-    named = (word.rpartition(":") for word in str(entry.reference).replace(",", " ").split())
+    parts = (word.rpartition(":") for word in str(entry.reference).replace(",", " ").split())
     charts = {"", *getattr(entry, "solvers", ())}
-    return [key for chart, _, key in named if chart in charts and key in bibliography()]
+    return [key for chart, _, key in parts if chart in charts and key in bibliography()]
 
 
 def citation(name: str | Integrator) -> str:
     """BibTeX of the source of an integrator. SymtopError for an unknown name and where no source is known."""
     method = integrator(name)
-    named = citation_keys(method)
-    if not named:
+    keys = citation_keys(method)
+    if not keys:
         raise SymtopError(
             f"integrator {method.name!r} names no source that is known here (its reference is {method.reference!r})"
         )
-    return "\n\n".join(bibliography()[key] for key in named)
+    return "\n\n".join(bibliography()[key] for key in keys)
 
 
 @functools.cache

@@ -63,37 +63,37 @@ def L_at(top: Any, at: Any) -> Any:
 
 
 @register_jitable
-def _numbers(top: Any, at: Any) -> Any:
+def _parameters(top: Any, at: Any) -> Any:
     spin = top.I3 * (at.psi_dot + at.phi_dot * math.cos(at.theta))
     return SpaceTop(top.I1, top.mgl, spin * (1.0 / top.I3 - 1.0 / top.I1))
 
 
 @register_jitable
-def _on_axis(top: Any, at: Any) -> Any:
-    return _numbers(top, at), (*e_at(at), *L_at(top, at))
+def _prepare_axis(top: Any, at: Any) -> Any:
+    return _parameters(top, at), (*e_at(at), *L_at(top, at))
 
 
-def _on_attitude(top: Any, at: Any) -> Any:
-    return _numbers(top, at), (*q_at(at), *L_at(top, at))
+def _prepare_attitude(top: Any, at: Any) -> Any:
+    return _parameters(top, at), (*q_at(at), *L_at(top, at))
 
 
-def _on_state(top: Any, at: Any) -> Any:
+def _prepare_state(top: Any, at: Any) -> Any:
     return AttitudeTop(top.I1, top.mgl, 1.0 / top.I3 - 1.0 / top.I1), (*q_at(at), *L_at(top, at))
 
 
-def _on_frame(top: Any, at: Any) -> Any:
+def _prepare_frame(top: Any, at: Any) -> Any:
     """a is the body's first axis."""
     w, x, y, z = q_at(at)
-    par, state = _on_axis(top, at)
+    par, state = _prepare_axis(top, at)
     return par, (*state, w * w + x * x - y * y - z * z, 2.0 * (x * y + w * z), 2.0 * (x * z - w * y))
 
 
-on_axis, on_attitude, on_frame = Preparation(_on_axis, 6), Preparation(_on_attitude, 7), Preparation(_on_frame, 9)
-on_state = Preparation(_on_state, 7)
+on_axis, on_attitude = Preparation(_prepare_axis, 6), Preparation(_prepare_attitude, 7)
+on_state, on_frame = Preparation(_prepare_state, 7), Preparation(_prepare_frame, 9)
 
 
 @register_jitable
-def _rows(e: Any, a: Any, b: Any) -> Any:
+def _quaternion_rows(e: Any, a: Any, b: Any) -> Any:
     """The rows of 4 q q^T, from the columns of the rotation matrix (Shepperd 1978)."""
     return (
         (1.0 + a[0] + b[1] + e[2], b[2] - e[1], e[0] - a[2], a[1] - b[0]),
@@ -106,13 +106,13 @@ def _rows(e: Any, a: Any, b: Any) -> Any:
 def _frame_to_attitude(par: Any, t: float, y: Any) -> Any:
     """A frame state as an attitude state (q, L); the sign of q is arbitrary."""
     e, a = (y[0], y[1], y[2]), (y[6], y[7], y[8])
-    rows = _rows(e, a, cross(e, a))
-    best, largest = rows[0], rows[0][0]  # the row with the largest diagonal loses no digits
+    rows = _quaternion_rows(e, a, cross(e, a))
+    row, diagonal = rows[0], rows[0][0]  # the row with the largest diagonal loses no digits
     for i in range(1, 4):
-        if rows[i][i] > largest:
-            best, largest = rows[i], rows[i][i]
-    length = math.sqrt(best[0] * best[0] + best[1] * best[1] + best[2] * best[2] + best[3] * best[3])
-    q = best[0] / length, best[1] / length, best[2] / length, best[3] / length
+        if rows[i][i] > diagonal:
+            row, diagonal = rows[i], rows[i][i]
+    length = math.sqrt(row[0] * row[0] + row[1] * row[1] + row[2] * row[2] + row[3] * row[3])
+    q = row[0] / length, row[1] / length, row[2] / length, row[3] / length
     return with_spin(par, (*q, y[3], y[4], y[5]), t)
 
 
@@ -137,7 +137,7 @@ def field_frame(par: Any, y: Any) -> Any:
 
 
 @register_jitable
-def _turning(par: Any, twist: float, right: float, back: float, y: Any) -> Any:
+def _attitude_rates(par: Any, twist: float, right: float, back: float, y: Any) -> Any:
     half, turn = 0.5 / par.I1, 0.5 * twist
     w, x, y1, z = y[0], y[1], y[2], y[3]
     px, py, pz = half * y[4], half * y[5], half * y[6]
@@ -159,14 +159,14 @@ def field_attitude(par: Any, y: Any) -> Any:
     inverse = 1.0 / (w * w + x * x + y1 * y1 + z * z)
     right, back, up = axis_of(w, x, y1, z)
     right, back, up = inverse * right, inverse * back, inverse * up
-    return _turning(par, par.lean * (right * y[4] + back * y[5] + up * y[6]), right, back, y)
+    return _attitude_rates(par, par.lean * (right * y[4] + back * y[5] + up * y[6]), right, back, y)
 
 
 @register_jitable
 def field_twisted(par: Any, y: Any) -> Any:
     """Time derivative of (q, L) for unit quaternions, with the twist of the start."""
     right, back, _ = axis_of(y[0], y[1], y[2], y[3])
-    return _turning(par, par.twist, right, back, y)
+    return _attitude_rates(par, par.twist, right, back, y)
 
 
 @register_jitable

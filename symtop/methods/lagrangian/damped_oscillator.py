@@ -152,8 +152,8 @@ def notebook_positions(damping: float, h: float, first: float, second: float, st
     The guess has dF/dx' where F belongs, and with the sign of V': a constant push and no damping at all.
     """
     update, guess = [first, second], [first, second]
-    old, new, ahead = -4.0 + 2.0 * damping * h - h * h, 2.0 * (4.0 - h * h), 4.0 + 2.0 * damping * h + h * h
+    old, new, divisor = -4.0 + 2.0 * damping * h - h * h, 2.0 * (4.0 - h * h), 4.0 + 2.0 * damping * h + h * h
     for _ in range(steps - 1):
-        update.append((old * update[-2] + new * update[-1]) / ahead)
+        update.append((old * update[-2] + new * update[-1]) / divisor)
         guess.append((new * guess[-1] - (4.0 + h * h) * guess[-2] + 4.0 * h * h * damping) / (4.0 + h * h))
     return np.array(update), np.array(guess)

@@ -75,13 +75,13 @@ def _near_pole(_: float, y: Any) -> float:
 _near_pole.terminal, _near_pole.direction = True, -1.0  # type: ignore[attr-defined]
 
 
-def theta_before_pole(scene: Scene, friction: Friction, times: Array, most: int) -> Array:
-    """Theta (rad), to 1e-13, until the axis is within `NEAR_POLE` of a pole; SymtopError beyond `most` evaluations."""
+def theta_before_pole(scene: Scene, friction: Friction, times: Array, limit: int) -> Array:
+    """Theta (rad), to 1e-13, until the axis is within `NEAR_POLE` of a pole; SymtopError beyond `limit` evaluations."""
     (rates, start), count = four_equations(scene, friction), itertools.count(1)
 
-    def counted(t: float, y: Any) -> tuple[float, ...]:
-        if next(count) > most:
-            raise SymtopError(f"the damped top takes more than {most} evaluations: DOP853 is at t = {t:.3g} s")
+    def limited_rates(t: float, y: Any) -> tuple[float, ...]:
+        if next(count) > limit:
+            raise SymtopError(f"the damped top takes more than {limit} evaluations: DOP853 is at t = {t:.3g} s")
         return rates(t, y)
 
-    return integrated(counted, start, times, "DOP853", 1e-13, _near_pole)[0]  # type: ignore[no-any-return]
+    return integrated(limited_rates, start, times, "DOP853", 1e-13, _near_pole)[0]  # type: ignore[no-any-return]

@@ -314,13 +314,13 @@ def discrete_lagrangian(
     SymtopError for nodes outside [0, 1], for other numbers of weights, and for weights that do not sum to 1.
     """
     rule, symmetric = quadrature(nodes, weights)
-    at_start = sum(node == 0.0 for node in rule.nodes)  # evaluated once a step, not once an iteration
-    fresh = len(rule.nodes) - at_start
+    start_nodes = sum(node == 0.0 for node in rule.nodes)  # evaluated once a step, not once an iteration
+    new_nodes = len(rule.nodes) - start_nodes
     method = Integrator(
         name=name,
         family="discrete-lagrangian",
         summary=summary or f"discrete Lagrangian with nodes {rule.nodes} and weights {rule.weights}",
-        solvers={"angles": FixedStep(march, rule, on_angles, fresh, implicit=True, each_step=at_start)},
+        solvers={"angles": FixedStep(march, rule, on_angles, new_nodes, implicit=True, each_step=start_nodes)},
         order=order, explicit=False, symplectic=True, symmetric=symmetric, conserves=frozenset({"p_phi", "p_psi"}),
         reference=reference, needs="lagrangian", general=True,
     )  # fmt: skip

@@ -111,24 +111,24 @@ def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 
 @register_jitable
-def _sum(high: float, low: float, more: float, late: float) -> Any:
-    """(high + low) + more: the increment of `high`, the new `high`, and the remainder plus `late`."""
-    addend = more + low
+def _sum(high: float, low: float, term: float, term_low: float) -> Any:
+    """(high + low) + term: the increment of `high`, the new `high`, and the remainder plus `term_low`."""
+    addend = term + low
     total = high + addend
     virtual = total - high
-    return addend, total, (((high - (total - virtual)) + (addend - virtual)) + ((more - addend) + low)) + late
+    return addend, total, (((high - (total - virtual)) + (addend - virtual)) + ((term - addend) + low)) + term_low
 
 
 @register_jitable
-def _kick(high: float, low: float, f: float, x: float, under: float) -> Any:
-    """(high + low) + f (x + under): the increment of `high`, the new `high`, and the remainder."""
-    small = f * under + low
+def _kick(high: float, low: float, f: float, x: float, x_low: float) -> Any:
+    """(high + low) + f (x + x_low): the increment of `high`, the new `high`, and the remainder."""
+    small = f * x_low + low
     addend = fused(f, x, small)
     total = high + addend
     virtual = total - high
     push = f * x
-    left = fused(f, x, -push) + ((push - addend) + small)
-    return addend, total, ((high - (total - virtual)) + (addend - virtual)) + left
+    remainder = fused(f, x, -push) + ((push - addend) + small)
+    return addend, total, ((high - (total - virtual)) + (addend - virtual)) + remainder
 
 
 @register_jitable
@@ -136,22 +136,22 @@ def _step(rule: Any, state: Any, carry: Any) -> Any:
     """Increment of one application of the map, the state after it, and the carry."""
     x1, y1, x2, y2, u1, v1, u2, v2 = state
     s1, s2, f1, f2, lx1, ly1, lx2, ly2, lu1, lv1, lu2, lv2 = carry
-    longer = s1 >= s2
+    first_longer = s1 >= s2
     # the longer one is scaled to its right length, and p by the inverse of that factor, so that J stays the same
-    lack, other = (1.0 - s1) - s2, (1.0 - s2) - s1
-    lack = lack if longer else other
-    half = 0.5 * lack
-    lack = half if abs(lack) > IDLE else 0.0
+    defect, defect2 = (1.0 - s1) - s2, (1.0 - s2) - s1
+    defect = defect if first_longer else defect2
+    half = 0.5 * defect
+    defect = half if abs(defect) > IDLE else 0.0
     # and p is corrected to fulfil sum Re(conj(Z) (W - f Z))/r = 0
     out1, out2 = x1 * u1 + y1 * v1 - f1 * s1, x2 * u2 + y2 * v2 - f2 * s2
-    swell = out1 * rule.q1 + out2 * rule.q2
+    residual = out1 * rule.q1 + out2 * rule.q2
     # both are computed and one is selected: a branch with arithmetic in it is not vectorised
     i1, i2 = _inverse(s1), _inverse(s2)
-    e1, e2, c1, c2 = lack * i1, lack * i2, swell * rule.r1 * i1, swell * rule.r2 * i2
-    e1 = e1 if longer else 0.0
-    e2 = 0.0 if longer else e2
-    c1 = c1 if longer else 0.0
-    c2 = 0.0 if longer else c2
+    e1, e2, c1, c2 = defect * i1, defect * i2, residual * rule.r1 * i1, residual * rule.r2 * i2
+    e1 = e1 if first_longer else 0.0
+    e2 = 0.0 if first_longer else e2
+    c1 = c1 if first_longer else 0.0
+    c2 = 0.0 if first_longer else c2
     c1, c2 = 2.0 * e1 * f1 - c1, 2.0 * e2 * f2 - c2
     p1, q1, p2, q2 = c1 * x1 - e1 * u1, c1 * y1 - e1 * v1, c2 * x2 - e2 * u2, c2 * y2 - e2 * v2
     dx1, x1, lx1 = _sum(x1, lx1 + (e1 * x1 + p1), u1, lu1)
@@ -160,9 +160,9 @@ def _step(rule: Any, state: Any, carry: Any) -> Any:
     dy2, y2, ly2 = _sum(y2, ly2 + (e2 * y2 + q2), v2, lv2)
     s1, s2 = x1 * x1 + y1 * y1, x2 * x2 + y2 * y2
     rest1, rest2 = 1.0 - s2, 1.0 - s1
-    longer = s1 >= s2
-    t1 = rest1 if longer else s1
-    t2 = s2 if longer else rest2
+    first_longer = s1 >= s2
+    t1 = rest1 if first_longer else s1
+    t2 = s2 if first_longer else rest2
     f1, f2 = _forces(rule, t1, t2)
     g1, g2 = f1 + f1, f2 + f2
     du1, u1, lu1 = _kick(u1, lu1 + p1, g1, x1, lx1)
@@ -208,15 +208,15 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
 def _phase(rule: Any, turn: float, k: int) -> Any:
     """exp(i k delta), and (-1)^k where a step leaves out an odd number of nutations."""
     n = k * rule.parts
-    turns, rest = two_product(n, turn)
-    rest += turns - np.rint(turns)
+    turns, fraction = two_product(n, turn)
+    fraction += turns - np.rint(turns)
     if rule.half_turns != 0.0:
-        rest += 0.5 * (n - 2.0 * np.floor(0.5 * n))
-    return math.cos(2.0 * math.pi * rest), math.sin(2.0 * math.pi * rest)
+        fraction += 0.5 * (n - 2.0 * np.floor(0.5 * n))
+    return math.cos(2.0 * math.pi * fraction), math.sin(2.0 * math.pi * fraction)
 
 
 @register_jitable
-def _unwound(rule: Any, s: Any, k: int) -> Any:
+def _state_after(rule: Any, s: Any, k: int) -> Any:
     """chi and chi' after k steps."""
     a, b, c, d = s[0], s[1], s[2], s[3]
     f1, f2 = _forces(rule, a * a + b * b, c * c + d * d)
@@ -234,7 +234,7 @@ def _unwound(rule: Any, s: Any, k: int) -> Any:
 
 def present_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     """(e, L), as wide as the kernel's state."""
-    s = _unwound(rule, state, k)
+    s = _state_after(rule, state, k)
     a, b, c, d = s[0], s[1], s[2], s[3]
     e = 2.0 * (a * c + b * d), 2.0 * (a * d - b * c), (a * a + b * b) - (c * c + d * d)
     return (*e, *momentum(par, s), 0.0, 0.0)
@@ -242,17 +242,17 @@ def present_axis(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
 
 def present_attitude(par: Any, rule: Any, state: Any, k: int, h: float) -> Any:
     """(q, L), the twist since the start put on again, as wide as the kernel's state."""
-    s = _unwound(rule, state, k)
+    s = _state_after(rule, state, k)
     return (*with_spin(par, (s[0], -s[3], s[2], -s[1], *momentum(par, s)), k * h), 0.0)
 
 
-def _side_by_side(par: Any, rule: Any, state: Any, carry: Any) -> Any:
+def _advance(par: Any, rule: Any, state: Any, carry: Any) -> Any:
     """A step in lanes; a step of several parts is given up, to be run alone."""
     step, _, carry = _step(rule, state, carry)
     return step, carry, finite_outcome(step[0] + step[2] + (0.0 if rule.parts == 1.0 else np.inf))
 
 
-_LANES = loop_with_rule(_side_by_side, Map, top=OscillatorTop, dimension=8, carry=12, add=accumulate_plainly)
+_LANES = loop_with_rule(_advance, Map, top=OscillatorTop, dimension=8, carry=12, add=accumulate_plainly)
 march_axis, march_attitude = (
     Loop(begin, increment, observe, enter, present, accumulate_plainly, lanes=lambda _: _LANES)
     for present in (present_axis, present_attitude)
@@ -270,8 +270,8 @@ def built_in() -> list[Integrator]:
             name="exact-discrete", family="discrete-lagrangian",
             summary="discrete Lagrangian of two oscillators whose step is the motion itself, one force",
             solvers={
-                chart: FixedStep(march, oscillators.numbers, on_oscillators, 1, implicit=False, present=shown)
-                for chart, (march, shown) in charts.items()
+                chart: FixedStep(march, oscillators.numbers, on_oscillators, 1, implicit=False, present=presentation)
+                for chart, (march, presentation) in charts.items()
             },
             explicit=True, symplectic=True, symmetric=True,
             conserves=frozenset({"energy", "p_phi", "p_psi", "axis_length"}),

@@ -97,9 +97,9 @@ class _Trial(NamedTuple):
 
 
 @register_jitable
-def _follow(jet: Any, fix: Any) -> Any:
+def _extrapolate(jet: Any, change: Any) -> Any:
     """The number after a correction of the unknowns, to first order."""
-    return jet.value + jet.by_m * fix[0] + jet.by_1 * fix[1]
+    return jet.value + jet.by_m * change[0] + jet.by_1 * change[1]
 
 
 @register_jitable
@@ -153,7 +153,7 @@ def _equations(par: Any, rule: Any, state: Any, steady: Any, opened: Any) -> Any
     return _Step(par, rule, state[0], _Node(*opened), h, h * state[1] / par.I1, scale)
 
 
-def _at(step: Any, unknowns: Any) -> Any:
+def _trial_at(step: Any, unknowns: Any) -> Any:
     """The trial at m = thetam - theta0 and d = theta1 - theta0."""
     m, d = unknowns
     return _evaluate(step.par, step.start, step.theta + m, step.theta + d)
@@ -163,15 +163,15 @@ def _correct(step: Any, trial: Any, unknowns: Any) -> Any:
     """Newton's correction of (m, d) for flight - d - scale (V0 + 2 Vm)/6 = 0 and d/2 - m + scale Vm/8 = 0."""
     m, d = unknowns
     V0, Vm, scale = trial.V0, trial.Vm, step.scale
-    short = step.flight - d - scale * (V0.value + 2.0 * Vm.value) / 6.0
+    gap = step.flight - d - scale * (V0.value + 2.0 * Vm.value) / 6.0
     bow = 0.5 * d - m + scale * Vm.value / 8.0
-    short_m, short_d = scale * (V0.by_m + 2.0 * Vm.by_m) / 6.0, 1.0 + scale * (V0.by_1 + 2.0 * Vm.by_1) / 6.0
+    gap_m, gap_d = scale * (V0.by_m + 2.0 * Vm.by_m) / 6.0, 1.0 + scale * (V0.by_1 + 2.0 * Vm.by_1) / 6.0
     bow_m, bow_d = 1.0 - scale * Vm.by_m / 8.0, -0.5 - scale * Vm.by_1 / 8.0
-    inverse = 1.0 / (short_d * bow_m - short_m * bow_d)
-    fix_m, fix_d = (bow * short_d - short * bow_d) * inverse, (short * bow_m - bow * short_m) * inverse
+    inverse = 1.0 / (gap_d * bow_m - gap_m * bow_d)
+    dm, dd = (bow * gap_d - gap * bow_d) * inverse, (gap * bow_m - bow * gap_m) * inverse
     reach = abs(step.flight) + scale * (abs(V0.value) + abs(Vm.value))
     enough = step.rule.tolerance * reach + NEGLIGIBLE_ANGLE
-    return Correction((fix_m, fix_d), (m + fix_m, d + fix_d), abs(fix_m) + abs(fix_d), enough, ANGLE_GRAIN)
+    return Correction((dm, dd), (m + dm, d + dd), abs(dm) + abs(dd), enough, ANGLE_GRAIN)
 
 
 def begin(par: Any, rule: Any, state: Any, h: float) -> Any:
@@ -190,10 +190,10 @@ def _predict(step: Any, carry: Any) -> Any:
 
 def _keep(trial: Any, correction: Any) -> Any:
     """The last trial with the last correction added to first order; the remainder is its square."""
-    fix = correction.change
+    change = correction.change
     return (
-        _follow(trial.V0, fix), _follow(trial.Vm, fix), _follow(trial.V1, fix),
-        _follow(trial.plus, fix), _follow(trial.minus, fix), correction.after[1],
+        _extrapolate(trial.V0, change), _extrapolate(trial.Vm, change), _extrapolate(trial.V1, change),
+        _extrapolate(trial.plus, change), _extrapolate(trial.minus, change), correction.after[1],
     )  # fmt: skip
 
 
@@ -232,7 +232,7 @@ def observe(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> Any:
 
 march = newton_loop(
     begin, observe, constants=lambda par, h: (h, h * h / par.I1), start=lambda par, _rule, theta: node_at(par, theta),
-    equation=_equations, predict=_predict, evaluate=_at, correct=_correct, keep=_keep, close=_close,
+    equation=_equations, predict=_predict, evaluate=_trial_at, correct=_correct, keep=_keep, close=_close,
     restart=lambda step: (0.5 * step.flight, step.flight), top=ReducedTop, dimension=4, steady=2, opened=5,
     unknowns=2, ends=6, newest=2, carry=8,
 )  # fmt: skip

@@ -73,13 +73,13 @@ def gauss_rule(s: int) -> Rule:
     c, b = 0.5 * (x + 1.0), 0.5 * w
     k = np.arange(s)
     weights = (legendre.legvander(x, s - 1) * (2 * k + 1)).T * b  # (k, j)
-    ahead = legendre.legvander(x + 2.0, s - 1)
+    continuation = legendre.legvander(x + 2.0, s - 1)
     P = legendre.legvander(x, s)
     integrals: Array = np.empty((s, s))  # of P_k from 0 to c_i
     integrals[:, 0] = c
     integrals[:, 1:] = (P[:, 2:] - P[:, :-2]) / (2.0 * (2 * k[1:] + 1))
     a = integrals @ weights
-    rows = [tuple(map(tuple, matrix.tolist())) for matrix in (a @ a, ahead @ weights)]
+    rows = [tuple(map(tuple, matrix.tolist())) for matrix in (a @ a, continuation @ weights)]
     return Rule(tuple(c.tolist()), tuple(b.tolist()), rows[0], tuple((b * (1.0 - c)).tolist()), rows[1])
 
 
@@ -125,10 +125,10 @@ def _evaluation(s: int) -> Callable[..., Any]:
         return lambda step, forces: evaluate(step, step.rule.c[i], step.rule.b[i], product(step.rule.reach[i], forces))
 
     @register_jitable
-    def evaluate(step, c, b, reached):  # type: ignore[no-untyped-def]
+    def evaluate(step, c, b, force_sum):  # type: ignore[no-untyped-def]
         par = step.par
-        flown = c * step.momentum + step.h * reached
-        node = node_at(par, step.theta + step.lever * flown)
+        momentum = c * step.momentum + step.h * force_sum
+        node = node_at(par, step.theta + step.lever * momentum)
         pull = pull_at(par, node, par.south, par.north)
         precession, bend = node.d * par.south + node.a * par.north, pull.south + pull.north
         return _Trial(
@@ -144,22 +144,22 @@ def _elimination(s: int) -> Callable[..., Any]:
     """A function that solves s equations, in rows of s + 1 numbers, the last of them the right-hand side."""
     if s == 1:
         return register_jitable(lambda rows: (rows[0][1] / rows[0][0],))
-    reduced = each(lambda j: lambda row, factor, first: row[j + 1] - factor * first[j + 1], s)
-    rest = each(lambda i: lambda rows, inverse: reduced(rows[i + 1], rows[i + 1][0] * inverse, rows[0]), s - 1)
-    below, less = _elimination(s - 1), total(lambda j: lambda row, x: -(row[j + 1] * x[j]), s - 1)
+    reduce_row = each(lambda j: lambda row, factor, first: row[j + 1] - factor * first[j + 1], s)
+    reduce_all = each(lambda i: lambda rows, inverse: reduce_row(rows[i + 1], rows[i + 1][0] * inverse, rows[0]), s - 1)
+    solve_below, subtract = _elimination(s - 1), total(lambda j: lambda row, x: -(row[j + 1] * x[j]), s - 1)
 
     @register_jitable
-    def solved(rows):  # type: ignore[no-untyped-def]
+    def solve(rows):  # type: ignore[no-untyped-def]
         inverse = 1.0 / rows[0][0]
-        x = below(rest(rows, inverse))
-        return (less(rows[0][s], rows[0], x) * inverse, *x)
+        x = solve_below(reduce_all(rows, inverse))
+        return (subtract(rows[0][s], rows[0], x) * inverse, *x)
 
-    return solved
+    return solve
 
 
 def _correction(s: int) -> Callable[..., Any]:
     """Newton's correction with s nodes."""
-    product, solved = dot_of(s), _elimination(s)
+    product, solve = dot_of(s), _elimination(s)
     row = each(lambda j: lambda stiffness, reach: stiffness * reach[j], s)
 
     def equation(i):  # type: ignore[no-untyped-def]
@@ -170,18 +170,18 @@ def _correction(s: int) -> Callable[..., Any]:
         return equation
 
     rows = each(equation, s)
-    added = each(lambda i: lambda forces, change: forces[i] + change[i], s)
-    size = total(lambda i: lambda turned: abs(turned[i]), s)
+    add = each(lambda i: lambda forces, change: forces[i] + change[i], s)
+    size = total(lambda i: lambda shift: abs(shift[i]), s)
     turning = each(lambda i: lambda step, change, scale: scale * product(step.rule.reach[i], change), s)
 
     def correct(step, trial, forces):  # type: ignore[no-untyped-def]
         scale = step.lever * step.h
-        change = solved(rows(step, trial, forces, scale))
-        after, turned, largest = added(forces, change), turning(step, change, scale), 0.0
+        change = solve(rows(step, trial, forces, scale))
+        after, shift, largest = add(forces, change), turning(step, change, scale), 0.0
         for i in range(s):
             largest = max(largest, abs(after[i]))
         enough = step.rule.tolerance * (abs(step.lever * step.momentum) + scale * largest) + NEGLIGIBLE_ANGLE
-        return Correction(turned, after, size(0.0, turned), enough, ANGLE_GRAIN)
+        return Correction(shift, after, size(0.0, shift), enough, ANGLE_GRAIN)
 
     return correct
 
@@ -192,19 +192,19 @@ def _prediction(s: int) -> Callable[..., Any]:
     return each(lambda i: lambda step, carry: product(step.rule.predict[i], carry), s)
 
 
-def _free_flight(step: Any) -> Any:
+def _no_forces(step: Any) -> Any:
     return zero(step.rule.c)
 
 
 def _keeping(s: int) -> Callable[..., Any]:
     """The last trial with the last correction added to first order; the remainder is its square."""
-    south = total(lambda i: lambda trial, turned: trial[i].south + trial[i].south_by * turned[i], s)
-    north = total(lambda i: lambda trial, turned: trial[i].north + trial[i].north_by * turned[i], s)
-    roll = total(lambda i: lambda trial, turned: trial[i].roll + trial[i].roll_by * turned[i], s)
+    south = total(lambda i: lambda trial, shift: trial[i].south + trial[i].south_by * shift[i], s)
+    north = total(lambda i: lambda trial, shift: trial[i].north + trial[i].north_by * shift[i], s)
+    roll = total(lambda i: lambda trial, shift: trial[i].roll + trial[i].roll_by * shift[i], s)
 
     def keep(trial, correction):  # type: ignore[no-untyped-def]
-        turned = correction.change
-        return (*correction.after, south(0.0, trial, turned), north(0.0, trial, turned), roll(0.0, trial, turned))
+        shift = correction.change
+        return (*correction.after, south(0.0, trial, shift), north(0.0, trial, shift), roll(0.0, trial, shift))
 
     return keep
 
@@ -241,12 +241,12 @@ _reduced = on_angles.numbers
 
 
 @register_jitable
-def _with_sums(top: Any, at: Any) -> Any:
+def _prepare_sums(top: Any, at: Any) -> Any:
     par, state = _reduced(top, at)
     return par, (*state, 0.0, 0.0)
 
 
-with_sums = Preparation(_with_sums, 6, require_chart)
+with_sums = Preparation(_prepare_sums, 6, require_chart)
 to_angles = Presentation(lambda _par, _t, y: (y[0], y[1], y[2], y[3]), 4)
 
 
@@ -255,7 +255,7 @@ def loop(s: int) -> Loop:
     """The loop of the method with s nodes, on (theta, p_theta, phi, psi, S, N)."""
     return newton_loop(
         begin, observe, constants=_steady, start=_open, equation=_equations, predict=_prediction(s),
-        evaluate=_evaluation(s), correct=_correction(s), restart=_free_flight, keep=_keeping(s), close=_closing(s),
+        evaluate=_evaluation(s), correct=_correction(s), restart=_no_forces, keep=_keeping(s), close=_closing(s),
         top=ReducedTop, dimension=6, steady=2, opened=1, unknowns=s, ends=s + 3, newest=s, carry=s + 1,
     )  # fmt: skip
 

@@ -70,14 +70,14 @@ def oscillator_numbers(top: Any, at: Any) -> Any:
     par = OscillatorTop(top.I1, twist, kappa, -0.5 * (kappa + mu), 0.5 * (kappa - mu), g2, g3)
     total, difference = 0.5 * (at.phi + at.psi), 0.5 * (at.phi - at.psi)
     ct, st, cd, sd = math.cos(total), math.sin(total), math.cos(difference), math.sin(difference)
-    nod = 0.5 * at.theta_dot
+    half_rate = 0.5 * at.theta_dot
     # the rates of both phases without a difference near a pole: phi' + psi' = p_psi/I1 + phi' (1 - u), twist taken off
     turn = cosine * (0.5 * spin + at.phi_dot * sine * sine)
     swerve = sine * (at.phi_dot * cosine * cosine - 0.5 * spin)
     return par, (
         cosine * ct, -cosine * st, sine * sd, -sine * cd,
-        -nod * sine * ct - turn * st, nod * sine * st - turn * ct,
-        nod * cosine * sd + swerve * cd, swerve * sd - nod * cosine * cd,
+        -half_rate * sine * ct - turn * st, half_rate * sine * st - turn * ct,
+        half_rate * cosine * sd + swerve * cd, swerve * sd - half_rate * cosine * cd,
     )  # fmt: skip
 
 
@@ -133,57 +133,57 @@ def one_oscillator(above: Any, g2: float, g3: float, sigma: float, b: float, J: 
 
 
 @register_jitable
-def _whole_turn(e: Any, sigma: float, b: float, J: float) -> float:
+def _turn_of_nutation(e: Any, sigma: float, b: float, J: float) -> float:
     """delta of one nutation; where b is next to the root e1 that bounds it, J and the integral are 0 times infinity.
 
     Of e1 - b and b - e2 only the larger is a difference of roots, which lose digits in it: if that is the second, the
     first is that of J^2 = (e1 - b)(b - e2)(b - e3).
     """
-    wide, rest, turn = e.e1 - e.e3, e.e1 - b, sigma * J
-    y, z = e.e1 - e.e2, wide
-    if rest < b - e.e2:
+    width, gap, turn = e.e1 - e.e3, e.e1 - b, sigma * J
+    y, z = e.e1 - e.e2, width
+    if gap < b - e.e2:
         y, z = b - e.e2, b - e.e3
-        rest = max(turn * turn / (y * z), TINY_ROOT * wide)
-        turn = math.copysign(math.sqrt(rest * y * z), turn)
-        y, z = y + rest, z + rest
-    return 2.0 * turn * r_j(0.0, y, z, rest) / 3.0
+        gap = max(turn * turn / (y * z), TINY_ROOT * width)
+        turn = math.copysign(math.sqrt(gap * y * z), turn)
+        y, z = y + gap, z + gap
+    return 2.0 * turn * r_j(0.0, y, z, gap) / 3.0
 
 
 @register_jitable
-def _turned(e: Any, above: Any, par: Any, sigma: float, b: float, J: float, sign: float, nutations: float) -> Any:
+def _oscillator(e: Any, above: Any, par: Any, sigma: float, b: float, J: float, sign: float, nutations: float) -> Any:
     """(A - 1) D, D, r, 1/r and delta in turns of one oscillator, for a step of `nutations` whole ones and a rest."""
     aD, D, delta = one_oscillator(above, par.g2, par.g3, sigma, b, J)
     delta *= sign
     if nutations != 0.0:
-        delta += nutations * _whole_turn(e, sigma, b, J)
+        delta += nutations * _turn_of_nutation(e, sigma, b, J)
     r = sign * math.sqrt(D)
     return aD, D, r, 1.0 / r, delta / (2.0 * math.pi)
 
 
-def _mapped(rule: Any, top: Any, at: Any, h: float) -> Any:
+def _map_of_step(rule: Any, top: Any, at: Any, h: float) -> Any:
     """The numbers of the step h from a start; of `rule` only the type is used."""
     par, s = oscillator_numbers(top, at)
     e = roots(par.g2, par.g3)
     # two roots that are neighbours lose digits: e1 and e2 beside a separatrix, both turning points in a steady motion
     half = half_period(e) if e.e1 - e.e2 > e.e2 - e.e3 else 0.5 * nutation_period(top, at)
-    apart, parts = e.e1 - e.e2, 1
-    known = apart * apart * (e.e1 - e.e3) > LEAST_APART * math.pow(par.b1 * par.b1 + par.b2 * par.b2, 1.5)
+    gap, parts = e.e1 - e.e2, 1
+    distinct = gap * gap * (e.e1 - e.e3) > LEAST_APART * math.pow(par.b1 * par.b1 + par.b2 * par.b2, 1.5)
     while True:
         nutations = np.rint(0.5 * h / parts / half)
-        rest = h / parts - 2.0 * nutations * half if nutations != 0.0 else h / parts
-        above = differences(e, max(abs(rest), SHORTEST_STEP))
+        remainder = h / parts - 2.0 * nutations * half if nutations != 0.0 else h / parts
+        above = differences(e, max(abs(remainder), SHORTEST_STEP))
         P = (above[0] + above[1] + above[2]) / 3.0
         # P - e2 or a D, which is small at half a nutation of an axis that comes near a pole
-        least = min(above[1], P - par.b1, P - par.b2)
-        if ((known or nutations == 0.0) and not above[2] > STEEPEST_RATIO * least) or parts >= MOST_PARTS:
+        smallest = min(above[1], P - par.b1, P - par.b2)
+        if ((distinct or nutations == 0.0) and not above[2] > STEEPEST_RATIO * smallest) or parts >= MOST_PARTS:
             break
         parts += 1
-    sign = 1.0 if rest >= 0.0 else -1.0
+    sign = 1.0 if remainder >= 0.0 else -1.0
     J1, J2 = s[0] * s[5] - s[1] * s[4], s[2] * s[7] - s[3] * s[6]
-    aD1, D1, r1, q1, turn1 = _turned(e, above, par, par.kappa, par.b1, J1, sign, nutations)
-    aD2, D2, r2, q2, turn2 = _turned(e, above, par, -par.kappa, par.b2, J2, sign, nutations)
+    aD1, D1, r1, q1, turn1 = _oscillator(e, above, par, par.kappa, par.b1, J1, sign, nutations)
+    aD2, D2, r2, q2, turn2 = _oscillator(e, above, par, -par.kappa, par.b2, J2, sign, nutations)
     odd = nutations - 2.0 * np.floor(0.5 * nutations)
     return Map(aD1, D1, r1, q1, turn1, aD2, D2, r2, q2, turn2, par.kappa, odd, float(parts))
 
 
-numbers = ScaledRule(Map(), _mapped)
+numbers = ScaledRule(Map(), _map_of_step)

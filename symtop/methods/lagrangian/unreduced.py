@@ -79,11 +79,11 @@ def _solve(first: Any, second: Any, third: Any, right: Any) -> Any:
     upper, lower = second[2] / third[2], first[2] / third[2]
     pivot = second[1] - upper * third[1]
     middle = first[1] - lower * third[1]
-    rest = right[1] - upper * right[2]
+    reduced = right[1] - upper * right[2]
     factor = middle / pivot
     slope = second[0] - upper * third[0]
-    x = (right[0] - lower * right[2] - factor * rest) / (first[0] - lower * third[0] - factor * slope)
-    y = (rest - slope * x) / pivot
+    x = (right[0] - lower * right[2] - factor * reduced) / (first[0] - lower * third[0] - factor * slope)
+    y = (reduced - slope * x) / pivot
     return x, y, (right[2] - third[0] * x - third[1] * y) / third[2]
 
 
@@ -126,7 +126,7 @@ def _evaluate(step: Any, rate: Any) -> Any:
 
 
 @register_jitable
-def _from_the_start(step: Any) -> Any:
+def _restart(step: Any) -> Any:
     return _rates(step[0], step[2])
 
 
@@ -156,7 +156,7 @@ def increment(par: Any, rule: Any, state: Any, carry: Any, h: float) -> Any:
         3.0 * (near[2] - far[2]) + farther[2],
     )
     step = par, rule, state, h
-    rate, sums, _, work, converged = newton(_evaluate, _correct, _from_the_start, step, guess, rule.iterations)
+    rate, sums, _, work, converged = newton(_evaluate, _correct, _restart, step, guess, rule.iterations)
     w, v, u = rate
     outcome = chart_outcome(state[0] + h * w) if converged else NOT_CONVERGED
     p_phi = sums.across * v + sums.mixed * u - 0.5 * h * par.c_phi * v
@@ -183,14 +183,14 @@ class DampedTop(NamedTuple):
     c_psi: float
 
 
-def _with_momenta(top: Any, at: Any) -> Any:
+def _prepare_momenta(top: Any, at: Any) -> Any:
     momenta = conserved(top, at)
     return DampedTop(top.I1, top.I3, top.mgl, 0.0, 0.0), (
         at.theta, at.phi, at.psi, top.I1 * at.theta_dot, momenta.p_phi, momenta.p_psi,
     )  # fmt: skip
 
 
-with_momenta = Preparation(_with_momenta, 6, require_chart)
+with_momenta = Preparation(_prepare_momenta, 6, require_chart)
 # (theta, p_theta, phi, psi) of the six state variables; p_phi and p_psi are columns of their own
 in_angles = Presentation(lambda _par, _t, y: (y[0], y[3], y[1], y[2]), 4)
 

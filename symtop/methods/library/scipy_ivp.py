@@ -56,7 +56,7 @@ def solver(method: str | type, chart: str, *, compiled: bool = False) -> Solver:
     run that fails returns the samples before the failure, and one that would never end is stopped.
     """
     form = FORMS[chart]
-    most = EVALUATIONS.get(method if isinstance(method, str) else "", EVALUATIONS["Radau"])
+    limit = EVALUATIONS.get(method if isinstance(method, str) else "", EVALUATIONS["Radau"])
 
     def solve(top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         from scipy import integrate  # 0.6 s to import
@@ -79,15 +79,15 @@ def solver(method: str | type, chart: str, *, compiled: bool = False) -> Solver:
                         outcome = STEP_TOO_SMALL if np.isfinite(stepper.y).all() else NOT_FINITE
                         break
                     steps += 1
-                    now = int(np.searchsorted(plan.times, stepper.t, side="right"))
-                    if now > row:
-                        states[row:now] = stepper.dense_output()(plan.times[row:now]).T  # DOP853 evaluates f here too
-                        row = now
+                    end = int(np.searchsorted(plan.times, stepper.t, side="right"))
+                    if end > row:
+                        states[row:end] = stepper.dense_output()(plan.times[row:end]).T  # DOP853 evaluates f here too
+                        row = end
                 except (OverflowError, ZeroDivisionError, ValueError):  # sin of infinity, or no finite Jacobian
                     outcome = NOT_FINITE
                     break
                 outcome = form.ended(stepper.y.tolist())
-                if outcome == OK and rhs.calls > plan.most(most) and stepper.status == "running":
+                if outcome == OK and rhs.calls > plan.most(limit) and stepper.status == "running":
                     outcome = OUT_OF_BUDGET
         reached = plan.horizon if outcome == OK else float(stepper.t)
         return as_run(form, par, plan.times, states, steps, rhs.calls, outcome, reached)
@@ -102,10 +102,10 @@ def integrated(
     from scipy.integrate import solve_ivp  # 0.6 s to import
 
     span = (0.0, float(times[-1]))
-    done = solve_ivp(rates, span, start, method=method, rtol=tolerance, atol=tolerance, t_eval=times, events=events)
-    if not done.success:
-        raise SymtopError(f"{method} cannot integrate to t = {times[-1]:g}: {done.message}")
-    return done.y  # type: ignore[no-any-return]
+    solution = solve_ivp(rates, span, start, method=method, rtol=tolerance, atol=tolerance, t_eval=times, events=events)
+    if not solution.success:
+        raise SymtopError(f"{method} cannot integrate to t = {times[-1]:g}: {solution.message}")
+    return solution.y  # type: ignore[no-any-return]
 
 
 _METHODS = {  # summary, order, reference, explicit

@@ -44,8 +44,8 @@ def _column(par: Any, e: Any, u: Any, Ju: Any, mean: Any, pull: Any, quarter: fl
     Jd, part = inertia(par, e, d), 1.0 / (1.0 + dot(u, u))
     changed = plus(plus(plus(cross(d, e), dot(u, e), d), dot(d, e), u), -2.0 * dot(u, d), mean)
     torque = gravity(par, scaled(part, changed))
-    rest = plus(plus(torque, -1.0, cross(u, torque)), -1.0, cross(d, pull))
-    return plus(plus(plus(Jd, 1.0, cross(d, Ju)), 1.0, cross(u, Jd)), -quarter, rest)
+    force = plus(plus(torque, -1.0, cross(u, torque)), -1.0, cross(d, pull))
+    return plus(plus(plus(Jd, 1.0, cross(d, Ju)), 1.0, cross(u, Jd)), -quarter, force)
 
 
 @register_jitable
@@ -57,34 +57,34 @@ def _mean(e: Any, u: Any) -> Any:
 
 def _start(par: Any, rule: Any, e: Any, L: Any, carry: Any, h: float) -> Any:
     a = scaled(0.5 * h, L)
-    pulled = plus(a, 0.25 * h * h, gravity(par, e))
-    along = dot(pulled, e)
-    return (*e, *a), plus(scaled(1.0 / par.I1, pulled), along / par.I3 - along / par.I1, e)
+    momentum = plus(a, 0.25 * h * h, gravity(par, e))
+    along = dot(momentum, e)
+    return (*e, *a), plus(scaled(1.0 / par.I1, momentum), along / par.I3 - along / par.I1, e)
 
 
-def _again(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:
+def _iterate(par: Any, rule: Any, carry: Any, h: float, fixed: Any, u: Any) -> Any:
     """Newton's next u."""
-    e, a, quarter = opened[:3], opened[3:], 0.25 * h * h
+    e, a, quarter = fixed[:3], fixed[3:], 0.25 * h * h
     mean = _mean(e, u)
     pull, Ju = gravity(par, mean), inertia(par, e, u)
-    rest = plus(plus(a, -1.0, Ju), -1.0, cross(u, Ju))
-    rest = plus(rest, quarter, plus(pull, -1.0, cross(u, pull)))
+    residual = plus(plus(a, -1.0, Ju), -1.0, cross(u, Ju))
+    residual = plus(residual, quarter, plus(pull, -1.0, cross(u, pull)))
     first = _column(par, e, u, Ju, mean, pull, quarter, (1.0, 0.0, 0.0))
     second = _column(par, e, u, Ju, mean, pull, quarter, (0.0, 1.0, 0.0))
     third = _column(par, e, u, Ju, mean, pull, quarter, (0.0, 0.0, 1.0))
-    change = solve3(first, second, third, rest)
+    change = solve3(first, second, third, residual)
     u = plus(u, 1.0, change)
     size = abs(change[0]) + abs(change[1]) + abs(change[2])
     return u, size <= CONVERGED_CORRECTION * (1.0 + abs(u[0]) + abs(u[1]) + abs(u[2])), False
 
 
-def _close(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:
+def _close(par: Any, rule: Any, carry: Any, h: float, fixed: Any, u: Any) -> Any:
     """The rotation of u, and the change of L."""
     m, v = cayley(u)
-    return m, v, scaled(h, gravity(par, _mean(opened[:3], u))), carry
+    return m, v, scaled(h, gravity(par, _mean(fixed[:3], u))), carry
 
 
-march = iterated_loop((_start, _again, _close), MOST_SWEEPS, opened=6, unknowns=3)
+march = iterated_loop((_start, _iterate, _close), MOST_SWEEPS, opened=6, unknowns=3)
 
 
 def built_in() -> list[Integrator]:

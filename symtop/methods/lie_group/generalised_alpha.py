@@ -57,40 +57,40 @@ def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 
 @register_jitable
-def _corrected(par: Any, e: Any, w: Any, m: float, v: Any, gain: Any, by: float, slope: Any, last: float) -> Any:
+def _correct(par: Any, e: Any, w: Any, m: float, v: Any, gain: Any, factor: float, slope: Any, last: float) -> Any:
     """The next W'_1, the size of its correction, and whether it is the last, after a correction of size `last`."""
     rate = plus(w, 1.0, gain)
     torque = gravity(par, plus(e, 1.0, moved(m, v, e)))
     torque = plus(torque, 1.0, moved(m, scaled(-1.0, v), torque))
     J = inertia(par, e, rate)
-    rest = plus(plus(torque, -1.0, cross(rate, J)), -1.0, inertia(par, e, slope))
+    residual = plus(plus(torque, -1.0, cross(rate, J)), -1.0, inertia(par, e, slope))
     x, y, z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
     Jx, Jy, Jz = inertia(par, e, x), inertia(par, e, y), inertia(par, e, z)
     change = solve3(
-        plus(Jx, by, plus(cross(x, J), 1.0, cross(rate, Jx))),
-        plus(Jy, by, plus(cross(y, J), 1.0, cross(rate, Jy))),
-        plus(Jz, by, plus(cross(z, J), 1.0, cross(rate, Jz))),
-        rest,
+        plus(Jx, factor, plus(cross(x, J), 1.0, cross(rate, Jx))),
+        plus(Jy, factor, plus(cross(y, J), 1.0, cross(rate, Jy))),
+        plus(Jz, factor, plus(cross(z, J), 1.0, cross(rate, Jz))),
+        residual,
     )
     size = abs(change[0]) + abs(change[1]) + abs(change[2])
     scale = abs(par.mgl) / par.I1 + rate[0] * rate[0] + rate[1] * rate[1] + rate[2] * rate[2]
-    ended = size <= CONVERGED_CORRECTION * scale or (size >= last and size <= 1e-10 * scale)
-    return plus(slope, 1.0, change), size, ended
+    converged = size <= CONVERGED_CORRECTION * scale or (size >= last and size <= 1e-10 * scale)
+    return plus(slope, 1.0, change), size, converged
 
 
 def _parts(rotation: Callable[..., Any], *, alone: bool) -> Parts:
     """The parts of an iteration in the body's axes of the start, with the rotor of any angle, or of one below 2.
 
-    x is W'_1 and the size of its last correction; then, with `alone`, the results of `made_of` in the last pass, which
+    x is W'_1 and the size of its last correction; then, with `alone`, the results of `derive` in the last pass, which
     fit in registers, and in lanes W'_1 before that correction, from which they are computed again.
     """
 
     @register_jitable
-    def made_of(rule, carry, h, opened, slope):  # type: ignore[no-untyped-def]
+    def derive(rule, carry, h, fixed, slope):  # type: ignore[no-untyped-def]
         """a_1, the rotation and the gain of W that follow from W'_1, its share in a_1, and is the angle below 2."""
-        w, a, part = opened[3:], carry[:3], 1.0 / (1.0 - rule[0])
-        known, share = scaled(part, plus(scaled(rule[1], carry[3:]), -rule[0], a)), part * (1.0 - rule[1])
-        b = plus(known, share, slope)
+        w, a, part = fixed[3:], carry[:3], 1.0 / (1.0 - rule[0])
+        base, share = scaled(part, plus(scaled(rule[1], carry[3:]), -rule[0], a)), part * (1.0 - rule[1])
+        b = plus(base, share, slope)
         angle = scaled(h, plus(plus(w, h * (0.5 - rule[3]), a), h * rule[3], b))
         square = 0.25 * dot(angle, angle)
         s, m = rotation(square, 0.5)
@@ -100,24 +100,24 @@ def _parts(rotation: Callable[..., Any], *, alone: bool) -> Parts:
         before, room = carry[3:], (0.0,) * 10 if alone else (0.0,) * 3
         return (*e, *_rates(par, e, L)), (*before, math.inf, *room)
 
-    def again(par, rule, carry, h, opened, x):  # type: ignore[no-untyped-def]
+    def iterate(par, rule, carry, h, fixed, x):  # type: ignore[no-untyped-def]
         slope = x[:3]
-        b, m, v, gain, share, is_near = made_of(rule, carry, h, opened, slope)
-        after, size, ended = _corrected(par, opened[:3], opened[3:], m, v, gain, h * rule[2] * share, slope, x[3])
-        rest = (*b, m, *v, *gain) if alone else slope
-        return (*after, size, *rest), ended, not (alone or is_near)
+        b, m, v, gain, share, is_near = derive(rule, carry, h, fixed, slope)
+        after, size, converged = _correct(par, fixed[:3], fixed[3:], m, v, gain, h * rule[2] * share, slope, x[3])
+        tail = (*b, m, *v, *gain) if alone else slope
+        return (*after, size, *tail), converged, not (alone or is_near)
 
-    def close(par, rule, carry, h, opened, x):  # type: ignore[no-untyped-def]
+    def close(par, rule, carry, h, fixed, x):  # type: ignore[no-untyped-def]
         """The rotation, the change of L, and a and W' of the next step in the axes that the rotation leads to."""
         if alone:
             b, m, v, gain = x[4:7], x[7], x[8:11], x[11:]
         else:
-            b, m, v, gain, _, _ = made_of(rule, carry, h, opened, x[4:])
-        J = inertia(par, opened[:3], plus(opened[3:], 1.0, gain))
-        dL = plus(inertia(par, opened[:3], gain), 1.0, moved(m, v, J))
+            b, m, v, gain, _, _ = derive(rule, carry, h, fixed, x[4:])
+        J = inertia(par, fixed[:3], plus(fixed[3:], 1.0, gain))
+        dL = plus(inertia(par, fixed[:3], gain), 1.0, moved(m, v, J))
         return m, v, dL, (*plus(b, 1.0, moved(m, v, b)), *plus(x[:3], 1.0, moved(m, v, x[:3])))
 
-    return start, again, close
+    return start, iterate, close
 
 
 march = iterated_loop(

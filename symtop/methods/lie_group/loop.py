@@ -42,7 +42,7 @@ from symtop.model.charts import BODY
 _attitude_numbers = on_attitude.numbers
 
 
-def _on_body(top: Any, at: Any) -> Any:
+def _prepare_body(top: Any, at: Any) -> Any:
     return BareTop(top.I1, top.I3, top.mgl), _attitude_numbers(top, at)[1]
 
 
@@ -55,7 +55,7 @@ class SpinForm(NamedTuple):
 
 
 UNSPUN = SpinForm(on_attitude, Presentation(lambda par, t, y: with_spin(par, y, t), 7), SpaceTop)
-SPUN = SpinForm(Preparation(_on_body, 7), None, BareTop)
+SPUN = SpinForm(Preparation(_prepare_body, 7), None, BareTop)
 TURNED = SpinForm(turned, turned_back, General)  # a body without symmetry
 _AXIS = Presentation(lambda _par, _t, y: (*axis_of(y[0], y[1], y[2], y[3]), y[4], y[5], y[6]), 6)
 STILL = (0.0,) * 7  # no increment
@@ -119,16 +119,16 @@ def lie_loop(
 
 
 def in_charts(
-    loop: Loop, rule: Any, carried: SpinForm, forces: int, *, implicit: bool, of_body: Loop | None = None
+    loop: Loop, rule: Any, form: SpinForm, forces: int, *, implicit: bool, of_body: Loop | None = None
 ) -> dict[str, FixedStep]:
     """Solvers on the axis and on the attitude, and of a body around a loop on (q*, M) with `observe_turned`.
 
     A unit of work is so many force evaluations.
     """
-    made = functools.partial(FixedStep, rule=rule, evaluations=forces, implicit=implicit)
-    shown = {"axis": _AXIS, "attitude": carried.present}
-    of_top = {chart: made(loop, prepare=carried.prepare, present=present) for chart, present in shown.items()}
-    return of_top if of_body is None else of_top | {BODY: made(of_body, prepare=TURNED.prepare, present=TURNED.present)}
+    make = functools.partial(FixedStep, rule=rule, evaluations=forces, implicit=implicit)
+    presentations = {"axis": _AXIS, "attitude": form.present}
+    of_top = {chart: make(loop, prepare=form.prepare, present=present) for chart, present in presentations.items()}
+    return of_top if of_body is None else of_top | {BODY: make(of_body, prepare=TURNED.prepare, present=TURNED.present)}
 
 
 @register_jitable
@@ -155,19 +155,19 @@ def add_rotation(block: Any, j: int, q: Any, m: float, v: Any, dL: Any) -> None:
 
 
 @register_jitable
-def give_up(block: Any, j: int, when: bool) -> None:
-    """Mark lane j to be run alone, if `when`, without a branch."""
-    block[FLAG * W + j] = 1.0 if when else block[FLAG * W + j]
+def give_up(block: Any, j: int, failed: bool) -> None:
+    """Mark lane j to be run alone, if `failed`, without a branch."""
+    block[FLAG * W + j] = 1.0 if failed else block[FLAG * W + j]
 
 
 def stepped(
-    part: Callable[..., None], lay: Callable[..., None], fields: int, each: int, *,
+    part: Callable[..., None], lay: Callable[..., None], fields: int, width: int, *,
     carried: SpinForm, carry: int = 1, begin: Callable[..., Any] = no_carry, room: int = 0,
     effort: Callable[[Any], int] = lambda _: 0,
 ) -> Lanes:  # fmt: skip
     """A map in lanes: ``part(block, table, row)`` makes one share of all lanes; `row` holds the share's numbers.
 
-    ``lay(par, rule, h, numbers)`` writes `fields` numbers of the rule, then `each` for every share.
+    ``lay(par, rule, h, numbers)`` writes `fields` numbers of the rule, then `width` for every share.
     """
     shares_at = len(carried.top._fields) + fields
     register_jitable(part)
@@ -176,17 +176,17 @@ def stepped(
         wide_vectors()
         for j in range(W):
             put(block, STEP, j, STILL)
-        for share in range((len(table) // W - shares_at) // each):
-            part(block, table, table[(shares_at + share * each) * W :])
+        for share in range((len(table) // W - shares_at) // width):
+            part(block, table, table[(shares_at + share * width) * W :])
         for j in range(W):
             state, step = column(block, 0, j, STILL), column(block, STEP, j, STILL)
             give_up(block, j, ended_space(step) != OK)
-            moved, low = accumulate(state, column(block, LOW, j, STILL), step)  # `move` takes a fifth longer here
-            put(block, 0, j, moved)
+            new, low = accumulate(state, column(block, LOW, j, STILL), step)  # `move` takes a fifth longer here
+            put(block, 0, j, new)
             put(block, LOW, j, low)
 
     def size(rule: Any) -> int:
-        return fields + each * len(rule.shares)
+        return fields + width * len(rule.shares)
 
     small, large = showing(_AXIS.sample), showing(as_it_steps if carried.present is None else carried.present.sample)
 
@@ -199,60 +199,60 @@ def stepped(
     return Lanes(step, lay, lambda _: 0.0, size, carried.top, SIZE, carry, effort, lambda _: room, begin, show)
 
 
-Parts = tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # start, again and close
+Parts = tuple[Callable[..., Any], Callable[..., Any], Callable[..., Any]]  # start, iterate and close
 
 
 def iterated_loop(  # noqa: C901  (the loops of one step, read in one piece)
-    parts: Parts, most: int, *, opened: int, unknowns: int, in_lanes: Parts | None = None,
+    parts: Parts, limit: int, *, opened: int, unknowns: int, in_lanes: Parts | None = None,
     numbers: Callable[..., Any] = lambda _: (0.0,), count: int = 1, begin: Callable[..., Any] = no_carry,
     carry: int = 1, carried: SpinForm = SPUN, observe: Callable[..., Any] = observe_attitude,
 ) -> Loop:  # fmt: skip
     """The loop around an iterated map of a body, for one and in lanes, from its parts; it counts passes as work.
 
         numbers(rule) -> rule                                        in lanes `count` numbers of it, as the parts take
-        start(par, rule, e, L, carry, h) -> (opened, x)              what no pass changes, and the first guess
-        again(par, rule, carry, h, opened, x) -> (x, ended, lost)    one pass; a lane that is lost runs alone
-        close(par, rule, carry, h, opened, x) -> (m, v, dL, carry)   the rotation and the next carry
+        start(par, rule, e, L, carry, h) -> (fixed, x)               `opened` numbers that stay, and the first guess
+        iterate(par, rule, carry, h, fixed, x) -> (x, converged, failed)      one pass; a lane that failed runs alone
+        close(par, rule, carry, h, fixed, x) -> (m, v, dL, carry)    the rotation and the next carry
 
-    `opened`, x and the carry are flat tuples. A run alone makes at most `most` passes. `in_lanes` are the parts without
+    `fixed`, x and the carry are flat tuples. A run alone makes at most `limit` passes. `in_lanes` are the parts without
     a branch, where there is one.
     """
-    (start, again, close), (begin_lane, again_lane, close_lane) = parts, in_lanes or parts
+    (start, iterate, close), (begin_lane, iterate_lane, close_lane) = parts, in_lanes or parts
     body, tops, first = carried.top, len(carried.top._fields), CARRY + carry
     x_at, live_at = first + opened, first + opened + unknowns
-    top_of, rule_of, opens, unknown = reading(tops), reading(count), reading(opened), reading(unknowns)
+    top_of, rule_of, fixed_of, x_of = reading(tops), reading(count), reading(opened), reading(unknowns)
     carry_of = reading(carry)
     for function in (*parts, *(in_lanes or ()), numbers):
         register_jitable(function)
 
     @register_jitable
-    def given(block, table, row, j):  # type: ignore[no-untyped-def]
+    def load(block, table, row, j):  # type: ignore[no-untyped-def]
         return body(*top_of(table, 0, j)), rule_of(table, tops, j), carry_of(block, CARRY, j), row[j]
 
     def part(block, table, row):  # type: ignore[no-untyped-def]
         wide_vectors()
         for j in range(W):
-            par, rule, carry, h = given(block, table, row, j)
+            par, rule, carry, h = load(block, table, row, j)
             _, e, L = present_state(block, j)
             fixed, x = begin_lane(par, rule, e, L, carry, h)
             put(block, first, j, fixed)
             put(block, x_at, j, x)
             block[live_at * W + j] = 1.0 - block[FLAG * W + j]
-        for _ in range(most // 2):
+        for _ in range(limit // 2):
             for j in range(W):
-                par, rule, carry, h = given(block, table, row, j)
-                x, live = unknown(block, x_at, j), block[live_at * W + j]
-                after, ended, lost = again_lane(par, rule, carry, h, opens(block, first, j), x)
+                par, rule, carry, h = load(block, table, row, j)
+                x, live = x_of(block, x_at, j), block[live_at * W + j]
+                after, converged, failed = iterate_lane(par, rule, carry, h, fixed_of(block, first, j), x)
                 for i in range(unknowns):
                     block[(x_at + i) * W + j] = after[i] if live != 0.0 else x[i]
-                block[FLAG * W + j] = max(block[FLAG * W + j], live if lost else 0.0)
+                block[FLAG * W + j] = max(block[FLAG * W + j], live if failed else 0.0)
                 block[WORK * W + j] += live
-                block[live_at * W + j] = 0.0 if ended or lost else live
+                block[live_at * W + j] = 0.0 if converged or failed else live
             if none_left(block, live_at):
                 break
         for j in range(W):
-            par, rule, carry, h = given(block, table, row, j)
-            m, v, dL, newest = close_lane(par, rule, carry, h, opens(block, first, j), unknown(block, x_at, j))
+            par, rule, carry, h = load(block, table, row, j)
+            m, v, dL, newest = close_lane(par, rule, carry, h, fixed_of(block, first, j), x_of(block, x_at, j))
             add_rotation(block, j, present_state(block, j)[0], m, v, dL)
             put(block, CARRY, j, newest)
             give_up(block, j, block[live_at * W + j] != 0.0)
@@ -267,12 +267,12 @@ def iterated_loop(  # noqa: C901  (the loops of one step, read in one piece)
 
     def turn(par, rule, e, L, carry, h):  # type: ignore[no-untyped-def]
         fixed, x = start(par, rule, e, L, carry, h)
-        work, ended, lost = 0, False, False
-        while not (ended or lost) and work < most:
-            x, ended, lost = again(par, rule, carry, h, fixed, x)
+        work, converged, failed = 0, False, False
+        while not (converged or failed) and work < limit:
+            x, converged, failed = iterate(par, rule, carry, h, fixed, x)
             work += 1
         m, v, dL, carry = close(par, rule, carry, h, fixed, x)
-        return m, v, dL, carry, work, OK if ended and not lost else NOT_CONVERGED
+        return m, v, dL, carry, work, OK if converged and not failed else NOT_CONVERGED
 
     lanes = stepped(part, lay, count, 1, carried=carried, carry=carry, begin=begin, room=live_at + 1 - first)
     return lie_loop(turn, begin, lambda _: lanes, observe)

@@ -91,21 +91,21 @@ def any_angle(square: float) -> Any:
 
 
 @register_jitable
-def times_exponential(so_far: Any, L: Any, element: Any, turned: Any) -> Any:
+def times_exponential(product: Any, L: Any, element: Any, rotation: Any) -> Any:
     """A product of exponentials with one more, exp(w, f) of s, m and C: its rotation, the axis and the change of L."""
-    (total, v, x, dL), (s, m, cubic), w, f = so_far, turned, element[:3], element[3:]
+    (total, v, x, dL), (s, m, cubic), w, f = product, rotation, element[:3], element[3:]
     u, bent = scaled(s, w), cross(w, f)
     b = plus(plus(f, 2.0 * s * s, bent), cubic, cross(w, bent))
     x = plus(x, 1.0, moved(m, u, x))
     dL = plus(plus(dL, 1.0, moved(m, u, plus(L, 1.0, dL))), 1.0, cross(b, x))
-    mixed = total + m + total * m - dot(u, v)
-    return mixed, plus(plus(scaled(1.0 + m, v), 1.0 + total, u), 1.0, cross(u, v)), x, dL
+    real = total + m + total * m - dot(u, v)
+    return real, plus(plus(scaled(1.0 + m, v), 1.0 + total, u), 1.0, cross(u, v)), x, dL
 
 
 @register_jitable
-def _bracket(element: Any, other: Any) -> Any:
+def _bracket(left: Any, right: Any) -> Any:
     """[(w, f), (x, g)] = (w x x, w x g + f x x)."""
-    w, f, x, g = element[:3], element[3:], other[:3], other[3:]
+    w, f, x, g = left[:3], left[3:], right[:3], right[3:]
     return (*cross(w, x), *plus(cross(w, g), 1.0, cross(f, x)))
 
 
@@ -114,23 +114,23 @@ def dexp_inverse(element: Any, slope: Any, brackets: Any) -> Any:
     """dexp^-1 of an element of the algebra, two, four or six nested brackets of it, on another one."""
     once = _bracket(element, slope)
     twice = _bracket(element, once)
-    bent = add(add(slope, once, -0.5), twice, 1.0 / 12.0)
+    result = add(add(slope, once, -0.5), twice, 1.0 / 12.0)
     if brackets > 2:
         four = _bracket(element, _bracket(element, twice))
-        bent = add(bent, four, -1.0 / 720.0)
+        result = add(result, four, -1.0 / 720.0)
         if brackets > 4:
-            bent = add(bent, _bracket(element, _bracket(element, four)), 1.0 / 30240.0)
-    return bent
+            result = add(result, _bracket(element, _bracket(element, four)), 1.0 / 30240.0)
+    return result
 
 
 @register_jitable
-def _of_top(par: Any, L: Any) -> Any:
+def _top_element(par: Any, L: Any) -> Any:
     """The element of se(3) that the field is at L."""
     return (*scaled(1.0 / par.I1, L), 0.0, 0.0, par.mgl)
 
 
 @register_jitable
-def _of_body(par: Any, M: Any) -> Any:
+def _body_element(par: Any, M: Any) -> Any:
     """The element of se(3) of a body at M, in body axes (`framework.body`)."""
     return -par.a1 * M[0], -par.a2 * M[1], -par.a3 * M[2], -par.c1, -par.c2, -par.c3
 
@@ -151,19 +151,19 @@ def _product(count: int, terms: int, first: int, stages: int) -> Part:
     """A function (e, L, slopes, row, j): the product of `count` exponentials, the last one, and 0 if all are near."""
     if count == 0:
 
-        def made(e, L, slopes, row, j):  # type: ignore[no-untyped-def]
+        def multiply(e, L, slopes, row, j):  # type: ignore[no-untyped-def]
             return (0.0, NOUGHT, e, NOUGHT), NO_SLOPE, 0.0
     else:
         before = _product(count - 1, terms, first, stages)
-        summed = weighted_in_lanes(terms, first + (count - 1) * stages)
+        weighted = weighted_in_lanes(terms, first + (count - 1) * stages)
 
-        def made(e, L, slopes, row, j):  # type: ignore[no-untyped-def]
-            so_far, _, far = before(e, L, slopes, row, j)
-            element = summed(NO_SLOPE, slopes, row, j)
+        def multiply(e, L, slopes, row, j):  # type: ignore[no-untyped-def]
+            product, _, far = before(e, L, slopes, row, j)
+            element = weighted(NO_SLOPE, slopes, row, j)
             square = half_square(element)
-            return times_exponential(so_far, L, element, near(square)), element, far if square < 1.0 else 1.0
+            return times_exponential(product, L, element, near(square)), element, far if square < 1.0 else 1.0
 
-    return register_jitable(made)
+    return register_jitable(multiply)
 
 
 def _stages(field: Part, counts: tuple[int, ...], stages: int, brackets: int) -> Part:
@@ -174,36 +174,36 @@ def _stages(field: Part, counts: tuple[int, ...], stages: int, brackets: int) ->
             return (field(par, L),), 0.0
     else:
         before = _stages(field, counts[:-1], stages, brackets)
-        made = _product(counts[-1], len(counts), sum(counts[:-1]) * stages, stages)
+        multiply = _product(counts[-1], len(counts), sum(counts[:-1]) * stages, stages)
 
         def slopes(par, e, L, row, j):  # type: ignore[no-untyped-def]
-            known, far = before(par, e, L, row, j)
-            so_far, element, too_far = made(e, L, known, row, j)
-            slope = field(par, plus(L, 1.0, so_far[3]))
+            values, far = before(par, e, L, row, j)
+            product, element, far_product = multiply(e, L, values, row, j)
+            slope = field(par, plus(L, 1.0, product[3]))
             if brackets:
                 slope = dexp_inverse(element, slope, brackets)
-            return (*known, slope), max(far, too_far)
+            return (*values, slope), max(far, far_product)
 
     return register_jitable(slopes)
 
 
 @functools.cache
-def _of_shape(field: Part, carried: SpinForm, counts: tuple[int, ...], brackets: int) -> Lanes:
-    stages, top, top_at = len(counts), carried.top, reading(len(carried.top._fields))
+def _lanes_of_shape(field: Part, form: SpinForm, counts: tuple[int, ...], brackets: int) -> Lanes:
+    stages, top, top_at = len(counts), form.top, reading(len(form.top._fields))
     slopes = _stages(field, counts[:-1], stages, brackets)
-    whole = _product(counts[-1], stages, sum(counts[:-1]) * stages, stages)
+    multiply = _product(counts[-1], stages, sum(counts[:-1]) * stages, stages)
 
     def part(block, table, row):  # type: ignore[no-untyped-def]
         wide_vectors()
         for j in range(W):
             par, (q, e, L) = top(*top_at(table, 0, j)), present_state(block, j)
-            known, far = slopes(par, e, L, row, j)
-            (m, v, _, dL), _, too_far = whole(e, L, known, row, j)
+            stage_slopes, far = slopes(par, e, L, row, j)
+            (m, v, _, dL), _, far_product = multiply(e, L, stage_slopes, row, j)
             add_rotation(block, j, q, m, v, dL)
-            give_up(block, j, max(far, too_far) != 0.0)
+            give_up(block, j, max(far, far_product) != 0.0)
 
-    each = sum(counts) * stages
-    return stepped(part, _lay, 0, each, carried=carried, effort=lambda rule: len(rule.counts) * len(rule.shares))
+    width = sum(counts) * stages
+    return stepped(part, _lay, 0, width, carried=form, effort=lambda rule: len(rule.counts) * len(rule.shares))
 
 
 class LieTable(NamedTuple):
@@ -219,33 +219,33 @@ def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
     return np.empty((len(rule.counts), 6))
 
 
-def _loop(field: Part, carried: SpinForm, observe: Callable[..., Any]) -> Loop:
+def _loop(field: Part, form: SpinForm, observe: Callable[..., Any]) -> Loop:
     """The loop around a step with ``field(par, L)`` in se(3); the work counted is the number of force evaluations."""
 
     def turn(par, rule, e, L, slopes, h):  # type: ignore[no-untyped-def]
         stages, row = len(rule.counts), 0
         store(slopes, 0, field(par, L))
-        made = 0.0, NOUGHT, e, NOUGHT
+        product = 0.0, NOUGHT, e, NOUGHT
         for i in range(1, stages + 1):
-            made, element = (0.0, NOUGHT, e, NOUGHT), NO_SLOPE
+            product, element = (0.0, NOUGHT, e, NOUGHT), NO_SLOPE
             for _ in range(int(rule.counts[i - 1])):
                 element = NO_SLOPE
                 for j in range(i):
                     element = add(element, row_of(slopes, j, NO_SLOPE), h * rule.weights[row + j])
                 row += stages
-                made = times_exponential(made, L, element, any_angle(half_square(element)))
+                product = times_exponential(product, L, element, any_angle(half_square(element)))
             if i < stages:
-                slope = field(par, plus(L, 1.0, made[3]))
+                slope = field(par, plus(L, 1.0, product[3]))
                 store(slopes, i, dexp_inverse(element, slope, rule.brackets) if rule.brackets > 0.0 else slope)
-        return made[0], made[1], made[3], slopes, stages, OK
+        return product[0], product[1], product[3], slopes, stages, OK
 
     def lanes(rule: LieTable) -> Lanes:
-        return _of_shape(field, carried, tuple(map(int, rule.counts)), int(rule.brackets))
+        return _lanes_of_shape(field, form, tuple(map(int, rule.counts)), int(rule.brackets))
 
     return lie_loop(turn, _begin, lanes, observe)
 
 
-march, march_body = _loop(_of_top, UNSPUN, observe_attitude), _loop(_of_body, TURNED, observe_turned)
+march, march_body = _loop(_top_element, UNSPUN, observe_attitude), _loop(_body_element, TURNED, observe_turned)
 
 
 def lie_runge_kutta(
@@ -270,7 +270,7 @@ def lie_runge_kutta(
 def built_in() -> list[Integrator]:
     """Four methods of Munthe-Kaas, Crouch-Grossman's and the commutator-free one."""
     munthe_kaas = "munthe-kaas-1999 engo-faltinsen-2001"
-    five, eight = (tuple((row,) for row in (*of.a[: len(of.b) - 1], of.b)) for of in (TSIT5, DOP853))
+    five, eight = (tuple((row,) for row in (*table.a[: len(table.b) - 1], table.b)) for table in (TSIT5, DOP853))
     return [
         lie_runge_kutta(
             "rkmk-se3-2", (((0.5,),), ((0.0, 1.0),)), 2,

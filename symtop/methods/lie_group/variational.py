@@ -81,7 +81,7 @@ def _next_k(par: Any, A: float, square: float, x: Any) -> Any:
 
 # The equation for one number, in functions of what a holds along the axis and of the square of what lies across:
 #     first(par, A, square) -> x
-#     after(par, A, square, x) -> (x, ended, lost)      one iteration
+#     after(par, A, square, x) -> (x, converged, failed) one iteration
 #     rates(par, A, x) -> (n, i, x)
 RIGID_BODY = (lambda _par, _A, _square: (1.0,)), _next_n, (lambda par, A, x: (x[0], par.I1, A / par.I3 * x[0]))
 RETRACTION = (  # k from 0 in the interval that it lies in
@@ -104,19 +104,19 @@ def _loop(first: Callable[..., Any], after: Callable[..., Any], rates: Callable[
         square = dot(across, across)
         return (*e, *across, A, square), first(par, A, square)
 
-    def again(par, rule, carry, h, opened, x):  # type: ignore[no-untyped-def]
-        return after(par, opened[6], opened[7], x)
+    def iterate(par, rule, carry, h, fixed, x):  # type: ignore[no-untyped-def]
+        return after(par, fixed[6], fixed[7], x)
 
-    def close(par, rule, carry, h, opened, x):  # type: ignore[no-untyped-def]
+    def close(par, rule, carry, h, fixed, x):  # type: ignore[no-untyped-def]
         """The rotation, and the change of L with both halves of the kick."""
-        (n, i, along), e, across, half = rates(par, opened[6], x), opened[:3], opened[3:6], 0.5 * h
+        (n, i, along), e, across, half = rates(par, fixed[6], x), fixed[:3], fixed[3:6], 0.5 * h
         bent = (par.I3 - par.I1) * along
         side = plus(scaled(i, across), -bent, cross(across, e))
         m, v = cayley(plus(scaled(along, e), n / (i * i + bent * bent), side))
         kick = scaled(half, gravity(par, e))
         return m, v, plus(kick, half, gravity(par, plus(e, 1.0, moved(m, v, e)))), carry
 
-    return iterated_loop((start, again, close), MOST_SWEEPS, opened=8, unknowns=unknowns)
+    return iterated_loop((start, iterate, close), MOST_SWEEPS, opened=8, unknowns=unknowns)
 
 
 MARCH = {MOSER_VESELOV: _loop(*RIGID_BODY, 1), EULER_POINCARE: _loop(*RETRACTION, 3)}
@@ -134,36 +134,36 @@ def _image(par: Any, kind: float, a: Any, u: Any, Ju: Any, d: Any) -> Any:
 def _start(par: Any, rule: Any, g: Any, M: Any, carry: Any, h: float) -> Any:
     """Gamma and M after half of the kick, and the first u."""
     half = 0.5 * h
-    kicked = plus(M, half, torque(par, *g))
-    a = scaled(half, kicked)
-    return (*g, *kicked), (par.a1 * a[0], par.a2 * a[1], par.a3 * a[2])
+    momentum = plus(M, half, torque(par, *g))
+    a = scaled(half, momentum)
+    return (*g, *momentum), (par.a1 * a[0], par.a2 * a[1], par.a3 * a[2])
 
 
-def _again(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:
+def _iterate(par: Any, rule: Any, carry: Any, h: float, fixed: Any, u: Any) -> Any:
     """Newton's next u, in the axes of the body."""
-    kind, a = rule[0], scaled(0.5 * h, opened[3:])
+    kind, a = rule[0], scaled(0.5 * h, fixed[3:])
     Ju = par.I1 * u[0], par.I2 * u[1], par.I3 * u[2]
-    rest = plus(scaled(1.0 + (1.0 - kind) * dot(u, u), a), -1.0, Ju)
-    rest = plus(plus(rest, -1.0, cross(u, Ju)), -kind * dot(u, Ju), u)
+    residual = plus(scaled(1.0 + (1.0 - kind) * dot(u, u), a), -1.0, Ju)
+    residual = plus(plus(residual, -1.0, cross(u, Ju)), -kind * dot(u, Ju), u)
     first = _image(par, kind, a, u, Ju, (1.0, 0.0, 0.0))
     second = _image(par, kind, a, u, Ju, (0.0, 1.0, 0.0))
     third = _image(par, kind, a, u, Ju, (0.0, 0.0, 1.0))
-    change = solve3(first, second, third, rest)
+    change = solve3(first, second, third, residual)
     u = plus(u, 1.0, change)
-    ended = dot(change, change) <= CONVERGED_CORRECTION * CONVERGED_CORRECTION * dot(u, u)
-    return u, ended, not dot(first, cross(second, third)) > 0.0
+    converged = dot(change, change) <= CONVERGED_CORRECTION * CONVERGED_CORRECTION * dot(u, u)
+    return u, converged, not dot(first, cross(second, third)) > 0.0
 
 
-def _close(par: Any, rule: Any, carry: Any, h: float, opened: Any, u: Any) -> Any:
+def _close(par: Any, rule: Any, carry: Any, h: float, fixed: Any, u: Any) -> Any:
     """The rotation, and the change of M with both halves of the kick."""
-    g, kicked = opened[:3], opened[3:]
+    g, momentum = fixed[:3], fixed[3:]
     m, v = cayley(scaled(-1.0, u))  # space turns the other way
     kick = plus(torque(par, *g), 1.0, torque(par, *plus(g, 1.0, moved(m, v, g))))
-    return m, v, plus(moved(m, v, kicked), 0.5 * h, kick), carry
+    return m, v, plus(moved(m, v, momentum), 0.5 * h, kick), carry
 
 
 march_body = iterated_loop(
-    (_start, _again, _close), MOST_SWEEPS, opened=6, unknowns=3, numbers=lambda rule: (rule.kind,), carried=TURNED,
+    (_start, _iterate, _close), MOST_SWEEPS, opened=6, unknowns=3, numbers=lambda rule: (rule.kind,), carried=TURNED,
     observe=observe_turned,
 )  # fmt: skip
 

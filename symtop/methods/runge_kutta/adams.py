@@ -83,16 +83,16 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
 
     @register_jitable
     def advance(par, state, memory, tolerance, t, step, end):  # type: ignore[no-untyped-def]  # noqa: C901
-        least, grid = 10.0 * (np.nextafter(t, np.inf) - t), 1.5 * end
-        k, failures, evaluations, step = max(int(memory[LAST, ORDER]), 1), 0, 0, max(step, least)
+        shortest, grid = 10.0 * (np.nextafter(t, np.inf) - t), 1.5 * end
+        k, failures, evaluations, step = max(int(memory[LAST, ORDER]), 1), 0, 0, max(step, shortest)
         settled = memory[LAST, SETTLED] != 0.0
-        while step >= least and failures < MOST_FAILURES:
+        while step >= shortest and failures < MOST_FAILURES:
             h = (grid + step) - grid  # so that t + h is exact and steps of one length stay so
-            h = max(least, h if h > 0.0 else step)
+            h = max(shortest, h if h > 0.0 else step)
             after = min(t + h, end)
             h = h if after < end else end - t
-            same = min(memory[LAST, SAME], memory[LAST, ORDER_THEN]) + 1.0 if h == memory[LAST, LENGTH] else 1.0
-            if same <= k or k != memory[LAST, ORDER_THEN] or failures > 0:
+            count = min(memory[LAST, SAME], memory[LAST, ORDER_THEN]) + 1.0 if h == memory[LAST, LENGTH] else 1.0
+            if count <= k or k != memory[LAST, ORDER_THEN] or failures > 0:
                 coefficients(memory, k, h)
             total = place = zero(state)
             for i in range(k - 1, -1, -1):
@@ -103,36 +103,36 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
             change = add(field(par, place), total, -1.0)
             evaluations += 1
             size = h * rms(change, state, place, tolerance)
-            own, below, lower = size * memory[NUMBERS + k, SIGMA] * GAMMA[k], np.inf, np.inf
+            error, below, lower = size * memory[NUMBERS + k, SIGMA] * GAMMA[k], np.inf, np.inf
             for i in range(1, min(k, 3)):
                 part = rms(add(change, row_of(memory, SUMS + k - i, state), 1.0), state, place, tolerance)
                 part *= h * memory[NUMBERS + k - i, SIGMA] * GAMMA[k - i]
                 below, lower = (part, 2.0 * part) if i == 1 else (below, max(below, part))
-            down = lower <= own
+            down = lower <= error
             settled = settled or down or k == HIGHEST
             if size * abs(memory[NUMBERS + k - 1, G] - memory[NUMBERS + k, G]) < 1.0:
                 new = add(place, change, h * memory[NUMBERS + k, G])
                 update(memory, add(field(par, new), total, -1.0), k, h)
-                chosen, step = k, h
+                order, step = k, h
                 if not settled:
-                    chosen, own = k + 1, 0.0
+                    order, error = k + 1, 0.0
                 elif down:
-                    chosen, own = k - 1, below
-                elif same > k:
+                    order, error = k - 1, below
+                elif count > k:
                     above = h * GAMMA[k + 1] * rms(row_of(memory, k + 1, state), state, new, tolerance)
-                    if k > 1 and below <= min(own, above):
-                        chosen, own = k - 1, below
-                    elif k < HIGHEST and above < (own if k > 1 else 0.5 * own):
-                        chosen, own = k + 1, above
-                if own * 2.0 ** (chosen + 1) <= 0.5:
+                    if k > 1 and below <= min(error, above):
+                        order, error = k - 1, below
+                    elif k < HIGHEST and above < (error if k > 1 else 0.5 * error):
+                        order, error = k + 1, above
+                if error * 2.0 ** (order + 1) <= 0.5:
                     step = 2.0 * h
-                elif own > 0.5:
-                    step = h * max(0.5, min(0.9, (0.5 / own) ** (1.0 / (chosen + 1))))
-                memory[LAST, ORDER], memory[LAST, ORDER_THEN], memory[LAST, SAME] = chosen, k, same
+                elif error > 0.5:
+                    step = h * max(0.5, min(0.9, (0.5 / error) ** (1.0 / (order + 1))))
+                memory[LAST, ORDER], memory[LAST, ORDER_THEN], memory[LAST, SAME] = order, k, count
                 memory[LAST, LENGTH], memory[LAST, SETTLED] = h, 1.0 if settled else 0.0
                 return new, after, step, evaluations + 1, OK
             settled, failures = True, failures + 1
-            factor = math.sqrt(0.5 / own) if failures > 3 and own > 2.0 else 0.5
+            factor = math.sqrt(0.5 / error) if failures > 3 and error > 2.0 else 0.5
             k, step = 1 if failures > 2 else k - 1 if down else k, factor * h
         return state, t, step, evaluations, STEP_TOO_SMALL
 
@@ -140,7 +140,7 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
     def sample(par, state, new, memory, h, x):  # type: ignore[no-untyped-def]
         if x == 0.0:  # the start of the run, to which the polynomial does not lead back
             return state
-        back, then, g, place = (x - 1.0) * h, 0.0, 1.0, zero(state)
+        back, previous, g, place = (x - 1.0) * h, 0.0, 1.0, zero(state)
         terms = int(memory[LAST, ORDER_THEN]) + 1
         for q in range(terms):
             memory[NUMBERS + q, WORK] = 1.0 / (q + 1)
@@ -148,9 +148,9 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
             if i > 0:
                 psi = memory[NUMBERS + i - 1, PSI]
                 for q in range(terms - i):
-                    value = (back + then) * memory[NUMBERS + q, WORK] - back * memory[NUMBERS + q + 1, WORK]
+                    value = (back + previous) * memory[NUMBERS + q, WORK] - back * memory[NUMBERS + q + 1, WORK]
                     memory[NUMBERS + q, WORK] = value / psi
-                g, then = memory[NUMBERS, WORK], psi
+                g, previous = memory[NUMBERS, WORK], psi
             place = add(place, row_of(memory, i, state), g)
         return add(new, place, back)
 

@@ -53,7 +53,7 @@ def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 
 @register_jitable
-def _swept(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
+def _solve(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
     """Fill in the increments of the stages; returns the number of sweeps and the outcome."""
     stages, start = len(rule.b), (1.0, 0.0, 0.0, 0.0, 0.0, 2.0 * L[0], 2.0 * L[1], 2.0 * L[2])
     unit = 1.0 / (abs(L[0]) + abs(L[1]) + abs(L[2]) + np.sqrt(par.I1 * abs(par.mgl)) + 1e-300)
@@ -85,7 +85,7 @@ def _swept(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
 
 def turn(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
     """One step; the work counted is the number of sweeps over the stages."""
-    effort, outcome = _swept(par, rule, e, L, work, h)
+    effort, outcome = _solve(par, rule, e, L, work, h)
     step = (0.0,) * 8
     for m in range(8):
         total = 0.0
@@ -94,8 +94,8 @@ def turn(par: Any, rule: Any, e: Any, L: Any, work: Any, h: float) -> Any:
         step = set_item(step, m, total)
     # Im(r g*)/2 - L with g = 1 + dg, r = 2 L + dr: no difference of large numbers
     dr, back = step[4:], conjugate(step[:4])
-    linear, bent = product((0.0, L[0], L[1], L[2]), back), product(dr, back)
-    dL = (0.5 * (dr[1] + bent[1]) + linear[1], 0.5 * (dr[2] + bent[2]) + linear[2], 0.5 * (dr[3] + bent[3]) + linear[3])
+    linear, quad = product((0.0, L[0], L[1], L[2]), back), product(dr, back)
+    dL = (0.5 * (dr[1] + quad[1]) + linear[1], 0.5 * (dr[2] + quad[2]) + linear[2], 0.5 * (dr[3] + quad[3]) + linear[3])
     return step[0], step[1:4], dL, work, effort, outcome
 
 

@@ -47,7 +47,7 @@ def _lay(par: Any, rule: Any, h: float, numbers: Any) -> None:
 
 
 def written_out(count: int, stage: Callable[[int], Callable[..., Any]]) -> Callable[..., Any]:
-    """A function (par, state, first, at, h) -> `count` slopes, the others ``stage(i)(par, state, made, at, h)``."""
+    """A function (par, state, first, at, h) -> `count` slopes, the others ``stage(i)(par, state, ks, at, h)``."""
     if count == 1:
 
         def slopes(par, state, first, at, h):  # type: ignore[no-untyped-def]
@@ -56,8 +56,8 @@ def written_out(count: int, stage: Callable[[int], Callable[..., Any]]) -> Calla
         before, last = written_out(count - 1, stage), register_jitable(stage(count - 1))
 
         def slopes(par, state, first, at, h):  # type: ignore[no-untyped-def]
-            made = before(par, state, first, at, h)
-            return (*made, last(par, state, made, at, h))
+            ks = before(par, state, first, at, h)
+            return (*ks, last(par, state, ks, at, h))
 
     return register_jitable(slopes)
 
@@ -129,12 +129,12 @@ def weighted(weights: Any, state: Any, slopes: Any, h: float) -> Any:
     return step
 
 
-def in_lanes(form: Any, moved: Callable[..., Any], lay: Callable[..., None], size: int, cost: int) -> Lanes:
-    """Lanes with increments ``moved(par, state, table, j)`` of `cost` evaluations; `lay` writes `size` numbers."""
-    ended, moved = form.ended, register_jitable(moved)
+def in_lanes(form: Any, increment: Callable[..., Any], lay: Callable[..., None], size: int, cost: int) -> Lanes:
+    """Lanes with increments ``increment(par, state, table, j)`` of `cost` evaluations; `lay` writes `size` numbers."""
+    ended, increment = form.ended, register_jitable(increment)
 
     def advance(par, state, carry, table, j):  # type: ignore[no-untyped-def]
-        step = moved(par, state, table, j)
+        step = increment(par, state, table, j)
         return step, carry, ended(summed(state, step))
 
     return one_loop(advance, lay, size, top=form.top, dimension=form.prepare.size, begin=no_carry, cost=cost)
@@ -156,8 +156,8 @@ def _loop(form: Any) -> Loop:
     def stage(i: int) -> Callable[..., Any]:
         place = weighted_in_lanes(i, tops + i * (i - 1) // 2)
 
-        def slope(par, state, made, table, j):  # type: ignore[no-untyped-def]
-            return field(par, place(state, made, table, j))
+        def slope(par, state, ks, table, j):  # type: ignore[no-untyped-def]
+            return field(par, place(state, ks, table, j))
 
         return slope
 
@@ -165,10 +165,10 @@ def _loop(form: Any) -> Loop:
     def lanes(count: int) -> Lanes:
         stages, total = written_out(count, stage), weighted_in_lanes(count, tops + count * (count - 1) // 2)
 
-        def moved(par, state, table, j):  # type: ignore[no-untyped-def]
+        def lane_increment(par, state, table, j):  # type: ignore[no-untyped-def]
             return total(zeros, stages(par, state, field(par, state), table, j), table, j)
 
-        return in_lanes(form, moved, _lay, count * (count + 1) // 2, count)
+        return in_lanes(form, lane_increment, _lay, count * (count + 1) // 2, count)
 
     return Loop(begin, increment, form.observe, lanes=lambda rule: lanes(len(rule.b)))
 

@@ -39,29 +39,29 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
     def line(par, state, table, j, h):  # type: ignore[no-untyped-def]
         """Fill in line j of the table over line j - 1: T_jj, and T_jj - T_j,j-1."""
         g = h / (2 * j)
-        before, here = state, add(state, row_of(table, 0, state), g)
+        before, current = state, add(state, row_of(table, 0, state), g)
         for _ in range(2 * j - 1):
-            before, here = here, add(before, field(par, here), 2.0 * g)
-        change = here
+            before, current = current, add(before, field(par, current), 2.0 * g)
+        change = current
         for m in range(len(state)):
-            value, low = here[m], 0.0
+            value, low = current[m], 0.0
             for i in range(1, j):
                 above, table[i, m] = table[i, m], value
                 low = (value - above) / ((j / (j - i)) ** 2 - 1.0)
                 value += low
             table[j, m] = value
-            here, change = set_item(here, m, value), set_item(change, m, low)
-        return here, change
+            current, change = set_item(current, m, value), set_item(change, m, low)
+        return current, change
 
     @register_jitable
     def advance(par, state, table, tolerance, t, step, end):  # type: ignore[no-untyped-def]
-        least = 10.0 * (np.nextafter(t, np.inf) - t)
-        step, evaluations, most = max(step, least), 0, GROW
+        shortest = 10.0 * (np.nextafter(t, np.inf) - t)
+        step, evaluations, growth = max(step, shortest), 0, GROW
         k = int(table[ORDERS, 0])
         if k == 0:  # the first step
             k = max(LEAST_K, min(LINES - 2, int(1.5 - 0.6 * math.log10(tolerance))))
         lengths, work = np.full(LINES + 1, 1.0), np.full(LINES + 1, np.inf)  # H_j and A_j/H_j
-        while step >= least:
+        while step >= shortest:
             after = min(t + step, end)
             h = after - t
             new, j, error = state, 0, np.inf
@@ -71,15 +71,15 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
                 evaluations += 2 * j - 1
                 if j > 1:
                     error = rms(change, state, new, tolerance)
-                    longer = GROW if error == 0.0 else 0.94 * (0.65 / error) ** (1.0 / (2 * j - 1))
-                    lengths[j] = h * (min(longer, GROW) if longer > 0.02 else 0.02)
+                    factor = GROW if error == 0.0 else 0.94 * (0.65 / error) ** (1.0 / (2 * j - 1))
+                    lengths[j] = h * (min(factor, GROW) if factor > 0.02 else 0.02)
                     work[j] = (1 + j * j) / lengths[j]
                 if (j == k - 1 and error > ((k + 1.0) * k) ** 2) or (j == k and error > (k + 1.0) ** 2):
                     break
             best = min(j, k)
             if work[best - 1] < 0.9 * work[best]:
                 best -= 1
-            elif error < 1.0 and most > 1.0 and work[best] < 0.9 * work[best - 1]:
+            elif error < 1.0 and growth > 1.0 and work[best] < 0.9 * work[best - 1]:
                 best += 1
             best = max(LEAST_K, min(LINES - 1, best))
             step = lengths[min(j, best)]
@@ -88,17 +88,17 @@ def method(field: Callable[..., Any]) -> Method:  # noqa: C901  (one step, read 
             table[ORDERS, 0], table[ORDERS, 1] = best, j
             if error < 1.0:
                 store(table, LAST, field(par, new))
-                return new, after, min(step, most * h), evaluations + 1, OK
-            k, most, step = best, 1.0, min(step, 0.9 * h)
+                return new, after, min(step, growth * h), evaluations + 1, OK
+            k, growth, step = best, 1.0, min(step, 0.9 * h)
         return state, t, step, evaluations, STEP_TOO_SMALL
 
     @register_jitable
     def sample(par, state, new, table, h, x):  # type: ignore[no-untyped-def]
         if x == 1.0:
             return new
-        other = table.copy()
+        scratch = table.copy()
         for j in range(1, int(table[ORDERS, 1]) + 1):
-            new, _ = line(par, state, other, j, x * h)
+            new, _ = line(par, state, scratch, j, x * h)
         return new
 
     return Method(advance, nothing_more, sample, LAST, -0.2)

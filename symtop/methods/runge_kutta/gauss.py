@@ -92,14 +92,14 @@ def _linearise(field: Any, par: Any, state: Any, work: Any, stages: int, share: 
         weight = share * work[i, len(state)]
         row, turn = base + 3 * i, weight / par.I1
         for k in range(stages):
-            column, same = 3 * k, 1.0 if i == k else 0.0
+            column, unit = 3 * k, 1.0 if i == k else 0.0
             swing, lift = turn * work[2 * stages + i, k], share * turn * mgl * work[2 * stages + i, stages + k]
             x, y, z = swing * place[3], swing * place[4], swing * place[5]
-            work[row, column], work[row, column + 1], work[row, column + 2] = same - lift * place[2], z, -y
-            work[row + 1, column], work[row + 1, column + 1], work[row + 1, column + 2] = -z, same - lift * place[2], x
+            work[row, column], work[row, column + 1], work[row, column + 2] = unit - lift * place[2], z, -y
+            work[row + 1, column], work[row + 1, column + 1], work[row + 1, column + 2] = -z, unit - lift * place[2], x
             work[row + 2, column] = y + lift * place[0]
             work[row + 2, column + 1] = lift * place[1] - x
-            work[row + 2, column + 2] = same
+            work[row + 2, column + 2] = unit
         for m in range(3):
             work[row + m, 3 * stages] = weight * slope[first + m] - work[i, first + m]
 
@@ -129,7 +129,7 @@ def _eliminate(work: Any, base: int, size: int) -> None:
 
 @register_jitable
 def _iterate(
-    field: Any, par: Any, state: Any, work: Any, stages: int, share: float, first: int, mgl: float, enough: float
+    field: Any, par: Any, state: Any, work: Any, stages: int, share: float, first: int, mgl: float, limit: float
 ) -> Any:
     """Newton from the present increments, for a share of the step; returns iterations, and whether they converged."""
     base, effort, converged = 4 * stages + 1, 0, False
@@ -149,11 +149,11 @@ def _iterate(
                 change = work[base + 3 * i + m, 3 * stages]
                 correction += abs(change)
                 work[i, first + m] += change
-        converged = correction <= enough  # false if it is not a number
+        converged = correction <= limit  # false if it is not a number
 
 
 @register_jitable
-def _twice(work: Any, dimension: int, stages: int) -> None:
+def _fill_nu(work: Any, dimension: int, stages: int) -> None:
     """nu = mu diag(w) mu, in each solve: in the preparation, every run would compute it, 216 products at s = 6."""
     for i in range(stages):
         for j in range(stages):
@@ -166,23 +166,23 @@ def _twice(work: Any, dimension: int, stages: int) -> None:
 @register_jitable
 def solve_stages(field: Any, par: Any, state: Any, work: Any, stages: int) -> Any:
     """Solve a step in the array of `_loop`; returns iterations and convergence. One call of the inlined `_iterate`."""
-    effort, rung, first, mgl, grown = 0, RUNGS, 0, par.mgl, False
-    _twice(work, len(state), stages)
+    effort, rung, first, mgl, restarted = 0, RUNGS, 0, par.mgl, False
+    _fill_nu(work, len(state), stages)
     for i in range(stages):
         for m in range(len(state)):
             work[i, m] = 0.0
     while True:
-        enough = CONVERGED_CORRECTION if rung == RUNGS else NEAR_SOLUTION
-        more, converged = _iterate(field, par, state, work, stages, RUNG_RATIO ** (rung - RUNGS), first, mgl, enough)
-        effort += more
+        limit = CONVERGED_CORRECTION if rung == RUNGS else NEAR_SOLUTION
+        count, converged = _iterate(field, par, state, work, stages, RUNG_RATIO ** (rung - RUNGS), first, mgl, limit)
+        effort += count
         if converged and rung < RUNGS:
             rung += 1
         elif converged and first == 0 and len(state) > 6:
             first, mgl = 6, 0.0
-        elif converged or grown or first > 0:
+        elif converged or restarted or first > 0:
             return effort, converged
         else:  # from the start again, with a tenth of the step
-            grown, rung = True, 1
+            restarted, rung = True, 1
             for i in range(stages):
                 for m in range(3):
                     work[i, m] = 0.0
@@ -229,16 +229,16 @@ def gauss_rule(stages: int) -> GaussRule:
     guesses = [mp.cos(mp.pi * (k - 0.25) / (stages + 0.5)) for k in range(stages, 0, -1)]
     roots = [mp.findroot(functools.partial(mp.legendre, stages), (x, x + 0.001)) for x in guesses]
     c = [(1 + root) / 2 for root in roots]
-    others = [[node for k, node in enumerate(c) if k != j] for j in range(stages)]
-    tops = [mp.fprod(c[j] - node for node in others[j]) for j in range(stages)]
-    b = [_antiderivative(others[j], mp.one) / tops[j] for j in range(stages)]
+    other_nodes = [[node for k, node in enumerate(c) if k != j] for j in range(stages)]
+    tops = [mp.fprod(c[j] - node for node in other_nodes[j]) for j in range(stages)]
+    b = [_antiderivative(other_nodes[j], mp.one) / tops[j] for j in range(stages)]
     mu, predict = np.full((stages, stages), 0.5), np.empty((stages, stages))
     for i in range(stages):
         for j in range(stages):
-            basis = mp.fprod(1 + c[i] - node for node in others[j]) / tops[j]
+            basis = mp.fprod(1 + c[i] - node for node in other_nodes[j]) / tops[j]
             predict[i, j] = float(b[i] / b[j] * basis)
             if i > j:  # the larger of the pair, mu_ij; 1 - mu_ij is then exact (Sterbenz)
-                mu[i, j] = float(_antiderivative(others[j], c[i]) / tops[j] / b[j])
+                mu[i, j] = float(_antiderivative(other_nodes[j], c[i]) / tops[j] / b[j])
                 mu[j, i] = 1.0 - mu[i, j]
     return GaussRule(mu, np.array([float(value) for value in b]), predict)
 
@@ -263,7 +263,7 @@ def momentum_unit(par: Any, state: Any) -> float:
 
 
 @register_jitable
-def _unit_of_body(par: Any, state: Any) -> float:
+def _body_unit(par: Any, state: Any) -> float:
     """`momentum_unit` of a body without symmetry, from M."""
     pull = par.I2 * np.sqrt(par.c1**2 + par.c2**2 + par.c3**2)
     momentum = np.sqrt(state[4] ** 2 + state[5] ** 2 + state[6] ** 2) + np.sqrt(pull)
@@ -276,19 +276,19 @@ def farthest(sweeps: int) -> float:
     return FARTHEST * PACE**sweeps
 
 
-def _after(first: Any, then: Any) -> Any:
-    """A function that applies `first` and then `then` to a block."""
+def _chain(first: Any, second: Any) -> Any:
+    """A function that applies `first` and then `second` to a block."""
 
     @register_jitable
-    def both(block, table):  # type: ignore[no-untyped-def]
+    def run(block, table):  # type: ignore[no-untyped-def]
         wide_vectors()
         first(block, table)
-        then(block, table)
+        second(block, table)
 
-    return both
+    return run
 
 
-def _swept(  # noqa: C901  (the loops of one step, read in one piece)
+def _sweep_lanes(  # noqa: C901  (the loops of one step, read in one piece)
     field: Callable[..., Any], top: Any, mu: tuple[tuple[float, ...], ...], predict: tuple[tuple[float, ...], ...],
     dimension: int, first: int, still: int, unit: Callable[..., float],
 ) -> Lanes:  # fmt: skip
@@ -298,8 +298,8 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
     carry = stages * dimension + 1  # the L_i and the unit
     unit_at = carry_at + carry - 1
     gap_at, pull_at, last_at, live_at = range(unit_at + 1, unit_at + 5)
-    carried, state_at, top_at, weighted = (0.0,) * carry, reading(dimension), reading(tops), dot_of(stages)
-    added = total(lambda i: lambda increments: increments[i], stages)
+    zero_carry, state_at, top_at, weighted = (0.0,) * carry, reading(dimension), reading(tops), dot_of(stages)
+    sum_of = total(lambda i: lambda increments: increments[i], stages)
 
     # number m of every L_i, of the next step's L_i, and of the state at a stage
     increments = each(lambda i: lambda block, m, j: block[(carry_at + i * dimension + m) * W + j], stages)
@@ -311,12 +311,12 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
         return lambda row, state, block, j: state[m] + weighted(row, increments(block, m, j))
 
     place = each(displaced, dimension)
-    renewed = each(
+    update = each(
         lambda m: lambda live, weight, slope, old: weight * slope[m] if live and m != still else old[m], dimension
     )
-    increment = each(lambda m: lambda block, j: added(0.0, increments(block, m, j)), dimension)
+    increment = each(lambda m: lambda block, j: sum_of(0.0, increments(block, m, j)), dimension)
 
-    def ahead(m: int) -> Any:
+    def extrapolation(m: int) -> Any:
         @register_jitable
         def extrapolated(block, table):  # type: ignore[no-untyped-def]
             wide_vectors()
@@ -328,15 +328,15 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
         return extrapolated
 
     def stage(i: int) -> Any:
-        row, own = mu[i], carry_at + i * dimension
+        row, row_at = mu[i], carry_at + i * dimension
 
         @register_jitable
-        def swept(block, table):  # type: ignore[no-untyped-def]
+        def sweep_stage(block, table):  # type: ignore[no-untyped-def]
             wide_vectors()
             for j in range(W):
-                there = place(row, state_at(block, 0, j), block, j)
-                slope, old = field(top(*top_at(table, 0, j)), there), state_at(block, own, j)
-                new = renewed(block[live_at * W + j] != 0.0, table[(tops + i) * W + j], slope, old)
+                y = place(row, state_at(block, 0, j), block, j)
+                slope, old = field(top(*top_at(table, 0, j)), y), state_at(block, row_at, j)
+                new = update(block[live_at * W + j] != 0.0, table[(tops + i) * W + j], slope, old)
                 gap = 0.0 if i == 0 else block[gap_at * W + j]
                 pull = 0.0 if i == 0 else block[pull_at * W + j]
                 for m in range(first):
@@ -345,14 +345,14 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
                     pull = max(pull, abs(new[m] - old[m]))
                 for m in range(first + 3, dimension):
                     gap = max(gap, abs(new[m] - old[m]))
-                put(block, own, j, new)
+                put(block, row_at, j, new)
                 block[gap_at * W + j] = gap
                 block[pull_at * W + j] = pull
 
-        return swept
+        return sweep_stage
 
-    extrapolate = functools.reduce(_after, [ahead(m) for m in range(dimension) if m != still])
-    sweep = functools.reduce(_after, map(stage, range(stages)))
+    extrapolate = functools.reduce(_chain, [extrapolation(m) for m in range(dimension) if m != still])
+    sweep = functools.reduce(_chain, map(stage, range(stages)))
 
     def step(block, table):  # type: ignore[no-untyped-def]
         wide_vectors()
@@ -364,29 +364,29 @@ def _swept(  # noqa: C901  (the loops of one step, read in one piece)
         while effort < MOST_SWEEPS:
             sweep(block, table)
             effort += 1
-            largest = farthest(effort)
+            limit = farthest(effort)
             for j in range(W):
                 correction = max(block[gap_at * W + j], block[pull_at * W + j] * block[unit_at * W + j])
                 live, falls = block[live_at * W + j], 0.0 < correction < block[last_at * W + j]
-                goes_on = falls or (correction >= ROUND_OFF and correction <= largest)
-                good = goes_on or correction < ROUND_OFF
+                goes_on = falls or (correction >= ROUND_OFF and correction <= limit)
+                valid = goes_on or correction < ROUND_OFF
                 block[work * W + j] += live
                 block[last_at * W + j] = correction
-                block[flag * W + j] = block[flag * W + j] if good or live == 0.0 else 1.0
+                block[flag * W + j] = block[flag * W + j] if valid or live == 0.0 else 1.0
                 block[live_at * W + j] = live if goes_on else 0.0
             if none_left(block, live_at):
                 break
         for j in range(W):
             dstate = increment(block, j)
-            healthy = np.isfinite(dstate[0]) and block[live_at * W + j] == 0.0
+            success = np.isfinite(dstate[0]) and block[live_at * W + j] == 0.0
             move(accumulate, block, dimension, j, dstate)
-            block[flag * W + j] = block[flag * W + j] if healthy else 1.0
+            block[flag * W + j] = block[flag * W + j] if success else 1.0
 
     def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
         stage_weights(rule, h, numbers)
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
-        shares, slope, values = np.empty(stages), field(par, state), carried
+        shares, slope, values = np.empty(stages), field(par, state), zero_carry
         stage_weights(rule, h, shares)
         for i in range(stages):
             for m in range(dimension):
@@ -428,16 +428,16 @@ def _loop(  # noqa: C901
         return work
 
     def increment(par, rule, state, work, h):  # type: ignore[no-untyped-def]  # noqa: C901  (one loop, read in one piece)
-        stages, nothing = len(work) // 7, zero(state)
+        stages, zeros = len(work) // 7, zero(state)
         for i in range(stages):  # the last step's polynomial, evaluated at this step's nodes
-            ahead = nothing
+            guess = zeros
             for j in range(stages):
                 weight = work[3 * stages + i, j]
                 for m in range(dimension):
                     if m != still:
-                        ahead = set_item(ahead, m, ahead[m] + weight * work[j, m])
+                        guess = set_item(guess, m, guess[m] + weight * work[j, m])
             for m in range(dimension):
-                work[stages + i, m] = ahead[m]
+                work[stages + i, m] = guess[m]
         for i in range(stages):
             for m in range(dimension):
                 work[i, m] = work[stages + i, m]
@@ -445,7 +445,7 @@ def _loop(  # noqa: C901
         while effort < MOST_SWEEPS:
             gap = gap_momentum = 0.0
             for i in range(stages):
-                place = nothing
+                place = zeros
                 for j in range(stages):
                     weight = work[2 * stages + i, j]
                     for m in range(dimension):
@@ -478,18 +478,18 @@ def _loop(  # noqa: C901
             effort += iterations
             if converged:
                 outcome = OK
-        step = nothing
+        step = zeros
         for i in range(stages):
             for m in range(dimension):
                 step = set_item(step, m, step[m] + work[i, m])
         return step, work, effort, outcome if np.isfinite(step[0]) else NOT_CONVERGED
 
     @functools.cache
-    def of_rows(mu: Any, predict: Any) -> Lanes:
-        return _swept(field, top, mu, predict, dimension, first, still, unit)
+    def lanes_of(mu: Any, predict: Any) -> Lanes:
+        return _sweep_lanes(field, top, mu, predict, dimension, first, still, unit)
 
     def in_lanes(rule: GaussRule) -> Lanes:
-        return of_rows(*(tuple(map(tuple, rows.tolist())) for rows in (rule.mu, rule.predict)))
+        return lanes_of(*(tuple(map(tuple, rows.tolist())) for rows in (rule.mu, rule.predict)))
 
     return Loop(begin, increment, observe, lanes=in_lanes)
 
@@ -497,7 +497,7 @@ def _loop(  # noqa: C901
 # `solve` of a loop without Newton's iteration: no iterations, not converged
 _unsolved = register_jitable(lambda _field, _par, _state, _work, _stages: (0, False))
 march_axis, march_frame = _loop(field_axis, 6), _loop(field_frame, 9)
-march_body = _loop(body.field_body, 7, 4, -1, _unit_of_body, _unsolved, body.observe_body, body.General)
+march_body = _loop(body.field_body, 7, 4, -1, _body_unit, _unsolved, body.observe_body, body.General)
 
 
 RULES = {stages: LazyRule(functools.partial(gauss_rule, stages), packed) for stages in STAGES}

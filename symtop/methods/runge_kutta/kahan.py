@@ -69,8 +69,8 @@ def _increment_frame(par: Any, rule: Any, state: Any, carry: Any, h: float) -> A
     d, D = _axis_step(par, state[:3], L, h)
     half = scaled(0.5 * h / par.I1, L)
     right = plus(scaled(2.0, cross(half, a)), 0.5 * h / par.I1, cross(D, a))
-    turned = plus(plus(right, 1.0, cross(half, right)), dot(half, right), half)
-    b = scaled(1.0 / (1.0 + dot(half, half)), turned)
+    numerator = plus(plus(right, 1.0, cross(half, right)), dot(half, right), half)
+    b = scaled(1.0 / (1.0 + dot(half, half)), numerator)
     return (*d, *D, *b), carry, 1, finite_outcome(d[0] + d[1] + d[2] + b[0] + b[1] + b[2])
 
 
@@ -81,7 +81,7 @@ def _observe_frame(par: Any, rule: Any, before: Any, dstate: Any, h: float) -> A
     return p_phi, p_psi / math.sqrt(dot(e, e))
 
 
-def _attitude_shown(par: Any, t: float, y: Any) -> Any:
+def _present_attitude(par: Any, t: float, y: Any) -> Any:
     """(q, L) of the frame with e made a unit vector and a one across it."""
     e, a = (y[0], y[1], y[2]), (y[6], y[7], y[8])
     e = scaled(1.0 / math.sqrt(dot(e, e)), e)
@@ -106,7 +106,7 @@ def _loop(increment: Callable[..., Any], observe: Callable[..., Any], dimension:
 
 
 march_axis, march_frame = _loop(_increment_axis, observe_axis, 6), _loop(_increment_frame, _observe_frame, 9)
-_attitude = Presentation(_attitude_shown, 7)
+_attitude = Presentation(_present_attitude, 7)
 
 
 class Onward(FixedStep):
@@ -116,11 +116,11 @@ class Onward(FixedStep):
         """One step of each length, each from where the last one ended."""
         par, rule, state = self.setup(top, start, lengths[0])
         for h in lengths:
-            done = self.loop(par, rule, state, h, np.array([1]))
-            state = tuple(done.states[0].tolist())
-        shown = done.states if self.present is None else self.present(par, np.array([sum(lengths)]), done.states)
-        p_phi, p_psi = done.momenta.T
-        return Run(shown, p_phi, p_psi, len(lengths), len(lengths), 0, OUTCOMES[done.outcome], sum(lengths))
+            march = self.loop(par, rule, state, h, np.array([1]))
+            state = tuple(march.states[0].tolist())
+        samples = march.states if self.present is None else self.present(par, np.array([sum(lengths)]), march.states)
+        p_phi, p_psi = march.momenta.T
+        return Run(samples, p_phi, p_psi, len(lengths), len(lengths), 0, OUTCOMES[march.outcome], sum(lengths))
 
 
 def built_in() -> list[Integrator]:

@@ -74,13 +74,13 @@ def kicks(par: Any, theta: Any) -> Any:
 
 
 def _total(weights: Row, velocity: Row) -> Any:
-    """A function (par, made, h): the increments of (theta, p_theta, phi, psi) due to the forces."""
+    """A function (par, ks, h): the increments of (theta, p_theta, phi, psi) due to the forces."""
     bend, turn = combination(weights), combination(velocity)
 
-    def added(par, made, h):  # type: ignore[no-untyped-def]
-        return bend((0.0,), made, h * h / par.I1) + turn((0.0, 0.0, 0.0), made, h)
+    def increments(par, ks, h):  # type: ignore[no-untyped-def]
+        return bend((0.0,), ks, h * h / par.I1) + turn((0.0, 0.0, 0.0), ks, h)
 
-    return register_jitable(added)
+    return register_jitable(increments)
 
 
 @register_jitable
@@ -102,9 +102,9 @@ def method(_: Callable[..., Any]) -> Method:
     def stage(i: int) -> Callable[..., Any]:
         bend, node = combination(table.a[i - 1]), table.c[i - 1]
 
-        def k(par, state, made, slopes, h):  # type: ignore[no-untyped-def]
-            flown = state[0] + node * h * state[1] / par.I1
-            return kicks(par, bend((flown,), made, h * h / par.I1)[0])
+        def k(par, state, ks, slopes, h):  # type: ignore[no-untyped-def]
+            theta = state[0] + node * h * state[1] / par.I1
+            return kicks(par, bend((theta,), ks, h * h / par.I1)[0])
 
         return k
 
@@ -112,29 +112,29 @@ def method(_: Callable[..., Any]) -> Method:
     total, error = _total(table.b, velocity), _total(table.error, table.velocity_error)
 
     @register_jitable
-    def made_of(par, state, slopes, h):  # type: ignore[no-untyped-def]
+    def stage_slopes(par, state, slopes, h):  # type: ignore[no-untyped-def]
         first = row_of(slopes, 0, state)
         return stages(par, state, (first[1], first[2], first[3], state[0]), slopes, h)
 
     @register_jitable
-    def after(par, state, made, h):  # type: ignore[no-untyped-def]
-        step = total(par, made, h)
-        flown = h * state[1] / par.I1 + step[0]
-        return state[0] + flown, state[1] + step[1], state[2] + step[2], state[3] + step[3]
+    def after(par, state, ks, h):  # type: ignore[no-untyped-def]
+        step = total(par, ks, h)
+        dtheta = h * state[1] / par.I1 + step[0]
+        return state[0] + dtheta, state[1] + step[1], state[2] + step[2], state[3] + step[3]
 
     @register_jitable
     def attempt(par, state, slopes, h, tolerance):  # type: ignore[no-untyped-def]
-        made = made_of(par, state, slopes, h)
-        new, last = after(par, state, made, h), made[-1]
+        ks = stage_slopes(par, state, slopes, h)
+        new, last = after(par, state, ks, h), ks[-1]
         store(slopes, 1, (new[1] / par.I1, last[0], last[1], last[2]))
-        return new, rms(error(par, made, h), state, new, tolerance)
+        return new, rms(error(par, ks, h), state, new, tolerance)
 
     @register_jitable
     def momenta(par, state, slopes, h):  # type: ignore[no-untyped-def]
-        made = made_of(par, state, slopes, h)
-        step, a, d = total(par, made, h), 0.0, 0.0
+        ks = stage_slopes(par, state, slopes, h)
+        step, a, d = total(par, ks, h), 0.0, 0.0
         for i in range(count):
-            sin_x, cos_x = sincos(0.5 * made[i][3])
+            sin_x, cos_x = sincos(0.5 * ks[i][3])
             a += h * velocity[i] / (4.0 * par.I1 * sin_x * sin_x)
             d += h * velocity[i] / (4.0 * par.I1 * cos_x * cos_x)
         slopes[2, 0], slopes[2, 1] = momenta_of_turns(par, a, d, h, step)
@@ -142,7 +142,7 @@ def method(_: Callable[..., Any]) -> Method:
 
     @register_jitable
     def shorter(par, state, new, slopes, h, x):  # type: ignore[no-untyped-def]
-        return after(par, state, made_of(par, state, slopes, x * h), x * h)
+        return after(par, state, stage_slopes(par, state, slopes, x * h), x * h)
 
     return Method(trying(attempt, cost, -1.0 / 7.0), momenta, shorter, 1, -1.0 / 7.0)
 

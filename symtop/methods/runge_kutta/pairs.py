@@ -60,11 +60,11 @@ class Method(NamedTuple):
 
 
 @register_jitable
-def rms(vector: Any, state: Any, other: Any, tolerance: float) -> float:
+def rms(vector: Any, state: Any, new: Any, tolerance: float) -> float:
     """Root mean square of a vector in units of the allowed error, tolerance (1 + |y|)."""
     total = 0.0
     for m in range(len(vector)):
-        part = vector[m] / (tolerance + max(abs(state[m]), abs(other[m])) * tolerance)
+        part = vector[m] / (tolerance + max(abs(state[m]), abs(new[m])) * tolerance)
         total += part * part
     return math.sqrt(total / len(vector))
 
@@ -77,11 +77,11 @@ def trying(attempt: Callable[..., Any], cost: int, power: float) -> Any:
 
     @register_jitable
     def advance(par, state, slopes, tolerance, t, step, end):  # type: ignore[no-untyped-def]
-        least = 10.0 * (np.nextafter(t, np.inf) - t)
-        step = max(step, least)
+        shortest = 10.0 * (np.nextafter(t, np.inf) - t)
+        step = max(step, shortest)
         grow = GROW
         evaluations = 0
-        while step >= least:
+        while step >= shortest:
             after = min(t + step, end)
             h = after - t
             new, error = attempt(par, state, slopes, h, tolerance)
@@ -101,18 +101,18 @@ def first_step(field: Any, par: Any, state: Any, slope: Any, end: float, toleran
     """SciPy's initial step: 1 % of |y|/|f|, then from the size of the second derivative, by one evaluation of f."""
     d0, d1 = rms(state, state, state, tolerance), rms(slope, state, state, tolerance)
     trial = min(1e-6 if d0 < 1e-5 or d1 < 1e-5 else 0.01 * d0 / d1, end)
-    bent = add(field(par, add(state, slope, trial)), slope, -1.0)
-    d2 = rms(bent, state, state, tolerance) / trial
+    change = add(field(par, add(state, slope, trial)), slope, -1.0)
+    d2 = rms(change, state, state, tolerance) / trial
     guess = max(1e-6, 1e-3 * trial) if max(d1, d2) <= 1e-15 else (0.01 / max(d1, d2)) ** -power
     return min(100.0 * trial, guess, end)
 
 
 @register_jitable
-def copy(rows: Any, to: Any) -> None:
+def copy(rows: Any, target: Any) -> None:
     """Copy rows; numba's assignment of slices would take a third of a kernel's compilation, for an error message."""
     for j in range(len(rows)):
         for m in range(rows.shape[1]):
-            to[j, m] = rows[j, m]
+            target[j, m] = rows[j, m]
 
 
 @functools.cache
@@ -129,19 +129,19 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
     advance, refine, between, last, power = method(field)
     clock = size + rows * size
 
-    def march(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]
+    def march(numbers, tolerance, times, budget, index, place, states, momenta):  # type: ignore[no-untyped-def]
         par, state = prepare(*unpack(numbers))
-        memory, nothing, end = np.zeros((rows, size)), zero(state), times[-1]
-        kept = place[:clock].reshape(1 + rows, size)  # the state, and the memory, there across lines of the cache
+        memory, zeros, end = np.zeros((rows, size)), zero(state), times[-1]
+        record = place[:clock].reshape(1 + rows, size)  # the state, and the memory, there across lines of the cache
         steps = effort = outcome = 0
-        if seen < 0:
+        if index < 0:
             slope = field(par, state)
             store(memory, 0, slope)
-            seen, t, step, effort = 0, 0.0, first_step(field, par, state, slope, end, tolerance, power), 2
+            index, t, step, effort = 0, 0.0, first_step(field, par, state, slope, end, tolerance, power), 2
         else:
             t, step = place[clock], place[clock + 1]
-            state = row_of(kept, 0, state)
-            copy(kept[1:], memory)
+            state = row_of(record, 0, state)
+            copy(record[1:], memory)
         while t < end and effort < budget:
             before, start = state, t
             state, t, step, work, outcome = advance(par, before, memory, tolerance, start, step, end)
@@ -150,21 +150,21 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
                 break
             steps += 1
             h = t - start
-            if seen < len(times) and times[seen] <= t:
+            if index < len(times) and times[index] <= t:
                 effort += refine(par, before, memory, h)
-            while seen < len(times) and times[seen] <= t:
-                place_then = between(par, before, state, memory, h, (times[seen] - start) / h)
-                store(states, seen, sample(par, times[seen], place_then))
-                momenta[seen, 0], momenta[seen, 1] = observe(par, memory, place_then, nothing, h)
-                seen += 1
+            while index < len(times) and times[index] <= t:
+                y = between(par, before, state, memory, h, (times[index] - start) / h)
+                store(states, index, sample(par, times[index], y))
+                momenta[index, 0], momenta[index, 1] = observe(par, memory, y, zeros, h)
+                index += 1
             outcome = ended(state)
             store(memory, 0, row_of(memory, last, state))
             if outcome != OK:
                 break
-        store(kept, 0, state)
-        copy(memory, kept[1:])
+        store(record, 0, state)
+        copy(memory, record[1:])
         place[clock], place[clock + 1] = t, step
-        return seen, steps, effort, outcome
+        return index, steps, effort, outcome
 
     compiled: AdaptiveLoop = compile_kernel(march)
     return compiled
@@ -172,7 +172,7 @@ def loop(form: Any, method: Any, rows: int) -> AdaptiveLoop:
 
 def solver(form: Any, method: Any, rows: int, *, light: bool = False) -> Adaptive:
     """A solver of the registry on the equations of a `Formulation`; `light` as `Adaptive` has it."""
-    size, shown = form.prepare.size, form.prepare.size if form.present is None else form.present.size
+    size, width = form.prepare.size, form.prepare.size if form.present is None else form.present.size
     clock = size * (1 + rows)
 
     @functools.cache  # once: the hash of a table takes a fifth of the time of a call
@@ -180,7 +180,7 @@ def solver(form: Any, method: Any, rows: int, *, light: bool = False) -> Adaptiv
         return loop(form, method, rows)
 
     limits = EVALUATIONS, BLOCK_EVALUATIONS
-    return Adaptive(lambda _: compiled(), shown, clock + 2, clock, *limits, check=form.prepare.check, light=light)
+    return Adaptive(lambda _: compiled(), width, clock + 2, clock, *limits, check=form.prepare.check, light=light)
 
 
 def integrator(name: str, summary: str, reference: str, method: Any, rows: int, **claims: Any) -> Integrator:
@@ -193,28 +193,28 @@ def integrator(name: str, summary: str, reference: str, method: Any, rows: int, 
     )  # fmt: skip
 
 
-_forget = register_jitable(lambda _slopes, _i, _slope: None)  # `keep` for slopes that are not used again
+_forget = register_jitable(lambda _slopes, _i, _slope: None)  # `record` for slopes that are not used again
 
 
 def combination(weights: Sequence[float]) -> Any:
-    """A function (place, made, h): place + h sum_j w_j k_j, term by term, of the tuple `made` of slopes."""
-    used = tuple(float(weight) if weight else None for weight in weights)
+    """A function (place, ks, h): place + h sum_j w_j k_j, term by term, of the tuple `ks` of slopes."""
+    factors = tuple(float(weight) if weight else None for weight in weights)
 
-    def added(place, made, h):  # type: ignore[no-untyped-def]
-        return combined(place, made, used, h)
+    def combine(place, ks, h):  # type: ignore[no-untyped-def]
+        return combined(place, ks, factors, h)
 
-    return register_jitable(added)
+    return register_jitable(combine)
 
 
-def _stages(field: Callable[..., Any], rows: Sequence[Row], keep: Callable[..., Any]) -> Any:
-    """A function (par, state, first, slopes, h): the slopes of a step, a tuple of tuples; `keep` stores each."""
+def _stages(field: Callable[..., Any], rows: Sequence[Row], record: Callable[..., Any]) -> Any:
+    """A function (par, state, first, slopes, h): the slopes of a step, a tuple of tuples; `record` stores each."""
 
     def stage(i: int) -> Callable[..., Any]:
         place = combination(rows[i - 1])
 
-        def slope(par, state, made, slopes, h):  # type: ignore[no-untyped-def]
-            new = field(par, place(state, made, h))
-            keep(slopes, i, new)
+        def slope(par, state, ks, slopes, h):  # type: ignore[no-untyped-def]
+            new = field(par, place(state, ks, h))
+            record(slopes, i, new)
             return new
 
         return slope
@@ -245,22 +245,22 @@ class Pair(NamedTuple):
     def __call__(self, field: Callable[..., Any]) -> Method:
         """The `Method` for `loop`: attempts, their error, and samples."""
         table, dense = self.table, self.table.dense
-        keep = store if dense else _forget
-        stages, total = _stages(field, table.a, keep), combination(table.b)
+        record = store if dense else _forget
+        stages, total = _stages(field, table.a, record), combination(table.b)
         error, third, cost = combination(table.error), combination(table.third), len(table.a) + 1
         two = bool(self.table.third)
 
         @register_jitable
         def attempt(par, state, slopes, h, tolerance):  # type: ignore[no-untyped-def]
-            none, first = zero(state), row_of(slopes, 0, state)
-            made = stages(par, state, first, slopes, h)
-            new = summed(state, total(none, made, h))
+            zeros, first = zero(state), row_of(slopes, 0, state)
+            ks = stages(par, state, first, slopes, h)
+            new = summed(state, total(zeros, ks, h))
             last = field(par, new)
             store(slopes, cost, last)
-            size = rms(error(none, (*made, last), h), state, new, tolerance)
+            size = rms(error(zeros, (*ks, last), h), state, new, tolerance)
             if two:
-                other = rms(third(none, made, h), state, new, tolerance)
-                size = 0.0 if size == other == 0.0 else size * size / math.sqrt(size * size + 0.01 * other * other)
+                size3 = rms(third(zeros, ks, h), state, new, tolerance)
+                size = 0.0 if size == size3 == 0.0 else size * size / math.sqrt(size * size + 0.01 * size3 * size3)
             return new, size
 
         @register_jitable
@@ -328,9 +328,9 @@ def _order_seven(table: Table, field: Callable[..., Any], cost: int) -> dict[str
                 at = set_item(at, m, at[m] * (x if i % 2 == 0 else 1.0 - x))
         first, last = row_of(slopes, 0, state), row_of(slopes, cost, state)
         for m in range(len(state)):
-            moved = new[m] - state[m]
-            bent = (at[m] + 2.0 * moved - h * (last[m] + first[m])) * x
-            at = set_item(at, m, state[m] + ((bent + h * first[m] - moved) * (1.0 - x) + moved) * x)
+            change = new[m] - state[m]
+            bent = (at[m] + 2.0 * change - h * (last[m] + first[m])) * x
+            at = set_item(at, m, state[m] + ((bent + h * first[m] - change) * (1.0 - x) + change) * x)
         return at
 
     return {"refine": refine, "sample": sample}
@@ -342,52 +342,52 @@ def fixed_loop(chart: str, pair: Pair) -> Loop:
     return loop_of(FORMS[chart], pair.table, lambda _par, _state, step: step)
 
 
-def loop_of(form: Any, table: Table, finished: Callable[..., Any]) -> Loop:
-    """The loop of a table's steps, for one and in lanes; ``finished(par, state, step)`` changes each increment."""
-    field, ended, finished = form.field, form.ended, register_jitable(finished)
+def loop_of(form: Any, table: Table, finish: Callable[..., Any]) -> Loop:
+    """The loop of a table's steps, for one and in lanes; ``finish(par, state, step)`` changes each increment."""
+    field, ended, finish = form.field, form.ended, register_jitable(finish)
     stages, total, cost = stages_of(field, table), combination(table.b), len(table.b)
     zeros, step_at = (0.0,) * form.prepare.size, len(form.top._fields) * W
 
     @register_jitable
-    def stepped(par, state, h):  # type: ignore[no-untyped-def]
+    def make_step(par, state, h):  # type: ignore[no-untyped-def]
         step = total(zeros, stages(par, state, field(par, state), 0.0, h), h)
-        return finished(par, state, step)
+        return finish(par, state, step)
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
-        step = stepped(par, state, h)
+        step = make_step(par, state, h)
         return step, carry, cost, ended(summed(state, step))
 
     def lay(par, rule, h, numbers):  # type: ignore[no-untyped-def]
         numbers[0] = h
 
-    def moved(par, state, table, j):  # type: ignore[no-untyped-def]
-        return stepped(par, state, table[step_at + j])
+    def lane_increment(par, state, table, j):  # type: ignore[no-untyped-def]
+        return make_step(par, state, table[step_at + j])
 
-    lanes = in_lanes(form, moved, lay, 1, cost)
+    lanes = in_lanes(form, lane_increment, lay, 1, cost)
     return Loop(no_carry, increment, form.observe, lanes=lambda _: lanes)
 
 
 @functools.cache
 def two_runs(chart: str, pair: Pair, compare: Callable[..., float]) -> Callable[..., None]:
-    """``run(near, far, h, marks, given, seen)``: two starts by the same steps, in the time of one and to the same bits.
+    """``run(near, far, h, marks, data, out)``: two starts by the same steps, in the time of one and to the same bits.
 
-    `near` and `far` are the plain numbers (`preparation`) of one top or body with each start. After each mark `seen`
-    has ``compare(state, other state, given)``. An overflow is not reported: the run goes on.
+    `near` and `far` are the plain numbers (`preparation`) of one top or body with each start. After each mark `out`
+    has ``compare(state, other state, data)``. An overflow is not reported: the run goes on.
     """
     form: Any = FORMS[chart]
     field, numbers, unpack = form.field, form.prepare.numbers, form.prepare.unpack
     stages, total = stages_of(field, pair.table), combination(pair.table.b)
 
-    def run(near, far, h, marks, given, seen):  # type: ignore[no-untyped-def]
+    def run(near, far, h, marks, data, out):  # type: ignore[no-untyped-def]
         par, first = numbers(*unpack(near))
-        nothing, state = zero(first), side_by_side(first, numbers(*unpack(far))[1])
-        none = low = side_by_side(nothing, nothing)
+        zeros, state = zero(first), side_by_side(first, numbers(*unpack(far))[1])
+        zero_pair = low = side_by_side(zeros, zeros)
         k = 0
         for j in range(len(marks)):
             while k < marks[j]:
-                state, low = accumulate(state, low, total(none, stages(par, state, field(par, state), 0.0, h), h))
+                state, low = accumulate(state, low, total(zero_pair, stages(par, state, field(par, state), 0.0, h), h))
                 k += 1
-            seen[j] = compare(*apart(state), given)
+            out[j] = compare(*apart(state), data)
 
     compiled: Callable[..., None] = compile_kernel(run)
     return compiled

@@ -67,9 +67,9 @@ def _without(u: Any, part: Any, v: Any) -> Any:
 
 
 @register_jitable
-def _inverse(own: Any, whole: Any) -> Any:
-    """1/own, of the square of a gradient's own part; 0 where that is below `SMALL_PART` times its square, `whole`."""
-    return 1.0 / own if own > SMALL_PART * whole else 0.0
+def _inverse(part: Any, square: Any) -> Any:
+    """1/part, of the square of a gradient's own part; 0 where that is below `SMALL_PART` times its whole `square`."""
+    return 1.0 / part if part > SMALL_PART * square else 0.0
 
 
 @register_jitable
@@ -93,8 +93,8 @@ def projected(par: Any, state: Any, step: Any) -> Any:
         t1 = 0.5 * (1.0 - dot(e, e)) * i1
         t2 = (par.p_psi - dot(L, e) - p21 * t1) * i2
         t3 = (par.energy - 0.5 * a * dot(L, L) - par.mgl * e[2] - p31 * t1 - p32 * t2) * i3
-        moved = _without(_without(_without((0.0, 0.0, 0.0, 0.0, 0.0), -t1, g1), -t2, c2), -t3, c3)
-        step = summed(step, (moved[0], moved[1], moved[2], par.weight * moved[3], par.weight * moved[4], 0.0))
+        shift = _without(_without(_without((0.0, 0.0, 0.0, 0.0, 0.0), -t1, g1), -t2, c2), -t3, c3)
+        step = summed(step, (shift[0], shift[1], shift[2], par.weight * shift[3], par.weight * shift[4], 0.0))
         end = summed(state, step)
     return step
 
@@ -103,13 +103,13 @@ def built_in() -> list[Integrator]:
     """Two pairs with fixed steps, projected."""
     methods = []
     for pair, name in ((DOP853_PAIR, "dop853-projected"), (VERN9_PAIR, "vern9-projected")):
-        plain = pair.fixed()
-        solver: Any = plain.solvers["axis"]
+        method = pair.fixed()
+        solver: Any = method.solvers["axis"]
         loop = loop_of(AXIS._replace(prepare=on_levels, top=Levels), pair.table, projected)
         methods.append(replace(
-            plain, name=name, summary=f"{pair.summary} with fixed steps, projected onto the constants of the motion",
+            method, name=name, summary=f"{pair.summary} with fixed steps, projected onto the constants of the motion",
             solvers={"axis": FixedStep(loop, solver.rule, on_levels, 1, implicit=False)},
             conserves=frozenset({"energy", "p_phi", "p_psi", "axis_length"}), needs="constants", general=False,
-            reference=f"{plain.reference} hairer-lubich-wanner-2006",
+            reference=f"{method.reference} hairer-lubich-wanner-2006",
         ))  # fmt: skip
     return methods

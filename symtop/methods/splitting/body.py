@@ -85,7 +85,7 @@ def _force(par: Any, state: Any, step: Any) -> Any:
     return vertical(state[0] + step[0], state[1] + step[1], state[2] + step[2], state[3] + step[3])
 
 
-def _kicking(gradient: bool | None) -> Callable[..., Any]:
+def _kick_of(gradient: bool | None) -> Callable[..., Any]:
     """A kick with a force gradient, without one, or as its table says (None)."""
 
     @register_jitable
@@ -129,12 +129,12 @@ def _turns(sine: Callable[..., Any], rotor: Callable[..., Any]) -> _Turns:
     Each is a function (state, d, turn) that returns the new increment d, and whether the series was accurate.
     """
 
-    def about(k: int) -> Callable[..., Any]:
+    def about_axis(k: int) -> Callable[..., Any]:
         """The turn about axis k; a, b, c are the places in q of axis k and of the two that follow, in M three more."""
         a, b, c = 1 + k, 1 + (k + 1) % 3, 1 + (k + 2) % 3
 
         @register_jitable
-        def turned(state, d, turn):  # type: ignore[no-untyped-def]
+        def rotate(state, d, turn):  # type: ignore[no-untyped-def]
             w, x, y, z = state[0] + d[0], state[a] + d[a], state[b] + d[b], state[c] + d[c]
             M2, M3 = state[b + 3] + d[b + 3], state[c + 3] + d[c + 3]
             s, m, near = sine(0.5 * turn * (state[a + 3] + d[a + 3]))
@@ -144,7 +144,7 @@ def _turns(sine: Callable[..., Any], rotor: Callable[..., Any]) -> _Turns:
             d = set_item(set_item(d, b + 3, d[b + 3] + (C * M2 + S * M3)), c + 3, d[c + 3] + (C * M3 - S * M2))
             return d, near
 
-        return turned
+        return rotate
 
     @register_jitable
     def momentum(state, d, turn):  # type: ignore[no-untyped-def]
@@ -154,14 +154,14 @@ def _turns(sine: Callable[..., Any], rotor: Callable[..., Any]) -> _Turns:
         square = half * half * (M1 * M1 + M2 * M2 + M3 * M3)
         s, m = rotor(square, half)
         m += 0.5 * (1.0 + m) * (1.0 - (w * w + x * x + y * y + z * z))
-        moved = (
+        increment = (
             d[0] + (m * w - s * (M1 * x + M2 * y + M3 * z)), d[1] + (m * x + s * (M1 * w + M3 * y - M2 * z)),
             d[2] + (m * y + s * (M2 * w + M1 * z - M3 * x)), d[3] + (m * z + s * (M3 * w + M2 * x - M1 * y)),
             d[4], d[5], d[6],
         )  # fmt: skip
-        return moved, square < 1.0
+        return increment, square < 1.0
 
-    return about(0), about(1), about(2), momentum
+    return about_axis(0), about_axis(1), about_axis(2), momentum
 
 
 ALONE, TOGETHER = _turns(by_either, exact), _turns(by_series, near)  # with a branch, and without it for lanes
@@ -176,7 +176,7 @@ def _begin(par: Any, rule: Any, state: Any, h: float) -> Any:
 
 
 def _march(drift: Callable[..., Any], in_lanes: Callable[..., Any], rest: Any = no_rest) -> Loop:
-    kick = _kicking(None)
+    kick = _kick_of(None)
 
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
         step, force = compose(_force, kick, drift, par, rule, state, carry)
@@ -184,7 +184,7 @@ def _march(drift: Callable[..., Any], in_lanes: Callable[..., Any], rest: Any = 
 
     @functools.cache
     def lanes(gradient: bool) -> Lanes:
-        return composed(_force, _kicking(gradient), in_lanes, _ended, top=body.General, dimension=7, carry=3, rest=rest)
+        return composed(_force, _kick_of(gradient), in_lanes, _ended, top=body.General, dimension=7, carry=3, rest=rest)
 
     def lanes_of(rule: Composition) -> Lanes | None:
         return lanes(any(rule.gradient)) if rule.turn == AS_GIVEN else None
@@ -193,9 +193,9 @@ def _march(drift: Callable[..., Any], in_lanes: Callable[..., Any], rest: Any = 
 
 
 @functools.cache
-def march(free: Table) -> Loop:
+def march(table: Table) -> Loop:
     """The loop of the tables whose drift is this composition of turns about the third axis and the first."""
-    outer, inner = free.kick, free.drift
+    outer, inner = table.kick, table.drift
     first, _, third, momentum = ALONE
 
     @register_jitable
@@ -207,10 +207,10 @@ def march(free: Table) -> Loop:
             step, _ = third(state, step, outer[i + 1] * about_third)
         return momentum(state, step, time * par.a2)[0]
 
-    return _march(drift, *_in_lanes(outer, inner))
+    return _march(drift, *_drift_in_lanes(outer, inner))
 
 
-def _in_lanes(outer: tuple[float, ...], inner: tuple[float, ...]) -> tuple[Any, Any]:
+def _drift_in_lanes(outer: tuple[float, ...], inner: tuple[float, ...]) -> tuple[Any, Any]:
     """The drift of `march` in lanes: its first turn, and a function of the others, each in a loop over lanes."""
     first, _, third, momentum = TOGETHER
 
@@ -264,12 +264,12 @@ def _axes(par: Any, turn: int) -> Any:
     return largest, 3 - largest - smallest, smallest
 
 
-def _five(turns: _Turns) -> Callable[..., Any]:
+def _five_turns(turns: _Turns) -> Callable[..., Any]:
     """A drift of five rotations."""
     first, second, third, momentum = turns
 
     @register_jitable
-    def about(par, axis, state, step, time):  # type: ignore[no-untyped-def]
+    def rotate(par, axis, state, step, time):  # type: ignore[no-untyped-def]
         if axis == 0:
             return first(state, step, time * par.a1)[0]
         if axis == 1:
@@ -279,14 +279,14 @@ def _five(turns: _Turns) -> Callable[..., Any]:
     @register_jitable
     def drift(par, rule, state, step, time):  # type: ignore[no-untyped-def]
         (outer, middle, inner), half = _axes(par, rule.turn), 0.5 * time
-        step = about(par, middle, state, about(par, outer, state, step, half), half)
-        step = about(par, middle, state, about(par, inner, state, step, time), half)
-        return momentum(state, about(par, outer, state, step, half), 0.0)[0]  # the length of q
+        step = rotate(par, middle, state, rotate(par, outer, state, step, half), half)
+        step = rotate(par, middle, state, rotate(par, inner, state, step, time), half)
+        return momentum(state, rotate(par, outer, state, step, half), 0.0)[0]  # the length of q
 
     return drift
 
 
-def _five_in_lanes() -> Callable[..., Any]:
+def _five_lane_turns() -> Callable[..., Any]:
     """A drift of five rotations in lanes, about the axes in the given order."""
     first, second, third, momentum = TOGETHER
 
@@ -303,8 +303,8 @@ def _five_in_lanes() -> Callable[..., Any]:
     return drift
 
 
-march_five = _march(_five(ALONE), _five_in_lanes())
-march_five_of_top = replace(_march(_five(_turns(by_library, exact)), _five_in_lanes()), lanes=lambda _: None)
+march_five = _march(_five_turns(ALONE), _five_lane_turns())
+march_five_of_top = replace(_march(_five_turns(_turns(by_library, exact)), _five_lane_turns()), lanes=lambda _: None)
 
 
 def five_rotations(order_of_axes: int) -> FixedStep:

@@ -59,7 +59,7 @@ def composition(
     """
     one_of("chart", chart, _KERNELS)
     one_of("rotation", rotation, ROTATIONS)
-    rule, boost = _checked(drift, kick, gradient), finite("processor", processor)
+    rule, boost = _checked_rule(drift, kick, gradient), finite("processor", processor)
     bare = not any(rule.gradient) and not boost
     if chart == "angles" and not (bare and rotation == "exact"):
         raise SymtopError(
@@ -70,12 +70,11 @@ def composition(
     stages = ScaledRule(table, scale, packed)
     kick_drift_kick = bare and rule.drift == (1.0,) and rule.kick == (0.5, 0.5)
     solvers = {
-        shown: FixedStep(march, stages, prepare, 1, implicit=False)
-        for shown, (march, prepare) in _KERNELS[chart].items()
+        key: FixedStep(march, stages, prepare, 1, implicit=False) for key, (march, prepare) in _KERNELS[chart].items()
     }
-    free = body.free_motion(rule, order) if chart == "space" and rotation == "exact" and not boost else None
-    if free is not None:
-        solvers[BODY] = FixedStep(body.march(free), body.scaled(table), on_body, 1, implicit=False)
+    turns = body.free_motion(rule, order) if chart == "space" and rotation == "exact" and not boost else None
+    if turns is not None:
+        solvers[BODY] = FixedStep(body.march(turns), body.scaled(table), on_body, 1, implicit=False)
     modified, sleeps = (kick_drift_kick and _KICK_DRIFT_KICK.get((chart, rotation))) or (None, None)
     return Integrator(
         name=name, family="splitting",
@@ -90,7 +89,7 @@ def composition(
     )  # fmt: skip
 
 
-def _checked(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] | None) -> Composition:
+def _checked_rule(drift: Sequence[float], kick: Sequence[float], gradient: Sequence[float] | None) -> Composition:
     """Coefficients that fit together, their sums closed to exactly 1."""
     drifts, kicks = row("drift", drift), row("kick", kick)
     if len(kicks) != len(drifts) + 1 or not drifts:

@@ -59,7 +59,7 @@ def _unpack(n: int) -> Callable[[Any], Composition]:
 
 
 @register_jitable
-def _of_any_length(row: Any) -> Composition:
+def _unpack_long(row: Any) -> Composition:
     row, n = row.copy(), (len(row) - 5) // 3  # a copy of its own: `times` multiplies in place
     m, end = 2 * n + 1, 3 * n + 2
     return Composition(row[:n], row[n:m], row[m:end], int(row[end]), int(row[end + 1]), row[end + 2])
@@ -72,7 +72,7 @@ def packed(rule: Any) -> tuple[Callable[[Any], Composition], NDArray[np.float64]
     are rows of the array, so that one kernel is compiled for all of them.
     """
     drift, kick, gradient = rule[:3]
-    unpack = _unpack(len(drift)) if len(drift) <= FEW_DRIFTS else _of_any_length
+    unpack = _unpack(len(drift)) if len(drift) <= FEW_DRIFTS else _unpack_long
     return unpack, np.array([*drift, *kick, *gradient, *rule[3:]], dtype=float)
 
 
@@ -92,10 +92,10 @@ def close(values: Any, total: float) -> Any:
     """`exact_sum` of a row in a kernel, by Knuth's two-sums: as `math.fsum` but for 1e-16 of the surplus itself."""
     high, low, n = -total, 0.0, len(values)
     for i in range(n):
-        moved = high + values[i]
-        back = moved - high
-        low += (high - (moved - back)) + (values[i] - back)
-        high = moved
+        new = high + values[i]
+        back = new - high
+        low += (high - (new - back)) + (values[i] - back)
+        high = new
     surplus, middle = high + low, n // 2
     if n % 2:
         return with_item(values, middle, values[middle] - surplus)
@@ -111,20 +111,20 @@ def stages(rule: Any, drift: float, kick: float, bend: float, boost: float) -> A
 
 
 @register_jitable
-def compose(force: Any, kick: Any, drift: Any, par: Any, rule: Any, state: Any, at_start: Any) -> Any:
+def compose(force: Any, kick: Any, drift: Any, par: Any, rule: Any, state: Any, start_force: Any) -> Any:
     """Increment of one step and the force at its end. A force that no kick uses is not evaluated."""
-    step, now, n = zero(state), at_start, len(rule.drift)
+    step, current, n = zero(state), start_force, len(rule.drift)
     for i in range(n):
         if rule.kick[i] != 0.0:
-            step = kick(par, now, step, rule.kick[i], rule.bend[i])
+            step = kick(par, current, step, rule.kick[i], rule.bend[i])
         step = drift(par, rule, state, step, rule.drift[i])
         if rule.kick[i + 1] != 0.0:
-            now = force(par, state, step)
+            current = force(par, state, step)
     if rule.kick[n] != 0.0:
-        step = kick(par, now, step, rule.kick[n], rule.bend[n])
+        step = kick(par, current, step, rule.kick[n], rule.bend[n])
     elif rule.kick[0] != 0.0:  # for the first kick of the next step
-        now = force(par, state, step)
-    return step, now
+        current = force(par, state, step)
+    return step, current
 
 
 def exact_sum(values: Sequence[float], total: float = 1.0) -> tuple[float, ...]:
@@ -159,7 +159,7 @@ no_rest = register_jitable(lambda _block, _row, _table: None)  # `rest` of a dri
 
 
 def composed(
-    force: Callable[..., Any], kick: Callable[..., Any], drift: Callable[..., Any], ended: Callable[..., Any], *,
+    force: Callable[..., Any], kick: Callable[..., Any], drift: Callable[..., Any], outcome: Callable[..., Any], *,
     top: Any, dimension: int, carry: int, still: int = 0, rest: Callable[..., None] = no_rest,
 ) -> Lanes:  # fmt: skip
     """A composition in lanes, from the functions that `compose` takes, but for the drift.
@@ -169,17 +169,17 @@ def composed(
     move: 0 is added once, which turns -0 into 0 as their sums would. ``rest(block, row, table)`` makes the remaining
     parts of a long drift, in loops of its own, and the force at its end.
     """
-    zeros, none, numbers = (0.0,) * dimension, (0.0,) * carry, (0.0,) * len(top._fields)
-    moving, unmoved = zeros[: dimension - still], zeros[dimension - still :]
-    coefficients, step_at, flag, still_at = len(numbers), 2 * dimension, 3 * dimension, len(moving)
+    zeros, carry_like, numbers = (0.0,) * dimension, (0.0,) * carry, (0.0,) * len(top._fields)
+    step_like, padding = zeros[: dimension - still], zeros[dimension - still :]
+    coefficients, step_at, flag, still_at = len(numbers), 2 * dimension, 3 * dimension, len(step_like)
     force_at = flag + 2
-    for part in (force, kick, drift, ended):
+    for part in (force, kick, drift, outcome):
         register_jitable(part)
 
     @register_jitable
     def stage(block, row, table, step, j):  # type: ignore[no-untyped-def]
         state, par = column(block, 0, j, zeros), top(*column(table, 0, j, numbers))
-        step = kick(par, column(block, force_at, j, none), step, row[j], row[W + j])
+        step = kick(par, column(block, force_at, j, carry_like), step, row[j], row[W + j])
         step, near = drift(par, state, step, row[2 * W + j])
         put(block, step_at, j, step[:still_at])
         put(block, force_at, j, force(par, state, step))
@@ -187,10 +187,10 @@ def composed(
 
     @register_jitable
     def last(block, row, table, j):  # type: ignore[no-untyped-def]
-        state, step = column(block, 0, j, zeros), column(block, step_at, j, moving) + unmoved
+        state, step = column(block, 0, j, zeros), column(block, step_at, j, step_like) + padding
         par = top(*column(table, 0, j, numbers))
-        step = kick(par, column(block, force_at, j, none), step, row[j], row[W + j])
-        block[flag * W + j] = block[flag * W + j] if ended(state, step) == OK else 1.0
+        step = kick(par, column(block, force_at, j, carry_like), step, row[j], row[W + j])
+        block[flag * W + j] = block[flag * W + j] if outcome(state, step) == OK else 1.0
         move(accumulate, block, dimension, j, step[:still_at])
         for i in range(still):
             block[(still_at + i) * W + j] = state[still_at + i] + 0.0
@@ -205,7 +205,7 @@ def composed(
         for i in range(1, drifts):
             row = table[(coefficients + 3 * i) * W :]
             for j in range(W):
-                stage(block, row, table, column(block, step_at, j, moving) + unmoved, j)
+                stage(block, row, table, column(block, step_at, j, step_like) + padding, j)
             rest(block, row, table)
         row = table[(coefficients + 3 * drifts) * W :]
         for j in range(W):

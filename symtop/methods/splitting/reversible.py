@@ -47,33 +47,33 @@ def growth(par: Any, k: float, state: Any, step: Any) -> Any:
 
 
 @compile_kernel
-def march(par, k, eps, turn, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]
+def march(par, k, eps, turn, times, budget, index, place, states, momenta):  # type: ignore[no-untyped-def]
     """Continue from `place`, a point of the grid, to the last of `times`, a failure or `budget` steps."""
-    state, low, force, clock, rest, rho = place
+    state, low, force, clock, clock_low, rho = place
     steps = outcome = 0
     if turn > 0.0:
         force, rho = force_angles(par, state, NONE), rho + turn * eps * growth(par, k, state, NONE)
-    while seen < len(times) and steps < budget and outcome == OK:
-        h, gap = eps / rho, (times[seen] - clock[0]) - rest[0]
+    while index < len(times) and steps < budget and outcome == OK:
+        h, gap = eps / rho, (times[index] - clock[0]) - clock_low[0]
         if not rho > 0.0 or clock[0] + h == clock[0]:  # the last steps before the axis is at the pole
             outcome = LEFT_CHART if rho > 0.0 else NOT_FINITE
             break
-        sampled = gap <= 0.5 * h if eps > 0.0 else gap >= 0.5 * h
-        part = gap if sampled else h
+        is_sample = gap <= 0.5 * h if eps > 0.0 else gap >= 0.5 * h
+        part = gap if is_sample else h
         rule = Stages((part / par.I1,), (0.5 * part, 0.5 * part), (0.0, 0.0), 1, 0, 0.0)
         step, after = compose(force_angles, kick_angles, drift_angles, par, rule, state, force)
-        there, left = accumulate(state, low, step)
+        new_state, new_low = accumulate(state, low, step)
         steps += 1 if part != 0.0 else 0
-        outcome = chart_outcome(there[0])
-        if outcome == OK and sampled:
+        outcome = chart_outcome(new_state[0])
+        if outcome == OK and is_sample:
             pair = observe(par, rule, state, step, part) if part != 0.0 else (par.north + par.p_psi, par.p_psi)
-            momenta[0, seen], momenta[1, seen] = pair
-            states[seen, 0], states[seen, 1], states[seen, 2], states[seen, 3] = there
-            seen += 1
+            momenta[0, index], momenta[1, index] = pair
+            states[index, 0], states[index, 1], states[index, 2], states[index, 3] = new_state
+            index += 1
         elif outcome == OK:
-            state, low, force, rho = there, left, after, rho + eps * growth(par, k, state, step)
-            clock, rest = accumulate(clock, rest, (h,))
-    return seen, steps, outcome, (state, low, force, clock, rest, rho)
+            state, low, force, rho = new_state, new_low, after, rho + eps * growth(par, k, state, step)
+            clock, clock_low = accumulate(clock, clock_low, (h,))
+    return index, steps, outcome, (state, low, force, clock, clock_low, rho)
 
 
 def _limit(count: int) -> int:
@@ -85,17 +85,17 @@ def _run(top: SymmetricTop, start: Angles, k: float, parts: Sequence[tuple[float
     """The samples of the last part, each part with an eps and times of its own."""
     par, state = on_angles(top, start)
     place: Any = (state, NONE, NONE[:3], NONE[:1], NONE[:1], 1.0 / math.sin(start.theta) ** k)
-    done, outcome, before, turn, most = 0, OK, 0.0, BEGIN, limit
+    total, outcome, before, turn, budget = 0, OK, 0.0, BEGIN, limit
     for eps, times in parts:
-        seen, before, turn = 0, eps, RETRACE if eps * before < 0.0 else turn
+        index, before, turn = 0, eps, RETRACE if eps * before < 0.0 else turn
         states, momenta = np.full((times.size, 4), np.nan), np.full((2, times.size), np.nan)
-        while seen < times.size and outcome == OK:
-            given = min(BLOCK, math.ceil(most - done)), seen, place, states, momenta
-            seen, steps, outcome, place = march(par, k, eps, turn, times, *given)
-            done, turn = done + steps, ONWARD
-            outcome = OUT_OF_BUDGET if outcome == OK and done >= most and seen < times.size else outcome
-    ended = OUTCOMES[outcome], float(times[-1] if outcome == OK else place[3][0])
-    return Run(states, momenta[0], momenta[1], done, done, 0, *ended)
+        while index < times.size and outcome == OK:
+            arguments = min(BLOCK, math.ceil(budget - total)), index, place, states, momenta
+            index, steps, outcome, place = march(par, k, eps, turn, times, *arguments)
+            total, turn = total + steps, ONWARD
+            outcome = OUT_OF_BUDGET if outcome == OK and total >= budget and index < times.size else outcome
+    end = OUTCOMES[outcome], float(times[-1] if outcome == OK else place[3][0])
+    return Run(states, momenta[0], momenta[1], total, total, 0, *end)
 
 
 @dataclass(frozen=True)

@@ -71,16 +71,16 @@ def exact(square: float, half: float) -> Any:
     return half * (2.0 * sin * cos / x), -2.0 * sin * sin
 
 
-def without_branch(turned: Callable[..., Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
+def without_branch(rotate: Callable[..., Any]) -> tuple[Callable[..., Any], Callable[..., Any]]:
     """An exact and a Cayley drift for lanes, as `loop.composed` takes them, with a flag: is the result accurate?"""
 
     def exact(par, state, step, half):  # type: ignore[no-untyped-def]
         square = half_square(state, step, half)
         s, m = near(square, half)
-        return turned(state, step, s, m), square < 1.0
+        return rotate(state, step, s, m), square < 1.0
 
     def by_cayley(par, state, step, half):  # type: ignore[no-untyped-def]
         s, m = cayley(half_square(state, step, half), half)
-        return turned(state, step, s, m), True
+        return rotate(state, step, s, m), True
 
     return exact, by_cayley

@@ -70,8 +70,8 @@ def mean_square_momentum(top: Any, at: Any) -> float:
     """The mean of ``|L|^2 = 2 I1 (E - mgl u) + p_psi^2 (1 - I1/I3)`` over a nutation, to 1e-14."""
     low, high = turning_cosines(top, at)
     excess, beta, a, _ = nutation_cubic(top, at)
-    _, gained = mean_nutation(top, at, low, high)
-    mean: float = top.I1 * top.I1 * (excess + beta * (math.cos(at.theta) - low) - gained + a * a)
+    _, rise = mean_nutation(top, at, low, high)
+    mean: float = top.I1 * top.I1 * (excess + beta * (math.cos(at.theta) - low) - rise + a * a)
     return mean
 
 
@@ -158,27 +158,27 @@ def process_attitude(s: float, w: float, x: float, y: float, z: float, Lx: float
     return up * w, down * x, down * y, up * z, D * Lx - d * Lz * ex, D * Ly - d * Lz * ey, Lz
 
 
-def _loop(force: Any, turned: Any, process: Any, spun: Any, observe: Any, dimension: int) -> Loop:
-    """The loop of a chart; `process` is the flow of G, `spun` adds the spin to a sample."""
+def _loop(force: Any, rotate: Any, process: Any, add_spin: Any, observe: Any, dimension: int) -> Loop:
+    """The loop of a chart; `process` is the flow of G, `add_spin` adds the spin to a sample."""
     zeros = (0.0,) * dimension
-    for part in (force, turned, process, spun):
+    for part in (force, rotate, process, add_spin):
         register_jitable(part)
 
-    def ended(state, step):  # type: ignore[no-untyped-def]
+    def outcome(state, step):  # type: ignore[no-untyped-def]
         total = step[0] + step[1]
         for i in range(2, dimension - 1):  # all but L_z
             total += step[i]
         return finite_outcome(total)
 
     exact, cayley = (
-        composed(force, kick_space, drift, ended, top=SpaceTop, dimension=dimension, carry=3, still=1)
-        for drift in without_branch(turned)
+        composed(force, kick_space, drift, outcome, top=SpaceTop, dimension=dimension, carry=3, still=1)
+        for drift in without_branch(rotate)
     )
 
     @register_jitable
     def drift(par, rule, state, step, half):  # type: ignore[no-untyped-def]
         s, m = rotor(rule, half_square(state, step, half), half)
-        return turned(state, step, s, m)
+        return rotate(state, step, s, m)
 
     def begin(par, rule, state, h):  # type: ignore[no-untyped-def]
         return force(par, state, zeros)
@@ -186,13 +186,13 @@ def _loop(force: Any, turned: Any, process: Any, spun: Any, observe: Any, dimens
     def increment(par, rule, state, carry, h):  # type: ignore[no-untyped-def]
         """The work counted is the number of kicks with a new axis."""
         step, axis = compose(force, kick_space, drift, par, rule, state, carry)
-        return step, axis, rule.forces, ended(state, step)
+        return step, axis, rule.forces, outcome(state, step)
 
     def enter(par, rule, state, h):  # type: ignore[no-untyped-def]
         return state if rule.boost == 0.0 else process(rule.boost, *state)
 
     def present(par, rule, state, k, h):  # type: ignore[no-untyped-def]
-        return spun(par, state if rule.boost == 0.0 else process(-rule.boost, *state), k * h)
+        return add_spin(par, state if rule.boost == 0.0 else process(-rule.boost, *state), k * h)
 
     return Loop(begin, increment, observe, enter, present, lanes=lambda rule: exact if rule.turn == EXACT else cayley)
 
@@ -209,8 +209,8 @@ def strang_energy(view: View, momenta: Momenta, h: float) -> Array:
     """
     top, e, L = view.top, view.axis, view.momentum
     u, square = e[:, 2], np.sum(L * L, axis=1)
-    bent = top.mgl * (L[:, 2] * np.sum(L * e, axis=1) - u * square) / top.I1**2
-    return np.asarray(h * h * (bent / 12 - top.mgl**2 * (1.0 - u) * (1.0 + u) / (24 * top.I1)))
+    V_tt = top.mgl * (L[:, 2] * np.sum(L * e, axis=1) - u * square) / top.I1**2
+    return np.asarray(h * h * (V_tt / 12 - top.mgl**2 * (1.0 - u) * (1.0 + u) / (24 * top.I1)))
 
 
 def cayley_correction(view: View, momenta: Momenta, h: float) -> Array:

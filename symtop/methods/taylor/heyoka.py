@@ -101,7 +101,7 @@ def stepper(chart: str, precision: str, tolerance: float) -> Any:
 
 
 @functools.lru_cache(maxsize=32)
-def _idle(chart: str, precision: str, tolerance: float) -> list[Any]:
+def _idle_steppers(chart: str, precision: str, tolerance: float) -> list[Any]:
     """The steppers of one kind that no run is using. A stepper holds the state of its run, so no two runs share one."""
     return []
 
@@ -145,25 +145,25 @@ class Flight(NamedTuple):
 
 
 def propagate(
-    chart: str, precision: str, tolerance: float, top: SymmetricTop, start: Angles, times: Array, most: int = 0
+    chart: str, precision: str, tolerance: float, top: SymmetricTop, start: Angles, times: Array, max_steps: int = 0
 ) -> Flight:
-    """heyoka's states, in the working precision, at increasing times, or those reached in `most` steps."""
+    """heyoka's states, in the working precision, at increasing times, or those reached in `max_steps`."""
     kind, grid = arithmetic(precision).kind, times if times[0] == 0.0 else np.concatenate([[0.0], times])
     numbers = grid if precision == "double" else np.array([kind(float(t)) for t in grid])
-    idle = _idle(chart, precision, tolerance)
+    pool = _idle_steppers(chart, precision, tolerance)
     try:
-        integrator = idle.pop()  # in one instruction: another thread may be here, too
+        integrator = pool.pop()  # in one instruction: another thread may be here, too
     except IndexError:
         integrator = stepper(chart, precision, tolerance)
     state, parameters = start_numbers(chart, precision, top, start)
     integrator.time = kind("0")
     integrator.state[:] = state
     integrator.pars[:] = parameters[: integrator.pars.size]  # the axis chart does not need the last one
-    outcome, _, _, steps, *_, states = integrator.propagate_grid(numbers, max_steps=most)
+    outcome, _, _, steps, *_, states = integrator.propagate_grid(numbers, max_steps=max_steps)
     order, time = int(integrator.order), float(integrator.time)
     if (unit := _unit(chart, top, start)) != 1.0:
         states[:, -3:] *= kind(repr(unit))
-    idle.append(integrator)  # not after an exception, which may leave it in any state
+    pool.append(integrator)  # not after an exception, which may leave it in any state
     return Flight(states[grid.size - times.size :], int(steps), order, outcome.name, time)
 
 
@@ -177,22 +177,22 @@ class HeyokaSolver:
     def __call__(self, top: SymmetricTop, start: Angles, plan: Plan) -> Run:
         """Run from the start to the horizon, samples by dense output."""
         form = FORMS[self.chart]
-        most = max(1, int(min(plan.most(MOST_STEPS[self.precision]), sys.maxsize)))  # infinity is a budget, too
-        flight = propagate(self.chart, self.precision, plan.tolerance, top, start, plan.times, most)
+        limit = max(1, int(min(plan.most(MOST_STEPS[self.precision]), sys.maxsize)))  # infinity is a budget, too
+        flight = propagate(self.chart, self.precision, plan.tolerance, top, start, plan.times, limit)
         count, size = len(flight.states), plan.times.size
         states = _padded(flight.states, size)
         par = BareTop(top.I1, top.I3, top.mgl) if self.chart == "angles" else None
-        whole = flight.states if self.chart in ("axis", "attitude") else states  # the others work in double
-        p_phi, p_psi = (_padded(values, size) for values in form.momenta(par, whole))
+        samples = flight.states if self.chart in ("axis", "attitude") else states  # the others work in double
+        p_phi, p_psi = (_padded(values, size) for values in form.momenta(par, samples))
         if form.present is not None:
             states = form.present(par, plan.times, states)
-        good: Any = np.isfinite(states).all(axis=1)
-        word = "ok" if good.all() and "time_limit" in flight.outcome else "not_finite"
-        if "step_limit" in flight.outcome and good[:count].all():
-            word = "out_of_budget"
-        reached = plan.horizon if word == "ok" else float(plan.times[good][-1]) if good.any() else 0.0
-        reached = flight.time if word == "out_of_budget" else reached
-        return Run(states, p_phi, p_psi, flight.steps, flight.steps * flight.order, 0, word, reached)
+        finite: Any = np.isfinite(states).all(axis=1)
+        outcome = "ok" if finite.all() and "time_limit" in flight.outcome else "not_finite"
+        if "step_limit" in flight.outcome and finite[:count].all():
+            outcome = "out_of_budget"
+        reached = plan.horizon if outcome == "ok" else float(plan.times[finite][-1]) if finite.any() else 0.0
+        reached = flight.time if outcome == "out_of_budget" else reached
+        return Run(states, p_phi, p_psi, flight.steps, flight.steps * flight.order, 0, outcome, reached)
 
     def bare(self, top: SymmetricTop, start: Angles, plan: Plan) -> tuple[Callable[[], Any], int]:
         """A function that runs heyoka's own loop to the horizon, without samples, and the derivatives it computes."""
@@ -211,9 +211,9 @@ def _padded(values: Any, size: int) -> Array:
     """Values as doubles, and NaN for the times that were not reached."""
     if len(values) == size and values.dtype == np.float64:
         return values  # type: ignore[no-any-return]  # not shared with another run: no copy
-    padded = np.full((size, *values.shape[1:]), np.nan)
-    padded[: len(values)] = values
-    return padded
+    result = np.full((size, *values.shape[1:]), np.nan)
+    result[: len(values)] = values
+    return result
 
 
 # beyond double there are no vector units, and quadruple precision is software
@@ -230,7 +230,7 @@ def built_in() -> list[Integrator]:
         import heyoka as hy
     except ImportError:
         return []
-    wide = ["longdouble"] if np.finfo(np.longdouble).eps < EPSILON else []
+    extended = ["longdouble"] if np.finfo(np.longdouble).eps < EPSILON else []
     quad = ["quad"] if hasattr(hy, "real128") else []
     return [
         Integrator(
@@ -243,7 +243,7 @@ def built_in() -> list[Integrator]:
             reference="biscani-izzo-2021", needs="expression", general=True, inner_loop="heyoka", precision=precision,
             speed=0.002 if precision == "quad" else 1.0,
         )
-        for precision in ("double", *wide, *quad)
+        for precision in ("double", *extended, *quad)
     ]  # fmt: skip
 
 

@@ -161,12 +161,12 @@ def axis_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..., A
             norm = b.fma(x, x, b.fma(y, y, b.fmul(u, u)))
             first = first_terms(v, (x, y), u, norm, (wx, wy), a, p, m)
             S, _ = axis_terms(v, first, v.pack(a), v.pack(m), order + 1)
-            whole = b.fadd(S[1], v.total(S[2 : order + 1]))
+            change = b.fadd(S[1], v.total(S[2 : order + 1]))
             pairs = ((S[n + 1], v.constant(n + 1), b.fmul(S[n], v.constant(n))) for n in range(2, order + 1, 2))
-            bent = v.total([v.fma(*pair) for pair in pairs])  # the sum of n S_n from 2 on
-            turned = v.lane(bent, 1), b.fneg(v.lane(bent, 0)), v.lane(whole, 2)
-            momentum = b.fmul(m, v.lane(whole, 0)), b.fmul(m, v.lane(whole, 1))
-            return v.array([*turned, *momentum, size(v, S, order), size(v, S, order - 1)])
+            slope = v.total([v.fma(*pair) for pair in pairs])  # the sum of n S_n from 2 on
+            axis = v.lane(slope, 1), b.fneg(v.lane(slope, 0)), v.lane(change, 2)
+            momentum = b.fmul(m, v.lane(change, 0)), b.fmul(m, v.lane(change, 1))
+            return v.array([*axis, *momentum, size(v, S, order), size(v, S, order - 1)])
 
         return types.UniTuple(types.float64, 7)(state, a, m), emit
 
@@ -203,7 +203,7 @@ def attitude_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..
             base = fma(c(0.25), fma(first.P, first.P, first.square), mul(c(0.5), first.ku))
             rest1 = b.fsub(first.ku, fma(c(0.5), pull, base))
             rest2 = b.fsub(first.ku, fma(c(-0.5), pull, base))
-            rest = v.pack(rest1, rest1, rest2, rest2)
+            factor = v.pack(rest1, rest1, rest2, rest2)
             # chi' = -(i/2) (P chi_1 + conj(a w) chi_2), -(i/2) (a w chi_1 - P chi_2)
             ar, ai, half, minus = mul(a, wx), mul(a, wy), c(0.5), c(-0.5)
             real1 = fma(first.P, qw, fma(ar, qy, neg(mul(ai, qx))))
@@ -212,17 +212,17 @@ def attitude_sum(order: int, arithmetic: type[Vectors] = Vectors) -> Callable[..
             imag2 = fma(ai, qw, fma(first.P, qx, neg(mul(ar, qz))))
             X = [v.pack(qw, neg(qz), qy, neg(qx))]
             X.append(v.pack(mul(half, imag1), mul(minus, real1), mul(half, imag2), mul(minus, real2)))
-            X.append(mul(mul(rest, X[0]), v.constant(0.5)))
+            X.append(mul(mul(factor, X[0]), v.constant(0.5)))
             av, mv = v.pack(a), v.pack(m)
             for n in range(1, order - 1):
                 product = v.dot([(U[j], X[n - j]) for j in middle_first(n)] + [(U[n], X[0])])
-                bent = v.fma(b.fmul(product, mv), av, b.fmul(rest, X[n]))
+                bent = v.fma(b.fmul(product, mv), av, b.fmul(factor, X[n]))
                 X.append(b.fmul(bent, v.constant(1.0 / ((n + 1) * (n + 2)))))
-            whole, halves = b.fadd(S[1], v.total(S[2:])), b.fadd(X[1], v.total(X[2:]))
-            turned = v.lane(halves, 0), neg(v.lane(halves, 3)), v.lane(halves, 2), neg(v.lane(halves, 1))
-            momentum = mul(m, v.lane(whole, 0)), mul(m, v.lane(whole, 1))
+            change, halves = b.fadd(S[1], v.total(S[2:])), b.fadd(X[1], v.total(X[2:]))
+            quaternion = v.lane(halves, 0), neg(v.lane(halves, 3)), v.lane(halves, 2), neg(v.lane(halves, 1))
+            momentum = mul(m, v.lane(change, 0)), mul(m, v.lane(change, 1))
             sizes = (b.fadd(size(v, S, n), _size(v, X[n])) for n in (order, order - 1))
-            return v.array([*turned, *momentum, *sizes])
+            return v.array([*quaternion, *momentum, *sizes])
 
         return types.UniTuple(types.float64, 8)(state, a, m), emit
 
@@ -238,10 +238,10 @@ def _loop(series_of: Callable[..., Any], size: int, observe: Callable[..., Any])
 
         @register_jitable
         def stepped(rule, state):  # type: ignore[no-untyped-def]
-            made, step, total = series(state, rule.turn, rule.pull), zeros, 0.0
+            values, step, total = series(state, rule.turn, rule.pull), zeros, 0.0
             for i in range(still):
-                step = set_item(step, i, made[i])
-                total += made[i]
+                step = set_item(step, i, values[i])
+                total += values[i]
             return step, finite_outcome(total)
 
         return stepped
@@ -305,36 +305,36 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
         last = max(math.sqrt(out[size - 1]), EARLIER * math.sqrt(out[size]))
         return set_item(dstate, size - 1, 0.0), last
 
-    def run(numbers, tolerance, times, budget, seen, place, states, momenta):  # type: ignore[no-untyped-def]
+    def run(numbers, tolerance, times, budget, index, place, states, momenta):  # type: ignore[no-untyped-def]
         body = BareTop(*numbers[:3])
         par, state = prepare(body, Start(*numbers[3:]))
-        low, t, rest = zero(state), 0.0, 0.0
+        low, t, t_low = zero(state), 0.0, 0.0
         turn = (state[size - 3] ** 2 + state[size - 2] ** 2 + state[size - 1] ** 2) / body.I1**2
         h = 1.0 / math.sqrt(turn + 4.0 * abs(body.mgl) / body.I1 + 1.0 / times[-1] ** 2)
-        kept = place[: 2 * size].reshape(2, size)
-        if seen >= 0:
-            state, low = row_of(kept, 0, state), row_of(kept, 1, low)
-            t, rest, h = place[2 * size], place[2 * size + 1], place[2 * size + 2]
-        seen = max(seen, 0)
+        record = place[: 2 * size].reshape(2, size)
+        if index >= 0:
+            state, low = row_of(record, 0, state), row_of(record, 1, low)
+            t, t_low, h = place[2 * size], place[2 * size + 1], place[2 * size + 2]
+        index = max(index, 0)
         steps = effort = outcome = 0
-        while seen < len(times) and effort < budget:
+        while index < len(times) and effort < budget:
             dstate, last = terms(state, body, h)
             effort += 1
             change = GROW if last == 0.0 else min(GROW, SAFETY * (tolerance / last) ** (1.0 / order))
             if last <= ACCEPTED_RATIO * tolerance:
-                ahead = t + h
-                after = (rest + (t - ahead)) + h if t > h else (rest + (h - ahead)) + t
-                while seen < len(times) and (times[seen] - ahead) - after <= 0.0:
-                    part, _ = terms(state, body, (times[seen] - t) - rest)
-                    shown, _ = accumulate(state, low, part)
-                    shown = sample(par, times[seen], shown)
-                    store(states, seen, shown)
-                    e = axis(shown)
-                    momenta[seen, 0] = shown[size - 1]
-                    momenta[seen, 1] = shown[size - 3] * e[0] + shown[size - 2] * e[1] + shown[size - 1] * e[2]
-                    seen += 1
+                t_new = t + h
+                t_new_low = (t_low + (t - t_new)) + h if t > h else (t_low + (h - t_new)) + t
+                while index < len(times) and (times[index] - t_new) - t_new_low <= 0.0:
+                    part, _ = terms(state, body, (times[index] - t) - t_low)
+                    y, _ = accumulate(state, low, part)
+                    y = sample(par, times[index], y)
+                    store(states, index, y)
+                    e = axis(y)
+                    momenta[index, 0] = y[size - 1]
+                    momenta[index, 1] = y[size - 3] * e[0] + y[size - 2] * e[1] + y[size - 1] * e[2]
+                    index += 1
                 state, low = accumulate(state, low, dstate)
-                t, rest = ahead, after
+                t, t_low = t_new, t_new_low
                 steps += 1
             elif not last < np.inf:
                 change = 0.1
@@ -345,10 +345,10 @@ def march_adaptive(chart: str, order: int) -> Callable[..., tuple[int, int, int,
             if not np.isfinite(state[0] + state[size - 2]):
                 outcome = NOT_FINITE
                 break
-        store(kept, 0, state)
-        store(kept, 1, low)
-        place[2 * size], place[2 * size + 1], place[2 * size + 2] = t, rest, h
-        return seen, steps, effort, outcome
+        store(record, 0, state)
+        store(record, 1, low)
+        place[2 * size], place[2 * size + 1], place[2 * size + 2] = t, t_low, h
+        return index, steps, effort, outcome
 
     return compile_kernel(run)  # type: ignore[no-any-return]
 

@@ -195,7 +195,7 @@ def loop(chart: str) -> Loop:
 
 def built_in() -> list[Integrator]:
     """`series-general` and `series-general-adaptive`."""
-    same: dict[str, Any] = {
+    common: dict[str, Any] = {
         "family": "taylor", "explicit": True, "symplectic": False, "symmetric": False,
         "conserves": frozenset({"p_phi"}), "reference": "jorba-zou-2005", "needs": "expression", "general": True,
     }  # fmt: skip
@@ -203,9 +203,9 @@ def built_in() -> list[Integrator]:
     adaptive = {chart: solver(FORMS[chart], method, HIGHEST_ORDER + 2, light=True) for chart, method in CHARTS.items()}
     summary = "Taylor series of the unreduced space-frame equations by recurrence"
     return [
-        Integrator("series-general", summary=f"{summary}, order {ORDER}", solvers=fixed, order=ORDER, **same),
+        Integrator("series-general", summary=f"{summary}, order {ORDER}", solvers=fixed, order=ORDER, **common),
         Integrator(
             "series-general-adaptive", summary=f"{summary}, order and steps of a tolerance", solvers=adaptive,
-            control="tolerance", least_tolerance=EPSILON / 1000.0, default_tolerance=EPSILON / 10.0, **same,
+            control="tolerance", least_tolerance=EPSILON / 1000.0, default_tolerance=EPSILON / 10.0, **common,
         ),
     ]  # fmt: skip

@@ -39,28 +39,28 @@ def body_digits(body: RigidBody, start: Attitude, times: Sequence[float]) -> Dig
     """The motion at increasing times of at least 0; SymtopError for one that takes more than `MOST_STEPS` steps."""
     mp = context(BITS * 3 // 10)
     fine = _spatial(mp, _run(body, start, times, BITS, ORDER, GOAL))
-    other = _spatial(mp, _run(body, start, times, BITS - BITS_APART, ORDER - BITS_APART, GOAL - BITS_APART))
+    check = _spatial(mp, _run(body, start, times, BITS - BITS_APART, ORDER - BITS_APART, GOAL - BITS_APART))
     size = max([mp.mpf(2) ** -GOAL, *(mp.norm(L) for _, L in fine)])
     gap = max(
-        max(2 * mp.norm(_less(q, p)), mp.norm(_less(L, K)) / size)
-        for (q, L), (p, K) in zip(fine, other, strict=True)
+        max(2 * mp.norm(_difference(q, p)), mp.norm(_difference(L, K)) / size)
+        for (q, L), (p, K) in zip(fine, check, strict=True)
     )  # fmt: skip
     return Digits([q for q, _ in fine], [L for _, L in fine], float(gap))
 
 
-def _less(first: Sequence[Any], second: Sequence[Any]) -> list[Any]:
+def _difference(first: Sequence[Any], second: Sequence[Any]) -> list[Any]:
     return [a - b for a, b in zip(first, second, strict=True)]
 
 
 def _spatial(mp: Any, rows: list[list[Fraction]]) -> list[tuple[list[Any], list[Any]]]:
     """Quaternion and L = q M q* of states (q, M)."""
-    turned = []
+    states = []
     for row in rows:
         w, x, y, z, a, b, c = (mp.mpf(value.numerator) / value.denominator for value in row)
         u, v, s = 2 * (y * c - z * b), 2 * (z * a - x * c), 2 * (x * b - y * a)  # t = 2 r x M, L = M + w t + r x t
         L = [a + w * u + y * s - z * v, b + w * v + z * u - x * s, c + w * s + x * v - y * u]
-        turned.append(([w, x, y, z], L))
-    return turned
+        states.append(([w, x, y, z], L))
+    return states
 
 
 def _run(
@@ -74,25 +74,25 @@ def _run(
     momentum = [moment * Fraction(rate) for moment, rate in zip(moments, start.omega_body, strict=True)]
     w, x, y, z = attitude
     up = [2 * (x * z - w * y), 2 * (y * z + w * x), w * w - x * x - y * y + z * z]
-    state = [_whole(value, one) for value in (*attitude, *momentum, *up)]
-    rates = [_whole(1 / moment, one) for moment in moments]
-    torque = [_whole(Fraction(part), one) for part in body.torque]
+    state = [_fixed_point(value, one) for value in (*attitude, *momentum, *up)]
+    rates = [_fixed_point(1 / moment, one) for moment in moments]
+    torque = [_fixed_point(Fraction(part), one) for part in body.torque]
     rows, at, k = list[list[Fraction]](), Fraction(0), 0
     for _ in range(MOST_STEPS):
         series = _series(state, rates, torque, bits, order)
         sizes = [max(abs(part[n]).bit_length() - bits for part in series) / n for n in (order - 1, order)]
         step = Fraction(2) ** floor(-goal / order - max(sizes))
         while k < len(times) and Fraction(times[k]) <= at + step:
-            moved = _whole(Fraction(times[k]) - at, one)
-            rows.append([Fraction(_horner(part, moved, bits), one) for part in series[:7]])
+            elapsed = _fixed_point(Fraction(times[k]) - at, one)
+            rows.append([Fraction(_horner(part, elapsed, bits), one) for part in series[:7]])
             k += 1
         if k == len(times):
             return rows
-        state, at = [_horner(part, _whole(step, one), bits) for part in series], at + step
+        state, at = [_horner(part, _fixed_point(step, one), bits) for part in series], at + step
     raise SymtopError(f"times must be within {MOST_STEPS} steps of the series, not reach {times[-1]:g}")
 
 
-def _whole(value: Fraction, one: int) -> int:
+def _fixed_point(value: Fraction, one: int) -> int:
     return value.numerator * one // value.denominator
 
 
@@ -115,21 +115,21 @@ def _series(state: list[int], rates: list[int], torque: list[int], bits: int, or
         o1, o2, o3 = (spin[::-1] for spin in spins)
         r2, r3 = m2[::-1], m3[::-1]
 
-        def of(first: list[int], second: list[int]) -> int:
+        def dot(first: list[int], second: list[int]) -> int:
             return sum(map(mul, first, second))
 
         turning = (
-            -of(x, o1) - of(y, o2) - of(z, o3), of(w, o1) + of(y, o3) - of(z, o2),
-            of(w, o2) - of(x, o3) + of(z, o1), of(w, o3) + of(x, o2) - of(y, o1),
+            -dot(x, o1) - dot(y, o2) - dot(z, o3), dot(w, o1) + dot(y, o3) - dot(z, o2),
+            dot(w, o2) - dot(x, o3) + dot(z, o1), dot(w, o3) + dot(x, o2) - dot(y, o1),
         )  # fmt: skip
         next_state = [value >> (bits + 1) for value in turning]
         for lever, product, pull in (
-            (a3 - a2, of(m2, r3), g2[n] * c3 - g3[n] * c2), (a1 - a3, of(m1, r3), g3[n] * c1 - g1[n] * c3),
-            (a2 - a1, of(m1, r2), g1[n] * c2 - g2[n] * c1),
+            (a3 - a2, dot(m2, r3), g2[n] * c3 - g3[n] * c2), (a1 - a3, dot(m1, r3), g3[n] * c1 - g1[n] * c3),
+            (a2 - a1, dot(m1, r2), g1[n] * c2 - g2[n] * c1),
         ):  # fmt: skip
             next_state.append((lever * (product >> bits) + pull) >> bits)
-        lifting = of(g2, o3) - of(g3, o2), of(g3, o1) - of(g1, o3), of(g1, o2) - of(g2, o1)
-        next_state += [value >> bits for value in lifting]
+        up_rates = dot(g2, o3) - dot(g3, o2), dot(g3, o1) - dot(g1, o3), dot(g1, o2) - dot(g2, o1)
+        next_state += [value >> bits for value in up_rates]
         for part, value in zip(series, next_state, strict=True):
             part.append(value // (n + 1))
     return series

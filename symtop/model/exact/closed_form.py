@@ -155,7 +155,7 @@ class ClosedForm(_Form):
 
     def axis_distance(self, times: Array, axes: Array) -> Array:
         """Angles between axes (n, 3) and the top's at times (n,), rad, shape (n,)."""
-        return np.asarray(distances(self._all, _in_a_row(times)[0], axes[None])[0])
+        return np.asarray(distances(self._all, _as_row(times)[0], axes[None])[0])
 
     def run(self, times: Array) -> tuple[Array, Array, Array]:
         """States (n, 7) at a row of times, with p_phi = L_z and p_psi = L.e read off them."""
@@ -166,7 +166,7 @@ class ClosedForm(_Form):
         return float(self._constants[place])
 
     def _view(self, times: ArrayLike, view: int) -> Array:
-        flat_times, shape = _in_a_row(times)
+        flat_times, shape = _as_row(times)
         width = (samples.WIDTHS[view],)
         return fill(self._all, flat_times, view).reshape(width + shape if view in samples.ROWS else shape + width)
 
@@ -188,9 +188,9 @@ def short_constants(rows: Array) -> tuple[Array, int]:
     if _build.ready(FORM_SECONDS * len(rows)):
         out = np.empty((len(rows), at.SIZE))
         return out, _build.compiled(rows, out)
-    plain = [[0.0] * at.SIZE for _ in rows]
-    failed = all_constants(rows.tolist(), plain)
-    return np.array(plain).reshape(len(rows), at.SIZE), failed
+    lists = [[0.0] * at.SIZE for _ in rows]
+    failed = all_constants(rows.tolist(), lists)
+    return np.array(lists).reshape(len(rows), at.SIZE), failed
 
 
 def take_digits(constants: Array, top: SymmetricTop, start: Angles) -> None:
@@ -221,15 +221,15 @@ def distances(constants: Array, times: Array, axes: Array) -> Array:
 def _put(kernel: LazyKernel, seconds: float, constants: Array, times: Array, *others: Any) -> None:
     """Let a kernel fill in the last argument (`seconds` if interpreted); SymtopError for a time out of range."""
     if kernel.ready(seconds):
-        bad = kernel.compiled(constants, times, *others)
+        index = kernel.compiled(constants, times, *others)
     else:
-        bad = kernel.py_func(constants.tolist(), times.tolist(), *others)
-    if bad >= 0:
+        index = kernel.py_func(constants.tolist(), times.tolist(), *others)
+    if index >= 0:
         words = f"times must be finite numbers of at most {samples.LONGEST_TIME:g} in size"
-        raise SymtopError(f"{words}, not {float(times.flat[bad])!r}")
+        raise SymtopError(f"{words}, not {float(times.flat[index])!r}")
 
 
-def _in_a_row(times: ArrayLike) -> tuple[Array, tuple[int, ...]]:
+def _as_row(times: ArrayLike) -> tuple[Array, tuple[int, ...]]:
     """Times in a row (1, n) that compiled code takes, and their shape."""
     array = real_numbers("times", times)
     row = array.reshape(1, -1)
@@ -280,11 +280,11 @@ class ClosedForms(_Form):
         return self.constants[:, place]
 
     def _view(self, times: ArrayLike, view: int) -> Array:
-        given = real_numbers("times", times)
-        rows = np.atleast_2d(given)
-        if rows.ndim != 2 or (len(rows) != len(self) and given.ndim != 1):
+        array = real_numbers("times", times)
+        rows = np.atleast_2d(array)
+        if rows.ndim != 2 or (len(rows) != len(self) and array.ndim != 1):
             words = f"times must be a row for all members or have the shape ({len(self)}, samples)"
-            raise SymtopError(f"{words}, not {given.shape}")
+            raise SymtopError(f"{words}, not {array.shape}")
         values = fill(self.constants, rows if rows.flags.writeable else rows.copy(), view)
         return values.swapaxes(0, 1) if view in samples.ROWS else values
 
@@ -296,11 +296,11 @@ def checked_numbers(numbers: ArrayLike, names: Any = None) -> Array:
     if rows.ndim != 2 or rows.shape[1] != len(NUMBERS):
         raise SymtopError(f"numbers must have the shape (n, 9), with {', '.join(NUMBERS)}, not {rows.shape}")
     inertia, theta = rows[:, :2], rows[:, 3]
-    good = ((rows <= LARGEST) & (rows >= -LARGEST)).all(axis=1) & (inertia >= 1.0 / LARGEST).all(axis=1)
+    valid = ((rows <= LARGEST) & (rows >= -LARGEST)).all(axis=1) & (inertia >= 1.0 / LARGEST).all(axis=1)
     with np.errstate(over="ignore"):  # of rows that are refused anyway
         fits = rows[:, 1] <= 2.0 * rows[:, 0] * (1.0 + MOMENT_SLACK)
-    good &= fits & (theta >= 0.0) & (theta <= np.pi)
-    for member in np.flatnonzero(~good).tolist():
+    valid &= fits & (theta >= 0.0) & (theta <= np.pi)
+    for member in np.flatnonzero(~valid).tolist():
         row = rows[member].tolist()
         try:
             SymmetricTop(*row[:3]), Angles(*row[3:])

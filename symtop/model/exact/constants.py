@@ -97,35 +97,35 @@ def put_turns(out: Any, place: int, rate: DoubleDouble, start: DoubleDouble) -> 
 
 @shared
 def _frame(
-    out: Any, place: int, near: Half, far: Half, least: DoubleDouble, most: DoubleDouble, depth: DoubleDouble
+    out: Any, place: int, near: Half, far: Half, near_gap: DoubleDouble, far_gap: DoubleDouble, depth: DoubleDouble
 ) -> None:
     """The half-angle functions about a turning point, scaled to the moduli that they have there.
 
-    It is at `least` from the pole that it is near and at `most` from the other; abs(u - u there) = depth angle^2.
+    It is at `near_gap` from the pole that it is near and at `far_gap` from the other; abs(u - u there) = depth angle^2.
     """
-    if least[0] == 0.0:
+    if near_gap[0] == 0.0:
         near_unit = div(root(scaled(depth, 0.5)), total(near.near_imag))
     else:
-        near_unit = div(root(scaled(least, 0.5)), total(near.near_real))
-    far_unit = div(root(scaled(most, 0.5)), total(far.far_real))
+        near_unit = div(root(scaled(near_gap, 0.5)), total(near.near_real))
+    far_unit = div(root(scaled(far_gap, 0.5)), total(far.far_real))
     _put(out, place + at.NEAR_REAL, near.near_real, near_unit)
     _put(out, place + at.NEAR_IMAG, near.near_imag, near_unit)
     _put(out, place + at.FAR_REAL, far.far_real, far_unit)
     _put(out, place + at.FAR_IMAG, far.far_imag, far_unit)
     out[place + at.NEAR_GROWTH], out[place + at.FAR_GROWTH] = rounded(near.growth), rounded(far.growth)
-    out[place + at.THROUGH] = 1.0 if least[0] == 0.0 else 0.0
+    out[place + at.THROUGH] = 1.0 if near_gap[0] == 0.0 else 0.0
 
 
 @shared
 def _argument_at_start(
-    half: Half, near: bool, hyperbolic: bool, sine: DoubleDouble, cosine: DoubleDouble, twice: DoubleDouble
+    half: Half, near: bool, hyperbolic: bool, sine: DoubleDouble, cosine: DoubleDouble, cosine2: DoubleDouble
 ) -> DoubleDouble:
     if near:
-        real, imag = mul(cosine, value(half.near_real, twice)), mul(sine, value(half.near_imag, twice))
+        real, imag = mul(cosine, value(half.near_real, cosine2)), mul(sine, value(half.near_imag, cosine2))
     elif hyperbolic:
-        real, imag = value(half.far_real, twice), mul(mul(sine, cosine), value(half.far_imag, twice))
+        real, imag = value(half.far_real, cosine2), mul(mul(sine, cosine), value(half.far_imag, cosine2))
     else:
-        real, imag = mul(cosine, value(half.far_real, twice)), mul(sine, value(half.far_imag, twice))
+        real, imag = mul(cosine, value(half.far_real, cosine2)), mul(sine, value(half.far_imag, cosine2))
     return arctan2(imag, real)
 
 
@@ -181,34 +181,34 @@ def move(data: Data, sums: Sums, exact: Exact, points: TurningPoints, out: Any) 
 
     # the start, from the nearer turning point: sn, cn up to a common factor
     sn2, cn2 = div(neg(points.x1), swing), div(points.x2, swing)
-    late = sn2[0] * (m1[0] + m[0] * cn2[0]) > cn2[0]
-    sn, cn = (root(cn2), root(mul(m1, sn2))) if late else (root(sn2), root(cn2))
+    near_crown = sn2[0] * (m1[0] + m[0] * cn2[0]) > cn2[0]
+    sn, cn = (root(cn2), root(mul(m1, sn2))) if near_crown else (root(sn2), root(cn2))
     lower, upper = _poles(points, nome, hyperbolic, bow)
     if hyperbolic:
         sine, cosine = imaginary_argument(sn, cn, nome)
         place = div(arsinh(sine, cosine), bow)
-        twice = add_double(scaled(square(sine), 2.0), 1.0)
+        cosine2 = add_double(scaled(square(sine), 2.0), 1.0)
     else:
         angle, sine, cosine = real_argument(sn, cn, nome)
         place = mul(angle, scaled(PER_PI, 2.0))
-        twice = add_double(scaled(square(sine), -2.0), 1.0)
-    rising = -1.0 if (data.theta_dot if upright else -data.theta_dot) > 0.0 else 1.0  # the sign of u'
-    elapsed = scaled(sub(ONE, place), rising) if late else scaled(place, rising)
+        cosine2 = add_double(scaled(square(sine), -2.0), 1.0)
+    direction = -1.0 if (data.theta_dot if upright else -data.theta_dot) > 0.0 else 1.0  # the sign of u'
+    elapsed = scaled(sub(ONE, place), direction) if near_crown else scaled(place, direction)
     put_line(out, at.QUARTERS, per_time, elapsed)
     at_floor = sn2[0] == 0.0
-    out[at.FLOOR_SIGN] = 1.0 if (rising > 0.0 and sn2[0] > 0.0) or (at_floor and data.theta_dot >= 0.0) else -1.0
+    out[at.FLOOR_SIGN] = 1.0 if (direction > 0.0 and sn2[0] > 0.0) or (at_floor and data.theta_dot >= 0.0) else -1.0
 
     sign_down, sign_up = _sign(sums.twist_down, exact.through_down), _sign(sums.twist_up, exact.through_up)
     turn = per_time if hyperbolic else mul(per_time, HALF_PI)
-    side = -rising if late else rising
+    side = -direction if near_crown else direction
     growth_down = growth_up = lag_down = lag_up = ZERO
     if sign_down != 0.0:
         growth_down = add(div(sums.twist_down, points.d2), scaled(mul(turn, lower.turning), 2.0 * sign_down))
-        argument = _argument_at_start(lower, not late, hyperbolic, sine, cosine, twice)
+        argument = _argument_at_start(lower, not near_crown, hyperbolic, sine, cosine, cosine2)
         lag_down = scaled(sub(argument, mul(lower.growth, place)), side * sign_down)
     if sign_up != 0.0:
         growth_up = add(div(sums.twist_up, points.e1), scaled(mul(turn, upper.turning), 2.0 * sign_up))
-        argument = _argument_at_start(upper, late, hyperbolic, sine, cosine, twice)
+        argument = _argument_at_start(upper, near_crown, hyperbolic, sine, cosine, cosine2)
         lag_up = scaled(sub(argument, mul(upper.growth, place)), side * sign_up)
 
     out[at.SIGN_DOWN], out[at.SIGN_UP], out[at.MAY_STOP] = sign_down, sign_up, 1.0 if sign_down * sign_up < 0.0 else 0.0
@@ -222,15 +222,15 @@ def move(data: Data, sums: Sums, exact: Exact, points: TurningPoints, out: Any) 
     high_depth = mul(low_depth, m1)
     _frame(out, at.FLOOR, lower, upper, points.d1, points.e1, low_depth)
     _frame(out, at.CROWN, upper, lower, points.e2, points.d2, high_depth)
-    quick = div(omega, mul(stretch, bend))
+    speed = div(omega, mul(stretch, bend))
     twist_down = ZERO if exact.through_down else sums.twist_down
     twist_up = ZERO if exact.through_up else sums.twist_up
-    out[at.FLOOR + at.STEEPNESS], out[at.CROWN + at.STEEPNESS] = -mul(quick, low_depth)[0], mul(quick, high_depth)[0]
+    out[at.FLOOR + at.STEEPNESS], out[at.CROWN + at.STEEPNESS] = -mul(speed, low_depth)[0], mul(speed, high_depth)[0]
     out[at.FLOOR + at.LEAN] = 0.5 * add(mul(twist_down, points.e1), mul(twist_up, points.d1))[0]
     out[at.CROWN + at.LEAN] = 0.5 * add(mul(twist_down, points.e2), mul(twist_up, points.d2))[0]
-    squared = square(bend)
-    out[at.FLOOR + at.LEANING] = -div(mul(sums.a, low_depth), squared)[0]
-    out[at.CROWN + at.LEANING] = div(mul(sums.a, high_depth), squared)[0]
+    bend2 = square(bend)
+    out[at.FLOOR + at.LEANING] = -div(mul(sums.a, low_depth), bend2)[0]
+    out[at.CROWN + at.LEANING] = div(mul(sums.a, high_depth), bend2)[0]
 
     low, high = _theta(points.d2, points.e2, upright), _theta(points.d1, points.e1, upright)
     if data.theta_dot == 0.0:  # the start is a turning point
@@ -255,7 +255,7 @@ def _in_range(data: Data, phi: float, psi: float) -> bool:
 
 
 @shared
-def _stand(data: Data, sums: Sums, exact: Exact, out: Any) -> tuple[int, Mean]:
+def _steady(data: Data, sums: Sums, exact: Exact, out: Any) -> tuple[int, Mean]:
     """Constants of an axis at a constant angle; the period is that of small nutations."""
     growth_down = div(sums.twist_down, sums.down) if not exact.through_down else ZERO
     growth_up = div(sums.twist_up, sums.up) if not exact.through_up else ZERO
@@ -283,38 +283,38 @@ def _per_period(rate: DoubleDouble, period: DoubleDouble) -> float:
 @shared
 def _conserved(data: Data, sums: Sums) -> tuple[float, float]:
     """Energy and p_phi: I1 (theta'^2 + phi'^2 sin^2)/2 + p_psi^2/2 I3 + mgl cos theta, and I1 (b - a) + p_psi."""
-    moving = scaled(mul(sums.kinetic, (data.I1, 0.0)), 0.5)
-    spinning = div(scaled(mul(sums.p_psi, sums.p_psi), 0.5), (data.I3, 0.0))
-    lifted = mul(sub((1.0, 0.0), sums.up), (abs(data.mgl), 0.0))
-    leaning = mul(sums.twist_up, (data.I1, 0.0))
-    p_phi = add(leaning, sums.p_psi) if data.mgl >= 0.0 else sub(leaning, sums.p_psi)
-    return add(add(moving, spinning), lifted)[0], p_phi[0]
+    kinetic = scaled(mul(sums.kinetic, (data.I1, 0.0)), 0.5)
+    spin = div(scaled(mul(sums.p_psi, sums.p_psi), 0.5), (data.I3, 0.0))
+    potential = mul(sub((1.0, 0.0), sums.up), (abs(data.mgl), 0.0))
+    momentum = mul(sums.twist_up, (data.I1, 0.0))
+    p_phi = add(momentum, sums.p_psi) if data.mgl >= 0.0 else sub(momentum, sums.p_psi)
+    return add(add(kinetic, spin), potential)[0], p_phi[0]
 
 
 @shared
-def _meets(data: Data, phi: float, psi: float, speed: float, c: Any) -> bool:
+def _agrees(data: Data, phi: float, psi: float, speed: float, c: Any) -> bool:
     """Does the form at time 0 agree with the start to rounding, in attitude, theta' and phi' sin theta?"""
     cosine, ax, ay, sine, bx, by, nod, rate = halves(c, 0.0)
-    ahead, behind, x, y = 0.5 * (phi + psi), 0.5 * (phi - psi), math.cos(0.5 * data.theta), math.sin(0.5 * data.theta)
-    sum_gap = max(abs(cosine * ax - x * math.cos(ahead)), abs(cosine * ay - x * math.sin(ahead)))
-    gap = max(sum_gap, abs(sine * bx - y * math.cos(behind)), abs(sine * by - y * math.sin(behind)))
+    plus, minus, x, y = 0.5 * (phi + psi), 0.5 * (phi - psi), math.cos(0.5 * data.theta), math.sin(0.5 * data.theta)
+    sum_gap = max(abs(cosine * ax - x * math.cos(plus)), abs(cosine * ay - x * math.sin(plus)))
+    gap = max(sum_gap, abs(sine * bx - y * math.cos(minus)), abs(sine * by - y * math.sin(minus)))
     if sine < 0.0 and cosine >= 0.0:
         nod = -nod
     across = 2.0 * x * y
-    off = 0.0
+    error = 0.0
     if data.theta > 0.0:
-        off = max(abs(nod - data.theta_dot), abs((rate - data.phi_dot) * across))
-    spread = abs(data.theta_dot) + abs(data.phi_dot * across) + abs(c[at.P_PSI] / data.I1) + 0.1 * speed
-    return gap <= 4e-15 + 4e-16 * (abs(ahead) + abs(behind)) and off <= 1e-13 * spread
+        error = max(abs(nod - data.theta_dot), abs((rate - data.phi_dot) * across))
+    scale = abs(data.theta_dot) + abs(data.phi_dot * across) + abs(c[at.P_PSI] / data.I1) + 0.1 * speed
+    return gap <= 4e-15 + 4e-16 * (abs(plus) + abs(minus)) and error <= 1e-13 * scale
 
 
 @shared
 def _lines(data: Data, phi: float, psi: float, a: DoubleDouble, mean: Mean, out: Any) -> None:
     """Lines of the angles: mean rates and starts."""
     upright = data.mgl >= 0.0
-    drift, turned = mul(a, div(two_sum(data.I1, -data.I3), (data.I3, 0.0))), psi if upright else -psi
-    down_start = sub(scaled(two_sum(phi, turned), 0.5), mean.lag_down)
-    up_start = sub(scaled(two_sum(phi, -turned), 0.5), mean.lag_up)
+    drift, psi_up = mul(a, div(two_sum(data.I1, -data.I3), (data.I3, 0.0))), psi if upright else -psi
+    down_start = sub(scaled(two_sum(phi, psi_up), 0.5), mean.lag_down)
+    up_start = sub(scaled(two_sum(phi, -psi_up), 0.5), mean.lag_up)
     down_rate, up_rate = scaled(add(drift, mean.growth_down), 0.5), scaled(sub(mean.growth_up, drift), 0.5)
     phi_rate, phi_start = scaled(add(mean.growth_down, mean.growth_up), 0.5), add(down_start, up_start)
     psi_rate = add(drift, scaled(sub(mean.growth_down, mean.growth_up), 0.5))
@@ -351,7 +351,7 @@ def motion_constants(numbers: Any, out: Any) -> int:
         out[at.FLOOR_SIGN] = 1.0 if data.theta_dot > 0.0 else -1.0
         out[at.THETA_LOW], out[at.THETA_HIGH] = 0.0, math.pi
     elif exact.rests:
-        status, mean = _stand(data, sums, exact, out)
+        status, mean = _steady(data, sums, exact, out)
     elif points.rate_error < RATE and points.value_error < VALUE:
         out[at.KIND], out[at.RATE_ERROR], out[at.VALUE_ERROR] = at.MOVES, points.rate_error + SERIES, points.value_error
         status, mean = move(data, sums, exact, points, out)
@@ -361,7 +361,7 @@ def motion_constants(numbers: Any, out: Any) -> int:
         return status
     _lines(data, phi, psi, sums.a, mean, out)
     speed = math.sqrt(sums.lead[0]) + math.sqrt(sums.kinetic[0])
-    return DONE if _meets(data, phi, psi, speed, out) else UNMET
+    return DONE if _agrees(data, phi, psi, speed, out) else UNMET
 
 
 def all_constants(rows: Any, out: Any) -> int:

@@ -241,8 +241,8 @@ class PreciseForm:
         self.Omega = ctx.sqrt(curve.stiffness) / 2 if curve.stiffness > 0 else ctx.zero
         self.nutation_period = 2 * self.K / self.Omega if self.Omega else ctx.inf
 
-        rising = -1 if self.facing * theta_dot > 0 else 1  # the sign of u'
-        sn, cn = rising * ctx.sqrt(curve.start_sn2), ctx.sqrt(curve.start_cn2)
+        sign = -1 if self.facing * theta_dot > 0 else 1  # the sign of u'
+        sn, cn = sign * ctx.sqrt(curve.start_sn2), ctx.sqrt(curve.start_cn2)
         self.tau0 = self._integral(None, sn, cn)
         self._complete = [self._integral(pole, ctx.one, ctx.zero) for pole in curve[:2]]  # 0 on the separatrix
         self._at_start = [self._integral(pole, sn, cn) for pole in curve[:2]]
@@ -250,7 +250,7 @@ class PreciseForm:
         self.floor_sign = 1 if sn > 0 or (sn == 0 and theta_dot >= 0) else -1
 
         factors = [pole.twist / pole.low if pole.twist else ctx.zero for pole in curve[:2]]
-        growth = [factor * whole_turn / self.K for factor, whole_turn in zip(factors, self._complete, strict=True)]
+        growth = [factor * integral / self.K for factor, integral in zip(factors, self._complete, strict=True)]
         self.mean_rates = (self.drift + growth[0], growth[1] - self.drift)  # of phi + psi and phi - psi
         self.lags0 = tuple(  # by how much they are ahead of their means at time 0, counted from a moment with u = u1
             (factor * first - self.tau0 * mean) / self.Omega if factor and self.Omega else ctx.zero
@@ -304,10 +304,10 @@ class PreciseForm:
         """sqrt((1 + u)/2) and sqrt((1 - u)/2), signed, phi + psi, phi - psi and theta', all in the upright picture."""
         exact, last = rational("time", time), self._last
         if last is None or last[0] != exact:  # else a call for another quantity at the same time
-            self._last = last = exact, self._after(self._real(exact))
+            self._last = last = exact, self._state_after(self._real(exact))
         return last[1]
 
-    def _after(self, elapsed: Any) -> tuple[Any, Any, Any, Any, Any]:
+    def _state_after(self, elapsed: Any) -> tuple[Any, Any, Any, Any, Any]:
         ctx, curve = self.ctx, self.curve
         if curve.swing == 0:
             angles = [angle + rate * elapsed for angle, rate in zip(self.angles0, self.mean_rates, strict=True)]
@@ -320,17 +320,17 @@ class PreciseForm:
         sn, cn, dn = self._jacobi(tau - 2 * turns * self.K)
         side = -1 if turns % 2 else 1
         angles, halves, ratios = [], [], []
-        for i, (pole, drift, wave, sign, least, most) in enumerate((
+        for i, (pole, drift, wave, sign, low, high) in enumerate((
             (curve.floor, self.drift, sn, side * self.floor_sign, curve.floor.low, curve.floor.high),
             (curve.crown, -self.drift, cn, side, curve.crown.high, curve.crown.low),
         )):  # fmt: skip
-            gained = 2 * turns * self._complete[i] + self._integral(pole, sn, cn) - self._at_start[i]
-            turned = pole.twist / pole.low * gained / self.Omega if pole.twist else 0
-            angles.append(self.angles0[i] + drift * elapsed + turned)
-            through = sign * ctx.sqrt(most / 2)
-            half = through * wave if least == 0 else ctx.sqrt((pole.low * cn**2 + pole.high * sn**2) / 2)
+            integral = 2 * turns * self._complete[i] + self._integral(pole, sn, cn) - self._at_start[i]
+            turn = pole.twist / pole.low * integral / self.Omega if pole.twist else 0
+            angles.append(self.angles0[i] + drift * elapsed + turn)
+            amplitude = sign * ctx.sqrt(high / 2)
+            half = amplitude * wave if low == 0 else ctx.sqrt((pole.low * cn**2 + pole.high * sn**2) / 2)
             halves.append(half)
-            ratios.append(1 / through if least == 0 else wave / half)
+            ratios.append(1 / amplitude if low == 0 else wave / half)
         return *halves, *angles, -self.Omega * curve.swing * dn * ratios[0] * ratios[1]
 
     def _integral(self, pole: Pole | None, sn: Any, cn: Any) -> Any:
@@ -347,13 +347,13 @@ class PreciseForm:
 
     def _jacobi(self, tau: Any) -> tuple[Any, Any, Any]:
         """sn, cn, dn for abs(tau) <= K, from the nearer of 0 and K: cn and dn keep their digits as m -> 1."""
-        ctx, short = self.ctx, abs(tau)
-        swap = short > self.K / 2
-        mean, other, gap, ratios = ctx.one, ctx.sqrt(self.m1), ctx.sqrt(self.m), []
+        ctx, size = self.ctx, abs(tau)
+        swap = size > self.K / 2
+        mean, geometric, gap, ratios = ctx.one, ctx.sqrt(self.m1), ctx.sqrt(self.m), []
         while gap > mean * ctx.eps:  # the arithmetic-geometric mean, and the ratios c/a of its steps
-            mean, other, gap = (mean + other) / 2, ctx.sqrt(mean * other), (mean - other) / 2
+            mean, geometric, gap = (mean + geometric) / 2, ctx.sqrt(mean * geometric), (mean - geometric) / 2
             ratios.append(gap / mean)
-        angle = 2 ** len(ratios) * mean * (self.K - short if swap else short)
+        angle = 2 ** len(ratios) * mean * (self.K - size if swap else size)
         for ratio in reversed(ratios):
             angle = (angle + ctx.asin(ratio * ctx.sin(angle))) / 2
         sn, cn = ctx.sin(angle), ctx.cos(angle)
@@ -405,16 +405,16 @@ def precise_constants(top: SymmetricTop, start: Angles, form: PreciseForm | None
             raise SymtopError(f"{words}, not as {start!r}")
         _expand(form, out)
     else:
-        rest = (ctx.sqrt(curve.floor.low / 2), ctx.sqrt(curve.crown.low / 2), form.phi_rate)
-        out[[at.REST_DOWN, at.REST_UP, at.REST_RATE]] = [float(value) for value in rest]
+        values = (ctx.sqrt(curve.floor.low / 2), ctx.sqrt(curve.crown.low / 2), form.phi_rate)
+        out[[at.REST_DOWN, at.REST_UP, at.REST_RATE]] = [float(value) for value in values]
 
-    leading = [(angle - lag) / 2 for angle, lag in zip(form.angles0, form.lags0, strict=True)]
-    phi0, psi0 = sum(leading), form.facing * (leading[0] - leading[1])
+    starts = [(angle - lag) / 2 for angle, lag in zip(form.angles0, form.lags0, strict=True)]
+    phi0, psi0 = sum(starts), form.facing * (starts[0] - starts[1])
     turn = 2 * ctx.pi
     _put_line(out, at.PHI_LINE, form.phi_rate, phi0)
     _put_line(out, at.PSI_LINE, form.psi_rate, psi0)
     rates = form.phi_rate, form.mean_rates[0] / 2, form.mean_rates[1] / 2
-    for place, rate, angle in zip((at.PHI_TURNS, at.DOWN_TURNS, at.UP_TURNS), rates, (phi0, *leading), strict=True):
+    for place, rate, angle in zip((at.PHI_TURNS, at.DOWN_TURNS, at.UP_TURNS), rates, (phi0, *starts), strict=True):
         _put_line(out, place, rate / turn, angle / turn - ctx.nint(angle / turn))
     return out
 
@@ -427,8 +427,8 @@ def _expand(form: PreciseForm, out: Array) -> None:
     out[at.SIGN_DOWN], out[at.SIGN_UP], out[at.MAY_STOP] = *signs, signs[0] * signs[1] < 0.0
     out[at.TWIST_DOWN], out[at.TWIST_UP] = (float(ctx.sqrt(abs(pole.twist)) / 2) for pole in curve[:2])
     _put_line(out, at.QUARTERS, form.Omega / form.K, form.tau0 / form.K)
-    period, other = (form.K1, form.K) if hyperbolic else (form.K, form.K1)
-    nome = ctx.exp(-ctx.pi * other / period) if form.m else ctx.zero
+    period, other_period = (form.K1, form.K) if hyperbolic else (form.K, form.K1)
+    nome = ctx.exp(-ctx.pi * other_period / period) if form.m else ctx.zero
     heights = [ctx.pi * height / (2 * period) for height in form.zero_heights()]
     halves = [(_hyperbolic_halves if hyperbolic else _trigonometric_halves)(ctx, y, nome) for y in heights]
     growths = [float(ctx.pi / 2 - (y if hyperbolic else 0)) for y in heights]
@@ -436,15 +436,15 @@ def _expand(form: PreciseForm, out: Array) -> None:
     out[at.SCALE] = float(scale)
     _put(out, at.BEND, bend, 1)
     floor, crown = curve.floor, curve.crown
-    for near, frame, side, least, most, grows in (
+    for near, frame, side, near_gap, far_gap, factor in (
         (0, at.FLOOR, 1, floor.low, crown.low, 1),
         (1, at.CROWN, -1, crown.high, floor.high, form.m1),
     ):
         near_real, near_imag, _, _ = halves[near]
         _, _, far_real, far_imag = halves[1 - near]
-        depth = curve.swing * grows * (form.K / scale) ** 2  # abs(u - u_near) = depth angle^2
-        near_unit = ctx.sqrt(least / 2) / sum(near_real) if least else ctx.sqrt(depth / 2) / sum(near_imag)
-        far_unit = ctx.sqrt(most / 2) / sum(far_real)
+        depth = curve.swing * factor * (form.K / scale) ** 2  # abs(u - u_near) = depth angle^2
+        near_unit = ctx.sqrt(near_gap / 2) / sum(near_real) if near_gap else ctx.sqrt(depth / 2) / sum(near_imag)
+        far_unit = ctx.sqrt(far_gap / 2) / sum(far_real)
         _put(out, frame + at.NEAR_REAL, near_real, near_unit)
         _put(out, frame + at.NEAR_IMAG, near_imag, near_unit)
         _put(out, frame + at.FAR_REAL, far_real, far_unit)
@@ -453,7 +453,7 @@ def _expand(form: PreciseForm, out: Array) -> None:
         out[frame + at.STEEPNESS] = float(-side * form.Omega * depth * scale / form.K / sum(bend))
         out[frame + at.LEAN] = float((floor.twist * crown[1 + near] + crown.twist * floor[1 + near]) / 2)  # b - a u
         out[frame + at.LEANING] = float(-side * form.facing * form.a * depth / sum(bend) ** 2)
-        out[frame + at.THROUGH] = least == 0
+        out[frame + at.THROUGH] = near_gap == 0
 
 
 def _trigonometric_halves(ctx: Any, y: Any, nome: Any) -> tuple[list[Any], ...]:

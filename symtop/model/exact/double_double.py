@@ -49,8 +49,8 @@ TO_WHOLE = 6755399441055744.0  # 1.5 * 2^52: adding and subtracting it rounds a 
 def two_sum(a: float, b: float) -> DoubleDouble:
     """The sum of two doubles and its rounding error, exactly."""
     total = a + b
-    added = total - a
-    return total, (a - (total - added)) + (b - added)
+    virtual = total - a
+    return total, (a - (total - virtual)) + (b - virtual)
 
 
 @inlined
@@ -73,9 +73,9 @@ def whole_part(x: float) -> float:
 def add(a: DoubleDouble, b: DoubleDouble) -> DoubleDouble:
     """a + b."""
     high, error = two_sum(a[0], b[0])
-    low, rest = two_sum(a[1], b[1])
+    low, low_error = two_sum(a[1], b[1])
     high, error = ordered_sum(high, error + low)
-    return ordered_sum(high, error + rest)
+    return ordered_sum(high, error + low_error)
 
 
 @inlined
@@ -129,8 +129,8 @@ def div(a: DoubleDouble, b: DoubleDouble) -> DoubleDouble:
     """a/b."""
     quotient = a[0] / b[0]
     product, error = two_product(quotient, b[0])
-    rest = ((a[0] - product) - error) + (a[1] - quotient * b[1])  # the first difference is exact
-    return ordered_sum(quotient, rest / b[0])
+    remainder = ((a[0] - product) - error) + (a[1] - quotient * b[1])  # the first difference is exact
+    return ordered_sum(quotient, remainder / b[0])
 
 
 @inlined
@@ -140,8 +140,8 @@ def root(a: DoubleDouble) -> DoubleDouble:
         return 0.0, 0.0
     high = math.sqrt(a[0])
     product, error = two_product(high, high)
-    rest = ((a[0] - product) - error) + a[1]
-    return ordered_sum(high, rest / (2.0 * high))
+    remainder = ((a[0] - product) - error) + a[1]
+    return ordered_sum(high, remainder / (2.0 * high))
 
 
 @inlined
@@ -196,7 +196,7 @@ PER2 = tuple((float(high), float(low)) for high, low in FACTORIALS[:, :2])
 
 
 @shared
-def _near_zero(r: float) -> tuple[DoubleDouble, DoubleDouble]:
+def _sincos_near_zero(r: float) -> tuple[DoubleDouble, DoubleDouble]:
     """sin r and cos r - 1 of a double, abs(r) <= 1/128."""
     x = two_product(r, r)
     y = x[0]
@@ -211,10 +211,10 @@ def _near_zero(r: float) -> tuple[DoubleDouble, DoubleDouble]:
 
 
 @shared
-def _by_node(high: float, low: float) -> tuple[DoubleDouble, DoubleDouble]:
+def _sincos_by_node(high: float, low: float) -> tuple[DoubleDouble, DoubleDouble]:
     """sin and cos of high + low, 0 <= high < 0.8."""
     k = int(high * NODES + 0.5) if high < 1.5 else 0  # NaN needs a node, too
-    s, c = _near_zero(high - k / NODES)
+    s, c = _sincos_near_zero(high - k / NODES)
     node_s, node_c = (float(ARCS[k, 0]), float(ARCS[k, 1])), (float(ARCS[k, 4]), float(ARCS[k, 5]))
     sine = add(add(mul(node_s, c), mul(node_c, s)), node_s)
     cosine = add(sub(mul(node_c, c), mul(node_s, s)), node_c)
@@ -232,11 +232,11 @@ def sincos(x: float) -> tuple[DoubleDouble, DoubleDouble]:
     if quarters > 0:
         first, error = two_product(float(quarters), HALF_PI[0])
         high, e = two_sum(size - first, -error)  # the difference is exact
-        second, lost = two_product(float(quarters), HALF_PI[1])
+        second, low_error = two_product(float(quarters), HALF_PI[1])
         high, low = two_sum(high, -second)
-        high, low = ordered_sum(high, low + (e + (quarters * HALF_PI_REST - lost)))
+        high, low = ordered_sum(high, low + (e + (quarters * HALF_PI_REST - low_error)))
     below = high < 0.0
-    sine, cosine = _by_node(-high, -low) if below else _by_node(high, low)
+    sine, cosine = _sincos_by_node(-high, -low) if below else _sincos_by_node(high, low)
     if below:
         sine = neg(sine)
     turn = quarters % 4
@@ -267,10 +267,10 @@ def exp(x: float) -> DoubleDouble:
     k = math.floor(x / LN2[0] + 0.5)
     high, low = two_product(-float(k), LN2[0])
     high, error = two_sum(high, x)
-    rest = add(add((high, error), (low, 0.0)), two_product(-float(k), LN2[1]))
-    rest = add_double(rest, -k * LN2[2])
-    j = math.floor(rest[0] * NODES + 0.5)
-    r = add_double(rest, -j / NODES)
+    remainder = add(add((high, error), (low, 0.0)), two_product(-float(k), LN2[1]))
+    remainder = add_double(remainder, -k * LN2[2])
+    j = math.floor(remainder[0] * NODES + 0.5)
+    r = add_double(remainder, -j / NODES)
     y = r[0]
     tail = PER[7] + y * (PER[8] + y * (PER[9] + y * (PER[10] + y * (PER[11] + y * PER[12]))))
     total = add(PER2[6], mul_double(r, tail))
@@ -301,12 +301,12 @@ HALF_PI_TAIL = (6.123233995736766e-17, -1.4973849048591698e-33, 5.56227110431682
 
 
 @inlined
-def _renormed(c0: float, c1: float, c2: float, c3: float, c4: float) -> QuadDouble:
+def _renormalise(c0: float, c1: float, c2: float, c3: float, c4: float) -> QuadDouble:
     """Five overlapping doubles of falling size as four."""
-    rest, c4 = ordered_sum(c3, c4)
-    rest, c3 = ordered_sum(c2, rest)
-    rest, c2 = ordered_sum(c1, rest)
-    c0, c1 = ordered_sum(c0, rest)
+    carry, c4 = ordered_sum(c3, c4)
+    carry, c3 = ordered_sum(c2, carry)
+    carry, c2 = ordered_sum(c1, carry)
+    c0, c1 = ordered_sum(c0, carry)
     c1, c2 = ordered_sum(c1, c2)
     c2, c3 = ordered_sum(c2, c3)
     return c0, c1, c2, c3 + c4
@@ -315,8 +315,8 @@ def _renormed(c0: float, c1: float, c2: float, c3: float, c4: float) -> QuadDoub
 @inlined
 def _three_sum(a: float, b: float, c: float) -> tuple[float, float, float]:
     first, error = two_sum(a, b)
-    first, rest = two_sum(c, first)
-    second, third = two_sum(error, rest)
+    first, carry = two_sum(c, first)
+    second, third = two_sum(error, carry)
     return first, second, third
 
 
@@ -339,7 +339,7 @@ def quad_mul(a: QuadDouble, b: QuadDouble) -> QuadDouble:
     s2 = s2 + (t0 + t1)
     s1 = s1 + (a[0] * b[3] + a[1] * b[2] + a[2] * b[1] + a[3] * b[0] + q0 + q3 + q4 + q5)
     s1, t0 = two_sum(s1, s2)
-    return _renormed(p0, p1, s0, s1, t0)
+    return _renormalise(p0, p1, s0, s1, t0)
 
 
 @shared
@@ -354,7 +354,7 @@ def quad_add(a: QuadDouble, b: QuadDouble) -> QuadDouble:
         t2, t3 = two_sum(t2, t3)
         t1, t2 = two_sum(t1, t2)
         t0, t1 = two_sum(t0, t1)
-    return _renormed(t0, t1, t2, t3, t4 + (t5 + (t6 + t7)))
+    return _renormalise(t0, t1, t2, t3, t4 + (t5 + (t6 + t7)))
 
 
 @inlined
@@ -378,8 +378,8 @@ def _per_factorial(n: int) -> QuadDouble:
 @shared
 def quad_sincos(x: float) -> tuple[QuadDouble, QuadDouble]:
     """sin and cos of a double in [0, pi/2]: the node k/64, and a series to r^24 whose tail is in double-double."""
-    over = x > 0.7853981633974483
-    if over:
+    upper = x > 0.7853981633974483
+    if upper:
         x = HALF_PI[0] - x  # exact
     k = int(x * NODES + 0.5)
     r = x - k / NODES
@@ -391,11 +391,11 @@ def quad_sincos(x: float) -> tuple[QuadDouble, QuadDouble]:
     even = sub(mul_double(square, PER[20] - y * (PER[22] - y * PER[24])), PER2[18])
     even = add(PER2[16], mul(square, even))
     even = sub(mul(square, even), PER2[14])
-    x2, wide = widened(square), (r, 0.0, 0.0, 0.0)
+    x2, r4 = widened(square), (r, 0.0, 0.0, 0.0)
     s, c = widened(tail), widened(even)
     for n in (11, 9, 7, 5, 3):
         s = quad_add(_per_factorial(n) if n % 4 == 1 else quad_neg(_per_factorial(n)), quad_mul(x2, s))
-    s = quad_add(wide, quad_mul(wide, quad_mul(x2, s)))
+    s = quad_add(r4, quad_mul(r4, quad_mul(x2, s)))
     for n in (12, 10, 8, 6, 4, 2):
         c = quad_add(_per_factorial(n) if n % 4 == 0 else quad_neg(_per_factorial(n)), quad_mul(x2, c))
     c = quad_mul(x2, c)
@@ -403,7 +403,7 @@ def quad_sincos(x: float) -> tuple[QuadDouble, QuadDouble]:
     c0 = (float(ARCS[k, 4]), float(ARCS[k, 5]), float(ARCS[k, 6]), float(ARCS[k, 7]))
     sine = quad_add(s0, quad_add(quad_mul(s0, c), quad_mul(c0, s)))
     cosine = quad_add(c0, quad_add(quad_mul(c0, c), quad_neg(quad_mul(s0, s))))
-    if not over:
+    if not upper:
         return sine, cosine
     half = quad_mul(HALF_PI_TAIL, HALF_PI_TAIL)  # pi/2 less its first double, by 1 - l^2/2 and l - l^3/6
     down = (-0.5 * half[0], -0.5 * half[1], -0.5 * half[2], -0.5 * half[3])

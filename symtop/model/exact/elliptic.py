@@ -198,8 +198,8 @@ def imaginary_argument(sn: DoubleDouble, cn: DoubleDouble, nome: Nome) -> tuple[
         even = sub(even, sub(mul(nome.q4, c2), mul(nome.q9, c3)))
         even = add_double(even, nome.q16 * (nome.q9[0] * (twice[0] * c4 - c3[0]) - c4))  # q^25 cosh 10y is up to q^20
         odd_rate += 5.0 * nome.q6[0] * d2 - 7.0 * nome.q12[0] * (twice[0] * d2 - d1)
-        grown = 16.0 * nome.q4[0] * c[0] - 12.0 * nome.q9[0] * (4.0 * c[0] * c[0] - 1.0)
-        even_rate += 2.0 * h * cosh[0] * grown
+        term = 16.0 * nome.q4[0] * c[0] - 12.0 * nome.q9[0] * (4.0 * c[0] * c[0] - 1.0)
+        even_rate += 2.0 * h * cosh[0] * term
     theta1, theta4 = mul_double(sub(ONE, odd), h), add_double(scaled(even, -2.0), 1.0)
     residual = sub(mul(sn, theta4), mul(along, theta1))
     step = residual[0] / (along[0] * cosh[0] * odd_rate - sn[0] * even_rate)
@@ -279,26 +279,26 @@ def trigonometric_half(sinh: DoubleDouble, cosh: DoubleDouble, nome: Nome) -> Ha
     s1, d1 = mul(sinh, add_double(c, 1.0)), mul(cosh, add_double(c, -1.0))  # sinh 3y, cosh 3y, and so on
     a1, b1 = mul(nome.q2, s1), mul(nome.q2, d1)
     a2 = b2 = a3 = b3 = ZERO
-    grown = add(sinh, cosh)  # exp(y)
-    shrunk, excess, last = div(ONE, grown), ZERO, 0.0
+    exp_plus = add(sinh, cosh)  # exp(y)
+    exp_minus, excess, last = div(ONE, exp_plus), ZERO, 0.0
     if sinh[0] < 1e100:  # beyond it q^2 exp(3y) is nothing
-        grown2, shrunk2 = square(grown), square(shrunk)
-        grown3, shrunk3 = mul(grown, grown2), mul(shrunk, shrunk2)
-        excess = mul(nome.q2, sub(scaled(shrunk3, 2.0), grown3))
+        exp_plus2, exp_minus2 = square(exp_plus), square(exp_minus)
+        exp_plus3, exp_minus3 = mul(exp_plus, exp_plus2), mul(exp_minus, exp_minus2)
+        excess = mul(nome.q2, sub(scaled(exp_minus3, 2.0), exp_plus3))
         if nome.q[0] > 1e-17:
             s2, d2 = sub(mul(c, s1), sinh), sub(mul(c, d1), cosh)
             s3, d3 = sub(mul(c, s2), s1), sub(mul(c, d2), d1)
             a2, b2, a3, b3 = mul(nome.q6, s2), mul(nome.q6, d2), mul(nome.q12, s3), mul(nome.q12, d3)
             last = nome.q20 * (c[0] * d3[0] - d2[0])
-            grown5, shrunk5 = mul(grown3, grown2), mul(shrunk3, shrunk2)
-            grown7, shrunk7 = mul(grown5, grown2), mul(shrunk5, shrunk2)
-            excess = add(excess, mul(nome.q6, sub(mul_double(shrunk5, 3.0), scaled(grown5, 2.0))))
-            excess = add(excess, mul(nome.q12, sub(scaled(shrunk7, 4.0), mul_double(grown7, 3.0))))
-            ninth = 5.0 * shrunk7[0] * shrunk2[0] - 4.0 * grown7[0] * grown2[0]
+            exp_plus5, exp_minus5 = mul(exp_plus3, exp_plus2), mul(exp_minus3, exp_minus2)
+            exp_plus7, exp_minus7 = mul(exp_plus5, exp_plus2), mul(exp_minus5, exp_minus2)
+            excess = add(excess, mul(nome.q6, sub(mul_double(exp_minus5, 3.0), scaled(exp_plus5, 2.0))))
+            excess = add(excess, mul(nome.q12, sub(scaled(exp_minus7, 4.0), mul_double(exp_plus7, 3.0))))
+            ninth = 5.0 * exp_minus7[0] * exp_minus2[0] - 4.0 * exp_plus7[0] * exp_plus2[0]
             excess = add_double(excess, nome.q20 * ninth)
     near, near_imag = _odd_cosines(sinh, neg(a1), a2, neg(a3)), odd_sines(cosh, neg(b1), b2, neg(b3))
     far, far_imag = _odd_cosines(cosh, b1, b2, b3), odd_sines(sinh, a1, a2, a3)
-    return Half(near, near_imag, far, far_imag, div(add(shrunk, excess), add_double(total(far), last)), HALF_PI)
+    return Half(near, near_imag, far, far_imag, div(add(exp_minus, excess), add_double(total(far), last)), HALF_PI)
 
 
 @shared

@@ -118,14 +118,14 @@ def _gap(inertia: Vector, first: DoubleDouble, last: DoubleDouble) -> DoubleDoub
 
 
 @inlined
-def _odd(c: Constants, place: int, sign: float, w0: float, w1: float, w2: float, w3: float) -> None:
+def _put_odd(c: Constants, place: int, sign: float, w0: float, w1: float, w2: float, w3: float) -> None:
     """Sum of w_n sin((2n+1)x)/sin x in powers of cos 2x, or with sign -1 of cos((2n+1)x)/cos x."""
     c[place], c[place + 1] = (w0 - w2) + sign * (w1 - w3), 2.0 * (w1 + sign * w2) - 4.0 * w3
     c[place + 2], c[place + 3] = 4.0 * (w2 + sign * w3), 8.0 * w3
 
 
 @inlined
-def _even(c: Constants, place: int, w0: float, w1: float, w2: float, w3: float) -> None:
+def _put_even(c: Constants, place: int, w0: float, w1: float, w2: float, w3: float) -> None:
     """Sum of w_n cos 2nx in powers of cos 2x."""
     c[place], c[place + 1], c[place + 2], c[place + 3] = w0 - w2, w1 - 3.0 * w3, 2.0 * w2, 4.0 * w3
 
@@ -136,14 +136,14 @@ def _trigonometric(c: Constants, nome: Nome, sn: DoubleDouble, cn: DoubleDouble)
     q, w1, w2, w3 = nome.q[0], nome.q2[0], nome.q6[0], nome.q12[0]
     e1, e2, e3 = 2.0 * q, 2.0 * nome.q4[0], 2.0 * nome.q9[0]
     c[NOME] = 2.0 * math.sqrt(math.sqrt(q))
-    _odd(c, SINE, 1.0, 1.0, -w1, w2, -w3)
-    _odd(c, COSINE, -1.0, 1.0, w1, w2, w3)
-    _even(c, THETA_3, 1.0, e1, e2, e3)
-    _even(c, THETA_4, 1.0, -e1, e2, -e3)
+    _put_odd(c, SINE, 1.0, 1.0, -w1, w2, -w3)
+    _put_odd(c, COSINE, -1.0, 1.0, w1, w2, w3)
+    _put_even(c, THETA_3, 1.0, e1, e2, e3)
+    _put_even(c, THETA_4, 1.0, -e1, e2, -e3)
     start, quarter = cubic(c, THETA_4, 1.0), cubic(c, THETA_4, -1.0)
-    aside = cubic(c, SINE, -1.0)
+    sine = cubic(c, SINE, -1.0)
     c[A1] *= start * start / (cubic(c, COSINE, 1.0) * cubic(c, THETA_3, 1.0))
-    c[A2] *= (quarter * quarter + (c[NOME] * aside) * (c[NOME] * aside)) / (quarter * aside)
+    c[A2] *= (quarter * quarter + (c[NOME] * sine) * (c[NOME] * sine)) / (quarter * sine)
 
     sinh, cosh = imaginary_argument(sn, cn, nome) if cn[0] > 0.0 else (ZERO, ONE)  # symmetric: Q cosh 2y is nothing
     c1, s1 = add_double(scaled(square(sinh), 2.0), 1.0), scaled(mul(sinh, cosh), 2.0)  # of 2y, and so on
@@ -156,7 +156,7 @@ def _trigonometric(c: Constants, nome: Nome, sn: DoubleDouble, cn: DoubleDouble)
     even = add_double(even, nome.q16 * (c4 - nome.q9[0] * c5))
     odd = sub(add(mul(nome.q, s1), mul_double(mul(nome.q9, s3), 3.0)), scaled(mul(nome.q4, s2), 2.0))
     odd = add_double(odd, nome.q16 * (5.0 * nome.q9[0] * s5 - 4.0 * s4))
-    _even(c, REAL, 1.0, -e1 * c1[0], e2 * c2[0], -e3 * c3[0])
+    _put_even(c, REAL, 1.0, -e1 * c1[0], e2 * c2[0], -e3 * c3[0])
     f1, f2, f3 = e1 * s1[0], -e2 * s2[0], e3 * s3[0]  # sin 2nx/(sin x cos x)
     c[IMAG], c[IMAG + 1], c[IMAG + 2] = 2.0 * (f1 - f3), 4.0 * f2, 8.0 * f3
     return div(scaled(odd, 4.0), add_double(scaled(even, 2.0), 1.0))
@@ -172,8 +172,8 @@ def _hyperbolic(c: Constants, nome: Nome, sn: DoubleDouble, cn: DoubleDouble, sp
     s3, c3 = sub(mul(twice, s2), s1), sub(mul(twice, c2), c1)
     s4, c4 = twice[0] * s3[0] - s2[0], twice[0] * c3[0] - c2[0]
     w1, w2, w3 = nome.q2[0], nome.q6[0], nome.q12[0]
-    _odd(c, REAL, -1.0, c0[0], w1 * c1[0], w2 * c2[0], w3 * c3[0])
-    _odd(c, IMAG, 1.0, s0[0], w1 * s1[0], w2 * s2[0], w3 * s3[0])
+    _put_odd(c, REAL, -1.0, c0[0], w1 * c1[0], w2 * c2[0], w3 * c3[0])
+    _put_odd(c, IMAG, 1.0, s0[0], w1 * s1[0], w2 * s2[0], w3 * s3[0])
     even = add(add(c0, mul(nome.q2, c1)), add(mul(nome.q6, c2), mul(nome.q12, c3)))
     odd = add(s0, add(mul_double(mul(nome.q2, s1), 3.0), mul_double(mul(nome.q6, s2), 5.0)))
     odd = add_double(add(odd, mul_double(mul(nome.q12, s3), 7.0)), 9.0 * nome.q20 * s4)
@@ -186,7 +186,7 @@ def _hyperbolic(c: Constants, nome: Nome, sn: DoubleDouble, cn: DoubleDouble, sp
 
 
 @inlined
-def _in_body(c: Constants, x: float, y: float, z: float) -> Vector:
+def _to_body_axes(c: Constants, x: float, y: float, z: float) -> Vector:
     """A vector in the body's axes from the canonical ones: exact."""
     return (
         c[FRAME] * x + c[FRAME + 1] * y + c[FRAME + 2] * z,
@@ -196,7 +196,7 @@ def _in_body(c: Constants, x: float, y: float, z: float) -> Vector:
 
 
 @inlined
-def _turned(c: Constants, m: Vector, angle: float, real: float, imag: float) -> Quaternion:
+def _rotation(c: Constants, m: Vector, angle: float, real: float, imag: float) -> Quaternion:
     """exp(k psi/2) r(n) in the body's axes: psi/2 = angle less s times the argument of T."""
     cosine, sine, imag = math.cos(angle), math.sin(angle), c[SIGN] * imag
     x, y = cosine * real + sine * imag, sine * real - cosine * imag
@@ -204,7 +204,7 @@ def _turned(c: Constants, m: Vector, angle: float, real: float, imag: float) -> 
     high = size + m[2]
     per = 1.0 / math.sqrt(2.0 * size * high * (real * real + imag * imag))
     x, y = per * x, per * y
-    return (x * high, *_in_body(c, x * m[1] + y * m[0], y * m[1] - x * m[0], y * high))
+    return (x * high, *_to_body_axes(c, x * m[1] + y * m[0], y * m[1] - x * m[0], y * high))
 
 
 @shared
@@ -222,37 +222,37 @@ def _orbit(c: Constants, phase: float) -> tuple[Vector, float, float, float]:
         return m, cubic(c, REAL, x), sine * cosine * cubic(c, IMAG, x), 0.0
     w = c[PER_PHASE] * phase
     back, w = math.copysign(1.0, w), min(abs(w), FAR_ALONG)
-    grown = math.exp(w)
-    shrunk = 1.0 / grown
-    p, grown2, shrunk2 = c[NOME], grown * grown, shrunk * shrunk
-    p2, r = p * p, p * grown2  # r is at most 1
+    exp_plus = math.exp(w)
+    exp_minus = 1.0 / exp_plus
+    p, exp_plus2, exp_minus2 = c[NOME], exp_plus * exp_plus, exp_minus * exp_minus
+    p2, r = p * p, p * exp_plus2  # r is at most 1
     p4, r2 = p2 * p2, r * r
-    r4, q4 = r2 * r2, p2 * shrunk2 * shrunk2
-    rising = grown * (1.0 + q4 + p4 * r2)
-    falling = shrunk * (1.0 + r2 + p4 * (q4 + p4 * r4))
-    f2, b2 = rising * rising, falling * falling
+    r4, q4 = r2 * r2, p2 * exp_minus2 * exp_minus2
+    forward = exp_plus * (1.0 + q4 + p4 * r2)
+    backward = exp_minus * (1.0 + r2 + p4 * (q4 + p4 * r4))
+    f2, b2 = forward * forward, backward * backward
     per = 1.0 / (f2 + b2)
     m1 = c[A1] * ((1.0 - r2) - q4 + p4 * (r4 + q4 * q4)) * per
-    m = (m1, back * c[A2] * (f2 - b2) * per, 2.0 * c[A3] * rising * falling * per)
-    x = 0.5 * (grown2 + shrunk2)
-    real, imag = (1.0 + shrunk2) * cubic(c, REAL, x), back * (1.0 - shrunk2) * cubic(c, IMAG, x)
+    m = (m1, back * c[A2] * (f2 - b2) * per, 2.0 * c[A3] * forward * backward * per)
+    x = 0.5 * (exp_plus2 + exp_minus2)
+    real, imag = (1.0 + exp_minus2) * cubic(c, REAL, x), back * (1.0 - exp_minus2) * cubic(c, IMAG, x)
     return m, real, imag, c[SIGN] * c[LEAN] * back * w
 
 
 @inlined
-def _reduced(c: Constants, place: int, t: float) -> tuple[float, float]:
+def _mod_half(c: Constants, place: int, t: float) -> tuple[float, float]:
     """A line at t less the nearest multiple of 1/2, its low half added last, and -1 if that multiple is odd."""
     high, low = line(c, place, t)
     part = high - 2.0 * whole_part(0.5 * high)  # doubles from 2^51 to 2^52 have halves
     halves = whole_part(2.0 * part)
-    rest = (part - 0.5 * halves) + low
-    more = whole_part(2.0 * rest)
-    halves += more
-    return rest - 0.5 * more, 1.0 if halves == 2.0 * whole_part(0.5 * halves) else -1.0
+    remainder = (part - 0.5 * halves) + low
+    extra = whole_part(2.0 * remainder)
+    halves += extra
+    return remainder - 0.5 * extra, 1.0 if halves == 2.0 * whole_part(0.5 * halves) else -1.0
 
 
 @inlined
-def _ordered(row: Any) -> tuple[int, int, int]:
+def _moment_order(row: Any) -> tuple[int, int, int]:
     """Places of the smallest, the middle and the largest moment."""
     low, middle, high = 0, 1, 2
     if row[low] > row[middle]:
@@ -263,12 +263,12 @@ def _ordered(row: Any) -> tuple[int, int, int]:
 
 
 @inlined
-def _size(a: DoubleDouble) -> DoubleDouble:
+def _abs(a: DoubleDouble) -> DoubleDouble:
     return a if a[0] >= 0.0 else neg(a)
 
 
 @shared
-def _moving(c: Constants, gap: DoubleDouble, inertia: Vector, m: Momentum, given: Quaternion) -> None:
+def _moving(c: Constants, gap: DoubleDouble, inertia: Vector, m: Momentum, attitude: Quaternion) -> None:
     """Constants of a motion in canonical axes that is no steady rotation."""
     s, (j1, j2, j3), (m1, m2, m3) = c[SIGN], inertia, m
     alpha = div(two_sum(s * j2, -s * j1), two_product(j1, j2))
@@ -284,7 +284,7 @@ def _moving(c: Constants, gap: DoubleDouble, inertia: Vector, m: Momentum, given
     # by Landen's transformation: the parameter and its complement, sn : cn of the start and of the pole
     parameter = square(div(div(mul(a, across2), bulk), square(top)))
     complement = div(scaled(kc, 4.0), square(top))
-    start_sn = mul(_size(sn), root(div(mul(top, add(kc, dn)), scaled(add_double(dn, 1.0), 2.0))))
+    start_sn = mul(_abs(sn), root(div(mul(top, add(kc, dn)), scaled(add_double(dn, 1.0), 2.0))))
     pole_sn, pole_cn = mul(side, mul(along, top)), mul(root(a), add(size, along))
 
     circular = parameter[0] <= 0.5
@@ -294,7 +294,7 @@ def _moving(c: Constants, gap: DoubleDouble, inertia: Vector, m: Momentum, given
     if circular:
         c[KIND], per_phase = TRIGONOMETRIC, PER_TURN
         bend = _trigonometric(c, nome, pole_sn, pole_cn)
-        begin, _, _ = real_argument(start_sn, _size(cn), nome)
+        begin, _, _ = real_argument(start_sn, _abs(cn), nome)
     else:
         c[KIND], per_phase, span = SEPARATRIX, ONE, ZERO
         if nome.q[0] > 0.0:
@@ -302,7 +302,7 @@ def _moving(c: Constants, gap: DoubleDouble, inertia: Vector, m: Momentum, given
             per_phase = div((0.5, 0.0), span)
         c[A2] = s * along[0] / math.sqrt(a[0])  # A1 sn/sqrt(b) = A3 k sn/sqrt(a)
         bend = _hyperbolic(c, nome, pole_sn, pole_cn, span)
-        sinh, cosh = imaginary_argument(start_sn, _size(cn), nome)
+        sinh, cosh = imaginary_argument(start_sn, _abs(cn), nome)
         begin = arsinh(sinh, cosh)
     begin, phase = mul(begin, per_phase), mul(rate, per_phase)
     if cn[0] < 0.0:  # half a period on, which the separatrix has not
@@ -311,19 +311,19 @@ def _moving(c: Constants, gap: DoubleDouble, inertia: Vector, m: Momentum, given
     begin = begin if sn[0] >= 0.0 else neg(begin)
     c[PHASE], c[PHASE + 1], c[PHASE + 2], c[PHASE + 3] = phase[0], phase[1], begin[0], begin[1]
 
-    fixed, swung = div(size, (j3, 0.0)), div(mul(gamma, across2), add(size, along))
-    swung = add(swung, scaled(mul(rate, bend), 2.0))
-    c[HALF], c[HALF + 1] = mul(add(fixed, scaled(swung, s)), scaled(PER_TURN, 0.5))
-    c[RATE_ERROR] = RATE * (fixed[0] + swung[0] + 2.0 * math.pi * rate[0])
-    _, real, imag, lag = _orbit(c, begin[0] if c[KIND] == SEPARATRIX else _reduced(c, PHASE, 0.0)[0])
-    w, x, y, z = _turned(c, (m1[0], m2[0], m3[0]), lag, real, imag)
-    c[START], c[START + 1], c[START + 2], c[START + 3] = product(given, (w, -x, -y, -z))
+    fixed, swing = div(size, (j3, 0.0)), div(mul(gamma, across2), add(size, along))
+    swing = add(swing, scaled(mul(rate, bend), 2.0))
+    c[HALF], c[HALF + 1] = mul(add(fixed, scaled(swing, s)), scaled(PER_TURN, 0.5))
+    c[RATE_ERROR] = RATE * (fixed[0] + swing[0] + 2.0 * math.pi * rate[0])
+    _, real, imag, lag = _orbit(c, begin[0] if c[KIND] == SEPARATRIX else _mod_half(c, PHASE, 0.0)[0])
+    w, x, y, z = _rotation(c, (m1[0], m2[0], m3[0]), lag, real, imag)
+    c[START], c[START + 1], c[START + 2], c[START + 3] = product(attitude, (w, -x, -y, -z))
 
 
 @shared
 def body_constants(row: Any, c: Constants) -> bool:
     """Constants of a motion from the numbers of a body; False if they leave the range."""
-    low, middle, high = _ordered(row)
+    low, middle, high = _moment_order(row)
     strongest = max(abs(row[7]), abs(row[8]), abs(row[9]))
     weakest = min([abs(row[i]) for i in range(7, 10) if row[i] != 0.0] + [strongest])
     if row[low] < LEAST_MOMENT * row[high] or weakest < LEAST * strongest:
@@ -364,20 +364,20 @@ def body_samples(c: Constants, times: Sequence[float], out: Any) -> None:
     unit, w, x, y, z = c[UNIT], c[START], c[START + 1], c[START + 2], c[START + 3]
     for i in range(len(times)):
         t = c[TIME_UNIT] * times[i]
-        turns, sign = _reduced(c, HALF, t)
+        turns, sign = _mod_half(c, HALF, t)
         if c[KIND] == STEADY:
-            m = _in_body(c, c[A1], c[A2], c[A3])
+            m = _to_body_axes(c, c[A1], c[A2], c[A3])
             sine = math.sin(TURN * turns) / c[G] if c[G] > 0.0 else 0.0
-            turned = (math.cos(TURN * turns), sine * m[0], sine * m[1], sine * m[2])
+            q = (math.cos(TURN * turns), sine * m[0], sine * m[1], sine * m[2])
         else:
             phase, flip = c[PHASE] * t + c[PHASE + 2], c[FLIP]
             if c[KIND] != SEPARATRIX:
-                phase, flip = _reduced(c, PHASE, t)
+                phase, flip = _mod_half(c, PHASE, t)
             (m1, m2, m3), real, imag, lag = _orbit(c, phase)
             m1, m2 = flip * m1, flip * m2
-            turned = _turned(c, (m1, m2, m3), TURN * turns + lag, real, imag)
-            m = _in_body(c, m1, m2, m3)
-        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = product((sign * w, sign * x, sign * y, sign * z), turned)
+            q = _rotation(c, (m1, m2, m3), TURN * turns + lag, real, imag)
+            m = _to_body_axes(c, m1, m2, m3)
+        out[i, 0], out[i, 1], out[i, 2], out[i, 3] = product((sign * w, sign * x, sign * y, sign * z), q)
         out[i, 4], out[i, 5], out[i, 6] = unit * m[0], unit * m[1], unit * m[2]
 
 
@@ -413,17 +413,17 @@ class FreeBody:
         self, inertia: ArrayLike, quaternion: ArrayLike, momentum_body: ArrayLike,
         momentum_lo: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:  # fmt: skip
-        given = checked_body(inertia, quaternion, momentum_body, momentum_lo)
-        given[3:7] /= math.hypot(*given[3:7])
+        row = checked_body(inertia, quaternion, momentum_body, momentum_lo)
+        row[3:7] /= math.hypot(*row[3:7])
         self._constants = np.zeros(SIZE)
         if _build.ready(FORM_SECONDS):
-            good = _build.compiled(given, self._constants)
+            success = _build.compiled(row, self._constants)
         else:
-            plain = [0.0] * SIZE
-            good = body_constants(given.tolist(), plain)
-            self._constants[:] = plain
-        if not good:
-            words = f"moments {given[:3].tolist()} and momentum {given[7:10].tolist()} must have no moment below 1e-30"
+            values = [0.0] * SIZE
+            success = body_constants(row.tolist(), values)
+            self._constants[:] = values
+        if not success:
+            words = f"moments {row[:3].tolist()} and momentum {row[7:10].tolist()} must have no moment below 1e-30"
             raise SymtopError(f"{words} and no component but 0 below 1e-100 of the largest")
 
     def samples(self, times: ArrayLike) -> BodyMotion:

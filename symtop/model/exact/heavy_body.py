@@ -83,8 +83,8 @@ class HeavyBody:
         momentum_lo: ArrayLike = (0.0, 0.0, 0.0),
     ) -> None:  # fmt: skip
         row = checked_body(inertia, quaternion, momentum_body, momentum_lo).tolist()
-        heavy = real_numbers("weight", weight)
-        if heavy.shape != (3,) or not (np.abs(heavy) <= 1e100).all():
+        vector = real_numbers("weight", weight)
+        if vector.shape != (3,) or not (np.abs(vector) <= 1e100).all():
             raise SymtopError(f"weight must be 3 finite numbers of at most 1e100, not {weight!r}")
         try:
             import heyoka  # noqa: F401
@@ -95,9 +95,9 @@ class HeavyBody:
         start, momentum = [mp.mpf(value) for value in row[3:7]], zip(row[7:10], row[10:], strict=True)
         size = mp.norm(start)
         state = [*(value / size for value in start), *(mp.mpf(high) + mp.mpf(low) for high, low in momentum)]
-        self._numbers = [*state, *(1 / mp.mpf(value) for value in row[:3]), *map(mp.mpf, heavy.tolist())]
+        self._numbers = [*state, *(1 / mp.mpf(value) for value in row[:3]), *map(mp.mpf, vector.tolist())]
         self._digits = lambda value: mp.nstr(value, 50)
-        turning, falling = np.divide(row[7:10], row[:3]), np.hypot(np.roll(heavy, 1), np.roll(heavy, 2)) / row[:3]
+        turning, falling = np.divide(row[7:10], row[:3]), np.hypot(np.roll(vector, 1), np.roll(vector, 2)) / row[:3]
         rate = float(np.clip(np.linalg.norm(turning) + np.sqrt(falling.max()), 1e-300, 1e300))  # also of a body at rest
         self._length = 2.0 ** math.floor(math.log2(FIRST_TURN / rate))
         self._ways: dict[tuple[float, bool], _Way] = {}
@@ -111,14 +111,14 @@ class HeavyBody:
         row = checked_times(times)
         high, low, bound = np.full((row.size, 7), np.nan), np.full((row.size, 7), np.nan), np.full(row.size, math.inf)
         known, too_long = math.inf, False
-        for sign, chosen in ((1.0, row >= 0.0), (-1.0, row < 0.0)):
-            if chosen.any():
+        for sign, mask in ((1.0, row >= 0.0), (-1.0, row < 0.0)):
+            if mask.any():
                 # taken out while it advances: another thread makes its own, and a run that was interrupted is dropped
                 way = self._ways.pop((sign, precise), None)
                 way = way or _Way([self._run(run) for run in range(4 if precise else 3)], sign * self._length)
-                sizes = np.abs(row[chosen])
+                sizes = np.abs(row[mask])
                 way.advance(sizes.max())
-                high[chosen], low[chosen], bound[chosen] = way.values(sizes)
+                high[mask], low[mask], bound[mask] = way.values(sizes)
                 known, too_long = min(known, way.known()), too_long or way.short_of(sizes.max())
                 self._ways[sign, precise] = way
         return BodyMotion(high[:, :4], low[:, :4], high[:, 4:], bound, known, too_long)
@@ -127,8 +127,8 @@ class HeavyBody:
         """An integrator at the start; of the first two with numbers that are off by one unit."""
         stepper = copy.copy(_stepper(run))
         kind = stepper.state.dtype.type
-        off = [LONG_UNIT * (-1) ** (i >> run) if run < 2 else 0.0 for i in range(13)]
-        numbers = [kind(self._digits(value * (1 + e))) for value, e in zip(self._numbers, off, strict=True)]
+        errors = [LONG_UNIT * (-1) ** (i >> run) if run < 2 else 0.0 for i in range(13)]
+        numbers = [kind(self._digits(value * (1 + e))) for value, e in zip(self._numbers, errors, strict=True)]
         stepper.state[:], stepper.pars[:] = numbers[:7], numbers[7:]
         return stepper
 
@@ -154,21 +154,21 @@ class _Way:
         """Advance all runs to |t| = end, or until the motion is lost."""
         while len(self.ends) == 1 or (self.short_of(end) and self._work < MOST_STEPS):
             self.ends.append(self.ends[-1] + self._length)
-            began, ended = np.array(self.ends[-2:], np.longdouble)
-            points = np.linspace(began, ended, CHECKS + 1)
+            start, stop = np.array(self.ends[-2:], np.longdouble)
+            points = np.linspace(start, stop, CHECKS + 1)
             solution, steps = _piece(self, len(self.ends) - 2)
             longest = SHORTER_STEPS * abs(self._length) / steps
             self._work += steps * (QUAD_STEP if len(self._others) == 3 else 1)
-            value, rest = _halves(solution(_row(self.main, points)))
+            value, low = _halves(solution(_row(self.main, points)))
             gaps = []
             for run, witness in enumerate(self._others):
-                most = {"max_delta_t": np.longdouble(longest)} if run < 2 else {}
-                _, _, _, count, *_, states = witness.propagate_grid(points, callback=_heard, **most)
+                options = {"max_delta_t": np.longdouble(longest)} if run < 2 else {}
+                _, _, _, count, *_, states = witness.propagate_grid(points, callback=_handle_interrupt, **options)
                 self._work += count
-                other, less = _halves(states)
-                gaps.append(((other - value) + (less - rest))[1:, :4])
-            apart = 2.0 * np.sqrt(np.square(gaps).sum(axis=2).max(axis=0))
-            bounds = np.where(apart < LINEAR_RANGE, SAFETY * self._unit * apart + PAIR_ROUNDING, math.inf)
+                other, other_low = _halves(states)
+                gaps.append(((other - value) + (other_low - low))[1:, :4])
+            distance = 2.0 * np.sqrt(np.square(gaps).sum(axis=2).max(axis=0))
+            bounds = np.where(distance < LINEAR_RANGE, SAFETY * self._unit * distance + PAIR_ROUNDING, math.inf)
             self._checks += np.abs(points[1:]).astype(float).tolist()
             self._bounds += np.maximum.accumulate([self._bounds[-1], *bounds])[1:].tolist()
             self._length *= 2.0 if steps < FEW_STEPS else 0.5 if steps > MANY_STEPS else 1.0
@@ -180,9 +180,9 @@ class _Way:
         high, low = np.full((sizes.size, 7), np.nan), np.full((sizes.size, 7), np.nan)
         places = np.maximum(np.searchsorted(np.abs(self.ends), sizes) - 1, 0)
         for k in np.unique(places[np.isfinite(bound)]).tolist():
-            here = np.isfinite(bound) & (places == k)
+            mask = np.isfinite(bound) & (places == k)
             solution, _ = _piece(self, k)
-            high[here], low[here] = _halves(solution(_row(self.main, np.copysign(sizes[here], self._length))))
+            high[mask], low[mask] = _halves(solution(_row(self.main, np.copysign(sizes[mask], self._length))))
         return high, low, bound
 
 
@@ -192,13 +192,13 @@ def _piece(way: _Way, k: int) -> tuple[Any, int]:
     main = way.main
     main.time, end = _row(main, way.ends[k : k + 2])
     main.state[:] = way.states[k]
-    _, _, _, steps, solution, _ = main.propagate_until(end, c_output=True, callback=_heard)
+    _, _, _, steps, solution, _ = main.propagate_until(end, c_output=True, callback=_handle_interrupt)
     if len(way.states) == k + 1:
         way.states.append(main.state.copy())
     return solution, int(steps)
 
 
-def _heard(_stepper: Any) -> bool:
+def _handle_interrupt(_stepper: Any) -> bool:
     """A call in each step, in which Python handles Ctrl-C."""
     return True
 

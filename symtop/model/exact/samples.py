@@ -45,23 +45,23 @@ def cubic(c: Constants, place: int, x: float) -> float:
 
 @inlined
 def _sinh_cosh(x: float) -> tuple[float, float]:
-    grown = math.exp(abs(x))
-    shrunk = 1.0 / grown
+    exp_plus = math.exp(abs(x))
+    exp_minus = 1.0 / exp_plus
     y = x * x
     if y > 0.1:
-        odd = math.copysign(0.5 * (grown - shrunk), x)
+        odd = math.copysign(0.5 * (exp_plus - exp_minus), x)
     else:
         tail = 1.0 / 5040.0 + y * (1.0 / 362880.0 + y * (1.0 / 39916800.0 + y / 6227020800.0))
         odd = x + x * y * (1.0 / 6.0 + y * (1.0 / 120.0 + y * tail))
-    return odd, 0.5 * (grown + shrunk)
+    return odd, 0.5 * (exp_plus + exp_minus)
 
 
 @inlined
-def _climbing(c: Constants, t: float) -> Wave:
+def _separatrix_wave(c: Constants, t: float) -> Wave:
     """Elementary motion on the separatrix, from the lower pole at time 0."""
     x, sign = c[at.SCALE] * t, c[at.FLOOR_SIGN]
-    shrunk = math.exp(-abs(x))
-    sech = 2.0 * shrunk / (1.0 + shrunk * shrunk)
+    exp_minus = math.exp(-abs(x))
+    sech = 2.0 * exp_minus / (1.0 + exp_minus * exp_minus)
     return sign * math.tanh(x), 1.0, 0.0, 0.0, sech, 1.0, 0.0, 0.0, -2.0 * c[at.SCALE] * sign * sech, 0.0
 
 
@@ -72,8 +72,8 @@ def _phase(c: Constants, t: float) -> tuple[float, float]:
     nearest = whole_part(high)
     offset = (high - nearest) + low
     if abs(high) > 1e15:  # the low half may hold whole quarters, too
-        more = whole_part(offset)
-        offset, nearest = offset - more, nearest % 4.0 + more % 4.0
+        extra = whole_part(offset)
+        offset, nearest = offset - extra, nearest % 4.0 + extra % 4.0
     return nearest - 4.0 * whole_part(0.25 * nearest - 0.375), offset
 
 
@@ -104,10 +104,10 @@ def wave(c: Constants, t: float) -> Wave:
     if c[at.KIND] == at.RESTS:
         return c[at.REST_DOWN], 1.0, 0.0, 0.0, c[at.REST_UP], 1.0, 0.0, 0.0, 0.0, c[at.REST_RATE]
     if c[at.KIND] == at.CLIMBS:
-        return _climbing(c, t)
+        return _separatrix_wave(c, t)
     quarter, offset = _phase(c, t)
-    late = quarter % 2.0 == 1.0
-    frame = at.CROWN if late else at.FLOOR
+    near_crown = quarter % 2.0 == 1.0
+    frame = at.CROWN if near_crown else at.FLOOR
     angle = c[at.SCALE] * offset
     if c[at.HYPERBOLIC] > 0.0:
         odd, even = _sinh_cosh(angle)
@@ -129,7 +129,7 @@ def wave(c: Constants, t: float) -> Wave:
     leaning = c[frame + at.LEANING] * (bend * bend) / square
     lean, size = c[frame + at.LEAN] + leaning, abs(c[frame + at.LEAN]) + abs(leaning)  # b - a u and its terms
 
-    sign_near, sign_far = (c[at.SIGN_UP], c[at.SIGN_DOWN]) if late else (c[at.SIGN_DOWN], c[at.SIGN_UP])
+    sign_near, sign_far = (c[at.SIGN_UP], c[at.SIGN_DOWN]) if near_crown else (c[at.SIGN_DOWN], c[at.SIGN_UP])
     near_lag, far_lag = sign_near * c[frame + at.NEAR_GROWTH] * offset, sign_far * c[frame + at.FAR_GROWTH] * offset
     near_x, near_y, far_x, far_y = 1.0, 0.0, 1.0, 0.0
     if sign_near != 0.0:
@@ -138,7 +138,7 @@ def wave(c: Constants, t: float) -> Wave:
         far_x, far_y = far_real / far_size, sign_far * far_imag / far_size
     norm = math.sqrt(square)
     near, far = near_size / norm, far_size / norm
-    down, up = (far, near) if late else (near, far)
+    down, up = (far, near) if near_crown else (near, far)
 
     rate = _precession(c, down, up, lean, size)
     if c[at.FLOOR + at.THROUGH] > 0.0:  # the sign of sn
@@ -147,7 +147,7 @@ def wave(c: Constants, t: float) -> Wave:
     if c[at.CROWN + at.THROUGH] > 0.0:  # the sign of cn
         sign = 1.0 if abs(quarter - 1.5) > 1.0 else -1.0  # 0 or 3
         up, nod = up * sign, nod * sign
-    if late:
+    if near_crown:
         return down, far_x, far_y, far_lag, up, near_x, near_y, near_lag, nod, rate
     return down, near_x, near_y, near_lag, up, far_x, far_y, far_lag, nod, rate
 
@@ -173,9 +173,9 @@ def halves(c: Constants, t: float) -> tuple[float, float, float, float, float, f
 
 
 @inlined
-def _turns(c: Constants, t: float, seen: Wave) -> tuple[float, float]:
+def _turns(c: Constants, t: float, values: Wave) -> tuple[float, float]:
     """phi and psi, continuous but for the passage of a pole."""
-    down, dx, dy, down_lag, up, ux, uy, up_lag, _, _ = seen
+    down, dx, dy, down_lag, up, ux, uy, up_lag, _, _ = values
     sum_lag, difference_lag = math.atan2(dy, dx) - down_lag, math.atan2(uy, ux) - up_lag
     upright = c[at.UPRIGHT] > 0.0
     high, low = line(c, at.PHI_LINE, t)
@@ -190,11 +190,11 @@ def _turns(c: Constants, t: float, seen: Wave) -> tuple[float, float]:
 
 @inlined
 def _motion(c: Constants, t: float) -> tuple[float, float, float, float, float, float]:
-    seen = wave(c, t)
-    phi, psi = _turns(c, t, seen)
+    values = wave(c, t)
+    phi, psi = _turns(c, t, values)
     upright = c[at.UPRIGHT] > 0.0
-    cosine, sine = (seen[0], seen[4]) if upright else (seen[4], seen[0])
-    theta_dot, rate = seen[8], seen[9]
+    cosine, sine = (values[0], values[4]) if upright else (values[4], values[0])
+    theta_dot, rate = values[8], values[9]
     if ((cosine < 0.0) != (sine < 0.0)) == upright:
         theta_dot = -theta_dot
     theta = 2.0 * math.atan2(abs(sine), abs(cosine))
@@ -211,7 +211,7 @@ def _axis(c: Constants, t: float) -> tuple[float, float, float]:
 
 
 @inlined
-def _along(state: Any) -> float:
+def _axial_momentum(state: Any) -> float:
     """L.e of a state (q, L)."""
     w, x, y, z = state[0], state[1], state[2], state[3]
     right, back, up = 2.0 * (x * z + w * y), 2.0 * (y * z - w * x), w * w - x * x - y * y + z * z
@@ -245,7 +245,7 @@ def samples(c: Constants, times: Sequence[float], view: int, out: Any) -> int:
                 out[i, first], out[i, first + 1] = nutation * x + flat * y, nutation * y - flat * x
                 out[i, first + 2] = turning * across + spin * along
             if view == RUN:
-                out[i, 7], out[i, 8] = out[i, 6], _along(out[i])
+                out[i, 7], out[i, 8] = out[i, 6], _axial_momentum(out[i])
     return -1
 
 
@@ -253,9 +253,9 @@ def all_samples(constants: Any, times: Any, view: int, out: Any) -> int:
     """`samples` of many tops, with one row of times for all of them or a row for each; the place counts all times."""
     for i in range(len(constants)):
         row = min(i, len(times) - 1)
-        bad = samples(constants[i], times[row], view, out[i])
-        if bad >= 0:
-            return row * len(times[row]) + bad
+        index = samples(constants[i], times[row], view, out[i])
+        if index >= 0:
+            return row * len(times[row]) + index
     return -1
 
 

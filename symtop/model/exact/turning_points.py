@@ -109,23 +109,23 @@ def _sums(data: Data, sine: Number, cosine: Number, grain: float) -> Sums:
     mass, mass2, weight = (I1, 0.0), two_product(I1, I1), abs(mgl)
     above, below = doubled(times(sine, sine)), doubled(times(cosine, cosine))  # 1 - cos theta, 1 + cos theta
     along = minus(times(cosine, cosine), times(sine, sine))
-    lever, turned = two_sum(I1, -I3), two_sum(psi_dot, phi_dot if theta < 1.5 else -phi_dot)
-    push, spun = like(sine, two_product(I1, phi_dot)), like(sine, two_product(I3, psi_dot))
-    swung = like(sine, two_product(I3, phi_dot))
+    lever, rate = two_sum(I1, -I3), two_sum(psi_dot, phi_dot if theta < 1.5 else -phi_dot)
+    I1_phi, I3_psi = like(sine, two_product(I1, phi_dot)), like(sine, two_product(I3, psi_dot))
+    I3_phi = like(sine, two_product(I3, phi_dot))
     lean = plus(like(sine, two_product(lever[0], phi_dot)), like(sine, two_product(lever[1], phi_dot)))
-    spin = plus(like(sine, two_product(turned[0], I3)), like(sine, two_product(turned[1], I3)))
+    spin = plus(like(sine, two_product(rate[0], I3)), like(sine, two_product(rate[1], I3)))
     level = times(lean, along)
-    far_terms = grain * (abs(push[0]) + abs(spun[0]) + abs(level[0]))
+    far_terms = grain * (abs(I1_phi[0]) + abs(I3_psi[0]) + abs(level[0]))
     if theta < 1.5:
         small = times(lean, above)
-        south, north = plus(spin, small), plus(minus(push, spun), level)
-        p_psi = minus(spin, times(swung, above))
+        south, north = plus(spin, small), plus(minus(I1_phi, I3_psi), level)
+        p_psi = minus(spin, times(I3_phi, above))
         south_error, north_error = grain * (abs(spin[0]) + abs(small[0])), far_terms
         nearest = above[0]
     else:
         small = times(lean, below)
-        north, south = minus(small, spin), minus(plus(push, spun), level)
-        p_psi = plus(spin, times(swung, below))
+        north, south = minus(small, spin), minus(plus(I1_phi, I3_psi), level)
+        p_psi = plus(spin, times(I3_phi, below))
         north_error, south_error = grain * (abs(spin[0]) + abs(small[0])), far_terms
         nearest = below[0]
     up, down, over, under = (above, below, north, south) if upright else (below, above, south, north)
@@ -133,19 +133,19 @@ def _sums(data: Data, sine: Number, cosine: Number, grain: float) -> Sums:
 
     nod, turn = like(sine, two_product(I1, theta_dot)), like(sine, two_product(I1, phi_dot))
     nod, turn = times(nod, nod), times(turn, turn)
-    heavy = like(sine, two_product(2.0 * weight, I1))  # lead I1^2
-    swing = minus(times(turn, down), heavy)
+    lead_I1 = like(sine, two_product(2.0 * weight, I1))  # lead I1^2
+    swing = minus(times(turn, down), lead_I1)
     excess = plus(nod, times(up, swing))  # D I1^2
     bound = times(up, times(p_psi, over))
     if not upright:
         bound = minus(like(sine, (0.0, 0.0)), bound)
     k1 = minus(minus(bound, times(up, swing)), nod)
-    k2 = minus(minus(doubled(heavy), excess), times(p_psi, p_psi))
-    torque = plus(times(swung, like(sine, (psi_dot, 0.0))), like(sine, (-mgl, 0.0)))
-    leaning = times(level, like(sine, (phi_dot, 0.0)))
+    k2 = minus(minus(doubled(lead_I1), excess), times(p_psi, p_psi))
+    torque = plus(times(I3_phi, like(sine, (psi_dot, 0.0))), like(sine, (-mgl, 0.0)))
+    lean_rate = times(level, like(sine, (phi_dot, 0.0)))
     speed2 = times(like(sine, two_product(theta_dot, theta_dot)), like(sine, mass))
     fall = times(along, speed2)
-    slope = minus(times(times(up, down), minus(torque, leaning)), fall)
+    slope = minus(times(times(up, down), minus(torque, lean_rate)), fall)
 
     twist_up, twist_down = div(narrowed(times(up, over)), mass), div(narrowed(times(down, under)), mass)
     a = div(narrowed(p_psi), mass)
@@ -154,16 +154,16 @@ def _sums(data: Data, sine: Number, cosine: Number, grain: float) -> Sums:
     first, second = scaled(div(narrowed(k1), mass2), 2.0), div(narrowed(k2), mass2)
     third = scaled(div(narrowed(slope), mass), 2.0)
     twist_error = up[0] * over_error / I1
-    p_error = grain * (abs(spin[0]) + abs(swung[0]) * nearest)
+    p_error = grain * (abs(spin[0]) + abs(I3_phi[0]) * nearest)
     energies = kinetic[0] + lead[0] * up[0]
     k1_terms, k2_terms = energies + abs(a[0] * twist_up[0]), 2.0 * lead[0] + energies + a[0] * a[0]
-    pushes = up[0] * down[0] * (abs(swung[0] * psi_dot) + weight + abs(leaning[0])) + abs(fall[0])
+    slope_terms = up[0] * down[0] * (abs(I3_phi[0] * psi_dot) + weight + abs(lean_rate[0])) + abs(fall[0])
     up_error = twist_error + GRAIN * abs(twist_up[0])
     down_error = down[0] * under_error / I1 + GRAIN * abs(twist_down[0])
     k1_terms = grain * k1_terms + abs(a[0]) * twist_error + abs(twist_up[0]) * p_error / I1
     k1_error = 2.0 * k1_terms + GRAIN * abs(first[0])
     k2_error = grain * k2_terms + 2.0 * abs(a[0]) * p_error / I1 + GRAIN * abs(second[0])
-    slope_error, p_error = 2.0 * grain * pushes / I1 + GRAIN * abs(third[0]), p_error + GRAIN * abs(p_psi[0])
+    slope_error, p_error = 2.0 * grain * slope_terms / I1 + GRAIN * abs(third[0]), p_error + GRAIN * abs(p_psi[0])
     a, third = (a, third) if upright else (neg(a), neg(third))
     near, far, momentum = narrowed(up), narrowed(down), narrowed(p_psi)
     return Sums(
@@ -217,10 +217,10 @@ def exact_zeros(data: Data) -> Exact:
     The only separatrix is that of `symtop.model.exact.digits`.
     """
     I1, I3, mgl, theta, theta_dot, phi_dot, psi_dot = data
-    push, spun = two_product(I1, phi_dot), two_product(I3, psi_dot)
+    I1_phi, I3_psi = two_product(I1, phi_dot), two_product(I3, psi_dot)
     level = I1 == I3 or phi_dot == 0.0  # no multiple of cos theta in N and S
-    north = theta == 0.0 or (level and push[0] == spun[0] and push[1] == spun[1])
-    south = (level and push[0] == -spun[0] and push[1] == -spun[1]) or (theta == 0.0 and psi_dot == -phi_dot)
+    north = theta == 0.0 or (level and I1_phi[0] == I3_psi[0] and I1_phi[1] == I3_psi[1])
+    south = (level and I1_phi[0] == -I3_psi[0] and I1_phi[1] == -I3_psi[1]) or (theta == 0.0 and psi_dot == -phi_dot)
     rests = theta_dot == 0.0 and (theta == 0.0 or (level and _is_zero(I3, phi_dot, psi_dot, mgl)))
     top = theta == 0.0 and psi_dot == -phi_dot and mgl < 0.0 and _is_zero(theta_dot, theta_dot, I1, -4.0 * mgl)
     return Exact(north if mgl >= 0.0 else south, south if mgl >= 0.0 else north, rests, top)
@@ -255,7 +255,7 @@ def unknown_points() -> TurningPoints:
 
 
 @shared
-def _beyond_the_pole(w: DoubleDouble, k1: DoubleDouble, k2: DoubleDouble, lead: DoubleDouble) -> DoubleDouble:
+def _root_beyond_pole(w: DoubleDouble, k1: DoubleDouble, k2: DoubleDouble, lead: DoubleDouble) -> DoubleDouble:
     """The positive root of -w + k1 t + k2 t^2 + lead t^3, w and lead positive; not a number if Newton fails."""
     w0, a, b, c = w[0], k1[0], k2[0], lead[0]
     t = 2.0 * max(-b / c if b < 0.0 else 0.0, math.sqrt(-a / c) if a < 0.0 else 0.0, (w0 / c) ** (1.0 / 3.0))
@@ -286,7 +286,7 @@ def _beyond_the_pole(w: DoubleDouble, k1: DoubleDouble, k2: DoubleDouble, lead: 
 def _third_root(sums: Sums, passes_up: bool, through_up: bool) -> DoubleDouble:
     """g3 = u3 - 1 of a top with weight."""
     if not through_up:
-        return _beyond_the_pole(square(sums.twist_up), sums.k1, sums.k2, sums.lead)
+        return _root_beyond_pole(square(sums.twist_up), sums.k1, sums.k2, sums.lead)
     if not passes_up:
         return ZERO
     s = root(sub(square(sums.k2), scaled(mul(sums.lead, sums.k1), 4.0)))  # k1 < 0
@@ -337,7 +337,7 @@ def _roots(sums: Sums, exact: Exact, theta_dot: float) -> tuple[bool, _Roots]:
 
 
 @inlined
-def _lower(sums: Sums, exact: Exact, roots: _Roots, d2: DoubleDouble) -> DoubleDouble:
+def _lower_gap(sums: Sums, exact: Exact, roots: _Roots, d2: DoubleDouble) -> DoubleDouble:
     """d1 = 1 + u1."""
     if exact.through_down:
         return ZERO
@@ -347,7 +347,7 @@ def _lower(sums: Sums, exact: Exact, roots: _Roots, d2: DoubleDouble) -> DoubleD
 
 
 @inlined
-def _upper(sums: Sums, exact: Exact, roots: _Roots, e1: DoubleDouble) -> DoubleDouble:
+def _upper_gap(sums: Sums, exact: Exact, roots: _Roots, e1: DoubleDouble) -> DoubleDouble:
     """e2 = 1 - u2."""
     if roots.passes_up:
         return ZERO
@@ -362,12 +362,12 @@ def _upper(sums: Sums, exact: Exact, roots: _Roots, e1: DoubleDouble) -> DoubleD
 def turning_points(sums: Sums, exact: Exact, theta_dot: float) -> TurningPoints:
     """The turning points of a moving axis, with bounds of their errors."""
     twisted = (exact.through_up or sums.twist_up[0] != 0.0) and (exact.through_down or sums.twist_down[0] != 0.0)
-    there, roots = _roots(sums, exact, theta_dot)
+    success, roots = _roots(sums, exact, theta_dot)
     e1, d2 = sub(sums.up, roots.x1), add(sums.down, roots.x2)
     stiffness = sub(roots.full, mul(sums.lead, roots.x1))
-    if not (there and twisted and d2[0] > 0.0 and e1[0] > 0.0 and stiffness[0] > 0.0):
+    if not (success and twisted and d2[0] > 0.0 and e1[0] > 0.0 and stiffness[0] > 0.0):
         return unknown_points()
-    d1, e2 = _lower(sums, exact, roots, d2), _upper(sums, exact, roots, e1)
+    d1, e2 = _lower_gap(sums, exact, roots, d2), _upper_gap(sums, exact, roots, e1)
     gap = add(roots.bend, mul(sums.lead, e2))
     if not (gap[0] > 0.0 and (d1[0] > 0.0 or exact.through_down) and (e2[0] > 0.0 or roots.passes_up)):
         return unknown_points()
