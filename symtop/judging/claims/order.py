@@ -121,7 +121,7 @@ def _lower_elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
                 if restart_gap(step, scene.start) > ONE_MAP:
                     continue
                 floor = max(ROUNDING_ERROR, subject.rounding(SINGLE_EPSILONS))
-                order, h = _lower_order(sizes, _step_errors(step, scene.start, sizes), power, scale / SHORT_STEP, floor)
+                order, h = _lower(sizes, _step_errors(step, scene.start, sizes), power, scale / SHORT_STEP, floor)
                 if order < power:
                     order = max(order, 0.0)
                     return order, f"a step of h = {h:.2g} from {name} has order {order:.1f}, in the {chart} chart"
@@ -137,7 +137,7 @@ def _step_errors(step: StepMap, start: Angles, sizes: Array) -> Array:
     return errors
 
 
-def _lower_order(sizes: Array, errors: Array, power: int, short: float, floor: float) -> tuple[float, float]:
+def _lower(sizes: Array, errors: Array, power: int, short: float, floor: float) -> tuple[float, float]:
     """An order lower than `power`, or infinity, and its step; errors below `floor` are rounding."""
     with np.errstate(all="ignore"):
         orders = np.log2(errors[:-1] / errors[1:]) - 1.0
@@ -276,7 +276,7 @@ def _by_steps(subject: Subject) -> Finding:
             words = f"as its step goes to zero it goes to a motion that is wrong by {error:.1e} ({slopes})"
             return _wrong_limit(claim, error, words)
     if claim is not None:
-        finding = _declared_order(claim, order, order.fits.values() if method.fixed_step else (), series, slopes)
+        finding = _declared(claim, order, order.fits.values() if method.fixed_step else (), series, slopes)
         lowest = min((fit.slope for fit in order.fits.values() if math.isfinite(fit.slope)), default=0.0)
         near_pole = min(height, math.sin(scene.start.theta)) <= APART
         wrong_term = series is not None and series.is_exact and series.order < claim
@@ -322,7 +322,7 @@ def _converges(order: Order, slopes: str) -> Finding:
     return Finding("order", CONVERGES, measured, "refuted", why, last, ROUNDED_ERROR)
 
 
-def _declared_order(power: int, order: Order, fits: Collection[Fit], series: Series | None, slopes: str) -> Finding:
+def _declared(power: int, order: Order, fits: Collection[Fit], series: Series | None, slopes: str) -> Finding:
     """The finding on a declared order; `fits` is empty for an adaptive method, whose steps do not all scale alike.
 
     If the series has a first wrong term, its order is that of runs as h -> 0, and another slope comes from steps that
