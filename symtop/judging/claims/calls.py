@@ -162,7 +162,7 @@ def _few_digits(state: Any) -> str:
 
 
 def _gap_in_parts(subject: Subject, h: float) -> tuple[float, str]:
-    """The gap of short runs in two parts (`_largest_gap`); of halves of the most steps of a call if these miss a step."""
+    """The gap of short runs in two parts (`_largest_gap`); of halves of the longest call if these miss a step."""
     short = _largest_gap(subject.stepper, subject.scene, h, PART_LENGTHS)
     half = int(min(MOST_STEPS, LATE_RUNS[subject.quick][1] / max(subject.seconds_a_step, 1e-9) / 3.0)) // 2
     if short[0] > DATA_GAP or half <= PART_LENGTHS[-1][0]:  # the new start of a multistep method has more effect later
