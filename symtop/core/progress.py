@@ -50,10 +50,10 @@ def progress_bar(words: str, *, quiet: bool = False, **options: Any) -> Iterator
     from tqdm import tqdm
 
     options = options or {"total": 1, "bar_format": "{desc}: {elapsed}"}
-    ended = threading.Event()
+    stop = threading.Event()
 
     def beat() -> None:
-        while not ended.wait(REDRAW_SECONDS):
+        while not stop.wait(REDRAW_SECONDS):
             bar.refresh()
 
     thread = threading.Thread(target=beat, daemon=True)
@@ -63,7 +63,7 @@ def progress_bar(words: str, *, quiet: bool = False, **options: Any) -> Iterator
         try:
             yield bar
         finally:
-            ended.set()
+            stop.set()
             if thread.is_alive():
                 thread.join()
 
@@ -80,12 +80,12 @@ def showing_work(words: str) -> Iterator[None]:
     if sys.__stderr__ is None or is_terminal(sys.stderr):
         yield
         return
-    posted, began, ended = [words], time.monotonic(), threading.Event()
+    posted, began, stop = [words], time.monotonic(), threading.Event()
 
     def tell() -> None:
         wait = FIRST_LINE
         with contextlib.suppress(OSError):  # the reader of the pipe has ended
-            while not ended.wait(wait):
+            while not stop.wait(wait):
                 seconds, wait = time.monotonic() - began, NEXT_LINE
                 print(f"symtop: {posted[-1]}, {seconds:.0f} s", file=sys.__stderr__, flush=True)
 
@@ -94,5 +94,5 @@ def showing_work(words: str) -> Iterator[None]:
     try:
         yield
     finally:
-        ended.set()
+        stop.set()
         listeners.remove(posted.append)
