@@ -431,7 +431,7 @@ def _advice(
     if not ranked:
         reason = f"Nothing that was tried meets {goal}; {source}."
         words = _exact_words(question, math.nan)
-        return question.advice(reason=reason, beside=_beside(beside), closed_form=words, fails=fails)
+        return question.advice(reason=reason, beside=_special_methods(beside), closed_form=words, fails=fails)
     best = ranked[0]
     name, fixed = best.run.integrator.name, best.run.integrator.fixed_step
     result = f"Error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
@@ -440,26 +440,26 @@ def _advice(
         result += f"; steps are {count:.3g} a {scene.period_word}, {1e6 * best.a_step:.2g} us each"
     need = best.run.integrator.needs
     requirement = f"It needs {NEEDS[need]} ({need})." if need else ""
-    use = f"{requirement}{_carries(question, best.run.integrator)}".strip()
+    use = f"{requirement}{_carry_over(question, best.run.integrator)}".strip()
     sentences = f"{best.words()} meets {goal}.", f"{result}.", use, f"{source[0].upper()}{source[1:]}."
-    runners = [f"{trial.words()}, {_as_long(trial.seconds / best.seconds)}." for trial in ranked[1:2]]
+    runners = [f"{trial.words()}, {_relative_time(trial.seconds / best.seconds)}." for trial in ranked[1:2]]
     setting = {str(best.run.integrator.control): best.run.setting}
     return question.advice(
         integrator=name, expected_error=best.error, seconds=best.seconds, confidence=best.confidence, fails=fails,
         reason="\n".join(filter(None, sentences)),
-        runner_up="".join(runners), beside=_beside(beside, best.seconds),
+        runner_up="".join(runners), beside=_special_methods(beside, best.seconds),
         closed_form=_exact_words(question, best.seconds), **setting,
         **_lines(question, best.run.integrator, **setting),
     )  # fmt: skip
 
 
-def _times(ratio: float) -> str:
+def _factor_words(ratio: float) -> str:
     """A factor: "1.1 times", "210 times"."""
     return f"{float(f'{ratio:.2g}'):g} times"
 
 
-def _as_long(ratio: float) -> str:
-    return "in the same time" if _times(ratio) == "1 times" else f"{_times(ratio)} the time"
+def _relative_time(ratio: float) -> str:
+    return "in the same time" if _factor_words(ratio) == "1 times" else f"{_factor_words(ratio)} the time"
 
 
 def _exact_advice(question: _Question, limit: float) -> Advice:
@@ -468,7 +468,7 @@ def _exact_advice(question: _Question, limit: float) -> Advice:
     reason = (
         f"exact, the closed form, meets {question.goal}.\n"
         f"Error below {limit:.2g} in {seconds:.2g} s, without steps.\n"
-        f"It needs {NEEDS['solution']} (solution).{_carries(question, exact)}"
+        f"It needs {NEEDS['solution']} (solution).{_carry_over(question, exact)}"
     )
     return question.advice(
         integrator=exact.name, expected_error=limit, seconds=seconds, confidence="at the reference's limit",
@@ -476,7 +476,7 @@ def _exact_advice(question: _Question, limit: float) -> Advice:
     )  # fmt: skip
 
 
-def _carries(question: _Question, method: Integrator) -> str:
+def _carry_over(question: _Question, method: Integrator) -> str:
     """A sentence on whether a method of a top carries over to a body without symmetry."""
     if question.scene.of_body:
         return ""
@@ -487,8 +487,8 @@ def _carries(question: _Question, method: Integrator) -> str:
     return " It carries over to a body without symmetry, in chart body; its step does not: ask again with that body."
 
 
-def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
-    times = [f", {_as_long(trial.seconds / best)}" if math.isfinite(best) else "" for trial in trials]
+def _special_methods(trials: Sequence[_Trial], best: float = math.nan) -> str:
+    times = [f", {_relative_time(trial.seconds / best)}" if math.isfinite(best) else "" for trial in trials]
     return "".join(f"Made for this top: {trial.words()}{time}." for trial, time in zip(trials, times, strict=True))
 
 
@@ -529,8 +529,8 @@ def _exact_words(question: _Question, best: float) -> str:
         return f"The closed form, integrator exact, takes no step{error}."
     seconds = _exact_seconds(question)
     if not best > LEAST_LEAD * seconds:
-        ratio = f", {_times(seconds / best)} that" if math.isfinite(best) else ""
+        ratio = f", {_factor_words(seconds / best)} that" if math.isfinite(best) else ""
         return f"The closed form, integrator exact, takes {seconds * 1e6:.2g} us{ratio}{error}, and no step."
     fastest = f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us"
     why = "Integrators are compared for what they do where it does not exist."
-    return f"{fastest}, {_times(best / seconds)} less{error}. {why}"
+    return f"{fastest}, {_factor_words(best / seconds)} less{error}. {why}"

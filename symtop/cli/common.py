@@ -208,7 +208,7 @@ class Group(click.Group):
             with told_apart(), _warnings_as_lines(), _plain_usage():
                 return super().invoke(ctx)
         except SymtopError as error:
-            warn(_in_options(error, self.commands.get(ctx.invoked_subcommand or "")))
+            warn(_option_message(error, self.commands.get(ctx.invoked_subcommand or "")))
             ctx.exit(2)
         except KeyboardInterrupt:  # click would exit with 1, which here means that a case has failed
             warn("interrupted")
@@ -250,7 +250,7 @@ def _plain_usage() -> Iterator[None]:
         raise
 
 
-def _in_options(error: SymtopError, command: click.Command | None) -> str:
+def _option_message(error: SymtopError, command: click.Command | None) -> str:
     """An error's message with names of options for arguments, and hints for an unknown scene or integrator."""
     parameters = command.params if command is not None else []
     options = [parameter for parameter in parameters if isinstance(parameter, click.Option)]

@@ -100,7 +100,7 @@ def judge(
         for file, write in ((card, cards.card), (badge, cards.write_badge)):
             if file is not None:
                 write(ledger, file)
-    _draw_beside(target, scene, figure, as_json, options, ledger.about.seconds_a_step)
+    _draw_with_peers(target, scene, figure, as_json, options, ledger.about.seconds_a_step)
     say_written(output, card, badge, figure, err=as_json)
     if ledger.refuted:
         sys.exit(1)
@@ -113,7 +113,7 @@ def _check(form: str | None, **files: str | None) -> None:
         raise SymtopError("--figure shows errors of the axis, of which a map of (theta, p_theta) has none")
 
 
-def _draw_beside(
+def _draw_with_peers(
     target: str, scene: str, file: str | None, quiet: bool, options: dict[str, Any], seconds_a_step: float
 ) -> None:
     """Draw a step's error against force evaluations with those of `PEERS`, if `file` is given, and print a ranking."""

@@ -71,7 +71,7 @@ def run(
         settings["step_size"] = h = common.step_of(scene, settings)
         problem = scenes.scene(scene, bodies=True)
         horizon = problem.horizon if settings["horizon"] is None else scenes.horizon_of(settings["horizon"])
-    has_truth = not problem.of_body or _is_known(problem, horizon, figure)
+    has_truth = not problem.of_body or _has_reference(problem, horizon, figure)
     if h is not None and h > 0.0:
         few_steps = partial(simulate, scene, integrator, step_size=h, samples=2, guard=False)
         estimate(horizon / h, lambda count: few_steps(horizon=count * h))
@@ -79,7 +79,7 @@ def run(
         data = simulate(scene, integrator, guard={"on": True, "off": False}.get(guard, guard), **settings)
         if output is not None:
             netcdf.write(data, output)
-        error, verdict = _judged(problem, data, figure) if has_truth else ({}, None)
+        error, verdict = _errors_and_verdict(problem, data, figure) if has_truth else ({}, None)
     words = QUANTITIES | OF_BODY if problem.of_body else QUANTITIES
     series = {name: error[name].dropna("time").values for name in words if name in error}
     largest = {name: {"largest": values.max(), "last": values[-1]} for name, values in series.items() if values.size}
@@ -106,7 +106,7 @@ def run(
         sys.exit(3)
 
 
-def _is_known(problem: Any, horizon: float, figure: str | None) -> bool:
+def _has_reference(problem: Any, horizon: float, figure: str | None) -> bool:
     """Is there a reference for a body up to the horizon? If not, warn why; SymtopError if `figure` is given."""
     from symtop.measure.settings import judgeable
 
@@ -121,7 +121,7 @@ def _is_known(problem: Any, horizon: float, figure: str | None) -> bool:
     return True
 
 
-def _judged(problem: Any, data: Any, figure: str | None) -> tuple[Any, Any]:
+def _errors_and_verdict(problem: Any, data: Any, figure: str | None) -> tuple[Any, Any]:
     """Errors and verdict of a run, which is drawn to `figure`, if given."""
     from symtop.measure.errors import errors
     from symtop.measure.verdicts import judgement

@@ -149,7 +149,7 @@ def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict
                 try:
                     yield waiting[0][1].result()
                 except StudyError as error:  # this study has no findings; the others go on
-                    _tell(waiting[0][1].failures, str(error))  # they may be the cause
+                    _print_failures(waiting[0][1].failures, str(error))  # they may be the cause
                     errors.append(error)
                 waiting.popleft()
     except BaseException:
@@ -177,11 +177,11 @@ def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str
         for line in (answer(findings, results), ", ".join(files)):
             if line:
                 click.echo(common.filled(f"  {line}"))
-    _tell(findings["failures"])
+    _print_failures(findings["failures"])
     return summary
 
 
-def _tell(failures: Sequence[str], sentence: str = "") -> None:
+def _print_failures(failures: Sequence[str], sentence: str = "") -> None:
     """Print the messages of failed cases, except one that `sentence` contains."""
     for failure in failures:
         if failure not in sentence:

@@ -134,18 +134,18 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
     def _defined(self) -> list[Any]:
         return [function for function in self._final_module.functions if not function.is_declaration]
 
-    def _own(self) -> set[str]:
+    def _entry_names(self) -> set[str]:
         """The names under which Python and C call a kernel; none for a function that only kernels call."""
         wrappers = {function.name for function in self._defined() if function.name.startswith(WRAPPERS)}
         return wrappers | {name.removeprefix(WRAPPERS[1]) for name in wrappers}
 
     def _optimize_final_module(self) -> None:
-        if self._own():
+        if self._entry_names():
             self.bitcode = self._final_module.as_bitcode()
             super()._optimize_final_module()
 
     def _finalize_final_module(self) -> None:
-        own, defined = self._own(), self._defined()
+        own, defined = self._entry_names(), self._defined()
         if not own and any(function.name.startswith("_ZN") for function in defined):
             self._finalize_dynamic_globals()
             self._verify_declare_only_symbols()
@@ -172,7 +172,7 @@ class _Cache:
     def files(self, signature: Any, codegen: Any) -> tuple[Path, Path, Path]:
         """Paths of the machine code, of the bitcode, and of the bitcode that may have come with a wheel."""
         system, *processor = codegen.magic_tuple()
-        stem = hashed(json.dumps([*map(_words, signature)]), system, llvmlite.__version__)
+        stem = hashed(json.dumps([*map(_json, signature)]), system, llvmlite.__version__)
         code = self.cache_path / f"{stem}.{hashed(*processor)}.code"
         return code, self.cache_path / f"{stem}.bitcode", SHIPPED / self.cache_path.name / f"{stem}.bitcode"
 
@@ -192,7 +192,7 @@ class _Cache:
         with contextlib.suppress(*LOAD_ERRORS):
             library, kernel, constants = result.library, result.fndesc, result.environment.consts
             header = {name: getattr(kernel, name) for name in KERNEL_NAMES} | {"library": library.name}
-            header |= {"returned": _words(result.signature.return_type), "constants": [str(kind) for kind in constants]}
+            header |= {"returned": _json(result.signature.return_type), "constants": [str(kind) for kind in constants]}
             inner = [env for env in result._find_referenced_environments() if env is not result.environment]
             storable = _type(header["returned"]) == result.signature.return_type
             storable &= [np.dtype(kind) for kind in header["constants"]] == constants
@@ -235,12 +235,12 @@ def _loaded(arguments: tuple[Any, ...], context: Any, entry: bytes, code: Path) 
     )  # fmt: skip
 
 
-def _words(kind: Any) -> Any:
+def _json(kind: Any) -> Any:
     """A type as JSON; that of a named tuple by its class and fields, which its `repr` lacks."""
     if not isinstance(kind, types.BaseTuple):
         return repr(kind)
     cls = getattr(kind, "instance_class", tuple)
-    return [cls.__module__, cls.__qualname__, *getattr(kind, "fields", ()), [*map(_words, kind)]]
+    return [cls.__module__, cls.__qualname__, *getattr(kind, "fields", ()), [*map(_json, kind)]]
 
 
 def _type(words: Any) -> Any:
@@ -273,7 +273,7 @@ def _write(file: Path, content: bytes, key: bytes) -> None:
         partial.write_bytes(hashlib.sha256(key + content).digest() + content)
 
 
-def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
+def _compile_lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
     """Compile a kernel as a `_Library`; environments are set once its code has addresses. Call with numba's lock."""
     codegen = kernel.targetctx.codegen()
     attributes = vars(codegen)
@@ -301,12 +301,12 @@ def lean_probe() -> Any:
     part = register_jitable(lambda x: x + 1.0, OPTIONS | KERNEL_ONLY)
     kernel = njit(**OPTIONS)(lambda x: 2.0 * part(x))
     with contextlib.suppress(Exception):
-        _lean(kernel, kernel.compile, (types.float64,))
+        _compile_lean(kernel, kernel.compile, (types.float64,))
         return kernel if kernel(1.0) == 4.0 else None
     return None
 
 
-def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
+def _compile_once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
     """`compiling`, run by one process at a time for a kernel that is not on disk: the others wait and load it.
 
     The garbage collector is off meanwhile: 9 % less time, and 100 MB more memory for the largest kernel. numba's lock
@@ -328,7 +328,7 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
                     make_private(kernel._cache.cache_path)
                     stack.enter_context(locked(kernel._cache.cache_path / "code", wait=True))
             lean = is_cached(kernel, signature, bitcode=True) or lean_probe()
-            return _lean(kernel, compiling, signature) if lean else compiling(signature)
+            return _compile_lean(kernel, compiling, signature) if lean else compiling(signature)
 
     return compile_now
 
@@ -351,8 +351,8 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     made_of = digest(by_file(parts) | {"format": FORMAT})
     if numba.config.DISABLE_JIT:
         raise SymtopError("NUMBA_DISABLE_JIT must be 0 or unset, not 1: some functions of kernels exist compiled only")
-    kernel = njit(**OPTIONS)(_named(function, made_of))
-    kernel.compile = _once(kernel, kernel.compile)
+    kernel = njit(**OPTIONS)(_renamed(function, made_of))
+    kernel.compile = _compile_once(kernel, kernel.compile)
     functions = (part.thing for part in parts if isinstance(part.thing, FunctionType))
     sources = [part for part in functions if not part.__module__.startswith("namedtuple_")]
     folder = cache_root() / "kernels" / made_of
@@ -363,7 +363,7 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     return kernel
 
 
-def _named(function: Any, made_of: str) -> FunctionType:
+def _renamed(function: Any, made_of: str) -> FunctionType:
     """The function under a unique name: LLVM finds machine code by name, and numba numbers names by process."""
     copy = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__,
                         function.__closure__)  # fmt: skip

@@ -28,14 +28,14 @@ def compiling() -> str:
     return f"compiling {count}, about {A_KERNEL * kernels_to_compile[0]:.0f} s on one core, once"
 
 
-def _tell() -> None:
+def _print_once() -> None:
     """Print once, on a terminal or in a notebook, that kernels are being compiled."""
-    on_cold.remove(_tell)
+    on_cold.remove(_print_once)
     if "ipykernel" in sys.modules or is_terminal(sys.stderr):
         print(f"symtop: {compiling()}", file=sys.stderr, flush=True)  # noqa: T201  (no warning: nothing is wrong)
 
 
-on_cold: list[Callable[[], object]] = [_tell]  # called when a kernel is not in the cache and has to be compiled
+on_cold: list[Callable[[], object]] = [_print_once]  # called when a kernel is not in the cache and has to be compiled
 
 
 def post(words: str) -> None:

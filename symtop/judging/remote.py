@@ -125,9 +125,9 @@ class Process(contextlib.AbstractContextManager["Process"]):
         try:
             return json.loads(self.pipe.recv_bytes())
         except (EOFError, OSError, ValueError):
-            raise SymtopError(self._death()) from None
+            raise SymtopError(self._death_message()) from None
 
-    def _death(self) -> str:
+    def _death_message(self) -> str:
         self.process.join(2.0)
         code = self.process.exitcode
         if code is not None and code < 0:

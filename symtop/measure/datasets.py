@@ -65,7 +65,7 @@ def _dense(cases: list[tuple[Any, xr.Dataset]]) -> xr.Dataset:
     for name, arrays in measured.items():
         dims, attributes = next((array.dims, array.attrs) for array in arrays.values())
         shape = len(scenes), len(methods), *(sizes[str(dim)] for dim in dims)
-        filled: Any = np.full(shape, *_blank([array.dtype for array in arrays.values()]))
+        filled: Any = np.full(shape, *_fill_value([array.dtype for array in arrays.values()]))
         for place, array in arrays.items():
             filled[(*place, *map(slice, array.shape))] = array.values
         variables[name] = ("scene", "variant", *dims), as_text(filled), dict(attributes)
@@ -90,7 +90,7 @@ def _coordinates(cells: list[Cell]) -> tuple[dict[str, int], dict[str, Any]]:
     return sizes, longest
 
 
-def _blank(types: "Sequence[np.dtype[Any]]") -> tuple[Any, Any]:
+def _fill_value(types: "Sequence[np.dtype[Any]]") -> tuple[Any, Any]:
     """The fill value for missing cells of an array of values of those types, and a type that can hold all of them."""
     if any(kind.kind in "OUT" for kind in types):
         return "", object

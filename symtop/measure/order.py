@@ -117,7 +117,7 @@ def order(
     used = np.isfinite(e) & (e > 10.0 * b) & (e < LARGEST_ERROR)
     used &= h * omega < LARGEST_PHASE * max(claim or 2, 2) / 2.0
     indices = rank[used[rank]]
-    series = _widest(h[indices], e[indices], b[indices], 2 if symmetric else 1)
+    series = _widest_fit(h[indices], e[indices], b[indices], 2 if symmetric else 1)
     if series is None:
         if np.min(finest) > ROUNDING_FLOOR * np.max(judged):
             return _no_fit(used, "the error does not fall to rounding as a power of the step")
@@ -148,12 +148,12 @@ def _round_off(h: Array, e: Array) -> float:
     """
     valid = np.isfinite(e)
     h, e = h[valid], e[valid]
-    places = [
+    indices = [
         index
         for index, ((fine, low), (coarse, high)) in enumerate(pairwise(zip(h, e, strict=True)), start=1)
         if high < ROUND_OFF_LEVEL * np.min(e) and high <= low * math.sqrt(coarse / fine)
     ]
-    return float(np.median(e[: places[-1]])) if places else 0.0
+    return float(np.median(e[: indices[-1]])) if indices else 0.0
 
 
 def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> str:
@@ -177,7 +177,7 @@ def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> s
     return "confirmed" if distance <= CONFIRMED_BEYOND else "undecided"
 
 
-def _widest(h: Array, e: Array, b: Array, power: int) -> tuple[float, float, float, slice] | None:
+def _widest_fit(h: Array, e: Array, b: Array, power: int) -> tuple[float, float, float, slice] | None:
     """Fit the series over the widest window of points that it describes: slope, interval, constant, window, or None."""
     first, last = 0, h.size
     while last - first >= LEAST_POINTS:

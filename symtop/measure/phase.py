@@ -49,7 +49,7 @@ class Split(NamedTuple):
     turn: Array
 
 
-def _curve(scene: Scene, times: Array) -> tuple[Array, Array, Array, Array, Array]:
+def _true_curve(scene: Scene, times: Array) -> tuple[Array, Array, Array, Array, Array]:
     """u, u', u'', phi and phi' of the true motion."""
     motion = closed_form(scene)(times)
     momenta, top = scene.top.momenta(scene.start), scene.top
@@ -66,7 +66,7 @@ def _table(top: SymmetricTop, start: Angles) -> tuple[Array, Array, Array]:
     scene = Scene("table", top, start, 1.0)
     period = scene.nutation_period
     times = period * np.arange(TABLE_POINTS) / TABLE_POINTS
-    u, du, *_ = _curve(scene, times)
+    u, du, *_ = _true_curve(scene, times)
     points = np.stack([u, du * period / (2.0 * math.pi)])
     return times, points, 0.5 * np.sum(points * points, axis=0)
 
@@ -87,7 +87,7 @@ def split_states(scene: Scene, t: Array, u: Array, du: Array, phi: Array) -> Spl
     period = scene.nutation_period
     omega = 2.0 * math.pi / period if math.isfinite(period) else 1.0
     if not nutates(scene):
-        u_true, du_true, _, phi_true, _ = _curve(scene, t)
+        u_true, du_true, _, phi_true, _ = _true_curve(scene, t)
         return Split(np.hypot(u - u_true, (du - du_true) / omega), np.full(t.size, math.nan), phi - phi_true)
     times, points, halves = _table(scene.top, scene.start)
     w = du / omega
@@ -97,7 +97,7 @@ def split_states(scene: Scene, t: Array, u: Array, du: Array, phi: Array) -> Spl
     tau, correction = t + lead, np.zeros(t.size)
     for _ in range(SWEEPS):
         tau = tau + np.clip(correction, -period / 16.0, period / 16.0)
-        u_true, du_true, bend, phi_true, rate = _curve(scene, tau)
+        u_true, du_true, bend, phi_true, rate = _true_curve(scene, tau)
         x, y, du_dt, across = u - u_true, w - du_true / omega, du_true, bend / omega
         correction = (x * du_dt + y * across) / (du_dt * du_dt + across * across)
     lag = (tau - t) + correction  # the last correction is not added to tau, whose last digit is too coarse for it

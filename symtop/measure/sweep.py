@@ -134,7 +134,7 @@ def sweep(
                         netcdf.write(combined(), file)
                         saved = time.monotonic()
                 bar.set_description("timing")
-                changed = _time([cell for cell in cells if timed], done) or bool(pending)
+                changed = _time_cells([cell for cell in cells if timed], done) or bool(pending)
             except BaseException:
                 if file is not None and done:
                     netcdf.write(combined(), file)
@@ -214,7 +214,7 @@ def error_row_or_message(
         return blank_row(method) | {"outcome": RAISED, "message": str(error)} | method.given(setting)
 
 
-def _time(cells: list[_Cell], tables: dict[str, xr.Dataset]) -> bool:
+def _time_cells(cells: list[_Cell], tables: dict[str, xr.Dataset]) -> bool:
     """Time the cells in `tables` that have no times yet; False if there were none."""
     untimed = [(cell, tables[cell.made_of]) for cell in cells if tables[cell.made_of]["seconds"].isnull().all()]
     runs: list[tuple[Scene, Integrator, float, list[dict[str, Any]]]] = []

@@ -73,7 +73,7 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         return Judgement(outcome, float(run.attrs["reached_time"]), str(run.attrs["outcome_message"]))
     (highest, lowest, margin, accurate), worst = barriers(scene), float(np.max(axis_error))
     if worst <= accurate:
-        sentence = f"accurate to {_upwards(worst)} rad up to t = {times[-1]:.6g}{scene.second}"
+        sentence = f"accurate to {_rounded_up(worst)} rad up to t = {times[-1]:.6g}{scene.second}"
         return Judgement("accurate", float(times[-1]), sentence)
     theta, energy = run["theta"].values, np.abs(run["energy"].values - run["energy"].values[0]) / scene.energy_scale
     outside = ~((theta >= highest - margin) & (theta <= lowest + margin))
@@ -95,11 +95,11 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         word, first, energies = "bounded_but_wrong", int(np.argmax(~(axis_error <= accurate))), "stayed within {}"
         if second_half > max(GROWING_RATIO * first_half, ROUNDING * scene.energy_grain):
             word, energies = "wrong", f"error grew, to {{}}, below {DRIFT_ERROR:.0%}"
-        energies = f"while the energy {energies.format(_upwards(energy.max()))}"
+        energies = f"while the energy {energies.format(_rounded_up(energy.max()))}"
         sentence = f"the axis error passed {accurate:.2g} rad at t = {times[first]:.6g}{scene.second} {energies}"
     return Judgement(word, float(times[first]), sentence)
 
 
-def _upwards(bound: float) -> str:
+def _rounded_up(bound: float) -> str:
     """A bound to two digits, rounded up."""
     return f"{float(Context(prec=2, rounding=ROUND_CEILING).create_decimal(repr(float(bound)))):.2g}"

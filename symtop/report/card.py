@@ -51,7 +51,7 @@ def _order(axis: Any, ledger: Ledger) -> None:
     steps, errors = (np.asarray(traces.get(name, [])) for name in ("step_size", "error"))
     valid = np.isfinite(steps) & (errors > 0.0)
     if not valid.any():
-        _nothing(axis, finding)
+        _write_reason(axis, finding)
         return
     in_fit = np.asarray(traces["fitted"]) == 1.0
     axis.plot(steps[valid], errors[valid], "o", color=GREY, fillstyle="none", label="not in the fit")
@@ -77,7 +77,7 @@ def _energy(axis: Any, ledger: Ledger) -> None:
     times, change = (np.asarray(traces.get(name, [])) for name in ("long_nutations", "energy_change"))
     valid = np.isfinite(change) & np.isfinite(times)
     if not valid.any():
-        _nothing(axis, finding)
+        _write_reason(axis, finding)
         return
     axis.plot(
         times[valid], np.maximum(change[valid], SMALLEST), color=ORANGE, label=f"{int(traces['steps_run'])} steps"
@@ -88,7 +88,7 @@ def _energy(axis: Any, ledger: Ledger) -> None:
     axis.legend(frameon=False)
 
 
-def _nothing(axis: Any, finding: Finding) -> None:
+def _write_reason(axis: Any, finding: Finding) -> None:
     """Write the reason into a panel without points."""
     words = textwrap.fill(finding.why or "it was not measured", 44)
     axis.text(0.5, 0.5, words, ha="center", va="center", transform=axis.transAxes)

@@ -97,10 +97,10 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
         ax.set_ylabel(f"{quantity} ({unit})" if unit else quantity)
     title, outcome = (data.attrs.get(word, "") for word in ("title", "outcome_message"))
     words = f"{title}: {outcome}" if outcome else title
-    ax.set(xlabel=_clock(data), title="" if several else words)  # a title would name only one of several
+    ax.set(xlabel=_time_label(data), title="" if several else words)  # a title would name only one of several
 
 
-def _clock(data: xr.Dataset) -> str:
+def _time_label(data: xr.Dataset) -> str:
     """The label of the axis of time, with its unit on a scene that has units."""
     return "time (s)" if data["time"].attrs.get("units") == "s" else "time"
 
@@ -178,7 +178,7 @@ def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Datase
     for name, values in residuals(scene, Trajectory.of_data(run)).items():
         _line(constants, times, np.abs(values), COLORS[name], f"residual of {name}, relative")
     angles.set(yscale="log", ylabel="error (rad)")
-    constants.set(yscale="log", ylabel="|change| since the start", xlabel=_clock(run))
+    constants.set(yscale="log", ylabel="|change| since the start", xlabel=_time_label(run))
     if run.attrs["outcome"] != "ok":
         for axis in axes[:, 0]:
             axis.axvline(run.attrs["reached_time"], color=VERMILLION, ls="--", label="stopped here")

@@ -98,7 +98,7 @@ def rendered(template: str | None, name: str, context: Mapping[str, Any]) -> str
     from jinja2 import TemplateError
 
     env = environment(autoescape=False, finalize=lambda value: GAP if value is None else value)
-    env.filters |= {function.__name__: _passing(function) for function in formats.FILTERS}
+    env.filters |= {function.__name__: _as_filter(function) for function in formats.FILTERS}
     template = template and template.replace("endraw %}", "endraw +%}")  # keeps the empty line after it
     try:
         parsed = env.get_template(PLAIN) if template is None else env.from_string(template)
@@ -125,7 +125,7 @@ def _complete(block: str) -> str:
     return "" if all(re.fullmatch(r"\*\*[^*]+\*\*", part) for part in full) else ("\n" if is_list else " ").join(full)
 
 
-def _passing(filter_: Callable[..., str | None]) -> Callable[..., str | None]:
+def _as_filter(filter_: Callable[..., str | None]) -> Callable[..., str | None]:
     """A format as a filter of templates: None (not measured) is passed on, and an undefined name is an error."""
     from jinja2 import Undefined
 

@@ -340,7 +340,7 @@ def _remedy(motion: Motion, method: Integrator, chart: str, plan: Plan, first: T
         if expected.outcome == "ok" and trouble(motion, method, chart, trial, expected) is None:
             return f"take a step of about {step:.2g}{suffix}"
         errors.append(expected.axis_error)
-        step = min(STEP_RATIO * step, _smaller(method, trial, expected))
+        step = min(STEP_RATIO * step, _smaller_step(method, trial, expected))
     foreign = method.order and not is_built_in(method.method)  # the order of any other is known to hold
     if foreign and len(errors) > 1 and SAME_ERROR * errors[0] < errors[-1] < math.inf:
         claim = f"whether it has the order {method.order} that it claims"
@@ -410,12 +410,12 @@ def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected:
     error = min(expected.axis_error, math.pi)
     size = f"expect an {motion.watches} error of {error:.1g} rad by t = {plan.horizon:.4g}{second}"
     out_of_budget = expected.outcome == "out_of_budget"  # then the step is not the cause
-    if not out_of_budget and (coarse := _coarse(motion, method, chart, plan, expected, size)) is not None:
+    if not out_of_budget and (coarse := _coarse_step(motion, method, chart, plan, expected, size)) is not None:
         return coarse
     if expected.outcome != "ok":
         curable = expected.outcome in CURABLE_OUTCOMES and method.fixed_step and method.order is not None
         words = sentence(expected.outcome, expected.reached, plan.horizon, second, remedy=not curable)
-        return Trouble(f"expect the run to be {words}", _smaller(method, plan, expected) if curable else math.nan)
+        return Trouble(f"expect the run to be {words}", _smaller_step(method, plan, expected) if curable else math.nan)
     if method.adaptive:
         tolerance = max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance)
         advice = f"try tolerance {tolerance:.1g}"
@@ -426,11 +426,11 @@ def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected:
         return Trouble(f"{size}: {NO_ORDER}")
     return Trouble(
         f"{size}: a step is 1/{marks.period / plan.step_size:.3g} of a {period}, and errors add up over "
-        f"{plan.horizon / marks.period:.3g} {period}s", _smaller(method, plan, expected),
+        f"{plan.horizon / marks.period:.3g} {period}s", _smaller_step(method, plan, expected),
     )  # fmt: skip
 
 
-def _coarse(
+def _coarse_step(
     motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast, size: str
 ) -> Trouble | None:
     """The trouble of a step that is too long for a pole or for the nutation, or in resonance with it; else None."""
@@ -450,12 +450,12 @@ def _coarse(
             if abs(order * turn - 2.0 * math.pi) < RESONANCE_GAP * order:
                 return Trouble(
                     f"{size}: a step turns the nutation by {turn:.4g} rad, close to 1/{order} of a turn, a resonance "
-                    f"(h omega = {step * frequency:.3f})", _smaller(method, plan, expected),
+                    f"(h omega = {step * frequency:.3f})", _smaller_step(method, plan, expected),
                 )  # fmt: skip
     return None
 
 
-def _smaller(method: Integrator, plan: Plan, expected: Forecast) -> float:
+def _smaller_step(method: Integrator, plan: Plan, expected: Forecast) -> float:
     """The step at which the forecast would be `AIM`, if the method keeps its order."""
     step = plan.step_size * math.pow(AIM / (min(expected.axis_error, 1.0) or AIM), 1.0 / (method.order or 1))
     return min(step, expected.landmarks.period / 20.0) if expected.axis_error > 1.0 else step

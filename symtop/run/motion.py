@@ -212,7 +212,7 @@ class IntegratedMotion:
                     if not distance.max() < SATURATED_ANGLE / CHANGE:
                         distance = attitude_distance(near.quaternion, far.quaternion) / FINE_CHANGE
                         change = FINE_CHANGE
-                    turning = _changed_later(top.moments, times, near.quaternion, near.momentum)
+                    turning = _growth_after_flip(top.moments, times, near.quaternion, near.momentum)
             growth = Growth.of(times, distance, SATURATED_ANGLE / change)
             self.growths[duration] = growth._replace(size=np.maximum(growth.size, turning))
         return self.growths[duration]
@@ -237,7 +237,7 @@ class IntegratedMotion:
         return 0.0 if whole else self.displacement(EPSILON, horizon)
 
 
-def _changed_later(moments: Any, times: Array, quaternion: Array, momentum: Array) -> Array:
+def _growth_after_flip(moments: Any, times: Array, quaternion: Array, momentum: Array) -> Array:
     """A (n,) of a change of a free body's momentum when that first leaves the axis of the start; 1 until then.
 
     If it never does, A is that of a change at the start.

@@ -245,7 +245,7 @@ class BatchStep(Stepper):
         self.library, self.jax = library(form, form, chart), form == "jax"
         self.function, self.chart, self.form = function, chart, FORMULATIONS[chart]
         self.name = label_of(name or function)
-        self._step = self.library.jit(self._called) if self.jax else self._called
+        self._step = self.library.jit(self._with_field) if self.jax else self._with_field
         self._tried = False
 
     def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> Array:
@@ -262,7 +262,7 @@ class BatchStep(Stepper):
     def _array(self, values: Array) -> Any:
         return self.library.numpy.asarray(values) if self.jax else self.library.tensor(values)
 
-    def _called(self, par: Any, t: float, y: Any, h: float) -> Any:
+    def _with_field(self, par: Any, t: float, y: Any, h: float) -> Any:
         stack, last = (self.library.numpy.stack, "axis") if self.jax else (self.library.stack, "dim")
         return self.function(field_of(self.chart, par, lambda rows: stack(rows, **{last: -1})), t, y, h)
 

@@ -226,9 +226,9 @@ class Job:
         period = nutation_periods(self.numbers) if self.period is None else self.period
         plan = schedule(period, self.horizon, self.samples, self.steps)
         with np.errstate(all="ignore"):  # a run may blow up, and that is a result
-            runs = _of_length_one(self._runs(plan), plan, self.chart)
+            runs = _end_off_length(self._runs(plan), plan, self.chart)
             view = View(self.chart, together(self.numbers), runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
-            runs, columns = _whole(runs, view, plan), self._observables(view, plan.times)
+            runs, columns = _end_at_non_finite(runs, view, plan), self._observables(view, plan.times)
         columns |= {
             "time": plan.times, "outcome": np.array(ENDS)[runs.outcome], "steps": runs.steps,
             "force_evaluations": runs.force_evaluations, "newton_iterations": runs.newton_iterations,
@@ -242,21 +242,21 @@ class Job:
         solver = self.method.solvers[self.chart]
         if isinstance(solver, FixedStep) and not solver.in_python:  # it takes marks that repeat at the end of a row
             with foreign_code(f"integrator {self.method.name}"):  # its kernel may not compile
-                many = solver.many(self.numbers, plan.step_size, plan.marks, compiling=self.compiling)
+                batch = solver.many(self.numbers, plan.step_size, plan.marks, compiling=self.compiling)
             padding = np.isnan(plan.times)
-            many.states[padding], many.momenta[padding] = np.nan, np.nan
-            reached, raised = many.steps * plan.step_size, ""
-            if (unknown := (many.outcome < 0) | (many.outcome >= len(OUTCOMES))).any():
+            batch.states[padding], batch.momenta[padding] = np.nan, np.nan
+            reached, raised = batch.steps * plan.step_size, ""
+            if (unknown := (batch.outcome < 0) | (batch.outcome >= len(OUTCOMES))).any():
                 try:
-                    ending(many.outcome[unknown][0])
+                    ending(batch.outcome[unknown][0])
                 except SymtopError as error:
                     raised = f"integrator {self.method.name}: {error}"
-                many.outcome[unknown] = ENDS.index(RAISED)
-            counts = many.steps, *solver.counts(*many[2:4])
-            return _Runs(many.states, many.momenta, *counts, many.outcome, reached, raised)
+                batch.outcome[unknown] = ENDS.index(RAISED)
+            counts = batch.steps, *solver.counts(*batch[2:4])
+            return _Runs(batch.states, batch.momenta, *counts, batch.outcome, reached, raised)
         if isinstance(solver, Adaptive) and self.tolerance is not None:
-            many, reached = solver.many(self.numbers, self.tolerance, plan.times, plan.counts, self.budget)
-            return _Runs(many.states, many.momenta, many.steps, many.work, 0 * many.work, many.outcome, reached)
+            batch, reached = solver.many(self.numbers, self.tolerance, plan.times, plan.counts, self.budget)
+            return _Runs(batch.states, batch.momenta, batch.steps, batch.work, 0 * batch.work, batch.outcome, reached)
         if solver is exact.solve:
             states, momenta = ClosedForms(self.numbers).run(np.nan_to_num(plan.times))
             zeros = np.zeros(len(self.numbers), dtype=np.int64)
@@ -367,7 +367,7 @@ def together(numbers: Array) -> Any:
     return top
 
 
-def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
+def _end_at_non_finite(runs: _Runs, view: View, plan: Schedule) -> _Runs:
     """End runs with outcome "ok" before the first sample with a state or energy that is not finite, as `simulate`."""
     if all(values.min() > -HARMLESS_SIZE and values.max() < HARMLESS_SIZE for values in runs[:2]):  # takes a tenth
         return runs
@@ -375,7 +375,7 @@ def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
     return _end_runs(runs, plan, ~finite & (runs.outcome == OK)[:, None], NOT_FINITE)
 
 
-def _of_length_one(runs: _Runs, plan: Schedule, chart: str) -> _Runs:
+def _end_off_length(runs: _Runs, plan: Schedule, chart: str) -> _Runs:
     """End runs where |q| is too far from one, as in `simulate`."""
     invalid = off_length(chart, runs.states)
     if not invalid.any():

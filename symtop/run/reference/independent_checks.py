@@ -115,11 +115,11 @@ def largest_errors(scene: Scene, times: Array, quaternions: Any, phis: Any, psis
         turn = 2.0 * float(mp.norm(attitude - true))
         tilt = float(mp.norm(charts.axis_from_quaternion(attitude) - charts.axis_from_quaternion(true)))
         total, difference = mp.atan2(z, w), mp.atan2(y, x)
-        rows.append((turn, tilt, _turn(mp, phi, total + difference), _turn(mp, psi, total - difference)))
+        rows.append((turn, tilt, _angle_gap(mp, phi, total + difference), _angle_gap(mp, psi, total - difference)))
     return {"times": times, **dict(zip(CHECKED, np.maximum.accumulate(np.array(rows), axis=0).T, strict=True))}
 
 
-def _turn(mp: Any, angle: Any, true: Any) -> float:
+def _angle_gap(mp: Any, angle: Any, true: Any) -> float:
     """Distance of two angles modulo a full turn."""
     gap = (angle - true) / (2 * mp.pi)
     return abs(float((gap - mp.nint(gap)) * 2 * mp.pi))
