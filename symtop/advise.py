@@ -299,7 +299,7 @@ class _Search:
         self.trials = sorted(timed, key=lambda trial: trial.cost(self.question))
 
     def _confirmed(self, trials: Sequence[_Trial], count: int) -> list[_Trial]:
-        """Confirm the first `most` trials and those as fast, or more until one is confirmed."""
+        """Confirm the first `count` trials and those as fast, or more until one is confirmed."""
         ranked: list[_Trial] = []
         costs = [trial.cost(self.question) for trial in trials]
         for number, trial in enumerate(trials):

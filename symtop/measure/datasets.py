@@ -48,26 +48,26 @@ def _dense(cases: list[tuple[Any, xr.Dataset]]) -> xr.Dataset:
             cells.append((case.scene, case.integrator, data))
     scenes, methods = (list(dict.fromkeys(names)) for names in list(zip(*cells, strict=True))[:2])
     sizes, coordinates = _coordinates(cells)
-    measured: dict[str, dict[tuple[int, int], xr.Variable]] = {}  # by name and place
+    measured: dict[str, dict[tuple[int, int], xr.Variable]] = {}  # by name and index
     for scene, method, data in cells:
-        place = scenes.index(scene), methods.index(method)
+        index = scenes.index(scene), methods.index(method)
         for name in map(str, data.data_vars):
             arrays, variable = measured.setdefault(name, {}), data.variables[name]
-            if place in arrays:
+            if index in arrays:
                 words = f"two cases of {method} on {scene} measure {name}, and one would replace the other"
                 remedy = "give each a group, or measure all settings in one case, over a dimension of the dataset"
                 raise SymtopError(f"{words}: {remedy}")
             if arrays and (axes := next(iter(arrays.values())).dims) != variable.dims:
                 words = f"over {axes}, as in other cases, not {variable.dims}"
                 raise SymtopError(f"{name} of {method} on {scene} must be {words}")
-            arrays[place] = variable
+            arrays[index] = variable
     variables: dict[str, Any] = {}
     for name, arrays in measured.items():
         dims, attributes = next((array.dims, array.attrs) for array in arrays.values())
         shape = len(scenes), len(methods), *(sizes[str(dim)] for dim in dims)
         filled: Any = np.full(shape, *_fill_value([array.dtype for array in arrays.values()]))
-        for place, array in arrays.items():
-            filled[(*place, *map(slice, array.shape))] = array.values
+        for index, array in arrays.items():
+            filled[(*index, *map(slice, array.shape))] = array.values
         variables[name] = ("scene", "variant", *dims), as_text(filled), dict(attributes)
     return xr.Dataset(variables, coords={"scene": scenes, "variant": methods} | coordinates)
 

@@ -72,9 +72,9 @@ class StepMap:
             raise SymtopError(f"a step of {h:.3g} in the {self.chart} chart ended as {run.outcome}")
         return run
 
-    def shown(self, done: Run) -> Array:
+    def shown(self, run: Run) -> Array:
         """The last sample as Y."""
-        return self.scaled(done.states[-1], done.p_phi[-1], done.p_psi[-1])
+        return self.scaled(run.states[-1], run.p_phi[-1], run.p_psi[-1])
 
     def scaled(self, state: Array, p_phi: float, p_psi: float) -> Array:
         """A state of the chart as Y; p_phi and p_psi are used only in the angles chart."""
@@ -170,14 +170,14 @@ def generic_start(scene: Scene) -> Angles:
 
 def drawn(scene: Scene, count: int, seed: int, *, same_top: bool) -> Iterator[Scene]:
     """Random starts whose axes are spread over all heights but the poles, on random tops or all on the `same_top`."""
-    draw, rate = np.random.default_rng(seed), 2.0 * math.pi / scene.time_scale()
-    for height in draw.permutation(count):
-        cosine, top = 0.99 * (2.0 * (height + draw.uniform()) / count - 1.0), scene.top
-        size, shape, weight = 2.0 ** draw.uniform(-1.0, 1.0), draw.uniform(0.2, 1.8), 2.0 ** draw.uniform(-1.0, 1.0)
+    rng, rate = np.random.default_rng(seed), 2.0 * math.pi / scene.time_scale()
+    for height in rng.permutation(count):
+        cosine, top = 0.99 * (2.0 * (height + rng.uniform()) / count - 1.0), scene.top
+        size, shape, weight = 2.0 ** rng.uniform(-1.0, 1.0), rng.uniform(0.2, 1.8), 2.0 ** rng.uniform(-1.0, 1.0)
         if not same_top:
             top = SymmetricTop(top.I1 * size, top.I1 * size * shape, top.mgl * size * weight)
-        rates = rate * draw.uniform(-1.0, 1.0, 3) * np.array([0.5, 0.5, 2.0])
-        yield Scene("drawn", top, Angles(math.acos(cosine), *draw.uniform(-3.0, 3.0, 2), *rates.tolist()), 1.0)
+        rates = rate * rng.uniform(-1.0, 1.0, 3) * np.array([0.5, 0.5, 2.0])
+        yield Scene("drawn", top, Angles(math.acos(cosine), *rng.uniform(-3.0, 3.0, 2), *rates.tolist()), 1.0)
 
 
 def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Angles]:

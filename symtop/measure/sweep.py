@@ -102,18 +102,18 @@ def sweep(
     pairs = [(cell.scene.name, cell.method.name) for cell in cells]
     file = None if path is None else file_path("path", path)
     with contextlib.nullcontext() if file is None else files.only_writer(file):
-        stored, done = _stored(file)
+        stored, tables = _stored(file)
         if others := [f"{name} on {scene}" for scene, name in stored if (scene, name) not in pairs]:
             first = ", ".join(others[:MOST_NAMED]) + f" and {len(others) - MOST_NAMED} more" * bool(others[MOST_NAMED:])
             rule = f"{first}: ask for these as well, or name another path"
             raise SymtopError(f"path {str(file)!r} holds what was not asked for, {rule}")
         # cells with an exception are computed again: the cause may have been temporary
-        pending = [cell for cell in cells if cell.made_of not in done or RAISED in done[cell.made_of]["outcome"].values]
+        todo = [cell for cell in cells if cell.made_of not in tables or RAISED in tables[cell.made_of]["outcome"].values]
 
         def combined() -> xr.Dataset:
             size = max(len(cell.settings) for cell in cells)
-            tables = [[_padded(done.get(cell.made_of), cell, size) for cell in row] for row in grid]
-            data = xr.concat([xr.concat(row, "variant") for row in tables], "scene")
+            padded = [[_padded(tables.get(cell.made_of), cell, size) for cell in row] for row in grid]
+            data = xr.concat([xr.concat(row, "variant") for row in padded], "scene")
             data = data.assign_coords(scene=named["scenes"], variant=named["integrators"])
             charts = [[chart_of(method, scene.observes, observe) for method in methods] for scene in problems]
             data["chart"] = ("scene", "variant"), charts
@@ -125,18 +125,18 @@ def sweep(
             return netcdf.describe(data, title, content=content, **words, **attributes(problems, ends))
 
         saved = time.monotonic()
-        with progress_bar("sweep", quiet=silent, total=len(cells), initial=len(cells) - len(pending)) as bar:
+        with progress_bar("sweep", quiet=silent, total=len(cells), initial=len(cells) - len(todo)) as bar:
             try:
-                for cell, table in zip(pending, in_threads(_table, pending, workers), strict=True):
-                    done[cell.made_of] = table
+                for cell, table in zip(todo, in_threads(_table, todo, workers), strict=True):
+                    tables[cell.made_of] = table
                     bar.update()
                     if file is not None and time.monotonic() - saved > KEEP_EVERY:
                         netcdf.write(combined(), file)
                         saved = time.monotonic()
                 bar.set_description("timing")
-                changed = _time_cells([cell for cell in cells if timed], done) or bool(pending)
+                changed = _time_cells([cell for cell in cells if timed], tables) or bool(todo)
             except BaseException:
-                if file is not None and done:
+                if file is not None and tables:
                     netcdf.write(combined(), file)
                 raise
         data = combined()

@@ -119,9 +119,9 @@ def _checked_bodies(numbers: Array, names: NDArray[Any] | None) -> Array:
 
 def _check_names(data: xr.Dataset, parts: dict[str, int]) -> None:
     """SymtopError for a variable whose name seems a misspelling of one in `parts`, or another word for a rate."""
-    proper = {name.lower(): name for name in parts}
+    by_lower = {name.lower(): name for name in parts}
     for name in (name for name in map(str, data.variables) if name not in parts and name not in KNOWN_NAMES):
-        near = [proper[match] for match in difflib.get_close_matches(name.lower(), proper, n=1, cutoff=SIMILARITY)]
+        near = [by_lower[match] for match in difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=SIMILARITY)]
         if parts is TOP and (rate := RATE.fullmatch(name.lower())) is not None:
             near = [f"{rate[2] or rate[4]}_dot"]
         if near:
