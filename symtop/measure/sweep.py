@@ -108,7 +108,7 @@ def sweep(
             rule = f"{first}: ask for these as well, or name another path"
             raise SymtopError(f"path {str(file)!r} holds what was not asked for, {rule}")
         # cells with an exception are computed again: the cause may have been temporary
-        todo = [cell for cell in cells if cell.made_of not in tables or RAISED in tables[cell.made_of]["outcome"].values]
+        new = [cell for cell in cells if cell.made_of not in tables or RAISED in tables[cell.made_of]["outcome"].values]
 
         def combined() -> xr.Dataset:
             size = max(len(cell.settings) for cell in cells)
@@ -125,16 +125,16 @@ def sweep(
             return netcdf.describe(data, title, content=content, **words, **attributes(problems, ends))
 
         saved = time.monotonic()
-        with progress_bar("sweep", quiet=silent, total=len(cells), initial=len(cells) - len(todo)) as bar:
+        with progress_bar("sweep", quiet=silent, total=len(cells), initial=len(cells) - len(new)) as bar:
             try:
-                for cell, table in zip(todo, in_threads(_table, todo, workers), strict=True):
+                for cell, table in zip(new, in_threads(_table, new, workers), strict=True):
                     tables[cell.made_of] = table
                     bar.update()
                     if file is not None and time.monotonic() - saved > KEEP_EVERY:
                         netcdf.write(combined(), file)
                         saved = time.monotonic()
                 bar.set_description("timing")
-                changed = _time_cells([cell for cell in cells if timed], tables) or bool(todo)
+                changed = _time_cells([cell for cell in cells if timed], tables) or bool(new)
             except BaseException:
                 if file is not None and tables:
                     netcdf.write(combined(), file)
