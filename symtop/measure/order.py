@@ -136,8 +136,8 @@ def wrong_limit(step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, least:
     h, e, b = (np.asarray(values, float) for values in (step_size, error, bound))
     fine = e[h <= 10.0 * np.min(h, initial=math.inf, where=h > 0.0)]  # NaN of a run that ended early: no limit
     floor = max(STAYING_BOUNDS * np.nanmax(b), least)
-    level = fine.size >= STAYING_POINTS and np.min(fine) > max(part * np.max(fine), floor)
-    return float(np.min(fine)) if level else math.nan
+    is_flat = fine.size >= STAYING_POINTS and np.min(fine) > max(part * np.max(fine), floor)
+    return float(np.min(fine)) if is_flat else math.nan
 
 
 def _round_off(h: Array, e: Array) -> float:

@@ -98,11 +98,11 @@ def split_states(scene: Scene, t: Array, u: Array, du: Array, phi: Array) -> Spl
     for _ in range(SWEEPS):
         tau = tau + np.clip(correction, -period / 16.0, period / 16.0)
         u_true, du_true, bend, phi_true, rate = _true_curve(scene, tau)
-        x, y, du_dt, across = u - u_true, w - du_true / omega, du_true, bend / omega
-        correction = (x * du_dt + y * across) / (du_dt * du_dt + across * across)
+        x, y, du_dtau, dw_dtau = u - u_true, w - du_true / omega, du_true, bend / omega
+        correction = (x * du_dtau + y * dw_dtau) / (du_dtau * du_dtau + dw_dtau * dw_dtau)
     lag = (tau - t) + correction  # the last correction is not added to tau, whose last digit is too coarse for it
     turns = np.rint((np.unwrap(lag, period=period) - lag) / period)
-    distance = np.abs(x * across - y * du_dt) / np.hypot(du_dt, across)
+    distance = np.abs(x * dw_dtau - y * du_dtau) / np.hypot(du_dtau, dw_dtau)
     turn = phi - phi_true - rate * correction - turns * closed_form(scene).phi_per_period
     # next to a pole phi may jump by pi, which would appear in the lag as whole turns
     sine = np.sqrt(np.maximum(1.0 - u_true * u_true, 0.0))

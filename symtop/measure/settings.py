@@ -111,37 +111,37 @@ def seek(
     """
     (finest, coarsest), goal = ends, math.sqrt(least) * target
     # factors by which a setting changes: after a failed run, at the least and at the most
-    failed, finer, coarser = (0.4, 0.02, 8.0) if fixed_step else (0.01, 1e-5, 1e4)
+    after_failure, finer, coarser = (0.4, 0.02, 8.0) if fixed_step else (0.01, 1e-5, 1e4)
     setting, why, smallest, flat = min(max(guess, finest), coarsest), TRIED, math.inf, 0
-    coarse: tuple[float, float] | None = None  # the coarsest setting that meets the target, with its error
-    fine: tuple[float, float] | None = None  # the finest setting that misses it, with its error
+    fine: tuple[float, float] | None = None  # the coarsest setting that meets the target, with its error
+    coarse: tuple[float, float] | None = None  # the finest setting that misses it, with its error
     for _ in range(TRIES):
         last = setting
         error, evaluations = run(setting)
         smallest = min(smallest, error)
         if error <= target:
-            coarse = setting, error
+            fine = setting, error
             if error >= least * target or setting >= coarsest:
                 break
         else:
-            improves = coarse is not None or fine is None or not fine[1] < FLAT_GAIN * error < NEAR_ROUNDING
-            flat, fine = 0 if improves else flat + 1, (setting, error)
+            improves = fine is not None or coarse is None or not coarse[1] < FLAT_GAIN * error < NEAR_ROUNDING
+            flat, coarse = 0 if improves else flat + 1, (setting, error)
             if flat == (1 if fixed_step else 2):  # if the order depends on the tolerance, the error falls in jumps
                 why = STOPPED
                 break
-        if coarse is not None and fine is not None:
-            if fine[0] < 1.15 * coarse[0]:
+        if fine is not None and coarse is not None:
+            if coarse[0] < 1.15 * fine[0]:
                 break
-            setting = between(*coarse, *fine, goal)
+            setting = between(*fine, *coarse, goal)
         else:
             change = (goal / max(error, 1e-3 * target)) ** (1.0 / power)
-            setting *= failed if math.isinf(error) else min(max(change, finer), STAIR if flat else coarser)
+            setting *= after_failure if math.isinf(error) else min(max(change, finer), STAIR if flat else coarser)
             setting = min(max(setting, finest), coarsest)
         if setting == last or evaluations * (last / setting if fixed_step else 1.0) > patience:
             why = STOPPED if setting == last else BUDGET
             break
-    if coarse is not None:
-        return coarse[0], ""
+    if fine is not None:
+        return fine[0], ""
     return math.nan, FAILED if math.isinf(smallest) and why != BUDGET else why
 
 

@@ -151,15 +151,15 @@ def slowdown(submit: Callable[..., Future[Any]], size: int) -> float:
     run needs, and up to 2 where two workers run on two hardware threads of one core.
     """
 
-    def all_workers() -> list[tuple[int, float, float, float]]:
+    def concurrent_turns() -> list[tuple[int, float, float, float]]:
         return [future.result() for future in [submit(timed_turn) for _ in range(size)]]
 
     for _ in range(TRIES):
-        if len({process for process, *_ in all_workers()}) == size:
+        if len({process for process, *_ in concurrent_turns()}) == size:
             break
     ratios = []
     for _ in range(TURNS):
-        single, parallel = submit(timed_turn).result(), all_workers()
+        single, parallel = submit(timed_turn).result(), concurrent_turns()
         if min(end for _, _, end, _ in parallel) - max(begin for _, begin, _, _ in parallel) > 0.5 * TURN_SECONDS:
             ratios.append(max(seconds for *_, seconds in parallel) / single[-1])
     return statistics.median(ratios) if ratios else math.inf
