@@ -158,8 +158,8 @@ class _Trial(NamedTuple):
     def cost(self, question: _Question) -> float:
         """Seconds of a run with exactly the accuracy, and steps up to `max_step`; of the run itself at a given step."""
         ratio = 1.0 if question.step is not None else self.error / question.accuracy
-        part = max(settings.at_accuracy(self.run.integrator, ratio), self.run.setting / question.max_step)
-        return self.seconds * part
+        factor = max(settings.at_accuracy(self.run.integrator, ratio), self.run.setting / question.max_step)
+        return self.seconds * factor
 
     def words(self) -> str:
         control = (self.run.integrator.control or "nothing").replace("_", " ")
@@ -496,9 +496,9 @@ def _lines(question: _Question, method: Integrator, **setting: float) -> dict[st
     """The command and the Python line of the recommended run; no command for a scene that is not registered."""
     scene, _, _, horizon = question[:4]
     in_catalogue = scenes.all_scenes().get(scene.name) == scene
-    of, until = f'"{scene.name}"' if in_catalogue else "scene", f", horizon={horizon!r}" * (horizon != scene.horizon)
+    label, end = f'"{scene.name}"' if in_catalogue else "scene", f", horizon={horizon!r}" * (horizon != scene.horizon)
     option = "".join(f", {name}={float(value)!r}" for name, value in setting.items())
-    python = f'symtop.simulate({of}, "{method.name}"{option}{until})'
+    python = f'symtop.simulate({label}, "{method.name}"{option}{end})'
     return {"command": command_of(scene, method.name, horizon, **setting) if in_catalogue else "", "python": python}
 
 

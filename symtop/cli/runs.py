@@ -277,7 +277,7 @@ def ensemble(
     series, maxima = dict[str, Any](), dict[str, Any]()  # errors over time, and the largest errors, of each member
 
     def added(data: Any) -> Any:
-        subset, results = (part.isel(member=slice(0, cap)) for part in (sample, data))
+        subset, results = (dataset.isel(member=slice(0, cap)) for dataset in (sample, data))
         with showing_seconds("comparing with the true motion"):
             series.update({name: member_errors(subset, results, name) for name in compared})
         maxima.update({name: largest(values) for name, values in series.items()})

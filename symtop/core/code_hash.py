@@ -300,17 +300,17 @@ class Code:
                 self._add_all(getattr(thing, name, None) for name in names)
 
     def _add_code(self, function: FunctionType) -> None:
-        for part in codes(function.__code__):
-            constants = [value for value in part.co_consts if not isinstance(value, CodeType)]
-            if part is function.__code__ and constants[:1] == [function.__doc__]:
+        for code in codes(function.__code__):
+            constants = [value for value in code.co_consts if not isinstance(value, CodeType)]
+            if code is function.__code__ and constants[:1] == [function.__doc__]:
                 del constants[0]
             # a frozenset prints in another order in every process
             texts = (f"frozenset({sorted(map(repr, x))})" if isinstance(x, frozenset) else repr(x) for x in constants)
-            self._note(part.co_code.hex(), part.co_exceptiontable.hex(), *texts)
+            self._note(code.co_code.hex(), code.co_exceptiontable.hex(), *texts)
             # every function has `CO_OPTIMIZED`, but numba clears it where a profiler watches
-            flags = part.co_flags | (inspect.CO_OPTIMIZED if part.co_flags & inspect.CO_NEWLOCALS else 0)
-            counts = part.co_argcount, part.co_kwonlyargcount, flags
-            self._note(repr((part.co_names, part.co_freevars, *counts)))
+            flags = code.co_flags | (inspect.CO_OPTIMIZED if code.co_flags & inspect.CO_NEWLOCALS else 0)
+            counts = code.co_argcount, code.co_kwonlyargcount, flags
+            self._note(repr((code.co_names, code.co_freevars, *counts)))
         self._add_all(references(function))
         self._add_all(self._also(function))
         file = file_label(_path(function.__code__.co_filename))

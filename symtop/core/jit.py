@@ -145,14 +145,14 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
             super()._optimize_final_module()
 
     def _finalize_final_module(self) -> None:
-        own, defined = self._entry_names(), self._defined()
-        if not own and any(function.name.startswith("_ZN") for function in defined):
+        exported, defined = self._entry_names(), self._defined()
+        if not exported and any(function.name.startswith("_ZN") for function in defined):
             self._finalize_dynamic_globals()
             self._verify_declare_only_symbols()
             self._finalized = True
             return
         for function in defined:
-            if own and function.name not in own:
+            if exported and function.name not in exported:
                 function.linkage = "internal"
         super()._finalize_final_module()
 
@@ -298,8 +298,8 @@ def _compile_lean(kernel: Any, compiling: Callable[..., Any], signature: Any) ->
 @functools.cache
 def lean_probe() -> Any:
     """A test kernel, if numba has the private parts that `_Library` needs; else None, for numba's own way. 0.06 s."""
-    part = register_jitable(lambda x: x + 1.0, OPTIONS | KERNEL_ONLY)
-    kernel = njit(**OPTIONS)(lambda x: 2.0 * part(x))
+    inner = register_jitable(lambda x: x + 1.0, OPTIONS | KERNEL_ONLY)
+    kernel = njit(**OPTIONS)(lambda x: 2.0 * inner(x))
     with contextlib.suppress(Exception):
         _compile_lean(kernel, kernel.compile, (types.float64,))
         return kernel if kernel(1.0) == 4.0 else None

@@ -156,7 +156,7 @@ def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
     t, r = t[valid], r[valid]
     if t.size < 2 * BLOCKS:
         return Trend(math.nan, math.nan, math.nan)
-    means = (np.array([part.mean() for part in np.array_split(values, BLOCKS)]) for values in (t, r))
+    means = (np.array([block.mean() for block in np.array_split(values, BLOCKS)]) for values in (t, r))
     slope, error, _, deviations = line(*means)
     # with first-order autocorrelation r, a fraction (1-r)/(1+r) of the residuals is independent; r has a bias of -4/n
     power = float(deviations @ deviations)

@@ -128,7 +128,7 @@ def _ends(scene: Scene, stages: Stages, horizon: float, counts: NDArray[np.int64
     theta, phi, *rates = map(Wide, (start.theta, start.phi, start.theta_dot, start.phi_dot, start.psi_dot))
     axes = np.tile(np.array(charts.axis_parts(np, theta, phi))[:, np.newaxis], counts.size)
     momenta = np.tile(np.array(charts.momentum_parts(np, top, theta, phi, *rates))[:, np.newaxis], counts.size)
-    drifts, kicks = ([Wide(value) for value in part] for part in (stages.drift, stages.kick))
+    drifts, kicks = ([Wide(value) for value in coefficients] for coefficients in (stages.drift, stages.kick))
     drifts = [value / sum(drifts) / Wide(top.I1) for value in drifts]
     kicks = [value / (sum(kicks) or 1) * Wide(top.mgl) for value in kicks]  # those of a free top are zero
     for index in range(counts[-1]):

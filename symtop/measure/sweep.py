@@ -233,8 +233,8 @@ def timed_rows(cells: list[tuple[Scene, Integrator, float, list[dict[str, Any]]]
     """Time all runs with outcome "ok" against each other; adds "seconds" and "seconds_spread" to the rows of cells."""
     rows, calls, firsts = [], list[Callable[[], object]](), list[Callable[[], object]]()
     for scene, method, horizon, runs in cells:
-        rows += (good := [run for run in runs if run["outcome"] == "ok"])
-        timed = [bare_run(scene, method, next(iter(method.solvers)), run["setting_value"], horizon) for run in good]
+        rows += (valid := [run for run in runs if run["outcome"] == "ok"])
+        timed = [bare_run(scene, method, next(iter(method.solvers)), run["setting_value"], horizon) for run in valid]
         calls += timed
         firsts += timed[:1]
     with foreign_code("a method that is timed"):

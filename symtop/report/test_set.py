@@ -84,8 +84,8 @@ def _states_csv(scenes: Sequence[Scene], motions: Sequence[Digits], digits: int)
 def states(scenes: Sequence[Scene], motions: Sequence[Digits]) -> xr.Dataset:
     """The states as pairs of doubles over ``problem`` and ``sample``, and the numbers of the problems."""
     variables: dict[str, Any] = {"time": (("problem", "sample"), [times_of(scene) for scene in scenes])}
-    parts = {"quaternion": ("part", "1"), "momentum": ("component", "1")}
-    for name, (dimension, units) in parts.items():
+    vectors = {"quaternion": ("part", "1"), "momentum": ("component", "1")}
+    for name, (dimension, units) in vectors.items():
         exact = np.array([getattr(motion, name) for motion in motions], dtype=object)
         high = exact.astype(float)
         words = {"quaternion": "attitude, body to space", "momentum": "angular momentum, space frame"}[name]

@@ -158,7 +158,7 @@ def exponential(probe: Probe, horizon: float) -> float:
     So the wobble of a free disc grows with an explicit gyroscopic term, however steady the motion is. 0 if it does not.
     """
     end = float(probe.times[-1])
-    half, later, full = (float(probe.error[probe.times <= part * end].max(initial=0.0)) for part in (0.5, 0.75, 1.0))
+    half, later, full = (float(probe.error[probe.times <= share * end].max(initial=0.0)) for share in (0.5, 0.75, 1.0))
     if not (half > ROUNDED_ERROR and FASTER * half < later and FASTER * later < full < math.inf):
         return 0.0
     folds = math.log(min(later / half, full / later)) * 4.0 * (horizon / end - 1.0)

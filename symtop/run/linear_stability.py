@@ -139,7 +139,7 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
     nutations. If the difference does not obey it (a method with more than two roots, or in single precision, where
     rounding hides it), its size is followed for longer. Rounding errors of the steps add up as a random walk, until the
     first has grown by e. If a stride turns by a small angle a, the two terms are almost linearly dependent, and a
-    rounding error e of the difference leaves an error of e/a^2 in the roots. A step that keeps the energy, whose
+    rounding error e of the difference leaves an uncertainty of e/a^2 in the roots. A step that keeps the energy, whose
     slope vanishes at the steady precession, may turn a rounding error of the energy into one of theta.
     """
     stride = max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))  # steps

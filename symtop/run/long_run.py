@@ -197,9 +197,9 @@ def long_run(
         variables: dict[str, Any] = {"steps": ("window", np.array(ends[: len(rows)], dtype=float))}
         for i, name in enumerate(quantities):
             words, units = ("theta", "rad") if name == "theta" else (f"relative change of {name} since the start", "1")
-            for m, part in enumerate(("least", "largest", "mean")):
-                attributes = {"long_name": f"{words}, {part} over the window", "units": units}
-                variables[f"{name}_{part}"] = ("window", columns[:, i, m], attributes)
+            for m, statistic in enumerate(("least", "largest", "mean")):
+                attributes = {"long_name": f"{words}, {statistic} over the window", "units": units}
+                variables[f"{name}_{statistic}"] = ("window", columns[:, i, m], attributes)
         data = netcdf.describe(
             xr.Dataset(variables), title=f"{title}, {count} steps", units=problem.units,
             integrator=method.name, scene=problem.name, step_size=h, horizon=count * h,
@@ -213,7 +213,7 @@ def long_run(
 
 def summary(values: dict[str, Array]) -> list[float]:
     """Least, largest and mean value of each quantity, in one list."""
-    return [float(part) for value in values.values() for part in (value.min(), value.max(), value.mean())]
+    return [float(number) for value in values.values() for number in (value.min(), value.max(), value.mean())]
 
 
 def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:

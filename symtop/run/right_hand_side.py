@@ -126,11 +126,11 @@ def _motion(f: Any, y: Array, end: float) -> tuple[Any, float]:
     # a start at zero gives no scale for the tolerance; take a negligible part of the expected size of y
     size = float(np.abs(y).max()) or EPSILON * (end * float(np.abs(f(0.0, y)).max()) or 1.0)
     solver = DOP853(f, 0.0, y, end, rtol=FINE_TOLERANCE, atol=FINE_TOLERANCE * size)
-    times, parts = [0.0], list[Any]()
-    while solver.status == "running" and len(parts) < MOST_FINE_STEPS and solver.step() is None:
+    times, interpolants = [0.0], list[Any]()
+    while solver.status == "running" and len(interpolants) < MOST_FINE_STEPS and solver.step() is None:
         times.append(solver.t)
-        parts.append(solver.dense_output())
-    return OdeSolution(times, parts) if parts else None, times[-1]
+        interpolants.append(solver.dense_output())
+    return OdeSolution(times, interpolants) if interpolants else None, times[-1]
 
 
 def _growth(f: Any, near: Any, y: Array, elapsed: Array, extent: float) -> Growth:
@@ -182,7 +182,7 @@ def _outlook(
     turn = 2.0 * math.pi / max(slow, TINY)  # longer than a period at `frequency` where a motion is fast now and then
     period = 2.0 * math.pi / max(frequency, TINY)
     piece = min(end, duration, max(PIECE_SHARE * end, PIECE_PERIODS * period, PIECE_TURNS * turn))
-    positions = np.union1d(np.geomspace(COMPARED_FROM, 1.0, POINTS // 4), elapsed / duration)  # in pieces
+    positions = np.union1d(np.geomspace(COMPARED_FROM, 1.0, POINTS // 4), elapsed / duration)  # compared, in pieces
 
     def run_piece(start: Array) -> tuple[Array, Array, float]:
         """Times and states of the piece, and the mean step (0 for an implicit method)."""

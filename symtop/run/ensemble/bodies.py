@@ -77,8 +77,8 @@ def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float 
         rows[index :: len(kinds)] = _members(stratum, first, len(range(index, count, len(kinds))), epsilon)
         strata[index :: len(kinds)] = stratum
     columns: dict[str, Any] = {
-        name: (("member", VECTORS[name]), part) if name in VECTORS else ("member", part[:, 0], PRINCIPAL.get(name))
-        for name, part in zip(PARTS, np.split(rows, SPLIT, axis=1), strict=True)
+        name: (("member", VECTORS[name]), block) if name in VECTORS else ("member", block[:, 0], PRINCIPAL.get(name))
+        for name, block in zip(PARTS, np.split(rows, SPLIT, axis=1), strict=True)
     }
     data = xr.Dataset(columns | {"stratum": ("member", strata)}, {name: list(LABELS[name]) for name in LABELS})
     draw: dict[str, Any] = {"seed": first, "kind": kind} | ({} if epsilon is None else {"epsilon": float(epsilon)})
@@ -100,7 +100,7 @@ def scenes_of(members: xr.Dataset) -> list[Scene]:
 def _members(kind: str, seed: int, count: int, epsilon: float | None) -> Array:
     """The first members of one stratum, (count, 14)."""
     generator = np.random.Philox(key=[seed % 2**64, KINDS.index(kind)])
-    parts, missing = list[Array](), count
+    batches, missing = list[Array](), count
     while missing:
         integers = generator.random_raw(DRAWS * missing) >> np.uint64(11)
         uniform = np.ascontiguousarray((integers * 2.0**-53).reshape(-1, DRAWS).T)
@@ -109,9 +109,9 @@ def _members(kind: str, seed: int, count: int, epsilon: float | None) -> Array:
             pieces = np.array_split(rows, -(-len(rows) // PIECE_MEMBERS))
             chaotic = np.concatenate([*in_threads(growth, pieces, cores())]) > CHAOTIC_GROWTH
             rows = rows[chaotic == (kind == "chaotic")]
-        parts.append(rows)
+        batches.append(rows)
         missing -= len(rows)
-    return np.concatenate(parts)
+    return np.concatenate(batches)
 
 
 def _directions(first: Array, second: Array) -> Array:
@@ -161,7 +161,7 @@ def _free(kind: str, u: Array) -> Array:
         momentum = np.stack([share, np.cos(0.5 + tilt), share * slope * (1.0 + signs(u[7]) * small)])
     rates = momentum / np.sqrt((momentum**2).sum(axis=0)) / moments
     order = np.argsort(u[8:11], axis=0)
-    moments, rates = (np.take_along_axis(part, order, axis=0) for part in (moments, rates))
+    moments, rates = (np.take_along_axis(values, order, axis=0) for values in (moments, rates))
     return _rows(moments, 0.0, np.stack([0.0 * ones, 0.0 * ones, ones]), _quaternions(u[11:14]), rates)
 
 

@@ -330,8 +330,8 @@ class Turns:
     def all(self) -> dict[str, Array]:
         """Continuous angles of all members, computed on all cores and cached."""
         firsts = range(0, len(self.numbers), READ_TOGETHER)
-        parts = list(in_threads(self.of, [slice(first, first + READ_TOGETHER) for first in firsts], cores()))
-        return {name: np.concatenate([part[name] for part in parts]) for name in self.angles}
+        blocks = list(in_threads(self.of, [slice(first, first + READ_TOGETHER) for first in firsts], cores()))
+        return {name: np.concatenate([block[name] for block in blocks]) for name in self.angles}
 
 
 class LazyAngle(BackendArray):

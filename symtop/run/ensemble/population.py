@@ -215,9 +215,9 @@ def population(n: int, *, seed: int = 0, kind: str = "all") -> xr.Dataset:
     columns: dict[str, Any] = {name: np.empty(count) for name in NUMBERS}
     columns["stratum"] = np.empty(count, dtype=f"U{max(map(len, STRATA))}")
     for begin in range(0, count, BLOCK_MEMBERS):
-        part = {name: values[begin : begin + BLOCK_MEMBERS] for name, values in columns.items()}
-        integers = generator.random_raw(len(part["I1"]) * DRAWS) >> np.uint64(11)
+        block = {name: values[begin : begin + BLOCK_MEMBERS] for name, values in columns.items()}
+        integers = generator.random_raw(len(block["I1"]) * DRAWS) >> np.uint64(11)
         uniform = (integers * 2.0**-53).reshape(-1, DRAWS)  # in [0, 1), of 53 bits
-        _fill(part, np.ascontiguousarray(uniform.T), kind)
+        _fill(block, np.ascontiguousarray(uniform.T), kind)
     data = xr.Dataset({name: ("member", values) for name, values in columns.items()})
     return netcdf.describe(data, f"{count} tops of the population {kind!r}", seed=start, kind=kind)

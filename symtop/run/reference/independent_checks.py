@@ -110,8 +110,8 @@ def largest_errors(scene: Scene, times: Array, quaternions: Any, phis: Any, psis
     for t, *numbers in zip(times, *quaternions.T, phis, psis, strict=True):
         precise = precise_attitude(scene.top, scene.start, float(t))
         w, x, y, z = true = np.array([mp.convert(value) for value in precise])  # all digits, in this arithmetic
-        *parts, phi, psi = [mp.mpf(float(number) if isinstance(number, float) else str(number)) for number in numbers]
-        attitude = np.array(parts) if true @ parts >= 0 else -np.array(parts)
+        *q, phi, psi = [mp.mpf(float(number) if isinstance(number, float) else str(number)) for number in numbers]
+        attitude = np.array(q) if true @ q >= 0 else -np.array(q)
         turn = 2.0 * float(mp.norm(attitude - true))
         tilt = float(mp.norm(charts.axis_from_quaternion(attitude) - charts.axis_from_quaternion(true)))
         total, difference = mp.atan2(z, w), mp.atan2(y, x)
