@@ -43,13 +43,13 @@ def read_columns(file: Path | None) -> dict[str, Column]:
     lines = [] if file is None else file.read_text(encoding="utf-8").splitlines()
     for index, line in enumerate(lines[1:], 2):
         name, *cells = line.split("\t")
-        units, bare, flags, long_name = cells if len(cells) == 4 else [""] * 4
+        units, unitless, flags, long_name = cells if len(cells) == 4 else [""] * 4
         pairs = [flag.split() for flag in flags.split(",") if flag]
         meanings = all(len(pair) == 2 and pair[0].isdigit() for pair in pairs)
         if not (name and long_name and meanings) or name in table:
             form = "a variable that no other line has, its units, those without units, flags, and its long name"
             raise SymtopError(f"{file}: line {index} must be {form}, between tabs, not {line!r}")
-        entry = (long_name, *filter(None, (units, bare)))
+        entry = (long_name, *filter(None, (units, unitless)))
         table[name] = Column(entry, {int(number): word for number, word in pairs})
     return table
 
@@ -97,8 +97,8 @@ def groups(data: xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
 def variable_attributes(name: str, units: str) -> dict[str, str]:
     """The long name and units of a variable, or of its low half, NAME_lo; nothing for a name symtop does not know."""
     base = name.removesuffix("_lo")
-    entry = label(VARIABLES[base], units) if base in VARIABLES else {}
-    return entry | {"long_name": f"{entry['long_name']}, low half"} if entry and base != name else entry
+    attrs = label(VARIABLES[base], units) if base in VARIABLES else {}
+    return attrs | {"long_name": f"{attrs['long_name']}, low half"} if attrs and base != name else attrs
 
 
 def label(entry: tuple[str, ...], units: str, elsewhere: str = "") -> dict[str, str]:

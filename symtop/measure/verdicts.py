@@ -77,11 +77,11 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         return Judgement("accurate", float(times[-1]), sentence)
     theta, energy = run["theta"].values, np.abs(run["energy"].values - run["energy"].values[0]) / scene.energy_scale
     outside = ~((theta >= highest - margin) & (theta <= lowest + margin))
-    invalid = outside | pole_passed(scene, run["p_phi"].values, run.get("p_psi", run["p_phi"]).values)
+    violations = outside | pole_passed(scene, run["p_phi"].values, run.get("p_psi", run["p_phi"]).values)
     half = energy.size // 2
     first_half, second_half = np.max(energy[:half] if half >= FEWEST_SAMPLES else energy), np.max(energy[half:])
-    if invalid.any():
-        first = int(np.argmax(invalid))
+    if violations.any():
+        first = int(np.argmax(violations))
         word, sentence = "wrong_regime", "the axis had passed a pole on the side that its momenta forbid"
         if outside[first]:
             bounds = f"{highest:.4g} to {lowest:.4g}"

@@ -189,7 +189,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
 
     def _in_workers(self, tasks: list[Task], on_result: OnResult, *, timed: bool) -> None:
         """Compute tasks in workers; a case whose worker dies is retried once, with no other case running."""
-        remaining, dead = {task.path: task for task in tasks}, dict[Path, Task]()
+        remaining, retries = {task.path: task for task in tasks}, dict[Path, Task]()
         fruitless = 0
 
         def settle(task: Task, result: Result) -> None:
@@ -197,7 +197,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
             fruitless = 0
             del remaining[task.path]
             if result.state == "died" and not last_round:
-                dead[task.path] = task
+                retries[task.path] = task
             else:
                 on_result(task, failed(task, ENDED) if result.state == "died" else result)
 
@@ -215,7 +215,7 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
                     if fruitless == MOST_FRUITLESS:
                         words = "the worker processes end before they begin; try --jobs 1 or look at the free memory"
                         raise SymtopError(words) from None
-            remaining.update(dead)
+            remaining.update(retries)
 
     def at_once(self, width: int) -> tuple[int, float]:
         """Timed cases that run at once, and the slowdown: `width`, halved until a trial is within `DISTURBED_RATIO`."""
