@@ -72,7 +72,7 @@ CHECKS: dict[str, dict[str, Any]] = {  # what is set in `symtop.run.guard` to sw
     "symmetric methods, too": {"STABILITY_ERROR": math.inf},
     "the motion amplifies errors": {"_amplified": lambda *_: 0.0},
     "and the tolerance": {"_grown_tolerance": lambda *_: 0.0}, "luck at a pole": {"CLOSE_TO_POLE": 0.0},
-    "the length of q drifts": {"_length_lost": lambda *_: None}, "tilt beside a pole": {"BESIDE_POLE": 0.0},
+    "the length of q drifts": {"_length_failure": lambda *_: None}, "tilt beside a pole": {"BESIDE_POLE": 0.0},
     "long probes at a pole": {"POLE_FACTOR": 1.0}, "a least probe": {"LEAST_PROBE": 0.0},
 }  # fmt: skip
 THRESHOLDS = (

@@ -121,8 +121,8 @@ class _Question(NamedTuple):
     @property
     def goal(self) -> str:
         """The question in words."""
-        until = f"t = {self.horizon:g}{self.scene.second}"
-        return f"{self.quantity} error {self.accuracy:g} on {self.scene.name} to {until}"
+        end = f"t = {self.horizon:g}{self.scene.second}"
+        return f"{self.quantity} error {self.accuracy:g} on {self.scene.name} to {end}"
 
     def advice(self, **facts: Any) -> Advice:
         return Advice(self.scene.name, self.quantity, self.accuracy, self.horizon, **facts)
@@ -158,8 +158,8 @@ class _Trial(NamedTuple):
     def cost(self, question: _Question) -> float:
         """Seconds of a run with exactly the accuracy, and steps up to `max_step`; of the run itself at a given step."""
         ratio = 1.0 if question.step is not None else self.error / question.accuracy
-        part = max(settings.at_accuracy(self.run.integrator, ratio), self.run.setting / question.max_step)
-        return self.seconds * part
+        factor = max(settings.at_accuracy(self.run.integrator, ratio), self.run.setting / question.max_step)
+        return self.seconds * factor
 
     def words(self) -> str:
         control = (self.run.integrator.control or "nothing").replace("_", " ")
@@ -191,7 +191,7 @@ def recommend(
     """
     scene = scenes.scene(scene, bodies=True)
     quantity = ("attitude" if scene.of_body else "axis") if quantity is None else quantity
-    allowed = _needs(_words("needs", needs))
+    classes = _needs(_words("needs", needs))
     accuracy = positive("accuracy", accuracy)
     one_of("quantity", quantity, settings.OF_BODY if scene.of_body else (*QUANTITIES, *FREQUENCIES))
     if quantity in settings.ANGLES and accuracy >= math.pi:
@@ -210,11 +210,11 @@ def recommend(
     time_a_step = math.inf if time_a_step is None else positive("time_a_step", time_a_step)
     constants = tuple(one_of("keeps", word, [*KEPT][: 1 if scene.of_body else None]) for word in _words("keeps", keeps))
     limits = step, longest, boolean("general", general), constants, time_a_step
-    question = _Question(scene, accuracy, quantity, horizon, allowed, *limits)
+    question = _Question(scene, accuracy, quantity, horizon, classes, *limits)
     if accuracy < limit:
         source = f"no run was made, as that is below {limit:.2g}, the least error that the reference can judge"
         return _advice(question, [], (), source)
-    if {*allowed} == {"solution"} and not scene.of_body and question.allows(integrator("exact")):
+    if {*classes} == {"solution"} and not scene.of_body and question.allows(integrator("exact")):
         return _exact_advice(question, limit)
     names, source = _candidates(question)
     search = _Search(question, names, _menu(question))
@@ -233,22 +233,22 @@ def recommend(
     return _advice(question, ranked, sentences, source, beside)
 
 
-def _words(name: str, given: object) -> list[object]:
+def _words(name: str, value: object) -> list[object]:
     """The entries of a list, or of a text with commas; empty for None."""
-    if isinstance(given, str):
-        return [*COMMA.split(given.strip())]
-    return [] if given is None else entries(name, given)
+    if isinstance(value, str):
+        return [*COMMA.split(value.strip())]
+    return [] if value is None else entries(name, value)
 
 
 def _needs(choice: Collection[object]) -> tuple[str, ...]:
     """Names of `NEEDS`, from names or words of them: words that make up no need whole select all that contain them."""
     parts = {name: set(COMMA.split(words)) for name, words in NEEDS.items()}
     terms = dict.fromkeys([*NEEDS, *sorted(set().union(*parts.values()))])
-    given = COMMA.split(", ".join(str(term).strip() for term in choice)) if choice else []
-    words = {one_of("needs", word, terms) for word in given}
-    whole = [name for name in NEEDS if name in words or parts[name] <= words]
-    rest = words.difference(NEEDS, *(parts[name] for name in whole))
-    return tuple(name for name in NEEDS if name in whole or parts[name] & rest)
+    choices = COMMA.split(", ".join(str(term).strip() for term in choice)) if choice else []
+    words = {one_of("needs", word, terms) for word in choices}
+    complete = [name for name in NEEDS if name in words or parts[name] <= words]
+    rest = words.difference(NEEDS, *(parts[name] for name in complete))
+    return tuple(name for name in NEEDS if name in complete or parts[name] & rest)
 
 
 class _Search:
@@ -275,10 +275,10 @@ class _Search:
         """The finalists, which were run to the end, the fastest first."""
         ranked = self._confirmed(self._general, FINALISTS)
         if not ranked and self.menu:
-            everyone = _usable(self.question._replace(needs=self.question.needs or OF_ANY))
-            self.widened, rest = len(everyone), {*everyone} - {*self.names, *self.menu}
-            self._try(rest)
-            ranked = self._confirmed([trial for trial in self.trials if trial.run.integrator.name in rest], FINALISTS)
+            usable = _usable(self.question._replace(needs=self.question.needs or OF_ANY))
+            self.widened, others = len(usable), {*usable} - {*self.names, *self.menu}
+            self._try(others)
+            ranked = self._confirmed([trial for trial in self.trials if trial.run.integrator.name in others], FINALISTS)
         return _timed(self.question, ranked, self.fails, TIMING_ROUNDS)
 
     def beside(self) -> list[_Trial]:
@@ -292,23 +292,23 @@ class _Search:
             post(f"trying method {number} of {len(names)}")
             rivals = [trial.run.evaluations for trial in self.trials if trial.run.integrator.needs not in THIS_TOP]
             patience = max(GIVE_UP_RATIO * min(rivals, default=math.inf), LEAST_EVALUATIONS)
-            failed = sum(len(self.fails.get(why, ())) for why in HOPELESS_REASONS)
-            most = LOWER_BUDGET if failed >= ENOUGH and not rivals else math.inf
-            self._sort_in(_tried(self.question, method, patience, most), self.trials)
+            failures = sum(len(self.fails.get(why, ())) for why in HOPELESS_REASONS)
+            limit = LOWER_BUDGET if failures >= ENOUGH and not rivals else math.inf
+            self._sort_in(_trial(self.question, method, patience, limit), self.trials)
         timed = _timed(self.question, self.trials, self.fails)
         self.trials = sorted(timed, key=lambda trial: trial.cost(self.question))
 
-    def _confirmed(self, trials: Sequence[_Trial], most: int) -> list[_Trial]:
-        """Confirm the first `most` trials and those as fast, or more until one is confirmed."""
+    def _confirmed(self, trials: Sequence[_Trial], count: int) -> list[_Trial]:
+        """Confirm the first `count` trials and those as fast, or more until one is confirmed."""
         ranked: list[_Trial] = []
         costs = [trial.cost(self.question) for trial in trials]
         for number, trial in enumerate(trials):
-            if number < most or not ranked or costs[number] <= FINALIST_RATIO * costs[0]:
+            if number < count or not ranked or costs[number] <= FINALIST_RATIO * costs[0]:
                 self._sort_in(_confirm(self.question, trial), ranked)
         return ranked
 
     def _sort_in(self, trial: _Trial, trials: list[_Trial]) -> None:
-        """Add the result of `_tried` or `_confirm` to `trials`, or the method to `errors_at_step` or `fails`."""
+        """Add the result of `_trial` or `_confirm` to `trials`, or the method to `errors_at_step` or `fails`."""
         if not trial.run.why:
             trials.append(trial)
         elif trial.run.why == INACCURATE:
@@ -333,7 +333,7 @@ def _usable(question: _Question) -> list[str]:
     ]  # fmt: skip
 
 
-def _same(variant: str, usable: Sequence[str]) -> str | None:
+def _usable_name(variant: str, usable: Sequence[str]) -> str | None:
     """The name in `usable` of a variant, or of its method in another chart; None if there is neither."""
     method = split_name(variant)[0]
     return next((name for name in (variant, *usable) if name in usable and split_name(name)[0] == method), None)
@@ -346,30 +346,30 @@ def _menu(question: _Question) -> list[str]:
         return []
     if question.keeps and scene.of_body:
         return []
-    asked, general = (quantity, accuracy, horizon / scene.time_scale(horizon)), question.general or scene.of_body
-    rows, usable = cheapest(question.needs, *asked, general=general), _usable(question)
+    key, general = (quantity, accuracy, horizon / scene.time_scale(horizon)), question.general or scene.of_body
+    rows, usable = cheapest(question.needs, *key, general=general), _usable(question)
     if question.keeps and not question.needs:
-        rows += cheapest(OF_ANY, *asked, general=general)
-    menu = list(dict.fromkeys(name for row in rows if (name := _same(row, usable))))[: MOST_LISTED + 1]
+        rows += cheapest(OF_ANY, *key, general=general)
+    menu = list(dict.fromkeys(name for row in rows if (name := _usable_name(row, usable))))[: MOST_LISTED + 1]
     return menu if len(menu) >= ENOUGH or not question.keeps else []
 
 
 def _candidates(question: _Question) -> tuple[list[str], str]:
     """The names of methods to try, and a phrase on their origin."""
-    everyone = _usable(question)
-    if not everyone:
-        return everyone, "no compiled method is within these limits"
+    usable = _usable(question)
+    if not usable:
+        return usable, "no compiled method is within these limits"
     if question.step is not None:
-        return everyone, f"tried all {len(everyone)} compiled methods of fixed step that you can use"
+        return usable, f"tried all {len(usable)} compiled methods of fixed step that you can use"
     of_top = [] if question.needs else _menu(question._replace(needs=THIS_TOP[:1]))[:1]  # named beside the answer
     menu = _menu(question)[:MOST_LISTED]
     if not menu:
-        return everyone, f"tried all {len(everyone)} compiled methods"
-    own = [name for name in everyone if not is_built_in(name)]
-    return list(dict.fromkeys([*menu, *own, *of_top])), "a study of random tops found the cheapest for such questions"
+        return usable, f"tried all {len(usable)} compiled methods"
+    users = [name for name in usable if not is_built_in(name)]
+    return list(dict.fromkeys([*menu, *users, *of_top])), "a study of random tops found the cheapest for such questions"
 
 
-def _tried(question: _Question, method: Integrator, patience: float, most: float) -> _Trial:
+def _trial(question: _Question, method: Integrator, patience: float, limit: float) -> _Trial:
     """A trial with a setting from short runs, or with the given step; its `run.why` is the reason of a failure."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
@@ -377,15 +377,15 @@ def _tried(question: _Question, method: Integrator, patience: float, most: float
             run = settings.attempt(scene, method, question.step, horizon, quantity)
         except SymtopError as error:  # a start at a pole, for a method in the angles chart
             return question.trial(settings.unmet(method, horizon, f"Not run, as {error}"))
-        wrong = INACCURATE if math.isfinite(run.error) else "No run ends well at this step"
-        return question.trial(run._replace(why="" if run.error <= accuracy else wrong))
+        reason = INACCURATE if math.isfinite(run.error) else "No run ends well at this step"
+        return question.trial(run._replace(why="" if run.error <= accuracy else reason))
     period = scene.nutation_period
     short = min(horizon, settings.TRIAL_NUTATIONS * period) if math.isfinite(period) else horizon
     law = (short / horizon) ** settings.growth(method, quantity)
     best = settings.search(
-        scene, method, accuracy * law, quantity, short, patience=min(patience, most), longest=question.max_step
+        scene, method, accuracy * law, quantity, short, patience=min(patience, limit), longest=question.max_step
     )  # fmt: skip
-    if best.why == settings.BUDGET and patience < min(settings.MOST_EVALUATIONS[method.implementation], most):
+    if best.why == settings.BUDGET and patience < min(settings.MOST_EVALUATIONS[method.implementation], limit):
         best = best._replace(why=f"Not within {GIVE_UP_RATIO:g} times the work of the best")
     if method.fixed_step and horizon / best.setting > MOST_STEPS:
         best = best._replace(why=f"Would need more than {MOST_STEPS:.0e} steps")
@@ -405,7 +405,7 @@ def _timed(question: _Question, trials: list[_Trial], fails: dict[str, list[str]
 
 
 def _confirm(question: _Question, trial: _Trial) -> _Trial:
-    """The trial run to the whole horizon, if affordable, with its setting corrected; its `run.why` as in `_tried`."""
+    """The trial run to the whole horizon, if affordable, with its setting corrected; its `run.why` as in `_trial`."""
     scene, accuracy, quantity, horizon = question[:4]
     if question.step is not None:
         return trial
@@ -430,36 +430,36 @@ def _advice(
     scene, goal = question.scene, question.goal
     if not ranked:
         reason = f"Nothing that was tried meets {goal}; {source}."
-        without = _exact_words(question, math.nan)
-        return question.advice(reason=reason, beside=_beside(beside), closed_form=without, fails=fails)
+        words = _exact_words(question, math.nan)
+        return question.advice(reason=reason, beside=_special_methods(beside), closed_form=words, fails=fails)
     best = ranked[0]
     name, fixed = best.run.integrator.name, best.run.integrator.fixed_step
-    worth = f"Error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
+    result = f"Error {best.error:.2g} ({CONFIDENCE[best.confidence]}) in {best.seconds:.2g} s"
     if fixed:
         count = scene.time_scale(question.horizon) / best.run.setting
-        worth += f"; steps are {count:.3g} a {scene.period_word}, {1e6 * best.a_step:.2g} us each"
+        result += f"; steps are {count:.3g} a {scene.period_word}, {1e6 * best.a_step:.2g} us each"
     need = best.run.integrator.needs
-    needed = f"It needs {NEEDS[need]} ({need})." if need else ""
-    use = f"{needed}{_carries(question, best.run.integrator)}".strip()
-    sentences = f"{best.words()} meets {goal}.", f"{worth}.", use, f"{source[0].upper()}{source[1:]}."
-    runners = [f"{trial.words()}, {_as_long(trial.seconds / best.seconds)}." for trial in ranked[1:2]]
+    requirement = f"It needs {NEEDS[need]} ({need})." if need else ""
+    use = f"{requirement}{_carry_over(question, best.run.integrator)}".strip()
+    sentences = f"{best.words()} meets {goal}.", f"{result}.", use, f"{source[0].upper()}{source[1:]}."
+    runners = [f"{trial.words()}, {_relative_time(trial.seconds / best.seconds)}." for trial in ranked[1:2]]
     setting = {str(best.run.integrator.control): best.run.setting}
     return question.advice(
         integrator=name, expected_error=best.error, seconds=best.seconds, confidence=best.confidence, fails=fails,
         reason="\n".join(filter(None, sentences)),
-        runner_up="".join(runners), beside=_beside(beside, best.seconds),
+        runner_up="".join(runners), beside=_special_methods(beside, best.seconds),
         closed_form=_exact_words(question, best.seconds), **setting,
         **_lines(question, best.run.integrator, **setting),
     )  # fmt: skip
 
 
-def _times(ratio: float) -> str:
+def _factor_words(ratio: float) -> str:
     """A factor: "1.1 times", "210 times"."""
     return f"{float(f'{ratio:.2g}'):g} times"
 
 
-def _as_long(ratio: float) -> str:
-    return "in the same time" if _times(ratio) == "1 times" else f"{_times(ratio)} the time"
+def _relative_time(ratio: float) -> str:
+    return "in the same time" if _factor_words(ratio) == "1 times" else f"{_factor_words(ratio)} the time"
 
 
 def _exact_advice(question: _Question, limit: float) -> Advice:
@@ -468,7 +468,7 @@ def _exact_advice(question: _Question, limit: float) -> Advice:
     reason = (
         f"exact, the closed form, meets {question.goal}.\n"
         f"Error below {limit:.2g} in {seconds:.2g} s, without steps.\n"
-        f"It needs {NEEDS['solution']} (solution).{_carries(question, exact)}"
+        f"It needs {NEEDS['solution']} (solution).{_carry_over(question, exact)}"
     )
     return question.advice(
         integrator=exact.name, expected_error=limit, seconds=seconds, confidence="at the reference's limit",
@@ -476,7 +476,7 @@ def _exact_advice(question: _Question, limit: float) -> Advice:
     )  # fmt: skip
 
 
-def _carries(question: _Question, method: Integrator) -> str:
+def _carry_over(question: _Question, method: Integrator) -> str:
     """A sentence on whether a method of a top carries over to a body without symmetry."""
     if question.scene.of_body:
         return ""
@@ -487,8 +487,8 @@ def _carries(question: _Question, method: Integrator) -> str:
     return " It carries over to a body without symmetry, in chart body; its step does not: ask again with that body."
 
 
-def _beside(trials: Sequence[_Trial], best: float = math.nan) -> str:
-    times = [f", {_as_long(trial.seconds / best)}" if math.isfinite(best) else "" for trial in trials]
+def _special_methods(trials: Sequence[_Trial], best: float = math.nan) -> str:
+    times = [f", {_relative_time(trial.seconds / best)}" if math.isfinite(best) else "" for trial in trials]
     return "".join(f"Made for this top: {trial.words()}{time}." for trial, time in zip(trials, times, strict=True))
 
 
@@ -496,20 +496,20 @@ def _lines(question: _Question, method: Integrator, **setting: float) -> dict[st
     """The command and the Python line of the recommended run; no command for a scene that is not registered."""
     scene, _, _, horizon = question[:4]
     in_catalogue = scenes.all_scenes().get(scene.name) == scene
-    of, until = f'"{scene.name}"' if in_catalogue else "scene", f", horizon={horizon!r}" * (horizon != scene.horizon)
+    label, end = f'"{scene.name}"' if in_catalogue else "scene", f", horizon={horizon!r}" * (horizon != scene.horizon)
     option = "".join(f", {name}={float(value)!r}" for name, value in setting.items())
-    python = f'symtop.simulate({of}, "{method.name}"{option}{until})'
+    python = f'symtop.simulate({label}, "{method.name}"{option}{end})'
     return {"command": command_of(scene, method.name, horizon, **setting) if in_catalogue else "", "python": python}
 
 
 def command_of(scene: Scene, method: str, horizon: float, **setting: float | None) -> str:
     """The command that runs a method on a scene."""
     label = f'"{method}"' if "[" in method else method
-    given = ((name.replace("_", "-"), value) for name, value in setting.items() if value is not None)
-    option = "".join(f" --{name} {float(value)!r}" for name, value in given)
-    until = "" if horizon == scene.horizon else f" --horizon {horizon!r}"
+    values = ((name.replace("_", "-"), value) for name, value in setting.items() if value is not None)
+    option = "".join(f" --{name} {float(value)!r}" for name, value in values)
+    end = "" if horizon == scene.horizon else f" --horizon {horizon!r}"
     files = "".join(f" --plugin {shlex.quote(file)}" for file in loaded())
-    return f"symtop run {scene.name} {label}{option}{until}{files}"
+    return f"symtop run {scene.name} {label}{option}{end}{files}"
 
 
 def _exact_seconds(question: _Question) -> float:
@@ -529,8 +529,8 @@ def _exact_words(question: _Question, best: float) -> str:
         return f"The closed form, integrator exact, takes no step{error}."
     seconds = _exact_seconds(question)
     if not best > LEAST_LEAD * seconds:
-        more = f", {_times(seconds / best)} that" if math.isfinite(best) else ""
-        return f"The closed form, integrator exact, takes {seconds * 1e6:.2g} us{more}{error}, and no step."
+        ratio = f", {_factor_words(seconds / best)} that" if math.isfinite(best) else ""
+        return f"The closed form, integrator exact, takes {seconds * 1e6:.2g} us{ratio}{error}, and no step."
     fastest = f"The fastest way is no integrator: the closed form (exact) takes {seconds * 1e6:.2g} us"
     why = "Integrators are compared for what they do where it does not exist."
-    return f"{fastest}, {_times(best / seconds)} less{error}. {why}"
+    return f"{fastest}, {_factor_words(best / seconds)} less{error}. {why}"

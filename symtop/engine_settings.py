@@ -68,19 +68,19 @@ class EngineAdvice:
         near = self.errors[self.best] <= WORST
         if self.best != default and near:
             times = self.errors[default] / (self.errors[self.best] or math.nan)
-            nearer = f", {times:.3g} times nearer than {default}" if self.errors[default] < math.pi else ""
-            lines.append(f"Its best setting is {self.best}{nearer}.")
+            factor = f", {times:.3g} times nearer than {default}" if self.errors[default] < math.pi else ""
+            lines.append(f"Its best setting is {self.best}{factor}.")
         if not near:
-            none = f"No setting is within {WORST:g} rad: none is better than another, and there is nothing to match."
-            lines.append(none)
+            line = f"No setting is within {WORST:g} rad: none is better than another, and there is nothing to match."
+            lines.append(line)
         if self.advice is None:
             return "\n".join([*lines, *["With --accuracy it names a method for the error that you need."] * (not near)])
         if (accuracy := self.advice.accuracy) != self.errors[self.best] or self.advice.integrator is None:
-            serving = ", ".join(name for name, value in self.errors.items() if value <= accuracy) or "none"
-            within = [f"Settings within {accuracy:g} rad at this step: {serving}."] * (self.advice.quantity == "axis")
-            return "\n".join([*lines, *within, str(self.advice)])
-        much = f"{self.gain:.3g} times fewer" if self.gain >= 1.0 else f"{1.0 / self.gain:.3g} times more"
-        work = f" with {much} force evaluations" if math.isfinite(self.gain) else ""  # the exact motion makes none
+            names = ", ".join(name for name, value in self.errors.items() if value <= accuracy) or "none"
+            note = [f"Settings within {accuracy:g} rad at this step: {names}."] * (self.advice.quantity == "axis")
+            return "\n".join([*lines, *note, str(self.advice)])
+        ratio = f"{self.gain:.3g} times fewer" if self.gain >= 1.0 else f"{1.0 / self.gain:.3g} times more"
+        work = f" with {ratio} force evaluations" if math.isfinite(self.gain) else ""  # the exact motion makes none
         return "\n".join([*lines, f"As near as {self.best}{work}: {self.advice.reason}"])
 
 
@@ -127,6 +127,6 @@ def i_use(
     advice = recommend(start, accuracy=target, horizon=end, **limits) if has_target else None
     gain = math.nan
     if advice is not None and advice.integrator is not None and (setting := advice.step_size or advice.tolerance):
-        needed = settings.attempt(start, integrator(advice.integrator), setting, end, "axis")
-        gain = runs[best].evaluations / needed.evaluations
+        trial = settings.attempt(start, integrator(advice.integrator), setting, end, "axis")
+        gain = runs[best].evaluations / trial.evaluations
     return EngineAdvice(start.name, engine, h, end, errors, best, gain, advice, start.second)

@@ -151,10 +151,10 @@ def test_a_method_is_recommended_in_a_chart_that_shows_the_quantity_and_named_wi
     assert {"rk4[axis]", "rk4[angles]", "strang[axis]", "stormer-verlet"} <= set(axis)
     assert not {"strang[attitude]", "rk45", "exact", "strang"} & set(axis)
     assert ("strang[attitude]" in attitude, "strang[axis]" in attitude) == (True, False)
-    assert advise._same("strang[axis]", attitude) == "strang[attitude]"
-    assert advise._same("rk4[angles]", axis) == "rk4[angles]"
-    assert advise._same("stormer-verlet[angles]", axis) == "stormer-verlet"
-    assert advise._same("exact[attitude]", axis) is None
+    assert advise._usable_name("strang[axis]", attitude) == "strang[attitude]"
+    assert advise._usable_name("rk4[angles]", axis) == "rk4[angles]"
+    assert advise._usable_name("stormer-verlet[angles]", axis) == "stormer-verlet"
+    assert advise._usable_name("exact[attitude]", axis) is None
 
 
 def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch):
@@ -178,8 +178,8 @@ def test_when_finalists_fail_the_next_are_run_and_the_failures_told(monkeypatch)
 
 
 def test_a_table_names_five_and_one_more_is_tried_if_the_trials_disagree_with_it(monkeypatch):
-    names, original = [], advise._tried
-    monkeypatch.setattr(advise, "_tried", lambda *arguments: names.append(arguments[1].name) or original(*arguments))
+    names, original = [], advise._trial
+    monkeypatch.setattr(advise, "_trial", lambda *arguments: names.append(arguments[1].name) or original(*arguments))
     scene = symtop.scene("goldstein")
     menu = ["vern9-fixed[axis]", "gauss-6[axis]", "rk4[axis]", "strang[axis]", "cayley[axis]", "srkn-14-6[axis]"]
     monkeypatch.setattr(advise, "_menu", lambda question: ["series[axis]"] if question.needs else menu)

@@ -13,21 +13,21 @@ import threading
 
 def run(name: str | None = None) -> None:
     """Run the command line of this process, with `name` in its messages, and exit with its exit code."""
-    if heard := signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    if default_handler := signal.getsignal(signal.SIGINT) is signal.default_int_handler:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback for Ctrl-C during imports
     from symtop.cli.main import main
     from symtop.core.parallel import VARIABLES
     from symtop.core.signals import BROKEN_PIPE
 
-    if heard:
+    if default_handler:
         signal.signal(signal.SIGINT, signal.default_int_handler)
     os.environ.update({name: "1" for name in VARIABLES if name not in os.environ})  # before NumPy reads them
     try:
         main(prog_name=name)
     except SystemExit as end:
         signal.signal(signal.SIGINT, signal.SIG_DFL)  # no traceback for a second Ctrl-C while threads end
-        alone = all(thread.daemon or thread is threading.main_thread() for thread in threading.enumerate())
-        if not alone or not (end.code is None or isinstance(end.code, int)):
+        only_daemons = all(thread.daemon or thread is threading.main_thread() for thread in threading.enumerate())
+        if not only_daemons or not (end.code is None or isinstance(end.code, int)):
             raise
         atexit._run_exitfuncs()
         code = end.code or 0

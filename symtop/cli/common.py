@@ -93,8 +93,8 @@ def _numbers(count: int) -> Callable[[click.Context, click.Parameter, str | None
         except ValueError:
             values = ()
         if values is not None and len(values) != count:
-            must = "a number" if count == 1 else f"{count} numbers with commas between"
-            raise SymtopError(f"--{option.name} must be {must}, not {text!r}")
+            rule = "a number" if count == 1 else f"{count} numbers with commas between"
+            raise SymtopError(f"--{option.name} must be {rule}, not {text!r}")
         return values
 
     return read
@@ -118,11 +118,11 @@ def body_options(command: Callable[..., None]) -> Callable[..., None]:
         scene = "scene" if "scene" in settings else "name"
         if numbers:
             if "body" not in numbers or settings[scene] != BODY:
-                options, given = ", ".join(f"--{name}" for name in numbers), settings[scene]
-                place = f"the scene {BODY}" + f", not {given}" * (given is not None)
-                lacking = ["--body I1,I2,I3"] * ("body" not in numbers) + [place] * (given != BODY)
-                raise SymtopError(f"{options} must come with {' and '.join(lacking)}")
-            settings[scene] = _own_body(numbers)
+                options, current = ", ".join(f"--{name}" for name in numbers), settings[scene]
+                requirement = f"the scene {BODY}" + f", not {current}" * (current is not None)
+                missing = ["--body I1,I2,I3"] * ("body" not in numbers) + [requirement] * (current != BODY)
+                raise SymtopError(f"{options} must come with {' and '.join(missing)}")
+            settings[scene] = _scene_of_body(numbers)
         command(**settings)
 
     for name, (count, metavar, words) in reversed(OF_BODY.items()):
@@ -132,16 +132,16 @@ def body_options(command: Callable[..., None]) -> Callable[..., None]:
 
 def given_body() -> str:
     """The options of a user's body in the command line of this command; empty without them."""
-    given = {name: value for name, value in click.get_current_context().params.items() if name in OF_BODY and value}
-    return " ".join(f"--{name} {','.join(map(repr, value))}" for name, value in given.items())
+    numbers = {name: value for name, value in click.get_current_context().params.items() if name in OF_BODY and value}
+    return " ".join(f"--{name} {','.join(map(repr, value))}" for name, value in numbers.items())
 
 
-def _own_body(numbers: dict[str, Any]) -> "Scene":
+def _scene_of_body(numbers: dict[str, Any]) -> "Scene":
     from symtop.model import body, scenes
     from symtop.model.top import Angles, SymmetricTop
 
-    given = *numbers["body"], *numbers.get("mgl", (0.0,)), numbers.get("centre", (0.0, 0.0, 1.0))
-    top: Any = body.RigidBody(*given)
+    parameters = *numbers["body"], *numbers.get("mgl", (0.0,)), numbers.get("centre", (0.0, 0.0, 1.0))
+    top: Any = body.RigidBody(*parameters)
     start: Any = body.Attitude(numbers.get("attitude", (1.0, 0.0, 0.0, 0.0)), numbers.get("rates", (0.0, 0.0, 0.0)))
     if not math.isfinite(period := top.nutation_period(start)):
         raise SymtopError("--body without a weight needs --rates: it does not move")
@@ -208,7 +208,7 @@ class Group(click.Group):
             with told_apart(), _warnings_as_lines(), _plain_usage():
                 return super().invoke(ctx)
         except SymtopError as error:
-            warn(_in_options(error, self.commands.get(ctx.invoked_subcommand or "")))
+            warn(_option_message(error, self.commands.get(ctx.invoked_subcommand or "")))
             ctx.exit(2)
         except KeyboardInterrupt:  # click would exit with 1, which here means that a case has failed
             warn("interrupted")
@@ -250,12 +250,12 @@ def _plain_usage() -> Iterator[None]:
         raise
 
 
-def _in_options(error: SymtopError, command: click.Command | None) -> str:
+def _option_message(error: SymtopError, command: click.Command | None) -> str:
     """An error's message with names of options for arguments, and hints for an unknown scene or integrator."""
     parameters = command.params if command is not None else []
     options = [parameter for parameter in parameters if isinstance(parameter, click.Option)]
-    named = {str(option.name): max(option.opts, key=len) for option in reversed(options)}  # the first option of a name
-    sentence = error.renamed({"quaternion": "--attitude", "omega_body": "--rates"} | named)
+    flags = {str(option.name): max(option.opts, key=len) for option in reversed(options)}  # the first option of a name
+    sentence = error.renamed({"quaternion": "--attitude", "omega_body": "--rates"} | flags)
     if not isinstance(error, UnknownNameError) or error.parameters[0] not in ("scene", "integrator"):
         return sentence
     from symtop.methods.framework.registry import integrators, split_name
@@ -263,12 +263,12 @@ def _in_options(error: SymtopError, command: click.Command | None) -> str:
 
     (kind,), name = error.parameters, str(error.value)
     if name in all_scenes() or split_name(name)[0] in integrators():
-        other = "an integrator" if kind == "scene" else "a scene"
-        both = {"scene", "integrator"} <= {given.name for given in parameters if isinstance(given, click.Argument)}
+        noun = "an integrator" if kind == "scene" else "a scene"
+        both = {"scene", "integrator"} <= {entry.name for entry in parameters if isinstance(entry, click.Argument)}
         order = ", and the scene comes first" if both else ""
-        return f"{kind} {name!r} is unknown; it is the name of {other}{order}"
-    own = {"scene": {"body": f"{BODY} with --body I1,I2,I3"}, "integrator": {}}[kind] | {"plugin": "--plugin FILE"}
-    ways = " or ".join(words for name, words in own.items() if name in {option.name for option in options})
+        return f"{kind} {name!r} is unknown; it is the name of {noun}{order}"
+    hints = {"scene": {"body": f"{BODY} with --body I1,I2,I3"}, "integrator": {}}[kind] | {"plugin": "--plugin FILE"}
+    ways = " or ".join(words for name, words in hints.items() if name in {option.name for option in options})
     return f"{sentence} (symtop {kind}s lists all{ways and f'; one of your own: {ways}'})"
 
 
@@ -276,17 +276,17 @@ def _in_options(error: SymtopError, command: click.Command | None) -> str:
 def _warnings_as_lines() -> Iterator[None]:
     with warnings.catch_warnings(action="always", category=SymtopWarning):
         warnings.filterwarnings("ignore", r"\d+ of \d+ members ended early: ")  # `symtop ensemble` counts them anyway
-        others: Any = warnings.showwarning
+        original: Any = warnings.showwarning
         warnings.showwarning = lambda message, category, *rest: (
-            warn(str(message)) if issubclass(category, SymtopWarning) else others(message, category, *rest)
+            warn(str(message)) if issubclass(category, SymtopWarning) else original(message, category, *rest)
         )
         yield
 
 
 def warn(sentence: str) -> None:
     """Print a warning to the standard error."""
-    clear = "\r\x1b[K" if is_terminal(sys.stderr) else ""  # clears a progress line
-    click.echo(clear + fitted(f"symtop: {sentence}", sys.stderr), err=True)
+    erase = "\r\x1b[K" if is_terminal(sys.stderr) else ""  # clears a progress line
+    click.echo(erase + fitted(f"symtop: {sentence}", sys.stderr), err=True)
 
 
 def as_text(content: Any) -> str:
@@ -333,8 +333,8 @@ def check_outputs(**files: str | None) -> None:
             errors.check_replaceable(path)
         with errors.writing(file):
             tempfile.TemporaryFile(dir=path.parent).close()
-        if (other := options.setdefault(path.resolve(), option)) != option:
-            raise SymtopError(f"{other} and {option} must be two files, not both {file!r}")
+        if (first := options.setdefault(path.resolve(), option)) != option:
+            raise SymtopError(f"{first} and {option} must be two files, not both {file!r}")
 
 
 def terminal_width() -> int:
@@ -349,9 +349,9 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], width: int | Non
         widths[-1] = min(widths[-1], max(20, width - sum(widths[:-1]) - 2 * (len(widths) - 1)))
     lines = []
     for row in [header, ["-" * size for size in widths], *rows]:
-        first, *others = textwrap.wrap(row[-1], widths[-1]) or [""]
-        broken = [[*row[:-1], first], *([*[""] * (len(row) - 1), other] for other in others)]
-        lines += ["  ".join(map(str.ljust, cells, widths)).rstrip() for cells in broken]
+        first, *rest = textwrap.wrap(row[-1], widths[-1]) or [""]
+        block = [[*row[:-1], first], *([*[""] * (len(row) - 1), text] for text in rest)]
+        lines += ["  ".join(map(str.ljust, cells, widths)).rstrip() for cells in block]
     return "\n".join(lines)
 
 

@@ -57,28 +57,28 @@ def compare(
         from symtop.report.plot import draw_compare
 
         draw_compare(data, figure)
-    places = {target: comparison.cheapest(data, target).tolist() for target in TARGETS}
+    indices = {target: comparison.cheapest(data, target).tolist() for target in TARGETS}
     cells = [data.isel(variant=k) for k in range(data.sizes["variant"])]
-    records = [[_record(cell, target, places[target][k]) for target in TARGETS] for k, cell in enumerate(cells)]
+    records = [[_record(cell, target, indices[target][k]) for target in TARGETS] for k, cell in enumerate(cells)]
     exact = data["exact_seconds"].item()  # NaN for a body without symmetry
     if as_json:
         facts = {name: data.attrs[name] for name in ATTRIBUTES}
-        every = [record for own in records for record in own]
-        click.echo(as_text({"scene": data["scene"].item(), **facts, "exact_seconds": exact, "cheapest": every}))
+        flat = [record for row in records for record in row]
+        click.echo(as_text({"scene": data["scene"].item(), **facts, "exact_seconds": exact, "cheapest": flat}))
         return
     timed, end, count = options["cost"] == "time", data.attrs["horizon"], data.attrs["nutations"]
     unit, period = " s" if data["reached_time"].attrs["units"] == "s" else "", period_word(data)
-    many = f"{count:.3g}"
-    span = f" ({many} {period}{'s' * (many != '1')})" if count > 0.0 else ""  # 0: a separatrix
+    number = f"{count:.3g}"
+    span = f" ({number} {period}{'s' * (number != '1')})" if count > 0.0 else ""  # 0: a separatrix
     say(f"{data['scene'].item()} to t = {end:.6g}{unit}{span}: the cheapest run by {options['cost']}")
     cost = "time" if timed else "force evaluations"
     say(f"steps a {period} or tolerance (tol), {cost}; error of {data.attrs['quantity']}")
-    rows = [[titled(cell), *(_cell(record, timed) for record in own)] for cell, own in zip(cells, records, strict=True)]
+    rows = [[titled(cell), *(_cell(record, timed) for record in row)] for cell, row in zip(cells, records, strict=True)]
     click.echo(table(["variant", *map("error {:.0e}".format, TARGETS)], rows))
     for cell in cells:
-        least = cell["error"].min().item()
+        smallest = cell["error"].min().item()
         words = [str(message) for message in cell["message"].values if message][:1] or [failed_setting(cell)]
-        words += [f"its least error was {least:.1e}"] if least > TARGETS[-1] else []
+        words += [f"its least error was {smallest:.1e}"] if smallest > TARGETS[-1] else []
         if any(words):
             say(f"{cell['variant'].item()}: {'; '.join(filter(None, words))}")
     if timed:
@@ -89,12 +89,12 @@ def compare(
     say_written(output, figure)
 
 
-def _record(cell: "xr.Dataset", target: float, place: int) -> dict[str, Any]:
+def _record(cell: "xr.Dataset", target: float, index: int) -> dict[str, Any]:
     """The cheapest run of a variant for a target, or the reason why there is none, as a JSON record."""
-    record = {"variant": str(cell["variant"].item()), "target": target, "reached": place >= 0}
-    if place < 0:
+    record = {"variant": str(cell["variant"].item()), "target": target, "reached": index >= 0}
+    if index < 0:
         return record | {"reason": str(cell["reached"].sel(target=target).item())}
-    return record | {name: cell[name].values[place].item() for name in COLUMNS}
+    return record | {name: cell[name].values[index].item() for name in COLUMNS}
 
 
 def _cell(record: dict[str, Any], timed: bool) -> str:
@@ -104,6 +104,6 @@ def _cell(record: dict[str, Any], timed: bool) -> str:
 
     steps, tolerance = record["steps_per_nutation"], record["tolerance"]
     fixed, formula = not math.isnan(record["step_size"]), math.isnan(tolerance)
-    many = f"{steps:.3g}" if steps < 999.5 else f"{steps:.0f}"
-    setting = f"{many} steps" if fixed else "-" if formula else f"tol {tolerance:.0e}"
+    count = f"{steps:.3g}" if steps < 999.5 else f"{steps:.0f}"
+    setting = f"{count} steps" if fixed else "-" if formula else f"tol {tolerance:.0e}"
     return f"{setting:>10} {as_time(record['seconds']) if timed else format(record['force_evaluations'], '.1e'):>7}"

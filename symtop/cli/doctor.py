@@ -126,10 +126,10 @@ def _results(results: Path) -> list[Finding]:
 
 def _writable(topic: str, folder: Path, advice: str) -> Finding:
     """The finding on whether a folder can be written, or made in its nearest parent, and its disk has space."""
-    place = next((path for path in (folder, *folder.resolve().parents) if path.exists()), Path("/"))
+    parent = next((path for path in (folder, *folder.resolve().parents) if path.exists()), Path("/"))
     try:
-        with tempfile.TemporaryFile(dir=place):
-            free = shutil.disk_usage(place).free
+        with tempfile.TemporaryFile(dir=parent):
+            free = shutil.disk_usage(parent).free
     except OSError as error:
         return Finding(topic, f"{folder}: {error.strerror or error}", False, advice)
     return Finding(topic, f"{folder}, {_bytes(free)} free", free > LEAST_SPACE, f"make room, or {advice}")
@@ -140,21 +140,21 @@ def _self_check(_: Path) -> list[Finding]:
     from symtop.measure.published import published_values
     from symtop.run.simulation import simulate
 
-    wrong = "numbers computed here cannot be trusted: reinstall the pinned packages (constraints.txt) and try again"
+    advice = "numbers computed here cannot be trusted: reinstall the pinned packages (constraints.txt) and try again"
     began = time.perf_counter()
     values = published_values()
     failures = [f"{value.source}, {value.quantity}" for value in values if not value.reproduced]
     missing = f": not {'; '.join(failures)}" if failures else ""
     result = f"{len(values) - len(failures)} of {len(values)} reproduced{missing}"
-    findings = [Finding("published values", result, not failures, wrong)]
+    findings = [Finding("published values", result, not failures, advice)]
     exact = simulate("spheroid", "exact", samples=41)
-    for name, step, allowed in (("midpoint", 1e-3, MIDPOINT_GAP), ("taylor", None, TAYLOR_GAP)):
+    for name, step, limit in (("midpoint", 1e-3, MIDPOINT_GAP), ("taylor", None, TAYLOR_GAP)):
         if name == "taylor" and importlib.util.find_spec("heyoka") is None:
             continue
         data = simulate("spheroid", name, step_size=step, samples=41, observe="attitude", guard=False)
         gap = float(abs(data["axis"] - exact["axis"]).max())
-        result = f"{gap:.1e} rad from the truth on spheroid (allowed {allowed:g})"
-        findings.append(Finding(name, result, gap <= allowed, wrong))
+        result = f"{gap:.1e} rad from the truth on spheroid (allowed {limit:g})"
+        findings.append(Finding(name, result, gap <= limit, advice))
     return [*findings, Finding("self-check", f"{time.perf_counter() - began:.1f} s")]
 
 
@@ -185,8 +185,8 @@ def _run(name: str) -> str:
     from symtop.run.reference.truth import reference
     from symtop.run.simulation import simulate
 
-    place = BODY_SCENE if name.endswith("[body]") else SCENE
-    span = WARM_PERIODS * scene(place, bodies=True).nutation_period
+    scene_name = BODY_SCENE if name.endswith("[body]") else SCENE
+    span = WARM_PERIODS * scene(scene_name, bodies=True).nutation_period
     try:
         if not name:
             for kernel in LAZY:
@@ -198,12 +198,12 @@ def _run(name: str) -> str:
         setting = variant.given(span / 2 if variant.fixed_step else max(1e-6, variant.least_tolerance))
         observe = "axis" if name.endswith("[axis]") else "attitude"
         options: dict[str, Any] = {**setting, "observe": observe, "horizon": span, "samples": 2}
-        simulate(place, name, **options)
+        simulate(scene_name, name, **options)
         solver = inside(*variant.solvers.values())
         if solver is None or not solver.in_lanes:
-            ensemble([place] * 2, name, **options, threads=1, quiet=True)
+            ensemble([scene_name] * 2, name, **options, threads=1, quiet=True)
         else:  # with as many members as fill a block
-            rows, ones = read_members([place] * LEAST_MEMBERS).numbers, np.ones(LEAST_MEMBERS)
+            rows, ones = read_members([scene_name] * LEAST_MEMBERS).numbers, np.ones(LEAST_MEMBERS)
             solver.many(rows, span / 2 * ones, np.array([[0, 2]] * LEAST_MEMBERS), compiling=True)
     except Exception as error:  # noqa: BLE001  (one that fails must not keep the others from being compiled)
         return f"{name or 'truth'}: {words_of(error)}"

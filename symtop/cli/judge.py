@@ -100,7 +100,7 @@ def judge(
         for file, write in ((card, cards.card), (badge, cards.write_badge)):
             if file is not None:
                 write(ledger, file)
-    _draw_beside(target, scene, figure, as_json, options, ledger.about.seconds_a_step)
+    _draw_with_peers(target, scene, figure, as_json, options, ledger.about.seconds_a_step)
     say_written(output, card, badge, figure, err=as_json)
     if ledger.refuted:
         sys.exit(1)
@@ -113,7 +113,7 @@ def _check(form: str | None, **files: str | None) -> None:
         raise SymtopError("--figure shows errors of the axis, of which a map of (theta, p_theta) has none")
 
 
-def _draw_beside(
+def _draw_with_peers(
     target: str, scene: str, file: str | None, quiet: bool, options: dict[str, Any], seconds_a_step: float
 ) -> None:
     """Draw a step's error against force evaluations with those of `PEERS`, if `file` is given, and print a ranking."""
@@ -127,19 +127,19 @@ def _draw_beside(
         from symtop.model.scenes import scene as find_scene
         from symtop.report.plot import draw_compare
 
-        on = find_scene(scene, bodies=True)
-        stepper = open_target(target, options["form"], options["chart"], on=on, adaptive=options["adaptive"])
+        problem = find_scene(scene, bodies=True)
+        stepper = open_target(target, options["form"], options["chart"], on=problem, adaptive=options["adaptive"])
         methods = [integrator(stepper, order=options["order"]), *PEERS]
         # `compare` counts at least one force evaluation per step
         budget = min(MOST_PEER_STEPS, LONGEST_BESIDE / max(seconds_a_step, 1e-9))
-        data = compare(on, methods, cost="evaluations", nutations=NUTATIONS, budget=budget, quiet=True)
+        data = compare(problem, methods, cost="evaluations", nutations=NUTATIONS, budget=budget, quiet=True)
         draw_compare(data, file)
-    most, errors = ranked(data)
+    limit, errors = ranked(data)
     if not quiet and errors:
         words = [f"{name} {error:.0e}" for name, error in errors.items()]
         words += [f"{name} none" for name in data["variant"].values if name not in errors]
         span = f"{NUTATIONS:g} {period_word(data)}s"
-        say(f"Axis error (rad) for {most:.0f} force evaluations in {span}: {', '.join(words)}.")
+        say(f"Axis error (rad) for {limit:.0f} force evaluations in {span}: {', '.join(words)}.")
 
 
 @click.command(short_help="Measure what integrators claim about themselves.")
@@ -166,9 +166,9 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
         from symtop.model.charts import BODY
 
         problem = scenes.scene(scene, bodies=True)
-        added = [name for name in registry.integrators() if not registry.is_built_in(name)]
-        known = [name for name, own in registry.integrators().items() if not problem.of_body or BODY in own.solvers]
-        methods = [registry.integrator(name) for name in names or added or known]
+        plugins = [name for name in registry.integrators() if not registry.is_built_in(name)]
+        known = [name for name, entry in registry.integrators().items() if not problem.of_body or BODY in entry.solvers]
+        methods = [registry.integrator(name) for name in names or plugins or known]
     refuted, entries = False, []
     for method in methods:
         with showing_seconds(f"measuring {method.name}"):
@@ -176,8 +176,8 @@ def claims(names: tuple[str, ...], scene: str, quick: bool, as_json: bool) -> No
         verdicts = {finding.verdict for finding in ledger.findings}
         refuted |= "refuted" in verdicts or not verdicts & {"confirmed", "measured"}
         if as_json:
-            about = {"integrator": ledger.integrator, "scene": problem.name}
-            entries += [{**about, **finding.plain()} for finding in ledger.findings]
+            head = {"integrator": ledger.integrator, "scene": problem.name}
+            entries += [{**head, **finding.plain()} for finding in ledger.findings]
         else:
             say("\n".join(finding.sentence(ledger.integrator) for finding in ledger.findings))
     if as_json:
@@ -221,16 +221,16 @@ def recommend(scene: Any, accuracy: float | None, engine: str | None, as_json: b
         raise SymtopError("recommend needs --accuracy, for example 1e-6, or --i-use")
     options |= {"step_size": common.step_of(scene, options), "needs": options["needs"] or ()}
     with showing_seconds("trying methods"):
-        answer: Any
+        result: Any
         if engine is not None:
-            answer = engine_settings.i_use(engine, scene, accuracy=accuracy, **options)
-            advice = answer.advice if accuracy is not None else None
+            result = engine_settings.i_use(engine, scene, accuracy=accuracy, **options)
+            advice = result.advice if accuracy is not None else None
         else:
-            answer = advice = advise.recommend(scene, accuracy=accuracy or 0.0, **options)
-            if advice.integrator and (own := common.given_body()):
+            result = advice = advise.recommend(scene, accuracy=accuracy or 0.0, **options)
+            if advice.integrator and (body := common.given_body()):
                 setting = {"step_size": advice.step_size, "tolerance": advice.tolerance}
                 command = advise.command_of(scene, advice.integrator, advice.horizon, **setting)
-                answer = advice = dataclasses.replace(advice, command=f"{command} {own}")
-    click.echo(as_text(dataclasses.asdict(answer))) if as_json else say(str(answer))
+                result = advice = dataclasses.replace(advice, command=f"{command} {body}")
+    click.echo(as_text(dataclasses.asdict(result))) if as_json else say(str(result))
     if advice is not None and advice.integrator is None:
         sys.exit(1)

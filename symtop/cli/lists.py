@@ -35,10 +35,10 @@ PACKAGE = f"""\
 
 
 def _print(
-    records: list[Record], short: list[Record], note: str, entry: Record | None, page: Callable[[Record], str],
+    records: list[Record], rows: list[Record], note: str, entry: Record | None, page: Callable[[Record], str],
     *, wide: bool, as_json: bool,
 ) -> None:  # fmt: skip
-    """Print the `entry` with `page`, if given, else a table of the `short` records; with options all, or JSON."""
+    """Print the `entry` with `page`, if given, else a table of `rows`; with options all, or JSON."""
     if entry is not None and (as_json or not wide):
         click.echo(as_text([entry]) if as_json else page(entry))
     elif as_json:
@@ -47,7 +47,7 @@ def _print(
         click.echo(table(*formats.columns(records)))
     else:
         narrow = is_terminal(sys.stdout) or "COLUMNS" in os.environ  # else one line an entry, for grep
-        click.echo(table(*formats.columns(short), terminal_width() if narrow else None))
+        click.echo(table(*formats.columns(rows), terminal_width() if narrow else None))
         click.echo(textwrap.fill(note, terminal_width()))
 
 
@@ -71,13 +71,13 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, eng
     """
     from symtop.methods.framework import registry
 
-    listed = registry.engines() if engines else registry.methods()
-    methods = [registry.integrator(name)] if name is not None else list(listed.values())
+    entries = registry.engines() if engines else registry.methods()
+    methods = [registry.integrator(name)] if name is not None else list(entries.values())
     records: list[Record] = [method.record() for method in methods]
     if markdown and not as_json:
         click.echo(formats.table(*formats.columns(records)))
         return
-    short: list[Record] = [
+    rows: list[Record] = [
         {
             "name": method.name, "order": str(method.order or "?"), "flags": _flags(method),
             "needs": method.needs or "?", "summary": method.summary,
@@ -87,8 +87,8 @@ def integrators(name: str | None, wide: bool, as_json: bool, markdown: bool, eng
     needs = "; ".join(f"{name}: {words}" for name, words in registry.NEEDS.items())
     note = f"flags: {FLAGS}. What a method needs of you (needs) is one of {needs}."
     note += " One in full: symtop integrators NAME; in one chart: NAME[CHART]."
-    entry = None if name is None else _described(methods[0])
-    _print(records, short, note, entry, _integrator_page, wide=wide, as_json=as_json)
+    entry = None if name is None else _full_record(methods[0])
+    _print(records, rows, note, entry, _integrator_page, wide=wide, as_json=as_json)
 
 
 def _flags(method: "Integrator") -> str:
@@ -96,30 +96,30 @@ def _flags(method: "Integrator") -> str:
     return "".join("?" if claim is None else yes if claim else no for claim, yes, no in letters)
 
 
-def _described(method: "Integrator") -> Record:
+def _full_record(method: "Integrator") -> Record:
     """The record of an integrator with its tolerances, its source and its description."""
     from symtop.methods.framework.registry import integrator
     from symtop.model.charts import BODY
 
-    described: Record = {**method.record()}
+    record: Record = {**method.record()}
     if method.conserves and BODY in method.solvers:
-        described["conserves"] += " of a top"  # on a body Gauss methods do not keep p_phi, Lie-group methods do
+        record["conserves"] += " of a top"  # on a body Gauss methods do not keep p_phi, Lie-group methods do
     if method.conserves is not None and len(integrator(method.method).charts()) > 1:
         where = "in every chart" if method.conserves else "common to all charts"  # a chart may have more
-        described["conserves"] += f" {where} of {method.method}"
+        record["conserves"] += f" {where} of {method.method}"
     if method.default_tolerance is not None:
-        described["default tolerance"] = f"{method.default_tolerance:g}"
+        record["default tolerance"] = f"{method.default_tolerance:g}"
     if method.least_tolerance > 0.0:
-        described["least tolerance"] = f"{method.least_tolerance:.3g}"
-    return described | {"source": method.reference or "none named"} | ({"about": method.about} if method.about else {})
+        record["least tolerance"] = f"{method.least_tolerance:.3g}"
+    return record | {"source": method.reference or "none named"} | ({"about": method.about} if method.about else {})
 
 
-def _integrator_page(described: Record) -> str:
+def _integrator_page(record: Record) -> str:
     from symtop.methods.framework.registry import citation
 
-    name, summary, about = (described.pop(key, "") for key in ("name", "summary", "about"))
+    name, summary, about = (record.pop(key, "") for key in ("name", "summary", "about"))
     paragraphs = filter(None, (f"{name}: {summary}", *about.split("\n\n")))
-    parts = [*(textwrap.fill(text, terminal_width()) for text in paragraphs), facts(described)]
+    parts = [*(textwrap.fill(text, terminal_width()) for text in paragraphs), facts(record)]
     with contextlib.suppress(SymtopError):  # a user's method may name an unknown source
         parts.append(citation(name))
     return "\n\n".join(parts)
@@ -142,11 +142,11 @@ def scenes(name: Any, wide: bool, as_json: bool) -> None:
     entries = [*catalogue.all_scenes().values()] if name is None else [catalogue.scene(name, bodies=True)]
     records: list[Record] = [scene.record() for scene in entries]
     keys = {"name": "name", "horizon": "horizon", "nutation": "nutation period", "purpose": "purpose"}
-    short: list[Record] = [{column: record[key] for column, key in keys.items()} for record in records]
+    rows: list[Record] = [{column: record[key] for column, key in keys.items()} for record in records]
     times = "horizon: the time a run covers; nutation: one period of it, of a body its natural period."
     note = f"{times} One in full: symtop scenes NAME."
     entry = None if name is None else _numbers(entries[0])
-    _print(records, short, note, entry, _scene_page, wide=wide, as_json=as_json)
+    _print(records, rows, note, entry, _scene_page, wide=wide, as_json=as_json)
 
 
 def _numbers(scene: "Scene") -> Record:

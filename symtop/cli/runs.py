@@ -71,15 +71,15 @@ def run(
         settings["step_size"] = h = common.step_of(scene, settings)
         problem = scenes.scene(scene, bodies=True)
         horizon = problem.horizon if settings["horizon"] is None else scenes.horizon_of(settings["horizon"])
-    known = not problem.of_body or _is_known(problem, horizon, figure)
+    has_truth = not problem.of_body or _has_reference(problem, horizon, figure)
     if h is not None and h > 0.0:
         few_steps = partial(simulate, scene, integrator, step_size=h, samples=2, guard=False)
-        estimate(horizon / h, lambda few: few_steps(horizon=few * h))
+        estimate(horizon / h, lambda count: few_steps(horizon=count * h))
     with showing_seconds("running"):
         data = simulate(scene, integrator, guard={"on": True, "off": False}.get(guard, guard), **settings)
         if output is not None:
             netcdf.write(data, output)
-        error, verdict = _judged(problem, data, figure) if known else ({}, None)
+        error, verdict = _errors_and_verdict(problem, data, figure) if has_truth else ({}, None)
     words = QUANTITIES | OF_BODY if problem.of_body else QUANTITIES
     series = {name: error[name].dropna("time").values for name in words if name in error}
     largest = {name: {"largest": values.max(), "last": values[-1]} for name, values in series.items() if values.size}
@@ -92,9 +92,9 @@ def run(
         method, actual, nominal = facts["integrator"], facts["step_size"], settings["step_size"]
         variant = method if method.endswith("]") else f"{method}[{facts['chart']}]"
         say(f"{variant} on {problem.name}: {facts['outcome_message']}")
-        other = nominal is not None and abs(actual / nominal - 1.0) > SAME_STEP
-        of = f" of {actual:.6g}, for a whole number of them fills the horizon" if other else ""
-        say(f"{counted(facts['steps'], 'step')}{of}, {counted(facts['force_evaluations'], 'force evaluation')}")
+        adjusted = nominal is not None and abs(actual / nominal - 1.0) > SAME_STEP
+        size = f" of {actual:.6g}, for a whole number of them fills the horizon" if adjusted else ""
+        say(f"{counted(facts['steps'], 'step')}{size}, {counted(facts['force_evaluations'], 'force evaluation')}")
         if facts["sampling"] == "dithered":
             say("samples are not evenly spaced, so that they show all phases of the nutation")
         if verdict is not None and facts["outcome"] == "ok":
@@ -106,7 +106,7 @@ def run(
         sys.exit(3)
 
 
-def _is_known(problem: Any, horizon: float, figure: str | None) -> bool:
+def _has_reference(problem: Any, horizon: float, figure: str | None) -> bool:
     """Is there a reference for a body up to the horizon? If not, warn why; SymtopError if `figure` is given."""
     from symtop.measure.settings import judgeable
 
@@ -121,7 +121,7 @@ def _is_known(problem: Any, horizon: float, figure: str | None) -> bool:
     return True
 
 
-def _judged(problem: Any, data: Any, figure: str | None) -> tuple[Any, Any]:
+def _errors_and_verdict(problem: Any, data: Any, figure: str | None) -> tuple[Any, Any]:
     """Errors and verdict of a run, which is drawn to `figure`, if given."""
     from symtop.measure.errors import errors
     from symtop.measure.verdicts import judgement
@@ -145,14 +145,14 @@ def estimate(steps: float, run: Callable[[int], object]) -> None:
         return
     with showing_seconds("timing some steps"):
         run(TRIAL_STEPS)  # compiles the kernel
-        few, fixed, seconds = TRIAL_STEPS, first_call(partial(run, TRIAL_STEPS)), 0.0
-        while seconds < LONG_ENOUGH and few * TIMED_RATIO < steps:
-            few *= 4
-            seconds = first_call(partial(run, few)) - fixed  # without the fixed cost of a run
-    took = seconds * steps / (few - TRIAL_STEPS)
+        count, fixed, seconds = TRIAL_STEPS, first_call(partial(run, TRIAL_STEPS)), 0.0
+        while seconds < LONG_ENOUGH and count * TIMED_RATIO < steps:
+            count *= 4
+            seconds = first_call(partial(run, count)) - fixed  # without the fixed cost of a run
+    total = seconds * steps / (count - TRIAL_STEPS)
     post("running")  # no longer compiling
-    if took > 10.0:
-        warn(f"{steps:.3g} steps take about {duration(took).replace(NO_BREAK, ' ')}")
+    if total > 10.0:
+        warn(f"{steps:.3g} steps take about {duration(total).replace(NO_BREAK, ' ')}")
 
 
 @click.command(short_help="Run up to billions of steps in little memory.")
@@ -192,7 +192,7 @@ def long(
         raise SymtopError(f"{scene} has no nutation to take a step from: give --step-size")
     h = period / PER_NUTATION if step_size is None else step_size
     count = whole("steps", steps, 1, MOST_STEPS)
-    estimate(count, lambda few: long_run(scene, integrator, steps=few, step_size=h, quiet=True))
+    estimate(count, lambda count: long_run(scene, integrator, steps=count, step_size=h, quiet=True))
     post(f"running {count:.3g} steps")
     try:
         data = long_run(scene, integrator, steps=count, step_size=h, checkpoint=checkpoint or True, output=output)
@@ -204,12 +204,12 @@ def long(
         rows = []
         steps_made = data["steps"].values
         for name in (OF_BODY if problem.of_body else QUANTITIES)[:-1]:  # except theta
-            least, most, mean = (data[f"{name}_{kind}"].values for kind in ("least", "largest", "mean"))
-            sizes = np.maximum.accumulate(np.maximum(np.abs(least), np.abs(most)))
+            smallest, largest, mean = (data[f"{name}_{kind}"].values for kind in ("least", "largest", "mean"))
+            sizes = np.maximum.accumulate(np.maximum(np.abs(smallest), np.abs(largest)))
             fit = power_law(steps_made, sizes, steps_made > steps_made[-1] / 10.0**FITTED_DECADES)
-            grows = f"t^{abs(fit.slope):.2f}" if math.isfinite(fit.slope) else ""  # no interval
+            law = f"t^{abs(fit.slope):.2f}" if math.isfinite(fit.slope) else ""  # no interval
             words = "|L|" if name == "momentum" else name
-            rows.append([words, *(f"{float(value):+.3e}" for value in (least.min(), most.max(), mean[-1])), grows])
+            rows.append([words, *(f"{float(value):+.3e}" for value in (smallest.min(), largest.max(), mean[-1])), law])
         click.echo(table(["change since the start", "least", "largest", "last window's mean", "grows as"], rows))
     say_written(output)
     if data.attrs["outcome"] != "ok":
@@ -255,7 +255,7 @@ def ensemble(
     check_outputs(output=output, figure=figure)
     if epsilon is not None and not bodies:
         raise SymtopError("--epsilon must come with --bodies: it is how far heavy bodies are from a top")
-    noun, most = ("bodies", MOST_COMPARED_BODIES) if bodies else ("tops", MOST_COMPARED)
+    noun, cap = ("bodies", MOST_COMPARED_BODIES) if bodies else ("tops", MOST_COMPARED)
     kernels_to_compile[0] = ENSEMBLE_KERNELS
     with showing_seconds(f"drawing {noun}"):
         import numpy as np
@@ -274,14 +274,14 @@ def ensemble(
     if figure is not None and not compared:
         needed = " or ".join(SHOWN_BY[name] for name in words)
         raise SymtopError(f"--figure needs {needed} among --variables, whose errors it shows")
-    wrong, own = dict[str, Any](), dict[str, Any]()  # errors over time, and the largest errors, of each member
+    series, maxima = dict[str, Any](), dict[str, Any]()  # errors over time, and the largest errors, of each member
 
     def added(data: Any) -> Any:
-        few, results = (part.isel(member=slice(0, most)) for part in (sample, data))
+        subset, results = (dataset.isel(member=slice(0, cap)) for dataset in (sample, data))
         with showing_seconds("comparing with the true motion"):
-            wrong.update({name: member_errors(few, results, name) for name in compared})
-        own.update({name: largest(values) for name, values in wrong.items()})
-        return _columns(sample, own, words)
+            series.update({name: member_errors(subset, results, name) for name in compared})
+        maxima.update({name: largest(values) for name, values in series.items()})
+        return _columns(sample, maxima, words)
 
     post(f"running {so_many(members, noun)}")
     try:
@@ -290,11 +290,11 @@ def ensemble(
         warn("interrupted" + ("" if output is None else "; what was run is kept: the same command resumes"))
         sys.exit(130)
     outcomes, steps = Counter(data["outcome"].values.tolist()), int(data["steps"].sum())
-    worst = {name: spread(values[:, None])[:, 0].tolist() for name, values in own.items()}
+    worst = {name: spread(values[:, None])[:, 0].tolist() for name, values in maxima.items()}
     if figure is not None:
         from symtop.report.plot import draw_ensemble
 
-        draw_ensemble(data.isel(member=slice(0, most)), wrong, figure)
+        draw_ensemble(data.isel(member=slice(0, cap)), series, figure)
     data.close()
     if as_json:
         errors = {name: dict(zip(map("{:g}".format, LEVELS), row, strict=True)) for name, row in worst.items()}
@@ -303,13 +303,13 @@ def ensemble(
         counts = ", ".join(f"{count} {OUTCOME.get(name, name)}" for name, count in outcomes.items())
         say(f"{data.attrs['integrator']} on {so_many(members, noun)}: {counts}")
         say(counted(steps, "step") + EXECUTION.get(data.attrs["execution"], ""))
-        heading = [f"largest error, {so_many(min(members, most), noun)}", *(f"{100.0 * level:g} %" for level in LEVELS)]
+        heading = [f"largest error, {so_many(min(members, cap), noun)}", *(f"{100.0 * level:g} %" for level in LEVELS)]
         if worst:
-            short = {name: text.replace("energy of", "that of") for name, text in words.items()}  # a line of 80 columns
-            click.echo(table(heading, [[short[name], *map("{:.1e}".format, row)] for name, row in worst.items()]))
+            names = {name: text.replace("energy of", "that of") for name, text in words.items()}  # a line of 80 columns
+            click.echo(table(heading, [[names[name], *map("{:.1e}".format, row)] for name, row in worst.items()]))
         say_written(output, figure)
-    if lost := sum(np.isnan(own.get("attitude", []))):
-        warn(f"the attitudes of {so_many(lost, noun)} are not compared: their motion is not known to 1e-9 rad")
+    if missing := sum(np.isnan(maxima.get("attitude", []))):
+        warn(f"the attitudes of {so_many(missing, noun)} are not compared: their motion is not known to 1e-9 rad")
     if "ok" not in outcomes:
         sys.exit(3)
 
@@ -318,8 +318,8 @@ def _kernels(members: int, *, per_nutation: Any, nutations: Any, horizon: Any, s
     """The most kernels that an ensemble of tops compiles: fewer for few steps, which are not made in lanes."""
     from symtop.methods.framework import lanes
 
-    each = (horizon or 0.0) / step_size if step_size else (per_nutation or 0.0) * (nutations or 0.0)
-    return KERNELS_OF_FEW if 0.0 < members * each <= lanes.FEW_STEPS else ENSEMBLE_KERNELS
+    steps = (horizon or 0.0) / step_size if step_size else (per_nutation or 0.0) * (nutations or 0.0)
+    return KERNELS_OF_FEW if 0.0 < members * steps <= lanes.FEW_STEPS else ENSEMBLE_KERNELS
 
 
 def _columns(sample: Any, errors: dict[str, Any], words: dict[str, str]) -> Any:
@@ -330,12 +330,12 @@ def _columns(sample: Any, errors: dict[str, Any], words: dict[str, str]) -> Any:
     from symtop.measure.errors import ERRORS
 
     numbers = {name: column.variable for name, column in sample.data_vars.items() if column.dtype.kind == "f"}
-    added: dict[str, Any] = {name if name in PARAMETERS else f"start_{name}": row for name, row in numbers.items()}
+    variables: dict[str, Any] = {name if name in PARAMETERS else f"start_{name}": row for name, row in numbers.items()}
     for name, values in errors.items():
         padded = np.pad(values, (0, sample.sizes["member"] - len(values)), constant_values=math.nan)
-        about = {"long_name": f"{words[name]}, largest over the run, infinite after a failure"}
-        added[f"{name}_error"] = "member", padded, about | {"units": ERRORS[name][1]}
-    return xr.Dataset(added, attrs={name: sample.attrs[name] for name in DRAW_ATTRIBUTES if name in sample.attrs})
+        attributes = {"long_name": f"{words[name]}, largest over the run, infinite after a failure"}
+        variables[f"{name}_error"] = "member", padded, attributes | {"units": ERRORS[name][1]}
+    return xr.Dataset(variables, attrs={name: sample.attrs[name] for name in DRAW_ATTRIBUTES if name in sample.attrs})
 
 
 @click.command(short_help="Open the explorer: one run in a browser, with sliders.")
@@ -351,8 +351,8 @@ def explore(port: int, no_browser: bool) -> None:
     from symtop.explore.server import address, serve
     from symtop.methods.framework.registry import integrators, is_built_in
 
-    if unseen := [name for name, method in integrators().items() if not (shows(method) or is_built_in(name))]:
-        warn(f"the page shows attitudes and leaves out {', '.join(unseen)}, without the chart angles or attitude")
+    if names := [name for name, method in integrators().items() if not (shows(method) or is_built_in(name))]:
+        warn(f"the page shows attitudes and leaves out {', '.join(names)}, without the chart angles or attitude")
     with ending_on_sigterm(), serve(port) as server:
         click.echo(f"symtop explore: {address(server)} (Ctrl-C ends it)")
         if not no_browser:

@@ -57,15 +57,15 @@ def study(
     symtop study --all --status --why
     symtop study convergence --scheduler tcp://10.0.0.1:8786
     """
-    alone = "must not be given together: --status computes nothing"
-    for wrong, sentence in (
+    clause = "must not be given together: --status computes nothing"
+    for conflict, sentence in (
         (why and not status, "--why must be given together with --status"),
         (all(grid.values()), "--quick and --full must not be given together"),
         (names and every, f"name studies or use --all, not both: {' '.join(names)} --all"),
-        (status and check, f"--status and --check {alone}"),
-        (status and fresh, f"--status and --fresh {alone}"),
+        (status and check, f"--status and --check {clause}"),
+        (status and fresh, f"--status and --fresh {clause}"),
     ):
-        if wrong:
+        if conflict:
             raise SymtopError(sentence)
     if limit is not None:
         positive("limit", limit)
@@ -92,19 +92,19 @@ def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick
     from symtop.methods.framework.registry import integrator
     from symtop.runner import scripts
 
-    chosen = scripts.names() if every else list(dict.fromkeys(names))
-    if not chosen:
+    study_names = scripts.names() if every else list(dict.fromkeys(names))
+    if not study_names:
         raise SymtopError(f"name a study or use --all; known: {', '.join(scripts.names())}")
     for name in only:
         integrator(name)  # raises an error with similar names if there is none
-    studies = [scripts.load(name) for name in chosen]
+    studies = [scripts.load(name) for name in study_names]
     if not only:
         return studies
     remaining, reasons = [], []
-    for narrowed in (study.only(only) for study in studies):
+    for part in (study.only(only) for study in studies):
         try:
-            narrowed.grid(quick=quick)
-            remaining.append(narrowed)
+            part.grid(quick=quick)
+            remaining.append(part)
         except SymtopError as error:
             reasons.append(error)
     if not remaining:
@@ -135,30 +135,30 @@ def _in_order(pool: "Pool", studies: "list[Study]", results: Path, options: dict
     from symtop.runner import run, store
     from symtop.runner.study import StudyError
 
-    ahead, refused = deque(studies), list[SymtopError]()
+    queue, errors = deque(studies), list[SymtopError]()
     waiting: deque[tuple[Any, Any]] = deque()  # (study, `PendingFindings`) whose findings have not been yielded
     try:
-        while ahead:
-            study = ahead.popleft()
+        while queue:
+            study = queue.popleft()
             try:
                 waiting.append((study, run.start(study, results, pool, **options)))
             except SymtopError as error:
-                refused.append(error)
-                ahead.clear()
-            while waiting and (not ahead or (len(waiting) > 1 and waiting[0][1].done())):
+                errors.append(error)
+                queue.clear()
+            while waiting and (not queue or (len(waiting) > 1 and waiting[0][1].done())):
                 try:
                     yield waiting[0][1].result()
                 except StudyError as error:  # this study has no findings; the others go on
-                    _tell(waiting[0][1].failures, str(error))  # they may be the cause
-                    refused.append(error)
+                    _print_failures(waiting[0][1].failures, str(error))  # they may be the cause
+                    errors.append(error)
                 waiting.popleft()
     except BaseException:
         pool.close()
         for study, _ in waiting:
             store.tidy(results.resolve(), study)
         raise
-    if refused:
-        raise refused[0]
+    if errors:
+        raise errors[0]
 
 
 def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str, Any]:
@@ -169,19 +169,19 @@ def _summary(findings: dict[str, Any], results: Path, as_json: bool) -> dict[str
     summary = {key: findings[key] for key in ("study", "cases", "computed", "failures", "facts")}
     summary |= {"figures": len(findings["pictures"]), "seconds": round(findings["seconds"], 3)}
     if not as_json:
-        drawn = counted(summary["figures"], "figure")
-        click.echo("{study}: {computed} of {cases} cases computed, {drawn}".format(drawn=drawn, **summary))
+        figures = counted(summary["figures"], "figure")
+        click.echo("{study}: {computed} of {cases} cases computed, {drawn}".format(drawn=figures, **summary))
         files = [f"dataset {results / name}.nc", f"facts {results / name}.json"]
         for kind, key in (("figures", "pictures"), ("tables", "tables")):
             files += [f"{kind} {results / kind / name}-*"] * bool(findings[key])
         for line in (answer(findings, results), ", ".join(files)):
             if line:
                 click.echo(common.filled(f"  {line}"))
-    _tell(findings["failures"])
+    _print_failures(findings["failures"])
     return summary
 
 
-def _tell(failures: Sequence[str], sentence: str = "") -> None:
+def _print_failures(failures: Sequence[str], sentence: str = "") -> None:
     """Print the messages of failed cases, except one that `sentence` contains."""
     for failure in failures:
         if failure not in sentence:

@@ -88,11 +88,11 @@ def version(package: str) -> str:
 @functools.cache
 def processor() -> str:
     """This machine's processor: its name, and its family and model, as different virtual machines share a name."""
-    about: dict[str, str] = {}
+    info: dict[str, str] = {}
     with contextlib.suppress(OSError), Path("/proc/cpuinfo").open(encoding="utf-8") as lines:
-        about = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
-    more = (f"{key} {about[key]}" for key in ("cpu family", "model", "CPU implementer", "CPU part") if key in about)
-    return ", ".join([about.get("model name", platform.processor() or platform.machine()), *more])
+        info = {key.strip(): value.strip() for key, _, value in (line.partition(":") for line in lines)}
+    details = (f"{key} {info[key]}" for key in ("cpu family", "model", "CPU implementer", "CPU part") if key in info)
+    return ", ".join([info.get("model name", platform.processor() or platform.machine()), *details])
 
 
 def packages(*names: str) -> Reasons:
@@ -123,9 +123,9 @@ def is_library(package: str) -> bool:
         return False
     with contextlib.suppress(ImportError, ValueError):
         module = sys.modules.get(package) or importlib.util.find_spec(package)
-        places = [getattr(module, name, None) for name in ("__file__", "origin")]
-        places += [*(getattr(module, "__path__", None) or getattr(module, "submodule_search_locations", None) or ())]
-        if any({"site-packages", "dist-packages"} & {*Path(place).parts} for place in places if place):
+        paths = [getattr(module, name, None) for name in ("__file__", "origin")]
+        paths += [*(getattr(module, "__path__", None) or getattr(module, "submodule_search_locations", None) or ())]
+        if any({"site-packages", "dist-packages"} & {*Path(path).parts} for path in paths if path):
             return True
     return package in sys.stdlib_module_names or package in sys.builtin_module_names
 
@@ -195,15 +195,15 @@ class Code:
     def reached(self, label: str, *things: object) -> list[Part]:
         """All parts that things lead to; the first one, labelled `label`, stands for the things themselves."""
         reached: dict[int, Part] = {}
-        ahead = [Part(label, "", things)]
-        self._open += ahead
+        queue = [Part(label, "", things)]
+        self._open += queue
         while self._open:
             self._at, self._held = self._open.pop(), {}
             self._look_into(self._at.thing)
-        while ahead:
-            part = ahead.pop()
+        while queue:
+            part = queue.pop()
             reached[id(part)] = part
-            ahead += [other for key, other in part.parts.items() if key not in reached]
+            queue += [child for key, child in part.parts.items() if key not in reached]
         return list(reached.values())
 
     def reasons(self, label: str, *things: object) -> Reasons:
@@ -216,9 +216,9 @@ class Code:
         elif isinstance(thing, FunctionType):
             self._add_code(thing)
         elif isinstance(thing, type):
-            own = ((name, getattr(part, "__func__", part)) for name, part in sorted(vars(thing).items()))
+            members = ((name, getattr(member, "__func__", member)) for name, member in sorted(vars(thing).items()))
             kinds = FunctionType, property
-            self._add_all(part for name, part in own if isinstance(part, kinds) or not name.startswith("__"))
+            self._add_all(member for name, member in members if isinstance(member, kinds) or not name.startswith("__"))
             self._add_all(thing.__bases__)
         else:
             self._add(thing)
@@ -289,8 +289,8 @@ class Code:
             if any(folder in path.parents for folder in roots.values()) and path.is_file():
                 self._lead_to("file", "", file_label(path), file_hash(path))
         elif is_dataclass(thing):
-            counted = [part.name for part in fields(thing) if not part.metadata.get("words")]
-            self._add_all((type(thing), *(getattr(thing, name) for name in counted)))
+            field_names = [part.name for part in fields(thing) if not part.metadata.get("words")]
+            self._add_all((type(thing), *(getattr(thing, name) for name in field_names)))
         else:
             self._add_class(type(thing))
             self._note(str(getattr(thing, "__name__", "")))  # of a function written in C
@@ -300,17 +300,17 @@ class Code:
                 self._add_all(getattr(thing, name, None) for name in names)
 
     def _add_code(self, function: FunctionType) -> None:
-        for part in codes(function.__code__):
-            constants = [value for value in part.co_consts if not isinstance(value, CodeType)]
-            if part is function.__code__ and constants[:1] == [function.__doc__]:
+        for code in codes(function.__code__):
+            constants = [value for value in code.co_consts if not isinstance(value, CodeType)]
+            if code is function.__code__ and constants[:1] == [function.__doc__]:
                 del constants[0]
             # a frozenset prints in another order in every process
             texts = (f"frozenset({sorted(map(repr, x))})" if isinstance(x, frozenset) else repr(x) for x in constants)
-            self._note(part.co_code.hex(), part.co_exceptiontable.hex(), *texts)
+            self._note(code.co_code.hex(), code.co_exceptiontable.hex(), *texts)
             # every function has `CO_OPTIMIZED`, but numba clears it where a profiler watches
-            flags = part.co_flags | (inspect.CO_OPTIMIZED if part.co_flags & inspect.CO_NEWLOCALS else 0)
-            counts = part.co_argcount, part.co_kwonlyargcount, flags
-            self._note(repr((part.co_names, part.co_freevars, *counts)))
+            flags = code.co_flags | (inspect.CO_OPTIMIZED if code.co_flags & inspect.CO_NEWLOCALS else 0)
+            counts = code.co_argcount, code.co_kwonlyargcount, flags
+            self._note(repr((code.co_names, code.co_freevars, *counts)))
         self._add_all(references(function))
         self._add_all(self._also(function))
         file = file_label(_path(function.__code__.co_filename))
@@ -339,7 +339,7 @@ def by_file(parts: Iterable[Part]) -> Reasons:
     for part in parts:
         label = f"code {part.file}" if part.file else part.label
         texts.setdefault(label, set()).add("\n".join((part.label, *part.values)))
-    return {label: hashed(*sorted(several)) for label, several in texts.items()}
+    return {label: hashed(*sorted(group)) for label, group in texts.items()}
 
 
 def codes(code: CodeType) -> Iterator[CodeType]:
@@ -361,18 +361,18 @@ def references(function: FunctionType) -> Iterator[object]:
 
 def named_globals(function: FunctionType) -> Iterator[tuple[str, object]]:
     """Name and value of each global that a function names or imports when it runs, attributes of modules included."""
-    inside = list(codes(function.__code__))
-    names = sorted({name for code in inside for name in code.co_names})
+    code_objects = list(codes(function.__code__))
+    names = sorted({name for code in code_objects for name in code.co_names})
     package = function.__globals__.get("__package__") or ""
-    reached = [(name, function.__globals__[name]) for name in names if name in function.__globals__]
-    reached += [pair for code in inside for pair in _imports(code, package)]
+    pending = [(name, function.__globals__[name]) for name in names if name in function.__globals__]
+    pending += [pair for code in code_objects for pair in _imports(code, package)]
     expanded = set[str]()
-    while reached:
-        name, value = reached.pop()
+    while pending:
+        name, value = pending.pop()
         yield name, value
         if isinstance(value, ModuleType) and value.__name__ not in expanded and not _of_library(value.__name__):
             expanded.add(value.__name__)
-            reached += [(f"{name}.{part}", getattr(value, part)) for part in names if hasattr(value, part)]
+            pending += [(f"{name}.{part}", getattr(value, part)) for part in names if hasattr(value, part)]
 
 
 def _imports(code: CodeType, package: str) -> Iterator[tuple[str, object]]:

@@ -62,8 +62,8 @@ def finite(name: str, value: object, least: float = -math.inf) -> float:
     """Return `value` as a float; refuse anything that is not one finite real number, or is below the least."""
     number = math.nan
     # float() accepts all of these: text, booleans and, below NumPy 2.4, arrays of one entry
-    other = getattr(value, "ndim", 0) or getattr(getattr(value, "dtype", None), "kind", "") in ("b", "U", "S", "c")
-    if not (other or isinstance(value, (bool, str, bytes, bytearray)) or type(value).__name__ == "MaskedConstant"):
+    is_array = getattr(value, "ndim", 0) or getattr(getattr(value, "dtype", None), "kind", "") in ("b", "U", "S", "c")
+    if not (is_array or isinstance(value, (bool, str, bytes, bytearray)) or type(value).__name__ == "MaskedConstant"):
         with contextlib.suppress(TypeError, ValueError, OverflowError):
             number = value = float(value)  # type: ignore[arg-type]
     if not math.isfinite(number):
@@ -155,8 +155,8 @@ def label(name: str, value: object) -> str:
     """Return `value` if it can name a scene or an integrator in a file, a table and a command."""
     if isinstance(value, str) and re.fullmatch(r"[A-Za-z0-9][A-Za-z0-9._+-]{0,63}", value):
         return value
-    must = "1 to 64 letters, digits or ._+- (a letter or digit first)"
-    raise SymtopError(f"{name} must be {must}, not {shown(value)}", name)
+    rule = "1 to 64 letters, digits or ._+- (a letter or digit first)"
+    raise SymtopError(f"{name} must be {rule}, not {shown(value)}", name)
 
 
 def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
@@ -164,9 +164,9 @@ def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     options = list(allowed)
     if isinstance(value, str) and value in options:
         return value
-    near = difflib.get_close_matches(value.lower(), options, n=3, cutoff=0.5) if isinstance(value, str) else []
+    matches = difflib.get_close_matches(value.lower(), options, n=3, cutoff=0.5) if isinstance(value, str) else []
     names = ", ".join(option or repr(option) for option in options[:12]) + " ..." * (len(options) > 12)
-    hint = f"did you mean {' or '.join(near)}?" if near else f"known: {names}"
+    hint = f"did you mean {' or '.join(matches)}?" if matches else f"known: {names}"
     error = UnknownNameError(f"{name} {shown(value)} is unknown; {hint}", name)
     error.value = value
     raise error

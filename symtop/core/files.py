@@ -118,8 +118,8 @@ def replacing(path: str | os.PathLike[str], suffix: str = "", mode: int = 0o666)
 
 def sweep(path: Path) -> None:
     """Remove what killed writers of `path` and of its parts left; call it only while no other process writes them."""
-    ours = path.parent.glob(f".{glob.escape(path.name)}.*.part*")
-    for partial in (*ours, *path.with_name(f"{path.name}.parts").glob(".*.????????.part*")):
+    leftovers = path.parent.glob(f".{glob.escape(path.name)}.*.part*")
+    for partial in (*leftovers, *path.with_name(f"{path.name}.parts").glob(".*.????????.part*")):
         partial.unlink(missing_ok=True)
 
 
@@ -170,7 +170,7 @@ def locked(path: Path, *, wait: bool) -> Iterator[bool]:
 def only_writer(path: Path) -> Iterator[Path]:
     """Lock a file for writing and yield the folder of its parts; SymtopError if another process is writing it."""
     folder = path.with_name(f"{path.name}.parts")
-    with locked(folder, wait=False) as ours:
-        if not ours:
+    with locked(folder, wait=False) as acquired:
+        if not acquired:
             raise SymtopError(f"another process is writing {path}: wait until it has ended, or name another path")
         yield folder

@@ -85,15 +85,15 @@ def register_jitable(function: Function, options: dict[str, Any] = INLINED) -> F
 @by_name
 def by_length(*functions: tuple[int, Callable[..., Any]]) -> Callable[..., Any]:
     """A function (par, x, ...) that calls the one of `functions` for the length of the tuple x, also in kernels."""
-    known = dict(functions)
-    for function in known.values():
+    table = dict(functions)
+    for function in table.values():
         register_jitable(function)
 
-    def chosen(par: Any, x: Any, *rest: Any) -> Any:
-        return known[len(x)](par, x, *rest)
+    def dispatch(par: Any, x: Any, *rest: Any) -> Any:
+        return table[len(x)](par, x, *rest)
 
-    overload(chosen, jit_options=INLINED, strict=False)(lambda _par, x, *_rest: known[len(x)])
-    return chosen
+    overload(dispatch, jit_options=INLINED, strict=False)(lambda _par, x, *_rest: table[len(x)])
+    return dispatch
 
 
 def _overloads(function: FunctionType) -> Iterator[object]:
@@ -134,25 +134,25 @@ class _Library(JITCodeLibrary):  # type: ignore[misc]
     def _defined(self) -> list[Any]:
         return [function for function in self._final_module.functions if not function.is_declaration]
 
-    def _own(self) -> set[str]:
+    def _entry_names(self) -> set[str]:
         """The names under which Python and C call a kernel; none for a function that only kernels call."""
         wrappers = {function.name for function in self._defined() if function.name.startswith(WRAPPERS)}
         return wrappers | {name.removeprefix(WRAPPERS[1]) for name in wrappers}
 
     def _optimize_final_module(self) -> None:
-        if self._own():
+        if self._entry_names():
             self.bitcode = self._final_module.as_bitcode()
             super()._optimize_final_module()
 
     def _finalize_final_module(self) -> None:
-        own, defined = self._own(), self._defined()
-        if not own and any(function.name.startswith("_ZN") for function in defined):
+        exported, defined = self._entry_names(), self._defined()
+        if not exported and any(function.name.startswith("_ZN") for function in defined):
             self._finalize_dynamic_globals()
             self._verify_declare_only_symbols()
             self._finalized = True
             return
         for function in defined:
-            if own and function.name not in own:
+            if exported and function.name not in exported:
                 function.linkage = "internal"
         super()._finalize_final_module()
 
@@ -172,34 +172,34 @@ class _Cache:
     def files(self, signature: Any, codegen: Any) -> tuple[Path, Path, Path]:
         """Paths of the machine code, of the bitcode, and of the bitcode that may have come with a wheel."""
         system, *processor = codegen.magic_tuple()
-        stem = hashed(json.dumps([*map(_words, signature)]), system, llvmlite.__version__)
+        stem = hashed(json.dumps([*map(_json, signature)]), system, llvmlite.__version__)
         code = self.cache_path / f"{stem}.{hashed(*processor)}.code"
         return code, self.cache_path / f"{stem}.bitcode", SHIPPED / self.cache_path.name / f"{stem}.bitcode"
 
     def load_overload(self, signature: Any, context: Any) -> Any:
         """The kernel from disk, for numba; if it has to be compiled, None, after a call of the functions `on_cold`."""
         context.refresh()
-        for of in (1, 2):
+        for index in (1, 2):
             with contextlib.suppress(*LOAD_ERRORS):
                 files = self.files(signature, context.codegen())
-                return _loaded(signature, context, _read(files[of], _name(files[of])), files[0])
-        for tell in on_cold:
-            tell()
+                return _loaded(signature, context, _read(files[index], _name(files[index])), files[0])
+        for callback in on_cold:
+            callback()
         return None
 
     def save_overload(self, signature: Any, result: Any) -> None:
         """Store a compiled kernel, for numba, unless the file would lack something that another process needs."""
         with contextlib.suppress(*LOAD_ERRORS):
             library, kernel, constants = result.library, result.fndesc, result.environment.consts
-            about = {name: getattr(kernel, name) for name in KERNEL_NAMES} | {"library": library.name}
-            about |= {"returned": _words(result.signature.return_type), "constants": [str(kind) for kind in constants]}
-            inner = [own for own in result._find_referenced_environments() if own is not result.environment]
-            same = _type(about["returned"]) == result.signature.return_type
-            same &= [np.dtype(kind) for kind in about["constants"]] == constants
-            same &= not any(own.consts for own in inner)
-            if same and not library.has_dynamic_globals and not result.reload_init:
+            header = {name: getattr(kernel, name) for name in KERNEL_NAMES} | {"library": library.name}
+            header |= {"returned": _json(result.signature.return_type), "constants": [str(kind) for kind in constants]}
+            inner = [env for env in result._find_referenced_environments() if env is not result.environment]
+            storable = _type(header["returned"]) == result.signature.return_type
+            storable &= [np.dtype(kind) for kind in header["constants"]] == constants
+            storable &= not any(env.consts for env in inner)
+            if storable and not library.has_dynamic_globals and not result.reload_init:
                 code, bitcode, _ = self.files(signature, library.codegen)
-                entry = json.dumps(about).encode() + b"\n" + zlib.compress(library.bitcode, 1)
+                entry = json.dumps(header).encode() + b"\n" + zlib.compress(library.bitcode, 1)
                 _write(bitcode, entry, _name(bitcode))
                 _write(code, library._get_compiled_object(), entry)
 
@@ -207,9 +207,9 @@ class _Cache:
 def _loaded(arguments: tuple[Any, ...], context: Any, entry: bytes, code: Path) -> Any:
     """A kernel from its bitcode and its machine code in the file `code`; missing machine code is made and stored."""
     head, _, bitcode = entry.partition(b"\n")
-    about = json.loads(head)
-    returned = _type(about["returned"])
-    library = _Library(context.codegen(), about["library"])
+    facts = json.loads(head)
+    returned = _type(facts["returned"])
+    library = _Library(context.codegen(), facts["library"])
     library._final_module = parse_bitcode(zlib.decompress(bitcode))
     library._final_module.name = library.name
     library.enable_object_caching()
@@ -222,12 +222,12 @@ def _loaded(arguments: tuple[Any, ...], context: Any, entry: bytes, code: Path) 
         with contextlib.suppress(OSError, SymtopError):
             _write(code, library._get_compiled_object(), entry)
     kernel = PythonFunctionDescriptor(
-        True, about["modname"], about["qualname"], about["unique_name"], "", {}, returned, {}, tuple(about["args"]), (),
-        argtypes=arguments, env_name=about["env_name"],
+        True, facts["modname"], facts["qualname"], facts["unique_name"], "", {}, returned, {}, tuple(facts["args"]), (),
+        argtypes=arguments, env_name=facts["env_name"],
     )  # fmt: skip
-    kernel.mangled_name = about["mangled_name"]
+    kernel.mangled_name = facts["mangled_name"]
     environment = Environment.from_fndesc(kernel)
-    environment.consts[:] = [np.dtype(kind) for kind in about["constants"]]
+    environment.consts[:] = [np.dtype(kind) for kind in facts["constants"]]
     return compile_result(
         typing_context=context.typing_context, target_context=context, library=library, fndesc=kernel,
         entry_point=context.get_executable(library, kernel, environment), environment=environment, objectmode=False,
@@ -235,12 +235,12 @@ def _loaded(arguments: tuple[Any, ...], context: Any, entry: bytes, code: Path) 
     )  # fmt: skip
 
 
-def _words(kind: Any) -> Any:
+def _json(kind: Any) -> Any:
     """A type as JSON; that of a named tuple by its class and fields, which its `repr` lacks."""
     if not isinstance(kind, types.BaseTuple):
         return repr(kind)
-    named = getattr(kind, "instance_class", tuple)
-    return [named.__module__, named.__qualname__, *getattr(kind, "fields", ()), [*map(_words, kind)]]
+    cls = getattr(kind, "instance_class", tuple)
+    return [cls.__module__, cls.__qualname__, *getattr(kind, "fields", ()), [*map(_json, kind)]]
 
 
 def _type(words: Any) -> Any:
@@ -253,31 +253,31 @@ def _name(file: Path) -> bytes:
     return f"{file.parent.name}/{file.name}".encode()
 
 
-def _read(file: Path, of: bytes) -> bytes:
-    """The content of a file written with `of`; ValueError if it was not, or another user may have written it."""
+def _read(file: Path, key: bytes) -> bytes:
+    """The content of a file written with `key`; ValueError if it was not, or another user may have written it."""
     if SHIPPED not in file.parents and not is_trusted(file):
         raise ValueError("the code on disk may be somebody else's")
-    whole = file.read_bytes()
-    if hashlib.sha256(of + whole[HASH_BYTES:]).digest() != whole[:HASH_BYTES]:
+    data = file.read_bytes()
+    if hashlib.sha256(key + data[HASH_BYTES:]).digest() != data[:HASH_BYTES]:
         raise ValueError("the code on disk is damaged")
-    return whole[HASH_BYTES:]
+    return data[HASH_BYTES:]
 
 
-def _write(file: Path, content: bytes, of: bytes) -> None:
-    """Replace a file in one move; a process's first call removes old kernels before. `of` enters the file's hash."""
+def _write(file: Path, content: bytes, key: bytes) -> None:
+    """Replace a file in one move; a process's first call removes old kernels before. `key` enters the file's hash."""
     if not _pruned:
         _pruned.append(file)
         prune(file.parent.parent, MOST_BYTES)
     make_private(file.parent)
     with replacing(file, mode=0o600) as partial:
-        partial.write_bytes(hashlib.sha256(of + content).digest() + content)
+        partial.write_bytes(hashlib.sha256(key + content).digest() + content)
 
 
-def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
+def _compile_lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
     """Compile a kernel as a `_Library`; environments are set once its code has addresses. Call with numba's lock."""
     codegen = kernel.targetctx.codegen()
-    own = vars(codegen)
-    if "set_env" in own:
+    attributes = vars(codegen)
+    if "set_env" in attributes:
         return compiling(signature)
 
     def set_where_defined(name: str, environment: Any) -> None:
@@ -288,7 +288,7 @@ def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
         codegen._library_class, codegen.set_env = _Library, set_where_defined
         entry = compiling(signature)
     finally:
-        own.pop("_library_class"), own.pop("set_env")
+        attributes.pop("_library_class"), attributes.pop("set_env")
     for result in kernel.overloads.values():
         for environment in result._find_referenced_environments():
             codegen.set_env(environment.env_name, environment)
@@ -298,15 +298,15 @@ def _lean(kernel: Any, compiling: Callable[..., Any], signature: Any) -> Any:
 @functools.cache
 def lean_probe() -> Any:
     """A test kernel, if numba has the private parts that `_Library` needs; else None, for numba's own way. 0.06 s."""
-    part = register_jitable(lambda x: x + 1.0, OPTIONS | KERNEL_ONLY)
-    kernel = njit(**OPTIONS)(lambda x: 2.0 * part(x))
+    inner = register_jitable(lambda x: x + 1.0, OPTIONS | KERNEL_ONLY)
+    kernel = njit(**OPTIONS)(lambda x: 2.0 * inner(x))
     with contextlib.suppress(Exception):
-        _lean(kernel, kernel.compile, (types.float64,))
+        _compile_lean(kernel, kernel.compile, (types.float64,))
         return kernel if kernel(1.0) == 4.0 else None
     return None
 
 
-def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
+def _compile_once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
     """`compiling`, run by one process at a time for a kernel that is not on disk: the others wait and load it.
 
     The garbage collector is off meanwhile: 9 % less time, and 100 MB more memory for the largest kernel. numba's lock
@@ -328,7 +328,7 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
                     make_private(kernel._cache.cache_path)
                     stack.enter_context(locked(kernel._cache.cache_path / "code", wait=True))
             lean = is_cached(kernel, signature, bitcode=True) or lean_probe()
-            return _lean(kernel, compiling, signature) if lean else compiling(signature)
+            return _compile_lean(kernel, compiling, signature) if lean else compiling(signature)
 
     return compile_now
 
@@ -336,8 +336,8 @@ def _once(kernel: Any, compiling: Callable[..., Any]) -> Callable[..., Any]:
 def is_stored(kernel: Any) -> bool:
     """Has a kernel been compiled, for arguments of some types, in this process, on disk or in a wheel?"""
     folder = kernel._cache.cache_path
-    places = (folder, SHIPPED / folder.name) if folder else ()
-    return bool(kernel.overloads) or any(file.is_file() for place in places for file in place.glob("*.*code"))
+    folders = (folder, SHIPPED / folder.name) if folder else ()
+    return bool(kernel.overloads) or any(file.is_file() for folder in folders for file in folder.glob("*.*code"))
 
 
 @by_name
@@ -351,24 +351,24 @@ def compile_kernel(function: Callable[..., Any]) -> Any:
     made_of = digest(by_file(parts) | {"format": FORMAT})
     if numba.config.DISABLE_JIT:
         raise SymtopError("NUMBA_DISABLE_JIT must be 0 or unset, not 1: some functions of kernels exist compiled only")
-    kernel = njit(**OPTIONS)(_named(function, made_of))
-    kernel.compile = _once(kernel, kernel.compile)
+    kernel = njit(**OPTIONS)(_renamed(function, made_of))
+    kernel.compile = _compile_once(kernel, kernel.compile)
     functions = (part.thing for part in parts if isinstance(part.thing, FunctionType))
-    written = [part for part in functions if not part.__module__.startswith("namedtuple_")]
+    sources = [part for part in functions if not part.__module__.startswith("namedtuple_")]
     folder = cache_root() / "kernels" / made_of
-    filed = all(Path(part.__code__.co_filename).is_file() for part in written)
-    if filed and all(map(is_trusted, (cache_root(), folder.parent, folder))):
+    in_files = all(Path(part.__code__.co_filename).is_file() for part in sources)
+    if in_files and all(map(is_trusted, (cache_root(), folder.parent, folder))):
         touch(folder)
         kernel._cache = _Cache(folder)
     return kernel
 
 
-def _named(function: Any, made_of: str) -> FunctionType:
+def _renamed(function: Any, made_of: str) -> FunctionType:
     """The function under a unique name: LLVM finds machine code by name, and numba numbers names by process."""
-    own = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__,
-                       function.__closure__)  # fmt: skip
-    own.__qualname__, own.__module__ = f"{function.__qualname__}_{made_of[:16]}", function.__module__
-    return own
+    copy = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__,
+                        function.__closure__)  # fmt: skip
+    copy.__qualname__, copy.__module__ = f"{function.__qualname__}_{made_of[:16]}", function.__module__
+    return copy
 
 
 def is_cached(kernel: Any, signature: Any, *, bitcode: bool = False) -> bool:

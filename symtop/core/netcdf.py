@@ -41,15 +41,15 @@ def read_columns(file: Path | None) -> dict[str, Column]:
     """The table in a file, as `symtop.measure.columns` describes it, empty without one; SymtopError for a wrong one."""
     table: dict[str, Column] = {}
     lines = [] if file is None else file.read_text(encoding="utf-8").splitlines()
-    for place, line in enumerate(lines[1:], 2):
+    for index, line in enumerate(lines[1:], 2):
         name, *cells = line.split("\t")
-        units, without, flags, long_name = cells if len(cells) == 4 else [""] * 4
+        units, unitless, flags, long_name = cells if len(cells) == 4 else [""] * 4
         pairs = [flag.split() for flag in flags.split(",") if flag]
         meanings = all(len(pair) == 2 and pair[0].isdigit() for pair in pairs)
         if not (name and long_name and meanings) or name in table:
             form = "a variable that no other line has, its units, those without units, flags, and its long name"
-            raise SymtopError(f"{file}: line {place} must be {form}, between tabs, not {line!r}")
-        entry = (long_name, *filter(None, (units, without)))
+            raise SymtopError(f"{file}: line {index} must be {form}, between tabs, not {line!r}")
+        entry = (long_name, *filter(None, (units, unitless)))
         table[name] = Column(entry, {int(number): word for number, word in pairs})
     return table
 
@@ -75,10 +75,10 @@ def _git(*arguments: str) -> str:
 @functools.cache
 def provenance(*, changes: bool = False) -> dict[str, str]:
     """Versions, revision and machine, flat strings as netCDF needs; `changes` marks code that is not committed."""
-    edited = changes and _git("status", "--porcelain", "--", "symtop", "studies")
+    dirty = changes and _git("status", "--porcelain", "--", "symtop", "studies")
     return {
         "symtop_version": __version__,
-        "symtop_revision": (_git("rev-parse", "HEAD")[:12] or "unknown") + ("+changes" if edited else ""),
+        "symtop_revision": (_git("rev-parse", "HEAD")[:12] or "unknown") + ("+changes" if dirty else ""),
         "python_version": platform.python_version(),
         "dependencies": json.dumps({name: version(name) for name in (*NUMERICS, "matplotlib")}, sort_keys=True),
         "platform": f"{platform.system()} {platform.machine()}",
@@ -96,9 +96,9 @@ def groups(data: xr.Dataset | xr.DataTree) -> dict[str, xr.Dataset]:
 @functools.cache
 def variable_attributes(name: str, units: str) -> dict[str, str]:
     """The long name and units of a variable, or of its low half, NAME_lo; nothing for a name symtop does not know."""
-    whole = name.removesuffix("_lo")
-    known = label(VARIABLES[whole], units) if whole in VARIABLES else {}
-    return known | {"long_name": f"{known['long_name']}, low half"} if known and whole != name else known
+    base = name.removesuffix("_lo")
+    attrs = label(VARIABLES[base], units) if base in VARIABLES else {}
+    return attrs | {"long_name": f"{attrs['long_name']}, low half"} if attrs and base != name else attrs
 
 
 def label(entry: tuple[str, ...], units: str, elsewhere: str = "") -> dict[str, str]:
@@ -174,8 +174,8 @@ def write(data: xr.Dataset | xr.DataTree, path: str | os.PathLike[str]) -> Path:
             stack.enter_context(dask.config.set(scheduler="threads"))
         try:
             with one_thread:
-                whole = encoding if isinstance(data, xr.DataTree) else encoding["/"]
-                data.to_netcdf(partial, engine="netcdf4", encoding=whole)
+                options = encoding if isinstance(data, xr.DataTree) else encoding["/"]
+                data.to_netcdf(partial, engine="netcdf4", encoding=options)
         except RuntimeError as error:  # the netCDF library's error for a full disk, among others
             full = shutil.disk_usage(partial.parent).free < LITTLE_SPACE
             raise OSError(None, f"no room is left in {partial.parent}" if full else str(error)) from error
@@ -227,8 +227,8 @@ def read_any(path: str | os.PathLike[str]) -> xr.Dataset | xr.DataTree:
     import netCDF4
 
     with _netcdf(path), contextlib.closing(netCDF4.Dataset(path, memory=Path(path).read_bytes())) as file:
-        parts, ahead = dict[str, xr.Dataset](), [file]
-        for group in ahead:
-            parts[group.path] = xr.open_dataset(xr.backends.NetCDF4DataStore(group)).load().drop_encoding()
-            ahead += group.groups.values()
-    return xr.DataTree.from_dict(parts) if len(parts) > 1 else parts["/"]
+        datasets, queue = dict[str, xr.Dataset](), [file]
+        for group in queue:
+            datasets[group.path] = xr.open_dataset(xr.backends.NetCDF4DataStore(group)).load().drop_encoding()
+            queue += group.groups.values()
+    return xr.DataTree.from_dict(datasets) if len(datasets) > 1 else datasets["/"]

@@ -18,13 +18,13 @@ _contexts = threading.local()  # its attributes are the thread's own
 
 def context(digits: int) -> Any:
     """An mpmath context of that many decimal digits, one for each thread, as all threads share `mpmath.mp`."""
-    mine: dict[Any, Any] = vars(_contexts)
-    if digits not in mine:
+    contexts: dict[Any, Any] = vars(_contexts)
+    if digits not in contexts:
         from mpmath.ctx_mp import MPContext  # mpmath costs 0.1 s to import
 
-        mine[digits] = MPContext()
-        mine[digits].dps = digits
-    return mine[digits]
+        contexts[digits] = MPContext()
+        contexts[digits].dps = digits
+    return contexts[digits]
 
 
 def real_numbers(name: str, values: object) -> np.ndarray:

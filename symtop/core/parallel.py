@@ -60,11 +60,11 @@ def in_threads(work: Callable[[Piece], Result], pieces: Iterable[Piece], threads
 
 def in_order(pool: Executor, work: Callable[[Piece], Result], pieces: Iterable[Piece], ahead: int) -> Iterator[Result]:
     """The results of the pieces that a pool computes, in their order; `ahead` of them are with the pool at a time."""
-    rest = iter(pieces)
-    submitted: deque[Future[Result]] = deque(pool.submit(work, piece) for piece in islice(rest, ahead))
+    remaining = iter(pieces)
+    submitted: deque[Future[Result]] = deque(pool.submit(work, piece) for piece in islice(remaining, ahead))
     while submitted:
         yield submitted.popleft().result()
-        submitted += [pool.submit(work, piece) for piece in islice(rest, 1)]
+        submitted += [pool.submit(work, piece) for piece in islice(remaining, 1)]
 
 
 class OneThread(SpawnProcess):
@@ -73,12 +73,12 @@ class OneThread(SpawnProcess):
     def start(self) -> None:
         """Start it; the environment of this process is afterwards what it was."""
         with _starting:
-            added = [name for name in VARIABLES if name not in os.environ]
-            os.environ.update(dict.fromkeys(added, "1"))
+            unset = [name for name in VARIABLES if name not in os.environ]
+            os.environ.update(dict.fromkeys(unset, "1"))
             try:
                 super().start()
             finally:
-                for name in added:
+                for name in unset:
                     del os.environ[name]
 
 

@@ -28,14 +28,14 @@ def compiling() -> str:
     return f"compiling {count}, about {A_KERNEL * kernels_to_compile[0]:.0f} s on one core, once"
 
 
-def _tell() -> None:
+def _print_once() -> None:
     """Print once, on a terminal or in a notebook, that kernels are being compiled."""
-    on_cold.remove(_tell)
+    on_cold.remove(_print_once)
     if "ipykernel" in sys.modules or is_terminal(sys.stderr):
         print(f"symtop: {compiling()}", file=sys.stderr, flush=True)  # noqa: T201  (no warning: nothing is wrong)
 
 
-on_cold: list[Callable[[], object]] = [_tell]  # called when a kernel is not in the cache and has to be compiled
+on_cold: list[Callable[[], object]] = [_print_once]  # called when a kernel is not in the cache and has to be compiled
 
 
 def post(words: str) -> None:
@@ -50,10 +50,10 @@ def progress_bar(words: str, *, quiet: bool = False, **options: Any) -> Iterator
     from tqdm import tqdm
 
     options = options or {"total": 1, "bar_format": "{desc}: {elapsed}"}
-    ended = threading.Event()
+    stop = threading.Event()
 
     def beat() -> None:
-        while not ended.wait(REDRAW_SECONDS):
+        while not stop.wait(REDRAW_SECONDS):
             bar.refresh()
 
     thread = threading.Thread(target=beat, daemon=True)
@@ -63,7 +63,7 @@ def progress_bar(words: str, *, quiet: bool = False, **options: Any) -> Iterator
         try:
             yield bar
         finally:
-            ended.set()
+            stop.set()
             if thread.is_alive():
                 thread.join()
 
@@ -80,12 +80,12 @@ def showing_work(words: str) -> Iterator[None]:
     if sys.__stderr__ is None or is_terminal(sys.stderr):
         yield
         return
-    posted, began, ended = [words], time.monotonic(), threading.Event()
+    posted, began, stop = [words], time.monotonic(), threading.Event()
 
     def tell() -> None:
         wait = FIRST_LINE
         with contextlib.suppress(OSError):  # the reader of the pipe has ended
-            while not ended.wait(wait):
+            while not stop.wait(wait):
                 seconds, wait = time.monotonic() - began, NEXT_LINE
                 print(f"symtop: {posted[-1]}, {seconds:.0f} s", file=sys.__stderr__, flush=True)
 
@@ -94,5 +94,5 @@ def showing_work(words: str) -> Iterator[None]:
     try:
         yield
     finally:
-        ended.set()
+        stop.set()
         listeners.remove(posted.append)

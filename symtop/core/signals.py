@@ -43,16 +43,16 @@ def _in_main_thread() -> bool:
 
 
 @contextlib.contextmanager
-def _handling(number: int, usual: Any, handler: Callable[..., None]) -> Iterator[None]:
+def _handling(number: int, default: Any, handler: Callable[..., None]) -> Iterator[None]:
     """Handle a signal in the main thread; a handler that is there already, other than the usual one, stays."""
-    ours = _in_main_thread() and signal.getsignal(number) == usual
+    replaces = _in_main_thread() and signal.getsignal(number) == default
     try:
-        if ours:
+        if replaces:
             signal.signal(number, handler)
         yield
     finally:
-        if ours:
-            signal.signal(number, usual)
+        if replaces:
+            signal.signal(number, default)
 
 
 @contextlib.contextmanager

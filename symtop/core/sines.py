@@ -57,9 +57,9 @@ def polynomials(x: float) -> tuple[float, float]:
     tail = fused(fused(COSINE[5], z, COSINE[4]), z2, fused(COSINE[3], z, COSINE[2]))
     w = fused(-0.5, z, 1.0)
     even = w + fused(z2, fused(tail, z2, fused(COSINE[1], z, COSINE[0])), fused(-r, t, fused(-0.5, z, 1.0 - w)))
-    lost = abs(r) > 1.0  # n has not digits enough: |x| is beyond 1e15
-    odd, even = (DIAGONAL if lost else odd), (DIAGONAL if lost else even)
+    inexact = abs(r) > 1.0  # n has not digits enough: |x| is beyond 1e15
+    odd, even = (DIAGONAL if inexact else odd), (DIAGONAL if inexact else even)
     quadrant = n - ((n + FOURS) - FOURS)  # -2 to 2
-    aside, opposite = abs(quadrant) == 1.0, abs(quadrant) == 2.0
-    sine, cosine = (even if aside else odd), (odd if aside else even)
+    swap, opposite = abs(quadrant) == 1.0, abs(quadrant) == 2.0
+    sine, cosine = (even if swap else odd), (odd if swap else even)
     return (-sine if opposite or quadrant == -1.0 else sine, -cosine if opposite or quadrant == 1.0 else cosine)

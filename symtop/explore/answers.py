@@ -94,29 +94,29 @@ def _budget(config: Setup) -> float:
     """
     tolerance = config.setting or 1.0
     key = config.method.name, config.scene.of_body, math.floor(math.log10(tolerance))
-    most = MOST_WORK[config.method.implementation]
+    limit = MOST_WORK[config.method.implementation]
     if key in _budgets:
         return _budgets[key]
 
     def trial(work: float) -> tuple[float, bool]:
         before = time.thread_time()  # without the time of other threads
-        asked: dict[str, Any] = {"tolerance": config.setting, "observe": "attitude", "samples": 2, "budget": work}
-        run = integrate(config.scene, config.method, **asked)
+        options: dict[str, Any] = {"tolerance": config.setting, "observe": "attitude", "samples": 2, "budget": work}
+        run = integrate(config.scene, config.method, **options)
         return time.thread_time() - before, run.outcome == "out_of_budget"
 
     trial(FIRST_TRIAL)  # compiles its kernels
-    work, (fixed, longer) = FIRST_TRIAL, trial(FIRST_TRIAL)
+    work, (fixed, unfinished) = FIRST_TRIAL, trial(FIRST_TRIAL)
     seconds = fixed
-    while longer and seconds - fixed < LONG_ENOUGH:
+    while unfinished and seconds - fixed < LONG_ENOUGH:
         work *= 4.0
-        if work >= most:
+        if work >= limit:
             break
-        seconds, longer = trial(work)
-    if not longer:
-        return most  # the run ends with less work than the trial
-    cost = (seconds - fixed) / (work - FIRST_TRIAL) if work < most else 0.0
-    affordable = MOST_SECONDS / cost if cost > 0.0 else most
-    return _budgets.setdefault(key, float(f"{min(most, affordable):.2g}"))
+        seconds, unfinished = trial(work)
+    if not unfinished:
+        return limit  # the run ends with less work than the trial
+    cost = (seconds - fixed) / (work - FIRST_TRIAL) if work < limit else 0.0
+    affordable = MOST_SECONDS / cost if cost > 0.0 else limit
+    return _budgets.setdefault(key, float(f"{min(limit, affordable):.2g}"))
 
 
 def setup(fields: Mapping[str, Any]) -> Setup:
@@ -126,21 +126,21 @@ def setup(fields: Mapping[str, Any]) -> Setup:
     missing = [name for name in (*names[0], *names[1], "horizon", "integrator") if name not in fields]
     if missing:
         raise SymtopError(f"the question lacks {', '.join(missing)}")
-    top, start = (tuple(finite(name, fields[name]) for name in some) for some in names)
+    top, start = (tuple(finite(name, fields[name]) for name in group) for group in names)
     if of_body:
         base = body_scenes()[one_of("base", str(fields.get("base")), body_scenes())]
-        moving = replace(base.top, **dict(zip(OF_BODY, top, strict=True))), replace(base.start, omega_body=start)
+        pair = replace(base.top, **dict(zip(OF_BODY, top, strict=True))), replace(base.start, omega_body=start)
     else:
-        moving = SymmetricTop(*top), Angles(*start)
-    scene = Scene(str(fields.get("scene", "explored")), *moving, horizon_of(fields["horizon"]))
+        pair = SymmetricTop(*top), Angles(*start)
+    scene = Scene(str(fields.get("scene", "explored")), *pair, horizon_of(fields["horizon"]))
     method = integrator(str(fields["integrator"]))
     chart_of(method, scene.observes, "attitude")  # refuses a variant such as rk4[axis]: the page shows the attitude
     if method.control is None:
         return Setup(scene, method, None)
     setting = positive(method.control, fields.get(method.control))
     if method.control == "step_size" and scene.horizon / setting > MOST_STEPS:
-        least = f"{scene.horizon / MOST_STEPS:.3g} for this horizon, not {setting!r}"
-        raise SymtopError(f"step_size must be at least {least}: the explorer runs at most {MOST_STEPS} steps")
+        minimum = f"{scene.horizon / MOST_STEPS:.3g} for this horizon, not {setting!r}"
+        raise SymtopError(f"step_size must be at least {minimum}: the explorer runs at most {MOST_STEPS} steps")
     return Setup(scene, method, setting)
 
 
@@ -166,11 +166,11 @@ def answer(config: Setup) -> dict[str, Any]:
     period = float(np.nan_to_num(scene.nutation_period, posinf=0.0))
     if scene.of_body:
         true = Trajectory.of_data(reference(scene, times))
-        truth, own = true.quaternion, {"middle": _middle(scene, run), "true_middle": _middle(scene, true)}
+        truth, extras = true.quaternion, {"middle": _middle(scene, run), "true_middle": _middle(scene, true)}
     else:
         truth = closed_form(scene).quaternion(times)
-        once = closed_form(scene)(np.linspace(0.0, period or scene.horizon, PORTRAIT))
-        own = {"p_theta": run.p_theta, "true_theta": once.theta, "true_p_theta": scene.top.I1 * once.theta_dot}
+        cycle = closed_form(scene)(np.linspace(0.0, period or scene.horizon, PORTRAIT))
+        extras = {"p_theta": run.p_theta, "true_theta": cycle.theta, "true_p_theta": scene.top.I1 * cycle.theta_dot}
     if attitude is None:
         attitude = charts.quaternion_from_angles(run.theta, run.phi, run.psi)
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
@@ -179,16 +179,16 @@ def answer(config: Setup) -> dict[str, Any]:
             "attitude": attitude,
             "truth": truth,
             "theta": run.theta,
-            **own,
+            **extras,
             **residuals(scene, run),
             "axis_error": charts.axis_distance(run.axis, charts.axis_from_quaternion(truth)),
             "attitude_error": charts.attitude_distance(attitude, truth),
         }
         largest = {}
         for name in {*CONSTANTS, "axis_error", "attitude_error"} & {*arrays}:
-            good = np.abs(arrays[name][np.isfinite(arrays[name])])
-            largest[name] = float(good.max()) if good.size else None
-        coded = {name: _float32(values) for name, values in arrays.items()}
+            sizes = np.abs(arrays[name][np.isfinite(arrays[name])])
+            largest[name] = float(sizes.max()) if sizes.size else None
+        encoded = {name: _float32(values) for name, values in arrays.items()}
     return {
         "outcome": run.outcome,
         "message": sentence(run.outcome, run.reached_time, scene.horizon, scene.second),
@@ -200,7 +200,7 @@ def answer(config: Setup) -> dict[str, Any]:
         "run_ms": 1e3 * (end - began),
         "all_ms": 1e3 * (time.perf_counter() - began),
         "largest": largest,
-        "arrays": coded,
+        "arrays": encoded,
     }
 
 
@@ -208,8 +208,8 @@ def _middle(scene: Scene, run: Trajectory) -> np.ndarray:
     """The component of a body's angular momentum along the axis of its middle moment, divided by |L|; (n,)."""
     middle = np.eye(3)[np.argsort(scene.top.moments)[1]]
     with np.errstate(over="ignore", invalid="ignore"):  # a run may have blown up
-        along = np.sum(rotated(run.quaternion, middle) * run.momentum, axis=1)
-        return np.asarray(along / np.linalg.norm(run.momentum, axis=1))
+        component = np.sum(rotated(run.quaternion, middle) * run.momentum, axis=1)
+        return np.asarray(component / np.linalg.norm(run.momentum, axis=1))
 
 
 def _float32(values: Any) -> str:
@@ -230,11 +230,11 @@ def grid(fields: Mapping[str, Any]) -> tuple[Setup, np.ndarray, np.ndarray]:
         raise SymtopError(f"a map must be of a top, not of {config.scene.name}, a body without symmetry")
     if config.method.control != "step_size":
         raise SymtopError(f"integrator must be one with a step for a map, not {config.method.name!r}")
-    least, most = (positive(name, fields.get(name)) for name in ("step_least", "step_most"))
+    fine, coarse = (positive(name, fields.get(name)) for name in ("step_least", "step_most"))
     low, high = (finite(name, fields.get(name)) for name in ("spin_least", "spin_most"))
-    if not (least < most and low < high):
-        raise SymtopError(f"the ranges of a map must not be empty, not {least!r} to {most!r}, {low!r} to {high!r}")
-    steps, spins = np.geomspace(least, most, COLUMNS), np.linspace(low, high, ROWS)
+    if not (fine < coarse and low < high):
+        raise SymtopError(f"the ranges of a map must not be empty, not {fine!r} to {coarse!r}, {low!r} to {high!r}")
+    steps, spins = np.geomspace(fine, coarse, COLUMNS), np.linspace(low, high, ROWS)
     if (total := ROWS * float(np.sum(config.scene.horizon / steps))) > MOST_MAP_STEPS:
         raise SymtopError(f"a map must have at most {MOST_MAP_STEPS} steps, not {total:.3g}: take a shorter time")
     return config, steps, spins
@@ -243,13 +243,13 @@ def grid(fields: Mapping[str, Any]) -> tuple[Setup, np.ndarray, np.ndarray]:
 def outcome_map(config: Setup, steps: np.ndarray, spins: np.ndarray) -> dict[str, Any]:
     """The map: ``error_rad`` as base64 of float32, row by row from the least spin; NaN where a run ended early."""
     scene = config.scene
-    step, spin = (each.ravel() for each in np.meshgrid(steps, spins))
+    step, spin = (column.ravel() for column in np.meshgrid(steps, spins))
     numbers = asdict(scene.top) | asdict(scene.start) | {"psi_dot": spin}
     members = xr.Dataset({name: ("member", np.broadcast_to(number, step.size)) for name, number in numbers.items()})
-    for some in (slice(-COLUMNS, None), slice(None)):  # the first call, of one row, compiles the kernel
+    for rows in (slice(-COLUMNS, None), slice(None)):  # the first call, of one row, compiles the kernel
         began = time.perf_counter()
         runs = ensemble(
-            members.isel(member=some), config.method, step_size=step[some], horizon=scene.horizon, samples=MAP_SAMPLES,
+            members.isel(member=rows), config.method, step_size=step[rows], horizon=scene.horizon, samples=MAP_SAMPLES,
             variables=["axis"], observe="attitude", quiet=True,
         )  # fmt: skip
     rate = step.size / (time.perf_counter() - began)
@@ -269,9 +269,9 @@ def _friction(fields: Mapping[str, Any]) -> float:
 def damped(fields: Mapping[str, Any]) -> tuple[float, float]:
     """Friction and step of the oscillator: `friction` (0 to 1e6), `oscillator_step`. SymtopError if out of range."""
     friction, step = _friction(fields), positive("step", fields.get("oscillator_step"))
-    least, most = OSCILLATOR_HORIZON / MOST_OSCILLATOR_STEPS, OSCILLATOR_HORIZON / 2.0
-    if not least <= step <= most:
-        raise SymtopError(f"step must be between {least} and {most}, not {step!r}", "step")
+    shortest, longest = OSCILLATOR_HORIZON / MOST_OSCILLATOR_STEPS, OSCILLATOR_HORIZON / 2.0
+    if not shortest <= step <= longest:
+        raise SymtopError(f"step must be between {shortest} and {longest}, not {step!r}", "step")
     return friction, step
 
 
@@ -311,21 +311,21 @@ def inclination(config: Setup, friction: float) -> dict[str, Any]:
     """
     scene, torque = config.scene, Friction(0.5 * friction, friction)
     steps = max(1, round(scene.horizon / (config.setting or scene.horizon)))
-    h, places = scene.horizon / steps, np.linspace(0.0, steps, min(config.samples, steps + 1))
-    marks = np.unique(np.rint(places).astype(int))
+    h, positions = scene.horizon / steps, np.linspace(0.0, steps, min(config.samples, steps + 1))
+    marks = np.unique(np.rint(positions).astype(int))
     run = damped_run(scene, torque, "midpoint", h, marks)
     times, theta = marks * h, run.states[:, 0]
     dense = np.union1d(times, np.linspace(0.0, scene.horizon, config.samples))
     exact = theta_before_pole(scene, torque, dense, MOST_TOP_EVALUATIONS)
     valid = np.searchsorted(dense, times) < exact.size
     error = np.degrees(np.abs(theta[valid] - exact[np.searchsorted(dense, times[valid])]))
-    ended = [f"midpoint: {OUTCOMES[run.outcome].replace('_', ' ')} at t = {run.steps * h:.3g}"] if run.outcome else []
+    notes = [f"midpoint: {OUTCOMES[run.outcome].replace('_', ' ')} at t = {run.steps * h:.3g}"] if run.outcome else []
     if exact.size < dense.size:
-        near = f"within {NEAR_POLE} rad of a pole at t = {dense[exact.size]:.3g}"
-        ended.append(f"the exact motion comes {near} and ends there")
+        words = f"within {NEAR_POLE} rad of a pole at t = {dense[exact.size]:.3g}"
+        notes.append(f"the exact motion comes {words} and ends there")
     of_exact = {"exact_time": dense[: exact.size], "exact": np.degrees(exact)}
     largest = {"midpoint": float(np.nanmax(error))}
-    return _curves(largest, "; ".join(ended), time=times, midpoint=np.degrees(theta), **of_exact)
+    return _curves(largest, "; ".join(notes), time=times, midpoint=np.degrees(theta), **of_exact)
 
 
 def script(config: Setup) -> str:
@@ -355,7 +355,7 @@ def catalogue() -> dict[str, Any]:
     """The scenes and integrators that the page offers, with the numbers of its controls."""
     from symtop.report import style  # matplotlib: half a second
 
-    offered = [
+    entries = [
         {
             **{name: getattr(entry, name) for name in ("name", "purpose", "horizon", "units")},
             "period": float(np.nan_to_num(entry.nutation_period, posinf=0.0)),
@@ -375,4 +375,4 @@ def catalogue() -> dict[str, Any]:
         for entry in integrators().values()
         if shows(entry)
     ]
-    return {"version": __version__, "scenes": offered, "integrators": methods}
+    return {"version": __version__, "scenes": entries, "integrators": methods}

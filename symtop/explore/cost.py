@@ -33,17 +33,17 @@ _at_work = threading.Lock()
 
 def question(fields: Mapping[str, Any]) -> list[Setup]:
     """The run of the page and, if it names a `second` method, a second run. Raises SymtopError as `setup`."""
-    first, other = setup(fields), str(fields.get("second") or "")
-    return [first, setup({**fields, "integrator": other})] if other else [first]
+    first, second = setup(fields), str(fields.get("second") or "")
+    return [first, setup({**fields, "integrator": second})] if second else [first]
 
 
 def _variants(setups: list[Setup]) -> dict[str, Integrator]:
     """The variants of a chart by the names of their methods, those of the page first; all determine the attitude."""
-    scene, beside = setups[0].scene, map(integrator, PEERS)
+    scene, peers = setups[0].scene, map(integrator, PEERS)
     methods = [setup.method for setup in setups]
-    methods += [method for method in beside if not scene.of_body or BODY in method.solvers]
-    able = [method for method in methods if method.control]
-    return {method.name: method.variant(chart_of(method, scene.observes, "attitude")) for method in able}
+    methods += [method for method in peers if not scene.of_body or BODY in method.solvers]
+    usable = [method for method in methods if method.control]
+    return {method.name: method.variant(chart_of(method, scene.observes, "attitude")) for method in usable}
 
 
 @functools.lru_cache(MOST_LINES)
@@ -70,20 +70,20 @@ def _compute(scene: Scene, variants: dict[str, Integrator], key: tuple[Any, ...]
                 runs, messages[name] = [], str(problem) if isinstance(problem, SymtopError) else words_of(problem)
             rows[name] = [dict(zip(("setting_value", "outcome", "error"), run, strict=True)) for run in runs]
         try:
-            timed_rows([(scene, variants[name], scene.horizon, own) for name, own in rows.items()])
+            timed_rows([(scene, variants[name], scene.horizon, records) for name, records in rows.items()])
         except Exception as problem:  # noqa: BLE001  (as above)
             rows, messages = {name: [] for name in rows}, dict.fromkeys(rows, str(problem))
         while len(_charts) >= MOST_CHARTS:
             del _charts[next(iter(_charts))]
-        _charts[scene] = {name: _line(name, own, messages.get(name, "")) for name, own in rows.items()}
+        _charts[scene] = {name: _line(name, records, messages.get(name, "")) for name, records in rows.items()}
         _newest.clear()
 
 
 def _line(name: str, rows: list[dict[str, Any]], message: str) -> dict[str, Any]:
     """Seconds and errors of the runs of a method with outcome "ok", and the number of failed ones."""
-    good = [row for row in rows if row["outcome"] == "ok" and row["error"] > 0.0]
+    valid = [row for row in rows if row["outcome"] == "ok" and row["error"] > 0.0]
     failed = sum(row["outcome"] != "ok" for row in rows)
-    numbers = {name: [row[name] for row in good] for name in ("seconds", "error")}
+    numbers = {name: [row[name] for row in valid] for name in ("seconds", "error")}
     return {"name": name, **numbers, "failed": failed, "message": message}
 
 

@@ -67,9 +67,9 @@ def compare(
         raise SymtopError("compare takes horizon or nutations, not both", "horizon", "nutations")
     if nutations is not None and not math.isfinite(problem.nutation_period):
         raise SymtopError(f"{problem.name} has no nutation: give horizon, not nutations", "horizon", "nutations")
-    until = horizon if nutations is None else positive("nutations", nutations) * problem.nutation_period
-    end = problem.horizon if until is None else horizon_of(until)
-    most = None if budget is None else positive("budget", budget)
+    duration = horizon if nutations is None else positive("nutations", nutations) * problem.nutation_period
+    end = problem.horizon if duration is None else horizon_of(duration)
+    budget = None if budget is None else positive("budget", budget)
     with x64(restored=True):
         records = [find(method, problem) for method in listed(methods)]
     variants = [record.variant(chart_of(record, problem.observes, settings.observed(quantity))) for record in records]
@@ -80,7 +80,7 @@ def compare(
         settings.judgeable(problem, quantity, end)
 
     def runs_of(method: Integrator) -> tuple[list[dict[str, Any]], list[str]]:
-        limit = BUDGET[method.implementation] * min(method.speed, 1.0) if most is None else most
+        limit = BUDGET[method.implementation] * min(method.speed, 1.0) if budget is None else budget
         return _runs(problem, method, end, limit, quantity)
 
     exact = find_integrator("exact")
@@ -98,8 +98,8 @@ def compare(
             bar.set_description("timing")
             post("timing the runs")
             pairs = zip([exact, *variants], [rows, *(runs for runs, _ in results)], strict=True)
-            timed = [(problem, method, end, runs) for method, runs in pairs]
-            timed_rows(timed[1:] if problem.of_body else timed)
+            jobs = [(problem, method, end, runs) for method, runs in pairs]
+            timed_rows(jobs[1:] if problem.of_body else jobs)
     size = max(len(runs) for runs, _ in results)
     blank: dict[str, Any] = {**NOT_TIMED, "message": "", "setting_value": math.nan}
     tables = [
@@ -114,14 +114,14 @@ def compare(
         reached=(("variant", "target"), [reached for _, reached in results]),
     )  # fmt: skip
     data = data.assign_coords(variant=names, target=list(settings.TARGETS), scene=problem.name)
-    entries = {f"error{end}": columns.ERROR_TABLE[f"{quantity}{end}"] for end in ("", "_bound")}
+    entries = {f"error{suffix}": columns.ERROR_TABLE[f"{quantity}{suffix}"] for suffix in ("", "_bound")}
     entries["target"] = "error that is accepted, largest over the run", *entries["error"][1:]
-    own = {name: netcdf.Column(entry, {}) for name, entry in entries.items()}
-    columns.described(data, problem.units, own, [problem.of_body])
+    error_columns = {name: netcdf.Column(entry, {}) for name, entry in entries.items()}
+    columns.described(data, problem.units, error_columns, [problem.of_body])
     return netcdf.describe(
         data, f"error against cost on {problem.name}", units=problem.units, quantity=quantity, cost=cost,
         nutations=end / problem.nutation_period, timed=TIMED if cost == "time" else "nothing",
-        budget=str(most or BUDGET), **attributes([problem], {problem.name: end}),
+        budget=str(budget or BUDGET), **attributes([problem], {problem.name: end}),
     )  # fmt: skip
 
 
@@ -154,8 +154,8 @@ def _runs(
 
     if method.control is None:
         error, _ = run(math.nan)
-        answers = ["met" if error <= target else "nothing can be set" for target in settings.TARGETS]
-        return list(rows.values()), answers
+        outcomes = ["met" if error <= target else "nothing can be set" for target in settings.TARGETS]
+        return list(rows.values()), outcomes
     ends, power = settings.limits(scene, method, horizon, quantity), float(method.order or 2)
     power = power if method.fixed_step else 1.0
     first = settings.TARGETS[0]
@@ -164,9 +164,9 @@ def _runs(
     for k, target in enumerate(settings.TARGETS):
         if k:
             error, work = run(guess)
-            finer = (0.5 * target / max(error, 1e-3 * target)) ** (1.0 / power)
+            factor = (0.5 * target / max(error, 1e-3 * target)) ** (1.0 / power)
             affordable = work / budget if method.fixed_step else 0.0
-            guess *= min(max(finer, affordable), 1.0)
+            guess *= min(max(factor, affordable), 1.0)
         if method.fixed_step and horizon / min(guess, ends[1]) > budget:
             why = settings.BUDGET
         else:
@@ -189,13 +189,13 @@ def _runs(
 def cheapest(data: xr.Dataset, target: float) -> np.ndarray:
     """The index along ``setting`` of each variant's cheapest run with an error within `target`, or -1; (variants,)."""
     cost = data["seconds" if data.attrs["cost"] == "time" else "force_evaluations"].values
-    good = (data["outcome"].values == "ok") & (data["error"].values <= target) & np.isfinite(cost)
-    return np.where(good.any(axis=1), np.argmin(np.where(good, cost, np.inf), axis=1), -1)
+    valid = (data["outcome"].values == "ok") & (data["error"].values <= target) & np.isfinite(cost)
+    return np.where(valid.any(axis=1), np.argmin(np.where(valid, cost, np.inf), axis=1), -1)
 
 
 def ranked(data: xr.Dataset) -> tuple[float, dict[str, float]]:
     """The largest number of force evaluations that all variants reach, and their least errors with it, best first."""
     work = data["force_evaluations"].where((data["outcome"] == "ok") & (data["force_evaluations"] > 0.0))  # 0: unknown
-    most = float(work.max("setting").min())
-    errors = data["error"].where(work <= most).min("setting").to_series().dropna()
-    return most, {str(name): float(error) for name, error in errors.sort_values().items()}
+    limit = float(work.max("setting").min())
+    errors = data["error"].where(work <= limit).min("setting").to_series().dropna()
+    return limit, {str(name): float(error) for name, error in errors.sort_values().items()}

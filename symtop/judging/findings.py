@@ -97,18 +97,18 @@ def yes_no(value: bool | int | None) -> str:
 
 
 def agreement(
-    claim: str, declared: bool | None, yes: bool | None, why: str, value: float, resolution: float
+    claim: str, declared: bool | None, holds: bool | None, why: str, value: float, resolution: float
 ) -> Finding:
-    """The finding on a claim that is true or false, from the measured answer `yes`; None is undecided."""
-    verdict = "measured" if declared is None else "confirmed" if declared == yes else "refuted"
-    measured, verdict = (UNMEASURED, "undecided") if yes is None else (Reading(yes_no(yes), value), verdict)
+    """The finding on a claim that is true or false, from the measured answer `holds`; None is undecided."""
+    verdict = "measured" if declared is None else "confirmed" if declared == holds else "refuted"
+    measured, verdict = (UNMEASURED, "undecided") if holds is None else (Reading(yes_no(holds), value), verdict)
     return Finding(claim, yes_no(declared), measured, verdict, why, value, resolution)
 
 
 def undecided(claim: str, declared: str, why: str) -> Finding:
     """The finding on a claim that could not be judged; a reason above `LONGEST` characters is cut."""
-    short = why.rstrip(".") if len(why) <= LONGEST else why[: LONGEST - len(ELLIPSIS)].rsplit(" ", 1)[0] + ELLIPSIS
-    return Finding(claim, declared, UNMEASURED, "undecided", short)
+    text = why.rstrip(".") if len(why) <= LONGEST else why[: LONGEST - len(ELLIPSIS)].rsplit(" ", 1)[0] + ELLIPSIS
+    return Finding(claim, declared, UNMEASURED, "undecided", text)
 
 
 def inapplicable(claim: str, why: str, declared: str = "") -> Finding:
@@ -187,12 +187,12 @@ def heading(about: About, scene: str) -> str:
 def line(finding: Finding, width: int = WIDTH) -> str:
     """A finding in one line, with the reason below it if a claim does not hold; empty for trivial findings."""
     claim, declared, measured, verdict, why, value, _ = finding
-    silent = verdict == "inapplicable" or claim == "explicit" or measured.kind in ("a function", "its states'")
-    if silent and not declared:
+    trivial = verdict == "inapplicable" or claim == "explicit" or measured.kind in ("a function", "its states'")
+    if trivial and not declared:
         return ""
-    says = PHRASES.get(f"{claim} {measured.kind}") or ("{1}" if measured.text else PHRASES.get(measured.kind, "{1}"))
+    phrase = PHRASES.get(f"{claim} {measured.kind}") or ("{1}" if measured.text else PHRASES.get(measured.kind, "{1}"))
     number = value if math.isnan(measured.number) else measured.number
-    words = says.format(number, measured).replace("to 0e+00", "to the last bit") if measured else verdict
+    words = phrase.format(number, measured).replace("to 0e+00", "to the last bit") if measured else verdict
     text = f"{claim_name(claim):<14} {words}"
     if declared:
         text += f" (claimed: {declared}{f'; {verdict}' if measured else ''})"
@@ -213,9 +213,9 @@ def description(findings: Sequence[Finding]) -> str:
         p, limits = order.number, {"wrong limit": "converges to another motion", "converges": order.text}
         words += [limits.get(order.kind) or (f"order {round(p)}" if abs(p - round(p)) < 0.3 else f"order {p:.1f}")]
         words[-1] += " or more" * order.text.endswith("or more")
-    for claim, yes in (("symplectic", "symplectic"), ("symmetric", "reversible")):
-        answer = measured.get(claim, UNMEASURED).kind
-        words += [yes] if answer == "yes" else [f"not {yes}"] if answer == "no" else []
+    for claim, word in (("symplectic", "symplectic"), ("symmetric", "reversible")):
+        kind = measured.get(claim, UNMEASURED).kind
+        words += [word] if kind == "yes" else [f"not {word}"] if kind == "no" else []
 
     def of_kind(*kinds: str) -> str:
         return _listed([name for claim, name in NOUNS.items() if measured.get(claim, UNMEASURED).kind in kinds])
@@ -224,8 +224,8 @@ def description(findings: Sequence[Finding]) -> str:
     changing = of_kind("drift", "growing", "random walk", "blows up")
     words += [f"keeps {constant}"] if constant else []
     words += [f"{bounded} bounded"] if bounded else []
-    without = "not" if constant or bounded else "does not keep"
-    words = [", ".join(words)] * bool(words) + [f"{without} {changing}"] * bool(changing)
+    negation = "not" if constant or bounded else "does not keep"
+    words = [", ".join(words)] * bool(words) + [f"{negation} {changing}"] * bool(changing)
     return "; ".join(words) or "nothing could be measured"
 
 
@@ -236,8 +236,8 @@ def _listed(names: Sequence[str]) -> str:
 def summary(ledger: Ledger) -> str:
     """The end of a report: the runs, the measured properties, and the verdicts on the claims made and implied."""
     counts = []
-    for follows in (False, True):
-        claimed = [row for row in ledger.findings if row.declared and (row.claim in ledger.implied) is follows]
+    for implied in (False, True):
+        claimed = [row for row in ledger.findings if row.declared and (row.claim in ledger.implied) is implied]
         count = Counter(row.verdict for row in claimed)
         counts.append(", ".join(f"{count[word]} {word}" for word in VERDICTS if count[word]))
     claims = f"Claims: {counts[0]}" if counts[0] else "No claims were made"
@@ -253,16 +253,16 @@ def _runs(ledger: Ledger) -> str:
     ladder = ledger.about.nutation / np.asarray(traces.get("step_size", []))  # NaN where no run was made
     if np.isfinite(ladder).any():
         failed = ladder[np.isnan(traces["error"]) & np.isfinite(ladder)]
-        fails = f" ({failed.max():.0f} and fewer fail)" if failed.size else ""
+        note = f" ({failed.max():.0f} and fewer fail)" if failed.size else ""
         density = ledger.about.nutation / traces.get("structure_step", math.nan)
         structure = f", {density:.1f} for the structure" if math.isfinite(density) else ""
         span = f"{np.nanmin(ladder):.0f} to {np.nanmax(ladder):.0f}"
-        words.append(f"{span} steps a {period} for the order{fails}{structure}")
+        words.append(f"{span} steps a {period} for the order{note}{structure}")
     if "steps_run" in traces and (steps := float(traces["steps_run"])):
         periods = float(traces["nutations_run"])
         length = f"{steps:.0f} steps over {periods:.3g} {period}s ({steps / periods:.0f} a {period})"
         scales = "kinetic one of the start and |mgl|, of the momentum to |L|"
         scales = scales if of_body else "nutation's, of momenta to the larger one"
         words += [f"{length} for the constants", f"changes of the energy are relative to the {scales}"]
-    joined = ";\n    ".join(words)
-    return f"Its runs: {joined}.\n" if words else ""
+    text = ";\n    ".join(words)
+    return f"Its runs: {text}.\n" if words else ""

@@ -113,7 +113,7 @@ def judge(
         raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {shown(energy)}", "energy")
     file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES)
     states = form is None and (file or isinstance(target, (xr.Dataset, Mapping)))
-    problem, listen = find_scene(scene, bodies=True), tell or (lambda _: None)
+    problem, emit = find_scene(scene, bodies=True), tell or (lambda _: None)
     for name, flag in (("adaptive", adaptive), ("autonomous", autonomous), ("quick", quick)):
         boolean(name, flag)
     seed = secrets.randbelow(SEEDS) if seed is None else whole("seed", seed, 0, SEEDS)
@@ -126,9 +126,9 @@ def judge(
             raise SymtopError("a trajectory shows no order, symplecticity, symmetry or cost: claim what it conserves")
         findings = of_trajectory(target, problem, names, energy)
         about = About(Path(target).stem if isinstance(target, (str, Path)) else "trajectory")
-        listen(about)
+        emit(about)
         for finding in findings:
-            listen(finding)
+            emit(finding)
         return Ledger(about.name, problem.name, tuple(findings), {}, about)
     if problem.of_body and ({symplectic, symmetric, explicit} != {None} or names - {"energy"}):
         words = "takes claims of its order and its energy alone; claim the rest on a top"
@@ -148,15 +148,15 @@ def judge(
         subject = Subject(method, problem, quick, stepper, seconds, seed, autonomous)
         facts = stepper.name, stepper.chart, stepper.implementation, subject.seconds_a_step
         about = About(*facts, seed, problem.time_scale())
-        listen(about)
+        emit(about)
         slow, opening = SLOW_HINTS[quick] + SERVER_HINT * (form == "program"), time.monotonic() - began
-        most, together, least = QUICK_VERDICT_SECONDS if quick else VERDICT_SECONDS
-        limits = most + opening, together + opening, least + opening  # a process that is started again opens it again
+        longest, total, shortest = QUICK_VERDICT_SECONDS if quick else VERDICT_SECONDS
+        limits = longest + opening, total + opening, shortest + opening  # a process started again opens it again
         for finding in _findings(subject, process, began, limits, slow):
-            listen(finding)
+            emit(finding)
             findings.append(finding)
-    follow = frozenset(finding.claim for finding in findings if finding.declared and implied.get(finding.claim))
-    return Ledger(about.name, problem.name, tuple(findings), subject.traces, about, follow)
+    derived = frozenset(finding.claim for finding in findings if finding.declared and implied.get(finding.claim))
+    return Ledger(about.name, problem.name, tuple(findings), subject.traces, about, derived)
 
 
 def read(target: Any) -> dict[str, Any]:
@@ -167,31 +167,31 @@ def read(target: Any) -> dict[str, Any]:
     try:
         head, *lines = path.read_text(encoding="utf-8-sig").replace(",", " ").splitlines()
     except (OSError, ValueError) as error:
-        coded = isinstance(error, UnicodeDecodeError)
-        reason = "it must be text in UTF-8" if coded else getattr(error, "strerror", None) or "it is empty"
+        undecodable = isinstance(error, UnicodeDecodeError)
+        reason = "it must be text in UTF-8" if undecodable else getattr(error, "strerror", None) or "it is empty"
         raise SymtopError(f"the trajectory {path} cannot be read: {reason}") from None
     names = head.lstrip("# ").split()
     fields = (*SCALARS, *(part for parts in VECTORS.values() for part in parts))
     for parts in VECTORS.values():
-        if lacking := {*parts} - {*names} if {*parts} & {*names} else ():
-            words = f"{path.name} must have all of {', '.join(parts)}, and lacks {', '.join(sorted(lacking))}"
+        if missing := {*parts} - {*names} if {*parts} & {*names} else ():
+            words = f"{path.name} must have all of {', '.join(parts)}, and lacks {', '.join(sorted(missing))}"
             raise SymtopError(words)
-    wrong = [f"{name} is none of them" for name in dict.fromkeys(names) if name not in fields]
-    wrong += [f"{name} is there twice" for name in dict.fromkeys(names) if names.count(name) > 1]
-    wrong += ["there is no time"] * ("time" not in names)
-    if wrong:
-        begin = f"{path.name} must begin with names, commas or spaces between: time and of {', '.join(fields[1:])}"
-        faults = ", ".join(wrong[:MOST_FAULTS]) + " ..." * (len(wrong) > MOST_FAULTS)
-        raise SymtopError(f"{begin}, but of {head[:60]!r} {faults}")
+    problems = [f"{name} is none of them" for name in dict.fromkeys(names) if name not in fields]
+    problems += [f"{name} is there twice" for name in dict.fromkeys(names) if names.count(name) > 1]
+    problems += ["there is no time"] * ("time" not in names)
+    if problems:
+        expected = f"{path.name} must begin with names, commas or spaces between: time and of {', '.join(fields[1:])}"
+        faults = ", ".join(problems[:MOST_FAULTS]) + " ..." * (len(problems) > MOST_FAULTS)
+        raise SymtopError(f"{expected}, but of {head[:60]!r} {faults}")
     if not any(line.partition("#")[0].strip() for line in lines):
         raise SymtopError(f"{path.name} must have a line of numbers below its names, and has none")
-    must = f"{path.name} must have {len(names)} numbers in each line"
+    rule = f"{path.name} must have {len(names)} numbers in each line"
     try:
         rows = np.loadtxt(lines, ndmin=2)
     except ValueError as error:
-        raise SymtopError(f"{must}: {str(error).partition(';')[0]}") from None
+        raise SymtopError(f"{rule}: {str(error).partition(';')[0]}") from None
     if rows.shape[1] != len(names):
-        raise SymtopError(f"{must}, not {rows.shape[1]}")
+        raise SymtopError(f"{rule}, not {rows.shape[1]}")
     columns = dict(zip(names, rows.T, strict=True))
     rows_of = {name: [columns[part] for part in parts] for name, parts in VECTORS.items() if parts[0] in names}
     columns |= {name: np.stack(rows, axis=-1) for name, rows in rows_of.items()}
@@ -220,19 +220,19 @@ def of_trajectory(target: Any, scene: Scene, conserves: Collection[str], energy:
     time = deviation["time"].values
     if rates is not None and scene.of_body:
         truth, moments = reference(scene, time), np.array(scene.top.moments)
-        inside = rotated(truth["quaternion"].values * CONJUGATE, truth["momentum"].values)
+        body_momentum = rotated(truth["quaternion"].values * CONJUGATE, truth["momentum"].values)
         bound = scene.momentum_scale / moments.min() * deviation["momentum_bound"].values
-        off = np.linalg.norm(rates - inside / moments, axis=1)
-        deviation = deviation.assign(rates=("time", off), rates_bound=("time", bound))
+        gaps = np.linalg.norm(rates - body_momentum / moments, axis=1)
+        deviation = deviation.assign(rates=("time", gaps), rates_bound=("time", bound))
     lengths = [name for name in map(str, deviation) if name.endswith("_length")]
-    strayed = [name for name in lengths if (deviation[name] > SINGLE_LENGTH).any()]
-    findings = [_error(name, scene, time, deviation) for name in (*OF_STATES, *strayed) if name in deviation]
-    own = _from_states(scene, states)
+    wrong_lengths = [name for name in lengths if (deviation[name] > SINGLE_LENGTH).any()]
+    findings = [_error(name, scene, time, deviation) for name in (*OF_STATES, *wrong_lengths) if name in deviation]
+    recomputed = _from_states(scene, states)
     for name in (*CONSTANTS, *sorted({*conserves} - {*CONSTANTS})):
-        values = own.get(name, columns.get(name))
+        values = recomputed.get(name, columns.get(name))
         declared = energy if name == "energy" and energy else "kept" if name in conserves else ""
         if values is not None:
-            note, values = "" if name in own else ", as the file reports it", np.asarray(values, float)
+            note, values = "" if name in recomputed else ", as the file reports it", np.asarray(values, float)
             findings.append(_constant(name, declared, time, values, scene, states.momentum, note))
         elif declared:
             remedy = f"; it would with {name}, or with the angular momentum beside the axis"
@@ -245,12 +245,12 @@ def _refuse_contradiction(states: Trajectory, scene: Scene) -> None:
     """SymtopError if axis and quaternion of a trajectory disagree, naming another convention if that explains it."""
     if states.axis is None or states.quaternion is None:
         return
-    apart = axis_distance(states.axis, axis_from_quaternion(states.quaternion))
-    if (apart > AGREE).any():  # false where it is NaN
+    gap = axis_distance(states.axis, axis_from_quaternion(states.quaternion))
+    if (gap > AGREE).any():  # false where it is NaN
         refuse_other_order(states.quaternion, reference(scene, states.time))
-        k = int(np.nanargmax(apart))
-        must = f"axis and quaternion must show one attitude within {AGREE:g} rad, but at t = {states.time[k]:.6g}"
-        raise SymtopError(f"{must} the axis is {apart[k]:.2g} rad from that of the quaternion")
+        k = int(np.nanargmax(gap))
+        rule = f"axis and quaternion must show one attitude within {AGREE:g} rad, but at t = {states.time[k]:.6g}"
+        raise SymtopError(f"{rule} the axis is {gap[k]:.2g} rad from that of the quaternion")
 
 
 def _from_states(scene: Scene, states: Trajectory) -> dict[str, np.ndarray]:
@@ -267,19 +267,19 @@ def _from_states(scene: Scene, states: Trajectory) -> dict[str, np.ndarray]:
 
 def _error(name: str, scene: Scene, time: np.ndarray, deviation: xr.Dataset) -> Finding:
     """The finding on the largest error of a quantity and its law of growth, from the samples that are not NaN."""
-    there = np.isfinite(deviation[name].values)
-    if not there.any():
-        return undecided(f"{name}_error", "", f"all of its {there.size} samples are lost")
-    time, values, lost = time[there], deviation[name].values[there], int((~there).sum())
+    valid = np.isfinite(deviation[name].values)
+    if not valid.any():
+        return undecided(f"{name}_error", "", f"all of its {valid.size} samples are lost")
+    time, values, missing = time[valid], deviation[name].values[valid], int((~valid).sum())
     growth = constant_of(time, values) if time.size >= FEWEST_SAMPLES else None
-    largest, gone = float(values.max()), f", {lost} of {there.size} samples lost" * bool(lost)
+    largest, note = float(values.max()), f", {missing} of {valid.size} samples lost" * bool(missing)
     bound = float(np.nanmax(deviation[f"{name}_bound"].values))
     unit = error_units(name)
-    why = f"largest error {largest:.1e}{unit} in {time.size} samples up to t = {time[-1]:.4g}{scene.second}{gone}"
+    why = f"largest error {largest:.1e}{unit} in {time.size} samples up to t = {time[-1]:.4g}{scene.second}{note}"
     if growth is not None and math.isfinite(growth.exponent):
         why += f", growing as t^{growth.exponent:.2f} +- {growth.exponent_interval:.2f} ({growth.law})"
     law = growth.law if growth is not None and growth.law not in ("undecided", "not judged") else ""
-    measured = Reading(law, largest, text=f"{largest:.0e}{unit}{law and ', '}{law}{gone}")
+    measured = Reading(law, largest, text=f"{largest:.0e}{unit}{law and ', '}{law}{note}")
     return Finding(f"{name}_error", "", measured, "measured", why, largest, bound)
 
 
@@ -287,10 +287,10 @@ def _constant(
     name: str, declared: str, time: np.ndarray, values: np.ndarray, scene: Scene, L: Any, note: str
 ) -> Finding:  # fmt: skip
     """The finding on the change of a constant, with the claim `declared`; L (n, 3) or None, `note` ends its words."""
-    there = ~np.isnan(values)
-    if not there.any():
-        return undecided(name, declared, f"all of its {there.size} samples are lost")
-    time, values = time[there], values[there]
+    valid = ~np.isnan(values)
+    if not valid.any():
+        return undecided(name, declared, f"all of its {valid.size} samples are lost")
+    time, values = time[valid], values[valid]
     scale, grain = scene.momentum_scale, scene.momentum_grain(L)
     if name == "energy":
         scale, grain = scene.energy_scale, scene.energy_grain
@@ -300,30 +300,30 @@ def _constant(
     if time.size < FEWEST_SAMPLES:
         change = change._replace(exponent=math.nan)
     constant = Constant(change, math.nan, KEPT_CHANGE * grain, grain)
-    count = f"{time.size}{f' of {there.size}' * (not there.all())} samples"
-    off = float(abs(values[0] - true)) / scale
-    finding = constant.finding(name, declared, constant.words(f"in {count}; it begins {off:.1e} from the scene's"))
-    note += f", and begins {off:.0e} from the scene's" * (off > AGREE)
-    if note and (seen := finding.measured):
-        text = PHRASES.get(seen.kind, "{1}").format(seen.number, seen) + note
-        finding = finding._replace(measured=seen._replace(text=text))
+    count = f"{time.size}{f' of {valid.size}' * (not valid.all())} samples"
+    gap = float(abs(values[0] - true)) / scale
+    finding = constant.finding(name, declared, constant.words(f"in {count}; it begins {gap:.1e} from the scene's"))
+    note += f", and begins {gap:.0e} from the scene's" * (gap > AGREE)
+    if note and (reading := finding.measured):
+        text = PHRASES.get(reading.kind, "{1}").format(reading.number, reading) + note
+        finding = finding._replace(measured=reading._replace(text=text))
     if finding.verdict != "refuted" and time.size < FEWEST_SAMPLES and np.ptp(time) < scene.time_scale():
-        few = f"fewer than {FEWEST_SAMPLES}, over less than a {scene.period_word}, say nothing"
-        finding = undecided(name, declared, f"{finding.why}; {few}")
-    beyond = blows_up(scene, (values - values[0]) / scale) if name == "energy" else np.empty(0)
-    return blow_up_finding(finding, time[beyond[0]], scene.of_body) if beyond.size else finding
+        words = f"fewer than {FEWEST_SAMPLES}, over less than a {scene.period_word}, say nothing"
+        finding = undecided(name, declared, f"{finding.why}; {words}")
+    indices = blows_up(scene, (values - values[0]) / scale) if name == "energy" else np.empty(0)
+    return blow_up_finding(finding, time[indices[0]], scene.of_body) if indices.size else finding
 
 
 def _findings(
     subject: Subject, process: Process, began: float, limits: tuple[float, float, float], slow: str = ""
 ) -> Iterator[Finding]:
     """The findings of all stages. Claims of a stage whose process was lost are undecided; of all, if it was "calls"."""
-    most, together, least = limits
+    longest, total, shortest = limits
     todo = stages(subject.kind)
     for stage in todo:
         current = subject
         for _ in range(2):
-            process.allow(max(least, min(most, together - (time.monotonic() - began))))
+            process.allow(max(shortest, min(longest, total - (time.monotonic() - began))))
             try:
                 findings = measure(stage, current)
             except SymtopError:
@@ -335,7 +335,7 @@ def _findings(
         first = "calls" in stage.claims
         process.lost += slow if process.late else ""
         if process.lost:
-            claims = tuple(claim for lost in (todo if first else [stage]) for claim in lost.claims)
+            claims = tuple(claim for skipped in (todo if first else [stage]) for claim in skipped.claims)
             findings = unmeasured(claims, subject, process.lost)
         yield from findings
         if process.lost and first:

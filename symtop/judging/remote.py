@@ -86,9 +86,9 @@ class Process(contextlib.AbstractContextManager["Process"]):
                 self.pipe.send((name, args))
             kind, answer = self._answer()
         except SymtopError as failure:
-            back = heartbeat.inside and heartbeat.step < 0.0 and not heartbeat.forward_only
+            backward = heartbeat.inside and heartbeat.step < 0.0 and not heartbeat.forward_only
             self.end()
-            if not back:
+            if not backward:
                 self.lost = str(failure)
                 raise
             heartbeat.forward_only = True
@@ -99,49 +99,49 @@ class Process(contextlib.AbstractContextManager["Process"]):
 
     def _start(self) -> None:
         context: Any = multiprocessing.get_context("fork")
-        self.pipe, theirs = context.Pipe()
+        self.pipe, child_pipe = context.Pipe()
         self.output = tempfile.TemporaryFile()  # noqa: SIM115  (closed with the process)
-        self.process = context.Process(target=_serve, args=(self.make, self.pipe, theirs, self.output), daemon=True)
+        self.process = context.Process(target=_serve, args=(self.make, self.pipe, child_pipe, self.output), daemon=True)
         with warnings.catch_warnings():
             # newer versions of Python warn of a fork with threads, which the child does not use
             warnings.filterwarnings("ignore", "This process .* is multi-threaded", DeprecationWarning)
             heartbeat.inside = False
             self.process.start()
-        theirs.close()
+        child_pipe.close()
         self.began = clock(self.process.pid)
 
     def _answer(self) -> Any:
         """The answer of the process; SymtopError if it ends, hangs in a call or exceeds `limit`."""
-        calls, since = heartbeat.calls, clock(self.process.pid)
+        calls, start = heartbeat.calls, clock(self.process.pid)
         while not self.pipe.poll(LOOK_SECONDS):
             now = clock(self.process.pid)
             if heartbeat.calls != calls or not heartbeat.inside:
-                calls, since = heartbeat.calls, now
-            if now - since > heartbeat.allowed:
-                raise SymtopError(f"a step of h = {heartbeat.step:.3g} had not returned after {now - since:.0f} s")
+                calls, start = heartbeat.calls, now
+            if now - start > heartbeat.allowed:
+                raise SymtopError(f"a step of h = {heartbeat.step:.3g} had not returned after {now - start:.0f} s")
             if now - self.began > self.limit:
                 self.late = self.limit / max(heartbeat.calls - self.calls, 1)
                 raise SymtopError(f"it was not judged within {self.limit:.0f} s, at {as_time(self.late)} a call")
         try:
             return json.loads(self.pipe.recv_bytes())
         except (EOFError, OSError, ValueError):
-            raise SymtopError(self._death()) from None
+            raise SymtopError(self._death_message()) from None
 
-    def _death(self) -> str:
+    def _death_message(self) -> str:
         self.process.join(2.0)
         code = self.process.exitcode
         if code is not None and code < 0:
             during = f" in a step of h = {heartbeat.step:.3g}" if heartbeat.inside else ""
-            name = next((sent.name for sent in signal.Signals if sent == -code), f"signal {-code}")  # one in real time
+            name = next((sig.name for sig in signal.Signals if sig == -code), f"signal {-code}")  # one in real time
             return f"its process was ended by {name}{during}"
         self.output.seek(0)
         words = last_words(self.output.read())
         return f"its process ended with code {code}{': ' if words else ''}{words}"
 
 
-def _serve(make: Callable[[], Table], asking: Any, pipe: Any, output: Any) -> None:
+def _serve(make: Callable[[], Table], parent_pipe: Any, pipe: Any, output: Any) -> None:
     os.setsid()  # a process group, so that its children can be killed with it
-    asking.close()  # inherited; left open, it would keep this process waiting after its parent was killed
+    parent_pipe.close()  # inherited; left open, it would keep this process waiting after its parent was killed
     for stream in (1, 2):
         os.dup2(output.fileno(), stream)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
@@ -170,19 +170,19 @@ def clock(pid: int) -> float:
     return time.monotonic() - waited
 
 
-def try_separately(call: Callable[[], Any], what: str) -> None:
-    """Try a call in a process of its own; SymtopError that `what` cannot be loaded if it crashes or takes too long."""
+def try_separately(call: Callable[[], Any], name: str) -> None:
+    """Try a call in a process of its own; SymtopError that `name` cannot be loaded if it crashes or takes too long."""
     with Process(lambda: {"call": call}) as process:
         process.allow(PATIENCE)
         with contextlib.suppress(SymtopError):
             process.call("call")
         if process.lost:
-            raise SymtopError(f"{what} cannot be loaded: {process.lost}")
+            raise SymtopError(f"{name} cannot be loaded: {process.lost}")
 
 
-def table_of(opened: Callable[[], Stepper]) -> Table:
+def table_of(load: Callable[[], Stepper]) -> Table:
     """The functions of a stepper that `Remote` calls, by name."""
-    stepper: Any = opened()
+    stepper: Any = load()
 
     def march(since: float, *args: Any) -> tuple[Any, ...]:
         stepper.since = since

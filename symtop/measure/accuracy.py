@@ -40,8 +40,8 @@ def enough_samples(scene: Scene, horizon: float) -> int:
     counts = np.arange(SAMPLES, 2 * SAMPLES)
     stride = horizon / (counts - 1) / period
     phase = np.mod(np.where(stride < 0.5, 1.0 / stride, stride), 1.0)
-    off = np.minimum(np.abs(phase - GOLDEN), np.abs(phase - 1.0 + GOLDEN))
-    return int(counts[np.argmax(off < GOLDEN_CLOSE) if (off < GOLDEN_CLOSE).any() else np.argmin(off)])
+    gap = np.minimum(np.abs(phase - GOLDEN), np.abs(phase - 1.0 + GOLDEN))
+    return int(counts[np.argmax(gap < GOLDEN_CLOSE) if (gap < GOLDEN_CLOSE).any() else np.argmin(gap)])
 
 
 def error_table(
@@ -53,10 +53,10 @@ def error_table(
     ``axis_bound`` ... the least error that the reference can judge (its own bound plus rounding).
     """
     rows: list[dict[str, float | str]] = []
-    enough = False
+    stop = False
     for setting in settings:
-        rows.append(blank_row(method) if enough else error_row(scene, method, setting, horizon, observe))
-        enough = enough or float(rows[-1]["force_evaluations"]) > NO_FINER_AFTER[method.implementation]
+        rows.append(blank_row(method) if stop else error_row(scene, method, setting, horizon, observe))
+        stop = stop or float(rows[-1]["force_evaluations"]) > NO_FINER_AFTER[method.implementation]
     return as_table(rows)
 
 
@@ -79,11 +79,11 @@ def error_row(
     control: dict[str, Any] = {"horizon": horizon, "samples": enough_samples(scene, horizon), "observe": observe}
     run = integrate(scene, method, budget=budget, **control | method.given(setting))
     truth = reference(scene, run.time, precision="closed-form")
-    shown, failed = errors_against(scene, run, truth), run.outcome != "ok"
+    errors, failed = errors_against(scene, run, truth), run.outcome != "ok"
     row: dict[str, float | str] = {name: getattr(run, name) for name in COUNTS}
     row["implementation"] = method.implementation
     for name in QUANTITIES:
-        values = shown.get(name, np.array([math.nan]))
+        values = errors.get(name, np.array([math.nan]))
         row[name] = math.nan if failed else float(np.max(values))
         row[f"{name}_end"] = math.nan if failed else float(values[-1])
         row[f"{name}_bound"] = float(np.max(error_bound(scene, run, truth, name)))

@@ -40,12 +40,12 @@ def described(
     keeps its attributes. `units` is that of `netcdf.describe`; `of_body` has `Scene.of_body` of each scene.
     """
     for group, variables in ((path, table.variables) for path, table in netcdf.groups(data).items()):
-        known = netcdf.VARIABLES | (ERROR_TABLE if "axis_bound" in variables else {})
+        entries = netcdf.VARIABLES | (ERROR_TABLE if "axis_bound" in variables else {})
         for name, variable in variables.items():
             column = own.get(f"{group}/{name}", own.get(str(name)))
-            if column or (name in known and "long_name" not in variable.attrs):
-                words, *choice = column.entry if column else known[str(name)]
-                variable.attrs.update(netcdf.label((against(words, of_body), *choice), units, " in units of the scene"))
+            if column or (name in entries and "long_name" not in variable.attrs):
+                words, *unit = column.entry if column else entries[str(name)]
+                variable.attrs.update(netcdf.label((against(words, of_body), *unit), units, " in units of the scene"))
             if column and column.flags:
                 values = np.array(list(column.flags), variable.dtype)
                 variable.attrs.update(flag_values=values, flag_meanings=" ".join(column.flags.values()))

@@ -79,8 +79,8 @@ def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = MOST_DECA
     if period:
         decades = min(max(math.log10(max(np.asarray(time)[-1] / period, 1.0)), LEAST_DECADES), decades)
     size, power = np.abs(np.asarray(residual, float)), growth(time, residual, decades)
-    good = size[np.isfinite(size)]
-    largest = float(good.max()) if good.size else math.nan
+    valid = size[np.isfinite(size)]
+    largest = float(valid.max()) if valid.size else math.nan
     with np.errstate(over="ignore", invalid="ignore"):  # squares of a run that blows up
         return Change(largest, *trend(time, residual), power.slope, power.interval, law(power))
 
@@ -88,8 +88,8 @@ def constant_of(time: ArrayLike, residual: ArrayLike, decades: float = MOST_DECA
 def residuals(scene: Scene, run: Trajectory) -> dict[str, np.ndarray]:
     """Signed relative change since the start of energy, p_phi and p_psi, of those that the run has; each (n,)."""
     scales = {"energy": scene.energy_scale, "p_phi": scene.momentum_scale, "p_psi": scene.momentum_scale}
-    values = {name: shown for name in CONSTANTS if (shown := getattr(run, name)) is not None}
-    return {name: (shown - shown[0]) / scales[name] for name, shown in values.items()}
+    values = {name: series for name in CONSTANTS if (series := getattr(run, name)) is not None}
+    return {name: (value - value[0]) / scales[name] for name, value in values.items()}
 
 
 def growth(time: ArrayLike, residual: ArrayLike, decades: float = MOST_DECADES) -> Fit:
@@ -152,15 +152,15 @@ def behaviour(size: float, slope: float, interval: float, grain: float = 1.0, ro
 def trend(time: ArrayLike, residual: ArrayLike) -> Trend:
     """The linear trend of a residual (n,) at times (n,), from the means of `BLOCKS` equal stretches of the run."""
     t, r = np.asarray(time, float), np.asarray(residual, float)
-    good = np.isfinite(r)
-    t, r = t[good], r[good]
+    valid = np.isfinite(r)
+    t, r = t[valid], r[valid]
     if t.size < 2 * BLOCKS:
         return Trend(math.nan, math.nan, math.nan)
-    means = (np.array([part.mean() for part in np.array_split(values, BLOCKS)]) for values in (t, r))
-    slope, error, _, rest = line(*means)
+    means = (np.array([block.mean() for block in np.array_split(values, BLOCKS)]) for values in (t, r))
+    slope, error, _, deviations = line(*means)
     # with first-order autocorrelation r, a fraction (1-r)/(1+r) of the residuals is independent; r has a bias of -4/n
-    power = float(rest @ rest)
-    memory = float(rest[1:] @ rest[:-1]) / power + 4.0 / BLOCKS if power > 0.0 else 0.0
+    power = float(deviations @ deviations)
+    memory = float(deviations[1:] @ deviations[:-1]) / power + 4.0 / BLOCKS if power > 0.0 else 0.0
     memory = min(max(memory, 0.0), 0.95)
     error *= math.sqrt((1.0 + memory) / (1.0 - memory))
     return Trend(slope, student(BLOCKS - 2) * error, slope * float(t[-1] - t[0]))
@@ -189,24 +189,24 @@ def from_increments(method: Integrator, scene: Scene, plan: Plan) -> Difference 
     steps = int(plan.marks[-1])
     if steps < FEWEST_STEPS:
         return None
-    places = np.arange(PLACES) + np.mod(GOLDEN * np.arange(PLACES), 1.0)
-    middles = np.rint(places * (steps - 2 * STENCIL_REACH - 1) / PLACES).astype(np.int64) + STENCIL_REACH
-    marks = (middles[:, None] + np.arange(-STENCIL_REACH, STENCIL_REACH + 1)).ravel()
-    again = Plan.steps(plan.step_size, np.unique(marks))
-    run = solve(method, "angles", scene.top, scene.start, again, f" on {scene.name}")
+    positions = np.arange(PLACES) + np.mod(GOLDEN * np.arange(PLACES), 1.0)
+    centres = np.rint(positions * (steps - 2 * STENCIL_REACH - 1) / PLACES).astype(np.int64) + STENCIL_REACH
+    marks = (centres[:, None] + np.arange(-STENCIL_REACH, STENCIL_REACH + 1)).ravel()
+    sparse = Plan.steps(plan.step_size, np.unique(marks))
+    run = solve(method, "angles", scene.top, scene.start, sparse, f" on {scene.name}")
     if run.outcome != "ok":
         return None
-    place = np.searchsorted(again.marks, middles)
-    around = run.states[place[:, None] + np.arange(-STENCIL_REACH, STENCIL_REACH + 1)]  # (places, 9, 4)
-    implied = dict(zip(("p_phi", "p_psi"), momenta_of(scene.top, around, again.step_size), strict=True))
-    times, sizes = again.times[place], {}
+    indices = np.searchsorted(sparse.marks, centres)
+    stencils = run.states[indices[:, None] + np.arange(-STENCIL_REACH, STENCIL_REACH + 1)]  # (places, 9, 4)
+    implied = dict(zip(("p_phi", "p_psi"), momenta_of(scene.top, stencils, sparse.step_size), strict=True))
+    times, sizes = sparse.times[indices], {}
     for name, values in implied.items():
-        reported = getattr(run, name)[place]
-        apart, own = trend(times, (values - reported) / scene.momentum_scale), trend(times, values)
-        hidden = abs(apart.rise) > max(LEAST_DRIFT, HIDDEN_SHARE * abs(own.rise) / scene.momentum_scale)
-        sizes[name] = abs(apart.rise) if hidden and abs(apart.slope) > SURE_WIDTHS * apart.interval else 0.0
+        reported = getattr(run, name)[indices]
+        excess, total = trend(times, (values - reported) / scene.momentum_scale), trend(times, values)
+        hidden = abs(excess.rise) > max(LEAST_DRIFT, HIDDEN_SHARE * abs(total.rise) / scene.momentum_scale)
+        sizes[name] = abs(excess.rise) if hidden and abs(excess.slope) > SURE_WIDTHS * excess.interval else 0.0
     name = max(sizes, key=lambda name: sizes[name])
-    where = f"more at the end of {int(again.marks[-1])} steps than at their start"
+    where = f"more at the end of {int(sparse.marks[-1])} steps than at their start"
     return Difference(name, sizes[name], LEAST_DRIFT, where)
 
 

@@ -48,26 +48,26 @@ def _dense(cases: list[tuple[Any, xr.Dataset]]) -> xr.Dataset:
             cells.append((case.scene, case.integrator, data))
     scenes, methods = (list(dict.fromkeys(names)) for names in list(zip(*cells, strict=True))[:2])
     sizes, coordinates = _coordinates(cells)
-    measured: dict[str, dict[tuple[int, int], xr.Variable]] = {}  # by name and place
+    measured: dict[str, dict[tuple[int, int], xr.Variable]] = {}  # by name and index
     for scene, method, data in cells:
-        place = scenes.index(scene), methods.index(method)
+        index = scenes.index(scene), methods.index(method)
         for name in map(str, data.data_vars):
-            own, variable = measured.setdefault(name, {}), data.variables[name]
-            if place in own:
+            arrays, variable = measured.setdefault(name, {}), data.variables[name]
+            if index in arrays:
                 words = f"two cases of {method} on {scene} measure {name}, and one would replace the other"
                 remedy = "give each a group, or measure all settings in one case, over a dimension of the dataset"
                 raise SymtopError(f"{words}: {remedy}")
-            if own and (other := next(iter(own.values())).dims) != variable.dims:
-                words = f"over {other}, as in other cases, not {variable.dims}"
+            if arrays and (axes := next(iter(arrays.values())).dims) != variable.dims:
+                words = f"over {axes}, as in other cases, not {variable.dims}"
                 raise SymtopError(f"{name} of {method} on {scene} must be {words}")
-            own[place] = variable
+            arrays[index] = variable
     variables: dict[str, Any] = {}
-    for name, own in measured.items():
-        dims, attributes = next((array.dims, array.attrs) for array in own.values())
+    for name, arrays in measured.items():
+        dims, attributes = next((array.dims, array.attrs) for array in arrays.values())
         shape = len(scenes), len(methods), *(sizes[str(dim)] for dim in dims)
-        filled: Any = np.full(shape, *_blank([array.dtype for array in own.values()]))
-        for place, array in own.items():
-            filled[(*place, *map(slice, array.shape))] = array.values
+        filled: Any = np.full(shape, *_fill_value([array.dtype for array in arrays.values()]))
+        for index, array in arrays.items():
+            filled[(*index, *map(slice, array.shape))] = array.values
         variables[name] = ("scene", "variant", *dims), as_text(filled), dict(attributes)
     return xr.Dataset(variables, coords={"scene": scenes, "variant": methods} | coordinates)
 
@@ -90,11 +90,11 @@ def _coordinates(cells: list[Cell]) -> tuple[dict[str, int], dict[str, Any]]:
     return sizes, longest
 
 
-def _blank(kinds: "Sequence[np.dtype[Any]]") -> tuple[Any, Any]:
+def _fill_value(types: "Sequence[np.dtype[Any]]") -> tuple[Any, Any]:
     """The fill value for missing cells of an array of values of those types, and a type that can hold all of them."""
-    if any(kind.kind in "OUT" for kind in kinds):
+    if any(kind.kind in "OUT" for kind in types):
         return "", object
-    kind = np.result_type(*kinds)
+    kind = np.result_type(*types)
     return (np.iinfo(kind).max, kind) if kind.kind == "u" else (math.nan, kind if kind == np.float32 else float)
 
 
@@ -113,26 +113,26 @@ def differences(stored: Combined, again: Combined, *, attributes: bool = True) -
     ]
 
 
-def _differences(stored: xr.Dataset, again: xr.Dataset, attributes: bool) -> list[str]:
-    ours, theirs = set(map(str, stored.variables)), set(map(str, again.variables))
-    differing = [f"{name} is in one of them only" for name in sorted(ours ^ theirs)]
+def _differences(stored: xr.Dataset, new_data: xr.Dataset, attributes: bool) -> list[str]:
+    ours, theirs = set(map(str, stored.variables)), set(map(str, new_data.variables))
+    sentences = [f"{name} is in one of them only" for name in sorted(ours ^ theirs)]
     for name in sorted(ours & theirs):
-        old, new = stored[name], again[name]
+        old, new = stored[name], new_data[name]
         if old.dims != new.dims or old.shape != new.shape:
-            differing.append(f"{name} has another shape: {dict(old.sizes)} and {dict(new.sizes)}")
+            sentences.append(f"{name} has another shape: {dict(old.sizes)} and {dict(new.sizes)}")
         elif not any(word in name for word in CLOCKED) and not (name in PRICES and old.dtype.kind == "f"):
             numbers = old.dtype.kind == "f" and old.dtype == new.dtype  # equal to the last bit
             if old.values.tobytes() == new.values.tobytes() if numbers else old.equals(new):
                 continue
-            how_much = ""
+            amount = ""
             if old.dtype.kind == new.dtype.kind == "f":
                 with np.errstate(all="ignore"):
                     gap = np.abs(old.values - new.values)
                 finite = np.isfinite(gap).any()
-                how_much = f" by up to {np.nanmax(gap):.3g}" if finite else " in which values are NaN"
-            differing.append(f"{name} differs{how_much}")
-    for key in sorted({*stored.attrs, *again.attrs} - {*netcdf.provenance(), "content"}) if attributes else []:
-        before, now = stored.attrs.get(key), again.attrs.get(key)
-        if before != now and not key.startswith("timed_"):
-            differing.append(f"attribute {key} differs: {before!r} and {now!r}")
-    return differing
+                amount = f" by up to {np.nanmax(gap):.3g}" if finite else " in which values are NaN"
+            sentences.append(f"{name} differs{amount}")
+    for key in sorted({*stored.attrs, *new_data.attrs} - {*netcdf.provenance(), "content"}) if attributes else []:
+        before, after = stored.attrs.get(key), new_data.attrs.get(key)
+        if before != after and not key.startswith("timed_"):
+            sentences.append(f"attribute {key} differs: {before!r} and {after!r}")
+    return sentences

@@ -122,56 +122,56 @@ def _of_run(run: Any, scene: Any, precision: str, warn: Callable[[str], object])
     """The errors of one run or trajectory; calls `warn` with each warning."""
     foreign = scene is not None and "integrator" not in getattr(run, "attrs", {})
     run = unpadded(run) if isinstance(run, xr.Dataset) else run
-    chosen = scene_of(run) if scene is None else find_scene(scene, bodies=True)
-    refuse_other_scene(run, chosen)
+    problem = scene_of(run) if scene is None else find_scene(scene, bodies=True)
+    refuse_other_scene(run, problem)
     data = checked(run) if foreign else Trajectory.of_data(run)
-    truth = reference(chosen, data.time, precision)
+    truth = reference(problem, data.time, precision)
     check_shapes({name: values for name in SHAPES if (values := getattr(data, name)) is not None}, data.time.size)
     if foreign and data.quaternion is not None:
         refuse_other_order(data.quaternion, truth)
     data = completed(data) if foreign or data.theta is None else data
     if data.theta is None or data.phi is None:  # psi alone shows no attitude
         data = data._replace(psi=None)
-    columns = errors_against(chosen, data, truth)
-    sure = scene is None or _stored(run, "start") is not None
-    doubtful = [] if sure else start_warnings(data.time, columns)
-    if doubtful and data.axis is not None:
+    columns = errors_against(problem, data, truth)
+    certain = scene is None or _stored(run, "start") is not None
+    doubts = [] if certain else start_warnings(data.time, columns)
+    if doubts and data.axis is not None:
         x, up, z = data.axis[0]
         if np.min(charts.axis_distance(np.array([[x, -z, up], [x, z, up]]), truth["axis"].values[0])) < RIGHT_WITHIN:
-            doubtful[0] += " It is the true one if y is read as up, where here z is up."
-    for sentence in [*doubtful, *(trajectory_warnings(data.time, columns, chosen.horizon) if foreign else ())]:
-        warn(f"on {chosen.name}: {sentence}")
-    bounds = {f"{name}_bound": error_bound(chosen, data, truth, name) for name in columns}
+            doubts[0] += " It is the true one if y is read as up, where here z is up."
+    for sentence in [*doubts, *(trajectory_warnings(data.time, columns, problem.horizon) if foreign else ())]:
+        warn(f"on {problem.name}: {sentence}")
+    bounds = {f"{name}_bound": error_bound(problem, data, truth, name) for name in columns}
     for name in UNIT_VECTORS if foreign else ():
         if name in run:
             columns[f"{name}_length"] = np.abs(np.linalg.norm(doubles(name, column(run, name)), axis=1) - 1.0)
             bounds[f"{name}_length_bound"] = np.full(data.time.size, 4.0 * EPSILON)
-    shown = dataset(data.time, columns | bounds, chosen.units)
+    table = dataset(data.time, columns | bounds, problem.units)
     for name in columns:
-        of = name.removesuffix("_length")
-        words, units = (f"distance of the length of the {of} from one", "1") if of != name else ERRORS[name]
-        words = against(words, [chosen.of_body])
-        shown.variables[name].attrs.update(long_name=words, units=units)
-        shown.variables[f"{name}_bound"].attrs.update(long_name=f"least {words} to be told from none", units=units)
-    attributes = {"scene": chosen.name, "precision": truth.attrs["precision"]}
+        vector = name.removesuffix("_length")
+        words, units = (f"distance of the length of the {vector} from one", "1") if vector != name else ERRORS[name]
+        words = against(words, [problem.of_body])
+        table.variables[name].attrs.update(long_name=words, units=units)
+        table.variables[f"{name}_bound"].attrs.update(long_name=f"least {words} to be told from none", units=units)
+    attributes = {"scene": problem.name, "precision": truth.attrs["precision"]}
     if isinstance(run, xr.Dataset) and not foreign:
-        shown.variables["time"].attrs.update(run["time"].attrs)
+        table.variables["time"].attrs.update(run["time"].attrs)
         attributes |= {name: run.attrs[name] for name in ("integrator", "chart") if name in run.attrs}
-    shown.attrs.update(netcdf.CONVENTIONS, title=f"errors on {chosen.name}", **attributes)
-    return shown
+    table.attrs.update(netcdf.CONVENTIONS, title=f"errors on {problem.name}", **attributes)
+    return table
 
 
 def _of_members(runs: xr.Dataset, members: Any, precision: str) -> xr.Dataset:
     """The errors of every member, computed singly; all their warnings are given as one, with their number."""
-    given, n = read_members(members), runs.sizes["member"]
-    refuse_others(given, runs)
-    tables, doubtful = [], list[str]()  # `warnings.catch_warnings` would also record warnings of other threads
-    for i, (top, start) in enumerate(members_of(given.numbers)):
+    record, n = read_members(members), runs.sizes["member"]
+    refuse_others(record, runs)
+    tables, doubts = [], list[str]()  # `warnings.catch_warnings` would also record warnings of other threads
+    for i, (top, start) in enumerate(members_of(record.numbers)):
         run = runs.isel(member=i)
         end = float(run["horizon"]) if "horizon" in run else float(np.nanmax(run["time"].values))
-        tables.append(_of_run(run, Scene(f"member-{i}", top, start, end), precision, doubtful.append))
-    if doubtful:
-        words = f"{len(doubtful)} warnings on members, the first: {doubtful[0]}"
+        tables.append(_of_run(run, Scene(f"member-{i}", top, start, end), precision, doubts.append))
+    if doubts:
+        words = f"{len(doubts)} warnings on members, the first: {doubts[0]}"
         warnings.warn(words, SymtopWarning, stacklevel=3)
     columns = {}
     for name in ("time", *tables[0].data_vars):
@@ -191,11 +191,11 @@ def error_bound(scene: Scene, run: Trajectory, truth: xr.Dataset, quantity: str)
     """
     true = truth.variables  # ``truth[name]`` would make a DataArray
     if scene.of_body and quantity in ("momentum", "p_phi"):
-        size, known = np.linalg.norm(true["momentum"].values, axis=1), np.zeros(truth.sizes["time"])
+        size, angle_bound = np.linalg.norm(true["momentum"].values, axis=1), np.zeros(truth.sizes["time"])
         if quantity == "momentum":
-            swung = math.sqrt(abs(scene.top.mgl) * max(scene.top.moments))
-            size, known = np.maximum(size, swung), true["attitude_error_bound"].values
-        return np.asarray((known + 4.0 * EPSILON) * np.maximum(size / scene.momentum_scale, 1.0))
+            swing = math.sqrt(abs(scene.top.mgl) * max(scene.top.moments))
+            size, angle_bound = np.maximum(size, swing), true["attitude_error_bound"].values
+        return np.asarray((angle_bound + 4.0 * EPSILON) * np.maximum(size / scene.momentum_scale, 1.0))
     if quantity in CONSTANTS:
         grain = scene.energy_grain if quantity == "energy" else 1.0
         return np.full(truth.sizes["time"], 4.0 * EPSILON * grain)
@@ -218,8 +218,8 @@ def errors_against(scene: Scene, run: Trajectory, truth: xr.Dataset) -> dict[str
         if run.axis is not None:
             columns["axis"] = charts.axis_distance(run.axis, true["axis"], true.get("axis_lo", 0.0))
         for name, unit in units.items():
-            if (mine := getattr(run, name)) is not None and name in true:  # a body has no p_psi
-                columns[name] = np.abs((mine - true[name]) - true.get(f"{name}_lo", 0.0)) / unit
+            if (values := getattr(run, name)) is not None and name in true:  # a body has no p_psi
+                columns[name] = np.abs((values - true[name]) - true.get(f"{name}_lo", 0.0)) / unit
         if (attitude := completed(run).quaternion) is not None:
             low = true.get("quaternion_lo", 0.0)
             columns["attitude"] = charts.attitude_distance(attitude, true["quaternion"], low)
@@ -244,19 +244,19 @@ def scene_of(run: xr.Dataset | Mapping[str, Any]) -> Scene:
     except (KeyError, TypeError, ValueError) as error:
         if not isinstance(run, Mapping):
             checked(run)  # says what data may be
-        of = "members" if "member" in getattr(run, "sizes", ()) else "scene"
-        words = f"these data do not say of which top and start they are, so give errors(data, {of})"
+        argument = "members" if "member" in getattr(run, "sizes", ()) else "scene"
+        words = f"these data do not say of which top and start they are, so give errors(data, {argument})"
         raise SymtopError(f"scene is missing: {words}") from error
 
 
 def refuse_other_scene(run: xr.Dataset | Mapping[str, Any], scene: Scene) -> None:
     """SymtopError for data with a top or start in their attributes that is not the scene's."""
     attributes = getattr(run, "attrs", {})
-    for name, own in (("top", scene.top), ("start", scene.start)):
-        if _stored(run, name) not in (None, own):
-            must = f"that of the data, {attributes.get('scene', 'of another name')}, whose {name} is {attributes[name]}"
+    for name, value in (("top", scene.top), ("start", scene.start)):
+        if _stored(run, name) not in (None, value):
+            rule = f"that of the data, {attributes.get('scene', 'of another name')}, whose {name} is {attributes[name]}"
             remedy = "drop_attrs() makes them a trajectory that is compared with any"
-            raise SymtopError(f"scene must be {must}, not {scene.name}; {remedy}")
+            raise SymtopError(f"scene must be {rule}, not {scene.name}; {remedy}")
 
 
 def _stored(run: xr.Dataset | Mapping[str, Any], name: str) -> Any:
@@ -272,48 +272,48 @@ def unpadded(run: xr.Dataset) -> xr.Dataset:
     # in other data a time of NaN is an error, raised in `checked`
     if "integrator" not in run.attrs or "time" not in run or run["time"].dims != ("time",):
         return run
-    there = np.isfinite(doubles("time", run["time"]))
-    return run if there.all() else run.isel(time=there)
+    valid = np.isfinite(doubles("time", run["time"]))
+    return run if valid.all() else run.isel(time=valid)
 
 
 def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
     """A foreign trajectory with axis and quaternion scaled to length one; SymtopError for any other data."""
     if not isinstance(data, Mapping):  # a Dataset is one
-        must = "a Dataset or a mapping with time and axis, quaternion or theta"
-        raise SymtopError(f"data must be {must}, not {type(data).__name__}")
+        rule = "a Dataset or a mapping with time and axis, quaternion or theta"
+        raise SymtopError(f"data must be {rule}, not {type(data).__name__}")
     if "time" not in data:
         raise SymtopError("data must hold time, elapsed since the start of the scene; there is none")
     time = doubles("time", data["time"])
     if time.ndim != 1 or time.size == 0:
         raise SymtopError(f"time must be a row of numbers, not of shape {time.shape}")
-    bad = ~np.isfinite(time) | (np.diff(time, prepend=-1.0 if time[0] == 0.0 else 0.0) <= 0.0)
-    if bad.any():
-        k = int(np.argmax(bad))
+    invalid = ~np.isfinite(time) | (np.diff(time, prepend=-1.0 if time[0] == 0.0 else 0.0) <= 0.0)
+    if invalid.any():
+        k = int(np.argmax(invalid))
         after = f" after {time[k - 1]:g}" if k else ""
         raise SymtopError(f"time must be finite, at least 0 and increase, but sample {k} is at {time[k]:g}{after}")
     columns: dict[str, Any] = {name: doubles(name, column(data, name)) for name in SHAPES if name in data}
     check_shapes(columns, time.size)
-    places = [columns[name].reshape(time.size, -1) for name in (*UNIT_VECTORS, "theta") if name in columns]
-    if all(np.isnan(place).any(axis=1).all() for place in places):
-        words = "numbers, but every sample of where the top is has a NaN" if places else (
+    positions = [columns[name].reshape(time.size, -1) for name in (*UNIT_VECTORS, "theta") if name in columns]
+    if all(np.isnan(position).any(axis=1).all() for position in positions):
+        words = "numbers, but every sample of where the top is has a NaN" if positions else (
             "one of axis, quaternion, theta beside time, to show where the top is")  # fmt: skip
         raise SymtopError(f"data must hold {words}")
     for name in UNIT_VECTORS:
         if name in columns:
             largest = np.abs(columns[name]).max(axis=1)  # divide by it, so that squares neither overflow nor underflow
             length = largest * np.linalg.norm(columns[name] / np.where(largest > 0.0, largest, 1.0)[:, None], axis=1)
-            off = (length == 0.0) | np.isinf(length)  # such a vector has no direction
+            invalid = (length == 0.0) | np.isinf(length)  # such a vector has no direction
             first = int(np.argmax(~np.isnan(length)))
-            off[first] |= np.abs(length[first] - 1.0) > LENGTH_OFF
-            if off.any():
-                must = f"of length 1, at first within {LENGTH_OFF:g}, and later of any above 0"
-                place = f"{length[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
-                raise SymtopError(f"{name} must be {must}, but its length is {place}")
+            invalid[first] |= np.abs(length[first] - 1.0) > LENGTH_OFF
+            if invalid.any():
+                rule = f"of length 1, at first within {LENGTH_OFF:g}, and later of any above 0"
+                where = f"{length[np.argmax(invalid)]:.6g} at t = {time[np.argmax(invalid)]:.6g}"
+                raise SymtopError(f"{name} must be {rule}, but its length is {where}")
             columns[name] = columns[name] / length[:, None]
     theta = columns.get("theta", np.zeros(1))
-    if (off := (theta < 0.0) | (theta > float(np.float32(np.pi)))).any():  # float32(pi) > pi
-        place = f"{theta[np.argmax(off)]:.6g} at t = {time[np.argmax(off)]:.6g}"
-        raise SymtopError(f"theta must be radians from the vertical in [0, pi], but it is {place}")
+    if (outside := (theta < 0.0) | (theta > float(np.float32(np.pi)))).any():  # float32(pi) > pi
+        where = f"{theta[np.argmax(outside)]:.6g} at t = {time[np.argmax(outside)]:.6g}"
+        raise SymtopError(f"theta must be radians from the vertical in [0, pi], but it is {where}")
     return Trajectory(time, **columns)
 
 
@@ -327,13 +327,13 @@ def check_shapes(columns: Mapping[str, charts.Array], count: int) -> None:
 def completed(data: Trajectory) -> Trajectory:
     """The trajectory with axis, attitude and theta added where its other variables determine them."""
     angles, axis, attitude, theta = [data.theta, data.phi, data.psi], data.axis, data.quaternion, data.theta
-    known = [angle is not None for angle in angles]
+    present = [angle is not None for angle in angles]
     with np.errstate(all="ignore"):  # samples may be NaN
-        if attitude is None and all(known):
+        if attitude is None and all(present):
             attitude = charts.quaternion_from_angles(*angles)
         if axis is None and attitude is not None:
             axis = charts.axis_from_quaternion(attitude)
-        elif axis is None and all(known[:2]):
+        elif axis is None and all(present[:2]):
             axis = charts.axis_from_angles(*angles[:2])
         if theta is None and axis is not None:
             theta = charts.theta_from_axis(axis)
@@ -343,9 +343,9 @@ def completed(data: Trajectory) -> Trajectory:
 def doubles(name: str, values: Any) -> charts.Array:
     """Any array of real numbers, or of their text, as doubles; NaN where a sample is missing (None, masked)."""
     try:
-        given = np.ma.filled(values.astype(float), np.nan) if np.ma.isMaskedArray(values) else np.asarray(values)
+        array = np.ma.filled(values.astype(float), np.nan) if np.ma.isMaskedArray(values) else np.asarray(values)
         # complex numbers and dates are refused
-        return given.astype(np.float64, casting="same_kind" if given.dtype.kind in "cmM" else "unsafe")
+        return array.astype(np.float64, casting="same_kind" if array.dtype.kind in "cmM" else "unsafe")
     except (TypeError, ValueError, OverflowError) as error:
         kind = getattr(values, "dtype", type(values).__name__)
         raise SymtopError(f"{name} must be an array of real numbers, not {kind}") from error
@@ -357,20 +357,20 @@ def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:
     far = np.flatnonzero(charts.attitude_distance(quaternion, true) > WRONG_BEYOND)
     if not far.size:
         return
-    given, k = quaternion[far[0]], far[0]
-    for other, moved in (("x, y, z, w", np.roll(given, 1)), ("from space to body", given * [1.0, -1.0, -1.0, -1.0])):
-        if float(charts.attitude_distance(moved, true[k])) < RIGHT_WITHIN:
-            place = "first sample" if k == 0 else f"sample at t = {truth.time.values[k]:.6g}"
-            must = "quaternion must be in the order w, x, y, z and from body to space"
-            raise SymtopError(f"{must}, but its {place} is the true one if it is read as {other}")
+    sample, k = quaternion[far[0]], far[0]
+    for form, q in (("x, y, z, w", np.roll(sample, 1)), ("from space to body", sample * [1.0, -1.0, -1.0, -1.0])):
+        if float(charts.attitude_distance(q, true[k])) < RIGHT_WITHIN:
+            where = "first sample" if k == 0 else f"sample at t = {truth.time.values[k]:.6g}"
+            rule = "quaternion must be in the order w, x, y, z and from body to space"
+            raise SymtopError(f"{rule}, but its {where} is the true one if it is read as {form}")
 
 
 def start_warnings(time: charts.Array, errors: Mapping[str, charts.Array]) -> list[str]:
     """A warning if the first sample of a trajectory is far from the true motion, as a list of at most one sentence."""
     for name in ("attitude", "axis", "theta"):
         if name in errors and errors[name][0] > WRONG_BEYOND:
-            place = f"at t = {time[0]:.6g}, is {errors[name][0]:.2g} rad from the true {name}"
-            return [f"the first sample, {place}: is this the start of the scene, and is its time counted from there?"]
+            where = f"at t = {time[0]:.6g}, is {errors[name][0]:.2g} rad from the true {name}"
+            return [f"the first sample, {where}: is this the start of the scene, and is its time counted from there?"]
     return []
 
 
@@ -378,11 +378,11 @@ def trajectory_warnings(time: charts.Array, errors: Mapping[str, charts.Array], 
     """Warnings about a foreign trajectory: times far beyond the scene's horizon, samples that are NaN."""
     sentences = []
     if time[-1] > MOST_HORIZONS * horizon:
-        far = f"{time[-1]:.6g}, {time[-1] / horizon:.3g} times the horizon {horizon:.6g}"
-        sentences.append(f"times reach to {far}: are they in the scene's unit of time?")
+        words = f"{time[-1]:.6g}, {time[-1] / horizon:.3g} times the horizon {horizon:.6g}"
+        sentences.append(f"times reach to {words}: are they in the scene's unit of time?")
     for name, values in errors.items():
         if np.isnan(values).any():
-            since = time[int(np.argmax(np.isnan(values)))]
-            sentences.append(f"{name} is not a number from t = {since:.6g}; a largest error leaves these samples out")
+            start = time[int(np.argmax(np.isnan(values)))]
+            sentences.append(f"{name} is not a number from t = {start:.6g}; a largest error leaves these samples out")
             break
     return sentences

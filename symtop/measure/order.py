@@ -70,13 +70,13 @@ class Fit(NamedTuple):
 
 def line(x: Array, y: Array) -> tuple[float, float, tuple[float, float], Array]:
     """Least-squares line through n >= 3 points: slope, its standard error, the point of means, and residuals (n,)."""
-    middle = x.mean(), y.mean()
-    dx, dy = x - middle[0], y - middle[1]
+    centre = x.mean(), y.mean()
+    dx, dy = x - centre[0], y - centre[1]
     spread = float(dx @ dx)
     slope = float(dx @ dy) / spread
-    rest = dy - slope * dx
-    error = math.sqrt(float(rest @ rest) / (x.size - 2) / spread)
-    return slope, error, middle, rest
+    residuals = dy - slope * dx
+    error = math.sqrt(float(residuals @ residuals) / (x.size - 2) / spread)
+    return slope, error, centre, residuals
 
 
 def student(freedom: int) -> float:
@@ -112,18 +112,18 @@ def order(
     rank = np.unique(h, return_index=True)[1]  # a step that was taken twice is one point
     finest = e[rank][np.isfinite(e[rank])][:2]
     if finest.size == 0:
-        return _unjudged(np.isfinite(e), "every run failed")
+        return _no_fit(np.isfinite(e), "every run failed")
     judged, b = b, np.maximum(b, _round_off(h[rank], e[rank]))
     used = np.isfinite(e) & (e > 10.0 * b) & (e < LARGEST_ERROR)
     used &= h * omega < LARGEST_PHASE * max(claim or 2, 2) / 2.0
-    places = rank[used[rank]]
-    series = _widest(h[places], e[places], b[places], 2 if symmetric else 1)
+    indices = rank[used[rank]]
+    series = _widest_fit(h[indices], e[indices], b[indices], 2 if symmetric else 1)
     if series is None:
         if np.min(finest) > ROUNDING_FLOOR * np.max(judged):
-            return _unjudged(used, "the error does not fall to rounding as a power of the step")
-        return _unjudged(used, "fewer than five points follow a power of the step before rounding")
+            return _no_fit(used, "the error does not fall to rounding as a power of the step")
+        return _no_fit(used, "fewer than five points follow a power of the step before rounding")
     used = np.zeros(h.shape, dtype=bool)
-    used[places[series[3]]] = True
+    used[indices[series[3]]] = True
     return Fit(*series[:3], used)
 
 
@@ -136,8 +136,8 @@ def wrong_limit(step_size: ArrayLike, error: ArrayLike, bound: ArrayLike, least:
     h, e, b = (np.asarray(values, float) for values in (step_size, error, bound))
     fine = e[h <= 10.0 * np.min(h, initial=math.inf, where=h > 0.0)]  # NaN of a run that ended early: no limit
     floor = max(STAYING_BOUNDS * np.nanmax(b), least)
-    stays = fine.size >= STAYING_POINTS and np.min(fine) > max(part * np.max(fine), floor)
-    return float(np.min(fine)) if stays else math.nan
+    is_flat = fine.size >= STAYING_POINTS and np.min(fine) > max(part * np.max(fine), floor)
+    return float(np.min(fine)) if is_flat else math.nan
 
 
 def _round_off(h: Array, e: Array) -> float:
@@ -146,14 +146,14 @@ def _round_off(h: Array, e: Array) -> float:
     A step with an error near the least one has reached round-off, and so have all finer steps, if its error is not
     larger than that of the next finer step by the square root of the ratio of the steps. The level is their median.
     """
-    good = np.isfinite(e)
-    h, e = h[good], e[good]
-    level = [
-        place
-        for place, ((fine, low), (coarse, high)) in enumerate(pairwise(zip(h, e, strict=True)), start=1)
+    valid = np.isfinite(e)
+    h, e = h[valid], e[valid]
+    indices = [
+        index
+        for index, ((fine, low), (coarse, high)) in enumerate(pairwise(zip(h, e, strict=True)), start=1)
         if high < ROUND_OFF_LEVEL * np.min(e) and high <= low * math.sqrt(coarse / fine)
     ]
-    return float(np.median(e[: level[-1]])) if level else 0.0
+    return float(np.median(e[: indices[-1]])) if indices else 0.0
 
 
 def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> str:
@@ -170,14 +170,14 @@ def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> s
         return "undecided"
     if claim is None:
         return "measured"
-    off = abs(main.slope - claim) - main.interval
+    distance = abs(main.slope - claim) - main.interval
     lower = any(fit.slope + fit.interval < claim - REFUTED_BEYOND for fit in others)
-    if off > REFUTED_BEYOND or lower:
+    if distance > REFUTED_BEYOND or lower:
         return "refuted"
-    return "confirmed" if off <= CONFIRMED_BEYOND else "undecided"
+    return "confirmed" if distance <= CONFIRMED_BEYOND else "undecided"
 
 
-def _widest(h: Array, e: Array, b: Array, power: int) -> tuple[float, float, float, slice] | None:
+def _widest_fit(h: Array, e: Array, b: Array, power: int) -> tuple[float, float, float, slice] | None:
     """Fit the series over the widest window of points that it describes: slope, interval, constant, window, or None."""
     first, last = 0, h.size
     while last - first >= LEAST_POINTS:
@@ -186,13 +186,13 @@ def _widest(h: Array, e: Array, b: Array, power: int) -> tuple[float, float, flo
         terms = range(1, min(TERMS, last - first - 4) + 1)  # two degrees of freedom are left at least
         columns = np.stack([np.ones(last - first), np.log(h[window]), *(relative**k for k in terms)], axis=1)
         values, weights = np.log(e[window]), 1.0 / (1.0 + (b[window] / (EXACT_RATIO * e[window])) ** 2)
-        if last - first > columns.shape[1] + 2 and _missed(columns, values, weights):
+        if last - first > columns.shape[1] + 2 and _is_outlier(columns, values, weights):
             first += 1
             continue
-        fitted, deviations, freedom = _regularised(columns, values, weights)
+        coefficients, deviations, freedom = _regularised(columns, values, weights)
         interval = student(max(int(freedom), 1)) * float(deviations[1])
-        if interval <= WIDEST_INTERVAL and np.max(np.abs(columns[:, 2:] @ fitted[2:])) <= LARGEST_CORRECTION:
-            return float(fitted[1]), max(interval, LEAST_INTERVAL), math.exp(float(fitted[0])), window
+        if interval <= WIDEST_INTERVAL and np.max(np.abs(columns[:, 2:] @ coefficients[2:])) <= LARGEST_CORRECTION:
+            return float(coefficients[1]), max(interval, LEAST_INTERVAL), math.exp(float(coefficients[0])), window
         last -= 1
     return None
 
@@ -209,21 +209,21 @@ def _regularised(columns: Array, values: Array, weights: Array) -> tuple[Array, 
     scatter = 1e-2
     for _ in range(ITERATIONS):
         basis, triangle = np.linalg.qr(np.vstack([top, scatter * prior]))
-        fitted = np.linalg.solve(triangle, basis.T @ right)
+        coefficients = np.linalg.solve(triangle, basis.T @ right)
         freedom = count - float(np.sum(basis[:count] ** 2))
-        rest = values - columns @ fitted
+        residuals = values - columns @ coefficients
         spread = np.sqrt(np.sum(np.linalg.inv(triangle) ** 2, axis=1)) * scatter
-        scatter = max(math.sqrt(float(weights @ rest**2) / max(freedom, 1.0)), LEAST_SCATTER)
-    return fitted, spread, freedom
+        scatter = max(math.sqrt(float(weights @ residuals**2) / max(freedom, 1.0)), LEAST_SCATTER)
+    return coefficients, spread, freedom
 
 
-def _missed(columns: Array, values: Array, weights: Array) -> bool:
+def _is_outlier(columns: Array, values: Array, weights: Array) -> bool:
     """Does the finest point lie off the curve through the others, beyond their scatter?"""
-    fitted, _, freedom = _regularised(columns[1:], values[1:], weights[1:])
-    rest = values[1:] - columns[1:] @ fitted
-    scatter = math.sqrt(float(weights[1:] @ rest**2) / max(freedom, 1.0) / float(weights[0]))
-    return bool(abs(values[0] - columns[0] @ fitted) > max(OUTLIER_LOG, OUTLIER_DEVIATIONS * scatter))
+    coefficients, _, freedom = _regularised(columns[1:], values[1:], weights[1:])
+    residuals = values[1:] - columns[1:] @ coefficients
+    scatter = math.sqrt(float(weights[1:] @ residuals**2) / max(freedom, 1.0) / float(weights[0]))
+    return bool(abs(values[0] - columns[0] @ coefficients) > max(OUTLIER_LOG, OUTLIER_DEVIATIONS * scatter))
 
 
-def _unjudged(used: NDArray[Any], reason: str) -> Fit:
-    return Fit(math.nan, math.nan, math.nan, used.astype(bool), reason)
+def _no_fit(mask: NDArray[Any], reason: str) -> Fit:
+    return Fit(math.nan, math.nan, math.nan, mask.astype(bool), reason)

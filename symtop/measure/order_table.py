@@ -44,10 +44,10 @@ def observable(method: Integrator) -> str:
 def asymptotic_steps(table: xr.Dataset, quantity: str, power: int) -> list[float]:
     """Added steps, whose errors reach from just above rounding `ADDED_DECADES` up; none if all errors are rounding."""
     h, error, bound = (table[name].values for name in ("step_size", quantity, f"{quantity}_bound"))
-    judged = np.flatnonzero(np.isfinite(error) & (error > 2.5 * ABOVE_ROUNDING * bound))
-    if judged.size == 0:
+    indices = np.flatnonzero(np.isfinite(error) & (error > 2.5 * ABOVE_ROUNDING * bound))
+    if indices.size == 0:
         return []
-    finest = judged[np.argmin(h[judged])]
+    finest = indices[np.argmin(h[indices])]
     first = h[finest] * max(float((ABOVE_ROUNDING * bound[finest] / error[finest]) ** (1.0 / power)), FINEST_ADDED)
     return [float(first * 10.0 ** (ADDED_DECADES / power * k / (ADDED_STEPS - 1))) for k in range(ADDED_STEPS)]
 
@@ -104,8 +104,8 @@ def extended_errors(scene: Scene, method: Integrator) -> xr.Dataset | None:
     truth = reference(scene, [horizon], "longdouble")
     true = truth["axis"].values[0].astype(Wide) + truth["axis_lo"].values[0]
     counts = np.unique(np.rint(NUTATIONS * np.geomspace(*STEPS_A_NUTATION, RUNS)).astype(int))
-    rest = _ends(scene, stages, horizon, counts) - true
-    error = np.sqrt((rest * rest).sum(axis=1)).astype(float)
+    difference = _ends(scene, stages, horizon, counts) - true
+    error = np.sqrt((difference * difference).sum(axis=1)).astype(float)
     bound = np.maximum(truth["axis_error_bound"].values[0], BOUND)
     columns = {"step": horizon / counts, "error": error, "bound": np.full(counts.size, bound)}
     return xr.Dataset({f"extended_{name}": ("extended", values) for name, values in columns.items()})
@@ -128,24 +128,24 @@ def _ends(scene: Scene, stages: Stages, horizon: float, counts: NDArray[np.int64
     theta, phi, *rates = map(Wide, (start.theta, start.phi, start.theta_dot, start.phi_dot, start.psi_dot))
     axes = np.tile(np.array(charts.axis_parts(np, theta, phi))[:, np.newaxis], counts.size)
     momenta = np.tile(np.array(charts.momentum_parts(np, top, theta, phi, *rates))[:, np.newaxis], counts.size)
-    drifts, kicks = ([Wide(value) for value in part] for part in (stages.drift, stages.kick))
+    drifts, kicks = ([Wide(value) for value in coefficients] for coefficients in (stages.drift, stages.kick))
     drifts = [value / sum(drifts) / Wide(top.I1) for value in drifts]
     kicks = [value / (sum(kicks) or 1) * Wide(top.mgl) for value in kicks]  # those of a free top are zero
-    for done in range(counts[-1]):
-        left = slice(int(np.searchsorted(counts, done, side="right")), None)  # runs with more steps than that
-        (x, y, z), momentum, h = axes[:, left], momenta[:, left], step[left]
+    for index in range(counts[-1]):
+        running = slice(int(np.searchsorted(counts, index, side="right")), None)  # runs with more steps than that
+        (x, y, z), momentum, h = axes[:, running], momenta[:, running], step[running]
         for kick, drift in zip(kicks, [*drifts, Wide(0.0)], strict=True):
             momentum = momentum + kick * h * np.stack([-y, x, 0.0 * z])
             length = np.sqrt((momentum * momentum).sum(axis=0))
             # a top at rest turns by no angle about any axis
             (a, b, c), angle = momentum / np.where(length > 0, length, 1), length * drift * h
-            cos, sin, along = np.cos(angle), np.sin(angle), (1 - np.cos(angle)) * (a * x + b * y + c * z)
+            cos, sin, dot = np.cos(angle), np.sin(angle), (1 - np.cos(angle)) * (a * x + b * y + c * z)
             x, y, z = (
-                cos * x + sin * (b * z - c * y) + along * a,
-                cos * y + sin * (c * x - a * z) + along * b,
-                cos * z + sin * (a * y - b * x) + along * c,
+                cos * x + sin * (b * z - c * y) + dot * a,
+                cos * y + sin * (c * x - a * z) + dot * b,
+                cos * z + sin * (a * y - b * x) + dot * c,
             )
-        axes[:, left], momenta[:, left] = (x, y, z), momentum
+        axes[:, running], momenta[:, running] = (x, y, z), momentum
     return axes.T
 
 
@@ -153,5 +153,5 @@ def extended_order_data(table: xr.Dataset) -> tuple[Any, Any, Any] | None:
     """Steps, errors and bounds of the runs in long double in an error table; None if it has none."""
     if "extended_error" not in table or not math.isfinite(float(table["extended_error"].max())):
         return None
-    part = table.dropna("extended", subset=["extended_error"])
-    return tuple(part[f"extended_{name}"].values for name in ("step", "error", "bound"))  # type: ignore[return-value]
+    rows = table.dropna("extended", subset=["extended_error"])
+    return tuple(rows[f"extended_{name}"].values for name in ("step", "error", "bound"))  # type: ignore[return-value]

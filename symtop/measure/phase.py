@@ -49,7 +49,7 @@ class Split(NamedTuple):
     turn: Array
 
 
-def _curve(scene: Scene, times: Array) -> tuple[Array, Array, Array, Array, Array]:
+def _true_curve(scene: Scene, times: Array) -> tuple[Array, Array, Array, Array, Array]:
     """u, u', u'', phi and phi' of the true motion."""
     motion = closed_form(scene)(times)
     momenta, top = scene.top.momenta(scene.start), scene.top
@@ -66,7 +66,7 @@ def _table(top: SymmetricTop, start: Angles) -> tuple[Array, Array, Array]:
     scene = Scene("table", top, start, 1.0)
     period = scene.nutation_period
     times = period * np.arange(TABLE_POINTS) / TABLE_POINTS
-    u, du, *_ = _curve(scene, times)
+    u, du, *_ = _true_curve(scene, times)
     points = np.stack([u, du * period / (2.0 * math.pi)])
     return times, points, 0.5 * np.sum(points * points, axis=0)
 
@@ -87,29 +87,29 @@ def split_states(scene: Scene, t: Array, u: Array, du: Array, phi: Array) -> Spl
     period = scene.nutation_period
     omega = 2.0 * math.pi / period if math.isfinite(period) else 1.0
     if not nutates(scene):
-        u_true, du_true, _, phi_true, _ = _curve(scene, t)
+        u_true, du_true, _, phi_true, _ = _true_curve(scene, t)
         return Split(np.hypot(u - u_true, (du - du_true) / omega), np.full(t.size, math.nan), phi - phi_true)
     times, points, halves = _table(scene.top, scene.start)
     w = du / omega
     nearest = np.argmin(halves - np.stack([u, w], axis=1) @ points, axis=1)  # |p - q|^2/2 without |q|^2/2
-    early = times[nearest] - t
-    early -= period * np.rint(early / period)
-    tau, rest = t + early, np.zeros(t.size)
+    lead = times[nearest] - t
+    lead -= period * np.rint(lead / period)
+    tau, correction = t + lead, np.zeros(t.size)
     for _ in range(SWEEPS):
-        tau = tau + np.clip(rest, -period / 16.0, period / 16.0)
-        u_true, du_true, bend, phi_true, rate = _curve(scene, tau)
-        x, y, along, across = u - u_true, w - du_true / omega, du_true, bend / omega
-        rest = (x * along + y * across) / (along * along + across * across)
-    lag = (tau - t) + rest  # the last correction is not added to tau, whose last digit is too coarse for it
+        tau = tau + np.clip(correction, -period / 16.0, period / 16.0)
+        u_true, du_true, bend, phi_true, rate = _true_curve(scene, tau)
+        x, y, du_dtau, dw_dtau = u - u_true, w - du_true / omega, du_true, bend / omega
+        correction = (x * du_dtau + y * dw_dtau) / (du_dtau * du_dtau + dw_dtau * dw_dtau)
+    lag = (tau - t) + correction  # the last correction is not added to tau, whose last digit is too coarse for it
     turns = np.rint((np.unwrap(lag, period=period) - lag) / period)
-    off = np.abs(x * across - y * along) / np.hypot(along, across)
-    turn = phi - phi_true - rate * rest - turns * closed_form(scene).phi_per_period
+    distance = np.abs(x * dw_dtau - y * du_dtau) / np.hypot(du_dtau, dw_dtau)
+    turn = phi - phi_true - rate * correction - turns * closed_form(scene).phi_per_period
     # next to a pole phi may jump by pi, which would appear in the lag as whole turns
     sine = np.sqrt(np.maximum(1.0 - u_true * u_true, 0.0))
-    clear = sine > CLEAR_OF_POLE * np.max(sine)
-    guide = np.interp(t, t[clear], np.unwrap(turn[clear]))
+    usable = sine > CLEAR_OF_POLE * np.max(sine)
+    guide = np.interp(t, t[usable], np.unwrap(turn[usable]))
     turn = turn - 2.0 * math.pi * np.rint((turn - guide) / (2.0 * math.pi))
-    return Split(off, lag + turns * period, turn)
+    return Split(distance, lag + turns * period, turn)
 
 
 def _slope(t: Array, values: Array, bound: Array, weights: Array) -> tuple[float, float]:
@@ -134,15 +134,15 @@ def phase(scene: Scene, run: Trajectory, truth: xr.Dataset) -> dict[str, float]:
     scale = max(abs(mean_rate), LEAST_RATE * omega)
     radius = 0.5 * abs(math.cos(form.theta_range[0]) - math.cos(form.theta_range[1]))
     grain = truth["axis_error_bound"].values + 4.0 * EPSILON
-    faster, doubt = 0.0, 0.0
+    faster, error = 0.0, 0.0
     if swings:
-        faster, doubt = _slope(t, parts.lag, grain / (radius * omega), np.ones(t.size))
-        doubt += EPSILON
-    turned, turn_doubt = _slope(t, parts.turn, grain / sine + EPSILON * np.abs(truth["phi"].values), sine * sine)
-    turn_doubt += abs(mean_rate) * (doubt + EPSILON)
+        faster, error = _slope(t, parts.lag, grain / (radius * omega), np.ones(t.size))
+        error += EPSILON
+    drift, drift_error = _slope(t, parts.turn, grain / sine + EPSILON * np.abs(truth["phi"].values), sine * sine)
+    drift_error += abs(mean_rate) * (error + EPSILON)
     return {
         "nutation_period": abs(1.0 / (1.0 + faster) - 1.0) if swings else math.nan,
-        "precession_rate": abs(mean_rate * faster + turned) / scale,
-        "nutation_period_bound": doubt if swings else math.nan,
-        "precession_rate_bound": turn_doubt / scale + EPSILON,
+        "precession_rate": abs(mean_rate * faster + drift) / scale,
+        "nutation_period_bound": error if swings else math.nan,
+        "precession_rate_bound": drift_error / scale + EPSILON,
     }

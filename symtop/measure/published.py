@@ -39,8 +39,8 @@ def published_values() -> list[KnownValue]:
     values = [KnownValue(source, "energy of the fast top", 1269.975, energy, 1e-3, "printed", tests=START)]
 
     source = "Bruls, Cardona & Arnold 2012"  # regression data of public codes, h = 2e-6
-    moved = reference("bruls-cardona-arnold", [1.0], "longdouble")["axis"].values[0] - np.array([0.0, 1.0, 0.0])
-    for name, value, ours in zip("xyz", (0.17334, -0.35991, -0.74849), moved, strict=True):
+    displacement = reference("bruls-cardona-arnold", [1.0], "longdouble")["axis"].values[0] - np.array([0.0, 1.0, 0.0])
+    for name, value, ours in zip("xyz", (0.17334, -0.35991, -0.74849), displacement, strict=True):
         quantity = f"{name} displacement of the centre at t = 1"
         values.append(KnownValue(source, quantity, value, ours, 1e-5, "printed"))
 
@@ -64,12 +64,12 @@ def published_values() -> list[KnownValue]:
 
     from scipy.integrate import solve_ivp
 
-    done = solve_ivp(  # Euler's equations of DETEST B5, by SciPy's DOP853 at its tightest tolerance
+    solution = solve_ivp(  # Euler's equations of DETEST B5, by SciPy's DOP853 at its tightest tolerance
         lambda _, y: (y[1] * y[2], -y[0] * y[2], -0.51 * y[0] * y[1]), (0.0, 20.0), (0.0, 1.0, 1.0),
         method="DOP853", rtol=3e-14, atol=1e-15,
     )  # fmt: skip
     source, printed = "Enright & Pryce 1987, DETEST B5", (-0.93965707987, -0.34211777540, 0.74141265962)
     return values + [
-        KnownValue(source, f"y{k + 1}(20)", value, float(done.y[k, -1]), 1e-11, "printed", OTHER_BODY)
+        KnownValue(source, f"y{k + 1}(20)", value, float(solution.y[k, -1]), 1e-11, "printed", OTHER_BODY)
         for k, value in enumerate(printed)
     ]

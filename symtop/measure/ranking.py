@@ -21,7 +21,7 @@ MENU_SIZE = 6  # variants in a row
 @functools.cache
 def _rows() -> dict[tuple[float, str, float, str, bool], list[str]]:
     lines = (line.split("\t") for line in TABLE.read_text(encoding="utf-8").splitlines()[1:])
-    return {(float(n), what, float(a), need, g == "yes"): names.split(" ") for n, what, a, need, g, names in lines}
+    return {(float(n), shown, float(a), need, g == "yes"): names.split(" ") for n, shown, a, need, g, names in lines}
 
 
 def cheapest(
@@ -31,8 +31,8 @@ def cheapest(
 
     Accuracy and length are the nearest in the table, in logarithms. The rows of several classes are interleaved.
     """
-    rows, shown = _rows(), SHOWN_AS.get(quantity, quantity)
+    rows, column = _rows(), SHOWN_AS.get(quantity, quantity)
     length = min({key[0] for key in rows}, key=lambda value: abs(math.log(value / max(nutations, 1e-3))))
     level = min({key[2] for key in rows}, key=lambda value: abs(math.log(value / accuracy)))
-    menus = [rows.get((length, shown, level, need, general), []) for need in needs or (ANY,)]
-    return list(dict.fromkeys(name for place in range(MENU_SIZE) for menu in menus for name in menu[place : place + 1]))
+    menus = [rows.get((length, column, level, need, general), []) for need in needs or (ANY,)]
+    return list(dict.fromkeys(name for rank in range(MENU_SIZE) for menu in menus for name in menu[rank : rank + 1]))

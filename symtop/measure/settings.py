@@ -48,14 +48,14 @@ def smallest_charts(observe: str) -> list[Integrator]:
 
 def compared(observe: str) -> list[Integrator]:
     """Every method to compare, in its `smallest_charts` for "axis" or in each chart with "attitude"."""
-    every = smallest_charts(observe) if observe == "axis" else variants(observe)
-    return [row for row in every if not row.exact_steps]  # these evaluate a closed form that other problems do not have
+    rows = smallest_charts(observe) if observe == "axis" else variants(observe)
+    return [row for row in rows if not row.exact_steps]  # these evaluate a closed form that other problems do not have
 
 
 def least_tolerance(method: Integrator) -> float:
     """The least tolerance that an adaptive method is tried with."""
-    tedious = method.implementation == "python" and method.explicit is False
-    return max(method.least_tolerance, TEDIOUS_TOLERANCE * tedious)
+    slow = method.implementation == "python" and method.explicit is False
+    return max(method.least_tolerance, TEDIOUS_TOLERANCE * slow)
 
 
 def limits(scene: Scene, method: Integrator, horizon: float, quantity: str = "axis") -> tuple[float, float]:
@@ -93,10 +93,10 @@ def ladder(method: Integrator, scene: Scene, horizon: float, count: int = 9, mos
 def between(fine: float, low: float, coarse: float, high: float, goal: float) -> float:
     """The setting with error `goal`, by log-log interpolation between `fine` (error `low`) and `coarse` (`high`)."""
     if math.isinf(high) or low <= 0.0 or high > 1e6 * low:
-        part = 0.5  # the errors follow no power law
+        fraction = 0.5  # the errors follow no power law
     else:
-        part = min(max(math.log(goal / low) / math.log(high / low), 0.1), 0.9)
-    return float(fine * (coarse / fine) ** part)
+        fraction = min(max(math.log(goal / low) / math.log(high / low), 0.1), 0.9)
+    return float(fine * (coarse / fine) ** fraction)
 
 
 def seek(
@@ -113,26 +113,26 @@ def seek(
     # factors by which a setting changes: after a failed run, at the least and at the most
     after_failure, finer, coarser = (0.4, 0.02, 8.0) if fixed_step else (0.01, 1e-5, 1e4)
     setting, why, smallest, flat = min(max(guess, finest), coarsest), TRIED, math.inf, 0
-    met: tuple[float, float] | None = None  # the coarsest setting that meets the target, with its error
-    missed: tuple[float, float] | None = None  # the finest setting that misses it, with its error
+    fine: tuple[float, float] | None = None  # the coarsest setting that meets the target, with its error
+    coarse: tuple[float, float] | None = None  # the finest setting that misses it, with its error
     for _ in range(TRIES):
         last = setting
         error, evaluations = run(setting)
         smallest = min(smallest, error)
         if error <= target:
-            met = setting, error
+            fine = setting, error
             if error >= least * target or setting >= coarsest:
                 break
         else:
-            gains = met is not None or missed is None or not missed[1] < FLAT_GAIN * error < NEAR_ROUNDING
-            flat, missed = 0 if gains else flat + 1, (setting, error)
+            improves = fine is not None or coarse is None or not coarse[1] < FLAT_GAIN * error < NEAR_ROUNDING
+            flat, coarse = 0 if improves else flat + 1, (setting, error)
             if flat == (1 if fixed_step else 2):  # if the order depends on the tolerance, the error falls in jumps
                 why = STOPPED
                 break
-        if met is not None and missed is not None:
-            if missed[0] < 1.15 * met[0]:
+        if fine is not None and coarse is not None:
+            if coarse[0] < 1.15 * fine[0]:
                 break
-            setting = between(*met, *missed, goal)
+            setting = between(*fine, *coarse, goal)
         else:
             change = (goal / max(error, 1e-3 * target)) ** (1.0 / power)
             setting *= after_failure if math.isinf(error) else min(max(change, finer), STAIR if flat else coarser)
@@ -140,8 +140,8 @@ def seek(
         if setting == last or evaluations * (last / setting if fixed_step else 1.0) > patience:
             why = STOPPED if setting == last else BUDGET
             break
-    if met is not None:
-        return met[0], ""
+    if fine is not None:
+        return fine[0], ""
     return math.nan, FAILED if math.isinf(smallest) and why != BUDGET else why
 
 
@@ -176,8 +176,8 @@ def attempt(scene: Scene, method: Integrator, setting: float, horizon: float, qu
     """One run; the error of a run that failed is infinite."""
     row = error_row(scene, method, setting, horizon, observed(quantity), phases=quantity in FREQUENCIES)
     error, bound, work = (float(row[name]) for name in (quantity, f"{quantity}_bound", "force_evaluations"))
-    good = row["outcome"] == "ok" and math.isfinite(error)
-    return Attempt(method, setting, error if good else math.inf, bound, horizon, work)
+    valid = row["outcome"] == "ok" and math.isfinite(error)
+    return Attempt(method, setting, error if valid else math.inf, bound, horizon, work)
 
 
 def judgeable(scene: Scene, quantity: str, horizon: float) -> float:
@@ -209,14 +209,14 @@ def search(
     results: dict[float, Attempt] = {}
 
     def run(setting: float) -> tuple[float, float]:
-        met = results[setting] = attempt(scene, method, setting, horizon, quantity)
-        return met.error, met.evaluations
+        result = results[setting] = attempt(scene, method, setting, horizon, quantity)
+        return result.error, result.evaluations
 
     try:
-        answer = seek(run, guess, accuracy, ends, power, fixed_step=method.fixed_step, patience=patience, least=least)
+        result = seek(run, guess, accuracy, ends, power, fixed_step=method.fixed_step, patience=patience, least=least)
     except SymtopError as error:  # a start at a pole, for a method in the angles chart
-        answer = math.nan, f"Not run, as {error}"
-    setting, why = answer
+        result = math.nan, f"Not run, as {error}"
+    setting, why = result
     return unmet(method, horizon, why) if why else results[setting]
 
 
@@ -228,8 +228,8 @@ def at_accuracy(method: Integrator, ratio: float) -> float:
 def rounded(scene: Scene, met: Attempt, accuracy: float, quantity: str) -> Attempt:
     """The result with its setting rounded down to five digits, if a run with that meets the accuracy; else `met`."""
     setting = float(Context(prec=5, rounding=ROUND_DOWN).create_decimal(repr(float(met.setting))))
-    again = met if setting == met.setting else attempt(scene, met.integrator, setting, met.horizon, quantity)
-    return again if again.error <= accuracy else met
+    rerun = met if setting == met.setting else attempt(scene, met.integrator, setting, met.horizon, quantity)
+    return rerun if rerun.error <= accuracy else met
 
 
 def seconds(scene: Scene, mets: Sequence[Attempt], quantity: str, horizon: float, batches: int = 5) -> list[float]:

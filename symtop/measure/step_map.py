@@ -65,16 +65,16 @@ class StepMap:
         if self.method.fixed_step:
             plan = Plan.steps(h, [steps])
         else:
-            loose = max(LOOSE_TOLERANCE, self.method.least_tolerance) if self.method.adaptive else math.nan
-            plan = Plan.until([steps * h], loose)
-        done = solve(self.method, self.chart, self.top, start, plan)
-        if done.outcome != "ok" or not np.isfinite(done.states).all():
-            raise SymtopError(f"a step of {h:.3g} in the {self.chart} chart ended as {done.outcome}")
-        return done
+            tolerance = max(LOOSE_TOLERANCE, self.method.least_tolerance) if self.method.adaptive else math.nan
+            plan = Plan.until([steps * h], tolerance)
+        run = solve(self.method, self.chart, self.top, start, plan)
+        if run.outcome != "ok" or not np.isfinite(run.states).all():
+            raise SymtopError(f"a step of {h:.3g} in the {self.chart} chart ended as {run.outcome}")
+        return run
 
-    def shown(self, done: Run) -> Array:
+    def shown(self, run: Run) -> Array:
         """The last sample as Y."""
-        return self.scaled(done.states[-1], done.p_phi[-1], done.p_psi[-1])
+        return self.scaled(run.states[-1], run.p_phi[-1], run.p_psi[-1])
 
     def scaled(self, state: Array, p_phi: float, p_psi: float) -> Array:
         """A state of the chart as Y; p_phi and p_psi are used only in the angles chart."""
@@ -134,10 +134,10 @@ class StepMap:
 
     def gap(self, first: Array, second: Array) -> float:
         """Largest difference of two Y; q and -q are one attitude, phi and psi are angles."""
-        apart = first - aligned(self.chart, second, first)
+        difference = first - aligned(self.chart, second, first)
         if self.chart == "angles":
-            apart[1:3] = np.remainder(apart[1:3] + math.pi, 2.0 * math.pi) - math.pi
-        return float(np.max(np.abs(apart)))
+            difference[1:3] = np.remainder(difference[1:3] + math.pi, 2.0 * math.pi) - math.pi
+        return float(np.max(np.abs(difference)))
 
 
 def angles_at(top: SymmetricTop, z: Array) -> Angles:
@@ -170,14 +170,14 @@ def generic_start(scene: Scene) -> Angles:
 
 def drawn(scene: Scene, count: int, seed: int, *, same_top: bool) -> Iterator[Scene]:
     """Random starts whose axes are spread over all heights but the poles, on random tops or all on the `same_top`."""
-    draw, rate = np.random.default_rng(seed), 2.0 * math.pi / scene.time_scale()
-    for height in draw.permutation(count):
-        cosine, top = 0.99 * (2.0 * (height + draw.uniform()) / count - 1.0), scene.top
-        size, shape, weight = 2.0 ** draw.uniform(-1.0, 1.0), draw.uniform(0.2, 1.8), 2.0 ** draw.uniform(-1.0, 1.0)
+    rng, rate = np.random.default_rng(seed), 2.0 * math.pi / scene.time_scale()
+    for height in rng.permutation(count):
+        cosine, top = 0.99 * (2.0 * (height + rng.uniform()) / count - 1.0), scene.top
+        size, shape, weight = 2.0 ** rng.uniform(-1.0, 1.0), rng.uniform(0.2, 1.8), 2.0 ** rng.uniform(-1.0, 1.0)
         if not same_top:
             top = SymmetricTop(top.I1 * size, top.I1 * size * shape, top.mgl * size * weight)
-        rates = rate * draw.uniform(-1.0, 1.0, 3) * np.array([0.5, 0.5, 2.0])
-        yield Scene("drawn", top, Angles(math.acos(cosine), *draw.uniform(-3.0, 3.0, 2), *rates.tolist()), 1.0)
+        rates = rate * rng.uniform(-1.0, 1.0, 3) * np.array([0.5, 0.5, 2.0])
+        yield Scene("drawn", top, Angles(math.acos(cosine), *rng.uniform(-3.0, 3.0, 2), *rates.tolist()), 1.0)
 
 
 def step_map(method: Integrator, chart: str, scene: Scene) -> tuple[StepMap, Angles]:
@@ -211,16 +211,16 @@ def bracket(chart: str, y: Array) -> Array:
     """B(Y): the brackets of all pairs of the chart's variables, momenta in the map's unit."""
     if chart in ("angles", "nutation"):
         return canonical(y.size)
-    place, momentum = y[:-3], y[-3:]
+    position, momentum = y[:-3], y[-3:]
     units = np.eye(3)
-    spun = [np.cross(unit, momentum) for unit in units]
+    rotations = [np.cross(unit, momentum) for unit in units]
     if chart == "axis":
-        turned = [np.cross(unit, place) for unit in units]
+        columns = [np.cross(unit, position) for unit in units]
     else:
-        w, x = place[0], place[1:]
-        turned = [0.5 * np.array([-(unit @ x), *(w * unit + np.cross(unit, x))]) for unit in units]
-    moved = np.stack(turned, axis=1)
-    return np.block([[np.zeros((place.size, place.size)), moved], [-moved.T, np.stack(spun, axis=1)]])
+        w, x = position[0], position[1:]
+        columns = [0.5 * np.array([-(unit @ x), *(w * unit + np.cross(unit, x))]) for unit in units]
+    block = np.stack(columns, axis=1)
+    return np.block([[np.zeros((position.size, position.size)), block], [-block.T, np.stack(rotations, axis=1)]])
 
 
 class Defect(NamedTuple):
@@ -240,18 +240,18 @@ def symplectic_defect(step: StepMap, start: Angles) -> Defect:
     scale = min(1.0, math.sin(start.theta))  # near a pole the map varies over the distance from the pole
     widths = np.array([scale * WIDEST_DIFFERENCE / 2.0**k for k in range(WIDTHS)])
     table = [[_differences(step, z, middle, width)] for width in widths]
-    best, doubt = table[0][0], math.inf
+    best, error = table[0][0], math.inf
     for k in range(1, WIDTHS):
         for j in range(1, k + 1):
             finer, coarser = table[k][j - 1], table[k - 1][j - 1]
             table[k].append(finer + (finer - coarser) / (4.0**j - 1.0))
             change = max(_largest(table[k][j] - finer), _largest(table[k][j] - coarser))
-            if change < doubt:
-                best, doubt = table[k][j], change
-    noise = 4.0 * _largest(best) * doubt + 1e-13
-    raw = np.array([_largest(_miss(step.chart, row[0], middle)) for row in table])
-    rest = float(np.linalg.svd(_miss(step.chart, best, middle), compute_uv=False)[2:3].sum())
-    return Defect(_largest(_miss(step.chart, best, middle)), rest, noise, widths, raw)
+            if change < error:
+                best, error = table[k][j], change
+    noise = 4.0 * _largest(best) * error + 1e-13
+    raw = np.array([_largest(_defect(step.chart, row[0], middle)) for row in table])
+    remainder = float(np.linalg.svd(_defect(step.chart, best, middle), compute_uv=False)[2:3].sum())
+    return Defect(_largest(_defect(step.chart, best, middle)), remainder, noise, widths, raw)
 
 
 def _differences(step: StepMap, z: Array, middle: Array, width: float) -> Array:
@@ -260,21 +260,21 @@ def _differences(step: StepMap, z: Array, middle: Array, width: float) -> Array:
         if step.chart == "axis" and k == 2:  # the variables of the axis chart do not depend on psi
             columns.append(np.zeros_like(middle))
             continue
-        aside = width * np.eye(z.size)[k]
-        ahead, behind = (aligned(step.chart, step.image(z + sign * aside), middle) for sign in (1.0, -1.0))
-        columns.append((ahead - behind) / (2.0 * width))
+        offset = width * np.eye(z.size)[k]
+        forward, backward = (aligned(step.chart, step.image(z + sign * offset), middle) for sign in (1.0, -1.0))
+        columns.append((forward - backward) / (2.0 * width))
     return np.stack(columns, axis=1)
 
 
 def aligned(chart: str, y: Array, middle: Array) -> Array:
     """Y with the sign of q that is nearer to that of `middle`: q and -q are one attitude."""
-    other = chart == "attitude" and float(y[:4] @ middle[:4]) < 0.0
-    return np.concatenate([-y[:4], y[4:]]) if other else y
+    opposite = chart == "attitude" and float(y[:4] @ middle[:4]) < 0.0
+    return np.concatenate([-y[:4], y[4:]]) if opposite else y
 
 
-def _miss(chart: str, slopes: Array, y: Array) -> Array:
-    wrong: Array = slopes @ canonical(slopes.shape[1]) @ slopes.T - bracket(chart, y)
-    return wrong
+def _defect(chart: str, slopes: Array, y: Array) -> Array:
+    difference: Array = slopes @ canonical(slopes.shape[1]) @ slopes.T - bracket(chart, y)
+    return difference
 
 
 def _largest(matrix: Any) -> float:
@@ -292,12 +292,12 @@ def return_miss(step: StepMap, start: Angles) -> float:
                 return step.gap(step.shown(there_and_back(step.top, start, step.h)), before)
             if abs(step.length(step.image(step.point(start))) - 1.0) > UNIT_LENGTH:
                 raise
-    arrived = step.restart(step.image(step.point(start)))
+    end = step.restart(step.image(step.point(start)))
     if step.method.fixed_step:
         with contextlib.suppress(SymtopError):
-            return step.gap(step.shown(step.run(arrived, -step.h)), before)
-    back = step.restart(step.shown(step.run(reversed_rates(arrived), step.h)))
-    return step.gap(step.at(reversed_rates(back)), before)
+            return step.gap(step.shown(step.run(end, -step.h)), before)
+    returned = step.restart(step.shown(step.run(reversed_rates(end), step.h)))
+    return step.gap(step.at(reversed_rates(returned)), before)
 
 
 def reversed_rates(start: Angles) -> Angles:
@@ -311,10 +311,10 @@ def restart_gap(step: StepMap, start: Angles) -> float:
     A step that does not keep |e| or |q| at one cannot be continued from a start: no evidence, and the result is zero.
     """
     if (onward := step.own("onward")) is not None:
-        singly = step.shown(onward(step.top, start, (0.25 * step.h,) * SEVERAL))
-        return step.gap(step.shown(step.run(start, 0.25 * step.h, SEVERAL)), singly)
+        steps = step.shown(onward(step.top, start, (0.25 * step.h,) * SEVERAL))
+        return step.gap(step.shown(step.run(start, 0.25 * step.h, SEVERAL)), steps)
     after = step.image(step.point(start))
     if not step.method.fixed_step or abs(step.length(after) - 1.0) > UNIT_LENGTH:
         return 0.0
-    once = step.restart(after)
-    return step.gap(step.shown(step.run(start, step.h, 2)), step.shown(step.run(once, step.h)))
+    middle = step.restart(after)
+    return step.gap(step.shown(step.run(start, step.h, 2)), step.shown(step.run(middle, step.h)))

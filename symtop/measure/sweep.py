@@ -86,57 +86,57 @@ def sweep(
     scenes and integrators than the file holds, but not fewer. Raises SymtopError for invalid arguments, for a damaged
     file, and for one that another process is writing.
     """
-    chosen = [find_scene(scene, bodies=True) for scene in listed(scenes)]
+    problems = [find_scene(scene, bodies=True) for scene in listed(scenes)]
     methods = [find_integrator(name) for name in listed(integrators)]
     silent = boolean("quiet", quiet)
     workers = cores() if threads is None else whole("threads", threads, 1, MOST_THREADS)
-    named = {"scenes": [scene.name for scene in chosen], "integrators": [method.name for method in methods]}
+    named = {"scenes": [scene.name for scene in problems], "integrators": [method.name for method in methods]}
     for words, names in named.items():
         if not names or len(set(names)) < len(names):
             raise SymtopError(f"{words} must be one or more, each once, not {names!r}")
     asked = {"step_size": step_size, "per_nutation": per_nutation, "tolerance": tolerance}
-    given = {name: _settings(name, values) for name, values in asked.items() if values is not None}
+    controls = {name: _settings(name, values) for name, values in asked.items() if values is not None}
     clock = boolean("timed", timed)
-    grid = [[_cell(scene, method, given, horizon, observe, clock) for method in methods] for scene in chosen]
+    grid = [[_cell(scene, method, controls, horizon, observe, clock) for method in methods] for scene in problems]
     cells = [cell for row in grid for cell in row]
     pairs = [(cell.scene.name, cell.method.name) for cell in cells]
     file = None if path is None else file_path("path", path)
     with contextlib.nullcontext() if file is None else files.only_writer(file):
-        stored, done = _stored(file)
-        if others := [f"{name} on {of}" for of, name in stored if (of, name) not in pairs]:
-            few = ", ".join(others[:MOST_NAMED]) + f" and {len(others) - MOST_NAMED} more" * bool(others[MOST_NAMED:])
-            must = f"{few}: ask for these as well, or name another path"
-            raise SymtopError(f"path {str(file)!r} holds what was not asked for, {must}")
+        stored, tables = _stored(file)
+        if others := [f"{name} on {scene}" for scene, name in stored if (scene, name) not in pairs]:
+            first = ", ".join(others[:MOST_NAMED]) + f" and {len(others) - MOST_NAMED} more" * bool(others[MOST_NAMED:])
+            rule = f"{first}: ask for these as well, or name another path"
+            raise SymtopError(f"path {str(file)!r} holds what was not asked for, {rule}")
         # cells with an exception are computed again: the cause may have been temporary
-        rest = [cell for cell in cells if cell.made_of not in done or RAISED in done[cell.made_of]["outcome"].values]
+        new = [cell for cell in cells if cell.made_of not in tables or RAISED in tables[cell.made_of]["outcome"].values]
 
         def combined() -> xr.Dataset:
             size = max(len(cell.settings) for cell in cells)
-            tables = [[_padded(done.get(cell.made_of), cell, size) for cell in row] for row in grid]
-            data = xr.concat([xr.concat(row, "variant") for row in tables], "scene")
+            padded = [[_padded(tables.get(cell.made_of), cell, size) for cell in row] for row in grid]
+            data = xr.concat([xr.concat(row, "variant") for row in padded], "scene")
             data = data.assign_coords(scene=named["scenes"], variant=named["integrators"])
-            charts = [[chart_of(method, scene.observes, observe) for method in methods] for scene in chosen]
+            charts = [[chart_of(method, scene.observes, observe) for method in methods] for scene in problems]
             data["chart"] = ("scene", "variant"), charts
-            units = chosen[0].units if len({scene.units for scene in chosen}) == 1 else ""
+            units = problems[0].units if len({scene.units for scene in problems}) == 1 else ""
             words = {"timed": TIMED if timed else "nothing: timed was not asked for", "units": units}
             title, content = "errors and work of a sweep", netcdf.content_hash(data)
-            data = columns.described(data, units, of_body=[scene.of_body for scene in chosen])
+            data = columns.described(data, units, of_body=[scene.of_body for scene in problems])
             ends = {row[0].scene.name: row[0].horizon for row in grid}
-            return netcdf.describe(data, title, content=content, **words, **attributes(chosen, ends))
+            return netcdf.describe(data, title, content=content, **words, **attributes(problems, ends))
 
-        written = time.monotonic()
-        with progress_bar("sweep", quiet=silent, total=len(cells), initial=len(cells) - len(rest)) as bar:
+        saved = time.monotonic()
+        with progress_bar("sweep", quiet=silent, total=len(cells), initial=len(cells) - len(new)) as bar:
             try:
-                for cell, table in zip(rest, in_threads(_table, rest, workers), strict=True):
-                    done[cell.made_of] = table
+                for cell, table in zip(new, in_threads(_table, new, workers), strict=True):
+                    tables[cell.made_of] = table
                     bar.update()
-                    if file is not None and time.monotonic() - written > KEEP_EVERY:
+                    if file is not None and time.monotonic() - saved > KEEP_EVERY:
                         netcdf.write(combined(), file)
-                        written = time.monotonic()
+                        saved = time.monotonic()
                 bar.set_description("timing")
-                changed = _time([cell for cell in cells if timed], done) or bool(rest)
+                changed = _time_cells([cell for cell in cells if timed], tables) or bool(new)
             except BaseException:
-                if file is not None and done:
+                if file is not None and tables:
                     netcdf.write(combined(), file)
                 raise
         data = combined()
@@ -175,28 +175,28 @@ def _settings(name: str, values: object) -> list[float]:
 
 
 def _cell(
-    scene: Scene, method: Integrator, given: dict[str, list[float]], horizon: float | None, observe: str | None,
+    scene: Scene, method: Integrator, controls: dict[str, list[float]], horizon: float | None, observe: str | None,
     timed: bool,
 ) -> _Cell:  # fmt: skip
     """A cell; SymtopError before any run if one of its runs has invalid arguments."""
-    until = scene.horizon if horizon is None else horizon_of(horizon)
+    end = scene.horizon if horizon is None else horizon_of(horizon)
     if method.fixed_step:
-        if ("step_size" in given) is ("per_nutation" in given):
-            both = ", not both" if "step_size" in given else ""
-            raise SymtopError(f"{method.name} has a fixed step: give step_size or per_nutation{both}")
-        settings = given.get("step_size") or [scene.time_scale(until) / count for count in given["per_nutation"]]
+        if ("step_size" in controls) is ("per_nutation" in controls):
+            note = ", not both" if "step_size" in controls else ""
+            raise SymtopError(f"{method.name} has a fixed step: give step_size or per_nutation{note}")
+        settings = controls.get("step_size") or [scene.time_scale(end) / count for count in controls["per_nutation"]]
     elif method.adaptive:
-        if "tolerance" not in given:
+        if "tolerance" not in controls:
             raise SymtopError(f"{method.name} is adaptive: give tolerance")
-        settings = given["tolerance"]
+        settings = controls["tolerance"]
     else:
         settings = [math.nan]
     for value in settings:
-        make_plan(scene, method, **method.given(value), horizon=until, samples=enough_samples(scene, until))
+        make_plan(scene, method, **method.given(value), horizon=end, samples=enough_samples(scene, end))
     made_of = _code().reasons("sweep", error_row, scene, method) | code_hash.packages()
-    question = (settings, until, observe, "timed") if timed else (settings, until, observe)
-    digest = code_hash.digest(made_of | {"settings": repr(question)})
-    return _Cell(scene, method, tuple(settings), until, observe, timed, digest)
+    settings_key = (settings, end, observe, "timed") if timed else (settings, end, observe)
+    digest = code_hash.digest(made_of | {"settings": repr(settings_key)})
+    return _Cell(scene, method, tuple(settings), end, observe, timed, digest)
 
 
 def _table(cell: _Cell) -> xr.Dataset:
@@ -214,29 +214,29 @@ def error_row_or_message(
         return blank_row(method) | {"outcome": RAISED, "message": str(error)} | method.given(setting)
 
 
-def _time(cells: list[_Cell], done: dict[str, xr.Dataset]) -> bool:
-    """Time the cells in `done` that have no times yet; False if there were none."""
-    waiting = [(cell, done[cell.made_of]) for cell in cells if done[cell.made_of]["seconds"].isnull().all()]
+def _time_cells(cells: list[_Cell], tables: dict[str, xr.Dataset]) -> bool:
+    """Time the cells in `tables` that have no times yet; False if there were none."""
+    untimed = [(cell, tables[cell.made_of]) for cell in cells if tables[cell.made_of]["seconds"].isnull().all()]
     runs: list[tuple[Scene, Integrator, float, list[dict[str, Any]]]] = []
-    for cell, table in waiting:
+    for cell, table in untimed:
         outcomes = zip(cell.settings, table["outcome"].values, strict=True)
         rows = [{"setting_value": setting, "outcome": outcome} | NOT_TIMED for setting, outcome in outcomes]
         chart = chart_of(cell.method, cell.scene.observes, cell.observe)
         runs.append((cell.scene, cell.method.variant(chart), cell.horizon, rows))
     timed_rows(runs)
-    for (cell, table), (*_, rows) in zip(waiting, runs, strict=True):
-        done[cell.made_of] = table.assign({name: ("setting", [run[name] for run in rows]) for name in NOT_TIMED})
-    return bool(waiting)
+    for (cell, table), (*_, rows) in zip(untimed, runs, strict=True):
+        tables[cell.made_of] = table.assign({name: ("setting", [run[name] for run in rows]) for name in NOT_TIMED})
+    return bool(untimed)
 
 
 def timed_rows(cells: list[tuple[Scene, Integrator, float, list[dict[str, Any]]]]) -> None:
     """Time all runs with outcome "ok" against each other; adds "seconds" and "seconds_spread" to the rows of cells."""
     rows, calls, firsts = [], list[Callable[[], object]](), list[Callable[[], object]]()
     for scene, method, horizon, runs in cells:
-        rows += (ended := [run for run in runs if run["outcome"] == "ok"])
-        own = [bare_run(scene, method, next(iter(method.solvers)), run["setting_value"], horizon) for run in ended]
-        calls += own
-        firsts += own[:1]
+        rows += (valid := [run for run in runs if run["outcome"] == "ok"])
+        timed = [bare_run(scene, method, next(iter(method.solvers)), run["setting_value"], horizon) for run in valid]
+        calls += timed
+        firsts += timed[:1]
     with foreign_code("a method that is timed"):
         if firsts:
             closed_form.compile_now()
@@ -252,9 +252,9 @@ def _padded(table: xr.Dataset | None, cell: _Cell, size: int) -> xr.Dataset:
     blank = as_table([blank_row(cell.method) | {"message": ""} | (NOT_TIMED if cell.timed else {})] * size)
     if table is None:
         return blank.assign(made_of=((), ""))
-    short = size - table.sizes["setting"]
-    whole = xr.concat([table, blank.isel(setting=slice(0, short))], "setting") if short else table
-    return whole.assign(made_of=((), cell.made_of))
+    missing = size - table.sizes["setting"]
+    padded = xr.concat([table, blank.isel(setting=slice(0, missing))], "setting") if missing else table
+    return padded.assign(made_of=((), cell.made_of))
 
 
 def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Dataset]]:
@@ -266,7 +266,7 @@ def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Data
     data = netcdf.read(file)
     if "made_of" not in data:
         raise SymtopError(f"path must be a new file or that of a sweep, not {str(file)!r}")
-    if data.attrs.get("content", made := netcdf.content_hash(data)) != made:
+    if data.attrs.get("content", content := netcdf.content_hash(data)) != content:
         raise SymtopError(f"path {str(file)!r} is damaged, its numbers are not those that were written: remove it")
     if "integrator" in data.coords:  # a file of version 0.2
         data = data.rename(integrator="variant")
@@ -276,9 +276,9 @@ def _stored(file: Path | None) -> tuple[list[tuple[str, str]], dict[str, xr.Data
             cell = data.isel(scene=s, variant=i)
             digest, run = str(cell["made_of"].values), cell["outcome"].values != "not_run"
             if digest and run.any():
-                own = cell.drop_attrs().drop_vars(["scene", "variant", "made_of", "chart"], errors="ignore")
+                table = cell.drop_attrs().drop_vars(["scene", "variant", "made_of", "chart"], errors="ignore")
                 pairs.append((scene, name))
-                tables[digest] = own.isel(setting=np.flatnonzero(run))
+                tables[digest] = table.isel(setting=np.flatnonzero(run))
     return pairs, tables
 
 

@@ -62,10 +62,10 @@ def first_call(function: Callable[[], object]) -> float:
     return _batch(function, 1)
 
 
-def _calibrate(function: Callable[[], object], batch: float, once: float) -> tuple[int, list[float]]:
+def _calibrate(function: Callable[[], object], batch: float, limit: float) -> tuple[int, list[float]]:
     """How many calls last a little over `batch` seconds; if a single call does, also the times of the trial calls."""
     count, single = 1, [_batch(function, 1)]
-    if min(TRIAL_SECONDS, batch) <= single[0] < once:  # once more: a garbage collection may have disturbed the first
+    if min(TRIAL_SECONDS, batch) <= single[0] < limit:  # once more: a garbage collection may have disturbed the first
         single.append(_batch(function, 1))
     elapsed = min(single)
     while elapsed < min(TRIAL_SECONDS, batch):
@@ -98,21 +98,21 @@ def timings(
         count, single = _calibrate(function, batch, math.inf if least > 1 else patience)
         calls.append(count)
         samples.append(single if warm else [])
-    draw = random.Random(0)  # noqa: S311
+    rng = random.Random(0)  # noqa: S311
     for number in range(batches):
-        long = [len(row) >= least and count * sum(row) >= patience for row, count in zip(samples, calls, strict=True)]
-        if all(enough or agree(row, close) for row, enough in zip(samples, long, strict=True)):
+        ready = [len(row) >= least and count * sum(row) >= patience for row, count in zip(samples, calls, strict=True)]
+        if all(stop or agree(row, close) for row, stop in zip(samples, ready, strict=True)):
             break
-        for index in draw.sample(range(len(functions)), len(functions)):
-            if len(samples[index]) <= number and not long[index]:
+        for index in rng.sample(range(len(functions)), len(functions)):
+            if len(samples[index]) <= number and not ready[index]:
                 samples[index].append(_batch(functions[index], calls[index]) / calls[index])
     return [Timing(tuple(row), first) for row, first in zip(samples, firsts, strict=True)]
 
 
 def agree(samples: Sequence[float], close: float) -> bool:
     """Do the least three of at least `LEAST_SAMPLES` samples agree within `close`? Fewer may agree on a wrong time."""
-    least = sorted(samples)[:3]
-    return len(samples) >= LEAST_SAMPLES and least[2] < (1.0 + close) * least[0]
+    fastest = sorted(samples)[:3]
+    return len(samples) >= LEAST_SAMPLES and fastest[2] < (1.0 + close) * fastest[0]
 
 
 def bare_run(
@@ -151,15 +151,15 @@ def slowdown(submit: Callable[..., Future[Any]], size: int) -> float:
     run needs, and up to 2 where two workers run on two hardware threads of one core.
     """
 
-    def at_once() -> list[tuple[int, float, float, float]]:
+    def concurrent_turns() -> list[tuple[int, float, float, float]]:
         return [future.result() for future in [submit(timed_turn) for _ in range(size)]]
 
     for _ in range(TRIES):
-        if len({process for process, *_ in at_once()}) == size:
+        if len({process for process, *_ in concurrent_turns()}) == size:
             break
     ratios = []
     for _ in range(TURNS):
-        alone, together = submit(timed_turn).result(), at_once()
-        if min(end for _, _, end, _ in together) - max(begin for _, begin, _, _ in together) > 0.5 * TURN_SECONDS:
-            ratios.append(max(seconds for *_, seconds in together) / alone[-1])
+        single, parallel = submit(timed_turn).result(), concurrent_turns()
+        if min(end for _, _, end, _ in parallel) - max(begin for _, begin, _, _ in parallel) > 0.5 * TURN_SECONDS:
+            ratios.append(max(seconds for *_, seconds in parallel) / single[-1])
     return statistics.median(ratios) if ratios else math.inf

@@ -47,10 +47,10 @@ def pole_passed(scene: Scene, p_phi: Any, p_psi: Any) -> NDArray[np.bool_]:
     if scene.of_body:  # no momentum keeps its axis from a pole
         return passed
     momenta = scene.top.momenta(scene.start)
-    least = NO_GAP * scene.momentum_scale
-    for gap, now in ((momenta.north, p_phi - p_psi), (momenta.south, p_phi + p_psi)):
-        if abs(gap) > least:
-            passed |= now * gap < 0.0
+    smallest = NO_GAP * scene.momentum_scale
+    for gap, value in ((momenta.north, p_phi - p_psi), (momenta.south, p_phi + p_psi)):
+        if abs(gap) > smallest:
+            passed |= value * gap < 0.0
     return passed
 
 
@@ -68,38 +68,38 @@ class Judgement(NamedTuple):
 
 def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgement:
     """The verdict on a run with the given axis errors (attitude errors for a body); NaN counts as the largest error."""
-    times, ended = run["time"].values, str(run.attrs["outcome"])
-    if ended != "ok":
-        return Judgement(ended, float(run.attrs["reached_time"]), str(run.attrs["outcome_message"]))
+    times, outcome = run["time"].values, str(run.attrs["outcome"])
+    if outcome != "ok":
+        return Judgement(outcome, float(run.attrs["reached_time"]), str(run.attrs["outcome_message"]))
     (highest, lowest, margin, accurate), worst = barriers(scene), float(np.max(axis_error))
     if worst <= accurate:
-        sentence = f"accurate to {_upwards(worst)} rad up to t = {times[-1]:.6g}{scene.second}"
+        sentence = f"accurate to {_rounded_up(worst)} rad up to t = {times[-1]:.6g}{scene.second}"
         return Judgement("accurate", float(times[-1]), sentence)
     theta, energy = run["theta"].values, np.abs(run["energy"].values - run["energy"].values[0]) / scene.energy_scale
-    beyond = ~((theta >= highest - margin) & (theta <= lowest + margin))
-    strays = beyond | pole_passed(scene, run["p_phi"].values, run.get("p_psi", run["p_phi"]).values)
+    outside = ~((theta >= highest - margin) & (theta <= lowest + margin))
+    violations = outside | pole_passed(scene, run["p_phi"].values, run.get("p_psi", run["p_phi"]).values)
     half = energy.size // 2
-    early, late = np.max(energy[:half] if half >= FEWEST_SAMPLES else energy), np.max(energy[half:])
-    if strays.any():
-        first = int(np.argmax(strays))
+    first_half, second_half = np.max(energy[:half] if half >= FEWEST_SAMPLES else energy), np.max(energy[half:])
+    if violations.any():
+        first = int(np.argmax(violations))
         word, sentence = "wrong_regime", "the axis had passed a pole on the side that its momenta forbid"
-        if beyond[first]:
+        if outside[first]:
             bounds = f"{highest:.4g} to {lowest:.4g}"
             sentence = f"theta was {theta[first]:.4g} rad, where the true motion never goes ({bounds})"
         sentence = f"at t = {times[first]:.6g}{scene.second} {sentence}"
-    elif not (late <= DRIFT_ERROR or late <= GROWING_RATIO * early):
+    elif not (second_half <= DRIFT_ERROR or second_half <= GROWING_RATIO * first_half):
         word, first = "drifting", int(np.argmax(~(energy <= DRIFT_ERROR)))
-        at = f"{times[first]:.6g}{scene.second}"
-        sentence = f"the energy error passed {DRIFT_ERROR:.0%} at t = {at} and grew on, to {energy.max():.2g}"
+        where = f"{times[first]:.6g}{scene.second}"
+        sentence = f"the energy error passed {DRIFT_ERROR:.0%} at t = {where} and grew on, to {energy.max():.2g}"
     else:
         word, first, energies = "bounded_but_wrong", int(np.argmax(~(axis_error <= accurate))), "stayed within {}"
-        if late > max(GROWING_RATIO * early, ROUNDING * scene.energy_grain):
+        if second_half > max(GROWING_RATIO * first_half, ROUNDING * scene.energy_grain):
             word, energies = "wrong", f"error grew, to {{}}, below {DRIFT_ERROR:.0%}"
-        energies = f"while the energy {energies.format(_upwards(energy.max()))}"
+        energies = f"while the energy {energies.format(_rounded_up(energy.max()))}"
         sentence = f"the axis error passed {accurate:.2g} rad at t = {times[first]:.6g}{scene.second} {energies}"
     return Judgement(word, float(times[first]), sentence)
 
 
-def _upwards(bound: float) -> str:
+def _rounded_up(bound: float) -> str:
     """A bound to two digits, rounded up."""
     return f"{float(Context(prec=2, rounding=ROUND_CEILING).create_decimal(repr(float(bound)))):.2g}"

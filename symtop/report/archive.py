@@ -78,8 +78,8 @@ def bundle(results: Path, target: Path | None = None) -> Path:
 
 def _stored(results: Path) -> list[Path]:
     """The files of a results folder that are bundled: no cases, and only figures and tables of the report."""
-    gathered = page.gather(results)
-    report_files = {results / kind / item["file"] for study in gathered for kind, items in (
+    studies = page.gather(results)
+    report_files = {results / kind / item["file"] for study in studies for kind, items in (
         ("figures", study["pictures"]), ("tables", study["tables"])) for item in items}  # fmt: skip
     endings = "*.nc", "*.json", "report.html", page.WORDS, page.REFERENCE
     files = [path for ending in endings for path in results.glob(ending)]
@@ -88,20 +88,20 @@ def _stored(results: Path) -> list[Path]:
 
 def readme(results: Path, files: Mapping[str, bytes]) -> str:
     """The README in Markdown: how the bundle was made, its files, and every variable of every dataset."""
-    listed = table(["file", "bytes"], [[name, f"{len(content):,}"] for name, content in sorted(files.items())])
-    described = [_described(f"results/{path.name}", netcdf.read_any(path)) for path in sorted(results.glob("*.nc"))]
-    described.append(_described("scenes/states.nc", states(list(scenes().values()))))
+    file_table = table(["file", "bytes"], [[name, f"{len(content):,}"] for name, content in sorted(files.items())])
+    sections = [_section(f"results/{path.name}", netcdf.read_any(path)) for path in sorted(results.glob("*.nc"))]
+    sections.append(_section("scenes/states.nc", states(list(scenes().values()))))
     return str(environment().get_template("archive.md").render(
         name=NAME, version=__version__, revision=netcdf.provenance()["symtop_revision"], times=TIMES, digits=DIGITS,
-        working=WORKING, files=listed, datasets=described,
+        working=WORKING, files=file_table, datasets=sections,
     ))  # fmt: skip
 
 
-def _described(name: str, data: xr.Dataset | xr.DataTree) -> str:
+def _section(name: str, data: xr.Dataset | xr.DataTree) -> str:
     """A section of the README on one dataset: title, origin, and the variables of each group."""
-    about = [data.attrs.get(key, "") for key in ("title", "question")]
+    titles = [data.attrs.get(key, "") for key in ("title", "question")]
     origin = ", ".join(str(data.attrs[key]) for key in ("symtop_revision", "processor") if key in data.attrs)
-    parts = [f"### {name}", " ".join(filter(None, map(str, about))), f"Made by: {origin}." if origin else ""]
+    parts = [f"### {name}", " ".join(filter(None, map(str, titles))), f"Made by: {origin}." if origin else ""]
     for group, variables in netcdf.groups(data).items():
         rows = [
             [str(key), " x ".join(f"{dimension} ({length})" for dimension, length in variable.sizes.items()),
@@ -181,12 +181,12 @@ def states(entries: Sequence[Scene]) -> xr.Dataset:
     """
     exact = np.array([precise(scene) for scene in entries], dtype=object)
     values = exact.astype(float)
-    both = ("scene", "sample")
-    variables: dict[str, Any] = {"time": (both, [times_of(scene) for scene in entries])}
+    dims = ("scene", "sample")
+    variables: dict[str, Any] = {"time": (dims, [times_of(scene) for scene in entries])}
     for ending, numbers in (("", values), ("_lo", (exact - values).astype(float))):
-        variables |= {f"{name}{ending}": (both, numbers[..., k]) for k, name in enumerate(ANGLES)}
-        variables[f"axis{ending}"] = ((*both, "component"), numbers[..., 6:9])
-        variables[f"quaternion{ending}"] = ((*both, "part"), numbers[..., 9:])
+        variables |= {f"{name}{ending}": (dims, numbers[..., k]) for k, name in enumerate(ANGLES)}
+        variables[f"axis{ending}"] = ((*dims, "component"), numbers[..., 6:9])
+        variables[f"quaternion{ending}"] = ((*dims, "part"), numbers[..., 9:])
     for name, column in zip(NUMBERS, zip(*(flat(row.top, row.start) for row in entries), strict=True), strict=True):
         variables[f"{name}_0" if name in ANGLES else name] = ("scene", list(column))
     names = [scene.name for scene in entries]

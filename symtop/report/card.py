@@ -31,10 +31,10 @@ SIGNS = {"confirmed": "✓", "refuted": "✗", "measured": "=", "undecided": "?"
 def figures(ledger: Ledger) -> tuple[Any, Any]:
     """Two figures: errors against the step size, and the change of the energy over the long run."""
     with mpl.rc_context(PAPER):  # without changing the caller's settings
-        both = Figure(figsize=(4.8, 3.9)), Figure(figsize=(4.8, 3.9))
-        _order(both[0].subplots(), ledger)
-        _energy(both[1].subplots(), ledger)
-    return both
+        drawings = Figure(figsize=(4.8, 3.9)), Figure(figsize=(4.8, 3.9))
+        _order(drawings[0].subplots(), ledger)
+        _energy(drawings[1].subplots(), ledger)
+    return drawings
 
 
 def _as_svg(figure: Any) -> str:
@@ -51,16 +51,16 @@ def _order(axis: Any, ledger: Ledger) -> None:
     steps, errors = (np.asarray(traces.get(name, [])) for name in ("step_size", "error"))
     valid = np.isfinite(steps) & (errors > 0.0)
     if not valid.any():
-        _nothing(axis, finding)
+        _write_reason(axis, finding)
         return
-    fitted = np.asarray(traces["fitted"]) == 1.0
+    in_fit = np.asarray(traces["fitted"]) == 1.0
     axis.plot(steps[valid], errors[valid], "o", color=GREY, fillstyle="none", label="not in the fit")
-    axis.plot(steps[valid & fitted], errors[valid & fitted], "o", color=BLUE, label="in the fit")
+    axis.plot(steps[valid & in_fit], errors[valid & in_fit], "o", color=BLUE, label="in the fit")
     axis.set(xscale="log", yscale="log")
     claimed = finding.declared.isdigit()
     slope = float(finding.declared) if claimed else finding.value
     if 0.5 < slope < 99.0:
-        points = valid & fitted if (valid & fitted).any() else valid
+        points = valid & in_fit if (valid & in_fit).any() else valid
         span, order = (steps[points].min(), steps[points].max()), round(slope)
         label = f"$h^{{{order}}}${', as claimed' if claimed else ''}"
         slope_guide(axis, order, span, errors[points][np.argmin(steps[points])], label)
@@ -77,7 +77,7 @@ def _energy(axis: Any, ledger: Ledger) -> None:
     times, change = (np.asarray(traces.get(name, [])) for name in ("long_nutations", "energy_change"))
     valid = np.isfinite(change) & np.isfinite(times)
     if not valid.any():
-        _nothing(axis, finding)
+        _write_reason(axis, finding)
         return
     axis.plot(
         times[valid], np.maximum(change[valid], SMALLEST), color=ORANGE, label=f"{int(traces['steps_run'])} steps"
@@ -88,7 +88,7 @@ def _energy(axis: Any, ledger: Ledger) -> None:
     axis.legend(frameon=False)
 
 
-def _nothing(axis: Any, finding: Finding) -> None:
+def _write_reason(axis: Any, finding: Finding) -> None:
     """Write the reason into a panel without points."""
     words = textwrap.fill(finding.why or "it was not measured", 44)
     axis.text(0.5, 0.5, words, ha="center", va="center", transform=axis.transAxes)

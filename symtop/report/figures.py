@@ -44,9 +44,9 @@ def keep_apart(places: Sequence[float], gap: float) -> list[float]:
 
     order, gaps = np.argsort(places, kind="stable"), gap * np.arange(len(places))
     level = isotonic_regression(np.array(places)[order] - gaps).x
-    placed = np.empty(len(places))
-    placed[order] = np.clip(level, 0.0, 1.0 - gaps[-1]) + gaps
-    return placed.tolist()
+    positions = np.empty(len(places))
+    positions[order] = np.clip(level, 0.0, 1.0 - gaps[-1]) + gaps
+    return positions.tolist()
 
 
 def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]]) -> None:
@@ -58,11 +58,11 @@ def name_ends(axis: Any, ends: Mapping[str, tuple[float, float, str]]) -> None:
         return
     axis.figure.canvas.figure.draw_without_rendering()  # the top-level figure, also for a subfigure
     height = axis.get_window_extent().height * 72.0 / axis.figure.dpi
-    places = axis.transAxes.inverted().transform(axis.transData.transform([end[:2] for end in ends.values()]))
-    heights = keep_apart([float(np.clip(y, 0.0, 1.0)) for _, y in places], 1.2 * LEAST_TEXT / height)
-    for (name, (x, y, color)), place in zip(ends.items(), heights, strict=True):
+    points = axis.transAxes.inverted().transform(axis.transData.transform([end[:2] for end in ends.values()]))
+    heights = keep_apart([float(np.clip(y, 0.0, 1.0)) for _, y in points], 1.2 * LEAST_TEXT / height)
+    for (name, (x, y, color)), level in zip(ends.items(), heights, strict=True):
         axis.annotate(
-            name, (x, y), (1.04, place), textcoords="axes fraction", va="center", fontsize=LEAST_TEXT, color=ink(color),
+            name, (x, y), (1.04, level), textcoords="axes fraction", va="center", fontsize=LEAST_TEXT, color=ink(color),
             arrowprops={"arrowstyle": "-", "color": color, "lw": 0.5, "shrinkA": 0, "shrinkB": 1, "relpos": (0.0, 0.5)},
             annotation_clip=False,
         )  # fmt: skip
@@ -79,26 +79,26 @@ def label_lines(axis: Any, lines: Sequence[tuple[str, str, Any, Any]], others: S
     figure = axis.figure.canvas.figure
     figure.draw_without_rendering()
     renderer, frame, point = figure.canvas.get_renderer(), axis.get_window_extent(), figure.dpi / 72.0
-    marks = np.concatenate([_dense(axis, x, y) for *_, x, y in [*lines, *others]])
+    marks = np.concatenate([_dense_points(axis, x, y) for *_, x, y in [*lines, *others]])
     dots = [axis.transData.transform(np.stack([x, y], axis=1)) for *_, x, y in lines]
     halo = [withStroke(linewidth=2.5, foreground="white")]  # makes a name readable over lines
     look: dict[str, Any] = {"textcoords": "offset points", "va": "center", "size": LEAST_TEXT, "weight": "bold"}
     boxes: list[Any] = []
-    for place in sorted(range(len(lines)), key=lambda place: -len(lines[place][0])):
-        name, color, x, y = lines[place]
+    for index in sorted(range(len(lines)), key=lambda index: -len(lines[index][0])):
+        name, color, x, y = lines[index]
         text = axis.annotate(name, (x[0], y[0]), (0, 0), color=ink(color), path_effects=halo, **look)
-        size, own = text.get_window_extent(renderer).size, dots[place]
-        foreign = np.concatenate([marks[:0], *(points for i, points in enumerate(dots) if i != place)])
-        between = np.concatenate([own[1:-1], 0.5 * (own[1:] + own[:-1])])
-        spots = [own[-1], own[0], *between[:: len(between) // MOST_SPOTS + 1]]
+        size, track = text.get_window_extent(renderer).size, dots[index]
+        foreign = np.concatenate([marks[:0], *(points for i, points in enumerate(dots) if i != index)])
+        between = np.concatenate([track[1:-1], 0.5 * (track[1:] + track[:-1])])
+        spots = [track[-1], track[0], *between[:: len(between) // MOST_SPOTS + 1]]
         candidates: list[Any] = []
         for k, (dx, dy, side) in product(range(len(spots)), PLACES):
             low = spots[k] + point * np.array([dx, dy]) - size * (0.5 - 0.5 * np.sign(dx), 0.5)
             box = Bbox([low, low + size])
-            out = box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0 or box.y1 > frame.y1
+            outside = box.x0 < frame.x0 or box.x1 > frame.x1 or box.y0 < frame.y0 or box.y1 > frame.y1
             covered = LINE_COST * _inside(marks, box).sum() + NEAR_COST * _inside(foreign, box, NEAR_OTHER_LINE).sum()
             covered += NEAR_COST * _inside(np.concatenate(dots), box, 2.0).sum()
-            price = 1e3 * (sum(box.overlaps(other) for other in boxes) + out) + covered
+            price = 1e3 * (sum(box.overlaps(other) for other in boxes) + outside) + covered
             price += abs(dy) / 2.0 + POINT_COSTS[min(k, 2)] + SIDE_COSTS[side]
             candidates.append((price, len(candidates), box, spots[k], (dx, dy), side))
         *_, box, text.xy, shift, side = min(candidates)
@@ -121,9 +121,9 @@ def _inside(points: Any, box: Any, margin: Any = 0.0) -> Any:
     return np.all((points > box.min - margin) & (points < box.max + margin), axis=1)
 
 
-def _dense(axis: Any, x: Any, y: Any) -> Any:
+def _dense_points(axis: Any, x: Any, y: Any) -> Any:
     """Points (n, 2) along a line in pixels, `PIXELS_APART` from each other."""
     ends = axis.transData.transform(np.stack([x, y], axis=1))
     length = np.append(0.0, np.cumsum(np.hypot(*np.diff(ends, axis=0).T)))
-    places = np.arange(0.0, length[-1] + PIXELS_APART, PIXELS_APART)
-    return np.stack([np.interp(places, length, ends[:, k]) for k in range(2)], axis=1)
+    distances = np.arange(0.0, length[-1] + PIXELS_APART, PIXELS_APART)
+    return np.stack([np.interp(distances, length, ends[:, k]) for k in range(2)], axis=1)

@@ -84,8 +84,8 @@ def code(name: str) -> str:
 def by_name(pairs: Sequence[tuple[str | None, str]], link: str = "to") -> str | None:
     """Group pairs (name, value) by name: ```a` to 10⁻³, and `b` to 10⁻⁶ and 10⁻⁹``; None if one name is None."""
     groups: dict[str | None, list[str]] = {}
-    for name, what in pairs:
-        groups.setdefault(name, []).append(what)
+    for name, value in pairs:
+        groups.setdefault(name, []).append(value)
     if None in groups:
         return None
     parts = [f"{code(str(name))} {link} {listed(what)}" for name, what in groups.items()]
@@ -99,8 +99,8 @@ def cell(value: Any, digits: int = 3) -> str:
     if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, (int, float)):
-        whole = math.isfinite(value) and float(value).is_integer() and abs(value) < MOST_COUNTED
-        return count(value) if whole else number(value, digits)
+        is_count = math.isfinite(value) and float(value).is_integer() and abs(value) < MOST_COUNTED
+        return count(value) if is_count else number(value, digits)
     return str(value)
 
 

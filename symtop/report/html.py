@@ -64,7 +64,7 @@ class Writer:
 
     def _markdown(self, text: str) -> str:
         tokens, title, parts = self._parser.parse(text), "", []
-        ends = [place + 1 for place, token in enumerate(tokens) if token.level == 0 and token.nesting <= 0]
+        ends = [index + 1 for index, token in enumerate(tokens) if token.level == 0 and token.nesting <= 0]
         blocks = [tokens[begin:end] for begin, end in itertools.pairwise([0, *ends])]  # of the top level
         while blocks:
             block = blocks.pop(0)
@@ -120,9 +120,9 @@ class Writer:
         )
 
 
-def link(name: str, what: str) -> str:
+def link(name: str, title: str) -> str:
     """A link, shown as #, to the anchor `name`."""
-    return f'<a class="anchor" href="#{name}" aria-label="Link to {html.escape(what)}">#</a>'
+    return f'<a class="anchor" href="#{name}" aria-label="Link to {html.escape(title)}">#</a>'
 
 
 def _only(inline: Token, kind: str) -> bool:

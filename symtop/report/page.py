@@ -71,29 +71,29 @@ def gather(results: Path) -> list[dict[str, Any]]:
     The page of a study that ships with symtop is that of its folder, any other page that of its findings.
     Raises SymtopError if findings are incomplete or a file is damaged, or there are none.
     """
-    studies, gathered = list(runner.names()), []
-    others = sorted({file.stem for file in results.glob("*.json")} - set(studies))
-    for name in [*studies, *others]:
+    studies, records = list(runner.names()), []
+    benchmarks = sorted({file.stem for file in results.glob("*.json")} - set(studies))
+    for name in [*studies, *benchmarks]:
         findings = _stored(results / f"{name}.json", f"run it again: symtop study {name}, or " * (name in studies))
-        if not isinstance(findings, dict) or (name in others and "pictures" not in findings):
+        if not isinstance(findings, dict) or (name in benchmarks and "pictures" not in findings):
             continue
-        shipped = runner.file_beside(name, "page.md") if name in studies else None
+        page_file = runner.file_beside(name, "page.md") if name in studies else None
         try:
-            about = {"measured": findings.get("measured", ""), "dataset": f"{name}.nc"}
-            about["dataset"] *= (results / f"{name}.nc").is_file()
+            extra = {"measured": findings.get("measured", ""), "dataset": f"{name}.nc"}
+            extra["dataset"] *= (results / f"{name}.nc").is_file()
             missing = [f"figures/{picture['file']}" for picture in findings["pictures"]]
             missing += [f"tables/{table['file']}" for table in findings["tables"]]
             for file in (file for file in missing if not (results / file).is_file()):
                 raise FileNotFoundError(f"{file} is missing")
-            page = findings["page"] if shipped is None else shipped.read_text(encoding="utf-8")
-            gathered.append({**findings, **about, "page": page})
+            page = findings["page"] if page_file is None else page_file.read_text(encoding="utf-8")
+            records.append({**findings, **extra, "page": page})
         except (OSError, KeyError, TypeError) as error:
             command = findings.get("command", f"symtop study {name}")
             words = f"the findings of {name} in {results} are incomplete ({error}); run it again: {command}"
             raise SymtopError(words) from error
-    if not gathered:
+    if not records:
         raise SymtopError(f"no study has left findings in {results}; run one first, for example: symtop study --all")
-    return gathered
+    return records
 
 
 def has_studies(results: Path) -> bool:
@@ -122,31 +122,31 @@ def _image(file: Path, *, embed: bool) -> dict[str, Any]:
 
 def texts(results: Path, studies: Sequence[Mapping[str, Any]]) -> tuple[dict[str, str], dict[str, str]]:
     """The parts of `report.md` and of `reference.md`, in Markdown by name: "front", the studies, "measured", ..."""
-    parts, more, pages = dict[str, str](), dict[str, str](), {"measured": _link("How it was measured")}
+    parts, appendix, pages = dict[str, str](), dict[str, str](), {"measured": _link("How it was measured")}
     for study in studies:
         pages[study["study"]] = _link(formats.typeset(study["question"]), REFERENCE if _checks_only(study) else "")
     parts["front"] = formats.typeset(template.front(_template("front"), studies, results, pages))
     for study in studies:
         name, text = study["study"], formats.typeset(_lower(template.filled(study, results, pages=pages)))
         if _checks_only(study):
-            more[name] = text
+            appendix[name] = text
             continue
         parts[name], mark, rest = text.partition(READING) if study["measured"] else (text, "", "")
         if mark:
             title = f"{study['title']}: tables"
             parts[name] += f"More: {_link(title, REFERENCE)}.\n"
-            more[f"{name}-tables"] = f"## {title}\n\n{mark}{rest}"
+            appendix[f"{name}-tables"] = f"## {title}\n\n{mark}{rest}"
     values = {"reference": f"{REFERENCE}#{slug(EQUATIONS)}"} | template.counts() | scene_tables()
-    parts["measured"], more["equations"] = (
+    parts["measured"], appendix["equations"] = (
         template.rendered(_template(name), name, values) for name in ("measured", "equations")
     )
     newest = next((study for study in reversed(studies) if not study["measured"]), studies[-1])["provenance"]
     versions = ", ".join(f"{name} {version}" for name, version in json.loads(newest["dependencies"]).items())
     facts = [[key, str(value)] for key, value in {**newest, "dependencies": versions}.items()]
-    more["provenance"] = f"## Provenance\n\n{formats.table(['what', 'which'], facts)}\n"
+    appendix["provenance"] = f"## Provenance\n\n{formats.table(['what', 'which'], facts)}\n"
     if any(study["quick"] for study in studies):
         parts["front"] += f"\n{QUICK}\n"
-    return parts, more
+    return parts, appendix
 
 
 def _checks_only(study: Mapping[str, Any]) -> bool:
@@ -175,10 +175,10 @@ def scene_tables() -> dict[str, Any]:
         period = f"{scene.nutation_period:.9g}" if math.isfinite(scene.nutation_period) else "infinite"
         uses.append([scene.name, scene.purpose, period, f"{scene.horizon:.6g}", f"{bounds[-1]:.1e}"])
         starts.append([scene.name, *(repr(number).removesuffix(".0") for number in flat(scene.top, scene.start))])
-    what = ["scene", "what it is for", "nutation period", "horizon", "bound of the truth (rad)"]
-    problem = ["scene", "I1", "I3", "mgl", "theta", "phi", "psi", "theta'", "phi'", "psi'"]
+    use_header = ["scene", "what it is for", "nutation period", "horizon", "bound of the truth (rad)"]
+    start_header = ["scene", "I1", "I3", "mgl", "theta", "phi", "psi", "theta'", "phi'", "psi'"]
     return {
-        "uses": formats.table(what, uses), "starts": formats.table(problem, starts),
+        "uses": formats.table(use_header, uses), "starts": formats.table(start_header, starts),
         "units": ", ".join(scene.name for scene in scenes().values() if scene.units == "SI"),
         "bound": max(bounds), "roundings": max(bounds) / EPSILON,
     }  # fmt: skip
@@ -187,7 +187,7 @@ def scene_tables() -> dict[str, Any]:
 def write(results: Path, *, embed: bool = False) -> Path:
     """Write ``report.html``, ``report.md`` and ``reference.md`` into the results folder; returns the page."""
     page, studies = template.environment(autoescape=True).get_template("report.html"), gather(results)
-    parts, more = texts(results, studies)
+    parts, appendix = texts(results, studies)
     images = {
         f"figures/{picture['file']}": _image(results / "figures" / picture["file"], embed=embed)
         for study in studies
@@ -196,31 +196,31 @@ def write(results: Path, *, embed: bool = False) -> Path:
     charts = {f"{study['study']}-{chart['name']}": chart for study in studies for chart in study["charts"]}
     records = formats.columns([method.record() for method in integrators().values()])
 
-    def marked(kind: str, name: str) -> str:
+    def replacement(kind: str, name: str) -> str:
         if kind == "table":
-            return _whole(name, *_read(results / "tables" / f"{name}.csv"))
+            return _full_table(name, *_read(results / "tables" / f"{name}.csv"))
         return f'<div class="chart"><script type="application/json">{prepared(charts[name])}</script></div>'
 
-    together = parts | more
-    writer = Writer(images, marked, "content", "scheme", *(f"part-{name}" for name in together))
+    sections = parts | appendix
+    writer = Writer(images, replacement, "content", "scheme", *(f"part-{name}" for name in sections))
     text = page.render(
         title=re.sub(r"^# ", "", parts["front"].partition("\n")[0]),
         css="".join((TEMPLATES / name).read_text(encoding="utf-8") for name in ("style.css", "report.css")),
         scripts=[(TEMPLATES / name).read_text(encoding="utf-8") for name in ("page.js", "chart.js")],
-        contents=[(name, part.partition("\n")[0].lstrip("# ")) for name, part in together.items()],
-        parts={name: writer(part.replace(f"]({REFERENCE}#", "](#")) for name, part in together.items()},
-        integrators=_whole("integrators", *records),
+        contents=[(name, part.partition("\n")[0].lstrip("# ")) for name, part in sections.items()],
+        parts={name: writer(part.replace(f"]({REFERENCE}#", "](#")) for name, part in sections.items()},
+        integrators=_full_table("integrators", *records),
         provenance=netcdf.provenance(changes=True),
         date=datetime.datetime.now(tz=datetime.UTC).date().isoformat(),
     )
     target = results / PAGE
     netcdf.write_text(target, text)
     netcdf.write_text(results / WORDS, "\n".join(parts.values()))
-    netcdf.write_text(results / REFERENCE, "# For reference\n\n" + "\n".join(more.values()))
+    netcdf.write_text(results / REFERENCE, "# For reference\n\n" + "\n".join(appendix.values()))
     return target
 
 
-def _whole(name: str, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
+def _full_table(name: str, header: Sequence[str], rows: Iterable[Sequence[Any]]) -> str:
     """A full table as a folded HTML element, which the page's script fills when it is opened."""
     cells = [["" if value != value else str(value) for value in row] for row in rows]  # noqa: PLR0124  (not a number)
     names = [formats.typeset(str(name)) for name in header]

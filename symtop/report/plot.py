@@ -77,30 +77,30 @@ def _over_time(ax: "Axes", data: xr.Dataset, quantity: str) -> None:
     name, chart, several = data.attrs.get("integrator", ""), data.attrs.get("chart", ""), bool(ax.get_lines())
     color = style.look(name).color if name else "black"
     label = name if name.endswith("]") or not chart else f"{name}[{chart}]"
-    drawn: dict[str, Any] = {"color": color, "lw": 1.2, "label": label or None}
+    options: dict[str, Any] = {"color": color, "lw": 1.2, "label": label or None}
     if quantity in QUANTITIES:
-        wrong = data if has_bounds else errors(data)
-        if quantity not in wrong:
-            shows = ", ".join(str(other) for other in wrong.data_vars if other in QUANTITIES)
-            raise SymtopError(f"this run does not show the {quantity}; it shows {shows}")
+        table = data if has_bounds else errors(data)
+        if quantity not in table:
+            names = ", ".join(str(key) for key in table.data_vars if key in QUANTITIES)
+            raise SymtopError(f"this run does not show the {quantity}; it shows {names}")
         marker = "o" if times.size == 2 else None  # a line has two points at least
-        later = np.maximum(wrong[quantity].values[1:], SMALLEST)
-        ax.plot(wrong["time"].values[1:], later, marker=marker, **drawn)
+        sizes = np.maximum(table[quantity].values[1:], SMALLEST)
+        ax.plot(table["time"].values[1:], sizes, marker=marker, **options)
         if has_bounds:
             ax.plot(times, np.maximum(data[f"{quantity}_bound"].values, SMALLEST), color="0.6", lw=0.8, ls=":")
-        ax.set(yscale="log", ylabel=quantity_words(wrong, quantity))
+        ax.set(yscale="log", ylabel=quantity_words(table, quantity))
     else:
         variables = {name: variable for name, variable in data.data_vars.items() if variable.dims == ("time",)}
         values = data[one_of("quantity", quantity, dict.fromkeys([*QUANTITIES, *map(str, variables)]))]
         unit = values.attrs.get("units", "")
-        ax.plot(times, values.values, **drawn)
+        ax.plot(times, values.values, **options)
         ax.set_ylabel(f"{quantity} ({unit})" if unit else quantity)
-    title, ended = (data.attrs.get(word, "") for word in ("title", "outcome_message"))
-    words = f"{title}: {ended}" if ended else title
-    ax.set(xlabel=_clock(data), title="" if several else words)  # a title would name only one of several
+    title, outcome = (data.attrs.get(word, "") for word in ("title", "outcome_message"))
+    words = f"{title}: {outcome}" if outcome else title
+    ax.set(xlabel=_time_label(data), title="" if several else words)  # a title would name only one of several
 
 
-def _clock(data: xr.Dataset) -> str:
+def _time_label(data: xr.Dataset) -> str:
     """The label of the axis of time, with its unit on a scene that has units."""
     return "time (s)" if data["time"].attrs.get("units") == "s" else "time"
 
@@ -132,21 +132,21 @@ def _sweep(ax: "Axes", data: xr.Dataset, quantity: str, x: str | None) -> None:
             options = style.line(variant) | ({"ls": LINES[number % len(LINES)]} if data.sizes["scene"] > 1 else {})
             label = titled(cell.assign_coords(variant=variant))
             label = label if data.sizes["scene"] == 1 else f"{label} on {scene}"
-            across, errors = cell[x].where(cell[x] > 0).values, np.maximum(cell[quantity].values, SMALLEST)
-            good = np.flatnonzero(np.isfinite(across) & np.isfinite(errors))
-            good = good if compared else good[np.argsort(across[good])]  # a comparison is in order of its settings
-            ax.plot(across[good], errors[good], lw=1.4, label=label, **options)
-            failed = across[(cell["outcome"].values != "ok") & np.isfinite(across)]
+            xs, errors = cell[x].where(cell[x] > 0).values, np.maximum(cell[quantity].values, SMALLEST)
+            valid = np.flatnonzero(np.isfinite(xs) & np.isfinite(errors))
+            valid = valid if compared else valid[np.argsort(xs[valid])]  # a comparison is in order of its settings
+            ax.plot(xs[valid], errors[valid], lw=1.4, label=label, **options)
+            failed = xs[(cell["outcome"].values != "ok") & np.isfinite(xs)]
             ax.scatter(failed, np.full(failed.size, 0.985), 22.0, options["color"], marker="x", lw=1.0, **edge)
-            last = good[np.argmin(errors[good])] if good.size else 0
-            place = (across[last], errors[last]) if good.size else (np.nanmax(data[x].values, initial=1e-300), np.pi)
-            none = "" if np.isfinite(across).any() else f"no {x.replace('_', ' ')}"
-            fails = failed_setting(cell).partition(",")[0] or none
-            ends[f"{label}: {fails}" if fails else label] = (*map(float, place), options["color"])
+            last = valid[np.argmin(errors[valid])] if valid.size else 0
+            point = (xs[last], errors[last]) if valid.size else (np.nanmax(data[x].values, initial=1e-300), np.pi)
+            note = "" if np.isfinite(xs).any() else f"no {x.replace('_', ' ')}"
+            failure = failed_setting(cell).partition(",")[0] or note
+            ends[f"{label}: {failure}" if failure else label] = (*map(float, point), options["color"])
     ax.set_ylim(bottom=0.1 * level)
     if compared:
-        many, end = f"{data.attrs['nutations']:.3g}", data.attrs["horizon"]
-        runs = f"{many} {period_word(data)}{'s' * (many != '1')}" if many != "0" else f"t = {end:g}"
+        count, end = f"{data.attrs['nutations']:.3g}", data.attrs["horizon"]
+        runs = f"{count} {period_word(data)}{'s' * (count != '1')}" if count != "0" else f"t = {end:g}"
         ax.set_title(f"{data['scene'].item()}, {runs}", loc="left", weight="bold")
         if x == "seconds" and data["exact_seconds"].notnull():
             ax.axvline(exact := data["exact_seconds"].item(), color="0.35", ls=(0, (1, 2)), lw=1.0)
@@ -178,7 +178,7 @@ def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Datase
     for name, values in residuals(scene, Trajectory.of_data(run)).items():
         _line(constants, times, np.abs(values), COLORS[name], f"residual of {name}, relative")
     angles.set(yscale="log", ylabel="error (rad)")
-    constants.set(yscale="log", ylabel="|change| since the start", xlabel=_clock(run))
+    constants.set(yscale="log", ylabel="|change| since the start", xlabel=_time_label(run))
     if run.attrs["outcome"] != "ok":
         for axis in axes[:, 0]:
             axis.axvline(run.attrs["reached_time"], color=VERMILLION, ls="--", label="stopped here")
@@ -187,34 +187,34 @@ def draw_run(scene: Scene, run: xr.Dataset, truth: xr.Dataset, errors: xr.Datase
 
 
 def _line(axis: Any, times: Any, values: Any, color: str, label: str) -> None:
-    later = np.isfinite(values[1:])
-    if later.any():  # a logarithmic axis cannot show a line of NaN only
-        marker = "o" if later.sum() == 1 else None  # a line has two points at least
+    valid = np.isfinite(values[1:])
+    if valid.any():  # a logarithmic axis cannot show a line of NaN only
+        marker = "o" if valid.sum() == 1 else None  # a line has two points at least
         axis.plot(times[1:], np.maximum(values[1:], SMALLEST), color=color, lw=1.0, label=label, marker=marker)
 
 
 def draw_ensemble(data: xr.Dataset, errors: dict[str, Array], path: str | Path) -> None:
     """Draw a panel for each error of an ensemble to a file: quantiles of `member_errors` (n, samples) against time."""
-    drawn = {name: values for name, values in errors.items() if not np.isnan(values).all()} or errors
-    figure, axes = style.panels(len(drawn), 1, height=2.1, sharex=True)
-    for axis, (name, values) in zip(axes[:, 0], drawn.items(), strict=True):
+    panels = {name: values for name, values in errors.items() if not np.isnan(values).all()} or errors
+    figure, axes = style.panels(len(panels), 1, height=2.1, sharex=True)
+    for axis, (name, values) in zip(axes[:, 0], panels.items(), strict=True):
         _bands(axis, data, name, values)
         axis.label_outer()
-    ended = (data["outcome"] == "ok").mean().item()
+    share = (data["outcome"] == "ok").mean().item()
     members = spread.so_many(data.sizes["member"], spread.kind_of(data))
     sentence = (
         f"{data.attrs['integrator']} on {members}: errors against the true motion; "
-        f"{100.0 * ended:.4g} % of the runs ended ok"
+        f"{100.0 * share:.4g} % of the runs ended ok"
     )
-    if ended < 1.0:
+    if share < 1.0:
         sentence += ", and those that failed count as infinitely wrong, at the upper edge"
-    if lost := max(np.isnan(values).all(axis=1).sum() for values in errors.values()):
-        sentence += f"; the angle is without {lost}, whose motion is not known"
+    if missing := max(np.isnan(values).all(axis=1).sum() for values in errors.values()):
+        sentence += f"; the angle is without {missing}, whose motion is not known"
     style.headline(figure, sentence)
     style.save(figure, at_home(path))
 
 
-def _bands(axis: Any, data: xr.Dataset, quantity: str, own: Array) -> None:
+def _bands(axis: Any, data: xr.Dataset, quantity: str, values: Array) -> None:
     """Draw quantiles over members of an error against time, at the places of `symtop.report.spread.at_places`.
 
     The median is a line, with two bands about it, labelled at their right ends. Errors beyond `LARGEST_DRAWN` are drawn
@@ -224,20 +224,20 @@ def _bands(axis: Any, data: xr.Dataset, quantity: str, own: Array) -> None:
     """
     horizons = data["horizon"].values
     shared = (horizons == horizons[0]).all()
-    places, own = spread.at_places(data, own)
-    quantiles = spread.spread(own)
-    valid = np.isfinite(places) & ~np.isnan(quantiles).any(axis=0) & (places > 0.0)
+    positions, values = spread.at_places(data, values)
+    quantiles = spread.spread(values)
+    valid = np.isfinite(positions) & ~np.isnan(quantiles).any(axis=0) & (positions > 0.0)
     if not valid.any():
         raise SymtopError("there is nothing to draw: the true motion of no member is known")
-    times, errors = (places * (horizons[0] if shared else 1.0))[valid], quantiles[:, valid]
-    most, color = LARGEST_DRAWN[quantity], style.look(data.attrs["integrator"]).color
-    quantiles = np.clip(errors, SMALLEST, most)
-    for low, high, opaque in BANDS:
-        axis.fill_between(times, quantiles[low], quantiles[high], color=color, alpha=opaque, lw=0.0)
+    times, errors = (positions * (horizons[0] if shared else 1.0))[valid], quantiles[:, valid]
+    limit, color = LARGEST_DRAWN[quantity], style.look(data.attrs["integrator"]).color
+    quantiles = np.clip(errors, SMALLEST, limit)
+    for low, high, alpha in BANDS:
+        axis.fill_between(times, quantiles[low], quantiles[high], color=color, alpha=alpha, lw=0.0)
     marker = "o" if times.size == 1 else None  # a line has two points at least
     axis.plot(times, quantiles[spread.LEVELS.index(0.5)], color=color, lw=1.8, marker=marker)
     if np.isinf(errors).any():
-        axis.plot(times[[0, -1]], [most, most], color="0.4", lw=0.8, ls=":")
+        axis.plot(times[[0, -1]], [limit, limit], color="0.4", lw=0.8, ls=":")
     names = ["median" if level == 0.5 else f"{100.0 * level:g} %" for level in spread.LEVELS]
     ends = {f"{name}: failed" if np.isinf(error) else name: (float(times[-1]), float(height), color)
             for name, error, height in zip(names, errors[:, -1], quantiles[:, -1], strict=True)}  # fmt: skip

@@ -57,8 +57,8 @@ def member_errors(members: xr.Dataset, data: xr.Dataset, quantity: str) -> Array
         raise SymtopError(f"the ensemble was asked for without the variable {variable}")
     n, samples = data.sizes["member"], data.sizes["time"]
     stride = max(1, BLOCK // samples)
-    parts = [slice(begin, begin + stride) for begin in range(0, n, stride)]
-    return np.concatenate([_errors(inputs.numbers[member], data.isel(member=member), quantity) for member in parts])
+    blocks = [slice(begin, begin + stride) for begin in range(0, n, stride)]
+    return np.concatenate([_errors(inputs.numbers[member], data.isel(member=member), quantity) for member in blocks])
 
 
 @functools.lru_cache(maxsize=1)
@@ -81,9 +81,9 @@ def _errors(numbers: Array, data: xr.Dataset, quantity: str) -> Array:
             errors, valid = charts.axis_distance(values, truth), np.isfinite(truth).all(axis=2)
         else:
             errors, valid = np.full(times.shape, np.nan), np.zeros(times.shape, bool)
-            for i, ((body, start), when) in enumerate(zip(members_of(numbers), filled, strict=True)):
+            for i, ((body, start), row) in enumerate(zip(members_of(numbers), filled, strict=True)):
                 with contextlib.suppress(SymtopError):  # if its reference ends before, as in chaos
-                    true = body_samples("a member", body, start, when.tobytes(), precise=False)
+                    true = body_samples("a member", body, start, row.tobytes(), precise=False)
                     errors[i] = charts.attitude_distance(values[i], true.quaternion, true.quaternion_lo)
                     valid[i] = True
     return np.where(finite & valid, np.where(np.isfinite(errors), errors, np.inf), np.nan)
@@ -110,19 +110,19 @@ def at_places(data: xr.Dataset, errors: Array) -> tuple[Array, Array]:
     counts = np.isfinite(shares).sum(axis=1)
     if (counts == errors.shape[1]).all():
         return shares.mean(axis=0), errors
-    places = np.linspace(0.0, 1.0, int(counts.max()))
-    places = places[places + SAME_SHARE >= shares[:, 1].max()] + SAME_SHARE  # without the start, where errors are zero
-    latest = np.empty((len(errors), places.size))
+    grid = np.linspace(0.0, 1.0, int(counts.max()))
+    grid = grid[grid + SAME_SHARE >= shares[:, 1].max()] + SAME_SHARE  # without the start, where errors are zero
+    latest = np.empty((len(errors), grid.size))
     for i, count in enumerate(counts):
-        latest[i] = errors[i, np.searchsorted(shares[i, :count], places, side="right") - 1]
-    return places - SAME_SHARE, latest
+        latest[i] = errors[i, np.searchsorted(shares[i, :count], grid, side="right") - 1]
+    return grid - SAME_SHARE, latest
 
 
 def spread(errors: Array, levels: tuple[float, ...] = LEVELS) -> Array:
     """Quantiles (levels, samples) over the members that have a sample; NaN where none has."""
     out = np.full((len(levels), errors.shape[1]), np.nan)
-    there = ~np.isnan(errors).all(axis=0)
-    out[:, there] = np.nanquantile(errors[:, there], levels, axis=0, method="inverted_cdf")
+    valid = ~np.isnan(errors).all(axis=0)
+    out[:, valid] = np.nanquantile(errors[:, valid], levels, axis=0, method="inverted_cdf")
     return out
 
 

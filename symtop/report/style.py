@@ -92,11 +92,11 @@ def look(name: str) -> Look:
     dash = ADAPTIVE if adaptive else DASHES.get(family, "-")
     if name in _LOOKS:
         return _LOOKS[name]._replace(dash=dash)
-    pairs = {known[:2] for known in _LOOKS.values()}
+    pairs = {entry[:2] for entry in _LOOKS.values()}
     free = [Look(shade, marker) for marker in _MARKERS for shade in SHADES[family] if (shade, marker) not in pairs]
-    alike = [other for other, method in registered.items() if method.family == family and other not in _LOOKS]
-    place = alike.index(name) if name in alike else zlib.crc32(name.encode())
-    return free[place % len(free)]._replace(dash=dash)
+    siblings = [key for key, method in registered.items() if method.family == family and key not in _LOOKS]
+    index = siblings.index(name) if name in siblings else zlib.crc32(name.encode())
+    return free[index % len(free)]._replace(dash=dash)
 
 
 def line(name: str, scale: float = 1.0) -> dict[str, Any]:
@@ -109,8 +109,8 @@ def ink(color: str) -> tuple[float, float, float]:
     """A colour for text on white: the colour itself, or darker (luminance at most 0.18, a contrast of 4.5)."""
     from matplotlib.colors import to_rgb
 
-    part = np.array(to_rgb(color))
-    linear = np.where(part <= 0.04045, part / 12.92, ((part + 0.055) / 1.055) ** 2.4)
+    rgb = np.array(to_rgb(color))
+    linear = np.where(rgb <= 0.04045, rgb / 12.92, ((rgb + 0.055) / 1.055) ** 2.4)
     linear *= min(1.0, 0.18 / max(float(linear @ np.array([0.2126, 0.7152, 0.0722])), 1e-9))
     encoded = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1.0 / 2.4) - 0.055)
     red, green, blue = map(float, encoded)
@@ -231,7 +231,7 @@ def slope_guide(axis: Any, power: float, x: tuple[float, float], y: float, label
     ends = np.array(x)
     axis.plot(ends, y * (ends / ends[0]) ** power, color=GREY, lw=0.9, ls=(0, (5, 3)), zorder=1)
     middle = float(np.sqrt(ends[0] * ends[1]))
-    place = middle, y * (middle / ends[0]) ** power
+    point = middle, y * (middle / ends[0]) ** power
     side, shift = ("left", 3) if (power > 0.0) != axis.xaxis_inverted() else ("right", -3)
     text = {"color": "#444444", "fontsize": 7.5, "va": "top", "ha": side}
-    axis.annotate(label, place, (shift, -2), textcoords="offset points", **text)
+    axis.annotate(label, point, (shift, -2), textcoords="offset points", **text)

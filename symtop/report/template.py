@@ -62,7 +62,7 @@ def front(template: str, studies: Sequence[Findings], results: Path, pages: Mapp
     titles = {study["title"]: pages.get(study["study"], "").partition("](")[2] for study in studies}
     context = {"pages": Links(pages), "fact": facts.get} | counts()
     context["listed"] = [f"[{title}]({address}" for title, address in titles.items() if address]
-    text = rendered(template, "front page", context | _names(studies, results, whole=True))
+    text = rendered(template, "front page", context | _names(studies, results, prefixed=True))
     return without_gaps(text).strip() + "\n"
 
 
@@ -97,35 +97,35 @@ def rendered(template: str | None, name: str, context: Mapping[str, Any]) -> str
     """A template (None: the plain one) rendered with `context`; SymtopError for a faulty one or an undefined name."""
     from jinja2 import TemplateError
 
-    ours = environment(autoescape=False, finalize=lambda value: GAP if value is None else value)
-    ours.filters |= {function.__name__: _passing(function) for function in formats.FILTERS}
+    env = environment(autoescape=False, finalize=lambda value: GAP if value is None else value)
+    env.filters |= {function.__name__: _as_filter(function) for function in formats.FILTERS}
     template = template and template.replace("endraw %}", "endraw +%}")  # keeps the empty line after it
     try:
-        ready = ours.get_template(PLAIN) if template is None else ours.from_string(template)
-        text = ready.render(**context)
+        parsed = env.get_template(PLAIN) if template is None else env.from_string(template)
+        text = parsed.render(**context)
     except (TemplateError, TypeError, ValueError, LookupError, ArithmeticError) as error:
         frames = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == "<template>"]
         lines = [getattr(error, "lineno", None), *frames[::-1]]
-        place = f", line {line}" if (line := next(filter(None, lines), None)) else ""
+        where = f", line {line}" if (line := next(filter(None, lines), None)) else ""
         words = str(error).replace("'types.SimpleNamespace object' has no attribute", "there is no fact")
-        raise SymtopError(f"{name}{place}: {words}") from error
+        raise SymtopError(f"{name}{where}: {words}") from error
     return "\n\n".join(map(_unwrapped, re.split(r"\n{2,}", text.strip()))) + "\n"
 
 
 def without_gaps(text: str) -> str:
     """A text without the sentences and list items that contain `GAP`."""
-    blocks = [_known(block) if GAP in block else block for block in text.split("\n\n")]
+    blocks = [_complete(block) if GAP in block else block for block in text.split("\n\n")]
     return "\n\n".join(filter(None, blocks))
 
 
-def _known(block: str) -> str:
-    listed = re.match(r"[-*] |\d+[.)] ", block)
-    parts = re.split(r"\n(?=[-*] |\d+[.)] )" if listed else r"(?<=[.?]) |(?<=[.?]\*\*) ", block)
-    whole = [part for part in parts if GAP not in part]
-    return "" if all(re.fullmatch(r"\*\*[^*]+\*\*", part) for part in whole) else ("\n" if listed else " ").join(whole)
+def _complete(block: str) -> str:
+    is_list = re.match(r"[-*] |\d+[.)] ", block)
+    parts = re.split(r"\n(?=[-*] |\d+[.)] )" if is_list else r"(?<=[.?]) |(?<=[.?]\*\*) ", block)
+    full = [part for part in parts if GAP not in part]
+    return "" if all(re.fullmatch(r"\*\*[^*]+\*\*", part) for part in full) else ("\n" if is_list else " ").join(full)
 
 
-def _passing(filter_: Callable[..., str | None]) -> Callable[..., str | None]:
+def _as_filter(filter_: Callable[..., str | None]) -> Callable[..., str | None]:
     """A format as a filter of templates: None (not measured) is passed on, and an undefined name is an error."""
     from jinja2 import Undefined
 
@@ -143,27 +143,27 @@ def _unwrapped(block: str) -> str:
     return block if re.match(r"[|#>`\s]|<!--|\$\$", block) else " ".join(block.split("\n"))
 
 
-def _names(studies: Sequence[Findings], results: Path, *, whole: bool = False) -> dict[str, Callable[..., Any]]:
+def _names(studies: Sequence[Findings], results: Path, *, prefixed: bool = False) -> dict[str, Callable[..., Any]]:
     """The functions `figure`, `table` and `has` of templates, for the figures, tables and facts of some studies."""
     pictures: dict[str, Any] = {}
     tables: dict[str, Any] = {}
     facts: set[str] = set()
     for study in studies:
-        before = f"{study['study']}-" if whole else ""
-        pictures |= {f"{before}{picture['name']}": picture for picture in study["pictures"]}
-        tables |= {f"{before}{table['name']}": table for table in study["tables"] if table["rows"]}
-        facts |= {f"{before}{name}" for name, value in study["facts"].items() if value is not None}
+        prefix = f"{study['study']}-" if prefixed else ""
+        pictures |= {f"{prefix}{picture['name']}": picture for picture in study["pictures"]}
+        tables |= {f"{prefix}{table['name']}": table for table in study["tables"] if table["rows"]}
+        facts |= {f"{prefix}{name}" for name, value in study["facts"].items() if value is not None}
 
     def figure(name: str, title: str = "", alt: str = "", chart: str = "", caller: Any = None) -> str:
         if name not in pictures:
             return ""
         caption = " ".join(caller().split()) if caller else ""
         if GAP in caption:  # keep a caption, because the paragraph below a figure is taken for it
-            caption = f"{_known(caption) or f'{title}.'} {GAP}"
+            caption = f"{_complete(caption) or f'{title}.'} {GAP}"
         parts = [f"**{title}**" if title else "", f"![{alt}](figures/{pictures[name]['file']})", caption]
         return "\n\n".join(filter(None, [*parts, MARKER.format(kind="chart", name=chart) if chart else ""])) + "\n"
 
-    def listed(
+    def excerpt(
         name: str, title: str = "", rows: int = MOST_ROWS, columns: Sequence[str] | None = None, digits: int = 3
     ) -> str:
         if name not in tables:
@@ -175,11 +175,11 @@ def _names(studies: Sequence[Findings], results: Path, *, whole: bool = False) -
         frame = frame if columns is None else frame[list(columns)]
         cells = [[formats.cell(value, digits) for value in row] for row in frame.itertuples(index=False)]
         extent = f"the first {len(cells)} of {count:,} rows; " if count > len(cells) else ""
-        whole = [MARKER.format(kind="table", name=Path(file).stem)] if count > len(cells) else []
+        marker = [MARKER.format(kind="table", name=Path(file).stem)] if count > len(cells) else []
         head = f"**{title or name}** ({extent}[CSV](tables/{file}))"
-        return "\n\n".join([head, table(list(map(str, frame.columns)), cells), *whole]) + "\n"
+        return "\n\n".join([head, table(list(map(str, frame.columns)), cells), *marker]) + "\n"
 
     def has(*names: str) -> bool:
         return all(name in pictures or name in tables or name in facts for name in names)
 
-    return {"figure": figure, "table": listed, "has": has}
+    return {"figure": figure, "table": excerpt, "has": has}

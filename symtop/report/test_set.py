@@ -35,8 +35,8 @@ CHECKERS = ("check.py", "check.c")
 
 def problems() -> list[Scene]:
     """The bodies and their starts."""
-    each = (body_population(count, seed=SEED, kind=kind) for kind, count in SHARES.items())
-    return [scene for members in each for scene in scenes_of(members)]
+    populations = (body_population(count, seed=SEED, kind=kind) for kind, count in SHARES.items())
+    return [scene for members in populations for scene in scenes_of(members)]
 
 
 def times_of(scene: Scene) -> list[float]:
@@ -84,8 +84,8 @@ def _states_csv(scenes: Sequence[Scene], motions: Sequence[Digits], digits: int)
 def states(scenes: Sequence[Scene], motions: Sequence[Digits]) -> xr.Dataset:
     """The states as pairs of doubles over ``problem`` and ``sample``, and the numbers of the problems."""
     variables: dict[str, Any] = {"time": (("problem", "sample"), [times_of(scene) for scene in scenes])}
-    parts = {"quaternion": ("part", "1"), "momentum": ("component", "1")}
-    for name, (dimension, units) in parts.items():
+    vectors = {"quaternion": ("part", "1"), "momentum": ("component", "1")}
+    for name, (dimension, units) in vectors.items():
         exact = np.array([getattr(motion, name) for motion in motions], dtype=object)
         high = exact.astype(float)
         words = {"quaternion": "attitude, body to space", "momentum": "angular momentum, space frame"}[name]
@@ -94,8 +94,8 @@ def states(scenes: Sequence[Scene], motions: Sequence[Digits]) -> xr.Dataset:
         variables[f"{name}_lo"] = dims, low, {"long_name": f"what {name} lacks, to be added", "units": units}
     numbers = np.array([scene.top.flat(scene.start) for scene in scenes])
     for k, name in enumerate(GIVEN):
-        about = {"long_name": f"{name} of the problem, as in problems.csv", "units": "1"}
-        variables[f"given_{name}"] = "problem", numbers[:, k], about
+        attributes = {"long_name": f"{name} of the problem, as in problems.csv", "units": "1"}
+        variables[f"given_{name}"] = "problem", numbers[:, k], attributes
     bounds = [motion.bound + ROUNDED[30] for motion in motions]
     words = "bound on the error of the attitude, rad, and of the momentum, relative"
     variables["bound"] = "problem", bounds, {"long_name": words, "units": "1"}

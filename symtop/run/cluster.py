@@ -17,8 +17,8 @@ NO_DISTRIBUTED = "scheduler needs the package distributed: pip install 'symtop[d
 def check_sent(address: object, work: object, name: str) -> None:
     """SymtopError for an address that is no text, and for `work` of the method `name` that cannot be pickled."""
     if not isinstance(address, str) or not address:
-        must = "the address of a dask scheduler, such as 'tcp://host:8786'"
-        raise SymtopError(f"scheduler must be {must}, not {shown(address)}", "scheduler")
+        rule = "the address of a dask scheduler, such as 'tcp://host:8786'"
+        raise SymtopError(f"scheduler must be {rule}, not {shown(address)}", "scheduler")
     try:
         from distributed.protocol import pickle
     except ImportError:
@@ -40,8 +40,8 @@ def connect(address: str) -> Any:
         logging.getLogger(f"distributed.{name}").setLevel(logging.CRITICAL)
     client, failure = None, ""
     try:
-        with ThreadPoolExecutor(1) as apart:  # the caller's thread may run an event loop, as in a notebook
-            apart.submit(asyncio.run, _query(address)).result()
+        with ThreadPoolExecutor(1) as executor:  # the caller's thread may run an event loop, as in a notebook
+            executor.submit(asyncio.run, _query(address)).result()
         with warnings.catch_warnings(action="ignore"):  # on other versions; every case's hash is compared anyway
             client = distributed.Client(address, timeout=PATIENCE, set_as_default=False)
             client.wait_for_workers(1, timeout=PATIENCE)
@@ -51,8 +51,8 @@ def connect(address: str) -> Any:
         leave(client)
         client = None
         gc.collect()  # a client that never connected closes itself here, and not under a lock of the next one
-        must = "the address of a dask scheduler that answers and has workers"
-        raise SymtopError(f"scheduler must be {must}, not {address!r} ({failure})", "scheduler")
+        rule = "the address of a dask scheduler that answers and has workers"
+        raise SymtopError(f"scheduler must be {rule}, not {address!r} ({failure})", "scheduler")
     return client
 
 

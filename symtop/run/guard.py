@@ -100,34 +100,34 @@ class Forecast(NamedTuple):
 
 
 @functools.cache
-def _places(points: int) -> Array:
+def _positions(points: int) -> Array:
     """Positions of the samples of a probe, from about 1 to `points`, not commensurate with the nutation."""
-    place = np.arange(1.0, points + 1.0)
-    place[:-1] += np.mod(GOLDEN * place[:-1], 1.0) - 0.5
-    return place
+    positions = np.arange(1.0, points + 1.0)
+    positions[:-1] += np.mod(GOLDEN * positions[:-1], 1.0) - 0.5
+    return positions
 
 
 @functools.lru_cache(maxsize=256)
 def _marks(steps: int, points: int) -> Any:
-    """`_places` for a probe of `steps` steps, rounded to whole steps; few values of `steps` occur (`PROBE_STEPS`)."""
-    return np.unique(np.maximum(np.rint(_places(points) * (steps / points)).astype(np.int64), 1))
+    """`_positions` for a probe of `steps` steps, rounded to whole steps; few `steps` occur (`PROBE_STEPS`)."""
+    return np.unique(np.maximum(np.rint(_positions(points) * (steps / points)).astype(np.int64), 1))
 
 
 def _probe(
     motion: Motion, method: Integrator, chart: str, plan: Plan, duration: float, step: float, since: float = 0.0
 ) -> Probe:
     """Run `method` from the time `since` of the true motion for `duration`, with `step` or the plan's tolerance."""
-    most = min(plan.most(math.inf), MOST_WORK[method.implementation])
+    limit = min(plan.most(math.inf), MOST_WORK[method.implementation])
     if method.fixed_step:
-        piece = Plan.steps(step, _marks(max(1, round(duration / step)), motion.points), budget=most)
+        piece = Plan.steps(step, _marks(max(1, round(duration / step)), motion.points), budget=limit)
     else:
-        piece = Plan.until(duration * (_places(motion.points) / motion.points), plan.tolerance, most)
+        piece = Plan.until(duration * (_positions(motion.points) / motion.points), plan.tolerance, limit)
     run = solve(method, chart, motion.scene.top, motion.start(since), piece)
     outcome, times, states = run.outcome, piece.times, run.states
     bound = outcome == "out_of_budget" and run.force_evaluations < plan.most(math.inf)  # at the limit of a probe only
     if method.fixed_step and bound and run.reached >= motion.landmarks.period:
-        known = times <= run.reached
-        outcome, times, states = "ok", times[known], states[known]
+        valid = times <= run.reached
+        outcome, times, states = "ok", times[valid], states[valid]
     with np.errstate(all="ignore"):
         error = motion.error(times, chart, states, since, plan.horizon)
         stray = np.abs(np.linalg.norm(states[:, :4], axis=1) - 1.0) if chart in QUATERNIONS else NO_LENGTHS
@@ -140,16 +140,16 @@ def _probe(
 def grown(probe: Probe, horizon: float, *, straight: bool) -> float:
     """The largest error of a probe, extrapolated to the horizon; `straight` if the method's error grows linearly."""
     half = 0.5 * float(probe.times[-1])
-    whole = float(probe.error.max())
+    largest = float(probe.error.max())
     n = horizon / half
-    if n <= 2.0 * (1.0 + 1e-9) or not math.isfinite(whole):
-        return whole
-    if whole < ROUNDED_ERROR:
-        return whole * math.pow(0.5 * n, 1.5)
+    if n <= 2.0 * (1.0 + 1e-9) or not math.isfinite(largest):
+        return largest
+    if largest < ROUNDED_ERROR:
+        return largest * math.pow(0.5 * n, 1.5)
     first = float(probe.error[probe.times <= half].max(initial=0.0))
     if straight:
-        return whole + max(whole - first, LEAST_GROWTH * whole) * (n - 2.0)
-    return n * first + 0.5 * max(abs(whole - 2.0 * first), LEAST_GROWTH * whole) * n * (n - 1.0)
+        return largest + max(largest - first, LEAST_GROWTH * largest) * (n - 2.0)
+    return n * first + 0.5 * max(abs(largest - 2.0 * first), LEAST_GROWTH * largest) * n * (n - 1.0)
 
 
 def exponential(probe: Probe, horizon: float) -> float:
@@ -158,11 +158,11 @@ def exponential(probe: Probe, horizon: float) -> float:
     So the wobble of a free disc grows with an explicit gyroscopic term, however steady the motion is. 0 if it does not.
     """
     end = float(probe.times[-1])
-    half, more, whole = (float(probe.error[probe.times <= part * end].max(initial=0.0)) for part in (0.5, 0.75, 1.0))
-    if not (half > ROUNDED_ERROR and FASTER * half < more and FASTER * more < whole < math.inf):
+    half, later, full = (float(probe.error[probe.times <= share * end].max(initial=0.0)) for share in (0.5, 0.75, 1.0))
+    if not (half > ROUNDED_ERROR and FASTER * half < later and FASTER * later < full < math.inf):
         return 0.0
-    folds = math.log(min(more / half, whole / more)) * 4.0 * (horizon / end - 1.0)
-    return whole * math.exp(min(folds, MOST_FOLDS))
+    folds = math.log(min(later / half, full / later)) * 4.0 * (horizon / end - 1.0)
+    return full * math.exp(min(folds, MOST_FOLDS))
 
 
 def _amplifies(motion: Motion, change: float, horizon: float, times: float = UNSTABLE_RATIO) -> bool:
@@ -175,7 +175,7 @@ def _amplified(motion: Motion, probe: Probe, horizon: float) -> float:
     return motion.amplified(float(probe.error.max()), float(probe.times[-1]), horizon)
 
 
-def _fixed(motion: Motion, method: Integrator, probe: Probe, horizon: float) -> float:
+def _fixed_step_error(motion: Motion, method: Integrator, probe: Probe, horizon: float) -> float:
     """The largest error of a fixed-step probe at the horizon: by the law of `grown` or by amplification, the larger.
 
     Errors of rounding and of truncated iterations are not symmetric, and an unstable motion amplifies them in every
@@ -187,8 +187,8 @@ def _fixed(motion: Motion, method: Integrator, probe: Probe, horizon: float) -> 
         expected = max(expected, exponential(probe, horizon))
     if not straight or not expected < STABILITY_ERROR:
         return expected
-    bent = grown(probe, horizon, straight=False)
-    return bent if bent > STABILITY_ERROR and _amplifies(motion, SMALL_CHANGE, horizon) else expected
+    quadratic = grown(probe, horizon, straight=False)
+    return quadratic if quadratic > STABILITY_ERROR and _amplifies(motion, SMALL_CHANGE, horizon) else expected
 
 
 def _grown_tolerance(motion: Motion, method: Integrator, plan: Plan) -> float:
@@ -207,31 +207,31 @@ def _grown_tolerance(motion: Motion, method: Integrator, plan: Plan) -> float:
 def _adaptive_forecast(
     motion: Motion, method: Integrator, chart: str, plan: Plan, period: float, share: float, twice: float, far: bool
 ) -> tuple[float, Probe]:
-    """`_expected` for an adaptive method, whose work per time is known after a first probe.
+    """`_forecast_error` for an adaptive method, whose work per time is known after a first probe.
 
     If `PROBE_EVALUATIONS` evaluations allow a longer probe, that is made, up to the whole run.
     """
-    cheap = method if method.same_steps_as is None else integrator(method.same_steps_as)  # a hundredth of the time
-    least = twice if cheap.implementation == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE_TOLERANCE else 0.0
+    proxy = method if method.same_steps_as is None else integrator(method.same_steps_as)  # a hundredth of the time
+    floor = twice if proxy.implementation == "compiled" else 0.5 * twice if plan.tolerance >= LOOSE_TOLERANCE else 0.0
 
-    def probed(piece: float) -> tuple[float, Probe]:
+    def run_probe(piece: float) -> tuple[float, Probe]:
         partial = piece < min(period, 0.5 * plan.horizon)
         since = max(0.0, motion.closest() - 0.5 * piece) if partial else 0.0
-        probe = _probe(motion, cheap, chart, plan, piece, math.nan, since)
+        probe = _probe(motion, proxy, chart, plan, piece, math.nan, since)
         return max(grown(probe, plan.horizon, straight=False), _amplified(motion, probe, plan.horizon)), probe
 
-    piece = max(share, least)
-    expected, probe = probed(piece)
-    afforded = PROBE_EVALUATIONS[cheap.implementation] * min(cheap.speed, 1.0)
-    if (far or (chart == "angles" and motion.landmarks.gap < plan.tolerance)) and cheap.implementation == "compiled":
-        afforded *= POLE_FACTOR
-    longer = min(plan.horizon, piece * afforded / max(probe.evaluations, 1))
-    if longer > 1.5 * piece or longer == plan.horizon > piece:
-        return probed(longer)
+    piece = max(share, floor)
+    expected, probe = run_probe(piece)
+    budget = PROBE_EVALUATIONS[proxy.implementation] * min(proxy.speed, 1.0)
+    if (far or (chart == "angles" and motion.landmarks.gap < plan.tolerance)) and proxy.implementation == "compiled":
+        budget *= POLE_FACTOR
+    length = min(plan.horizon, piece * budget / max(probe.evaluations, 1))
+    if length > 1.5 * piece or length == plan.horizon > piece:
+        return run_probe(length)
     return expected, probe
 
 
-def _expected(motion: Motion, method: Integrator, chart: str, plan: Plan) -> tuple[float, Probe]:
+def _forecast_error(motion: Motion, method: Integrator, chart: str, plan: Plan) -> tuple[float, Probe]:
     """The expected largest axis error of a run, and the probe from which it follows."""
     straight, marks = method.keeps_frequencies, motion.landmarks
     grows = motion.scene.of_body and motion.scene.top.free and _amplifies(motion, SMALL_CHANGE, plan.horizon, SHEAR)
@@ -243,24 +243,24 @@ def _expected(motion: Motion, method: Integrator, chart: str, plan: Plan) -> tup
         return _adaptive_forecast(motion, method, chart, plan, period, share, twice, grows)
     step = plan.step_size
     share = min(share, MOST_PROBED * step)
-    allowed = max(PROBE_STEPS[method.implementation] * step, share)
-    if twice <= allowed:
+    limit = max(PROBE_STEPS[method.implementation] * step, share)
+    if twice <= limit:
         piece = max(twice, share, min(LEAST_PROBE * PROBE_STEPS[method.implementation] * step, motion.reach * period))
         if grows:
             piece = max(piece, LONGEST_PROBE * PROBE_STEPS[method.implementation] * step)
         probe = _probe(motion, method, chart, plan, min(plan.horizon, piece), step)
-        return _fixed(motion, method, probe, plan.horizon), probe
-    coarse = twice / round(allowed / step)
-    probe, finer = _probe(motion, method, chart, plan, twice, coarse), (step / coarse) ** (method.order or 0)
-    if method.order and (off := float(probe.error.max())) > EXPECTED:  # another top's map, or too coarse
+        return _fixed_step_error(motion, method, probe, plan.horizon), probe
+    coarse = twice / round(limit / step)
+    probe, factor = _probe(motion, method, chart, plan, twice, coarse), (step / coarse) ** (method.order or 0)
+    if method.order and (error := float(probe.error.max())) > EXPECTED:  # another top's map, or too coarse
         half = _probe(motion, method, chart, plan, twice, 0.5 * coarse)
-        finer = finer if float(half.error.max()) < SAME_ERROR * off else 1.0
-    probe = probe._replace(evaluations=round(probe.evaluations * coarse / step), stray=probe.stray * finer)
-    expected = _fixed(motion, method, probe, plan.horizon) * finer
+        factor = factor if float(half.error.max()) < SAME_ERROR * error else 1.0
+    probe = probe._replace(evaluations=round(probe.evaluations * coarse / step), stray=probe.stray * factor)
+    expected = _fixed_step_error(motion, method, probe, plan.horizon) * factor
     if chart == "angles" and marks.rate * coarse > RESOLVED_TURN:
-        since = max(0.0, motion.closest() - 0.5 * allowed)
+        since = max(0.0, motion.closest() - 0.5 * limit)
         if since < plan.horizon:
-            probe = _probe(motion, method, chart, plan, min(allowed, plan.horizon - since), step, since)
+            probe = _probe(motion, method, chart, plan, min(limit, plan.horizon - since), step, since)
             passages = max(1.0, plan.horizon / period)
             expected = float(np.max(probe.error)) * (passages if straight else passages**2)
     return expected, probe
@@ -276,30 +276,30 @@ def forecast(scene: Scene, method: Integrator, chart: str, plan: Plan, motion: M
     marks = motion.landmarks
     if method.control is None:
         return Forecast(0.0, 0.0, "ok", plan.horizon, marks)
-    error, probe = _expected(motion, method, chart, plan)
+    error, probe = _forecast_error(motion, method, chart, plan)
     partly = method.adaptive and method.implementation == "python" and not probe.times[-1] >= plan.horizon
     if partly and chart == "angles" and marks.gap < CLOSE_TO_POLE:
         error = max(error, float(np.nan_to_num(motion.displacement(PASSING_ERROR * plan.tolerance, plan.horizon))))
     unstable = _grown_tolerance(motion, method, plan) if partly else 0.0
     whole = bool(probe.times[-1] >= plan.horizon * (1.0 - 1e-9))
-    ended, rounding = (probe.outcome, probe.reached), motion.rounding(plan.horizon, whole=whole)
+    end, rounding = (probe.outcome, probe.reached), motion.rounding(plan.horizon, whole=whole)
     if probe.outcome == "ok" and probe.stray.size and not whole:
-        ended = _length_lost(probe, plan.horizon) or ended
+        end = _length_failure(probe, plan.horizon) or end
     limit = getattr(method.solvers[chart], "limit", None)
     if limit is not None and probe.outcome == "ok" and probe.times[-1] >= min(marks.period, plan.horizon):
         reached = float(probe.times[-1]) * limit(plan) / max(probe.evaluations, 1)
         if reached < plan.horizon:
-            error, ended = math.inf, ("out_of_budget", reached)
-    return Forecast(max(error, unstable), rounding, *ended, marks, unstable, whole)
+            error, end = math.inf, ("out_of_budget", reached)
+    return Forecast(max(error, unstable), rounding, *end, marks, unstable, whole)
 
 
-def _length_lost(probe: Probe, horizon: float) -> tuple[str, float] | None:
+def _length_failure(probe: Probe, horizon: float) -> tuple[str, float] | None:
     """Outcome and time of the run's end if the drift of |q| continues as in the probe; None if |q| stays in bounds."""
-    half, most = 0.5 * float(probe.times[-1]), float(probe.stray.max())
-    drift = (most - float(probe.stray[probe.times <= half].max(initial=0.0))) / half
-    if most + drift * (horizon - 2.0 * half) <= LENGTH_OFF:
+    half, largest = 0.5 * float(probe.times[-1]), float(probe.stray.max())
+    drift = (largest - float(probe.stray[probe.times <= half].max(initial=0.0))) / half
+    if largest + drift * (horizon - 2.0 * half) <= LENGTH_OFF:
         return None
-    return "not_normalised", 2.0 * half + (LENGTH_OFF - most) / drift
+    return "not_normalised", 2.0 * half + (LENGTH_OFF - largest) / drift
 
 
 class Trouble(NamedTuple):
@@ -329,29 +329,29 @@ def warning(scene: Scene, method: Integrator, chart: str, plan: Plan, *, series:
 
 def _remedy(motion: Motion, method: Integrator, chart: str, plan: Plan, first: Trouble) -> str:
     """The advice to use a step, of two digits, for which there is no warning: the first try or a smaller one."""
-    step, others, words, errors = first.step, f", or {first.otherwise}" if first.otherwise else "", "", []
+    step, suffix, words, errors = first.step, f", or {first.otherwise}" if first.otherwise else "", "", []
     for _ in range(REMEDY_TRIES):
         if not plan.horizon / step <= MOST_STEPS:
             words = f"take {first.otherwise or 'another method'}: more than {MOST_STEPS:.0e} steps would be needed"
             break
         step = float(f"{step:.2g}")
-        finer = plan._replace(step_size=step)  # a forecast looks at the step and the horizon
-        expected = forecast(motion.scene, method, chart, finer, motion)
-        if expected.outcome == "ok" and trouble(motion, method, chart, finer, expected) is None:
-            return f"take a step of about {step:.2g}{others}"
+        trial = plan._replace(step_size=step)  # a forecast looks at the step and the horizon
+        expected = forecast(motion.scene, method, chart, trial, motion)
+        if expected.outcome == "ok" and trouble(motion, method, chart, trial, expected) is None:
+            return f"take a step of about {step:.2g}{suffix}"
         errors.append(expected.axis_error)
-        step = min(STEP_RATIO * step, _smaller(method, finer, expected))
-    own = method.order and not is_built_in(method.method)  # the order of any other is known to hold
-    if own and len(errors) > 1 and SAME_ERROR * errors[0] < errors[-1] < math.inf:
+        step = min(STEP_RATIO * step, _smaller_step(method, trial, expected))
+    foreign = method.order and not is_built_in(method.method)  # the order of any other is known to hold
+    if foreign and len(errors) > 1 and SAME_ERROR * errors[0] < errors[-1] < math.inf:
         claim = f"whether it has the order {method.order} that it claims"
         return f"shorter steps do not help: `symtop claims {method.name}` measures {claim}"
-    return words or f"try a step of about {step:.2g}{others}"
+    return words or f"try a step of about {step:.2g}{suffix}"
 
 
 def trouble(motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
     """Why a run is expected to be wrong; None if it is not."""
-    known = isinstance(motion, ExactMotion) and _instability(motion.scene, method, chart, plan, expected)
-    return known or _cause(motion, method, chart, plan, expected)
+    instability = isinstance(motion, ExactMotion) and _instability(motion.scene, method, chart, plan, expected)
+    return instability or _cause(motion, method, chart, plan, expected)
 
 
 def _growth(scene: Scene, method: Integrator, chart: str, step: float, frequency: float) -> Growth:
@@ -368,27 +368,27 @@ def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expec
     if method.adaptive or good_run:
         return None
     growth, steps = _growth(scene, method, chart, step, frequency), plan.horizon / step
-    beside = marks.gap if marks.gap < BESIDE_POLE else 0.0  # of a pole, the tilt grows
-    size, folds = marks.width + beside + growth.size, steps * math.log(max(growth.factor, 1.0))
+    gap = marks.gap if marks.gap < BESIDE_POLE else 0.0  # of a pole, the tilt grows
+    size, folds = marks.width + gap + growth.size, steps * math.log(max(growth.factor, 1.0))
     grows = growth.factor > 1.0 + max(NONLINEAR_SHARE * growth.size, growth.doubt)
     if not grows or not size * math.expm1(min(folds, MOST_FOLDS)) > EXPECTED:
         return None
-    good, bad = SMALL_TURN / frequency, step
+    low, high = SMALL_TURN / frequency, step
 
     def stable(h: float) -> bool:
         return _growth(scene, method, chart, h, frequency).factor <= 1.0 + UNSTABLE_GROWTH
 
-    if growth.factor > 1.0 + UNSTABLE_GROWTH and good < bad and stable(good):
-        while bad - good > 1e-3 * bad:
-            middle = 0.5 * (good + bad)
-            good, bad = (middle, bad) if stable(middle) else (good, middle)
-        where = f"at a step of {step:.4g}, the method is stable up to {good:.4g} (h omega = {good * frequency:.3f})"
-        words, finer = f"small nutations (frequency {frequency:.4g}) grow {where}", 0.5 * good
+    if growth.factor > 1.0 + UNSTABLE_GROWTH and low < high and stable(low):
+        while high - low > 1e-3 * high:
+            middle = 0.5 * (low + high)
+            low, high = (middle, high) if stable(middle) else (low, middle)
+        where = f"at a step of {step:.4g}, the method is stable up to {low:.4g} (h omega = {low * frequency:.3f})"
+        words, proposal = f"small nutations (frequency {frequency:.4g}) grow {where}", 0.5 * low
     else:
         words = f"small nutations (frequency {frequency:.4g}) of {size:.1g} rad grow by {growth.factor - 1.0:.1g} of "
         words += f"themselves in each of {steps:.3g} steps"
-        finer = step * math.pow(math.log1p(AIM / size) / folds, 1.0 / (method.order or 1))
-    return Trouble(f"{words}: {NO_ORDER}") if method.order is None else Trouble(words, finer)
+        proposal = step * math.pow(math.log1p(AIM / size) / folds, 1.0 / (method.order or 1))
+    return Trouble(f"{words}: {NO_ORDER}") if method.order is None else Trouble(words, proposal)
 
 
 def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast) -> Trouble | None:
@@ -407,15 +407,15 @@ def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected:
     if not expected.axis_error > EXPECTED and expected.outcome == "ok":
         return None
     second, period = motion.scene.second, motion.period_word
-    reached = min(expected.axis_error, math.pi)
-    size = f"expect an {motion.watches} error of {reached:.1g} rad by t = {plan.horizon:.4g}{second}"
-    limited = expected.outcome == "out_of_budget"  # then the step is not the cause
-    if not limited and (coarse := _coarse(motion, method, chart, plan, expected, size)) is not None:
+    error = min(expected.axis_error, math.pi)
+    size = f"expect an {motion.watches} error of {error:.1g} rad by t = {plan.horizon:.4g}{second}"
+    out_of_budget = expected.outcome == "out_of_budget"  # then the step is not the cause
+    if not out_of_budget and (coarse := _coarse_step(motion, method, chart, plan, expected, size)) is not None:
         return coarse
     if expected.outcome != "ok":
         curable = expected.outcome in CURABLE_OUTCOMES and method.fixed_step and method.order is not None
         words = sentence(expected.outcome, expected.reached, plan.horizon, second, remedy=not curable)
-        return Trouble(f"expect the run to be {words}", _smaller(method, plan, expected) if curable else math.nan)
+        return Trouble(f"expect the run to be {words}", _smaller_step(method, plan, expected) if curable else math.nan)
     if method.adaptive:
         tolerance = max(plan.tolerance * AIM / min(expected.axis_error, 1.0), method.least_tolerance)
         advice = f"try tolerance {tolerance:.1g}"
@@ -426,11 +426,11 @@ def _cause(motion: Motion, method: Integrator, chart: str, plan: Plan, expected:
         return Trouble(f"{size}: {NO_ORDER}")
     return Trouble(
         f"{size}: a step is 1/{marks.period / plan.step_size:.3g} of a {period}, and errors add up over "
-        f"{plan.horizon / marks.period:.3g} {period}s", _smaller(method, plan, expected),
+        f"{plan.horizon / marks.period:.3g} {period}s", _smaller_step(method, plan, expected),
     )  # fmt: skip
 
 
-def _coarse(
+def _coarse_step(
     motion: Motion, method: Integrator, chart: str, plan: Plan, expected: Forecast, size: str
 ) -> Trouble | None:
     """The trouble of a step that is too long for a pole or for the nutation, or in resonance with it; else None."""
@@ -450,12 +450,12 @@ def _coarse(
             if abs(order * turn - 2.0 * math.pi) < RESONANCE_GAP * order:
                 return Trouble(
                     f"{size}: a step turns the nutation by {turn:.4g} rad, close to 1/{order} of a turn, a resonance "
-                    f"(h omega = {step * frequency:.3f})", _smaller(method, plan, expected),
+                    f"(h omega = {step * frequency:.3f})", _smaller_step(method, plan, expected),
                 )  # fmt: skip
     return None
 
 
-def _smaller(method: Integrator, plan: Plan, expected: Forecast) -> float:
+def _smaller_step(method: Integrator, plan: Plan, expected: Forecast) -> float:
     """The step at which the forecast would be `AIM`, if the method keeps its order."""
     step = plan.step_size * math.pow(AIM / (min(expected.axis_error, 1.0) or AIM), 1.0 / (method.order or 1))
     return min(step, expected.landmarks.period / 20.0) if expected.axis_error > 1.0 else step

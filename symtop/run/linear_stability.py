@@ -87,7 +87,7 @@ def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None) 
     """The trace of the map of a step h at the method's steady precession; in the axis' smallest chart by default."""
     top, momenta = scene.top, scene.top.momenta(scene.start)
     chart = chart or method.chart_for("axis")
-    theta, moved = top.steady_theta(momenta), math.inf
+    theta, shift = top.steady_theta(momenta), math.inf
     for _ in range(FIXED_POINT_ROUNDS):
         if not 1e-3 < theta < math.pi - 1e-3:
             return NO_TRACE
@@ -97,15 +97,15 @@ def trace(method: Integrator, scene: Scene, h: float, chart: str | None = None) 
         if run.outcome != "ok" or not np.isfinite(y).all():
             return NO_TRACE
         t, d, c = _recurrence(y, symmetric=bool(method.symmetric))
-        denominator, doubt = 1.0 - t + d, ROUNDING / max(float(np.ptp(y)), TINY)
-        if abs(denominator) <= doubt and abs(c) <= doubt * NUDGE:  # every inclination is a fixed point
-            return Trace(t, d, theta, doubt)
+        denominator, uncertainty = 1.0 - t + d, ROUNDING / max(float(np.ptp(y)), TINY)
+        if abs(denominator) <= uncertainty and abs(c) <= uncertainty * NUDGE:  # every inclination is a fixed point
+            return Trace(t, d, theta, uncertainty)
         if denominator == 0.0:
             return NO_TRACE
-        last, moved = moved, abs(c / denominator)
-        if moved < NUDGE:
-            return Trace(t, d, theta, doubt)
-        if moved > 2.0 * last:
+        last, shift = shift, abs(c / denominator)
+        if shift < NUDGE:
+            return Trace(t, d, theta, uncertainty)
+        if shift > 2.0 * last:
             return NO_TRACE
         theta += c / denominator
     return NO_TRACE
@@ -144,17 +144,17 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
     """
     stride = max(1, int(min(STRIDE / max(h * frequency, TINY), MOST_STRIDE[method.implementation])))  # steps
     gap = min(theta := scene.top.steady_theta(scene.top.momenta(scene.start)), math.pi - theta)
-    nudge, rounding = NUDGE if _beside(scene, chart) else min(NUDGE, max(NUDGE_SHARE * gap, LEAST_NUDGE)), EPSILON
-    runs, delta, off = _apart(method, scene, h, chart, nudge, stride)
-    places = runs[0].states[1:, :3]
+    nudge, rounding = NUDGE if _near_pole(scene, chart) else min(NUDGE, max(NUDGE_SHARE * gap, LEAST_NUDGE)), EPSILON
+    runs, delta, offset = _run_pair(method, scene, h, chart, nudge, stride)
+    positions = runs[0].states[1:, :3]
     with np.errstate(over="ignore"):  # a run may have blown up
-        single = chart != "angles" and bool((places.astype(np.float32) == places).all())
+        single = chart != "angles" and bool((positions.astype(np.float32) == positions).all())
     if single:
         nudge, rounding = SINGLE_NUDGE, SINGLE_EPSILON
-        delta, off = _apart(method, scene, h, chart, nudge, stride)[1], 0.0
+        delta, offset = _run_pair(method, scene, h, chart, nudge, stride)[1], 0.0
     factor = _root(delta, RESIDUAL if method.order else RESIDUAL_WITHOUT_ORDER)
     if math.isnan(factor) and (method.order or single):
-        long = np.abs(_apart(method, scene, h, chart, nudge, stride, LONG_STRIDES)[1])
+        long = np.abs(_run_pair(method, scene, h, chart, nudge, stride, LONG_STRIDES)[1])
         third = long.size // 3
         with np.errstate(all="ignore"):
             factor = float(np.max(long[-third:]) / np.max(long[:third])) ** (1.0 / (2 * third))
@@ -163,47 +163,47 @@ def nutation_growth(method: Integrator, scene: Scene, h: float, chart: str, freq
     factor **= 1.0 / stride
     noise, top = ROUNDING, scene.top
     if "energy" in (method.conserves or ()):
-        lost = EPSILON * (abs(top.energy(scene.start)) + abs(top.mgl))
-        noise = max(noise, lost / max(top.I1 * frequency**2 * nudge, TINY))
+        error = EPSILON * (abs(top.energy(scene.start)) + abs(top.mgl))
+        noise = max(noise, error / max(top.I1 * frequency**2 * nudge, TINY))
     doubt = noise / nudge / max(min(stride * h * frequency, 1.0) ** 2, TINY) / stride
-    return Growth(factor, off + rounding * math.sqrt(0.5 / max(math.log(max(factor, 1.0)), LEAST_GROWTH)), doubt)
+    return Growth(factor, offset + rounding * math.sqrt(0.5 / max(math.log(max(factor, 1.0)), LEAST_GROWTH)), doubt)
 
 
-def _beside(scene: Scene, chart: str) -> bool:
+def _near_pole(scene: Scene, chart: str) -> bool:
     """Is the steady precession so near a pole with a stable rotation that nutations are followed in e_x, e_y?"""
     top, momenta = scene.top, scene.top.momenta(scene.start)
     theta, square = top.steady_theta(momenta), momenta.p_psi**2
     weight = 4.0 * top.I1 * (top.mgl if theta < 1.0 else -top.mgl)  # p_psi^2 at the threshold
-    beside = min(theta, math.pi - theta) < BESIDE_POLE
-    return chart != "angles" and beside and square - weight > MARGIN * max(square, weight)
+    close = min(theta, math.pi - theta) < BESIDE_POLE
+    return chart != "angles" and close and square - weight > MARGIN * max(square, weight)
 
 
-def _apart(
+def _run_pair(
     method: Integrator, scene: Scene, h: float, chart: str, nudge: float, stride: int, count: int = STEPS
 ) -> tuple[list[Run], np.ndarray, float]:
     """Two runs two nudges apart, half their difference every `stride` steps, the largest offset of their mean (rad)."""
     top, momenta = scene.top, scene.top.momenta(scene.start)
-    theta, beside = top.steady_theta(momenta), _beside(scene, chart)
-    if beside:
+    theta, close = top.steady_theta(momenta), _near_pole(scene, chart)
+    if close:
         tilt, spin = math.pi - nudge if theta > 1.0 else nudge, momenta.p_psi / top.I3
         pair = [Angles(tilt, phi, psi_dot=spin) for phi in (0.0, math.pi)]
     else:
         pair = [with_momenta(top, min(max(theta + side, nudge), math.pi - nudge), momenta) for side in (nudge, -nudge)]
-    runs = [few_steps(method, chart, top, at, h, (count + WARM_UP) * stride) for at in pair]
+    runs = [few_steps(method, chart, top, start, h, (count + WARM_UP) * stride) for start in pair]
     with np.errstate(all="ignore"):
-        if beside:
+        if close:
             first, second = (axis[:, 0] + 1j * axis[:, 1] for axis in (axis_of(chart, run.states) for run in runs))
         else:
             first, second = (np.asarray(View(chart, top, run.states).theta) for run in runs)
-        off = 0.0 if beside else float(np.max(np.abs(0.5 * (first + second) - theta)))
-        return runs, 0.5 * (first - second)[WARM_UP * stride :: stride], off
+        offset = 0.0 if close else float(np.max(np.abs(0.5 * (first + second) - theta)))
+        return runs, 0.5 * (first - second)[WARM_UP * stride :: stride], offset
 
 
-def _root(delta: np.ndarray, left_over: float) -> float:
-    """The largest |root| of the two-term recurrence of `delta`; NaN if its relative residual exceeds `left_over`."""
+def _root(delta: np.ndarray, limit: float) -> float:
+    """The largest |root| of the two-term recurrence of `delta`; NaN if its relative residual exceeds `limit`."""
     if not np.isfinite(delta).all() or not delta.any():
         return math.nan
-    known = np.stack([delta[1:-1], delta[:-2]], axis=1)
-    t, minus_d = np.linalg.lstsq(known, delta[2:], rcond=None)[0]
-    left = np.max(np.abs(known @ np.array([t, minus_d]) - delta[2:])) / np.max(np.abs(delta))
-    return float(np.max(np.abs(np.roots([1.0, -t, -minus_d])))) if left < left_over else math.nan
+    matrix = np.stack([delta[1:-1], delta[:-2]], axis=1)
+    t, minus_d = np.linalg.lstsq(matrix, delta[2:], rcond=None)[0]
+    residual = np.max(np.abs(matrix @ np.array([t, minus_d]) - delta[2:])) / np.max(np.abs(delta))
+    return float(np.max(np.abs(np.roots([1.0, -t, -minus_d])))) if residual < limit else math.nan

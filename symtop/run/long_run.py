@@ -62,9 +62,9 @@ def windows(steps: int) -> list[int]:
 
 def scattered(begin: int, end: int, samples: int = SAMPLES) -> Ints:
     """At most `samples` whole steps in (begin, end] with strides of no fixed ratio, and `end`."""
-    place = np.arange(samples, dtype=float)
-    place += np.mod(GOLDEN * place, 1.0)
-    marks = begin + 1 + np.floor(place * ((end - begin) / samples)).astype(np.int64)
+    positions = np.arange(samples, dtype=float)
+    positions += np.mod(GOLDEN * positions, 1.0)
+    marks = begin + 1 + np.floor(positions * ((end - begin) / samples)).astype(np.int64)
     return np.unique(np.append(marks[marks <= end], end))
 
 
@@ -100,25 +100,25 @@ def gauge_of(scene: Scene, method: Integrator, h: float) -> Gauge:
     conserved = {"p_phi", "p_psi"} <= set(method.conserves or ())
 
     def energies(states: Array, momenta: Array) -> tuple[Array, Array]:
-        used = None if conserved else momenta
-        plain = modified.energy(scene, chart, states, used)
-        return plain, modified.modified_energy(scene, method, chart, states, h, used)
+        measured = None if conserved else momenta
+        plain = modified.energy(scene, chart, states, measured)
+        return plain, modified.modified_energy(scene, method, chart, states, h, measured)
 
     head = solver.loop(par, rule, state, h, scattered(0, FIRST_WINDOW, 8 * SAMPLES))
     first, momenta = presented(solver, par, head.states), head.momenta
-    ran = np.isfinite(first).all(axis=1) & np.isfinite(momenta).all(axis=1)  # a run may fail in its first steps
+    valid = np.isfinite(first).all(axis=1) & np.isfinite(momenta).all(axis=1)  # a run may fail in its first steps
     at_start = presented(solver, par, solver.loop(par, rule, state, h, np.array([0])).states)
     momenta_start = np.array([start[:2]])
-    first, momenta = (first[ran], momenta[ran]) if ran.any() else (at_start, momenta_start)
+    first, momenta = (first[valid], momenta[valid]) if valid.any() else (at_start, momenta_start)
     energy_start = float(energies(at_start, momenta_start)[0][0])
-    rest = modified.oscillation(*modified.section(chart, first), energies(first, momenta)[1])
+    subtract = modified.oscillation(*modified.section(chart, first), energies(first, momenta)[1])
 
     def gauge(states: Array, momenta: Array, *, shown: bool = False) -> dict[str, Array]:
         states = states if shown else presented(solver, par, states)
         energy, values = energies(states, momenta)
         return {
             "energy": (energy - energy_start) / energy_unit,
-            "modified_energy": rest(*modified.section(chart, states), values) / energy_unit,
+            "modified_energy": subtract(*modified.section(chart, states), values) / energy_unit,
             "p_phi": (momenta[:, 0] - start.p_phi) / momentum_unit,
             "p_psi": (momenta[:, 1] - start.p_psi) / momentum_unit,
             "theta": View(chart, scene.top, states).theta,
@@ -165,46 +165,46 @@ def long_run(
     Raises SymtopError for a method without a compiled loop, for a checkpoint of another run and for an output that
     cannot be written.
     """
-    chosen, method, silent = find_scene(scene, bodies=True), find_integrator(integrator), boolean("quiet", quiet)
+    problem, method, silent = find_scene(scene, bodies=True), find_integrator(integrator), boolean("quiet", quiet)
     count, h = whole("steps", steps, 1, MOST_STEPS), positive("step_size", step_size)
-    chart, solver = chart_of(method, of_body=chosen.of_body)
+    chart, solver = chart_of(method, of_body=problem.of_body)
     assert isinstance(solver.loop, Loop)  # noqa: S101
     compensated = boolean("compensated", compensated)
     loop = solver.loop if compensated else solver.loop.plain
-    par, rule, state = solver.setup(chosen.top, chosen.start, h)
-    checkpoints = _Checkpoint(checkpoint, _identity(chosen, method, h, count, compensated))
+    par, rule, state = solver.setup(problem.top, problem.start, h)
+    checkpoints = _Checkpoint(checkpoint, _identity(problem, method, h, count, compensated))
     result = None if output is None else checkpoints.checked(file_path("output", output))
-    at, rows = checkpoints.resumed(loop.start(par, rule, state, h))
-    ends, outcome, reached, title = windows(count), OK, at.k, f"{method.name} on {chosen.name}"
-    quantities = OF_BODY if chosen.of_body else QUANTITIES
-    gauge = gauge_of(chosen, method, h) if len(rows) < len(ends) else None
+    position, rows = checkpoints.resumed(loop.start(par, rule, state, h))
+    ends, outcome, reached, title = windows(count), OK, position.k, f"{method.name} on {problem.name}"
+    quantities = OF_BODY if problem.of_body else QUANTITIES
+    gauge = gauge_of(problem, method, h) if len(rows) < len(ends) else None
     with ending_on_sigterm(), checkpoints:
-        with progress_bar(title, quiet=silent, total=count, initial=at.k, unit="step", unit_scale=True) as bar:
+        with progress_bar(title, quiet=silent, total=count, initial=position.k, unit="step", unit_scale=True) as bar:
             while gauge is not None and len(rows) < len(ends) and outcome == OK:
-                marks = scattered(at.k, ends[len(rows)])
-                stretch, after = loop.advance(par, rule, at, h, marks)
+                marks = scattered(position.k, ends[len(rows)])
+                stretch, after = loop.advance(par, rule, position, h, marks)
                 outcome, reached = stretch.outcome, after.k
-                if outcome == OK and (lost := off_length(chart, presented(solver, par, stretch.states))).any():
-                    outcome, reached = NOT_NORMALISED, int([at.k, *marks][lost.argmax()])
+                if outcome == OK and (invalid := off_length(chart, presented(solver, par, stretch.states))).any():
+                    outcome, reached = NOT_NORMALISED, int([position.k, *marks][invalid.argmax()])
                 if outcome == OK:
                     rows.append(summary(gauge(stretch.states, stretch.momenta)))
-                    bar.update(after.k - at.k)
-                    at = after
-                    checkpoints.note(at, rows)
-        with foreign_code(f"integrator {method.name} on {chosen.name}"):
-            ended = ending(outcome)
+                    bar.update(after.k - position.k)
+                    position = after
+                    checkpoints.note(position, rows)
+        with foreign_code(f"integrator {method.name} on {problem.name}"):
+            end = ending(outcome)
         columns = np.array(rows).reshape(len(rows), len(quantities), 3)
         variables: dict[str, Any] = {"steps": ("window", np.array(ends[: len(rows)], dtype=float))}
         for i, name in enumerate(quantities):
             words, units = ("theta", "rad") if name == "theta" else (f"relative change of {name} since the start", "1")
-            for m, part in enumerate(("least", "largest", "mean")):
-                attributes = {"long_name": f"{words}, {part} over the window", "units": units}
-                variables[f"{name}_{part}"] = ("window", columns[:, i, m], attributes)
+            for m, statistic in enumerate(("least", "largest", "mean")):
+                attributes = {"long_name": f"{words}, {statistic} over the window", "units": units}
+                variables[f"{name}_{statistic}"] = ("window", columns[:, i, m], attributes)
         data = netcdf.describe(
-            xr.Dataset(variables), title=f"{title}, {count} steps", units=chosen.units,
-            integrator=method.name, scene=chosen.name, step_size=h, horizon=count * h,
-            compensated=str(compensated).lower(), outcome=ended, reached_time=reached * h,
-            outcome_message=sentence(ended, reached * h, count * h, chosen.second),
+            xr.Dataset(variables), title=f"{title}, {count} steps", units=problem.units,
+            integrator=method.name, scene=problem.name, step_size=h, horizon=count * h,
+            compensated=str(compensated).lower(), outcome=end, reached_time=reached * h,
+            outcome_message=sentence(end, reached * h, count * h, problem.second),
         )  # fmt: skip
         if result is not None:
             checkpoints.write(data, result)
@@ -213,15 +213,15 @@ def long_run(
 
 def summary(values: dict[str, Array]) -> list[float]:
     """Least, largest and mean value of each quantity, in one list."""
-    return [float(part) for value in values.values() for part in (value.min(), value.max(), value.mean())]
+    return [float(number) for value in values.values() for number in (value.min(), value.max(), value.mean())]
 
 
 def _identity(scene: Scene, method: Integrator, h: float, steps: int, compensated: bool) -> str:
     """A hash of all that determines the bits of a run. It uses compiled code, so that comments do not change it."""
     numbers = [[getattr(record, name) for name in record.__slots__] for record in (scene.top, scene.start)]
     settings = [numbers, h, steps, compensated, FIRST_WINDOW, PER_DECADE, LONGEST_WINDOW, SAMPLES]
-    made = by_file(code_of((method, gauge_of, windows, scattered, summary)))
-    return digest(made | {"numbers": hashed(json.dumps(settings))})
+    hashes = by_file(code_of((method, gauge_of, windows, scattered, summary)))
+    return digest(hashes | {"numbers": hashed(json.dumps(settings))})
 
 
 def leaves(carry: Any) -> list[float]:
@@ -267,8 +267,8 @@ class _Checkpoint(contextlib.AbstractContextManager["_Checkpoint"]):
         """The data in the file. If damaged: SymtopError for a user's file, None with a warning for one in the cache."""
         try:
             data = netcdf.read(file)
-            known = not self.own or data.attrs.get("identity") == self.identity  # a file in the cache is named by it
-            if known and data.attrs.get("content") == netcdf.content_hash(data):
+            matches = not self.own or data.attrs.get("identity") == self.identity  # a file in the cache is named by it
+            if matches and data.attrs.get("content") == netcdf.content_hash(data):
                 return data
             raise SymtopError("its numbers are not those that were written")  # noqa: TRY301
         except SymtopError as error:
@@ -278,18 +278,18 @@ class _Checkpoint(contextlib.AbstractContextManager["_Checkpoint"]):
             warnings.warn(f"{sentence}; the run begins anew", SymtopWarning, stacklevel=4)
             return None
 
-    def note(self, at: Position, rows: list[list[float]]) -> None:
+    def note(self, position: Position, rows: list[list[float]]) -> None:
         """Record the position after a window, and write the file if the last writing was over `SAVE_SECONDS` ago."""
-        self.latest = (at, list(rows))  # a copy: an interrupt may fall between a window and its note
+        self.latest = (position, list(rows))  # a copy: an interrupt may fall between a window and its note
         if time.monotonic() - self.saved > SAVE_SECONDS:
             self.save()
 
     def save(self) -> None:
         if self.file is None or self.latest is None:
             return
-        at, rows = self.latest
-        columns: dict[str, Any] = {"position": ("number", leaves(at[:3])), "rows": (("window", "part"), rows)}
-        data = xr.Dataset({**columns, "steps_done": ((), at.k)})
+        position, rows = self.latest
+        columns: dict[str, Any] = {"position": ("number", leaves(position[:3])), "rows": (("window", "part"), rows)}
+        data = xr.Dataset({**columns, "steps_done": ((), position.k)})
         data.attrs.update(content=netcdf.content_hash(data), identity=self.identity)
         if self.own:
             make_private(self.file.parent)

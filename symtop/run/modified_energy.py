@@ -65,15 +65,15 @@ def oscillation(x: Array, y: Array, values: Array, harmonics: int = HARMONICS) -
     """
     level = float(values[0])
     if x.size < 4 * harmonics or np.ptp(x) == 0.0 or not np.any(y):
-        missing = float((values - level).mean())
-        return lambda _x, _y, others: (others - level) - missing
-    least, largest, height = float(x.min()), float(x.max()), float(np.abs(y).max())
-    centre, width = 0.5 * (least + largest), 0.5 * (largest - least)
+        mean = float((values - level).mean())
+        return lambda _x, _y, samples: (samples - level) - mean
+    smallest, largest, height = float(x.min()), float(x.max()), float(np.abs(y).max())
+    centre, width = 0.5 * (smallest + largest), 0.5 * (largest - smallest)
 
     def series(x: Array, y: Array) -> Array:
-        turned = np.outer(np.arctan2(y / height, (x - centre) / width), np.arange(1, harmonics + 1))
-        return np.concatenate([np.cos(turned), np.sin(turned)], axis=1)
+        angles = np.outer(np.arctan2(y / height, (x - centre) / width), np.arange(1, harmonics + 1))
+        return np.concatenate([np.cos(angles), np.sin(angles)], axis=1)
 
     columns = np.concatenate([np.ones((x.size, 1)), series(x, y)], axis=1)
-    fitted = np.linalg.lstsq(columns, values - level, rcond=None)[0]
-    return lambda x, y, others: (others - level) - (fitted[0] + series(x, y) @ fitted[1:])
+    coefficients = np.linalg.lstsq(columns, values - level, rcond=None)[0]
+    return lambda x, y, samples: (samples - level) - (coefficients[0] + series(x, y) @ coefficients[1:])

@@ -67,18 +67,18 @@ class Landmarks(NamedTuple):
 @functools.lru_cache(maxsize=256)
 def landmarks(scene: Scene) -> Landmarks:
     """The landmarks of a top's motion, by its closed form; cached."""
-    top, at, form = scene.top, scene.start, closed_form(scene)
-    momenta = top.momenta(at)
+    top, start, form = scene.top, scene.start, closed_form(scene)
+    momenta = top.momenta(start)
     highest, lowest = form.theta_range
     upper = highest <= math.pi - lowest
     gap = highest if upper else math.pi - lowest
     near, far = (momenta.north, momenta.south) if upper else (momenta.south, momenta.north)
     sine = math.sin(0.5 * gap) ** 2
     rate = abs(far / math.cos(0.5 * gap) ** 2 + (near / sine if sine > 0.0 else 0.0)) / (4.0 * top.I1)
-    rounded = (replace(at, phi_dot=at.phi_dot * (1.0 + turn)) for turn in (-4e-16, 4e-16))
-    moved = [scene.nutation_period, *map(top.nutation_period, rounded)]
-    spread = max(moved) - min(moved)
-    shear = spread / max(moved) if math.isfinite(spread) else 1.0
+    starts = (replace(start, phi_dot=start.phi_dot * (1.0 + change)) for change in (-4e-16, 4e-16))
+    periods = [scene.nutation_period, *map(top.nutation_period, starts)]
+    spread = max(periods) - min(periods)
+    shear = spread / max(periods) if math.isfinite(spread) else 1.0
     pole, frequency = "upper" if upper else "lower", top.nutation_frequency(momenta)
     return Landmarks(form.nutation_period, frequency, lowest - highest, gap, pole, rate, shear)
 
@@ -90,38 +90,38 @@ class Growth(NamedTuple):
     size: Array
 
     @classmethod
-    def of(cls, times: Array, apart: Array, most: float) -> Self:
-        """A from the relative distance `apart` (n,) of two motions at times > 0; exponential growth beyond `most`."""
-        size = np.maximum.accumulate(np.maximum(np.where(np.isnan(apart), math.inf, apart), 1.0))
-        last = int(np.searchsorted(size, most))
+    def of(cls, times: Array, distance: Array, limit: float) -> Self:
+        """A from the relative `distance` (n,) of two motions at times > 0; exponential growth beyond `limit`."""
+        size = np.maximum.accumulate(np.maximum(np.where(np.isnan(distance), math.inf, distance), 1.0))
+        last = int(np.searchsorted(size, limit))
         if last < size.size:
-            size[last:] = np.exp(np.minimum(math.log(most) * times[last:] / times[last], MOST_FOLDS))
+            size[last:] = np.exp(np.minimum(math.log(limit) * times[last:] / times[last], MOST_FOLDS))
         return cls(times, size)
 
-    def at(self, until: float) -> float:
+    def at(self, time: float) -> float:
         """A at any time; beyond the last of `times` it is extrapolated by its power law in their second half."""
         last, count = float(self.times[-1]), self.size.size
-        if until <= last:
-            return float(self.size[min(int(np.searchsorted(self.times, until)), count - 1)])
+        if time <= last:
+            return float(self.size[min(int(np.searchsorted(self.times, time)), count - 1)])
         power = math.log2(float(self.size[-1] / self.size[count // 2 - 1]))
-        folds = min(max(power, 1.0), MOST_POWER) * math.log(until / last)
+        folds = min(max(power, 1.0), MOST_POWER) * math.log(time / last)
         return float(self.size[-1]) * math.exp(min(folds, MOST_FOLDS))
 
 
 @register_jitable
-def _apart(near: Any, far: Any, units: Any) -> Any:
+def _distance(near: Any, far: Any, units: Any) -> Any:
     """The larger of the distances of two states in place and in momentum; NaN if not finite or |q| is far from 1."""
     first = len(near) - 3  # of the momentum
-    place, momentum, near_square, far_square = 0.0, 0.0, 0.0, 0.0
+    position, momentum, near_square, far_square = 0.0, 0.0, 0.0, 0.0
     for m in range(first):
-        place += (far[m] - near[m]) ** 2
+        position += (far[m] - near[m]) ** 2
         near_square += near[m] ** 2
         far_square += far[m] ** 2
     for m in range(first, len(near)):
         momentum += (far[m] - near[m]) ** 2
-    long = max(abs(math.sqrt(near_square) - 1.0), abs(math.sqrt(far_square) - 1.0)) if first == 4 else 0.0
-    sound = place + momentum < math.inf and long <= LENGTH_OFF
-    return max(math.sqrt(place) * units[0], math.sqrt(momentum) * units[1]) if sound else math.nan
+    length_error = max(abs(math.sqrt(near_square) - 1.0), abs(math.sqrt(far_square) - 1.0)) if first == 4 else 0.0
+    valid = position + momentum < math.inf and length_error <= LENGTH_OFF
+    return max(math.sqrt(position) * units[0], math.sqrt(momentum) * units[1]) if valid else math.nan
 
 
 class IntegratedMotion:
@@ -141,9 +141,9 @@ class IntegratedMotion:
             self.rate, per = (2.0 ** math.frexp(unit)[1] for unit in (slow, 0.25 * self.inertia))
             self.momentum = per * self.rate
             *moments, mgl, x, y, z = scene.top.flat(scene.start)[:7]
-            turned = (rate / self.rate for rate in scene.start.omega_body)
+            rates = (rate / self.rate for rate in scene.start.omega_body)
             numbers = *(moment / per for moment in moments), mgl / per / self.rate**2, x, y, z, *scene.start.quaternion
-            self.given = from_flat((*numbers, *turned))
+            self.given = from_flat((*numbers, *rates))
 
     def states(self, times: Array, tolerance: float) -> Array:
         """States (n, dimension) at `times` (n,), NaN after `MOST_WORK` steps.
@@ -161,12 +161,12 @@ class IntegratedMotion:
         """The error (n,), rad, of states (n, dimension) at `times` (n,), plus the estimated error of the reference."""
         end = float(times[-1])
         steady = self.amplification(end, horizon) < LARGE_GROWTH
-        part = max(times.size // CHECK_EVERY, 1)
-        some = slice(part) if steady else slice((times.size - 1) % CHECK_EVERY, None, CHECK_EVERY)
+        count = max(times.size // CHECK_EVERY, 1)
+        subset = slice(count) if steady else slice((times.size - 1) % CHECK_EVERY, None, CHECK_EVERY)
         calm = max(self.amplification(horizon, horizon), (horizon / end) ** 2) < LARGE_GROWTH
-        looser = CALM_FACTOR if calm else 1.0
-        true, check = self.states(times, FINE_TOLERANCE * looser), self.states(times[some], CHECK_TOLERANCE * looser)
-        gap = np.abs(check - true[some])[:, : 4 if self.chart == BODY else 3].max(initial=0.0)
+        factor = CALM_FACTOR if calm else 1.0
+        true, check = self.states(times, FINE_TOLERANCE * factor), self.states(times[subset], CHECK_TOLERANCE * factor)
+        gap = np.abs(check - true[subset])[:, : 4 if self.chart == BODY else 3].max(initial=0.0)
         if self.chart == BODY:
             return np.asarray(attitude_distance(states[:, :4], true[:, :4]) + gap)
         return np.asarray(axis_distance(axes(chart, states), axes(self.chart, true)) + gap)
@@ -181,11 +181,11 @@ class IntegratedMotion:
 
     def moved(self, by: float = CHANGE) -> Any:
         """The scene's start with its rates changed by `by` times the natural frequency."""
-        at, rate = self.scene.start, by * self.landmarks.frequency
+        start, rate = self.scene.start, by * self.landmarks.frequency
         if self.chart == BODY:
-            x, y, z = at.omega_body
-            return replace(at, omega_body=(x + 0.6 * rate, y - 0.48 * rate, z + 0.64 * rate))
-        return replace(at, theta_dot=at.theta_dot + 0.6 * rate, phi_dot=at.phi_dot + 0.8 * rate)
+            x, y, z = start.omega_body
+            return replace(start, omega_body=(x + 0.6 * rate, y - 0.48 * rate, z + 0.64 * rate))
+        return replace(start, theta_dot=start.theta_dot + 0.6 * rate, phi_dot=start.phi_dot + 0.8 * rate)
 
     def growth(self, horizon: float) -> Growth:
         """A up to the horizon, or as far as `WATCHED_PERIODS` and `MOST_WATCHED` allow; cached.
@@ -195,31 +195,31 @@ class IntegratedMotion:
         while the body turns over, which moves it off the separatrix more than one of a start beside the unstable axis.
         """
         step = 2.0 * math.pi / self.fast / PAIR_STEPS
-        until = min(horizon, WATCHED_PERIODS[self.chart] * self.landmarks.period, MOST_WATCHED * step)
-        if until not in self.growths:
-            steps = max(math.ceil(until / step), POINTS)
-            h, marks, apart = until / steps, np.arange(1, POINTS + 1) * steps // POINTS, np.empty(POINTS)
-            given = (flat(self.scene.top, start) for start in (self.scene.start, self.moved()))
+        duration = min(horizon, WATCHED_PERIODS[self.chart] * self.landmarks.period, MOST_WATCHED * step)
+        if duration not in self.growths:
+            steps = max(math.ceil(duration / step), POINTS)
+            h, marks, distance = duration / steps, np.arange(1, POINTS + 1) * steps // POINTS, np.empty(POINTS)
+            pair = (flat(self.scene.top, start) for start in (self.scene.start, self.moved()))
             momentum = self.inertia * self.landmarks.frequency
             units = (2.0 if self.chart == BODY else 1.0) / CHANGE, 1.0 / (CHANGE * momentum)
-            two_runs(self.chart, DOP853_PAIR, _apart)(*given, h, marks, units, apart)
-            times, moved, top, turning = np.multiply(marks, h, dtype=float), CHANGE, self.scene.top, np.ones(POINTS)
-            if self.chart == BODY and top.free and not apart.max() < FLIP_GROWTH:
+            two_runs(self.chart, DOP853_PAIR, _distance)(*pair, h, marks, units, distance)
+            times, change, top, turning = np.multiply(marks, h, dtype=float), CHANGE, self.scene.top, np.ones(POINTS)
+            if self.chart == BODY and top.free and not distance.max() < FLIP_GROWTH:
                 starts = self.scene.start, self.moved(FINE_CHANGE)
                 with contextlib.suppress(SymtopError):  # the closed form refuses some momenta
                     forms = [FreeBody(top.moments, a.quaternion, top.momentum(a), top.momentum_lo(a)) for a in starts]
                     near, far = (form.samples(times) for form in forms)
-                    if not apart.max() < SATURATED_ANGLE / CHANGE:
-                        apart = attitude_distance(near.quaternion, far.quaternion) / FINE_CHANGE
-                        moved = FINE_CHANGE
-                    turning = _changed_later(top.moments, times, near.quaternion, near.momentum)
-            growth = Growth.of(times, apart, SATURATED_ANGLE / moved)
-            self.growths[until] = growth._replace(size=np.maximum(growth.size, turning))
-        return self.growths[until]
+                    if not distance.max() < SATURATED_ANGLE / CHANGE:
+                        distance = attitude_distance(near.quaternion, far.quaternion) / FINE_CHANGE
+                        change = FINE_CHANGE
+                    turning = _growth_after_flip(top.moments, times, near.quaternion, near.momentum)
+            growth = Growth.of(times, distance, SATURATED_ANGLE / change)
+            self.growths[duration] = growth._replace(size=np.maximum(growth.size, turning))
+        return self.growths[duration]
 
-    def amplification(self, until: float, horizon: float) -> float:
-        """A at the time `until`, of a run to `horizon`."""
-        return self.growth(horizon).at(until)
+    def amplification(self, time: float, horizon: float) -> float:
+        """A at `time`, of a run to `horizon`."""
+        return self.growth(horizon).at(time)
 
     def displacement(self, change: float, horizon: float) -> float:
         """The distance, rad, at the horizon from the motion whose start is changed by `change`."""
@@ -237,17 +237,17 @@ class IntegratedMotion:
         return 0.0 if whole else self.displacement(EPSILON, horizon)
 
 
-def _changed_later(moments: Any, times: Array, quaternion: Array, momentum: Array) -> Array:
+def _growth_after_flip(moments: Any, times: Array, quaternion: Array, momentum: Array) -> Array:
     """A (n,) of a change of a free body's momentum when that first leaves the axis of the start; 1 until then.
 
     If it never does, A is that of a change at the start.
     """
     length = np.linalg.norm(momentum[0])
-    size, then = np.ones(times.size), int(np.argmax(np.abs(momentum @ momentum[0]) < FLIP_COSINE * length**2))
-    small = LEAST_MOMENTUM_CHANGE * length * np.array([0.6, -0.48, 0.64])
-    later, start = times[then + 1 :] - times[then], (quaternion[then], momentum[then])
-    apart = attitude_distance(*(FreeBody(moments, *start, low).samples(later).quaternion for low in (small, -small)))
-    size[then + 1 :] = np.where(apart > ABOVE_ROUNDING, apart / (2.0 * LEAST_MOMENTUM_CHANGE), 1.0)
+    size, index = np.ones(times.size), int(np.argmax(np.abs(momentum @ momentum[0]) < FLIP_COSINE * length**2))
+    change = LEAST_MOMENTUM_CHANGE * length * np.array([0.6, -0.48, 0.64])
+    later, start = times[index + 1 :] - times[index], (quaternion[index], momentum[index])
+    gap = attitude_distance(*(FreeBody(moments, *start, low).samples(later).quaternion for low in (change, -change)))
+    size[index + 1 :] = np.where(gap > ABOVE_ROUNDING, gap / (2.0 * LEAST_MOMENTUM_CHANGE), 1.0)
     return np.maximum.accumulate(size)
 
 
@@ -261,18 +261,18 @@ def _frequencies(scene: Scene) -> tuple[float, float, float]:
     T is at most the energy less the least potential. F changes by the work of the weight across each axis, which is
     estimated by a few swings: of 640 random bodies one turned more than a tenth faster than the bound.
     """
-    top, at, slowest = scene.top, scene.start, 2.0 * math.pi / scene.horizon
+    top, start, slowest = scene.top, scene.start, 2.0 * math.pi / scene.horizon
     if not scene.of_body:
-        rates = at.theta_dot, at.phi_dot * math.sin(at.theta), top.momenta(at).p_psi / top.I1
+        rates = start.theta_dot, start.phi_dot * math.sin(start.theta), top.momenta(start).p_psi / top.I1
         slow = max(math.hypot(*rates, math.sqrt(abs(top.mgl) / top.I1)), slowest)
         return slow, slow, top.I1
-    slow = max(2.0 * math.pi / top.nutation_period(at), slowest)
-    least, middle, most = sorted(top.moments)
+    slow = max(2.0 * math.pi / top.nutation_period(start), slowest)
+    smallest, middle, largest = sorted(top.moments)
     pulls = [abs(top.mgl) * math.sqrt(max(1.0 - along * along, 0.0)) for along in top.centre]
-    twice = 2.0 * (top.energy(at) + abs(top.mgl))
-    parts = zip(top.moments, at.omega_body, pulls, strict=True)
-    part = sum((1.0 - moment / most) * (moment * rate * rate + SWING_FACTOR * pull) for moment, rate, pull in parts)
-    turning = max(twice / most, 0.0) + max(min(part, twice * (1.0 - least / most)), 0.0) / least
+    energy2 = 2.0 * (top.energy(start) + abs(top.mgl))
+    parts = zip(top.moments, start.omega_body, pulls, strict=True)
+    part = sum((1.0 - moment / largest) * (moment * rate * rate + SWING_FACTOR * pull) for moment, rate, pull in parts)
+    turning = max(energy2 / largest, 0.0) + max(min(part, energy2 * (1.0 - smallest / largest)), 0.0) / smallest
     swinging = max(pull / moment for moment, pull in zip(top.moments, pulls, strict=True))
     return slow, max(slow, math.sqrt(max(turning, swinging))), middle
 

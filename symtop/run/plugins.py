@@ -20,17 +20,17 @@ _loaded: dict[Path, list[str]] = {}  # files of plug-ins in use, and the names t
 
 def python_file(path: str | Path, name: str, kind: str) -> Path:
     """The file at a path; without one, SymtopError that the argument `name` must be `kind`, such as "a Python file"."""
-    there = False
+    exists = False
     with contextlib.suppress(OSError, ValueError):  # a name that is too long, or holds a null character
         if (file := at_home(path).resolve()).is_file():
             return file
-        there = file.exists()
-    raise SymtopError(f"{name} must be {kind}, not {str(path)!r}{'' if there else ', which does not exist'}", name)
+        exists = file.exists()
+    raise SymtopError(f"{name} must be {kind}, not {str(path)!r}{'' if exists else ', which does not exist'}", name)
 
 
 def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
     """Import a file as the module `name`, which may import files beside it, or as a package with the paths `places`."""
-    for stale in [known for known in sys.modules if known.startswith(f"{name}.")]:
+    for stale in [loaded for loaded in sys.modules if loaded.startswith(f"{name}.")]:
         del sys.modules[stale]  # submodules of another folder with the same name
     if file.suffix != ".py":
         raise SymtopError(f"{str(file)!r} cannot be loaded: its name must end in .py")
@@ -40,14 +40,14 @@ def execute(name: str, file: Path, places: list[str] | None = None) -> ModuleTyp
     assert spec is not None and spec.loader is not None  # noqa: PT018, S101  (its suffix has one)
     module = importlib.util.module_from_spec(spec)
     sys.modules[name] = module  # also because kernels are cached under the name of their module
-    usual, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # no ``__pycache__`` in the user's folder
+    previous, sys.dont_write_bytecode = sys.dont_write_bytecode, True  # no ``__pycache__`` in the user's folder
     try:
         spec.loader.exec_module(module)
     except BaseException:
         sys.modules.pop(name)
         raise
     finally:
-        sys.dont_write_bytecode = usual
+        sys.dont_write_bytecode = previous
     return module
 
 
@@ -67,7 +67,7 @@ def load(path: str | Path) -> list[str]:
         with foreign_code(where):
             raise
     entries = (*integrators().items(), *scenes().items(), *body_scenes().items())
-    _loaded[file] = [name for name, entry in entries if not any(entry is known for known in before)]
+    _loaded[file] = [name for name, entry in entries if not any(entry is record for record in before)]
     return _loaded[file]
 
 

@@ -67,11 +67,11 @@ def guard(
     rules = {name: getattr(next(iter(method.solvers.values())), "rule", None) for name, method in integrators().items()}
     tables = {name: rule for name, rule in rules.items() if isinstance(rule, Tableau)}
     rule = tables.get(one_of("method", method, [*SCIPY, *tables]))
-    own, other = names = ("tolerance", "step_size") if rule is None else ("step_size", "tolerance")
-    given, left_out = (tolerance, step_size) if rule is None else (step_size, tolerance)
-    if given is None or left_out is not None:
-        raise SymtopError(f"{method} needs {own}, and no {other}", *names)
-    start, setting = np.array(row("y0", y0)), positive(own, given)
+    required, excluded = names = ("tolerance", "step_size") if rule is None else ("step_size", "tolerance")
+    argument, extra = (tolerance, step_size) if rule is None else (step_size, tolerance)
+    if argument is None or extra is not None:
+        raise SymtopError(f"{method} needs {required}, and no {excluded}", *names)
+    start, setting = np.array(row("y0", y0)), positive(required, argument)
     begin, end, accuracy = finite("t0", t0), positive("horizon", horizon), positive("accuracy", accuracy)
     if start.size == 0:
         raise SymtopError("y0 must be at least one number, not none", "y0")
@@ -92,17 +92,17 @@ def guard(
         return _outlook(rate, begin, start, end, method, rule, setting, accuracy)
 
 
-def _stepped(f: Any, rule: Tableau, y: Array, h: float, marks: Any) -> Array:
+def _states(f: Any, rule: Tableau, y: Array, h: float, marks: Any) -> Array:
     """States (marks, n) of an explicit Runge-Kutta method after the numbers of steps `marks`."""
     b = np.array(rule.b)
-    a, slopes, states, done = np.zeros((b.size, b.size)), np.zeros((b.size, y.size)), [], 0
+    a, slopes, states, first = np.zeros((b.size, b.size)), np.zeros((b.size, y.size)), [], 0
     a[np.tril_indices(b.size, -1)] = np.array(rule.a)[: b.size * (b.size - 1) // 2]
     for mark in marks:
-        for k in range(done, int(mark)):
+        for k in range(first, int(mark)):
             for i in range(b.size):
                 slopes[i] = f((k + a[i].sum()) * h, y + h * (a[i, :i] @ slopes[:i]))
             y = y + h * (b @ slopes)
-        done = int(mark)
+        first = int(mark)
         states.append(y)
     return np.array(states)
 
@@ -126,34 +126,34 @@ def _motion(f: Any, y: Array, end: float) -> tuple[Any, float]:
     # a start at zero gives no scale for the tolerance; take a negligible part of the expected size of y
     size = float(np.abs(y).max()) or EPSILON * (end * float(np.abs(f(0.0, y)).max()) or 1.0)
     solver = DOP853(f, 0.0, y, end, rtol=FINE_TOLERANCE, atol=FINE_TOLERANCE * size)
-    times, parts = [0.0], list[Any]()
-    while solver.status == "running" and len(parts) < MOST_FINE_STEPS and solver.step() is None:
+    times, interpolants = [0.0], list[Any]()
+    while solver.status == "running" and len(interpolants) < MOST_FINE_STEPS and solver.step() is None:
         times.append(solver.t)
-        parts.append(solver.dense_output())
-    return OdeSolution(times, parts) if parts else None, times[-1]
+        interpolants.append(solver.dense_output())
+    return OdeSolution(times, interpolants) if interpolants else None, times[-1]
 
 
 def _growth(f: Any, near: Any, y: Array, elapsed: Array, extent: float) -> Growth:
     """The amplification A of a small change of the start; with a smaller change if the two motions separate too far."""
-    for moved in DISTANCES:
-        far, reached = _motion(f, y + moved * extent / math.sqrt(y.size), float(elapsed[-1]))
-        times, most = elapsed[elapsed <= reached * (1.0 + EPSILON)], MOST_DISTANCE / moved
+    for distance in DISTANCES:
+        far, reached = _motion(f, y + distance * extent / math.sqrt(y.size), float(elapsed[-1]))
+        times, limit = elapsed[elapsed <= reached * (1.0 + EPSILON)], MOST_DISTANCE / distance
         if times.size == 0:
             return Growth(elapsed[:1], np.array([math.inf]))
-        apart = np.linalg.norm(far(times) - near(times), axis=0) / (moved * extent)
-        if apart.max() < most:
+        ratio = np.linalg.norm(far(times) - near(times), axis=0) / (distance * extent)
+        if ratio.max() < limit:
             break
-    return Growth.of(times, apart, most)
+    return Growth.of(times, ratio, limit)
 
 
-def _expected(times: Array, error: Array, end: float, amplified: float, extent: float) -> float:
+def _largest_error(times: Array, error: Array, end: float, amplified: float, extent: float) -> float:
     """The largest error of a run to `end`, from that of a piece; `extent` of the motion is inf if it is not known."""
     largest, middle = float(error.max()), int(np.searchsorted(times, 0.5 * times[-1]))
     if largest > 2.0 * extent and 0 < middle < times.size - 1:  # the run departs from the motion
         folds = math.log(max(float(error[-1] / error[middle]), 1.0)) / (times[-1] - times[middle])
         return largest * math.exp(min(folds * (end - times[-1]), MOST_FOLDS))
-    late = float(error[middle:].max())
-    lasting = np.minimum(error, late) if late < FADED_SHARE * largest else error
+    second_half = float(error[middle:].max())
+    lasting = np.minimum(error, second_half) if second_half < FADED_SHARE * largest else error
     later = max(grown(Probe(times, lasting, "ok", end, 0), end, straight=False), float(lasting.max()) * amplified)
     return max(largest, min(later, 2.0 * extent))
 
@@ -164,70 +164,70 @@ def _outlook(
     from scipy.integrate import solve_ivp
 
     safe = _finite(f, t)
-    near, watched = _motion(safe, y, end)
+    near, duration = _motion(safe, y, end)
     if near is None or (near.t_max < end and len(near.interpolants) < MOST_FINE_STEPS):
-        words = f"below {watched:.6g}, not {end!r}: the motion goes beyond all bounds there, as far as DOP853 can tell"
+        words = f"below {duration:.6g}, not {end!r}: the motion goes beyond all bounds there, as far as DOP853 can tell"
         raise SymtopError(f"horizon must be {words}", "horizon")
-    elapsed = watched * np.arange(1.0, POINTS + 1.0) / POINTS
+    elapsed = duration * np.arange(1.0, POINTS + 1.0) / POINTS
     true = near(elapsed)
     path = np.column_stack([y, true])  # with the start, which a transient may leave before the first of these times
     spread, extent = np.std(true, axis=1), float(np.linalg.norm(np.ptp(path, axis=1))) or 1.0
     turns = 0.5 * float(np.linalg.norm(np.diff(path, axis=1), axis=0).sum()) / extent  # oscillations, from path length
     rates = np.std([f(time, state) for time, state in zip(elapsed, true.T, strict=True)], axis=0)
     frequency = float(np.linalg.norm(rates)) / max(float(np.linalg.norm(spread)), TINY)
-    whole = watched >= end or turns >= 1.0  # the extent of the motion is known
-    slow = min(frequency, 2.0 * math.pi * turns / watched)
-    moved, kind = y + DISTANCES[0] * extent / math.sqrt(y.size), "step" if rule else "tolerance"
+    complete = duration >= end or turns >= 1.0  # the extent of the motion is known
+    slow = min(frequency, 2.0 * math.pi * turns / duration)
+    y_far, kind = y + DISTANCES[0] * extent / math.sqrt(y.size), "step" if rule else "tolerance"
     growth = _growth(safe, near, y, elapsed, extent)
     turn = 2.0 * math.pi / max(slow, TINY)  # longer than a period at `frequency` where a motion is fast now and then
     period = 2.0 * math.pi / max(frequency, TINY)
-    piece = min(end, watched, max(PIECE_SHARE * end, PIECE_PERIODS * period, PIECE_TURNS * turn))
-    places = np.union1d(np.geomspace(COMPARED_FROM, 1.0, POINTS // 4), elapsed / watched)  # compared times, in pieces
+    piece = min(end, duration, max(PIECE_SHARE * end, PIECE_PERIODS * period, PIECE_TURNS * turn))
+    positions = np.union1d(np.geomspace(COMPARED_FROM, 1.0, POINTS // 4), elapsed / duration)  # compared, in pieces
 
     def run_piece(start: Array) -> tuple[Array, Array, float]:
         """Times and states of the piece, and the mean step (0 for an implicit method)."""
         if rule:
-            marks = np.unique(np.rint(min(int(piece / setting * (1.0 + 1e-9)), MOST_PROBE_STEPS) * places).clip(1.0))
-            return marks * setting, _stepped(f, rule, start, setting, marks), setting
-        (name, cost), shown = SCIPY[method], np.unique(np.minimum(piece * places, piece))
-        run = solve_ivp(safe, (0.0, piece), start, name, shown, rtol=setting, atol=setting)
+            marks = np.unique(np.rint(min(int(piece / setting * (1.0 + 1e-9)), MOST_PROBE_STEPS) * positions).clip(1.0))
+            return marks * setting, _states(f, rule, start, setting, marks), setting
+        (name, cost), t_eval = SCIPY[method], np.unique(np.minimum(piece * positions, piece))
+        run = solve_ivp(safe, (0.0, piece), start, name, t_eval, rtol=setting, atol=setting)
         return run.t, run.y.T, piece * cost / run.nfev
 
     times, states, mean = run_piece(y)
     error = np.linalg.norm(states - near(times).T, axis=1)
-    short = setting > watched if rule else times[-1] < 0.99 * piece  # the piece has no step, or SciPy ended early
-    ended = bool(short) or not np.isfinite(error).all()
-    total, since = growth.at(end), growth.at(float(times[-1]))
-    expected = math.inf if ended else _expected(times, error, end, total / since, extent if whole else math.inf)
-    better = setting * (accuracy / max(expected, TINY)) ** (1.0 / ((rule and integrator(method).order) or 1))
-    better = 0.3 * setting if ended else min(better, end if rule else LOOSEST)
+    short = setting > duration if rule else times[-1] < 0.99 * piece  # the piece has no step, or SciPy ended early
+    fails = bool(short) or not np.isfinite(error).all()
+    total, part = growth.at(end), growth.at(float(times[-1]))
+    expected = math.inf if fails else _largest_error(times, error, end, total / part, extent if complete else math.inf)
+    proposal = setting * (accuracy / max(expected, TINY)) ** (1.0 / ((rule and integrator(method).order) or 1))
+    proposal = 0.3 * setting if fails else min(proposal, end if rule else LOOSEST)
     change = math.sqrt(EPSILON) * extent
     rate = f(0.0, y)
     slopes = [(f(0.0, y + change * unit) - rate) / change for unit in np.eye(y.size)]
     modes, cause = np.linalg.eigvals(np.array(slopes)), "step"
     fastest = float(np.abs(modes).max())
     if rule and fastest > STIFF_RATIO * slow:  # limit the step by stability
-        better = min(better, max(setting, 1.0 / fastest))
-    better = float(Context(prec=2, rounding=ROUND_DOWN).create_decimal(better))
-    why = f"errors add up over {end * slow / (2.0 * math.pi):.3g} periods; take a {kind} of about {better:.2g}"
+        proposal = min(proposal, max(setting, 1.0 / fastest))
+    proposal = float(Context(prec=2, rounding=ROUND_DOWN).create_decimal(proposal))
+    why = f"errors add up over {end * slow / (2.0 * math.pi):.3g} periods; take a {kind} of about {proposal:.2g}"
     if not expected > accuracy:
-        cause, why = "", f"a {kind} of {better:.2g} would do for {accuracy:.1g}"
+        cause, why = "", f"a {kind} of {proposal:.2g} would do for {accuracy:.1g}"
     elif mean * fastest > 1.0 and fastest > max(STIFF_RATIO * slow, 2.0 * float(modes.real.max())):  # none grows
-        cause, better = "stiffness", math.nan
+        cause, proposal = "stiffness", math.nan
         why = f"f has rates of {fastest:.1g}, the motion of {slow:.1g}; take an implicit method, such as radau"
-    elif ended or np.linalg.norm(run_piece(moved)[1] - states, axis=1).max() > OWN * since**2 * DISTANCES[0] * extent:
-        better = min(better, 0.3 * setting)
+    elif fails or np.linalg.norm(run_piece(y_far)[1] - states, axis=1).max() > OWN * part**2 * DISTANCES[0] * extent:
+        proposal = min(proposal, 0.3 * setting)
         cause = "instability"
-        why = f"it multiplies a small change more than the motion does; try a {kind} of {better:.2g}"
+        why = f"it multiplies a small change more than the motion does; try a {kind} of {proposal:.2g}"
     elif total > UNSTABLE_GROWTH * growth.at(0.5 * end):
         lost = total * EPSILON * extent > accuracy
-        cause, better = "instability", math.nan if lost else better
+        cause, proposal = "instability", math.nan if lost else proposal
         why = f"the motion multiplies a small change {total:.1g} times; " + (
-            "rounding alone decides, shorten the horizon" if lost else f"try a {kind} of {better:.2g}"
+            "rounding alone decides, shorten the horizon" if lost else f"try a {kind} of {proposal:.2g}"
         )
     elif float(error.max()) < 10.0 * FINE_TOLERANCE * float(np.abs(true).max()):
-        cause, better, why = "rounding", math.nan, f"rounding adds up, and no {kind} helps"
-    words = ", with the motion lost and no size known" if whole and extent < expected < math.inf else ""
+        cause, proposal, why = "rounding", math.nan, f"rounding adds up, and no {kind} helps"
+    words = ", with the motion lost and no size known" if complete and extent < expected < math.inf else ""
     sentence = f"{method}: expect an error of {expected:.1g} by t = {t + end:.4g}{words}: {why}"
-    sentence += "" if whole else f"; the motion was watched to t = {t + watched:.4g} alone"
-    return Outlook(expected, better, cause, total, sentence)
+    sentence += "" if complete else f"; the motion was watched to t = {t + duration:.4g} alone"
+    return Outlook(expected, proposal, cause, total, sentence)

@@ -64,10 +64,10 @@ def unseen(times: Array, period: Any) -> Array:
 
 def places(samples: int, *, dithered: bool) -> Array:
     """Positions of the samples in a run, from 0 to 1: equidistant, or `dithered` by the golden ratio."""
-    place = np.arange(samples, dtype=float)
+    positions = np.arange(samples, dtype=float)
     if dithered:
-        place[1:-1] += np.mod(GOLDEN * place[1:-1], 1.0) - 0.5
-    return place / (samples - 1)
+        positions[1:-1] += np.mod(GOLDEN * positions[1:-1], 1.0) - 0.5
+    return positions / (samples - 1)
 
 
 def sample_times(horizon: float, samples: int, period: float, steps: int | None = None) -> tuple[Any, Any, bool]:
@@ -79,11 +79,11 @@ def sample_times(horizon: float, samples: int, period: float, steps: int | None 
     for dithered in (False, True):
         if long_enough and not dithered and samples * WIDEST_GAP <= 1.0:
             continue  # so few samples leave a wider gap, wherever they fall
-        place = places(samples, dithered=dithered)
+        positions = places(samples, dithered=dithered)
         if steps is None:
-            marks, times = np.empty(0, dtype=np.int64), horizon * place
+            marks, times = np.empty(0, dtype=np.int64), horizon * positions
         else:
-            marks = np.rint(steps * place).astype(np.int64)
+            marks = np.rint(steps * positions).astype(np.int64)
             marks = marks if steps > 2 * samples else np.unique(marks)  # places are half a stride apart or more
             times = marks * (horizon / steps)
         if dithered or not long_enough or unseen(times, period) < WIDEST_GAP:
@@ -96,10 +96,10 @@ def chart_of(method: Integrator, watched: str, observe: str | None = None) -> st
     if watched == BODY:
         one_of("observe", observe or "attitude", ("axis", "attitude"))
         if BODY not in method.solvers:
-            able = [name for name, entry in methods().items() if BODY in entry.solvers]
-            words = f"one of {len(able)}, such as strang or dop853-compiled (all: symtop integrators --wide)"
-            other = f"{method.method} without brackets" if method.method in able else words
-            raise SymtopError(f"integrator must have the chart body, of a RigidBody, not {method.name}: take {other}")
+            candidates = [name for name, entry in methods().items() if BODY in entry.solvers]
+            words = f"one of {len(candidates)}, such as strang or dop853-compiled (all: symtop integrators --wide)"
+            advice = f"{method.method} without brackets" if method.method in candidates else words
+            raise SymtopError(f"integrator must have the chart body, of a RigidBody, not {method.name}: take {advice}")
         return BODY
     if isinstance(observe, str) and observe == "theta":
         raise SymtopError("observe must be nutation, which shows theta, axis or attitude, not 'theta'", "observe")
@@ -141,9 +141,9 @@ def make_plan(
         step = positive("step_size", step_size)
         if step > horizon:
             raise SymtopError(f"step_size must be at most the horizon {horizon!r}, not {step!r}", "step_size")
-        most = MOST_STEPS if budget is None else budget
-        if horizon / step > most:
-            words = f"asks for {horizon / step:.3g} steps; the limit is {most:.3g} (see budget)"
+        limit = MOST_STEPS if budget is None else budget
+        if horizon / step > limit:
+            words = f"asks for {horizon / step:.3g} steps; the limit is {limit:.3g} (see budget)"
             raise SymtopError(f"step_size {step!r} {words}", "step_size", "budget")
         steps = max(1, round(horizon / step))
         _, marks, dithered = sample_times(horizon, samples, period, steps)
@@ -195,20 +195,20 @@ def simulate(
     """
     warn = functools.partial(warnings.warn, category=SymtopWarning, stacklevel=3)  # where `simulate` was called
     report = guard if callable(guard) else warn if isinstance(guard, str) or boolean("guard", guard) else None
-    asked = _setup(scene, integrator, step_size, tolerance, horizon, samples, observe, budget, times)
-    chosen, method, plan = asked.scene, asked.method, asked.plan
-    if isinstance(guard, str) and one_of("guard", guard, ("exact", "series")) == "exact" and chosen.of_body:
-        raise SymtopError(f"guard must be series on {chosen.name}, a body without symmetry, not 'exact'", "guard")
-    trajectory, caution = _guarded(asked, report, guard == "series")
-    data = dataset(trajectory.time, trajectory.columns, chosen.units)
+    setup = _setup(scene, integrator, step_size, tolerance, horizon, samples, observe, budget, times)
+    problem, method, plan = setup.scene, setup.method, setup.plan
+    if isinstance(guard, str) and one_of("guard", guard, ("exact", "series")) == "exact" and problem.of_body:
+        raise SymtopError(f"guard must be series on {problem.name}, a body without symmetry, not 'exact'", "guard")
+    trajectory, caution = _guarded(setup, report, guard == "series")
+    data = dataset(trajectory.time, trajectory.columns, problem.units)
     data.attrs = netcdf.attributes_of(
-        f"{method.name} on {chosen.name}", integrator=method.name, scene=chosen.name, chart=asked.chart,
+        f"{method.name} on {problem.name}", integrator=method.name, scene=problem.name, chart=setup.chart,
         implementation=method.implementation, horizon=plan.horizon, step_size=plan.step_size, tolerance=plan.tolerance,
         steps=trajectory.steps, force_evaluations=trajectory.force_evaluations,
         newton_iterations=trajectory.newton_iterations, outcome=trajectory.outcome,
-        outcome_message=sentence(trajectory.outcome, trajectory.reached_time, plan.horizon, chosen.second),
-        reached_time=trajectory.reached_time, guard=caution, sampling=asked.sampling, top=_json(chosen.top),
-        start=_json(chosen.start),
+        outcome_message=sentence(trajectory.outcome, trajectory.reached_time, plan.horizon, problem.second),
+        reached_time=trajectory.reached_time, guard=caution, sampling=setup.sampling, top=_json(problem.top),
+        start=_json(problem.start),
     )  # fmt: skip
     return data
 
@@ -237,17 +237,17 @@ def _setup(
 ) -> _Setup:  # fmt: skip
     """Check the arguments of `simulate`. With `times`, the marks are the whole steps before each of them."""
     row = None if times is None else _checked_times(times, horizon, samples)
-    chosen, method, h = find_scene(scene, bodies=True), find_integrator(integrator), math.nan
+    problem, method, h = find_scene(scene, bodies=True), find_integrator(integrator), math.nan
     if row is not None:
-        horizon, samples = float(row[-1]) or BRIEF_RUN * chosen.time_scale(), 2
+        horizon, samples = float(row[-1]) or BRIEF_RUN * problem.time_scale(), 2
         if step_size is not None:
             h = positive("step_size", step_size)
             step_size = min(h, horizon)  # it may be longer than the run
-    end = chosen.horizon if horizon is None else horizon_of(horizon)
+    end = problem.horizon if horizon is None else horizon_of(horizon)
     count = whole("samples", samples, 2, MOST_SAMPLES)
-    chart = chart_of(method, chosen.observes, observe)
+    chart = chart_of(method, problem.observes, observe)
     limit = None if budget is None else positive("budget", budget)
-    plan, dithered = make_plan(chosen, method, step_size, tolerance, horizon=end, samples=count, budget=limit)
+    plan, dithered = make_plan(problem, method, step_size, tolerance, horizon=end, samples=count, budget=limit)
     marks = plan.marks
     uneven = marks.size and marks[-1] % (marks.size - 1)  # unequal numbers of steps
     sampling = "dithered" if dithered else "nearest steps" if uneven else "uniform"
@@ -257,70 +257,70 @@ def _setup(
             marks = np.where(np.abs(row - near * h) <= SAME_TIME * row, near, np.floor(row / h)).astype(np.int64)
         plan = plan._replace(times=row, horizon=float(row[-1]), step_size=h, marks=marks)
         sampling = "at times"
-    return _Setup(chosen, method, chart, plan, sampling)
+    return _Setup(problem, method, chart, plan, sampling)
 
 
 def _checked_times(times: ArrayLike, horizon: object, samples: object) -> Array:
     """The row of `times`; SymtopError for anything else, and where `horizon` or `samples` are given, too."""
-    for name, given, usual in (("horizon", horizon, None), ("samples", samples, 501)):
-        if type(given) is not type(usual) or given != usual:
-            raise SymtopError(f"{name} must be left out where times are given, not {shown(given)}", name, "times")
+    for name, value, default in (("horizon", horizon, None), ("samples", samples, 501)):
+        if type(value) is not type(default) or value != default:
+            raise SymtopError(f"{name} must be left out where times are given, not {shown(value)}", name, "times")
     row = np.atleast_1d(real_numbers("times", times)).copy()
     flat = row.ravel()
     bad = ~(np.isfinite(flat) & ((flat >= SHORTEST) | (flat == 0.0)) & (flat > np.append(-1.0, flat[:-1])))
     if row.ndim != 1 or bad.any() or not row.size:
-        wrong = f"{float(flat[bad][0])!r} in place {np.argmax(bad)}" if bad.any() else f"of shape {row.shape}"
-        must = f"an increasing row of finite numbers, each 0 or at least {SHORTEST:g}"
-        raise SymtopError(f"times must be {must}, not {wrong}", "times")
+        actual = f"{float(flat[bad][0])!r} in place {np.argmax(bad)}" if bad.any() else f"of shape {row.shape}"
+        rule = f"an increasing row of finite numbers, each 0 or at least {SHORTEST:g}"
+        raise SymtopError(f"times must be {rule}, not {actual}", "times")
     return row
 
 
-def _guarded(asked: _Setup, guard: Callable[[str], object] | None, series: bool = False) -> tuple[Trajectory, str]:
+def _guarded(setup: _Setup, guard: Callable[[str], object] | None, series: bool = False) -> tuple[Trajectory, str]:
     """Call `guard` with the guard's sentence, if any, and make the run; the sentence is "off" without a guard."""
-    scene, method, chart, plan, sampling = asked
+    scene, method, chart, plan, sampling = setup
     caution = "off" if guard is None else ""
     forecast = plan._replace(step_size=plan.horizon) if plan.step_size > plan.horizon else plan
     if guard is not None and plan.horizon > 0.0 and (caution := warning(scene, method, chart, forecast, series=series)):
         guard(caution)
     if sampling == "at times" and method.fixed_step:
-        return Trajectory.of_run(scene, chart, plan, _stepped(scene, method, chart, plan)), caution
-    brief = plan if plan.horizon else Plan.until([0.0, BRIEF_RUN * scene.time_scale()], plan.tolerance, plan.budget)
-    run = solve(method, chart, scene.top, scene.start, brief, f" on {scene.name}")
+        return Trajectory.of_run(scene, chart, plan, _run_at_times(scene, method, chart, plan)), caution
+    run_plan = plan if plan.horizon else Plan.until([0.0, BRIEF_RUN * scene.time_scale()], plan.tolerance, plan.budget)
+    run = solve(method, chart, scene.top, scene.start, run_plan, f" on {scene.name}")
     run = run if plan.horizon else Run(run.states[:1], run.p_phi[:1], run.p_psi[:1], 0, 0, 0, "ok", 0.0)
     return Trajectory.of_run(scene, chart, plan, run), caution
 
 
-def _stepped(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Run:
+def _run_at_times(scene: Scene, method: Integrator, chart: str, plan: Plan) -> Run:
     """A run of fixed steps, with a shorter step to each time inside one; NaN from the first step that fails."""
-    begun = scene.top, scene.start, 1.0
-    times, since, words = plan.times, plan.marks * plan.step_size, f" on {scene.name}"
-    marks, place = np.unique(plan.marks, return_inverse=True)
-    whole = Plan.steps(plan.step_size, marks, budget=plan.budget)
-    steps = solve(method, chart, scene.top, scene.start, whole, words)
-    states, p_phi, p_psi = (values[place] for values in steps[:3])
+    origin = scene.top, scene.start, 1.0
+    times, starts, words = plan.times, plan.marks * plan.step_size, f" on {scene.name}"
+    marks, inverse = np.unique(plan.marks, return_inverse=True)
+    grid_plan = Plan.steps(plan.step_size, marks, budget=plan.budget)
+    steps = solve(method, chart, scene.top, scene.start, grid_plan, words)
+    states, p_phi, p_psi = (values[inverse] for values in steps[:3])
     outcome, reached = steps.outcome, plan.horizon if steps.outcome == "ok" else steps.reached
-    lost = np.zeros(times.size, dtype=bool)
-    for i in np.flatnonzero(np.abs(times - since) > SAME_TIME * times):
-        lost[i:] = True
+    invalid = np.zeros(times.size, dtype=bool)
+    for i in np.flatnonzero(np.abs(times - starts) > SAME_TIME * times):
+        invalid[i:] = True
         if not np.isfinite(states[i]).all() or (steps.outcome != "ok" and plan.marks[i] >= steps.steps):
             break  # the whole step that contains this time failed
         try:
-            top, start, r = _start(scene, chart, states[i], p_phi[i], p_psi[i]) if plan.marks[i] else begun
+            top, start, r = _start(scene, chart, states[i], p_phi[i], p_psi[i]) if plan.marks[i] else origin
         except SymtopError:  # the state is finite, but has no direction or is too large for a start
-            outcome, reached = "not_finite", float(since[i])
+            outcome, reached = "not_finite", float(starts[i])
             break
-        rest = solve(method, chart, top, start, Plan.steps(float(times[i] - since[i]), [1]), words)
-        if rest.outcome != "ok":
-            outcome, reached = rest.outcome, float(since[i])
+        tail = solve(method, chart, top, start, Plan.steps(float(times[i] - starts[i]), [1]), words)
+        if tail.outcome != "ok":
+            outcome, reached = tail.outcome, float(starts[i])
             break
-        lost[i:], states[i], p_phi[i], p_psi[i] = False, rest.states[0], rest.p_phi[0], rest.p_psi[0]
+        invalid[i:], states[i], p_phi[i], p_psi[i] = False, tail.states[0], tail.p_phi[0], tail.p_psi[0]
         if r != 1.0:
             states[i, :-3] *= r
             (p_phi if chart == BODY else p_psi)[i] *= r if chart == "axis" else r * r
-    if outcome == "not_normalised" or (off_length(chart, states) & ~lost).any():
-        lost |= off_length(chart, states) | ~np.isfinite(states).all(axis=1)
-        outcome, reached = "not_normalised", plan.last_of(~lost)
-    states[lost], p_phi[lost], p_psi[lost] = math.nan, math.nan, math.nan
+    if outcome == "not_normalised" or (off_length(chart, states) & ~invalid).any():
+        invalid |= off_length(chart, states) | ~np.isfinite(states).all(axis=1)
+        outcome, reached = "not_normalised", plan.last_of(~invalid)
+    states[invalid], p_phi[invalid], p_psi[invalid] = math.nan, math.nan, math.nan
     return Run(states, p_phi, p_psi, *steps[3:6], outcome, reached)
 
 
@@ -330,21 +330,21 @@ def _start(scene: Scene, chart: str, state: Array, p_phi: float, p_psi: float) -
     with np.errstate(all="ignore"):
         if chart == "angles":
             theta, p_theta, phi, psi = state.tolist()
-            held = top.momenta(scene.start)  # its `north` and `south` are free of cancellation
-            more, other = p_phi - held.p_phi, p_psi - held.p_psi
-            north, south = held.north + more - other, held.south + more + other
+            initial = top.momenta(scene.start)  # its `north` and `south` are free of cancellation
+            phi_change, psi_change = p_phi - initial.p_phi, p_psi - initial.p_psi
+            north, south = initial.north + phi_change - psi_change, initial.south + phi_change + psi_change
             _, phi_dot, cosine = effective_force(theta, north, south, top.I1, top.mgl)
             return top, Angles(theta, phi, psi, p_theta / top.I1, phi_dot, p_psi / top.I3 - phi_dot * cosine), 1.0
         r = float(np.linalg.norm(state[:-3]))
         unit, momentum = state[:-3] / (r or math.nan), state[-3:]
-        place, heavy = tuple(unit.tolist()), replace(top, mgl=top.mgl * (r if chart == "axis" else r * r))
+        direction, heavy = tuple(unit.tolist()), replace(top, mgl=top.mgl * (r if chart == "axis" else r * r))
         if chart == "axis":
-            return heavy, Angles.from_axis(top, place, momentum.tolist()), r
+            return heavy, Angles.from_axis(top, direction, momentum.tolist()), r
         if chart == BODY:
-            return heavy, Attitude(place, tuple((momentum / top.moments).tolist())), r
-        along = axis_from_quaternion(unit)
-        omega = momentum / top.I1 + (1.0 / top.I3 - 1.0 / top.I1) * (momentum @ along) * along
-        return top, Angles.from_quaternion(place, omega_space=omega.tolist()), r  # f does not depend on |q|
+            return heavy, Attitude(direction, tuple((momentum / top.moments).tolist())), r
+        axis = axis_from_quaternion(unit)
+        omega = momentum / top.I1 + (1.0 / top.I3 - 1.0 / top.I1) * (momentum @ axis) * axis
+        return top, Angles.from_quaternion(direction, omega_space=omega.tolist()), r  # f does not depend on |q|
 
 
 @functools.lru_cache(maxsize=256)

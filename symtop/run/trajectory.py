@@ -63,9 +63,9 @@ class Trajectory(NamedTuple):
                     phi, psi = (*continuous(np.array(angles), guides), None)[:2]
                 axis, energy, p_theta = readings(view)
             outcome, reached = run.outcome, run.reached
-            whole = np.isfinite(energy + run.p_phi) & axis.any(axis=1)  # an overflow, or an axis of zero
-            if outcome == "ok" and not whole.all():
-                outcome, reached = "not_finite", plan.last_of(whole)
+            valid = np.isfinite(energy + run.p_phi) & axis.any(axis=1)  # an overflow, or an axis of zero
+            if outcome == "ok" and not valid.all():
+                outcome, reached = "not_finite", plan.last_of(valid)
             return cls(
                 plan.times, view.theta, phi, psi, axis, view.quaternion if chart in ("attitude", BODY) else None,
                 energy, p_theta, run.p_phi, None if chart == BODY else run.p_psi, momentum, chart, plan.step_size,
@@ -90,8 +90,8 @@ def column(data: xr.Dataset | Mapping[str, Any], name: str) -> Any:
     values = data[name]
     if isinstance(values, xr.DataArray) and values.dims != ("time",):
         for dim, labels in LABELS.items():
-            given = values.coords[dim].to_numpy().tolist() if dim in values.coords else [*labels]
-            if given != [*labels] and {*given} == {*labels}:
+            order = values.coords[dim].to_numpy().tolist() if dim in values.coords else [*labels]
+            if order != [*labels] and {*order} == {*labels}:
                 values = values.sel({dim: [*labels]})
         if "time" in values.dims[1:]:
             values = values.transpose("time", ...)
@@ -115,17 +115,17 @@ def dataset(time: Array, columns: Mapping[str, Array], units: str = "") -> xr.Da
 def _public(time: Array, columns: Mapping[str, Array], units: str) -> xr.Dataset:
     attributes = netcdf.variable_attributes
     variables = {name: (_DIMS[values.shape[1:]], values, attributes(name, units)) for name, values in columns.items()}
-    used = [name for name in LABELS if any(name in dims for dims, _, _ in variables.values())]
-    coordinates = {name: (name, list(LABELS[name]), attributes(name, units)) for name in used}
+    present = [name for name in LABELS if any(name in dims for dims, _, _ in variables.values())]
+    coordinates = {name: (name, list(LABELS[name]), attributes(name, units)) for name in present}
     return xr.Dataset(variables, {"time": ("time", time.copy(), attributes("time", units)), **coordinates})
 
 
 def _direct(time: Array, columns: Mapping[str, Array], units: str) -> xr.Dataset:
     def variable(kind: type, dims: tuple[str, ...], data: Any, name: str, encoding: Any = None) -> Any:
-        made: Any = object.__new__(kind)
-        made._dims, made._data, made._encoding = dims, data, encoding
-        made._attrs = dict(netcdf.variable_attributes(name, units)) or None
-        return made
+        instance: Any = object.__new__(kind)
+        instance._dims, instance._data, instance._encoding = dims, data, encoding
+        instance._attrs = dict(netcdf.variable_attributes(name, units)) or None
+        return instance
 
     variables: dict[str, Any] = {}
     sizes = {"time": len(time)}

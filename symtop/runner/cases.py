@@ -87,8 +87,8 @@ class StudyCases:
 
     def compute(self, missing: dict[Path, Case], pool: Pool, limit: float, *, fresh: bool, quiet: bool) -> None:
         """Compute cases in a pool, with a progress bar on a terminal."""
-        script, files, most = str(file_of(self.study.name)), plugins.loaded(), min(limit, LONGEST_LIMIT)
-        tasks = [Task(script, case, path, files, most, fresh) for path, case in missing.items()]
+        script, files, seconds = str(file_of(self.study.name)), plugins.loaded(), min(limit, LONGEST_LIMIT)
+        tasks = [Task(script, case, path, files, seconds, fresh) for path, case in missing.items()]
         before = self.computed + len(self.failures)
         with progress_bar(self.study.name, quiet=quiet or not tasks, total=len(tasks), unit="case") as bar:
 
@@ -148,12 +148,12 @@ def status(
 
 def other_settings(study: Study, case: Case, stored: list[Path]) -> list[str]:
     """The settings and dependencies in which a case differs from the most similar stored one of its label."""
-    alike = [path for path in stored if store.identity_of(path).rpartition("--")[0] == case.label]
-    settings, made = json.loads(json.dumps(dict(case.settings))), fingerprint.reasons(study, case)
+    similar = [path for path in stored if store.identity_of(path).rpartition("--")[0] == case.label]
+    settings, hashes = json.loads(json.dumps(dict(case.settings))), fingerprint.reasons(study, case)
     differing = [
         [f"setting {name}" for name in sorted({*old, *settings}) if old.get(name, "") != settings.get(name, "")]
-        + [label for label in code_hash.changes(before, made) if label != "settings"]
-        for old, before in ([_attribute(path, name) for name in ("settings", "made_of")] for path in alike)
+        + [label for label in code_hash.changes(before, hashes) if label != "settings"]
+        for old, before in ([_attribute(path, name) for name in ("settings", "made_of")] for path in similar)
     ]
     return min(differing, key=len, default=["never computed"])
 
@@ -174,16 +174,16 @@ def check(
     stored = sorted(cases.data.items(), key=lambda item: store.digest_of(item[0]))
     sample = {path.name: data for path, data in stored[: None if everything else CHECKED_CASES]}
     with tempfile.TemporaryDirectory(prefix="symtop-check-") as folder:
-        again = StudyCases(study, Path(folder).resolve())
-        missing = again.add(case for path, case in cases.cases.items() if path.name in sample)
-        again.compute(missing, pool, limit or study.limit, fresh=False, quiet=True)
-        again.read(missing)
-    differing = again.failures
-    for path, data in again.data.items():
-        label = f"{again.cases[path].integrator} on {again.cases[path].scene}"
+        rerun = StudyCases(study, Path(folder).resolve())
+        missing = rerun.add(case for path, case in cases.cases.items() if path.name in sample)
+        rerun.compute(missing, pool, limit or study.limit, fresh=False, quiet=True)
+        rerun.read(missing)
+    differing = rerun.failures
+    for path, data in rerun.data.items():
+        label = f"{rerun.cases[path].integrator} on {rerun.cases[path].scene}"
         differing += [f"{label}: {text}" for text in differences(sample[path.name], data)]
-    whole = results / f"{study.name}.nc"
-    if whole.is_file() and len(stored) == len(cases.cases):
-        pair = differences(netcdf.read_any(whole), cases.combined(), attributes=False)
-        differing += [f"{whole.name}: {text}" for text in pair]
+    file = results / f"{study.name}.nc"
+    if file.is_file() and len(stored) == len(cases.cases):
+        texts = differences(netcdf.read_any(file), cases.combined(), attributes=False)
+        differing += [f"{file.name}: {text}" for text in texts]
     return {"study": study.name, "stored": len(stored), "compared": len(sample), "differences": differing}

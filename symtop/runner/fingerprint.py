@@ -46,9 +46,9 @@ def settings_key(study: Study, case: Case) -> str:
 def reasons(study: Study, case: Case) -> Reasons:
     """Everything that a case's numbers depend on: settings, scene, integrators, code, versions."""
     methods, catalogue = integrators(), all_scenes()
-    places = sorted(scenes()) if case.scene == EVERY_NAME else {case.scene} & catalogue.keys()
+    scene_names = sorted(scenes()) if case.scene == EVERY_NAME else {case.scene} & catalogue.keys()
     parts = [made_of("measure", study.measure), code_hash.packages(), {"settings": settings_key(study, case)}]
-    parts += [made_of(f"scene {name}", catalogue[name]) for name in places]
+    parts += [made_of(f"scene {name}", catalogue[name]) for name in scene_names]
     parts += [made_of(f"integrator {name}", methods[name]) for name in uses(study, case)]
     return code_hash.merged(parts) | ({"processor": code_hash.processor()} if study.is_timed(case) else {})
 

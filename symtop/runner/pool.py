@@ -82,11 +82,11 @@ def execute_case(task: Task, study: Study | None = None) -> Result:
     study = study or prepare(task.study, task.plugins)
     path, case = task.path, task.case
     if fingerprint.digest(study, case) != store.digest_of(path):
-        of = f"the sources or dependencies of {case.integrator} on {case.scene}"
+        words = f"the sources or dependencies of {case.integrator} on {case.scene}"
         remedy = "if a file was edited meanwhile, run the study again"
-        raise SymtopError(f"{of} are not those that the study was started with; {remedy}")
-    with files.locked(path, wait=False) as ours:
-        if not ours:
+        raise SymtopError(f"{words} are not those that the study was started with; {remedy}")
+    with files.locked(path, wait=False) as acquired:
+        if not acquired:
             return Result("busy")
         if not task.fresh and store.load_case(path) is not None:
             return Result("found")
@@ -163,59 +163,59 @@ class Pool(contextlib.AbstractContextManager["Pool"]):
     def analyse(self, function: Callable[..., Any], *args: Any) -> Future[Any]:
         """Call a function in a worker while cases of the next study run; timed cases wait until it is done."""
         self.open(self.jobs)
-        self._analyses = [other for other in self._analyses if not other.done()]
+        self._analyses = [future for future in self._analyses if not future.done()]
         self._analyses.append(self.submit(function, *args))
         return self._analyses[-1]
 
     def run(self, study: Study, tasks: Sequence[Task], on_result: OnResult) -> None:
         """Compute all tasks, timed ones last, and call `on_result` with each as it ends."""
         for timed in (False, True):
-            part = in_order([task for task in tasks if study.is_timed(task.case) == timed])
-            if part and timed:
+            batch = in_order([task for task in tasks if study.is_timed(task.case) == timed])
+            if batch and timed:
                 wait(self._analyses)
-            local = any(plugins.is_local(name) for task in part for name in (task.case.scene, *task.case.integrators))
+            local = any(plugins.is_local(name) for task in batch for name in (task.case.scene, *task.case.integrators))
             if self.client is not None and not timed and not local:
                 submit = partial(self.client.get_executor(pure=False).submit, execute_case)
-                _drain(part, submit, cluster.width(self.client), on_result)
-            elif local or (len(part) < WORTH_WORKERS and not self.size):
+                _drain(batch, submit, cluster.width(self.client), on_result)
+            elif local or (len(batch) < WORTH_WORKERS and not self.size):
 
-                def here(task: Task) -> Future[Result]:
+                def inline(task: Task) -> Future[Result]:
                     (future := Future[Result]()).set_result(execute_case(task, study))
                     return future
 
-                _drain([task._replace(timed=(1, math.nan) if timed else None) for task in part], here, 1, on_result)
+                _drain([task._replace(timed=(1, math.nan) if timed else None) for task in batch], inline, 1, on_result)
             else:
-                self._in_workers(part, on_result, timed=timed)
+                self._in_workers(batch, on_result, timed=timed)
 
     def _in_workers(self, tasks: list[Task], on_result: OnResult, *, timed: bool) -> None:
         """Compute tasks in workers; a case whose worker dies is retried once, with no other case running."""
-        remaining, died = {task.path: task for task in tasks}, dict[Path, Task]()
+        remaining, retries = {task.path: task for task in tasks}, dict[Path, Task]()
         fruitless = 0
 
         def settle(task: Task, result: Result) -> None:
             nonlocal fruitless
             fruitless = 0
             del remaining[task.path]
-            if result.state == "died" and not alone:
-                died[task.path] = task
+            if result.state == "died" and not last_round:
+                retries[task.path] = task
             else:
                 on_result(task, failed(task, ENDED) if result.state == "died" else result)
 
-        for alone in (False, True):
+        for last_round in (False, True):
             while remaining:
                 self.open(min(self.jobs, len(remaining)))
-                together = self.at_once(min(self.size, len(remaining))) if timed else None
-                width = 1 if alone else CASES_AHEAD * self.size if together is None else together[0]
+                concurrency = self.at_once(min(self.size, len(remaining))) if timed else None
+                width = 1 if last_round else CASES_AHEAD * self.size if concurrency is None else concurrency[0]
                 try:
-                    ahead = [task._replace(timed=together) for task in remaining.values()]
-                    _drain(ahead, lambda task: self.submit(execute_case, task, limit=task.limit + GRACE), width, settle)
+                    queue = [task._replace(timed=concurrency) for task in remaining.values()]
+                    _drain(queue, lambda task: self.submit(execute_case, task, limit=task.limit + GRACE), width, settle)
                 except BrokenExecutor:
                     self.close_workers()
                     fruitless += 1
                     if fruitless == MOST_FRUITLESS:
                         words = "the worker processes end before they begin; try --jobs 1 or look at the free memory"
                         raise SymtopError(words) from None
-            remaining.update(died)
+            remaining.update(retries)
 
     def at_once(self, width: int) -> tuple[int, float]:
         """Timed cases that run at once, and the slowdown: `width`, halved until a trial is within `DISTURBED_RATIO`."""
@@ -276,16 +276,16 @@ def in_order(tasks: Sequence[Task]) -> list[Task]:
 
 def _drain(tasks: Sequence[Task], submit: Callable[[Task], Future[Result]], width: int, settle: OnResult) -> None:
     """Submit all tasks, `width` at a time, and settle each; one that is busy in another command is submitted again."""
-    ahead, futures = deque(tasks), dict[Future[Result], Task]()
-    while ahead or futures:
-        while ahead and len(futures) < width:
-            task = ahead.popleft()
+    queue, futures = deque(tasks), dict[Future[Result], Task]()
+    while queue or futures:
+        while queue and len(futures) < width:
+            task = queue.popleft()
             futures[submit(task)] = task
         for future in wait(futures, return_when=FIRST_COMPLETED).done:
             task = futures.pop(future)
             result = _result(future, task)
             if result.state == "busy":
-                ahead.append(task)
+                queue.append(task)
                 time.sleep(BUSY_SECONDS)
             else:
                 settle(task, result)

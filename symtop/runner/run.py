@@ -49,8 +49,8 @@ def run(study: Study, results: Path, *, jobs: int | None = None, pool: Pool | No
     Failed cases are named in ``failures``, recorded beside the others with their traceback, and tried again by the next
     run. Raises SymtopError if the results cannot be written or nothing could be measured.
     """
-    with Pool(jobs) if pool is None else contextlib.nullcontext(pool) as own:
-        return start(study, results, own, **options).result()
+    with Pool(jobs) if pool is None else contextlib.nullcontext(pool) as workers:
+        return start(study, results, workers, **options).result()
 
 
 def start(study: Study, results: Path, pool: Pool, *, quick: bool = False, full: bool = False,
@@ -113,17 +113,17 @@ def analyse_stored(
     study = prepare(script, files_of_plugins)
     cases = StudyCases(study, results, cases=stored, failures=failures)
     cases.read_all()
-    edited = drawing_digest(study, save) != drawing  # then the next run must draw again
-    return analyse(cases, "" if edited else made_of, save, quick)
+    changed = drawing_digest(study, save) != drawing  # then the next run must draw again
+    return analyse(cases, "" if changed else made_of, save, quick)
 
 
 def drawing_digest(study: Study, save: Save | None) -> str:
     """Hash of the code that combines and draws, and of the template and the table of columns beside a study."""
-    answers = study.facts, study.pictures, study.tables, study.charts, study.title, study.question
+    functions = study.facts, study.pictures, study.tables, study.charts, study.title, study.question
     drawing = combine, columns.described, findings_of, save
     files_beside = (file_beside(study.name, name) for name in ("page.md", "columns.tsv"))
     texts = {f"file {file.name}": code_hash.hashed(file.read_text(encoding="utf-8")) for file in files_beside if file}
-    code = fingerprint.reached().reasons("drawing", answers, drawing)
+    code = fingerprint.reached().reasons("drawing", functions, drawing)
     return code_hash.digest(code | texts | code_hash.packages("matplotlib"))
 
 
@@ -186,8 +186,8 @@ def _facts(study: Study, data: Combined) -> Iterator[tuple[str, float | str | bo
             raise StudyError(f"study {study.name}: a fact's name must be a word of letters, digits and _, not {name!r}")
         value = raw.item() if getattr(raw, "ndim", None) == 0 else raw  # a scalar of NumPy
         if value is not None and not isinstance(value, (bool, int, float, str)):
-            must = f"fact {name} must be a number, text or None, not {shown(value)[:LONGEST]}"
-            raise StudyError(f"study {study.name}: {must}")
+            rule = f"fact {name} must be a number, text or None, not {shown(value)[:LONGEST]}"
+            raise StudyError(f"study {study.name}: {rule}")
         yield name, None if isinstance(value, float) and math.isnan(value) else value
 
 

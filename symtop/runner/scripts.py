@@ -22,21 +22,21 @@ _own_scripts: dict[str, Path] = {}  # the user's scripts that are loaded, by the
 
 def folder() -> Path:
     """The folder of the studies that ship with symtop."""
-    beside = Path(__file__).resolve().parents[2]
-    for place in (beside / STUDIES, beside / "studies"):
-        if (place / "__init__.py").is_file():
-            return place
-    raise SymtopError(f"no studies lie beside the package in {beside}; install symtop again")
+    parent = Path(__file__).resolve().parents[2]
+    for path in (parent / STUDIES, parent / "studies"):
+        if (path / "__init__.py").is_file():
+            return path
+    raise SymtopError(f"no studies lie beside the package in {parent}; install symtop again")
 
 
-def _once(name: str, file: Path, places: list[str] | None = None) -> ModuleType:
+def _import_once(name: str, file: Path, paths: list[str] | None = None) -> ModuleType:
     module = sys.modules.get(name)
-    return module if module is not None and module.__file__ == str(file) else execute(name, file, places)
+    return module if module is not None and module.__file__ == str(file) else execute(name, file, paths)
 
 
-def _package(name: str, place: Path) -> ModuleType:
-    code_hash.add_root(name, place)
-    return _once(name, place / "__init__.py", [str(place)])
+def _package(name: str, path: Path) -> ModuleType:
+    code_hash.add_root(name, path)
+    return _import_once(name, path / "__init__.py", [str(path)])
 
 
 def install() -> ModuleType:
@@ -72,7 +72,7 @@ def _module(file: Path) -> ModuleType:
     if (file.parent / "__init__.py").is_file():
         package = _package(f"symtop_study_{file.parent.name}", file.parent)
         return importlib.import_module(f"{package.__name__}.{file.stem}")
-    return _once(f"symtop_study_{file.stem}", file)
+    return _import_once(f"symtop_study_{file.stem}", file)
 
 
 def load(name: str) -> Study:

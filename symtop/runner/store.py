@@ -76,12 +76,12 @@ def save_case(data: xr.Dataset, path: Path, study: Study, case: Case) -> None:
     arrays = {str(k): as_text(variable.values) for k, variable in enumerate(data.variables.values())}
     variables = [[str(name), list(variable.dims), variable.attrs, name in data.coords]
                  for name, variable in data.variables.items()]  # fmt: skip
-    about = json.dumps(
+    header = json.dumps(
         {"variables": variables, "attributes": attributes},
         default=lambda value: value.tolist() if hasattr(value, "tolist") else str(value),
     )
     with replacing(path) as partial, partial.open("wb") as file:
-        np.savez(file, about=about, content=_content(about, arrays), **arrays)
+        np.savez(file, about=header, content=_content(header, arrays), **arrays)
     failure_path(path).unlink(missing_ok=True)
 
 
@@ -91,19 +91,19 @@ def load_case(path: Path) -> xr.Dataset | None:
         with path.open("rb") as stream, np.load(stream) as file:
             arrays = {name: file[name] for name in file.files}
         text, content = str(arrays.pop("about")), str(arrays.pop("content"))
-        about = json.loads(text)
+        header = json.loads(text)
     except Exception:  # noqa: BLE001  (no file, or a damaged archive, which raises nearly anything)
         return None
-    if content != _content(text, arrays) or about["attributes"]["sources"] != digest_of(path):
+    if content != _content(text, arrays) or header["attributes"]["sources"] != digest_of(path):
         return None
     kinds: tuple[dict[str, Any], dict[str, Any]] = {}, {}  # variables, coordinates
-    for k, (name, dims, attributes, is_coordinate) in enumerate(about["variables"]):
+    for k, (name, dims, attributes, is_coordinate) in enumerate(header["variables"]):
         kinds[is_coordinate][name] = dims, arrays[str(k)], attributes
-    return xr.Dataset(*kinds, about["attributes"])
+    return xr.Dataset(*kinds, header["attributes"])
 
 
-def _content(about: str, arrays: dict[str, Any]) -> str:
-    return hashed(about, *(netcdf.array_hash(arrays[name]) for name in sorted(arrays)))
+def _content(header: str, arrays: dict[str, Any]) -> str:
+    return hashed(header, *(netcdf.array_hash(arrays[name]) for name in sorted(arrays)))
 
 
 def failure_path(path: Path) -> Path:
@@ -139,12 +139,12 @@ def tidy(results: Path, study: Study) -> None:
     """Remove partial files of a study that killed processes have left, unless another process holds the lock."""
     for lock in (results / "cases" / study.name).glob(".*.lock"):
         path = lock.with_name(f"{lock.stem[1:]}.npz")
-        with locked(path, wait=False) as ours:
-            if ours:
+        with locked(path, wait=False) as acquired:
+            if acquired:
                 sweep(path)
                 trace_path(path).unlink(missing_ok=True)
-    with locked(results / f"{study.name}.nc", wait=False) as ours:
-        if ours:
+    with locked(results / f"{study.name}.nc", wait=False) as acquired:
+        if acquired:
             for file in (results / f"{study.name}.nc", results / f"{study.name}.json"):
                 sweep(file)
             for partial in (results / "figures").glob(f".{study.name}-*.part*"):
@@ -161,13 +161,13 @@ def _entries(results: Path) -> dict[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-def _marks(results: Path, paths: Iterable[Path]) -> dict[str, list[int] | None]:
+def _file_marks(results: Path, paths: Iterable[Path]) -> dict[str, list[int] | None]:
     """Size and modification time (ns) of files by relative path; None for one that is missing."""
     marks: dict[str, list[int] | None] = {path.relative_to(results).as_posix(): None for path in paths}
     for name in marks:
         with contextlib.suppress(OSError):
-            facts = (results / name).stat()
-            marks[name] = [facts.st_size, facts.st_mtime_ns]
+            stat = (results / name).stat()
+            marks[name] = [stat.st_size, stat.st_mtime_ns]
     return marks
 
 
@@ -177,12 +177,12 @@ def is_current(results: Path, name: str, made_of: str) -> bool:
     if not isinstance(entry, dict) or entry.get("made_of") != made_of or not isinstance(entry.get("files"), dict):
         return False
     marks = entry["files"]
-    return None not in marks.values() and marks == _marks(results, [results / file for file in marks])
+    return None not in marks.values() and marks == _file_marks(results, [results / file for file in marks])
 
 
 def note(results: Path, name: str, made_of: str, paths: Iterable[Path]) -> None:
     """Write an entry of the manifest; a lock protects it from other processes."""
     with locked(manifest(results), wait=True):
         sweep(manifest(results))
-        entry = {"made_of": made_of, "files": _marks(results, paths)}
+        entry = {"made_of": made_of, "files": _file_marks(results, paths)}
         netcdf.write_json(manifest(results), _entries(results) | {name: entry})

@@ -37,10 +37,10 @@ def failing(study: str, function: str) -> AbstractContextManager[None]:
 def each(study: str, function: str, make: Callable[[], Any], kind: type, form: str) -> Iterator[Any]:
     """The entries that a function of a study returns or yields; StudyError unless each is of that `kind`."""
     with failing(study, function):
-        answer = make()
-    if isinstance(answer, (str, bytes, Mapping, kind)) or not isinstance(answer, Iterable):
-        raise StudyError(f"study {study}: {function} must return {form}, not {shown(answer)[:LONGEST]}")
-    entries, end = iter(answer), object()
+        result = make()
+    if isinstance(result, (str, bytes, Mapping, kind)) or not isinstance(result, Iterable):
+        raise StudyError(f"study {study}: {function} must return {form}, not {shown(result)[:LONGEST]}")
+    entries, end = iter(result), object()
     while True:
         with failing(study, function):
             entry = next(entries, end)
@@ -110,8 +110,8 @@ class Case:
             try:
                 json.dumps(value)
             except (TypeError, ValueError, RecursionError):
-                allowed = "numbers of Python, text, lists or mappings, which JSON can hold"
-                raise SymtopError(f"setting {key!r} must be {allowed}, not {shown(value)[:LONGEST]}") from None
+                rule = "numbers of Python, text, lists or mappings, which JSON can hold"
+                raise SymtopError(f"setting {key!r} must be {rule}, not {shown(value)[:LONGEST]}") from None
 
     @property
     def integrators(self) -> tuple[str, ...]:
@@ -183,28 +183,28 @@ class Study:
                 if any({name, split_name(name)[0]} & methods for name in case.integrators)
             ]
 
-        def first(quick: bool) -> list[Case]:
+        def selected(quick: bool) -> list[Case]:
             cases = select(self.cases(quick))
-            alone = all({*case.integrators} <= {REFERENCE} for case in cases)
-            if not cases or (alone and REFERENCE not in names):
+            only_reference = all({*case.integrators} <= {REFERENCE} for case in cases)
+            if not cases or (only_reference and REFERENCE not in names):
                 raise StudyError(f"study {self.name} has no case of {', '.join(names)}")
             return cases
 
-        def able(answer: Callable[[Any], Any] | None) -> Any:
-            def answered(data: Any) -> Any:
+        def guarded(function: Callable[[Any], Any] | None) -> Any:
+            def wrapper(data: Any) -> Any:
                 try:
-                    return answer(data)  # type: ignore[misc]
+                    return function(data)  # type: ignore[misc]
                 except StudyError:
                     raise
                 except Exception as error:
                     sentence = f"study {self.name} compares methods and has no answer with {', '.join(names)} alone"
                     raise StudyError(f"{sentence}; name more of them") from error
 
-            return answer and answered
+            return function and wrapper
 
         full, follow_up = self.full, self.follow_up
-        answers = {name: able(getattr(self, name)) for name in ("facts", "pictures", "tables", "charts")}
+        answers = {name: guarded(getattr(self, name)) for name in ("facts", "pictures", "tables", "charts")}
         return replace(
-            self, cases=first, full=full and (lambda: select(full())),
+            self, cases=selected, full=full and (lambda: select(full())),
             follow_up=follow_up and (lambda data: select(follow_up(data))), **answers,
         )  # fmt: skip

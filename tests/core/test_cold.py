@@ -108,7 +108,7 @@ def test_garbage_is_collected_and_calls_of_llvm_noted_again_after_a_kernel_is_co
 
     state = lambda: (gc.isenabled(), len(jit.ffi.lib._lock._cblist))
     before, during, compiled = state(), [], compile_kernel(kernel)
-    jit._once(compiled, lambda _: during.append(state()))((types.float64,))
+    jit._compile_once(compiled, lambda _: during.append(state()))((types.float64,))
     assert (before, during) == ((True, 1), [(False, 0)])
     assert state() == before
     with pytest.raises(TypingError):

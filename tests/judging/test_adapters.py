@@ -298,7 +298,7 @@ def test_a_right_step_is_not_refuted_beside_a_pole_or_without_momenta(scene, kee
 def test_what_a_run_that_blows_up_makes_of_the_last_bit_is_nothing_that_a_step_keeps(memory):
     scene, calls_made = symtop.scene("separatrix"), itertools.count()
     stepper = PythonStep(lambda f, t, y, h: midpoint(f, t, y, h) + memory * h * (next(calls_made) % 7), "axis")
-    missed, _ = calls._cut(stepper, scene, calls.STEP_SHARE * scene.time_scale() / 1.6, [(8, 30), (3, 4)])
+    missed, _ = calls._largest_gap(stepper, scene, calls.STEP_SHARE * scene.time_scale() / 1.6, [(8, 30), (3, 4)])
     assert (missed > calls.LATE_GAP) is (memory > 0.0)
 
 

@@ -263,7 +263,7 @@ def test_a_slope_yields_to_the_terms_of_a_step_but_for_one_that_is_clearly_lower
     noisy, five = (terms._replace(defect=np.zeros(7), noise=np.full(7, noise)) for noise in (1e-5, 1e-14))
     fits = [Fit(slope, doubt, 1.0, np.ones(1, dtype=bool)) for slope in (main, second)]
     data = order.Order("", *[np.ones(1)] * 4, fits[0], {})
-    assert [order._claimed(4, data, fits, term, "").verdict for term in (terms, None, noisy, five)] == verdicts.split()
+    assert [order._declared(4, data, fits, term, "").verdict for term in (terms, None, noisy, five)] == verdicts.split()
 
 
 @pytest.mark.parametrize(("lengths", "verdict"), [((8.37, 40.0), "confirmed"), ((8.37,), "undecided")])

@@ -21,7 +21,7 @@ from symtop.run import guard
 from symtop.run.ensemble.bodies import body_population, scenes_of
 from symtop.run.guard import EXPECTED, Probe, grown
 from symtop.run.linear_stability import nutation_growth, trace
-from symtop.run.motion import ExactMotion, IntegratedMotion, _apart, landmarks
+from symtop.run.motion import ExactMotion, IntegratedMotion, _distance, landmarks
 from symtop.run.simulation import make_plan
 
 WOBBLY = ("jolt", 0.227), ("rk4", 0.227), ("mujoco-euler", 2.0)  # the first doubles a wobble in a turn
@@ -350,9 +350,9 @@ def test_passages_of_a_pole_add_up_and_what_was_lost_is_not_compared():
         assert bool(caution(scene, name, step_size=step)) is is_lost
     state, units = (1.0, 0.0, 0.0, 0.0, 1.0, 2.0, 3.0), (1.0, 1.0)
     for broken_state in ((math.nan, *state[1:]), (1.002, *state[1:]), (*state[:6], math.inf)):
-        assert all(math.isnan(_apart(*pair, units)) for pair in ((state, broken_state), (broken_state, state)))
-    assert _apart(state, (*state[:6], 3.5), units) == 0.5
-    assert _apart(state[1:], (1.002, *state[2:]), units) == 1.002  # an axis
+        assert all(math.isnan(_distance(*pair, units)) for pair in ((state, broken_state), (broken_state, state)))
+    assert _distance(state, (*state[:6], 3.5), units) == 0.5
+    assert _distance(state[1:], (1.002, *state[2:]), units) == 1.002  # an axis
 
 
 def test_beside_a_pole_no_growth_is_seen_where_there_is_none_and_a_length_that_drifts_away_is():

@@ -81,7 +81,7 @@ def test_an_error_is_forecast_within_a_factor_of_three(f, y0, horizon, name, con
 def test_an_error_that_has_halved_goes_on_as_it_was_and_one_that_has_faded_as_it_is():
     times = np.arange(1.0, 11.0)
     whole, halved, faded = (
-        right_hand_side._expected(times, 1e-9 * np.where(times < 5.0, 1.0, share), 1000.0, 1.0, math.inf)
+        right_hand_side._largest_error(times, 1e-9 * np.where(times < 5.0, 1.0, share), 1000.0, 1.0, math.inf)
         for share in (1.0, 0.5, 0.05)
     )
     assert halved == pytest.approx(whole, rel=1e-9)

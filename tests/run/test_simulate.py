@@ -17,7 +17,7 @@ from symtop.methods.runge_kutta.pair_tables import DOP853
 from symtop.model import charts
 from symtop.model.scenes import grazing, steady
 from symtop.run import trajectory as trajectories
-from symtop.run.simulation import WIDEST_GAP, _setup, _stepped, integrate, sample_times
+from symtop.run.simulation import WIDEST_GAP, _run_at_times, _setup, integrate, sample_times
 from symtop.run.trajectory import Trajectory, dataset
 
 
@@ -185,7 +185,7 @@ def test_a_time_inside_a_step_has_the_order_of_the_method_and_a_line_between_ste
 def test_a_time_inside_a_step_is_the_same_step_that_is_shorter_by_hand(scene, row, h):
     """From a state whose |e| or |q| is not one: one step of half the length of f, as anybody has it."""
     case, method, chart, plan, _ = _setup(scene, row, h, times=[40 * h, 40.5 * h])
-    before, after = _stepped(case, method, chart, plan).states
+    before, after = _run_at_times(case, method, chart, plan).states
     assert 1e-7 < abs(np.linalg.norm(before[:-3]) - 1.0) < 1e-2
     f, slopes, zero = symtop.field(chart, case.top), [], np.zeros(before.size)
     a, b = RK4 if row.startswith("rk4") else (((), *DOP853.a), DOP853.b)

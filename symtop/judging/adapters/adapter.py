@@ -87,34 +87,34 @@ class Stepper:
     def there_and_back(self, top: SymmetricTop, start: Angles, h: float) -> Run:
         """The end of a step of h and one from there with all rates reversed, for methods without steps of -h."""
         par, state = self.form.prepare(top, start)
-        turned = np.ones(len(state))
-        turned[-3 if turned.size > 2 else -1 :] = -1.0  # L, w, the rates or p_theta
-        y = turned * self.march(top, par, np.array(state, dtype=float), h, A_STEP)[0]
-        y = turned * self.march(top, self.form.prepare(top, reversed_rates(start))[0], y, h, A_STEP)[0]
+        signs = np.ones(len(state))
+        signs[-3 if signs.size > 2 else -1 :] = -1.0  # L, w, the rates or p_theta
+        y = signs * self.march(top, par, np.array(state, dtype=float), h, A_STEP)[0]
+        y = signs * self.march(top, self.form.prepare(top, reversed_rates(start))[0], y, h, A_STEP)[0]
         return as_run(self.form, par, np.zeros(1), y[None], 1, 0, OK, 0.0)
 
 
 def in_runs(
-    run: Callable[[int, int, Any], Any], y: Any, marks: Marks, most: int, show: Callable[[Any], Array] = np.asarray
+    run: Callable[[int, int, Any], Any], y: Any, marks: Marks, limit: int, show: Callable[[Any], Array] = np.asarray
 ) -> Array:
-    """The arrays show(y) at the marks, with y = run(done, steps, y) for at most `most` steps; NaN after a failure."""
-    states, done = np.full((marks.size, show(y).size), np.nan), 0
-    for place, mark in enumerate(map(int, marks)):
-        while done < mark:
+    """The arrays show(y) at the marks, with y = run(first, steps, y) for at most `limit` steps; NaN after a failure."""
+    states, first = np.full((marks.size, show(y).size), np.nan), 0
+    for row, mark in enumerate(map(int, marks)):
+        while first < mark:
             if not np.isfinite(show(y)).all():
                 return states
-            steps = min(most, mark - done)
-            done, y = done + steps, run(done, steps, y)
-        states[place] = show(y)
+            steps = min(limit, mark - first)
+            first, y = first + steps, run(first, steps, y)
+        states[row] = show(y)
     return states
 
 
-def repeat(once: Callable[[int, Any], Any], y: Any, marks: Marks, show: Callable[[Any], Array] = np.asarray) -> Array:
-    """`in_runs` for a function of single steps, y = once(k, y)."""
+def repeat(step: Callable[[int, Any], Any], y: Any, marks: Marks, show: Callable[[Any], Array] = np.asarray) -> Array:
+    """`in_runs` for a function of single steps, y = step(k, y)."""
 
-    def run(done: int, steps: int, y: Any) -> Any:
-        for k in range(done, done + steps):
-            y = once(k, y)
+    def run(first: int, steps: int, y: Any) -> Any:
+        for k in range(first, first + steps):
+            y = step(k, y)
         return y
 
     return in_runs(run, y, marks, CHECKED_STEPS, show)
@@ -126,9 +126,9 @@ def relative_gap(first: Any, second: Any) -> float:
     return gap if np.isfinite(gap) else math.inf
 
 
-def label_of(thing: Any) -> str:
+def label_of(target: Any) -> str:
     """A valid name of an integrator from any text, or from the name of a function or of an object's class."""
-    text = thing if isinstance(thing, str) else getattr(thing, "__name__", type(thing).__name__)
+    text = target if isinstance(target, str) else getattr(target, "__name__", type(target).__name__)
     return re.sub(r"[^A-Za-z0-9._+-]+", "-", text).strip("-._+")[:64] or "step"
 
 

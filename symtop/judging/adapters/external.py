@@ -95,7 +95,7 @@ class SharedObject(Stepper):
         par, room = numbers.copy(), np.full(size + GUARD_DOUBLES, GUARD_VALUE)
         room[:size] = y
 
-        def run(_done: int, steps: int, room: Array) -> Array:
+        def run(_first: int, steps: int, room: Array) -> Array:
             with heartbeat.call(h):
                 self.function(room.ctypes.data_as(Doubles), h, par.ctypes.data_as(Doubles), steps)
             return room
@@ -131,12 +131,12 @@ class Program(Stepper):
         numbers = [top.I1, top.I3, top.mgl, h, last, stride, *y.tolist()]
         answer = self._answer(" ".join(map(repr, numbers)) + "\n", h, last)
         states = _states(answer, last // stride + 1, y.size, self.name)
-        off = states[0] - y  # zero except for rounding, the sign of a quaternion and multiples of 2 pi
+        deviation = states[0] - y  # zero except for rounding, the sign of a quaternion and multiples of 2 pi
         if self.chart in QUATERNIONS and states[0, :4] @ y[:4] < 0.0:
-            off[:4] = states[0, :4] + y[:4]
+            deviation[:4] = states[0, :4] + y[:4]
         if self.chart == "angles":
-            off[:3] = np.sin(0.5 * off[:3])
-        if np.isfinite(states[0]).all() and not (np.abs(off) <= WRITTEN_ROUNDING * np.abs(y).max()).all():
+            deviation[:3] = np.sin(0.5 * deviation[:3])
+        if np.isfinite(states[0]).all() and not (np.abs(deviation) <= WRITTEN_ROUNDING * np.abs(y).max()).all():
             first = ", ".join(f"{value:.4g}" for value in states[0])
             words = f"{self.name} must write the start that it was given as the first of its states, not {first}"
             raise SymtopError(words)
@@ -148,8 +148,8 @@ class Program(Stepper):
             try:
                 answer, code, errors = self._run(line, seconds)
             except subprocess.TimeoutExpired:
-                what = f"{steps} step{'s' * (steps != 1)} of {h:.3g}"
-                words = f"had not ended{self.ending} {seconds:.0f} s after it was asked for {what}"
+                request = f"{steps} step{'s' * (steps != 1)} of {h:.3g}"
+                words = f"had not ended{self.ending} {seconds:.0f} s after it was asked for {request}"
                 raise SymtopError(f"{self.name} {words}") from None
         if code != 0:
             raise SymtopError(f"{self.name} ended with code {code}: {last_words(errors) or 'it said nothing'}")
@@ -182,12 +182,12 @@ class Server(Program):
             self._errors, pipe = tempfile.TemporaryFile(), subprocess.PIPE  # noqa: SIM115  (open as long as it runs)
             self._server = subprocess.Popen(self.words, stdin=pipe, stdout=pipe, stderr=self._errors, bufsize=0)  # noqa: S603
         output = self._server.stdout
-        early = select.select([output], [], [], 0.0)[0] and os.read(output.fileno(), CHUNK_BYTES).strip()
+        leftover = select.select([output], [], [], 0.0)[0] and os.read(output.fileno(), CHUNK_BYTES).strip()
         with contextlib.suppress(BrokenPipeError):
             self._server.stdin.write(line.encode())
         try:
-            answer, *after = EMPTY_LINE.split(b"" if early else self._read(end), 1)
-            if early or b"".join(after).strip():
+            answer, *after = EMPTY_LINE.split(b"" if leftover else self._read(end), 1)
+            if leftover or b"".join(after).strip():
                 self.close()
                 raise SymtopError(f"{self.name} must write nothing but its answer, which an empty line ends")
             if after:
@@ -233,8 +233,8 @@ def _states(answer: bytes, rows: int, size: int, name: str) -> Array:
         excerpt = answer[:40].decode(errors="replace").strip()
         raise SymtopError(f"{name} must write numbers, as text or as raw doubles, not {excerpt!r}") from None
     if values.size != rows * size:
-        must = f"{rows} states of {size} numbers (the start and one every stride steps), {rows * size} in all"
-        raise SymtopError(f"{name} must write {must}, not {values.size}")
+        rule = f"{rows} states of {size} numbers (the start and one every stride steps), {rows * size} in all"
+        raise SymtopError(f"{name} must write {rule}, not {values.size}")
     return values.reshape(rows, size)
 
 
@@ -245,7 +245,7 @@ class BatchStep(Stepper):
         self.library, self.jax = library(form, form, chart), form == "jax"
         self.function, self.chart, self.form = function, chart, FORMULATIONS[chart]
         self.name = label_of(name or function)
-        self._step = self.library.jit(self._called) if self.jax else self._called
+        self._step = self.library.jit(self._with_field) if self.jax else self._with_field
         self._tried = False
 
     def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> Array:
@@ -256,27 +256,27 @@ class BatchStep(Stepper):
             if not self._tried:
                 self._try(step, y, batch, h)
             return repeat(
-                lambda k, rows: _once(step, self.since + k * h, rows, h), batch, marks, lambda rows: np.asarray(rows)[0]
+                lambda k, rows: _call(step, self.since + k * h, rows, h), batch, marks, lambda rows: np.asarray(rows)[0]
             )
 
     def _array(self, values: Array) -> Any:
         return self.library.numpy.asarray(values) if self.jax else self.library.tensor(values)
 
-    def _called(self, par: Any, t: float, y: Any, h: float) -> Any:
+    def _with_field(self, par: Any, t: float, y: Any, h: float) -> Any:
         stack, last = (self.library.numpy.stack, "axis") if self.jax else (self.library.stack, "dim")
         return self.function(field_of(self.chart, par, lambda rows: stack(rows, **{last: -1})), t, y, h)
 
     def _try(self, step: Callable[..., Any], y: Array, batch: Any, h: float) -> None:
         """Compare a step of the first row alone with one in the batch; SymtopError if they differ."""
-        pair = (_once(step, 0.0, rows, h, COMPILING_SECONDS)[0] for rows in (self._array(y[None]), batch + 0.0))
-        alone, beside = (state_like(y, np.asarray(row)) for row in pair)
-        if (gap := relative_gap(alone, beside)) > SAME_ROW:
-            how = f"the same state with another row beside it comes out different by {gap:.1e}"
-            raise SymtopError(f"a row of a batch must be stepped by itself: {how}")
+        pair = (_call(step, 0.0, rows, h, COMPILING_SECONDS)[0] for rows in (self._array(y[None]), batch + 0.0))
+        single, batched = (state_like(y, np.asarray(row)) for row in pair)
+        if (gap := relative_gap(single, batched)) > SAME_ROW:
+            detail = f"the same state with another row beside it comes out different by {gap:.1e}"
+            raise SymtopError(f"a row of a batch must be stepped by itself: {detail}")
         self._tried = True
 
 
-def _once(step: Callable[..., Any], t: float, batch: Any, h: float, seconds: float = 0.0) -> Any:
+def _call(step: Callable[..., Any], t: float, batch: Any, h: float, seconds: float = 0.0) -> Any:
     with heartbeat.call(h, seconds):
         after = step(t, batch, h)
     if tuple(getattr(after, "shape", ())) != tuple(batch.shape):
@@ -304,8 +304,8 @@ def field_of(chart: str, par: Any, stack: Any) -> Any:
     def f(_t: Any, y: Any) -> Any:
         """The time derivative of y, of the shape of y."""
         columns = tuple(y[..., k] for k in range(y.shape[-1]))
-        nothing = 0.0 * columns[0]  # added to a constant derivative, which is a float and no array
-        return stack([value + nothing if isinstance(value, float) else value for value in field(par, columns)])
+        zeros = 0.0 * columns[0]  # added to a constant derivative, which is a float and no array
+        return stack([value + zeros if isinstance(value, float) else value for value in field(par, columns)])
 
     return f
 
@@ -339,10 +339,10 @@ def x64(*, restored: bool = False) -> Iterator[None]:
             sys.modules["jax"].config.update("jax_enable_x64", False)
 
 
-def is_solver(thing: Any) -> bool:
+def is_solver(target: Any) -> bool:
     """Is it an instance of a solver of diffrax, or of a class derived from one?"""
-    bases = [base.__module__.partition(".")[0] for base in type(thing).__mro__]
-    return "diffrax" in bases and hasattr(thing, "term_structure")
+    bases = [base.__module__.partition(".")[0] for base in type(target).__mro__]
+    return "diffrax" in bases and hasattr(target, "term_structure")
 
 
 class DiffraxSolver(Stepper):
@@ -370,9 +370,9 @@ class DiffraxSolver(Stepper):
     def march(self, _top: SymmetricTop, par: Any, y: Array, h: float, marks: Marks) -> Array:
         """The state at the marks; NaN where the solver says that a step failed."""
 
-        def run(done: int, steps: int, at: Any) -> Any:
+        def run(first: int, steps: int, carry: Any) -> Any:
             with heartbeat.call(h, COMPILING_SECONDS if self._fresh else 0.0):
-                after = self._run(par, *at, self.since + done * h, h, steps)
+                after = self._run(par, *carry, self.since + first * h, h, steps)
                 self.jax.block_until_ready(after)
             self._fresh = False
             return after
@@ -381,7 +381,7 @@ class DiffraxSolver(Stepper):
             with heartbeat.call(h, COMPILING_SECONDS if self._fresh else 0.0):
                 start = self.jax.numpy.asarray(y)
                 memory = self._begin(par, start, h)
-            return in_runs(run, (start, memory), marks, MOST_STEPS, lambda at: np.asarray(at[0]))
+            return in_runs(run, (start, memory), marks, MOST_STEPS, lambda carry: np.asarray(carry[0]))
 
     def _compiled(self) -> tuple[Any, Any]:
         """Two compiled functions: the start of a run, and `count` steps. The top is an argument: no recompilation."""
@@ -392,12 +392,12 @@ class DiffraxSolver(Stepper):
             return solver.init(term, 0.0 * h, h, y, par)
 
         def run(par: Any, y: Any, memory: Any, t: Any, h: Any, count: Any) -> Any:
-            def once(k: Any, at: Any) -> Any:
-                now, memory = at
+            def body(k: Any, carry: Any) -> Any:
+                state, memory = carry
                 start = t + k * h
-                after, _, _, memory, result = solver.step(term, start, start + h, now, par, memory, False)
+                after, _, _, memory, result = solver.step(term, start, start + h, state, par, memory, False)
                 return jax.numpy.where(result != diffrax.RESULTS.successful, jax.numpy.nan, after), memory
 
-            return jax.lax.fori_loop(0, count, once, (y, memory))
+            return jax.lax.fori_loop(0, count, body, (y, memory))
 
         return jax.jit(begin), jax.jit(run)

@@ -61,7 +61,7 @@ SAME_STEP = 1e-9  # relative: a step length that differs less from h is h
 _patching = threading.RLock()  # `compare` runs variants in threads
 
 
-def state_like(before: Array, after: Any, what: str = "step") -> Array:
+def state_like(before: Array, after: Any, name: str = "step") -> Array:
     """The result of a step as an array of floats; SymtopError if it is not of the shape of `before`."""
     if type(after) is np.ndarray and after.shape == before.shape and after.dtype == np.float64:
         return after
@@ -71,7 +71,7 @@ def state_like(before: Array, after: Any, what: str = "step") -> Array:
     if array is None or array.shape != before.shape or array.dtype.kind not in "fiu":
         kind = type(after).__name__ if after is not None else "None"
         form = kind if array is None else f"{kind} of shape {array.shape} and type {array.dtype}"
-        raise SymtopError(f"{what} must return the new state, {before.size} real numbers, not {form}")
+        raise SymtopError(f"{name} must return the new state, {before.size} real numbers, not {form}")
     return array.astype(float)
 
 
@@ -98,14 +98,14 @@ class FunctionStep(Stepper):
     def __init__(self, function: Callable[..., Any], name: str = "") -> None:
         self.function, self.name = function, label_of(name or function)
 
-    def steps(self, once: Callable[[float, Array], Any], t: float, y: Array, h: float, marks: Marks) -> Array:
-        """The states at the marks, from time t on; `once(t, y)` calls the function for one step of h."""
+    def steps(self, step: Callable[[float, Array], Any], t: float, y: Array, h: float, marks: Marks) -> Array:
+        """The states at the marks, from time t on; `step(t, y)` calls the function for one step of h."""
 
-        def checked(k: int, y: Array) -> Array:
+        def checked_step(k: int, y: Array) -> Array:
             before = y.copy() if k == 0 else y
             try:
                 with heartbeat.call(h):
-                    after = once(t + k * h, y)
+                    after = step(t + k * h, y)
             except SymtopError:
                 if np.isfinite(y).all():
                     raise
@@ -113,7 +113,7 @@ class FunctionStep(Stepper):
             self.wrote = self.wrote or (k == 0 and not np.array_equal(before, y))
             return state_like(before, after)
 
-        return repeat(checked, y, marks)
+        return repeat(checked_step, y, marks)
 
 
 class PythonStep(FunctionStep):
@@ -134,7 +134,7 @@ class PythonStep(FunctionStep):
 
     def along(self, f: Field, t: float, y: Array, h: float, marks: Marks) -> Array:
         """The states at the marks for any right-hand side, from time t on."""
-        return self.steps(lambda at, state: self.function(f, at, state, h), t, y, h, marks)
+        return self.steps(lambda time, state: self.function(f, time, state, h), t, y, h, marks)
 
 
 class ScipySolver(PythonStep):
@@ -146,8 +146,8 @@ class ScipySolver(PythonStep):
         from scipy.integrate import OdeSolver  # 0.6 s to import
 
         if not issubclass(kind, OdeSolver):
-            other = "any other step is a function, or the method of an object: FILE.py:OBJECT.METHOD"
-            raise SymtopError(f"a class must be derived from scipy.integrate.OdeSolver, not {kind.__name__}; {other}")
+            hint = "any other step is a function, or the method of an object: FILE.py:OBJECT.METHOD"
+            raise SymtopError(f"a class must be derived from scipy.integrate.OdeSolver, not {kind.__name__}; {hint}")
         super().__init__(kind, chart)
         self.adaptive = solver_of(kind, chart) if adaptive else None
 
@@ -162,14 +162,14 @@ class ScipySolver(PythonStep):
                 for name in ("newton_tol", "kappa", "tiny_err"):
                     setattr(solver, name, STAGE_ERROR / LOOSE_TOLERANCE)
 
-        def once(k: int, y: Array) -> Array:
+        def step(k: int, y: Array) -> Array:
             if solver.status != "running" or not np.isfinite(y).all():
                 return np.full(y.shape, np.nan)
             with heartbeat.call(h):
                 solver.step()
             if abs(solver.t - (t + (k + 1) * h)) > SAME_STEP * size * (k + 1):
-                must = f"steps of max_step = first_step = {size:.3g} where the tolerance accepts any error"
-                raise SymtopError(f"{self.name} must make {must}, and made one of {solver.t - t - k * h:.3g}")
+                rule = f"steps of max_step = first_step = {size:.3g} where the tolerance accepts any error"
+                raise SymtopError(f"{self.name} must make {rule}, and made one of {solver.t - t - k * h:.3g}")
             return state_like(y, solver.y, "a solver")
 
         with contextlib.ExitStack() as undo:  # allow Newton's iteration `MOST_NEWTON` iterations
@@ -178,7 +178,7 @@ class ScipySolver(PythonStep):
                 undo.enter_context(_patching)
                 undo.callback(setattr, module, NEWTON_LIMIT, getattr(module, NEWTON_LIMIT))
                 setattr(module, NEWTON_LIMIT, MOST_NEWTON)
-            return repeat(once, state_like(y, solver.y, "a solver"), marks)
+            return repeat(step, state_like(y, solver.y, "a solver"), marks)
 
 
 class Body(NamedTuple):
@@ -191,13 +191,13 @@ class Body(NamedTuple):
     of_top: bool
 
 
-def _body_of(top: Any, at: Any) -> tuple[Body, tuple[float, ...]]:
+def _body_of(top: Any, start: Any) -> tuple[Body, tuple[float, ...]]:
     """The body and the state (q, w) of a start, of a top or of a body without symmetry."""
     if isinstance(top, RigidBody):
         x, y, z = top.centre
         body = Body(np.array(top.moments), top.mgl * x, top.mgl * y, top.mgl * z, of_top=False)
-        return body, (*at.quaternion, *at.omega_body)
-    q, momentum = np.split(np.array(on_attitude(top, at)[1]), [4])
+        return body, (*start.quaternion, *start.omega_body)
+    q, momentum = np.split(np.array(on_attitude(top, start)[1]), [4])
     inertia = np.array([top.I1, top.I1, top.I3])
     rates = rotated(q * CONJUGATE, momentum) / inertia
     return Body(inertia, 0.0, 0.0, top.mgl, of_top=True), (*q.tolist(), *rates.tolist())
@@ -220,9 +220,9 @@ def _body_momenta(body: Body, states: Array) -> tuple[Array, Array]:
 ROTATION = FORMULATIONS["attitude"]._replace(prepare=_body_of, present=_body_shown, momenta=_body_momenta)
 
 
-def _matrix_of(top: Any, at: Any) -> tuple[Body, tuple[float, ...]]:
+def _matrix_of(top: Any, start: Any) -> tuple[Body, tuple[float, ...]]:
     """The body and the state (R, w) of a start, R row by row."""
-    body, state = _body_of(top, at)
+    body, state = _body_of(top, start)
     return body, (*rotated(state[:4], np.eye(3)).T.ravel().tolist(), *state[4:])
 
 
@@ -231,11 +231,11 @@ def _with_quaternions(states: Array) -> Array:
     rows = np.full((len(states), 7), np.nan)
     matrices = states[:, :9].reshape(-1, 3, 3)
     with np.errstate(all="ignore"):
-        good = np.isfinite(states).all(axis=1) & (np.linalg.det(matrices) > 0.0)
-    if good.any():
-        turned = Rotation.from_matrix(matrices[good]).as_quat()[:, [3, 0, 1, 2]]
-        lengths = np.sqrt(np.linalg.norm(matrices[good][:, :, 2], axis=1))
-        rows[good] = np.concatenate([lengths[:, None] * turned, states[good, 9:]], axis=1)
+        valid = np.isfinite(states).all(axis=1) & (np.linalg.det(matrices) > 0.0)
+    if valid.any():
+        rotations = Rotation.from_matrix(matrices[valid]).as_quat()[:, [3, 0, 1, 2]]
+        lengths = np.sqrt(np.linalg.norm(matrices[valid][:, :, 2], axis=1))
+        rows[valid] = np.concatenate([lengths[:, None] * rotations, states[valid, 9:]], axis=1)
     return rows
 
 
@@ -269,11 +269,11 @@ class RotationStep(FunctionStep):
 
         def torque(q: Any) -> Array:
             self.evaluations += 1
-            at = np.asarray(q, dtype=float)
-            up = at[2] if shape == (3, 3) else np.array(vertical(*at.tolist())) / (float(at @ at) or math.nan)
+            q = np.asarray(q, dtype=float)
+            up = q[2] if shape == (3, 3) else np.array(vertical(*q.tolist())) / (float(q @ q) or math.nan)
             return np.array(torque_of(par, *up.tolist()))
 
-        def once(_: float, y: Array) -> Array:
+        def step(_: float, y: Array) -> Array:
             q = y[:-3].reshape(shape)
             after = self.function(q.copy(), y[-3:].copy(), h, par.inertia.copy(), torque)
             if not isinstance(after, (tuple, list)) or len(after) != 2:
@@ -281,12 +281,12 @@ class RotationStep(FunctionStep):
             return np.concatenate([state_like(q, after[0]).ravel(), state_like(y[-3:], after[1])])
 
         try:
-            states = self.steps(once, 0.0, y, h, marks)
+            states = self.steps(step, 0.0, y, h, marks)
         except SymtopError as error:
-            other = self.of_matrix.partition("raises ")[2]
-            if not other or str(error).endswith(other):
+            matrix_error = self.of_matrix.partition("raises ")[2]
+            if not matrix_error or str(error).endswith(matrix_error):
                 raise
-            raise SymtopError(f"{error}, given q = (w, x, y, z); given a matrix, it raises {other}") from None
+            raise SymtopError(f"{error}, given q = (w, x, y, z); given a matrix, it raises {matrix_error}") from None
         self.of_matrix = ""
         return states
 
@@ -295,9 +295,9 @@ def _no_field(*_: Any) -> Any:
     raise SymtopError("a map of (theta, p_theta) has no equations of six variables")
 
 
-def _plane_of(top: SymmetricTop, at: Angles) -> tuple[Any, tuple[float, ...]]:
+def _plane_of(top: SymmetricTop, start: Angles) -> tuple[Any, tuple[float, ...]]:
     """The top with its momenta, which are parameters of the reduced motion, and (theta, p_theta) of a start."""
-    par, state = on_angles(top, at)
+    par, state = on_angles(top, start)
     return par, state[:2]
 
 

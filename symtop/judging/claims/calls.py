@@ -63,41 +63,41 @@ def _calls(subject: Subject) -> Finding:
     flat = {"phi": 0.0, "psi": 0.0}  # a map of (theta, p_theta) has no others
     h, start = STEP_SHARE * scene.time_scale(), replace(generic_start(scene), **(flat if subject.in_plane else {}))
 
-    def once(at: Angles, step: float) -> Any:
-        state, run = stepper.from_start(scene.top, at, step)
+    def move(origin: Angles, step: float) -> Any:
+        state, run = stepper.from_start(scene.top, origin, step)
         return run(state, 1)[0]
 
     stepper.renew()  # timing has called the step before
     other = Angles(**{name: getattr(start, name) * (1.0 - OTHER_START) for name in Angles.__slots__} | flat)
-    first = once(start, h)
+    first = move(start, h)
     if not np.isfinite(first).all():
         kind = f"returns {'NaN' if np.isnan(first).any() else 'infinity'}"
         return _refuted(kind, f"a step of h = {h:.3g} {kind}", resolution=math.nan)
-    if refuted := _repeated(stepper, lambda: relative_gap(first, once(start, h)), lambda step: once(other, step), h):
+    if refuted := _repeated(stepper, lambda: relative_gap(first, move(start, h)), lambda step: move(other, step), h):
         return refuted
     step = one_step(subject.method, subject.method.charts()[0], scene, TINY_STEP * h)
     after = step.shown(step.run(start, step.h)), step.image(step.point(other))  # SymtopError if the second is at a pole
-    own, gap = (step.gap(shown, step.at(at)) for shown, at in zip(after, (start, other), strict=True))
-    if own > TINY_MOVE:
-        no_state = _short(first) or "what it returns is no state, or no next one"
-        why = f"a step of {step.h:.0e} moves by {own:.1e}: {no_state}"
-        return _refuted("jumps", why, own, TINY_MOVE)
+    shift, gap = (step.gap(end, step.at(origin)) for end, origin in zip(after, (start, other), strict=True))
+    if shift > TINY_MOVE:
+        no_state = _few_digits(first) or "what it returns is no state, or no next one"
+        why = f"a step of {step.h:.0e} moves by {shift:.1e}: {no_state}"
+        return _refuted("jumps", why, shift, TINY_MOVE)
     if gap > TINY_MOVE:
         why = f"it keeps something of its first start: from another one, a step of {step.h:.0e} moves by {gap:.1e}"
         return _refuted("keeps state", why, gap, TINY_MOVE)
     traits = {"changes its input": "it writes to its input"} if stepper.wrote else {}  # short names, with clauses
     traits |= {"single precision": "it computes in single precision"} if subject.single else {}
-    traits |= {"few digits": short} if (short := _short(first)) else {}
-    miss, why = _parts(subject, h / 10.0) if stepper.own_loop else (0.0, "")
+    traits |= {"few digits": clause} if (clause := _few_digits(first)) else {}
+    miss, why = _gap_in_parts(subject, h / 10.0) if stepper.own_loop else (0.0, "")
     if miss > COUNT_GAP:
         return _refuted("miscounts steps", why, miss, COUNT_GAP)
     traits |= {"remembers": why} if miss > DATA_GAP and "few digits" not in traits else {}
-    traits |= {"stands still": f"a step of {step.h:.0e} moves nothing"} if own == 0.0 and not subject.single else {}
-    gap, refuted = _kept(subject, start, h, lambda: relative_gap(first, once(start, h)))
+    traits |= {"stands still": f"a step of {step.h:.0e} moves nothing"} if shift == 0.0 and not subject.single else {}
+    gap, refuted = _late_gap(subject, start, h, lambda: relative_gap(first, move(start, h)))
     if refuted:
         return refuted
     try:
-        once(start, -h)
+        move(start, -h)
     except SymtopError as error:
         traits["forward only"] = str(error)
     why = "; ".join(["a call gives the same numbers again, and after a step elsewhere", *traits.values()])
@@ -105,73 +105,73 @@ def _calls(subject: Subject) -> Finding:
 
 
 def _repeated(
-    stepper: Stepper, again: Callable[[], float], elsewhere: Callable[[float], Any], h: float
+    stepper: Stepper, repeat: Callable[[], float], other_step: Callable[[float], Any], h: float
 ) -> Finding | None:
-    """A refuting finding if `again`, the relative gap of a repeated first call, is too large; None if it is not."""
-    began, most, count, gap = time.monotonic(), 2 if stepper.own_loop else REPEATS, 1, 0.0
-    while count <= most and gap <= SAME_CALL and time.monotonic() - began < REPEAT_SECONDS:
-        count, gap = count + 1, again()
-    how = f"call {count} with the same arguments"
+    """A refuting finding if `repeat`, the relative gap of a repeated first call, is too large; None if it is not."""
+    began, limit, count, gap = time.monotonic(), 2 if stepper.own_loop else REPEATS, 1, 0.0
+    while count <= limit and gap <= SAME_CALL and time.monotonic() - began < REPEAT_SECONDS:
+        count, gap = count + 1, repeat()
+    call = f"call {count} with the same arguments"
     if gap <= SAME_CALL:
-        elsewhere(h)
+        other_step(h)
         with contextlib.suppress(SymtopError):
-            elsewhere(FAILING_STEP * h)  # it may fail, which must not change later calls either
-        how, gap = "after a step elsewhere the same call", again()
+            other_step(FAILING_STEP * h)  # it may fail, which must not change later calls either
+        call, gap = "after a step elsewhere the same call", repeat()
     if gap <= SAME_CALL:
         return None
-    differences = [again() for _ in range(NOISE_CALLS)]
+    differences = [repeat() for _ in range(NOISE_CALLS)]
     if (noise := max(differences) - min(differences)) > NOISE_SHARE * gap:
         return _refuted("not repeatable", f"calls with the same arguments differ by {noise:.1e}", noise)
-    return _refuted("keeps state", f"it keeps something between calls: {how} differs by {gap:.1e}", gap)
+    return _refuted("keeps state", f"it keeps something between calls: {call} differs by {gap:.1e}", gap)
 
 
-def _kept(subject: Subject, start: Angles, h: float, again: Callable[[], float]) -> tuple[float, Finding | None]:
-    """`again` after late runs, the gap of the first call, and a refuting finding if they or calls beside it differ."""
+def _late_gap(subject: Subject, start: Angles, h: float, repeat: Callable[[], float]) -> tuple[float, Finding | None]:
+    """`repeat` after late runs, the gap of the first call, and a refuting finding if they or calls beside it differ."""
     stepper, top = subject.stepper, subject.scene.top
-    beside = [] if stepper.own_loop else _beside(stepper, top, start, h)
-    miss, why = _cut(stepper, subject.scene, h / 1.6, _late(subject))
+    nearby = [] if stepper.own_loop else _nearby_ends(stepper, top, start, h)
+    miss, why = _largest_gap(stepper, subject.scene, h / 1.6, _late_lengths(subject))
     keeps = "it keeps something between calls:"
-    if miss > (most := COUNT_GAP if stepper.own_loop else LATE_GAP):
-        return miss, _refuted("keeps state", f"{keeps} {why} (seed {subject.seed})", miss, most)
-    ends = zip(beside, _beside(stepper, top, start, h) if beside else [], strict=True)
-    gaps = [*(relative_gap(*pair) for pair in ends), again()]
-    for how, gap in zip(NEARBY_CALLS[-len(gaps) :], gaps, strict=True):
+    if miss > (limit := COUNT_GAP if stepper.own_loop else LATE_GAP):
+        return miss, _refuted("keeps state", f"{keeps} {why} (seed {subject.seed})", miss, limit)
+    ends = zip(nearby, _nearby_ends(stepper, top, start, h) if nearby else [], strict=True)
+    gaps = [*(relative_gap(*pair) for pair in ends), repeat()]
+    for change, gap in zip(NEARBY_CALLS[-len(gaps) :], gaps, strict=True):
         if gap > SAME_CALL:
-            return gap, _refuted("keeps state", f"{keeps} the first one, repeated{how}, differs by {gap:.1e}", gap)
+            return gap, _refuted("keeps state", f"{keeps} the first one, repeated{change}, differs by {gap:.1e}", gap)
     return gaps[-1], None
 
 
-def _beside(stepper: Stepper, top: SymmetricTop, start: Angles, h: float) -> list[Any]:
+def _nearby_ends(stepper: Stepper, top: SymmetricTop, start: Angles, h: float) -> list[Any]:
     """The ends of steps that differ from the first one as `NEARBY_CALLS` says; zeros where a step fails."""
     near = Angles(**{name: getattr(start, name) * (1.0 + CLOSE_START) for name in Angles.__slots__})
     trials = (top, near, h), (top, start, h * (1.0 + LONGER_STEP)), (replace(top, mgl=HEAVIER_TOP * top.mgl), start, h)
     state, ends = stepper.form.prepare(top, start)[1], []
-    for of_top, at, step in trials:
-        par, y = stepper.form.prepare(of_top, at)
+    for trial_top, trial_start, step in trials:
+        par, y = stepper.form.prepare(trial_top, trial_start)
         ends.append(np.zeros(len(y)))
         with contextlib.suppress(SymtopError):
-            y = y if at is near else state
-            ends[-1] = np.nan_to_num(stepper.march(of_top, par, np.array(y, dtype=float), step, A_STEP)[0])
+            y = y if trial_start is near else state
+            ends[-1] = np.nan_to_num(stepper.march(trial_top, par, np.array(y, dtype=float), step, A_STEP)[0])
     return ends
 
 
-def _short(state: Any) -> str:
+def _few_digits(state: Any) -> str:
     """A clause on numbers of at most `FEWEST_DIGITS` digits, as a program writes them; empty if one has more."""
-    short = all(float(f"{number:.{FEWEST_DIGITS}g}") == number for number in state.tolist())
-    return f"its numbers have at most {FEWEST_DIGITS} digits: it must write 17" * short
+    is_short = all(float(f"{number:.{FEWEST_DIGITS}g}") == number for number in state.tolist())
+    return f"its numbers have at most {FEWEST_DIGITS} digits: it must write 17" * is_short
 
 
-def _parts(subject: Subject, h: float) -> tuple[float, str]:
-    """The gap of short runs in two parts (`_cut`); of two halves of the most steps of one call if these miss a step."""
-    few = _cut(subject.stepper, subject.scene, h, PART_LENGTHS)
+def _gap_in_parts(subject: Subject, h: float) -> tuple[float, str]:
+    """The gap of short runs in two parts (`_largest_gap`); of halves of the longest call if these miss a step."""
+    short = _largest_gap(subject.stepper, subject.scene, h, PART_LENGTHS)
     half = int(min(MOST_STEPS, LATE_RUNS[subject.quick][1] / max(subject.seconds_a_step, 1e-9) / 3.0)) // 2
-    if few[0] > DATA_GAP or half <= PART_LENGTHS[-1][0]:  # the new start of a multistep method has more effect later
-        return few
-    many = _cut(subject.stepper, subject.scene, h, [(half, half)])
-    return many if many[0] > COUNT_GAP else few
+    if short[0] > DATA_GAP or half <= PART_LENGTHS[-1][0]:  # the new start of a multistep method has more effect later
+        return short
+    long = _largest_gap(subject.stepper, subject.scene, h, [(half, half)])
+    return long if long[0] > COUNT_GAP else short
 
 
-def _cut(stepper: Stepper, scene: Scene, h: float, parts: Sequence[tuple[int, int]]) -> tuple[float, str]:
+def _largest_gap(stepper: Stepper, scene: Scene, h: float, parts: Sequence[tuple[int, int]]) -> tuple[float, str]:
     """The largest gap, in steps, between the end of a run of n + m steps and m steps made anew, and a clause on it."""
     start, run = stepper.from_start(scene.top, generic_start(scene), h)
     a_step, worst, words = _gap(run(start, 1)[0], start), 0.0, "after few steps"
@@ -192,12 +192,12 @@ def _cut(stepper: Stepper, scene: Scene, h: float, parts: Sequence[tuple[int, in
     return worst, words
 
 
-def _late(subject: Subject) -> list[tuple[int, int]]:
+def _late_lengths(subject: Subject) -> list[tuple[int, int]]:
     """Random lengths (n, m) of late runs; the last is the longest, so that the next call comes after many steps."""
-    draw, (most, seconds) = np.random.default_rng(subject.seed), LATE_RUNS[subject.quick]
-    longest = max(min(most, seconds / max(subject.seconds_a_step, 1e-9)), MOST_AFTER)
-    shares = *np.sort(draw.uniform(0.2, 1.0, LATE_CALLS - 1)).tolist(), 1.0
-    return [(round(longest**share * draw.uniform(1.0, 1.1)), int(draw.integers(1, MOST_AFTER))) for share in shares]
+    rng, (limit, seconds) = np.random.default_rng(subject.seed), LATE_RUNS[subject.quick]
+    longest = max(min(limit, seconds / max(subject.seconds_a_step, 1e-9)), MOST_AFTER)
+    shares = *np.sort(rng.uniform(0.2, 1.0, LATE_CALLS - 1)).tolist(), 1.0
+    return [(round(longest**share * rng.uniform(1.0, 1.1)), int(rng.integers(1, MOST_AFTER))) for share in shares]
 
 
 def _gap(first: Any, second: Any) -> float:

@@ -88,16 +88,16 @@ class Constant(NamedTuple):
             return word
         if not (math.isfinite(change.largest) and math.isfinite(change.exponent)):
             return "unknown"
-        sure = 0.0 < SURE_WIDTHS * change.interval < abs(change.slope)
-        return "drift" if sure and abs(change.rise) > VISIBLE_TREND * change.largest else word
+        significant = 0.0 < SURE_WIDTHS * change.interval < abs(change.slope)
+        return "drift" if significant and abs(change.rise) > VISIBLE_TREND * change.largest else word
 
     @property
     def grows(self) -> bool | None:
         """Does it grow? None if the interval of the exponent leaves that open."""
         if self.kind in ("kept", "bounded", "unknown"):
             return None if self.kind == "unknown" else False
-        least = self.changed.exponent - self.changed.exponent_interval
-        return True if self.kind == "drift" or least > GROWTH_EXPONENT else None
+        lower = self.changed.exponent - self.changed.exponent_interval
+        return True if self.kind == "drift" or lower > GROWTH_EXPONENT else None
 
     def words(self, place: str) -> str:
         """A clause with its largest change, `place`, and the exponent of growth."""
@@ -110,8 +110,8 @@ class Constant(NamedTuple):
         """The verdict on the claim that it is kept or bounded; "measured" if neither is claimed."""
         if self.kind == "unknown" or (claimed == "bounded" and self.grows is None):
             return "undecided"
-        within = self.kind == "kept" or (self.kind == "bounded" and self.changed.largest <= self.floor)
-        true = {"kept": within, "bounded": not self.grows}.get(claimed)
+        kept = self.kind == "kept" or (self.kind == "bounded" and self.changed.largest <= self.floor)
+        true = {"kept": kept, "bounded": not self.grows}.get(claimed)
         return "measured" if true is None else "confirmed" if true else "refuted"
 
     def finding(self, claim: str, claimed: str, why: str) -> Finding:
@@ -160,47 +160,47 @@ def _run(
     if method.adaptive and method.default_tolerance is None:
         control = {"tolerance": TOLERANCE}
     plan, _ = make_plan(scene, method, **control, horizon=horizon, samples=samples)
-    own = run = solve(method, chart, scene.top, scene.start, plan, f" on {scene.name}")
+    derived = run = solve(method, chart, scene.top, scene.start, plan, f" on {scene.name}")
     if chart in ("axis", "attitude"):
         with np.errstate(over="ignore", invalid="ignore"):  # a run may blow up
             p_phi, p_psi = space_momenta(chart, run.states)
-        own = run._replace(p_phi=p_phi, p_psi=p_psi)
-    return Trajectory.of_run(scene, chart, plan, own), run, plan
+        derived = run._replace(p_phi=p_phi, p_psi=p_psi)
+    return Trajectory.of_run(scene, chart, plan, derived), run, plan
 
 
 def long_run(
     method: Integrator, scene: Scene, chart: str, *, quick: bool = False, most: float | None = None, seed: int = 0
 ) -> LongRun:
     """A run of a million steps of a compiled method in a chart, or of `most`; fewer if that would take minutes."""
-    inside, unit = "angles" if chart == PLANE else chart, scene.time_scale()
-    for finer in FINER_STEPS:  # a motion that passes close to a pole needs shorter steps
-        step = unit / (STEPS_A_NUTATION * finer)
+    run_chart, unit = "angles" if chart == PLANE else chart, scene.time_scale()
+    for factor in FINER_STEPS:  # a motion that passes close to a pole needs shorter steps
+        step = unit / (STEPS_A_NUTATION * factor)
         if scene.of_body:  # L turns a needle about its own axis many times in a natural period
             step = min(step, math.tau * min(scene.top.moments) / (STEPS_A_TURN * scene.momentum_scale))
-        pilot, first, _ = _run(method, scene, inside, PILOT_STEPS, step, PILOT_STEPS + 1)
+        pilot, first, _ = _run(method, scene, run_chart, PILOT_STEPS, step, PILOT_STEPS + 1)
         steps = float(PILOT_STEPS)  # for a closed form, which has no steps that accumulate errors
         if method.control is not None:
             cost = max(first.force_evaluations / PILOT_STEPS, 1.0)
             share = QUICK_SHARE if quick else 1.0
             limit = share * EVALUATIONS[method.implementation] / cost if most is None else most
             steps = max(min(QUICK_STEPS if quick else STEPS, limit) * method.speed, PILOT_STEPS)
-        trajectory, run, plan = _run(method, scene, inside, steps, step, SAMPLES)
+        trajectory, run, plan = _run(method, scene, run_chart, steps, step, SAMPLES)
         if run.outcome == "ok" or not method.fixed_step:
             break
         if quick and most is not None:
             most = max(most - run.steps, LEAST_SHARE * most)
-    _, other, _ = _run(method, scene, inside, PILOT_STEPS, 0.21 * step, PILOT_STEPS + 1)
-    steady = len({run.force_evaluations / max(run.steps, 1) for run in (first, other)}) == 1
+    _, second, _ = _run(method, scene, run_chart, PILOT_STEPS, 0.21 * step, PILOT_STEPS + 1)
+    steady_cost = len({run.force_evaluations / max(run.steps, 1) for run in (first, second)}) == 1
     reported = None
-    plain = isinstance(method.solvers[inside], Stepper)
+    plain = isinstance(method.solvers[run_chart], Stepper)
     if not (plain or scene.of_body):  # else its momenta are those of its states
         reported = _reported(method, scene, chart, trajectory, (run, plan))
         if method.fixed_step:
             reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
     changes, every_step, blown_up = constants(scene, trajectory), constants(scene, pilot), math.nan
-    if (beyond := blows_up(scene, changes["energy"])).size:
-        blown_up = float(plan.times[beyond[0]])
-        trajectory, run, plan = _run(method, scene, inside, blown_up / step, step, SAMPLES)
+    if (indices := blows_up(scene, changes["energy"])).size:
+        blown_up = float(plan.times[indices[0]])
+        trajectory, run, plan = _run(method, scene, run_chart, blown_up / step, step, SAMPLES)
         changes = constants(scene, trajectory)
     count, grains = max(run.steps, 1), {"energy": scene.energy_grain}
     grains["p_phi"] = scene.momentum_grain(trajectory.momentum)
@@ -210,12 +210,12 @@ def long_run(
         for name in (changes if chart != PLANE else ("energy",))
     }  # fmt: skip
     message, nutations = sentence(run.outcome, run.reached, float(plan.times[-1])), run.reached / unit
-    shown = min(run.steps, round(run.reached / step)) if method.fixed_step else run.steps  # of those that were made
-    costs = run.force_evaluations / count, run.newton_iterations / count, steady
+    step_count = min(run.steps, round(run.reached / step)) if method.fixed_step else run.steps  # of those made
+    costs = run.force_evaluations / count, run.newton_iterations / count, steady_cost
     times = plan.times / unit
     rows = maxima(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS)  # fewer, where no sample is
     energy = np.array([np.pad(row, (0, WINDOWS - len(row)), constant_values=math.nan) for row in rows])
-    return LongRun(by_name, run.outcome, message, chart, shown, nutations, *costs, reported, energy, blown_up)
+    return LongRun(by_name, run.outcome, message, chart, step_count, nutations, *costs, reported, energy, blown_up)
 
 
 def blows_up(scene: Scene, change: Array) -> NDArray[np.int64]:
@@ -226,8 +226,8 @@ def blows_up(scene: Scene, change: Array) -> NDArray[np.int64]:
 def blow_up_finding(finding: Finding, time: float, of_body: bool, steps: str = "") -> Finding:
     """The finding on the energy of a run that blows up at `time`."""
     measured, when = Reading("blows up", finding.value, f"blows up at t = {time:.3g}{steps}"), f"by t = {time:.3g}"
-    most = "the kinetic one of the start and 3 |mgl|" if of_body else "that of the nutation and 2 |mgl|"
-    why = f"{when} it rises by more than {most}; before: {finding.why}"
+    limit = "the kinetic one of the start and 3 |mgl|" if of_body else "that of the nutation and 2 |mgl|"
+    why = f"{when} it rises by more than {limit}; before: {finding.why}"
     return finding._replace(measured=measured, verdict="refuted" if finding.declared else "measured", why=why)
 
 
@@ -235,10 +235,10 @@ def _contradiction(
     method: Integrator, scene: Scene, chart: str, long: tuple[Run, Plan], pilot: Run, h: float, seed: int
 ) -> Difference | None:
     """A difference between a run of n steps, n random, and the first n of a longer run; None if all runs agree."""
-    draw, step = np.random.default_rng(seed), one_step(method, chart, scene, h)
+    rng, step = np.random.default_rng(seed), one_step(method, chart, scene, h)
     for k in range(CUTS):
         run, marks = (long[0], long[1].marks) if k % 2 else (pilot, np.arange(pilot.states.shape[0]))
-        i = min(int(marks.size ** draw.uniform(0.0, 1.0)), marks.size - 1)
+        i = min(int(marks.size ** rng.uniform(0.0, 1.0)), marks.size - 1)
         state = step.scaled(run.states[i], run.p_phi[i], run.p_psi[i])
         if marks[i] > 0 and np.isfinite(state).all():
             gap = step.gap(step.shown(step.run(scene.start, h, int(marks[i]))), state)
@@ -255,8 +255,8 @@ def _reported(
     if chart == "angles":
         drift = from_increments(method, scene, plan) if method.fixed_step else None
         if drift is not None and drift.size > drift.floor:  # aliasing may give a drift at one length only
-            fewer = Plan.steps(plan.step_size, [0, round(SECOND_LENGTH * int(plan.marks[-1]))])
-            drift = min(drift, from_increments(method, scene, fewer) or drift, key=lambda found: found.size)
+            shorter = Plan.steps(plan.step_size, [0, round(SECOND_LENGTH * int(plan.marks[-1]))])
+            drift = min(drift, from_increments(method, scene, shorter) or drift, key=lambda difference: difference.size)
         return drift
     gaps = {name: np.abs(getattr(run, name) - getattr(trajectory, name)) for name in ("p_phi", "p_psi")}
     size, name = max((float(np.max(gap[np.isfinite(gap)], initial=0.0)), name) for name, gap in gaps.items())
@@ -283,14 +283,14 @@ def _cayley_residual(top: SymmetricTop, run: Trajectory) -> Array:
     spin: Array = 0.5 * run.p_psi**2 * (1.0 / top.I3 - 1.0 / top.I1)
     square: Array = top.I1 * (run.energy - top.mgl * u - spin)  # |L|^2 / 2
     kick = run.step_size * top.mgl
-    rest = square - kick * kick * (1.0 - u) * (1.0 + u) / 8.0
-    good = np.isfinite(rest) & np.isfinite(u)
-    if good.sum() < 8 or np.ptp(u[good]) == 0.0:
+    partial = square - kick * kick * (1.0 - u) * (1.0 + u) / 8.0
+    valid = np.isfinite(partial) & np.isfinite(u)
+    if valid.sum() < 8 or np.ptp(u[valid]) == 0.0:
         return np.full(u.size, math.nan)
-    du, dr = u[good] - u[good].mean(), rest[good] - rest[good].mean()
+    du, dr = u[valid] - u[valid].mean(), partial[valid] - partial[valid].mean()
     c = -float(du @ dr) / float(du @ du)
-    whole = rest + c * u
-    return np.asarray((whole - whole[0]) / float(np.max(np.abs(rest[good]))))
+    invariant = partial + c * u
+    return np.asarray((invariant - invariant[0]) / float(np.max(np.abs(partial[valid]))))
 
 
 def change_of(
@@ -310,8 +310,8 @@ def change_of(
     floor = max(KEPT_CHANGE * grain, rounding)
     with np.errstate(all="ignore"):  # a run may blow up
         ratio = np.abs(np.diff(values)) / max(a_step * steps / (time.size - 1), floor)
-        calm = np.abs(values[1:-1]) < LITTLE_BEFORE
-        jump = np.flatnonzero((ratio[1:] > SUDDEN) & (np.fmax.accumulate(ratio)[:-1] < SUDDEN / 10.0) & calm)
+        small = np.abs(values[1:-1]) < LITTLE_BEFORE
+        jump = np.flatnonzero((ratio[1:] > SUDDEN) & (np.fmax.accumulate(ratio)[:-1] < SUDDEN / 10.0) & small)
     words = "after t = {:.4g} it changes {:.0e} times as much as by its first steps"
     sudden = words.format(time[jump[0] + 1], ratio[jump[0] + 1]) if even and jump.size else ""
     return Constant(constant_of(time, values, period=period), a_step, floor, grain, sudden)
@@ -354,24 +354,24 @@ def _badness(finding: Finding) -> tuple[int, int, float]:
 def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, constant: Constant | None) -> Finding:
     if constant is None:
         return inapplicable(claim, f"the {run.chart} chart has no such constant", claimed)
-    kind, changed, ended = constant.kind, constant.changed, run.outcome != "ok"
+    kind, changed, failed = constant.kind, constant.changed, run.outcome != "ok"
     why = constant.words(f"in {run.span}, {constant.a_step:.0e} in one step at most")
     why += f", drifting by {changed.rise / max(run.steps, 1):.1e} a step" if kind == "drift" else ""
     finding = constant.finding(claim, claimed, why)
-    finding = finding if run.steps and not (ended and run.nutations < 1.0) else finding._replace(measured=UNMEASURED)
+    finding = finding if run.steps and not (failed and run.nutations < 1.0) else finding._replace(measured=UNMEASURED)
     # an error that is periodic with the nutation cannot exceed the largest change of a step times the steps of one
-    most = constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
+    limit = constant.a_step * run.steps / run.nutations if run.nutations > 1.0 else math.inf
     if claim == "energy" and run.blown_up > 0.0:
         steps = f", after {run.steps} steps, {run.steps / run.nutations:.0f} a {run.period}"
         return blow_up_finding(finding, run.blown_up, run.chart == BODY, steps)
-    if run.outcome not in ("ok", "not_finite", "not_normalised") or (ended and kind in ("kept", "bounded")):
+    if run.outcome not in ("ok", "not_finite", "not_normalised") or (failed and kind in ("kept", "bounded")):
         return finding._replace(verdict="undecided", why=f"{why}; but the run {run.message}")
     if method.fixed_step and constant.sudden:
         return finding._replace(verdict="refuted", declared=claimed or SUDDEN_WORDS, why=f"{constant.sudden}; {why}")
-    if kind == "unknown" and ended:
+    if kind == "unknown" and failed:
         return finding._replace(why=f"the run {run.message}")
-    returns = ("kept", "unknown", *["bounded"] * (run.chart == BODY))  # a body may have slower periods, too
-    if claimed == "bounded" and kind not in returns and changed.largest > max(most, constant.floor):
+    periodic = ("kept", "unknown", *["bounded"] * (run.chart == BODY))  # a body may have slower periods, too
+    if claimed == "bounded" and kind not in periodic and changed.largest > max(limit, constant.floor):
         why += f", more than the steps of a {run.period} can add up to: it does not come back"
         return finding._replace(verdict="refuted", why=why)
     return finding
@@ -379,18 +379,18 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
 
 def _of_states(run: LongRun) -> Finding:
     """The finding on whether reported momenta are those of the states, and a short run is part of a longer one."""
-    other = run.reported
-    if other is None:
+    difference = run.reported
+    if difference is None:
         return inapplicable("reported", f"the {run.chart} chart shows no momenta beside the reported")
-    declared, verdict, differs = OWN_STATES, "refuted", f"differs by {other.size:.1e} {other.how}"
-    if other.size <= other.floor:
+    declared, verdict, clause = OWN_STATES, "refuted", f"differs by {difference.size:.1e} {difference.how}"
+    if difference.size <= difference.floor:
         declared, verdict, kind = "", "measured", OWN_STATES
-        why = f"the momenta that it reports differ from those of its states by {other.size:.1e} at most"
-    elif other.name == OF_RUN:
-        kind, why = "another run", f"a run contradicts itself, as if the method knew of it: the state {differs}"
+        why = f"the momenta that it reports differ from those of its states by {difference.size:.1e} at most"
+    elif difference.name == OF_RUN:
+        kind, why = "another run", f"a run contradicts itself, as if the method knew of it: the state {clause}"
     else:
-        kind, why = "others", f"it reports other momenta than its states have: {other.name} {differs}"
-    return Finding("reported", declared, Reading(kind), verdict, why, other.size, other.floor)
+        kind, why = "others", f"it reports other momenta than its states have: {difference.name} {clause}"
+    return Finding("reported", declared, Reading(kind), verdict, why, difference.size, difference.floor)
 
 
 def _invariant(method: Integrator, run: LongRun) -> Finding:
@@ -412,15 +412,15 @@ def _costs(method: Integrator, run: LongRun) -> list[Finding]:
         why = "it makes no steps" if method.control is None else "its forces are not counted"
         return [inapplicable("explicit", why, claimed), inapplicable("work", why)]
     text = f"{run.evaluations:.1f}" + f" ({run.iterations:.1f} it.)" * iterates
-    solves = f" and {run.iterations:.2f} iterations" * iterates
-    why = f"{run.evaluations:.2f} force evaluations{solves} a step, in {run.span}"
+    clause = f" and {run.iterations:.2f} iterations" * iterates
+    why = f"{run.evaluations:.2f} force evaluations{clause} a step, in {run.span}"
     work = Finding("work", "", Reading("work", run.evaluations, text=text), "measured", why, run.evaluations, 0.0)
     if not (iterates or run.steady_cost):
         why = "it reports no iterations, but its steps do not all cost the same"
         return [undecided("explicit", claimed, why), work]
-    answer = False if iterates else None if method.explicit is False else True
+    explicit = False if iterates else None if method.explicit is False else True
     why = f"it reports no iterations and {run.evaluations:.2f} forces a step, always"
-    why += "; so does a method that solves linear equations" * (answer is None)
+    why += "; so does a method that solves linear equations" * (explicit is None)
     why = f"it reports {run.iterations:.2f} iterations a step" if iterates else why
-    finding = agreement("explicit", method.explicit, answer, why, run.iterations, 0.0)
-    return [finding._replace(measured=Reading(yes_no(answer))), work]
+    finding = agreement("explicit", method.explicit, explicit, why, run.iterations, 0.0)
+    return [finding._replace(measured=Reading(yes_no(explicit))), work]

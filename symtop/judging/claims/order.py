@@ -96,14 +96,14 @@ def measure(subject: Subject) -> list[Finding]:
         verdict = "refuted" if table.order < min(power, len(table.defect)) else finding.verdict
         finding = finding._replace(verdict=verdict, why=f"{table.words(power)}; {finding.why}")
     if method.order is not None and finding.verdict == "confirmed":
-        lower = _elsewhere(subject, method.order)
+        lower = _lower_elsewhere(subject, method.order)
         if lower is not None:
             measured = Reading("order", lower[0], text=f"{lower[0]:.1f} elsewhere")
             finding = Finding("order", finding.declared, measured, "refuted", lower[1], lower[0], LOWER)
     return [finding]
 
 
-def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
+def _lower_elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
     """An order of one step below `power` at a random start, top, time and step, with a sentence; None if there is none.
 
     Steps of h, h/2, h/4 ... have errors d(h) ~ h^(order + 1). To exclude steps that are only too long, the order must
@@ -111,37 +111,37 @@ def _elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
     """
     if subject.in_plane or not subject.method.fixed_step or subject.method.exact_steps:
         return None
-    draw = np.random.default_rng(subject.seed)
+    rng = np.random.default_rng(subject.seed)
     for name, scene in subject.elsewhere(DRAWS, DRAW_SECONDS):
         scale = scene.time_scale() * math.sin(scene.start.theta)
-        sizes: Array = scale / draw.uniform(9.0, 18.0) / 2.0 ** np.arange(float(HALVINGS))
+        sizes: Array = scale / rng.uniform(9.0, 18.0) / 2.0 ** np.arange(float(HALVINGS))
         for chart in subject.charts:
             with contextlib.suppress(SymtopError):
                 step = one_step(subject.method, chart, scene, float(sizes[0]))
                 if restart_gap(step, scene.start) > ONE_MAP:
                     continue
-                seen = max(ROUNDING_ERROR, subject.rounding(SINGLE_EPSILONS))
-                order, h = _lower(sizes, _misses(step, scene.start, sizes), power, scale / SHORT_STEP, seen)
+                floor = max(ROUNDING_ERROR, subject.rounding(SINGLE_EPSILONS))
+                order, h = _lower(sizes, _step_errors(step, scene.start, sizes), power, scale / SHORT_STEP, floor)
                 if order < power:
                     order = max(order, 0.0)
                     return order, f"a step of h = {h:.2g} from {name} has order {order:.1f}, in the {chart} chart"
     return None
 
 
-def _misses(step: StepMap, start: Angles, sizes: Array) -> Array:
+def _step_errors(step: StepMap, start: Angles, sizes: Array) -> Array:
     """The errors of single steps of these sizes; NaN where a step fails."""
-    motion, z, misses = step.motion(start), step.point(start), np.full(sizes.size, math.nan)
+    motion, z, errors = step.motion(start), step.point(start), np.full(sizes.size, math.nan)
     for k, h in enumerate(sizes.tolist()):
         with contextlib.suppress(SymtopError):
-            misses[k] = step.gap(step.image(z, h), motion(h))
-    return misses
+            errors[k] = step.gap(step.image(z, h), motion(h))
+    return errors
 
 
-def _lower(sizes: Array, misses: Array, power: int, short: float, seen: float) -> tuple[float, float]:
-    """An order lower than `power`, or infinity, and its step; errors below `seen` are rounding."""
+def _lower(sizes: Array, errors: Array, power: int, short: float, floor: float) -> tuple[float, float]:
+    """An order lower than `power`, or infinity, and its step; errors below `floor` are rounding."""
     with np.errstate(all="ignore"):
-        orders = np.log2(misses[:-1] / misses[1:]) - 1.0
-    clear = ((misses[:-1] < LARGE_ERROR) | (sizes[:-1] <= short / TINY_STEP)) & (misses[1:] > seen)
+        orders = np.log2(errors[:-1] / errors[1:]) - 1.0
+    clear = ((errors[:-1] < LARGE_ERROR) | (sizes[:-1] <= short / TINY_STEP)) & (errors[1:] > floor)
     fine = np.flatnonzero(clear & (sizes[:-1] <= short))[-2:]
     if fine.size == 2 and (orders[fine] < power - LOWER).all():
         return float(orders[fine].max()), float(sizes[fine[0]])
@@ -152,34 +152,34 @@ def _lower(sizes: Array, misses: Array, power: int, short: float, seen: float) -
 def on_body(subject: Subject) -> list[Finding]:
     """The finding on a body without symmetry: from the slope of attitude errors, or from errors that do not fall."""
     claim, scene = subject.method.order, subject.scene
-    fitted = measured_order(subject.method, scene, quick=subject.quick, finest=subject.finest, main="attitude")
-    subject.traces.update(fitted.traces())
-    fit, verdict, why = fitted.main, order_verdict(claim, fitted.main), f"attitude {fitted.main} on {scene.name}"
+    order = measured_order(subject.method, scene, quick=subject.quick, finest=subject.finest, main="attitude")
+    subject.traces.update(order.traces())
+    fit, verdict, why = order.main, order_verdict(claim, order.main), f"attitude {order.main} on {scene.name}"
     if claim is None and subject.stepper is not None and subject.method.adaptive:
-        return [_converges(fitted, why)]
-    if not fitted.measured:
-        least = max(TRUE_LIMIT, subject.rounding(subject.finest or 0.0))
-        wrong = wrong_limit(fitted.step_size, fitted.error, fitted.bound, least)
-        if math.isfinite(wrong):
-            how = f"however small its step, it goes to a motion that is wrong by {wrong:.1e} rad on {scene.name}"
-            return [_wrong_limit(claim, wrong, how)]
-        return [undecided("order", yes_no(claim), _hidden(subject, fit.reason))]
+        return [_converges(order, why)]
+    if not order.measured:
+        floor = max(TRUE_LIMIT, subject.rounding(subject.finest or 0.0))
+        error = wrong_limit(order.step_size, order.error, order.bound, floor)
+        if math.isfinite(error):
+            words = f"however small its step, it goes to a motion that is wrong by {error:.1e} rad on {scene.name}"
+            return [_wrong_limit(claim, error, words)]
+        return [undecided("order", yes_no(claim), _reason(subject, fit.reason))]
     if verdict == "refuted" and fit.slope - fit.interval > (claim or 0) + REFUTED_BEYOND:  # as Fasso's on some bodies
         verdict, why = "measured", f"{why}: here the error falls with a higher power"
-    return [Finding("order", yes_no(claim), fitted.measured, verdict, why, fit.slope, fit.interval)]
+    return [Finding("order", yes_no(claim), order.measured, verdict, why, fit.slope, fit.interval)]
 
 
-def _wrong_limit(claim: int | None, wrong: float, why: str) -> Finding:
+def _wrong_limit(claim: int | None, error: float, why: str) -> Finding:
     verdict = "measured" if claim is None else "refuted"
-    return Finding("order", yes_no(claim), Reading("wrong limit", wrong), verdict, why, wrong, TRUE_LIMIT)
+    return Finding("order", yes_no(claim), Reading("wrong limit", error), verdict, why, error, TRUE_LIMIT)
 
 
 def _terms(series: Series) -> Reading:
     order, term = max(series.order, 0), series.order + 1
     text = f"{order} or more"
     if series.is_exact:
-        miss = f"{series.defect[term]:.1g} +- {series.noise[term]:.0g} of it"
-        text = f"{order}: in one step the term in h^{term} is the first that is wrong, by {miss}"
+        defect = f"{series.defect[term]:.1g} +- {series.noise[term]:.0g} of it"
+        text = f"{order}: in one step the term in h^{term} is the first that is wrong, by {defect}"
     return Reading("by a term", order, text=text)
 
 
@@ -233,11 +233,11 @@ def measured_order(
     if has_order and not quick and method.implementation == "compiled":
         runs += [(find_scene(FALLBACK_SCENE), nutations) for nutations in LONGER_RUNS]
     count = (11 if quick else 13) if method.fixed_step else (9 if quick else 25)  # errors of adaptive methods scatter
-    most = FINEST_RUN[method.implementation] * (QUICK_SHARE if quick else 1.0) if finest is None else finest
+    max_steps = FINEST_RUN[method.implementation] * (QUICK_SHARE if quick else 1.0) if finest is None else finest
     orders: list[Order] = []
     for problem, nutations in runs:
         horizon = nutations * problem.time_scale()
-        settings = ladder(method, problem, horizon, count, most)
+        settings = ladder(method, problem, horizon, count, max_steps)
         table = order_table(problem, method, settings, horizon, quantity, dense=finest is None)
         step = table["step_size"].values if method.fixed_step else horizon / table["steps"].values
         fits = {name: order_fit(problem, method, table, name, horizon) for name in (main, "theta", "energy")}
@@ -253,16 +253,16 @@ def _by_steps(subject: Subject) -> Finding:
     method, scene, finest = subject.method, subject.scene, subject.finest
     series, claim = series_of(subject), method.order
     options: dict[str, Any] = {"quick": subject.quick, "finest": finest, "main": "theta" if subject.in_plane else ""}
-    fitted = measured_order(method, scene, **options)
-    if series and not fitted.measured and series.is_exact and series.order < (claim or 0):
+    order = measured_order(method, scene, **options)
+    if series and not order.measured and series.is_exact and series.order < (claim or 0):
         # for a high declared order the ladder has long steps, whose errors follow no power if the true order is low,
         # and the limit is extrapolated by a power that errors do not have, and looks wrong
         method = replace(method, order=max(series.order, 1))
-        fitted = measured_order(method, scene, **options)
-    main, measured = fitted.main, fitted.measured
-    subject.traces.update(fitted.traces())
-    slopes = ", ".join(f"{name} {fit}" for name, fit in fitted.fits.items() if math.isfinite(fit.slope))
-    slopes = f"slopes {slopes} on {fitted.scene}" if slopes else "no slope"
+        order = measured_order(method, scene, **options)
+    main, measured = order.main, order.measured
+    subject.traces.update(order.traces())
+    slopes = ", ".join(f"{name} {fit}" for name, fit in order.fits.items() if math.isfinite(fit.slope))
+    slopes = f"slopes {slopes} on {order.scene}" if slopes else "no slope"
     power = method.order or 1
     # if a step certainly has the motion's terms up to h^power, its runs converge to the motion
     follows = series and series.order >= power and float(series.noise[1]) < SINGLE_NOISE
@@ -271,21 +271,21 @@ def _by_steps(subject: Subject) -> Finding:
     pole = height if height <= APART else 1.0  # near a pole, angles have an error of 2e-16 over the square
     if method.fixed_step and not (subject.in_plane or (settled and follows)):
         power = max(1, min(method.order or 99, round(main.slope))) if measured else power
-        wrong, doubt = limit(method, scene, power, finest)
-        if wrong > max(TRUE_LIMIT / pole**2, 10.0 * doubt, subject.rounding(finest or 0.0)):
-            how = f"as its step goes to zero it goes to a motion that is wrong by {wrong:.1e} ({slopes})"
-            return _wrong_limit(claim, wrong, how)
+        error, uncertainty = limit(method, scene, power, finest)
+        if error > max(TRUE_LIMIT / pole**2, 10.0 * uncertainty, subject.rounding(finest or 0.0)):
+            words = f"as its step goes to zero it goes to a motion that is wrong by {error:.1e} ({slopes})"
+            return _wrong_limit(claim, error, words)
     if claim is not None:
-        finding = _claimed(claim, fitted, fitted.fits.values() if method.fixed_step else (), series, slopes)
-        lowest = min((fit.slope for fit in fitted.fits.values() if math.isfinite(fit.slope)), default=0.0)
-        beside = min(height, math.sin(scene.start.theta)) <= APART
+        finding = _declared(claim, order, order.fits.values() if method.fixed_step else (), series, slopes)
+        lowest = min((fit.slope for fit in order.fits.values() if math.isfinite(fit.slope)), default=0.0)
+        near_pole = min(height, math.sin(scene.start.theta)) <= APART
         wrong_term = series is not None and series.is_exact and series.order < claim
-        faster = beside and method.fixed_step and lowest > claim - CONFIRMED_BEYOND and not wrong_term
+        faster = near_pole and method.fixed_step and lowest > claim - CONFIRMED_BEYOND and not wrong_term
         if finding.verdict == "refuted" and faster:
             finding = finding._replace(verdict="undecided", why=f"beside a pole errors may fall faster: {finding.why}")
-        return finding._replace(why=_hidden(subject, finding.why)) if finding.verdict == "undecided" else finding
+        return finding._replace(why=_reason(subject, finding.why)) if finding.verdict == "undecided" else finding
     if subject.stepper is not None and method.adaptive:
-        return _converges(fitted, slopes)
+        return _converges(order, slopes)
     value, why = main.slope, slopes
     if series is not None:
         power = round(main.slope) if measured else series.order
@@ -293,28 +293,28 @@ def _by_steps(subject: Subject) -> Finding:
         if not measured or series.order < power:  # the slope, unless the series of a step has a lower order
             measured, value = _terms(series), float(max(series.order, 0))
     if not measured:
-        return undecided("order", "", _hidden(subject, main.reason))
+        return undecided("order", "", _reason(subject, main.reason))
     return Finding("order", "", measured, "measured", why, value, main.interval)
 
 
-def _hidden(subject: Subject, why: str) -> str:
+def _reason(subject: Subject, why: str) -> str:
     """The reason why an order could not be judged, after that of single precision if it applies."""
-    least = subject.rounding(subject.finest or 0.0)
-    return hidden_by_single(least, why) if least else why
+    floor = subject.rounding(subject.finest or 0.0)
+    return hidden_by_single(floor, why) if floor else why
 
 
-def _converges(fitted: Order, slopes: str) -> Finding:
+def _converges(order: Order, slopes: str) -> Finding:
     """The finding on whether the error falls with the tolerance, down to rounding."""
-    tolerances, errors = fitted.tolerance, fitted.error
-    good, (decades, less) = np.isfinite(errors), FALL
-    if not good.any():
-        return undecided("order", CONVERGES, fitted.main.reason)
-    rank = np.flatnonzero(good)[np.argsort(tolerances[good])]
+    tolerances, errors = order.tolerance, order.error
+    valid, (decades, factor) = np.isfinite(errors), FALL
+    if not valid.any():
+        return undecided("order", CONVERGES, order.main.reason)
+    rank = np.flatnonzero(valid)[np.argsort(tolerances[valid])]
     tolerances, errors = tolerances[rank], errors[rank]
     last, coarser = float(errors[0]), errors[tolerances > 0.99 * decades * tolerances[0]]
     why = f"an error of {last:.1e} at a tolerance of {tolerances[0]:.0e}, from {errors[-1]:.1e} at {tolerances[-1]:.0e}"
-    if last <= ROUNDED_ERROR or (coarser.size and last < coarser.min() / less):
-        measured = fitted.measured or Reading("converges", last, text="converges as its tolerance falls")
+    if last <= ROUNDED_ERROR or (coarser.size and last < coarser.min() / factor):
+        measured = order.measured or Reading("converges", last, text="converges as its tolerance falls")
         return Finding("order", CONVERGES, measured, "confirmed", f"{why}; {slopes}", last, ROUNDED_ERROR)
     if not coarser.size:
         return undecided("order", CONVERGES, f"{why}: too few runs ended")
@@ -322,50 +322,50 @@ def _converges(fitted: Order, slopes: str) -> Finding:
     return Finding("order", CONVERGES, measured, "refuted", why, last, ROUNDED_ERROR)
 
 
-def _claimed(power: int, fitted: Order, fits: Collection[Fit], series: Series | None, slopes: str) -> Finding:
+def _declared(power: int, order: Order, fits: Collection[Fit], series: Series | None, slopes: str) -> Finding:
     """The finding on a declared order; `fits` is empty for an adaptive method, whose steps do not all scale alike.
 
     If the series has a first wrong term, its order is that of runs as h -> 0, and another slope comes from steps that
     are too long. A slope that is clearly lower refutes the order all the same, because a run may pass points with
     larger errors. A larger slope that is no whole number is no order, and refutes none.
     """
-    main, measured, verdict = fitted.main, fitted.measured, order_verdict(power, fitted.main, fits)
+    main, measured, verdict = order.main, order.measured, order_verdict(power, order.main, fits)
     value, resolution = main.slope, CONFIRMED_BEYOND + main.interval
     why = f"{slopes}; {series.words(power)}" if series else slopes
-    shown = series is not None and series.order == power and series.is_exact
-    early, known, following = bool(measured) and main.slope > power, 0.0, 0.0
+    agrees = series is not None and series.order == power and series.is_exact
+    above, floor, next_defect = bool(measured) and main.slope > power, 0.0, 0.0
     if series:
-        known = series.least(power + 1) if power + 1 < series.noise.size else math.inf
-        following = float(series.defect[power + 2]) if series.is_exact and series.order == power + 1 else 0.0
-    sharply = known <= max(SHARP_DEFECT, SHARE_OF_NEXT * following)
+        floor = series.least(power + 1) if power + 1 < series.noise.size else math.inf
+        next_defect = float(series.defect[power + 2]) if series.is_exact and series.order == power + 1 else 0.0
+    sharp = floor <= max(SHARP_DEFECT, SHARE_OF_NEXT * next_defect)
     lower = any(fit.slope + fit.interval < power - REFUTED_BEYOND for fit in fits)
-    if series is not None and shown and verdict != "confirmed" and not lower and (measured or _agree(fitted, power)):
+    if series is not None and agrees and verdict != "confirmed" and not lower and (measured or _agree(order, power)):
         why = f"{why} ({main.reason or 'at steps too long for a slope'})"
         defect = series.worst(power), series.least(power)
         return Finding("order", str(power), _terms(series), "confirmed", why, *defect)
-    if early and verdict == "refuted" and not lower:
-        whole = abs(main.slope - round(main.slope)) <= resolution
-        verdict = verdict if sharply and whole else "undecided"
+    if above and verdict == "refuted" and not lower:
+        integer = abs(main.slope - round(main.slope)) <= resolution
+        verdict = verdict if sharp and integer else "undecided"
     if verdict == "refuted":
         why = f"the error falls with another power of the step: {why}"
     elif series is not None and series.order < min(power, series.resolved):
         verdict, why, measured, term = "refuted", f"{series.words(power)}; {slopes}", _terms(series), series.order + 1
         value, resolution = series.worst(term), series.least(term)
     elif verdict == "undecided":
-        neither = f"the slope is neither {power} nor clearly another order"
-        if early and not sharply:
-            doubt = f"the h^{power + 1} term of a step is known only to {min(known, 1.0):.0e} of itself"
-            neither = f"the slope is above {power}, and {doubt}"
-        why = f"{neither}: {why}" if measured else f"{main.reason} ({why})"
+        words = f"the slope is neither {power} nor clearly another order"
+        if above and not sharp:
+            detail = f"the h^{power + 1} term of a step is known only to {min(floor, 1.0):.0e} of itself"
+            words = f"the slope is above {power}, and {detail}"
+        why = f"{words}: {why}" if measured else f"{main.reason} ({why})"
     return Finding("order", str(power), measured, verdict, why, value, resolution)
 
 
-def _agree(fitted: Order, power: int) -> bool:
+def _agree(order: Order, power: int) -> bool:
     """Do the errors of the finest judgeable runs fall as h^power, within a factor `FIT_FACTOR`?"""
-    h, error, bound = fitted.step_size, fitted.error, fitted.bound
-    good = np.isfinite(error) & (error > ABOVE_BOUND * bound) & (error < LARGEST_ERROR)
-    finest = np.argsort(h[good])[:FINEST_RUNS]
-    scaled = error[good][finest] / h[good][finest] ** power
+    h, error, bound = order.step_size, order.error, order.bound
+    valid = np.isfinite(error) & (error > ABOVE_BOUND * bound) & (error < LARGEST_ERROR)
+    finest = np.argsort(h[valid])[:FINEST_RUNS]
+    scaled = error[valid][finest] / h[valid][finest] ** power
     return scaled.size < 2 or float(np.max(scaled)) < FIT_FACTOR * float(np.min(scaled))
 
 
@@ -396,14 +396,14 @@ def _exactness(subject: Subject) -> Finding:
     """The finding on a method with exact steps, from the errors at steps of all sizes."""
     method, scene = subject.method, subject.scene
     horizon, main = NUTATIONS * scene.time_scale(), observable(method)
-    finer = ladder(method, scene, horizon, 7 if subject.quick else 13, FINEST_RUN[method.implementation])
-    settings = [scene.time_scale() / LARGEST_EXACT, *finer]
+    steps = ladder(method, scene, horizon, 7 if subject.quick else 13, FINEST_RUN[method.implementation])
+    settings = [scene.time_scale() / LARGEST_EXACT, *steps]
     table = error_table(scene, method, settings, horizon, observe=main)
     largest = float(table[main].max())
     why = f"largest error {largest:.1e} at steps from {settings[-1]:.1e} s to {settings[0]:.1e} s on {scene.name}"
-    right = largest <= TRUE_LIMIT
-    measured = Reading("exact", largest) if right else UNMEASURED
-    return Finding("order", "exact", measured, "confirmed" if right else "refuted", why, largest, TRUE_LIMIT)
+    is_exact = largest <= TRUE_LIMIT
+    measured = Reading("exact", largest) if is_exact else UNMEASURED
+    return Finding("order", "exact", measured, "confirmed" if is_exact else "refuted", why, largest, TRUE_LIMIT)
 
 
 def table_of(method: Integrator) -> Conditions | None:

@@ -56,8 +56,8 @@ class Conditions(NamedTuple):
         """A clause on whether the conditions up to order `power` are met."""
         if self.order < min(power, len(self.defect)):
             return f"its table misses a condition of order {self.order + 1} by {self.defect[self.order]:.1e}"
-        shown = min(power, len(self.defect))
-        return f"its table meets the conditions up to order {shown} to {max(1e-16, *self.defect[:shown]):.0e}"
+        order = min(power, len(self.defect))
+        return f"its table meets the conditions up to order {order} to {max(1e-16, *self.defect[:order]):.0e}"
 
 
 @functools.cache
@@ -96,10 +96,10 @@ def conditions(a: ArrayLike, b: ArrayLike, most: int = MOST_VERTICES) -> Conditi
             phi = phi * (matrix @ weight(branch))
         return phi
 
-    def miss(tree: Tree) -> float:
+    def defect(tree: Tree) -> float:
         return abs(math.fsum(weights * weight(tree)) - 1.0 / density(tree))
 
-    return Conditions(tuple(max(map(miss, trees(vertices))) for vertices in range(1, most + 1)))
+    return Conditions(tuple(max(map(defect, trees(vertices))) for vertices in range(1, most + 1)))
 
 
 def triangle(entries: ArrayLike, stages: int) -> np.ndarray:
@@ -132,17 +132,17 @@ def exponential(words: Words) -> Words:
     power = total
     for k in range(1, len(words)):
         power = [row / k for row in product(power, words)]
-        total = [row + more for row, more in zip(total, power, strict=True)]
+        total = [row + term for row, term in zip(total, power, strict=True)]
     return total
 
 
 def logarithm(words: Words) -> Words:
     """log of a series whose constant is one."""
-    rest: Words = [np.zeros(1), *words[1:]]
-    total, power = [np.zeros_like(row) for row in words], rest
+    series: Words = [np.zeros(1), *words[1:]]
+    total, power = [np.zeros_like(row) for row in words], series
     for k in range(1, len(words)):
-        total = [row - (-1.0) ** k / k * more for row, more in zip(total, power, strict=True)]
-        power = product(power, rest)
+        total = [row - (-1.0) ** k / k * term for row, term in zip(total, power, strict=True)]
+        power = product(power, series)
     return total
 
 
@@ -165,7 +165,7 @@ def _vanishing(length: int, letters: int) -> Array:
         columns += [_spread(column, 1) for column in _vanishing(length - 1, letters - 1).T]
         if letters > length - letters + 1:
             for word in (word for word in range(2**length) if word.bit_count() == letters):
-                bits = [word >> place & 1 for place in range(length)]  # [x1, [x2, ... [x(n-1), xn]]], the last first
+                bits = [word >> bit & 1 for bit in range(length)]  # [x1, [x2, ... [x(n-1), xn]]], the last first
                 columns.append(functools.reduce(_spread, bits[1:], np.eye(2)[bits[0]]))
     if not columns:
         return np.zeros((2**length, 0))
@@ -184,17 +184,17 @@ def splitting_conditions(
 ) -> Conditions:
     """Defects of the conditions of a splitting, the largest of each length; arguments are those of `composition`."""
     t, v = element(t=1.0), element(v=1.0)
-    bent = commutator(v, commutator(v, t))
+    nested = commutator(v, commutator(v, t))
     step = exponential(element())
-    for place, (b, c) in enumerate(zip(kick, gradient or [0.0] * len(kick), strict=True)):
+    for stage, (b, c) in enumerate(zip(kick, gradient or [0.0] * len(kick), strict=True)):
         if b or c:
-            step = product(step, exponential([b * row + c * more for row, more in zip(v, bent, strict=True)]))
-        if place < len(drift):
-            step = product(step, exponential(element(t=drift[place])))
+            step = product(step, exponential([b * row + c * term for row, term in zip(v, nested, strict=True)]))
+        if stage < len(drift):
+            step = product(step, exponential(element(t=drift[stage])))
     if processor:
         ends = [exponential([sign * processor * row for row in commutator(t, v)]) for sign in (1.0, -1.0)]
         step = product(product(ends[0], step), ends[1])
     defects = logarithm(step)
     defects[1] = defects[1] - 1.0
     pairs = [(row, vanishing(length)) for length, row in enumerate(defects[1:], start=1)]
-    return Conditions(tuple(float(np.max(np.abs(row - none @ (none.T @ row)))) for row, none in pairs))
+    return Conditions(tuple(float(np.max(np.abs(row - basis @ (basis.T @ row)))) for row, basis in pairs))

@@ -78,10 +78,10 @@ class Series(NamedTuple):
 
     def words(self, power: int) -> str:
         """A clause on whether the series has the order `power`."""
-        agreed, ahead = min(power, self.order), "" if self.backward else " (a step of -h is not taken)"
-        if agreed < min(power, self.resolved):
-            return f"{self.wrong_term()}, in the {self.chart} chart{ahead}"
-        return f"a step has the motion's terms up to h^{agreed} to {max(self.worst(agreed), 1e-16):.0e}{ahead}"
+        order, note = min(power, self.order), "" if self.backward else " (a step of -h is not taken)"
+        if order < min(power, self.resolved):
+            return f"{self.wrong_term()}, in the {self.chart} chart{note}"
+        return f"a step has the motion's terms up to h^{order} to {max(self.worst(order), 1e-16):.0e}{note}"
 
     def wrong_term(self) -> str:
         """A clause on the first term that differs from that of the motion; there must be one."""
@@ -99,29 +99,29 @@ def compared(
     image: Callable[[float], Array], motion: Callable[[float], Array], period: float, chart: str = ""
 ) -> Series:
     """The series of the function `image` of h compared with that of `motion`, both (n,) in one chart, of size one."""
-    ahead = functools.partial(_narrowed, image, motion, period, chart, backward=False)
+    fit = functools.partial(_best_fit, image, motion, period, chart, backward=False)
     try:
-        scatter, series = ahead(backward=True)
+        scatter, series = fit(backward=True)
     except SymtopError:
-        return ahead()[1]
+        return fit()[1]
     if scatter > ROUGH_RESIDUAL:
         with contextlib.suppress(SymtopError):
-            series = forward[1] if (forward := ahead())[0] < LESS_RESIDUAL * scatter else series
+            series = forward[1] if (forward := fit())[0] < LESS_RESIDUAL * scatter else series
     return series
 
 
-def _narrowed(image: Any, motion: Any, period: float, chart: str, *, backward: bool) -> tuple[float, Series]:
+def _best_fit(image: Any, motion: Any, period: float, chart: str, *, backward: bool) -> tuple[float, Series]:
     """The scatter and the series of the fit with least scatter among narrower and narrower intervals."""
     width, best = WIDEST_STEP * period, None
     refusal = SymtopError("no step succeeds")
     for _ in range(TRIES):
         try:
-            fitted = _fitted(image, motion, width, chart, backward=backward)
+            trial = _fit(image, motion, width, chart, backward=backward)
         except SymtopError as error:
             refusal = error
         else:
-            if best is None or fitted[0] < 0.5 * best[0]:
-                best = fitted
+            if best is None or trial[0] < 0.5 * best[0]:
+                best = trial
             if best[0] < CLEAN_RESIDUAL:
                 break
         width *= STEP_RATIO
@@ -130,14 +130,14 @@ def _narrowed(image: Any, motion: Any, period: float, chart: str, *, backward: b
     return best
 
 
-def _fitted(
+def _fit(
     image: Callable[[float], Array], motion: Callable[[float], Array], width: float, chart: str, *, backward: bool
 ) -> tuple[float, Series]:
     """The scatter and the series of a fit over [-width, width], or over [0, width]."""
     nodes = np.cos(math.pi * (np.arange(NODES) + 0.5) / NODES)
-    places = nodes if backward else 0.5 * (nodes + 1.0)
-    exact = np.stack([motion(width * float(place)) for place in places])
-    error = np.stack([image(width * float(place)) for place in places]) - exact
+    points = nodes if backward else 0.5 * (nodes + 1.0)
+    exact = np.stack([motion(width * float(point)) for point in points])
+    error = np.stack([image(width * float(point)) for point in points]) - exact
     with np.errstate(over="ignore"):
         squares = error * error  # the fits need finite squares
     if not np.isfinite(squares).all():
@@ -146,27 +146,27 @@ def _fitted(
     power = max(degree, LEAST_POWER)
     fits = (chebyshev.chebfit(nodes, error, degree) for degree in (power, power + DEGREES_MORE))
     terms, finer = (_monomials(fit, backward=backward) for fit in fits)
-    _, top = _degree(nodes, exact)
-    true = _monomials(chebyshev.chebfit(nodes, exact, max(top, power)), backward=backward)[: power + 1]
+    _, exact_degree = _degree(nodes, exact)
+    true = _monomials(chebyshev.chebfit(nodes, exact, max(exact_degree, power)), backward=backward)[: power + 1]
     size = np.maximum(np.max(np.abs(true), axis=1), np.finfo(float).tiny)
     size[0] = 1.0
-    moved = np.max(np.abs(finer[: power + 1] - terms), axis=1)
+    change = np.max(np.abs(finer[: power + 1] - terms), axis=1)
     weights = np.full(power + 1, 2.0 / NODES)
     weights[0] = 1.0 / NODES
     grown = np.sqrt((_to_powers(power, backward=backward) ** 2) @ weights)  # of each power, by a scatter of one
-    doubt = np.maximum(scatter * grown, moved)
-    return scatter, Series(width, np.max(np.abs(terms), axis=1) / size, doubt / size, backward, chart)
+    uncertainty = np.maximum(scatter * grown, change)
+    return scatter, Series(width, np.max(np.abs(terms), axis=1) / size, uncertainty / size, backward, chart)
 
 
 def _degree(nodes: Array, values: Array) -> tuple[float, int]:
     """The least residual of a fit (root mean square of the worst component), and the least degree that reaches it."""
     rows = []
     for degree in DEGREES:
-        rest = values - chebyshev.chebval(nodes, chebyshev.chebfit(nodes, values, degree)).T
-        rows.append(float(np.max(np.sqrt(np.sum(rest * rest, axis=0) / (nodes.size - degree - 1)))))
-    least = max(min(rows), SAMPLE_ROUNDING)
-    place = next(k for k, row in enumerate(rows) if row <= RESIDUAL_RATIO * least)
-    return max(rows[place], SAMPLE_ROUNDING), DEGREES[place]
+        residual = values - chebyshev.chebval(nodes, chebyshev.chebfit(nodes, values, degree)).T
+        rows.append(float(np.max(np.sqrt(np.sum(residual * residual, axis=0) / (nodes.size - degree - 1)))))
+    smallest = max(min(rows), SAMPLE_ROUNDING)
+    index = next(k for k, row in enumerate(rows) if row <= RESIDUAL_RATIO * smallest)
+    return max(rows[index], SAMPLE_ROUNDING), DEGREES[index]
 
 
 def _monomials(coefficients: Any, *, backward: bool) -> Array:

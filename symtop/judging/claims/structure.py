@@ -60,20 +60,20 @@ def measure(subject: Subject) -> list[Finding]:
         try:
             step, start = map_of(subject, chart)
             subject.traces["structure_step"] = np.array(step.h)
-            answers.append(_answer_at(_bracket, step, start, subject.traces))
-            answers.append(_answer_at(_returned, step, start))
+            answers.append(_answer_at(_symplectic, step, start, subject.traces))
+            answers.append(_answer_at(_reversible, step, start))
             if subject.method.fixed_step and not subject.in_plane:
-                answers = _elsewhere(subject, step, answers)
+                answers = _refuted_elsewhere(subject, step, answers)
             finest = maps.WIDEST_DIFFERENCE / 2.0 ** (maps.WIDTHS - 1)
-            hidden = subject.rounding(BRACKET_UNITS) / finest, subject.rounding(RETURN_UNITS)
-            for k, (yes, value, _, why) in enumerate(answers):
-                if yes is False and value <= hidden[k]:
-                    answers[k] = None, value, hidden[k], hidden_by_single(hidden[k], why)
+            rounding = subject.rounding(BRACKET_UNITS) / finest, subject.rounding(RETURN_UNITS)
+            for k, (holds, value, _, why) in enumerate(answers):
+                if holds is False and value <= rounding[k]:
+                    answers[k] = None, value, rounding[k], hidden_by_single(rounding[k], why)
         except SymtopError as error:
             answers += [(None, math.nan, math.nan, undecided("", "", str(error)).why)] * (2 - len(answers))
-        for claim, (yes, value, least, why) in zip(by_claim, answers, strict=True):
+        for claim, (holds, value, resolution, why) in zip(by_claim, answers, strict=True):
             claimed, words = getattr(subject.method, claim), f"{why}, in the {chart} chart"
-            by_claim[claim].append(agreement(claim, claimed, yes, words, value, least))
+            by_claim[claim].append(agreement(claim, claimed, holds, words, value, resolution))
     return [max(findings, key=_badness) for findings in by_claim.values()]
 
 
@@ -89,8 +89,8 @@ class Plane(maps.StepMap):
 
     def angles(self, z: Array) -> Angles:
         """The start at a point z, with phi = psi = 0."""
-        whole = [float(z[0]), 0.0, 0.0, self.unit * float(z[1]), self.momenta.p_phi, self.momenta.p_psi]
-        return maps.angles_at(self.top, np.array(whole))
+        coordinates = [float(z[0]), 0.0, 0.0, self.unit * float(z[1]), self.momenta.p_phi, self.momenta.p_psi]
+        return maps.angles_at(self.top, np.array(coordinates))
 
     def point(self, start: Angles) -> Array:
         """z of a start."""
@@ -115,37 +115,37 @@ def _badness(finding: Finding) -> tuple[int, float]:
     return ("", "yes", "no").index(finding.measured.kind), finding.value if math.isfinite(finding.value) else -1.0
 
 
-def _answer_at(ask: Callable[..., Answer], step: maps.StepMap, start: Angles, *traces: dict[str, Any]) -> Answer:
-    """The answer of `ask` at a step, or that at half the step if a defect vanishes there (iteration not converged)."""
-    answer = ask(step, start, *traces)
+def _answer_at(check: Callable[..., Answer], step: maps.StepMap, start: Angles, *traces: dict[str, Any]) -> Answer:
+    """The answer of `check` at a step, or that at half the step if a defect vanishes there (not converged)."""
+    answer = check(step, start, *traces)
     falls = step.method.explicit and 2.0 ** (step.method.order or 0) >= VANISHING_RATIO  # a true defect falls as fast
     if answer[0] is False and step.method.fixed_step and not falls:
         with contextlib.suppress(SymtopError):
-            finer = ask(replace(step, h=0.5 * step.h), start)
+            finer = check(replace(step, h=0.5 * step.h), start)
             return finer if finer[0] and VANISHING_RATIO * finer[1] < answer[1] else answer
     return answer
 
 
-def _bracket(step: maps.StepMap, start: Angles, traces: dict[str, Any] | None = None) -> Answer:
+def _symplectic(step: maps.StepMap, start: Angles, traces: dict[str, Any] | None = None) -> Answer:
     defect, gap = maps.symplectic_defect(step, start), maps.restart_gap(step, start)
     if traces is not None:
         traces.update(defect_width=defect.widths, bracket_defect=defect.raw)
     floor = max(3.0 * defect.noise, 1e-12)
-    shrinks = f"from {defect.raw[0]:.0e} to {defect.raw[-1]:.0e} at a 16th of the width; noise {defect.noise:.0e}"
+    trend = f"from {defect.raw[0]:.0e} to {defect.raw[-1]:.0e} at a 16th of the width; noise {defect.noise:.0e}"
     foreign = step.own("onward") is not None  # perhaps a multistep method, whose first step is another method's
     if defect.size <= min(SYMPLECTIC, floor) and defect.noise <= SYMPLECTIC and not (foreign and gap > ONE_MAP):
-        return True, defect.size, floor, f"defect of the bracket {defect.size:.0e} (it falls {shrinks})"
+        return True, defect.size, floor, f"defect of the bracket {defect.size:.0e} (it falls {trend})"
     if gap > ONE_MAP:
         if not foreign and step.chart != "axis" and defect.rest <= max(3.0 * defect.noise, SYMPLECTIC):
             why = f"one number that a run takes from its start explains the defect ({defect.rest:.0e} is left)"
             return True, defect.rest, floor, why
         return None, defect.size, floor, f"a run differs from its steps one by one by {gap:.0e}: no one map"
     stands = defect.raw[-1] > max(PERSISTENT_RATIO * defect.raw[0], 100.0 * REAL_DEFECT, LOST_IN_NOISE * defect.noise)
-    bad = stands or defect.size > max(10.0 * defect.noise, REAL_DEFECT)
-    return False if bad else None, defect.size, floor, f"defect of the bracket {defect.size:.1e} (it goes {shrinks})"
+    violated = stands or defect.size > max(10.0 * defect.noise, REAL_DEFECT)
+    return False if violated else None, defect.size, floor, f"defect of the bracket {defect.size:.1e} (it goes {trend})"
 
 
-def _returned(step: maps.StepMap, start: Angles) -> Answer:
+def _reversible(step: maps.StepMap, start: Angles) -> Answer:
     miss = maps.return_miss(step, start)
     if (miss > RETURN_GAP or step.own("onward") is not None) and (gap := maps.restart_gap(step, start)) > ONE_MAP:
         return None, miss, RETURN_GAP, f"a run differs from its steps one by one by {gap:.0e}: no one map"
@@ -153,14 +153,14 @@ def _returned(step: maps.StepMap, start: Angles) -> Answer:
     return True if miss <= RETURN_GAP else False if miss > NO_RETURN_GAP else None, miss, RETURN_GAP, why
 
 
-def _elsewhere(subject: Subject, step: maps.StepMap, answers: list[Answer]) -> list[Answer]:
+def _refuted_elsewhere(subject: Subject, step: maps.StepMap, answers: list[Answer]) -> list[Answer]:
     """The answers, with each yes replaced by a no that is measured at a random start."""
     for name, scene in subject.elsewhere(DRAWS, DRAW_SECONDS) if answers[0][0] or answers[1][0] else ():
         with contextlib.suppress(SymtopError):
             trial = maps.one_step(step.method, step.chart, scene, maps.RUN_NUTATIONS * scene.time_scale())
-            other = maps.coarsest(trial, scene.start)
-            for i, ask in enumerate((_bracket, _returned)):
-                if answers[i][0] and (answer := _answer_at(ask, other, scene.start))[0] is False:
+            coarse = maps.coarsest(trial, scene.start)
+            for i, check in enumerate((_symplectic, _reversible)):
+                if answers[i][0] and (answer := _answer_at(check, coarse, scene.start))[0] is False:
                     answers[i] = *answer[:3], f"{answer[3]} ({name})"
     return answers
 
@@ -185,8 +185,8 @@ class Passage(NamedTuple):
         return "passes" if self.passes else "wrong" if self.outcome == "ok" else "ends there"
 
     def __str__(self) -> str:
-        how = f", off by {self.error:.0e} and {self.finer:.0e} with finer steps"
-        return f"{self.chart}: {self.word}{how if self.outcome == 'ok' else f' ({self.outcome})'}"
+        words = f", off by {self.error:.0e} and {self.finer:.0e} with finer steps"
+        return f"{self.chart}: {self.word}{words if self.outcome == 'ok' else f' ({self.outcome})'}"
 
 
 def passages(method: Integrator, right: float = POLE_RIGHT) -> list[Passage]:

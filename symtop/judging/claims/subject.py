@@ -104,13 +104,13 @@ class Subject:
 
     def elsewhere(self, draws: tuple[int, int], seconds: tuple[float, float]) -> Iterator[tuple[str, Scene]]:
         """Random starts as (description, scene), up to a number and seconds (usual, quick); every other one is late."""
-        began, draw, stepper = time.monotonic(), np.random.default_rng(self.seed), self.stepper or Stepper()
+        began, rng, stepper = time.monotonic(), np.random.default_rng(self.seed), self.stepper or Stepper()
         scenes = drawn(self.scene, draws[self.quick], self.seed, same_top=self.knows_top)
         try:
             for k, scene in enumerate(scenes, start=1):
                 if time.monotonic() - began > seconds[self.quick]:  # a program that takes long to start
                     return
-                stepper.since = 0.0 if k % 2 else scene.time_scale() * 10.0 ** draw.uniform(0.0, 3.0)
+                stepper.since = 0.0 if k % 2 else scene.time_scale() * 10.0 ** rng.uniform(0.0, 3.0)
                 rates, (I1, I3, mgl) = scene.start, (scene.top.I1, scene.top.I3, scene.top.mgl)
                 where = f"theta {rates.theta:.3g}, rates {rates.theta_dot:.3g} {rates.phi_dot:.3g} {rates.psi_dot:.3g}"
                 where += f", I1 {I1:.3g}, I3 {I3:.3g}, mgl {mgl:.3g}" + f", t {stepper.since:.3g}" * (k % 2 == 0)
@@ -152,13 +152,13 @@ class Subject:
         scene, h = self.scene, self.scene.time_scale() / STEPS_A_NUTATION
         state, run = self.stepper.from_start(scene.top, generic_start(scene), h)
         end = run(state, 1)[0]
-        added, size = end - state, np.abs(end)
-        added, size = (values[np.abs(added) > LEAST_MOVE * size] for values in (added, size))
+        moves, size = end - state, np.abs(end)
+        moves, size = (values[np.abs(moves) > LEAST_MOVE * size] for values in (moves, size))
         with np.errstate(over="ignore"):  # a step may blow up beyond the range of float32
             if (end == end.astype(np.float32)).all():
                 return not (state == state.astype(np.float32)).all()
-            off = [np.abs(sums - sums.astype(np.float32)) * unit for sums, unit in ((added, 1.0), (added / h, h))]
-        return added.size > 2 and bool((off <= ROUNDING_EPSILONS * EPSILON * size).all(axis=1).any())
+            gaps = [np.abs(sums - sums.astype(np.float32)) * unit for sums, unit in ((moves, 1.0), (moves / h, h))]
+        return moves.size > 2 and bool((gaps <= ROUNDING_EPSILONS * EPSILON * size).all(axis=1).any())
 
     def rounding(self, steps: float) -> float:
         """The relative rounding error of `steps` steps in single precision, one epsilon each; 0 in double precision."""
@@ -236,45 +236,45 @@ def open_target(
         return (Program if kind == "program" else Server)(str(target), chart)
     if kind == "shared":
         return SharedObject(path, chart, symbol or "step")
-    return _python_step(*_thing(target, free=form is None), chart, kind, adaptive=adaptive, free=form is None)
+    return _python_step(*_load(target, free=form is None), chart, kind, adaptive=adaptive, free=form is None)
 
 
-def _python_step(thing: Any, name: str, chart: str, kind: str, *, adaptive: bool, free: bool) -> Stepper:
-    if kind == "diffrax" or is_solver(thing):
-        return DiffraxSolver(thing, chart, name)
-    if isinstance(thing, type):
-        return ScipySolver(thing, chart, adaptive=adaptive)
+def _python_step(target: Any, name: str, chart: str, kind: str, *, adaptive: bool, free: bool) -> Stepper:
+    if kind == "diffrax" or is_solver(target):
+        return DiffraxSolver(target, chart, name)
+    if isinstance(target, type):
+        return ScipySolver(target, chart, adaptive=adaptive)
     if kind == "scipy" or adaptive:
-        raise SymtopError(f"form scipy, and a tolerance, need a class derived from OdeSolver, not {thing!r}")
+        raise SymtopError(f"form scipy, and a tolerance, need a class derived from OdeSolver, not {target!r}")
     arguments = ARGUMENTS.get(kind, ARGUMENTS["ode"])
     try:
-        inspect.signature(thing).bind(*arguments.split(","))
+        inspect.signature(target).bind(*arguments.split(","))
     except TypeError:
         hint = "; a rotation, q = (w, x, y, z), takes (q, w, h, inertia, torque): form rotation" * free
-        signature = f"{inspect.signature(thing)}{hint}"
+        signature = f"{inspect.signature(target)}{hint}"
         raise SymtopError(f"a step of the form {kind} must take {arguments}, not {signature}") from None
     except ValueError:  # built in, without a signature
         pass
     if kind in ("torch", "jax"):
-        return BatchStep(thing, chart, kind, name)
+        return BatchStep(target, chart, kind, name)
     if kind == "ode":
-        return PythonStep(thing, chart, name)
+        return PythonStep(target, chart, name)
     if kind == "rotation":
-        return RotationStep(thing, name, BODY if chart == BODY else "attitude")
-    return SeparableStep(thing, name)
+        return RotationStep(target, name, BODY if chart == BODY else "attitude")
+    return SeparableStep(target, name)
 
 
-def _thing(target: Any, *, free: bool) -> tuple[Any, str]:
+def _load(target: Any, *, free: bool) -> tuple[Any, str]:
     """The object `target`, or that of FILE.py:NAME (by default ``step``), and its name; `free`: no form was given."""
     if callable(target) or is_solver(target):
         return target, ""
     path, _, name = str(target).partition(":")
     if not path.endswith(".py"):
-        more = ", FILE.so, a trajectory such as FILE.csv, or a command with form program" if free else " or FILE.so"
-        words = f"a step must be FILE.py:NAME{more}"
+        forms = ", FILE.so, a trajectory such as FILE.csv, or a command with form program" if free else " or FILE.so"
+        words = f"a step must be FILE.py:NAME{forms}"
         known = (method := path.partition("[")[0]) in methods()
-        own = f", an integrator, whose claims `symtop claims {method}` measures" * known
-        raise SymtopError(f"{words}, not {str(target)!r}{own}")
+        note = f", an integrator, whose claims `symtop claims {method}` measures" * known
+        raise SymtopError(f"{words}, not {str(target)!r}{note}")
     hint = " (a command needs form program)" * free
     file = python_file(path, "a step", f"FILE.py:NAME{hint}")
     with foreign_code(f"the file {file.name}"), x64():

@@ -62,27 +62,27 @@ def body_population(n: int, *, seed: int = 0, kind: str = "all", epsilon: float 
     the distance of heavy bodies from a Lagrange top, from 0 (with chaotic ones from 0.02) to 1/2; by default it is
     drawn. Member i depends on the seed, not on n. Raises SymtopError for invalid arguments.
     """
-    count, chosen, first = whole("n", n, 1, MOST_MEMBERS), one_of("kind", kind, KINDS), whole("seed", seed, 0)
+    count, kind, first = whole("n", n, 1, MOST_MEMBERS), one_of("kind", kind, KINDS), whole("seed", seed, 0)
     check_memory("n", count)
-    kinds = {"all": STRATA, "free": FREE}.get(chosen, (chosen,))
+    kinds = {"all": STRATA, "free": FREE}.get(kind, (kind,))
     if epsilon is not None:
         if not {*kinds} - {*FREE, "lagrange"}:
-            raise SymtopError(f"epsilon is of heavy bodies, and not of the kind {chosen!r}", "epsilon")
-        least = LEAST_CHAOTIC if "chaotic" in kinds else 0.0
+            raise SymtopError(f"epsilon is of heavy bodies, and not of the kind {kind!r}", "epsilon")
+        smallest = LEAST_CHAOTIC if "chaotic" in kinds else 0.0
         epsilon = finite("epsilon", epsilon)
-        if not least <= epsilon <= LARGEST_EPSILON:
-            raise SymtopError(f"epsilon must be from {least} to {LARGEST_EPSILON}, not {epsilon!r}", "epsilon")
+        if not smallest <= epsilon <= LARGEST_EPSILON:
+            raise SymtopError(f"epsilon must be from {smallest} to {LARGEST_EPSILON}, not {epsilon!r}", "epsilon")
     rows, strata = np.empty((count, 14)), np.empty(count, dtype=f"U{max(map(len, KINDS))}")
-    for place, stratum in enumerate(kinds[:count]):
-        rows[place :: len(kinds)] = _members(stratum, first, len(range(place, count, len(kinds))), epsilon)
-        strata[place :: len(kinds)] = stratum
+    for index, stratum in enumerate(kinds[:count]):
+        rows[index :: len(kinds)] = _members(stratum, first, len(range(index, count, len(kinds))), epsilon)
+        strata[index :: len(kinds)] = stratum
     columns: dict[str, Any] = {
-        name: (("member", VECTORS[name]), part) if name in VECTORS else ("member", part[:, 0], PRINCIPAL.get(name))
-        for name, part in zip(PARTS, np.split(rows, SPLIT, axis=1), strict=True)
+        name: (("member", VECTORS[name]), block) if name in VECTORS else ("member", block[:, 0], PRINCIPAL.get(name))
+        for name, block in zip(PARTS, np.split(rows, SPLIT, axis=1), strict=True)
     }
     data = xr.Dataset(columns | {"stratum": ("member", strata)}, {name: list(LABELS[name]) for name in LABELS})
-    draw: dict[str, Any] = {"seed": first, "kind": chosen} | ({} if epsilon is None else {"epsilon": float(epsilon)})
-    return netcdf.describe(data, f"{count} bodies of the population {chosen!r}", **draw)
+    draw: dict[str, Any] = {"seed": first, "kind": kind} | ({} if epsilon is None else {"epsilon": float(epsilon)})
+    return netcdf.describe(data, f"{count} bodies of the population {kind!r}", **draw)
 
 
 def scenes_of(members: xr.Dataset) -> list[Scene]:
@@ -100,7 +100,7 @@ def scenes_of(members: xr.Dataset) -> list[Scene]:
 def _members(kind: str, seed: int, count: int, epsilon: float | None) -> Array:
     """The first members of one stratum, (count, 14)."""
     generator = np.random.Philox(key=[seed % 2**64, KINDS.index(kind)])
-    parts, missing = list[Array](), count
+    batches, missing = list[Array](), count
     while missing:
         integers = generator.random_raw(DRAWS * missing) >> np.uint64(11)
         uniform = np.ascontiguousarray((integers * 2.0**-53).reshape(-1, DRAWS).T)
@@ -109,29 +109,29 @@ def _members(kind: str, seed: int, count: int, epsilon: float | None) -> Array:
             pieces = np.array_split(rows, -(-len(rows) // PIECE_MEMBERS))
             chaotic = np.concatenate([*in_threads(growth, pieces, cores())]) > CHAOTIC_GROWTH
             rows = rows[chaotic == (kind == "chaotic")]
-        parts.append(rows)
+        batches.append(rows)
         missing -= len(rows)
-    return np.concatenate(parts)
+    return np.concatenate(batches)
 
 
-def _direction(first: Array, second: Array) -> Array:
+def _directions(first: Array, second: Array) -> Array:
     """Directions (3, n), uniform over the sphere."""
     z, angle = 2.0 * first - 1.0, 2.0 * math.pi * second
-    across = np.sqrt(np.maximum(1.0 - z * z, 0.0))
-    return np.stack([across * np.cos(angle), across * np.sin(angle), z])
+    radius = np.sqrt(np.maximum(1.0 - z * z, 0.0))
+    return np.stack([radius * np.cos(angle), radius * np.sin(angle), z])
 
 
-def _turn(u: Array) -> Array:
+def _quaternions(u: Array) -> Array:
     """Quaternions (4, n), uniform over all rotations."""
     out, back = np.sqrt(u[0]), np.sqrt(1.0 - u[0])
     first, second = 2.0 * math.pi * u[1], 2.0 * math.pi * u[2]
     return np.stack([out * np.cos(first), out * np.sin(first), back * np.cos(second), back * np.sin(second)])
 
 
-def _rows(moments: Array, mgl: float, centre: Array, turns: Array, rates: Array) -> Array:
+def _rows(moments: Array, mgl: float, centre: Array, quaternions: Array, rates: Array) -> Array:
     """Members (n, 14) from columns of their parts, each (components, n), rounded to nine digits."""
     n = moments.shape[1]
-    rows = np.concatenate([moments, np.full((1, n), mgl), centre, turns, rates]).T
+    rows = np.concatenate([moments, np.full((1, n), mgl), centre, quaternions, rates]).T
     rows = np.array([float(f"{value:.9g}") + 0.0 for value in rows.ravel().tolist()]).reshape(n, 14)
     for begin, end in ((4, 7), (7, 11)):
         rows[:, begin:end] /= np.sqrt((rows[:, begin:end] ** 2).sum(axis=1, keepdims=True))
@@ -154,28 +154,28 @@ def _free(kind: str, u: Array) -> Array:
     elif kind == "near-symmetric":
         equal = 1.0 + octaves(-20.0, -6.0, u[5])
         moments = np.where(u[6] < 0.5, np.stack([low, ones, equal]), np.stack([ones, equal, 1.3 * ones]))
-        momentum = _direction(u[2], u[3])
+        momentum = _directions(u[2], u[3])
     elif kind == "near-separatrix":  # I1 (I3 - I2) M3^2 = I3 (I2 - I1) M1^2 on it
         slope = np.sqrt((moments[1] - moments[0]) * moments[2] / ((moments[2] - moments[1]) * moments[0]))
         share = np.sin(0.5 + tilt)
         momentum = np.stack([share, np.cos(0.5 + tilt), share * slope * (1.0 + signs(u[7]) * small)])
     rates = momentum / np.sqrt((momentum**2).sum(axis=0)) / moments
     order = np.argsort(u[8:11], axis=0)
-    moments, rates = (np.take_along_axis(part, order, axis=0) for part in (moments, rates))
-    return _rows(moments, 0.0, np.stack([0.0 * ones, 0.0 * ones, ones]), _turn(u[11:14]), rates)
+    moments, rates = (np.take_along_axis(values, order, axis=0) for values in (moments, rates))
+    return _rows(moments, 0.0, np.stack([0.0 * ones, 0.0 * ones, ones]), _quaternions(u[11:14]), rates)
 
 
 def _heavy(u: Array, epsilon: float | None) -> Array:
     """Heavy bodies with I1 = mgl = 1, at the distance `epsilon` from a Lagrange top, or at a random one for None."""
-    off, ones = octaves(-7.0, -1.0, u[0]) if epsilon is None else np.full(u.shape[1], epsilon), np.ones(u.shape[1])
+    distance, ones = octaves(-7.0, -1.0, u[0]) if epsilon is None else np.full(u.shape[1], epsilon), np.ones(u.shape[1])
     third = between(0.2, 1.8, u[2])
-    second = np.minimum(1.0 + off * between(0.5, 1.0, u[1]), 0.99 * (1.0 + third))
+    second = np.minimum(1.0 + distance * between(0.5, 1.0, u[1]), 0.99 * (1.0 + third))
     third = np.minimum(third, 0.99 * (1.0 + second))
-    centre = np.stack([*(off * _direction(u[3], u[4])[:2]), ones])
+    centre = np.stack([*(distance * _directions(u[3], u[4])[:2]), ones])
     spin = signs(u[5]) * octaves(-4.0, 2.0, u[6]) * 2.0 / third
     turn = 2.0 * math.pi * u[8]
     rates = np.stack([1.5 * u[7] * np.cos(turn), 1.5 * u[7] * np.sin(turn), spin])
-    return _rows(np.stack([ones, second, third]), 1.0, centre, _turn(u[9:12]), rates)
+    return _rows(np.stack([ones, second, third]), 1.0, centre, _quaternions(u[9:12]), rates)
 
 
 def growth(rows: Array) -> Array:
@@ -183,15 +183,15 @@ def growth(rows: Array) -> Array:
     solver, n = integrator("series-general-adaptive").solvers[BODY], len(rows)
     periods = np.array([body.nutation_period(start) for body, start in members_of(rows)])
     times = periods[:, None] * np.linspace(0.0, HORIZON_PERIODS, 4 * round(HORIZON_PERIODS) + 1)[1:]
-    turned, pushed, (w, x) = rows.copy(), rows.copy(), rows[:, 7:9].T
-    turned[:, 7], turned[:, 8] = w - SMALL_CHANGE * x, x + SMALL_CHANGE * w
+    rotated_rows, kicked_rows, (w, x) = rows.copy(), rows.copy(), rows[:, 7:9].T
+    rotated_rows[:, 7], rotated_rows[:, 8] = w - SMALL_CHANGE * x, x + SMALL_CHANGE * w
     scale = SMALL_CHANGE * np.array([math.hypot(*rates) for rates in rows[:, 11:].tolist()])
-    pushed[:, 11:] += np.stack([scale, -scale, scale], axis=1)
+    kicked_rows[:, 11:] += np.stack([scale, -scale, scale], axis=1)
 
     def attitudes(numbers: Array) -> Array:
-        done, _ = solver.many(numbers, np.full(n, TOLERANCE), times, np.full(n, times.shape[1]))  # type: ignore[attr-defined]
-        return np.asarray(done.states[:, :, :4])
+        runs, _ = solver.many(numbers, np.full(n, TOLERANCE), times, np.full(n, times.shape[1]))  # type: ignore[attr-defined]
+        return np.asarray(runs.states[:, :, :4])
 
     run = attitudes(rows)
-    apart = [attitude_distance(attitudes(numbers), run) for numbers in (turned, pushed)]
-    return np.asarray(np.nanmax(apart, axis=(0, 2)) / (2.0 * SMALL_CHANGE))
+    distances = [attitude_distance(attitudes(numbers), run) for numbers in (rotated_rows, kicked_rows)]
+    return np.asarray(np.nanmax(distances, axis=(0, 2)) / (2.0 * SMALL_CHANGE))

@@ -81,17 +81,17 @@ def schedule(period: Array, horizon: Array, samples: int, steps: Ints | None) ->
     plan = Schedule(h, marks, times, np.full(n, samples), np.zeros(n, dtype=bool))
 
     def lay_out(rows: Ints, *, dithered: bool) -> None:
-        place = places(samples, dithered=dithered)
+        positions = places(samples, dithered=dithered)
         plan.dithered[rows] = dithered
         if steps is None:
-            times[rows] = horizon[rows, None] * place
+            times[rows] = horizon[rows, None] * positions
             return
-        each = np.rint(steps[rows, None] * place).astype(np.int64)
-        new = np.diff(each, axis=1, prepend=-1) > 0
+        row_marks = np.rint(steps[rows, None] * positions).astype(np.int64)
+        new = np.diff(row_marks, axis=1, prepend=-1) > 0
         plan.counts[rows] = new.sum(axis=1)
-        few = plan.counts[rows] < samples  # remove repeated marks, and fill the row with the last
-        each[few] = np.sort(np.where(new[few], each[few], each[few, -1:]), axis=1)
-        marks[rows], times[rows] = each, each * h[rows, None]
+        short = plan.counts[rows] < samples  # remove repeated marks, and fill the row with the last
+        row_marks[short] = np.sort(np.where(new[short], row_marks[short], row_marks[short, -1:]), axis=1)
+        marks[rows], times[rows] = row_marks, row_marks * h[rows, None]
 
     lay_out(np.arange(n), dithered=False)
     long_enough = np.isfinite(period) & (horizon > 2.0 * period)
@@ -125,8 +125,8 @@ def all_periods(numbers: Array, periods: Array) -> None:
             put(lanes, 0, j, (*nutation_cubic(top, start), cosine, -1.0, cosine, 1.0, cosine))
         for _ in range(BISECTIONS):
             for j in range(W):
-                at = column(lanes, 0, j, _NONE)
-                put(lanes, 5, j, bisected(at[:4], at[4], *at[5:]))
+                lane = column(lanes, 0, j, _NONE)
+                put(lanes, 5, j, bisected(lane[:4], lane[4], *lane[5:]))
         for j in range(min(W, n - first)):
             top, start = unpack_top(to_fixed_tuple(numbers[first + j], _WIDTH))
             low, below, high, above = column(lanes, 5, j, _NONE[:4])
@@ -197,11 +197,11 @@ class Job:
         """
         n, begin, size = len(self.numbers), 0, max(1, CHUNK // self.samples)
         ends = np.cumsum(np.full(n, UNKNOWN_STEPS) if self.steps is None else self.steps)
-        most = min(CHUNK_STEPS, max(LEAST_STEPS, ends[-1] // LEAST_CHUNKS))
-        most //= SLOWER if self.execution == IN_PYTHON else 1
+        limit = min(CHUNK_STEPS, max(LEAST_STEPS, ends[-1] // LEAST_CHUNKS))
+        limit //= SLOWER if self.execution == IN_PYTHON else 1
         while begin < n:
-            done = ends[begin - 1] if begin else 0
-            length = min(int(np.searchsorted(ends, done + most, "right")) - begin, size)
+            previous = ends[begin - 1] if begin else 0
+            length = min(int(np.searchsorted(ends, previous + limit, "right")) - begin, size)
             length = length // W * W if length > 4 * W else max(length, 1)
             end = min(begin + length, n)
             yield slice(begin, end)
@@ -218,17 +218,17 @@ class Job:
         solver = self.method.solvers[self.chart]
         if self.execution != IN_LANES or not (solver.implicit or np.ptp(self.steps)):  # type: ignore[attr-defined]
             return None
-        each = turns(self.numbers, self.horizon / self.steps)
-        return np.concatenate(divided(np.arange(len(each)), self.steps, each))[::-1]
+        step_turns = turns(self.numbers, self.horizon / self.steps)
+        return np.concatenate(divided(np.arange(len(step_turns)), self.steps, step_turns))[::-1]
 
     def columns(self) -> dict[str, Any]:
         """Make the runs: columns of observables, settings and outcomes, and the message of the first exception."""
         period = nutation_periods(self.numbers) if self.period is None else self.period
         plan = schedule(period, self.horizon, self.samples, self.steps)
         with np.errstate(all="ignore"):  # a run may blow up, and that is a result
-            runs = _of_length_one(self._runs(plan), plan, self.chart)
+            runs = _end_off_length(self._runs(plan), plan, self.chart)
             view = View(self.chart, together(self.numbers), runs.states, runs.momenta[..., 0], runs.momenta[..., 1])
-            runs, columns = _whole(runs, view, plan), self._observables(view, plan.times)
+            runs, columns = _end_at_non_finite(runs, view, plan), self._observables(view, plan.times)
         columns |= {
             "time": plan.times, "outcome": np.array(ENDS)[runs.outcome], "steps": runs.steps,
             "force_evaluations": runs.force_evaluations, "newton_iterations": runs.newton_iterations,
@@ -242,28 +242,28 @@ class Job:
         solver = self.method.solvers[self.chart]
         if isinstance(solver, FixedStep) and not solver.in_python:  # it takes marks that repeat at the end of a row
             with foreign_code(f"integrator {self.method.name}"):  # its kernel may not compile
-                done = solver.many(self.numbers, plan.step_size, plan.marks, compiling=self.compiling)
+                batch = solver.many(self.numbers, plan.step_size, plan.marks, compiling=self.compiling)
             padding = np.isnan(plan.times)
-            done.states[padding], done.momenta[padding] = np.nan, np.nan
-            reached, raised = done.steps * plan.step_size, ""
-            if (odd := (done.outcome < 0) | (done.outcome >= len(OUTCOMES))).any():
+            batch.states[padding], batch.momenta[padding] = np.nan, np.nan
+            reached, raised = batch.steps * plan.step_size, ""
+            if (unknown := (batch.outcome < 0) | (batch.outcome >= len(OUTCOMES))).any():
                 try:
-                    ending(done.outcome[odd][0])
+                    ending(batch.outcome[unknown][0])
                 except SymtopError as error:
                     raised = f"integrator {self.method.name}: {error}"
-                done.outcome[odd] = ENDS.index(RAISED)
-            counts = done.steps, *solver.counts(*done[2:4])
-            return _Runs(done.states, done.momenta, *counts, done.outcome, reached, raised)
+                batch.outcome[unknown] = ENDS.index(RAISED)
+            counts = batch.steps, *solver.counts(*batch[2:4])
+            return _Runs(batch.states, batch.momenta, *counts, batch.outcome, reached, raised)
         if isinstance(solver, Adaptive) and self.tolerance is not None:
-            done, ended = solver.many(self.numbers, self.tolerance, plan.times, plan.counts, self.budget)
-            return _Runs(done.states, done.momenta, done.steps, done.work, 0 * done.work, done.outcome, ended)
+            batch, reached = solver.many(self.numbers, self.tolerance, plan.times, plan.counts, self.budget)
+            return _Runs(batch.states, batch.momenta, batch.steps, batch.work, 0 * batch.work, batch.outcome, reached)
         if solver is exact.solve:
             states, momenta = ClosedForms(self.numbers).run(np.nan_to_num(plan.times))
-            none = np.zeros(len(self.numbers), dtype=np.int64)
-            return _Runs(states, momenta, none, plan.counts, none, none, self.horizon)
-        return self._in_turn(plan)
+            zeros = np.zeros(len(self.numbers), dtype=np.int64)
+            return _Runs(states, momenta, zeros, plan.counts, zeros, zeros, self.horizon)
+        return self._one_by_one(plan)
 
-    def _in_turn(self, plan: Schedule) -> _Runs:
+    def _one_by_one(self, plan: Schedule) -> _Runs:
         """The runs of the members by one call of the solver each; an exception ends only that member."""
         n = len(plan.counts)
         states = np.full((n, self.samples, DIMENSIONS[self.chart]), np.nan)
@@ -274,18 +274,18 @@ class Job:
             if self.chart == "angles" and not 0.0 < start.theta < np.pi:
                 runs.outcome[i] = LEFT_CHART
                 continue
-            own = self._plan(i, plan)
+            member_plan = self._plan(i, plan)
             try:
                 name = self.first + i if self.names is None else self.names[i]
-                run = solve(self.method, self.chart, top, start, own, f" on member {name}")
+                run = solve(self.method, self.chart, top, start, member_plan, f" on member {name}")
             except SymtopError as error:
                 arithmetic = isinstance(error.__cause__, (ArithmeticError, np.linalg.LinAlgError))
                 runs.outcome[i] = NOT_FINITE if arithmetic else ENDS.index(RAISED)
                 if not (arithmetic or runs.raised):
                     runs = runs._replace(raised=str(error))
                 continue
-            runs.states[i, : own.times.size] = run.states
-            runs.momenta[i, : own.times.size] = np.stack([run.p_phi, run.p_psi], axis=-1)
+            runs.states[i, : member_plan.times.size] = run.states
+            runs.momenta[i, : member_plan.times.size] = np.stack([run.p_phi, run.p_psi], axis=-1)
             runs.steps[i], runs.force_evaluations[i], runs.newton_iterations[i] = run[3:6]
             runs.outcome[i], runs.reached[i] = OUTCOMES.index(run.outcome), run.reached
         return runs
@@ -301,8 +301,8 @@ class Job:
     def _observables(self, view: View, times: Array) -> dict[str, Any]:
         """The columns of `observables` of all members, as a `Trajectory` has them for one run."""
         columns = {name: getattr(view, name) for name in self.observables}
-        turned = self.turned if self.continuous else ()
-        return columns | Turns(self.numbers, times, {name: columns[name] for name in turned}).of(slice(None))
+        angles = self.turned if self.continuous else ()
+        return columns | Turns(self.numbers, times, {name: columns[name] for name in angles}).of(slice(None))
 
     @property
     def turned(self) -> tuple[str, ...]:
@@ -330,8 +330,8 @@ class Turns:
     def all(self) -> dict[str, Array]:
         """Continuous angles of all members, computed on all cores and cached."""
         firsts = range(0, len(self.numbers), READ_TOGETHER)
-        parts = list(in_threads(self.of, [slice(first, first + READ_TOGETHER) for first in firsts], cores()))
-        return {name: np.concatenate([part[name] for part in parts]) for name in self.angles}
+        blocks = list(in_threads(self.of, [slice(first, first + READ_TOGETHER) for first in firsts], cores()))
+        return {name: np.concatenate([block[name] for block in blocks]) for name in self.angles}
 
 
 class LazyAngle(BackendArray):
@@ -345,10 +345,10 @@ class LazyAngle(BackendArray):
         return indexing.explicit_indexing_adapter(key, self.shape, indexing.IndexingSupport.OUTER, self._read)
 
     def _read(self, key: tuple[Any, ...]) -> Any:
-        chosen = np.arange(len(self.turns.numbers))[key[0]]
-        few = 2 * chosen.size < len(self.turns.numbers)
-        values = self.turns.of(np.atleast_1d(chosen))[self.name] if few else self.turns.all[self.name][chosen]
-        return values.reshape(*chosen.shape, -1)[..., key[1]]
+        members = np.arange(len(self.turns.numbers))[key[0]]
+        partial = 2 * members.size < len(self.turns.numbers)
+        values = self.turns.of(np.atleast_1d(members))[self.name] if partial else self.turns.all[self.name][members]
+        return values.reshape(*members.shape, -1)[..., key[1]]
 
     def variable(self) -> xr.Variable:
         """An xarray variable that computes its values when first read and keeps them."""
@@ -367,28 +367,28 @@ def together(numbers: Array) -> Any:
     return top
 
 
-def _whole(runs: _Runs, view: View, plan: Schedule) -> _Runs:
+def _end_at_non_finite(runs: _Runs, view: View, plan: Schedule) -> _Runs:
     """End runs with outcome "ok" before the first sample with a state or energy that is not finite, as `simulate`."""
     if all(values.min() > -HARMLESS_SIZE and values.max() < HARMLESS_SIZE for values in runs[:2]):  # takes a tenth
         return runs
     finite = np.isfinite(runs.states).all(axis=2) & np.isfinite(view.energy + view.p_phi) | np.isnan(plan.times)
-    return _ended(runs, plan, ~finite & (runs.outcome == OK)[:, None], NOT_FINITE)
+    return _end_runs(runs, plan, ~finite & (runs.outcome == OK)[:, None], NOT_FINITE)
 
 
-def _of_length_one(runs: _Runs, plan: Schedule, chart: str) -> _Runs:
+def _end_off_length(runs: _Runs, plan: Schedule, chart: str) -> _Runs:
     """End runs where |q| is too far from one, as in `simulate`."""
-    lost = off_length(chart, runs.states)
-    if not lost.any():
+    invalid = off_length(chart, runs.states)
+    if not invalid.any():
         return runs
-    states, momenta = (np.where(lost[..., None], np.nan, values) for values in (runs.states, runs.momenta))
-    return _ended(runs._replace(states=states, momenta=momenta), plan, lost, NOT_NORMALISED)
+    states, momenta = (np.where(invalid[..., None], np.nan, values) for values in (runs.states, runs.momenta))
+    return _end_runs(runs._replace(states=states, momenta=momenta), plan, invalid, NOT_NORMALISED)
 
 
-def _ended(runs: _Runs, plan: Schedule, lost: NDArray[np.bool_], outcome: int) -> _Runs:
-    """End runs with `outcome` before their first sample that is `lost`, (n, samples)."""
-    bad = lost.any(axis=1)
-    reached = plan.times[np.arange(len(lost)), np.maximum(lost.argmax(axis=1) - 1, 0)]
-    return runs._replace(outcome=np.where(bad, outcome, runs.outcome), reached=np.where(bad, reached, runs.reached))
+def _end_runs(runs: _Runs, plan: Schedule, invalid: NDArray[np.bool_], outcome: int) -> _Runs:
+    """End runs with `outcome` before their first sample that is `invalid`, (n, samples)."""
+    ends = invalid.any(axis=1)
+    reached = plan.times[np.arange(len(invalid)), np.maximum(invalid.argmax(axis=1) - 1, 0)]
+    return runs._replace(outcome=np.where(ends, outcome, runs.outcome), reached=np.where(ends, reached, runs.reached))
 
 
 def same_times(times: Any, row: Any) -> bool:

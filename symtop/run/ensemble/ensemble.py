@@ -89,35 +89,35 @@ def ensemble(
     Raises SymtopError for invalid arguments, for members that are no top or no start, by number, and for a path to
     which another process is writing.
     """
-    read, method = read_members(members), find_integrator(integrator)
+    record, method = read_members(members), find_integrator(integrator)
     count, silent = whole("samples", samples, 2, MOST_SAMPLES), boolean("quiet", quiet)
     workers = cores() if threads is None else whole("threads", threads, 1, MOST_THREADS)
-    chart = chart_of(method, read.observes, observe)
-    observables, n = _observables(variables, chart), len(read.numbers)
+    chart = chart_of(method, record.observes, observe)
+    observables, n = _observables(variables, chart), len(record.numbers)
     if path is None:
         _check_memory(n, count, observables)
     limit = None if budget is None else positive("budget", budget)
     names, values = ("step_size", "per_nutation", "horizon", "nutations"), (step_size, per_nutation, horizon, nutations)
     settings = {name: value for name, value in zip(names, values, strict=True) if value is not None}
-    job = _job(read, method, chart, settings, tolerance, count, limit, observables)
+    job = _job(record, method, chart, settings, tolerance, count, limit, observables)
     if scheduler is not None:
         cluster.check_sent(scheduler, job.of(slice(0, 1)), method.name)
     order = job.order() if path is None else None
-    many = job.steps is not None and int(job.steps.sum()) > lanes.FEW_STEPS
-    ordered = replace(job if order is None else job.of(order), continuous=path is not None, compiling=many)
+    compiling = job.steps is not None and int(job.steps.sum()) > lanes.FEW_STEPS
+    ordered = replace(job if order is None else job.of(order), continuous=path is not None, compiling=compiling)
     chunks = list(ordered.chunks())
     nouns = ("body", "bodies") if chart == BODY else ("top", "tops")
     words = {
-        "title": f"{method.name} on {n} {nouns[n != 1]}", "units": read.units, "chart": chart,
+        "title": f"{method.name} on {n} {nouns[n != 1]}", "units": record.units, "chart": chart,
         "integrator": method.name, "implementation": method.implementation, "execution": job.execution,
     }  # fmt: skip
 
-    def compute(rest: list[slice], keep: Callable[[slice, dict[str, Any]], object]) -> tuple[int, str]:
-        """Compute the chunks `rest`; returns the number of members whose solver raised, and the first message."""
-        raised, first, left = 0, "", sum(chunk.stop - chunk.start for chunk in rest)
-        drawn = progress_bar(words["title"], quiet=silent, total=n, initial=n - left, unit="run")
-        with drawn as bar, contextlib.closing(_computed(ordered, rest, workers, scheduler)) as parts:
-            for chunk, part in zip(rest, parts, strict=True):
+    def compute(pending: list[slice], keep: Callable[[slice, dict[str, Any]], object]) -> tuple[int, str]:
+        """Compute the chunks `pending`; returns the number of members whose solver raised, and the first message."""
+        raised, first, left = 0, "", sum(chunk.stop - chunk.start for chunk in pending)
+        progress = progress_bar(words["title"], quiet=silent, total=n, initial=n - left, unit="run")
+        with progress as bar, contextlib.closing(_computed(ordered, pending, workers, scheduler)) as parts:
+            for chunk, part in zip(pending, parts, strict=True):
                 if message := part.pop(RAISED, ""):
                     raised, first = raised + int((part["outcome"] == RAISED).sum()), first or message
                 keep(chunk, part)
@@ -131,25 +131,25 @@ def ensemble(
         )
         if raised == n:
             raise SymtopError(first)
-        data = as_dataset(columns, read.labels, of=job)
+        data = as_dataset(columns, record.labels, of=job)
         data = netcdf.describe(data, **words, **({RAISED: first} if raised else {}))
         data = data.assign(added(data))
     else:
         file = file_path("path", path)
         check_replaceable(file)
         with only_writer(file) as folder:
-            stream = Stream(file, folder, job, read.labels, words)
+            stream = Stream(file, folder, job, record.labels, words)
             raised, first = compute(stream.missing(chunks), stream.keep)
             if raised == n:
                 stream.forget(chunks)  # there is nothing to resume
                 raise SymtopError(first)
             data = stream.finish(chunks, added)
-    early = Counter(() if silent else data["outcome"].values.tolist())
-    del early["ok"], early[RAISED]
-    counts = ", ".join(map("{0[1]} {0[0]}".format, early.most_common()))
-    told = {f"raised an exception, the first: {first}": raised, f"ended early: {counts}": early.total()}
-    for end in filter(told.get, told):
-        warnings.warn(f"{told[end]} of {n} members {end}", SymtopWarning, stacklevel=2)
+    endings = Counter(() if silent else data["outcome"].values.tolist())
+    del endings["ok"], endings[RAISED]
+    counts = ", ".join(map("{0[1]} {0[0]}".format, endings.most_common()))
+    messages = {f"raised an exception, the first: {first}": raised, f"ended early: {counts}": endings.total()}
+    for end in filter(messages.get, messages):
+        warnings.warn(f"{messages[end]} of {n} members {end}", SymtopWarning, stacklevel=2)
     return data
 
 
@@ -199,9 +199,9 @@ def _job(
     budget: float | None, observables: tuple[str, ...],
 ) -> Job:  # fmt: skip
     """Check the settings and return the `Job` of the members."""
-    for name, other in (("step_size", "per_nutation"), ("horizon", "nutations")):
-        if name in settings and other in settings:
-            raise SymtopError(f"give {name} or {other}, not both", name, other)
+    for name, alternative in (("step_size", "per_nutation"), ("horizon", "nutations")):
+        if name in settings and alternative in settings:
+            raise SymtopError(f"give {name} or {alternative}, not both", name, alternative)
     control = "per_nutation" if "per_nutation" in settings else "step_size"
     check_control(method, settings.get(control), tolerance, control)
     if method.fixed_step and control not in settings:
@@ -216,7 +216,7 @@ def _job(
     steps = bounds = None
     if method.fixed_step:
         step = for_each(control, settings[control], n, names)
-        step = step if period is None or control == "step_size" else _parts(period, step, horizon, names)
+        step = step if period is None or control == "step_size" else _step_sizes(period, step, horizon, names)
         steps = _steps(step, horizon, budget or MOST_STEPS, names)
     elif method.adaptive:
         period = nutation_periods(numbers) if period is None else period
@@ -245,26 +245,26 @@ def _horizons(members: Members, settings: dict[str, Any], period: Array | None) 
     return horizon
 
 
-def _parts(period: Array, counted: Array, horizon: Array, names: Any) -> Array:
-    """The step of each member, its nutation period divided by `counted`; SymtopError above its horizon."""
+def _step_sizes(period: Array, per_nutation: Array, horizon: Array, names: Any) -> Array:
+    """The step of each member, its nutation period divided by `per_nutation`; SymtopError above its horizon."""
     with np.errstate(over="ignore"):  # an infinite step is also longer than the horizon
-        step: Array = period / counted
+        step: Array = period / per_nutation
     for i in np.flatnonzero(step > horizon)[:1]:
-        least = f"{period[i] / horizon[i]:.4g}, a step within the horizon"
-        words = f"not {counted[i]:.4g} as of {member_name(names, i)}"
-        raise SymtopError(f"per_nutation must be at least {least}, {words}", "per_nutation")
+        minimum = f"{period[i] / horizon[i]:.4g}, a step within the horizon"
+        words = f"not {per_nutation[i]:.4g} as of {member_name(names, i)}"
+        raise SymtopError(f"per_nutation must be at least {minimum}, {words}", "per_nutation")
     return step
 
 
-def _steps(step: Array, horizon: Array, most: float, names: Any) -> Ints:
+def _steps(step: Array, horizon: Array, limit: float, names: Any) -> Ints:
     """The number of steps of each member, computed and checked as in `simulation.make_plan`."""
     with np.errstate(over="ignore"):
         ratio = horizon / step
     for i in np.flatnonzero(step > horizon)[:1]:
         words = f"not {step[i]!s} of {horizon[i]!s} as of {member_name(names, i)}"
         raise SymtopError(f"step_size must be at most the horizon, {words}", "step_size")
-    for i in np.flatnonzero(ratio > most)[:1]:
-        words = f"{ratio[i]:.3g} steps; the limit is {most:.3g} (see budget)"
+    for i in np.flatnonzero(ratio > limit)[:1]:
+        words = f"{ratio[i]:.3g} steps; the limit is {limit:.3g} (see budget)"
         raise SymtopError(f"{member_name(names, i)} asks for {words}", "budget")
     return np.maximum(1, np.rint(ratio)).astype(np.int64)
 
@@ -336,9 +336,9 @@ class Stream:
                         for name, values in columns.items():
                             file[name][chunk] = values.astype(object) if values.dtype.kind == "U" else values
                 with xr.open_dataset(partial, engine="netcdf4") as data:
-                    more = added(data)
-                if more:
-                    more.to_netcdf(partial, mode="a")
+                    extra = added(data)
+                if extra:
+                    extra.to_netcdf(partial, mode="a")
             except RuntimeError as error:  # raised by the netCDF library if the disk is full
                 words = f"What was computed is in {self.folder}, and the same call goes on from there"
                 raise SymtopError(f"cannot write {self.path}: {error}; is the disk full? {words}") from error
@@ -376,10 +376,10 @@ def _lay_out(file: Any, pattern: xr.Dataset, n: int) -> None:
     for name, variable in variables.items():
         values = variable.values
         kind = str if values.dtype.kind == "U" else "i1" if values.dtype.kind == "b" else values.dtype
-        made = file.createVariable(name, kind, variable.dims, contiguous=kind is not str)
-        made.setncatts(variable.attrs | ({"dtype": "bool"} if values.dtype.kind == "b" else {}))
+        copy = file.createVariable(name, kind, variable.dims, contiguous=kind is not str)
+        copy.setncatts(variable.attrs | ({"dtype": "bool"} if values.dtype.kind == "b" else {}))
         if "member" not in variable.dims:
-            made[:] = values.astype(object) if kind is str else values
+            copy[:] = values.astype(object) if kind is str else values
     file.setncatts(attributes)
 
 

@@ -52,8 +52,8 @@ def read_members(members: xr.Dataset | Iterable[str | Scene]) -> Members:
     """
     if isinstance(members, xr.Dataset):
         return _from_dataset(members)
-    several = isinstance(members, Iterable) and getattr(members, "shape", True) != ()
-    if isinstance(members, (str, bytes, Scene)) or not several:
+    iterable = isinstance(members, Iterable) and getattr(members, "shape", True) != ()
+    if isinstance(members, (str, bytes, Scene)) or not iterable:
         raise SymtopError(f"members must be a dataset or a list of scenes, not {shown(members)}")
     tables = type(members).__module__.startswith("pandas")
     if tables or isinstance(members, (dict, xr.DataArray)):  # iterating over these gives names or numbers
@@ -84,22 +84,22 @@ def _from_dataset(data: xr.Dataset) -> Members:
         column = np.broadcast_to(np.reshape(DEFAULTS.get(name, 0.0), (1, -1)), (n, width))
         if name in data:
             values, vector = data[name], width > 1
-            over = values.dims[:-1] if vector else values.dims
+            axes = values.dims[:-1] if vector else values.dims
             fits = not vector or values.shape[-1:] == (width,)
-            if over not in ((), ("member",)) or values.dtype.kind not in "fiu" or not fits:
-                wrong = f"{values.dtype} {values.shape} over {', '.join(map(str, values.dims)) or 'nothing'}"
-                each = f"rows of {width} numbers" if vector else "numbers"
-                raise SymtopError(f"{name} of members must be {each} over member, or one for all, not {wrong}")
+            if axes not in ((), ("member",)) or values.dtype.kind not in "fiu" or not fits:
+                actual = f"{values.dtype} {values.shape} over {', '.join(map(str, values.dims)) or 'nothing'}"
+                required = f"rows of {width} numbers" if vector else "numbers"
+                raise SymtopError(f"{name} of members must be {required} over member, or one for all, not {actual}")
             column = np.broadcast_to(values.to_numpy().reshape(-1, width), (n, width))
         columns.append(column)
     numbers = np.concatenate(columns, axis=1, dtype=float)
     _check_names(data, parts)
-    named = [name for name in ("scene", "stratum") if name in data]
-    for name in named:
+    label_names = [name for name in ("scene", "stratum") if name in data]
+    for name in label_names:
         if data[name].dims not in ((), ("member",)):
             dims = ", ".join(map(str, data[name].dims))
             raise SymtopError(f"{name} of members must be names over member, or one for all, not over {dims}")
-    labels = {name: np.broadcast_to(data[name].to_numpy().astype(str, copy=False), n) for name in named}
+    labels = {name: np.broadcast_to(data[name].to_numpy().astype(str, copy=False), n) for name in label_names}
     if "member" in data.indexes and "member" in data.dims:
         labels["member"] = _plain(data.indexes["member"])
     check = _checked_bodies if observes == BODY else checked_numbers
@@ -119,9 +119,9 @@ def _checked_bodies(numbers: Array, names: NDArray[Any] | None) -> Array:
 
 def _check_names(data: xr.Dataset, parts: dict[str, int]) -> None:
     """SymtopError for a variable whose name seems a misspelling of one in `parts`, or another word for a rate."""
-    usual = {name.lower(): name for name in parts}
+    by_lower = {name.lower(): name for name in parts}
     for name in (name for name in map(str, data.variables) if name not in parts and name not in KNOWN_NAMES):
-        near = [usual[like] for like in difflib.get_close_matches(name.lower(), usual, n=1, cutoff=SIMILARITY)]
+        near = [by_lower[match] for match in difflib.get_close_matches(name.lower(), by_lower, n=1, cutoff=SIMILARITY)]
         if parts is TOP and (rate := RATE.fullmatch(name.lower())) is not None:
             near = [f"{rate[2] or rate[4]}_dot"]
         if near:
@@ -132,9 +132,9 @@ def refuse_others(members: Members, runs: xr.Dataset) -> None:
     """SymtopError for members that are not those of the ensemble `runs`, by their number or their labels."""
     if len(members.numbers) != (n := runs.sizes["member"]):
         raise SymtopError(f"members must be the {n} of the ensemble, not {len(members.numbers)}")
-    known = {name: row.to_numpy() for name, row in runs.variables.items() if row.dims == ("member",)}
+    stored = {name: row.to_numpy() for name, row in runs.variables.items() if row.dims == ("member",)}
     for name, labels in members.labels.items():
-        if name in known and [*map(str, labels)] != [*map(str, known[name])]:
+        if name in stored and [*map(str, labels)] != [*map(str, stored[name])]:
             words = "names" if name == "scene" else "strata" if name == "stratum" else "labels"
             raise SymtopError(f"members must be those of the ensemble in their order, and their {words} are others")
 

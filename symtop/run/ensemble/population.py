@@ -57,9 +57,9 @@ def between(low: float, high: float, uniform: Array) -> Array:
 
 def octaves(low: float, high: float, uniform: Array) -> Array:
     """Draws between two powers of two (exponents), spread evenly over octaves and evenly within each."""
-    place = between(low, high, uniform)
-    octave = np.floor(place)
-    return np.ldexp(1.0 + (place - octave), octave.astype(np.int64))
+    exponent = between(low, high, uniform)
+    octave = np.floor(exponent)
+    return np.ldexp(1.0 + (exponent - octave), octave.astype(np.int64))
 
 
 def signs(uniform: Array) -> Array:
@@ -115,8 +115,8 @@ def _grazing(draw: Array) -> Start:
     top = np.where(upper, np.sqrt(square), base) / tangent
     a = signs(draw[1]) * between(0.05, 0.95, draw[2]) * top
     delta = signs(draw[6]) * octaves(-14.0, -5.0, draw[4]) * speed
-    rest = top * tangent
-    rate = signs(draw[7]) * np.sqrt(rest * rest - a * a * tangent * tangent)
+    largest = top * tangent
+    rate = signs(draw[7]) * np.sqrt(largest * largest - a * a * tangent * tangent)
     turn = (delta + a * (1.0 - cosine)) / (sine * sine)
     return np.where(upper, away, math.pi - away), rate, turn, np.where(upper, a, -a)
 
@@ -176,8 +176,8 @@ def _fill(columns: dict[str, Any], draw: Array, kind: str) -> None:
     names, ends = list(STRATA), np.cumsum([share for share, _ in STRATA.values()])[:-1]
     strata = np.searchsorted(ends, draw[0], side="right")
     strata = strata if kind == "all" else np.full_like(strata, names.index(kind))
-    for place, name in enumerate(names):
-        members = strata == place
+    for index, name in enumerate(names):
+        members = strata == index
         if members.any():
             start = STRATA[name][1](draw[1:9, members])
             numbers = _scaled(start, draw[9:14, members], -1.0 if name == "hanging" else 1.0)
@@ -188,8 +188,8 @@ def _fill(columns: dict[str, Any], draw: Array, kind: str) -> None:
 
 def memory() -> float:
     """Bytes of memory of this machine; infinite if the system does not report it."""
-    known = hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names
-    return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")) if known else math.inf
+    supported = hasattr(os, "sysconf") and "SC_PHYS_PAGES" in os.sysconf_names
+    return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE")) if supported else math.inf
 
 
 def check_memory(name: str, members: int) -> None:
@@ -210,14 +210,14 @@ def population(n: int, *, seed: int = 0, kind: str = "all") -> xr.Dataset:
     """
     count = whole("n", n, 1, MOST_MEMBERS)
     check_memory("n", count)
-    chosen, start = one_of("kind", kind, KINDS), whole("seed", seed, 0)
+    kind, start = one_of("kind", kind, KINDS), whole("seed", seed, 0)
     generator = np.random.Philox(start)
     columns: dict[str, Any] = {name: np.empty(count) for name in NUMBERS}
     columns["stratum"] = np.empty(count, dtype=f"U{max(map(len, STRATA))}")
     for begin in range(0, count, BLOCK_MEMBERS):
-        part = {name: values[begin : begin + BLOCK_MEMBERS] for name, values in columns.items()}
-        integers = generator.random_raw(len(part["I1"]) * DRAWS) >> np.uint64(11)
+        block = {name: values[begin : begin + BLOCK_MEMBERS] for name, values in columns.items()}
+        integers = generator.random_raw(len(block["I1"]) * DRAWS) >> np.uint64(11)
         uniform = (integers * 2.0**-53).reshape(-1, DRAWS)  # in [0, 1), of 53 bits
-        _fill(part, np.ascontiguousarray(uniform.T), chosen)
+        _fill(block, np.ascontiguousarray(uniform.T), kind)
     data = xr.Dataset({name: ("member", values) for name, values in columns.items()})
-    return netcdf.describe(data, f"{count} tops of the population {chosen!r}", seed=start, kind=chosen)
+    return netcdf.describe(data, f"{count} tops of the population {kind!r}", seed=start, kind=kind)

@@ -54,23 +54,23 @@ def integrate(scene: Scene, times: Array, precision: str, chart: str = "attitude
 def iterate_map(scene: Scene, times: Array, per_nutation: float = MAP_STEPS[0]) -> tuple[Any, int]:
     """Attitudes (n, 4) of the discrete map at times (n,) > 0, each reached in whole steps, and the number of steps."""
     solve = integrator("exact-discrete").solvers["attitude"]
-    nutation, attitudes, made = min(scene.nutation_period, scene.horizon), [], 0
+    nutation, attitudes, total = min(scene.nutation_period, scene.horizon), [], 0
     nutation = max(nutation, float(np.max(times)) / MOST_NUTATIONS)  # if the horizon is far below a nutation
     for t in map(float, times):
         steps = math.ceil(t / nutation * per_nutation)
         attitudes.append(solve(scene.top, scene.start, Plan.steps(t / steps, [steps])).states[0, :4])
-        made += steps
-    return np.array(attitudes), made
+        total += steps
+    return np.array(attitudes), total
 
 
 def iterate_map_with_error(scene: Scene, times: Array) -> tuple[Any, Array]:
     """Attitudes of the discrete map, and `SAFETY` times their distance from runs with another step and another mgl."""
-    attitudes, apart = iterate_map(scene, times)[0], np.zeros(len(times))
-    for way in (-math.inf, math.inf):
-        mgl = math.nextafter(scene.top.mgl, way) if scene.top.mgl else 0.0
+    attitudes, gap = iterate_map(scene, times)[0], np.zeros(len(times))
+    for direction in (-math.inf, math.inf):
+        mgl = math.nextafter(scene.top.mgl, direction) if scene.top.mgl else 0.0
         near = iterate_map(replace(scene, top=replace(scene.top, mgl=mgl)), times, MAP_STEPS[1])[0]
-        apart = np.maximum(apart, charts.attitude_distance(attitudes, near))
-    return attitudes, SAFETY * np.maximum.accumulate(apart)
+        gap = np.maximum(gap, charts.attitude_distance(attitudes, near))
+    return attitudes, SAFETY * np.maximum.accumulate(gap)
 
 
 def have_heyoka() -> bool:
@@ -86,9 +86,9 @@ def check_times(scene: Scene, horizon: float) -> Array:
     """
     even = horizon * (np.arange(1, CHECKS + 1) / CHECKS) ** 2
     period = min(scene.nutation_period, horizon)
-    around = np.maximum(even[:, None] - period * np.linspace(0.0, 1.0, 64), 0.0)
-    speed = np.nan_to_num(np.abs(closed_form(scene)(around).theta_dot))
-    fastest = around[np.arange(CHECKS), np.argmax(speed, axis=1)]
+    grid = np.maximum(even[:, None] - period * np.linspace(0.0, 1.0, 64), 0.0)
+    speed = np.nan_to_num(np.abs(closed_form(scene)(grid).theta_dot))
+    fastest = grid[np.arange(CHECKS), np.argmax(speed, axis=1)]
     return np.unique(np.concatenate([even, fastest[fastest > 0.0]]))
 
 
@@ -110,16 +110,16 @@ def largest_errors(scene: Scene, times: Array, quaternions: Any, phis: Any, psis
     for t, *numbers in zip(times, *quaternions.T, phis, psis, strict=True):
         precise = precise_attitude(scene.top, scene.start, float(t))
         w, x, y, z = true = np.array([mp.convert(value) for value in precise])  # all digits, in this arithmetic
-        *parts, phi, psi = [mp.mpf(float(number) if isinstance(number, float) else str(number)) for number in numbers]
-        attitude = np.array(parts) if true @ parts >= 0 else -np.array(parts)
+        *q, phi, psi = [mp.mpf(float(number) if isinstance(number, float) else str(number)) for number in numbers]
+        attitude = np.array(q) if true @ q >= 0 else -np.array(q)
         turn = 2.0 * float(mp.norm(attitude - true))
         tilt = float(mp.norm(charts.axis_from_quaternion(attitude) - charts.axis_from_quaternion(true)))
         total, difference = mp.atan2(z, w), mp.atan2(y, x)
-        rows.append((turn, tilt, _turn(mp, phi, total + difference), _turn(mp, psi, total - difference)))
+        rows.append((turn, tilt, _angle_gap(mp, phi, total + difference), _angle_gap(mp, psi, total - difference)))
     return {"times": times, **dict(zip(CHECKED, np.maximum.accumulate(np.array(rows), axis=0).T, strict=True))}
 
 
-def _turn(mp: Any, angle: Any, true: Any) -> float:
+def _angle_gap(mp: Any, angle: Any, true: Any) -> float:
     """Distance of two angles modulo a full turn."""
     gap = (angle - true) / (2 * mp.pi)
     return abs(float((gap - mp.nint(gap)) * 2 * mp.pi))
@@ -155,10 +155,10 @@ class Integration(NamedTuple):
 def integrate_with_checks(scene: Scene, times: Array, precision: str) -> Integration:
     """The integration for `integration_values`, through the given times and those of the checks."""
     check = check_times(scene, float(times[-1]))
-    grid, place = np.unique(np.concatenate([times, check]), return_inverse=True)
+    grid, inverse = np.unique(np.concatenate([times, check]), return_inverse=True)
     start = time.perf_counter()
     states, _ = integrate(scene, grid, precision)
-    return Integration(grid, place[: times.size], place[times.size :], states, time.perf_counter() - start)
+    return Integration(grid, inverse[: times.size], inverse[times.size :], states, time.perf_counter() - start)
 
 
 def integration_values(scene: Scene, run: Integration) -> tuple[dict[str, Any], Checks]:
@@ -166,13 +166,13 @@ def integration_values(scene: Scene, run: Integration) -> tuple[dict[str, Any], 
     attitude = run.states[:, :4]
     theta, phi, psi = charts.angles_from_quaternion(attitude)
     motion = closed_form(scene)(run.grid)
-    shown = {
+    columns = {
         "theta": theta,
         "phi": _unwrapped(phi, motion.phi),
         "psi": _unwrapped(psi, motion.psi),
         "axis": charts.axis_from_quaternion(attitude),
         "quaternion": attitude,
     }
-    at = run.checked
-    checks = largest_errors(scene, run.grid[at], attitude[at], shown["phi"][at], shown["psi"][at])
-    return {name: values[run.chosen] for name, values in shown.items()}, checks
+    index = run.checked
+    checks = largest_errors(scene, run.grid[index], attitude[index], columns["phi"][index], columns["psi"][index])
+    return {name: values[run.chosen] for name, values in columns.items()}, checks

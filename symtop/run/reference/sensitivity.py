@@ -50,7 +50,7 @@ def conditioning(scene: Scene, horizon: float) -> float:
     `LEAST_CHANGE` by up to a third. If `LEAST_CHANGE` still displaces it by more, the ratio is a lower bound.
     """
     for change in (SMALL_CHANGE, 8.0 * EPSILON, LEAST_CHANGE):
-        apart = displacement(scene, change, horizon)
-        if not apart > FAR_APART:
+        distance = displacement(scene, change, horizon)
+        if not distance > FAR_APART:
             break
-    return float(np.maximum(apart / change, 1.0))
+    return float(np.maximum(distance / change, 1.0))

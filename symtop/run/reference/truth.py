@@ -120,13 +120,13 @@ def reference(
 
     Raises SymtopError for times that are negative, not finite or none, and for those beyond a body's reference.
     """
-    chosen = find_scene(scene, bodies=True)
-    moments = real_numbers("times", times)
-    if moments.ndim != 1 or moments.size == 0 or not np.isfinite(moments).all() or moments.min() < 0.0:
+    problem = find_scene(scene, bodies=True)
+    instants = real_numbers("times", times)
+    if instants.ndim != 1 or instants.size == 0 or not np.isfinite(instants).all() or instants.min() < 0.0:
         raise SymtopError(f"times must be a row of finite numbers of at least 0, not {short(times)}")
     one_of("precision", precision, PRECISIONS)
-    if chosen.of_body:
-        return _of_body(chosen, moments, precision, certify)
+    if problem.of_body:
+        return _of_body(problem, instants, precision, certify)
     if certify is not None:
         one_of("certify", certify, KINDS)
         if precision != "closed-form":
@@ -136,47 +136,47 @@ def reference(
         missing = "is certified without an integration" if source == precision else f"stands in for {precision!r}"
         warnings.warn(f"heyoka is not installed: the closed form in double {missing}", SymtopWarning, stacklevel=2)
     if source == "closed-form":
-        data, words = _by_closed_form(chosen, moments, certify)
+        data, words = _by_closed_form(problem, instants, certify)
     else:
-        data, words = _by_integration(chosen, moments, source)
-    words = {"scene": chosen.name, "precision": source, "asked_for": precision} | words
-    return netcdf.describe(data, f"reference motion of {chosen.name}", chosen.units, **words)
+        data, words = _by_integration(problem, instants, source)
+    words = {"scene": problem.name, "precision": source, "asked_for": precision} | words
+    return netcdf.describe(data, f"reference motion of {problem.name}", problem.units, **words)
 
 
 @functools.lru_cache(maxsize=64)
 def _motion(body: RigidBody, start: Attitude) -> FreeBody | HeavyBody:
-    at = start.quaternion, body.momentum(start), body.momentum_lo(start)
-    return FreeBody(body.moments, *at) if body.free else HeavyBody(body.moments, body.torque, *at)
+    initial = start.quaternion, body.momentum(start), body.momentum_lo(start)
+    return FreeBody(body.moments, *initial) if body.free else HeavyBody(body.moments, body.torque, *initial)
 
 
 @functools.lru_cache(maxsize=16)
 def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> BodyMotion:
     """The motion of a body at the times with the bytes `plain`, cached; SymtopError if its reference ends before."""
     motion, times = _motion(body, start), np.frombuffer(plain).copy()
-    sampled = motion.samples if body.free else functools.partial(motion.samples, precise=precise)  # type: ignore[call-arg]
-    if not np.isfinite((shown := sampled(times)).bound).all():  # `known` does not depend on `times`
-        known = float(f"{0.999 * shown.known:.4g}")
+    sample = motion.samples if body.free else functools.partial(motion.samples, precise=precise)  # type: ignore[call-arg]
+    if not np.isfinite((result := sample(times)).bound).all():  # `known` does not depend on `times`
+        limit = float(f"{0.999 * result.known:.4g}")
         why = "its motion is not known to 1e-9 rad for longer"
-        if shown.too_long:
+        if result.too_long:
             why = f"to integrate its motion for longer takes more than {MOST_STEPS:,} Taylor steps"
-        words = f"at most {known:g} on {name}, not {times.max():.6g}: {why}"
+        words = f"at most {limit:g} on {name}, not {times.max():.6g}: {why}"
         raise SymtopError(f"times must be {words}", "times")
-    return shown
+    return result
 
 
 def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) -> xr.Dataset:
     body, start = scene.top, scene.start
-    known = ("closed-form",) if body.free else ("closed-form", "longdouble", "quad")
-    one_of(f"precision on {scene.name}", precision, known)
+    precisions = ("closed-form",) if body.free else ("closed-form", "longdouble", "quad")
+    one_of(f"precision on {scene.name}", precision, precisions)
     if certify is not None:
         raise SymtopError(f"certify must be None on {scene.name}, a body without symmetry, not {certify!r}")
-    shown = body_samples(scene.name, body, start, times.tobytes(), precision == "quad")
-    quaternion = shown.quaternion
-    momentum = charts.lifted(np.concatenate([quaternion, shown.momentum], axis=1))
+    motion = body_samples(scene.name, body, start, times.tobytes(), precision == "quad")
+    quaternion = motion.quaternion
+    momentum = charts.lifted(np.concatenate([quaternion, motion.momentum], axis=1))
     axis = charts.axis_from_quaternion(quaternion)
     columns = {"theta": charts.theta_from_axis(axis), "axis": axis, "quaternion": quaternion, "momentum": momentum}
-    columns |= {"quaternion_lo": shown.quaternion_lo, "attitude_error_bound": shown.bound}
-    columns |= dict.fromkeys(("axis_error_bound", "theta_error_bound"), shown.bound + 2.0 * EPSILON)
+    columns |= {"quaternion_lo": motion.quaternion_lo, "attitude_error_bound": motion.bound}
+    columns |= dict.fromkeys(("axis_error_bound", "theta_error_bound"), motion.bound + 2.0 * EPSILON)
     constants = {"energy": body.energy(start), "p_phi": body.momenta(start).p_phi}
     data = dataset(times, columns | {name: np.full(times.size, value) for name, value in constants.items()})
     source = "closed-form" if body.free else "quad" if precision == "quad" else "longdouble"
@@ -188,13 +188,13 @@ def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) ->
 
 def _by_closed_form(scene: Scene, times: Array, certify: str | None) -> tuple[xr.Dataset, dict[str, str]]:
     """The dataset of values and bounds in double, and its attributes."""
-    values, known = closed_values(scene, times), certificate(scene, certify)
+    values, record = closed_values(scene, times), certificate(scene, certify)
     bounds = closed_bounds(scene, times, values)
-    if known is not None:
-        bounds = {name: known.factor * bound + known.doubt for name, bound in bounds.items()}
+    if record is not None:
+        bounds = {name: record.factor * bound + record.doubt for name, bound in bounds.items()}
     words = {
         "bound": "from the arithmetic of the closed form, its views and integrals compared at every time",
-        "certificate": UNCERTIFIED if known is None else str(known),
+        "certificate": UNCERTIFIED if record is None else str(record),
         "arithmetic": f"constants in {closed_form(scene).provenance.arithmetic}, values in double",
         "conditioning": conditioned(scene, float(times.max())),
     }
@@ -225,11 +225,11 @@ def conditioned(scene: Scene, horizon: float) -> str:
     factor = conditioning(scene, horizon)
     if math.isnan(factor):  # a changed start that comes too close to a pole
         return "unknown"
-    change, anew = f"{factor:.2g} times a change of the start", "rounding the start anew moves the axis by"
+    change, rounding = f"{factor:.2g} times a change of the start", "rounding the start anew moves the axis by"
     if factor * LEAST_CHANGE > FAR_APART:  # the smallest change moves the axis so far: the factor is a lower bound
-        known = "nothing is known of the axis but from these very doubles"
-        return f"at least {change}; {anew} {factor * EPSILON:.2g} rad or more: {known}"
-    return f"{change}; {anew} {factor * EPSILON:.1g} rad" if factor > ILL_CONDITIONED else change
+        note = "nothing is known of the axis but from these very doubles"
+        return f"at least {change}; {rounding} {factor * EPSILON:.2g} rad or more: {note}"
+    return f"{change}; {rounding} {factor * EPSILON:.1g} rad" if factor > ILL_CONDITIONED else change
 
 
 def _dataset(scene: Scene, times: Array, columns: dict[str, Array], bounds: dict[str, Array]) -> xr.Dataset:
@@ -255,23 +255,23 @@ def judged_integration(scene: Scene, times: Array, precision: str, run: Integrat
     return _dataset(scene, times, columns, bounds)
 
 
-def _bounds(times: Array, shown: dict[str, Any], checks: Checks, grain: float) -> dict[str, Array]:
-    sine = np.maximum(np.sin(shown["theta"]), TINY)
+def _bounds(times: Array, values: dict[str, Any], checks: Checks, grain: float) -> dict[str, Array]:
+    sine = np.maximum(np.sin(values["theta"]), TINY)
     axis = envelope(checks, "axis", times) + grain
     attitude = envelope(checks, "attitude", times) + grain
     # an error of the axis changes phi by 1/sin(theta) times it, and psi by that and the attitude's error
-    turn = np.maximum(envelope(checks, "phi", times), axis / sine) + grain * np.abs(shown["phi"])
-    spin = np.maximum(envelope(checks, "psi", times), attitude + axis / sine) + grain * np.abs(shown["psi"])
+    turn = np.maximum(envelope(checks, "phi", times), axis / sine) + grain * np.abs(values["phi"])
+    spin = np.maximum(envelope(checks, "psi", times), attitude + axis / sine) + grain * np.abs(values["psi"])
     return {"axis": axis, "attitude": attitude, "theta": axis, "phi": turn, "psi": spin}
 
 
-def _raise_to_distance(bounds: dict[str, Array], shown: dict[str, Any], closed: dict[str, Any]) -> None:
+def _raise_to_distance(bounds: dict[str, Array], values: dict[str, Any], closed: dict[str, Any]) -> None:
     """Raise bounds where an integration visibly differs from the closed form in double, to that distance."""
-    distances = {name: np.abs(shown[name] - closed[name]) for name in ("theta", "phi", "psi")}
-    distances["axis"] = charts.axis_distance(shown["axis"], closed["axis"])
-    distances["attitude"] = charts.attitude_distance(shown["quaternion"], closed["quaternion"])
+    distances = {name: np.abs(values[name] - closed[name]) for name in ("theta", "phi", "psi")}
+    distances["axis"] = charts.axis_distance(values["axis"], closed["axis"])
+    distances["attitude"] = charts.attitude_distance(values["quaternion"], closed["quaternion"])
     for name, distance in distances.items():
-        scale = np.abs(shown[name]) if name in ("phi", "psi") else 1.0
+        scale = np.abs(values[name]) if name in ("phi", "psi") else 1.0
         grain = 4.0 * EPSILON * np.maximum(scale, 1.0)
         visible = distance > 8.0 * grain
         bounds[name] = np.where(visible, np.maximum(bounds[name], distance + grain), bounds[name])
@@ -302,10 +302,10 @@ def closed_bounds(scene: Scene, times: Array, values: dict[str, Any]) -> dict[st
 def disagreement(form: ClosedForm, times: Array, values: dict[str, Any]) -> Array:
     """The largest inconsistency of the closed form (n,): of its three attitudes, rad, or of a constant, relative."""
     axis, (x, y, z) = charts.axis_from_quaternion(values["quaternion"]), values["axis"].T
-    apart = np.sqrt(((axis - values["axis"]) ** 2).sum(axis=1))
-    named = charts.quaternion_from_angles(values["theta"], values["phi"], values["psi"])
+    gap = np.sqrt(((axis - values["axis"]) ** 2).sum(axis=1))
+    from_angles = charts.quaternion_from_angles(values["theta"], values["phi"], values["psi"])
     rounded = 2.0 * EPSILON * (np.abs(values["phi"]) + np.abs(values["psi"]))
-    apart = np.maximum(apart, charts.attitude_distance(named, values["quaternion"]) - rounded)
+    gap = np.maximum(gap, charts.attitude_distance(from_angles, values["quaternion"]) - rounded)
     motion, top = form(times), form.top
     level = x * x + y * y  # sin^2 theta with all digits, next to a pole as well
     turning = top.I1 * motion.phi_dot * level
@@ -313,7 +313,7 @@ def disagreement(form: ClosedForm, times: Array, values: dict[str, Any]) -> Arra
     spinning, lifting = 0.5 * form.p_psi**2 / top.I3, top.mgl * z
     energy = np.abs(moving + spinning + lifting - form.energy) / (moving + spinning + abs(top.mgl) + TINY)
     p_phi = np.abs(turning + form.p_psi * z - form.p_phi) / (np.abs(turning) + abs(form.p_psi) + TINY)
-    return np.asarray(np.maximum(apart, np.maximum(energy, p_phi)))
+    return np.asarray(np.maximum(gap, np.maximum(energy, p_phi)))
 
 
 class Certificate(NamedTuple):
@@ -341,8 +341,8 @@ class Certificate(NamedTuple):
         words = f"{DIGITS} digits at {self.times} times up to t = {self.reach:.3g}, {share}"
         for check, gap in (("discrete map", self.map_apart), ("long double integration", self.apart)):
             if not math.isnan(gap):
-                apart = "no further apart than its own error" if gap == 0.0 else f"{gap:.1g} rad apart"
-                words += f"; {check} up to t = {self.overlap:.3g}, {apart}"
+                clause = "no further apart than its own error" if gap == 0.0 else f"{gap:.1g} rad apart"
+                words += f"; {check} up to t = {self.overlap:.3g}, {clause}"
         return words
 
 
@@ -375,9 +375,9 @@ def _compared(scene: Scene, kind: str) -> xr.Dataset:
     bounds = closed_bounds(scene, times, values)
     share = max(float(np.max(checks[name] / bounds[name])) for name in CHECKED)
     overlap, map_apart = _against_map(scene) if kind != "digits" else (math.nan, math.nan)
-    apart = _against_integration(scene)[1] if kind == "integration" else math.nan
-    made = Certificate(float(times[-1]), times.size, share, overlap, map_apart, apart)
-    return xr.Dataset({name: ((), value) for name, value in made._asdict().items()})
+    gap = _against_integration(scene)[1] if kind == "integration" else math.nan
+    record = Certificate(float(times[-1]), times.size, share, overlap, map_apart, gap)
+    return xr.Dataset({name: ((), value) for name, value in record._asdict().items()})
 
 
 def _times(scene: Scene, nutations: float) -> Array:
@@ -388,9 +388,9 @@ def _times(scene: Scene, nutations: float) -> Array:
 def _against_map(scene: Scene) -> tuple[float, float]:
     """The last time compared with the discrete map, and the distance from the closed form beyond the map's error."""
     times = _times(scene, OVERLAP_NUTATIONS)
-    attitudes, own = iterate_map_with_error(scene, times)
+    attitudes, error = iterate_map_with_error(scene, times)
     gap = charts.attitude_distance(closed_form(scene).quaternion(times), attitudes)
-    return float(times[-1]), float(max(np.max(gap - own), 0.0))
+    return float(times[-1]), float(max(np.max(gap - error), 0.0))
 
 
 def _against_integration(scene: Scene) -> tuple[float, float]:
