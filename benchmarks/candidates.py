@@ -71,7 +71,7 @@ def cover(costs: np.ndarray, count: int) -> list[int]:
 def table(data: xr.DataTree) -> list[str]:
     """The lines of the table, from the dataset of the study of cost."""
     prices = data["prices"].to_dataset()[["price", "call"]].sel(priced_at=PRICED_AT, method="nearest").median("scene")
-    lines = ["\t".join((*ranking.ASKED, "variants"))]
+    lines = ["nutations\tquantity\taccuracy\tneeds\tgeneral\tvariants"]
     for span in ("short", "long"):
         group = data[span].to_dataset().isel(scene=0)
         price, names = prices.sel(variant=group["variant"].values), group["variant"].values

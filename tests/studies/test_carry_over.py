@@ -317,8 +317,7 @@ def test_planted_factors_of_steps_and_of_silent_runs_are_found():
 ])  # fmt: skip
 def test_a_method_that_no_step_within_the_budget_makes_safe_is_counted(unserved, words):
     data = planted_data(3.0)
-    met = data["short"]["met_at"].copy()
-    index = {"variant": 1, "family": [*FAMILIES].index(FREE), "target": 0}
+    met, index = data["short"]["met_at"].copy(), {"variant": 1, "family": [*FAMILIES].index(FREE), "target": 0}
     met[{**index, "member": slice(unserved)}] = np.inf  # 3 of 40 are more than 5 %
     data["short"] = data["short"].to_dataset().assign(met_at=met)
     assert (facts.steps(data, FREE).words, facts.steps(data, "0.1").words) == (words, "median 1, 95\xa0% below 1")

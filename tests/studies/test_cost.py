@@ -15,6 +15,7 @@ from symtop_studies.cost.ranking import SAFE, Ladder, Safe, cost_to_reach, hinds
 from symtop_studies.cost.tops import ASKED, FIRST, KINDS, MOMENTA, NATURAL, SCENE, natural, tops_of
 
 import symtop
+from benchmarks import candidates
 from symtop.core import netcdf
 from symtop.measure import datasets
 from symtop.measure.accuracy import error_row
@@ -460,6 +461,9 @@ def test_facts_and_tables_are_those_of_the_cells(small):
     assert "takahashi-imada[axis] (symmetric)" in kicks["1e-3 rad"]
     assert tables["have"]["you have"].tolist() == ["rk4[axis]"]
     parts = {name: node.to_dataset() for name, node in small.children.items()}
+    header, row, *_ = candidates.table(xr.DataTree.from_dict({**parts, "long": parts["short"]}))
+    assert header == candidates.ranking.TABLE.read_text().partition("\n")[0]
+    assert row.endswith("taylor[axis] rk4[axis]")
     cell = Cell("short", "axis", 1e-3, "strata")
     kinds = cells.kinds_of(small, "short")[cells.chosen(small, "short", "strata")][cells.asked_tops(small, cell)]
     (choice,) = (choice for choice in cells.safest(small, cell)[0] if choice.name == "taylor[axis]")

@@ -131,8 +131,7 @@ def test_a_shape_is_the_distance_from_the_true_orbit_and_steps_add_up_exactly():
     case = scene("spheroid")
     tops, h = one_top(), case.nutation_period / 40.0
     run = symtop.simulate(case, "strang", step_size=h, horizon=400 * h, samples=101, observe="nutation", guard=False)
-    u = np.cos(run["theta"].values)
-    rate = -np.sin(run["theta"].values) * run["p_theta"].values / case.top.I1
+    u, rate = np.cos(run["theta"].values), -np.sin(run["theta"].values) * run["p_theta"].values / case.top.I1
     mine = runs.shape(tops, u[np.newaxis], rate[np.newaxis])[0]
     theirs = split(case, Trajectory.of_data(run)).shape
     mask = theirs > 0.2 * theirs.max()

@@ -93,8 +93,7 @@ def rotation_frames(q, w, h, inertia, torque):
 
 def rotation_unnormalised(q, w, h, inertia, torque, mended=lambda q: q):
     """The explicit midpoint rule for the quaternion, which nothing brings back to length one."""
-    middle = w + h / 2 * rates(q, w, inertia, torque)
-    half = mended(q + h / 4 * product(q, np.array([0.0, *w])))
+    middle, half = w + h / 2 * rates(q, w, inertia, torque), mended(q + h / 4 * product(q, np.array([0.0, *w])))
     return mended(q + h / 2 * product(half, np.array([0.0, *middle]))), w + h * rates(half, middle, inertia, torque)
 
 
