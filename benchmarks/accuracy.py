@@ -7,6 +7,7 @@ times, where there is no nutation) with the motion in 50 digits. An error beyond
 printed with its top. Time: 60 ms a top and process, nearly all of it mpmath.
 """
 
+import argparse
 import math
 import sys
 from collections import Counter
@@ -161,9 +162,11 @@ def lines(total: ErrorSummary) -> list[str]:
 
 def main() -> int:
     """Measure and print; exit code 1 if a top exceeds its allowance."""
-    words = sys.argv[1:]
-    count, jobs = int(words[0]) if words else EACH, int(words[1]) if words[1:] else 2
-    total = measure(count, jobs, verbose=True)
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.accuracy", description=str(__doc__).partition("\n")[0])
+    parser.add_argument("tops", type=int, nargs="?", default=EACH, help="of each family")
+    parser.add_argument("processes", type=int, nargs="?", default=2)
+    options = parser.parse_args()
+    total = measure(options.tops, options.processes, verbose=True)
     print("\n".join([*lines(total), *total.broken]))
     return 1 if total.broken else 0
 

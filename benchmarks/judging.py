@@ -6,9 +6,9 @@ A wrong method is caught if the line that names its defect is refuted, and a rig
 the processor, of this process and those that it starts.
 """
 
+import argparse
 import os
 import statistics
-import sys
 from itertools import groupby
 
 import symtop
@@ -32,7 +32,9 @@ def ledger_of(step, claims, options, *, quick):
 
 def main():
     """Print the tables."""
-    quick, rows, costs = "--full" not in sys.argv, [], []
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.judging", description=str(__doc__).partition("\n")[0])
+    parser.add_argument("--full", action="store_true", help="judge without --quick")
+    quick, rows, costs = not parser.parse_args().full, [], []
     for name, (claims, line, options) in wrong.CLAIMS.items():
         ledger, cost = ledger_of(step_of(name, wrong, right), claims, options, quick=quick)
         costs.append((cost, name))

@@ -1,18 +1,19 @@
 """Speed-up by a second process: a study's accuracy grid with one worker and with two, kernels compiled before.
 
-    python benchmarks/scaling.py [STUDY]
+    python -m benchmarks.scaling [STUDY]
 
 Timed is the computing of all cases, the start of the workers included; combining and drawing, which one process does in
 either case, are not. Needs a machine with two cores that does nothing else. Exit code 1 below `ENOUGH`.
 """
 
+import argparse
 import os
 import sys
 import tempfile
 import time
 from pathlib import Path
 
-from symtop.runner import run as runner
+from symtop.runner import run as runner, scripts
 from symtop.runner.cases import StudyCases
 from symtop.runner.pool import Pool
 
@@ -33,7 +34,9 @@ def seconds(name: str, jobs: int, *, quick: bool = False) -> float:
 
 def main() -> int:
     """Warm the caches, then measure."""
-    name = (sys.argv[1:] or ["convergence"])[0]
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.scaling", description=str(__doc__).partition("\n")[0])
+    parser.add_argument("study", nargs="?", default="convergence", choices=scripts.names())
+    name = parser.parse_args().study
     seconds(name, 2, quick=True)
     one, two = (seconds(name, jobs) for jobs in (1, 2))
     print(f"{name}: {one:.1f} s with one worker, {two:.1f} s with two, {one / two:.2f} times faster")

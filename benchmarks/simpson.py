@@ -14,7 +14,7 @@ Each is measured here with a control that lacks the property. They give no times
 loop at the coarsest step that meets an accuracy, in one run.
 """
 
-import sys
+import argparse
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +22,7 @@ import numpy as np
 import symtop
 from symtop.measure.order import power_law
 from symtop.measure.timing import bare_run, timings
-from symtop.model.scenes import Scene, scene as find_scene
+from symtop.model.scenes import Scene, scenes
 
 SIMPSON, MIDPOINT, CLASSICAL = "galerkin-simpson", "midpoint", "rk4"
 OTHERS = ("strang", "gauss-4", "takahashi-imada")  # for `cost`: the usual splitting, Gauss of the same order, the best
@@ -113,7 +113,9 @@ def cost(scene: Scene) -> list[Cost]:
 
 def main() -> None:
     """Print the points and the costs of a scene, spheroid by default."""
-    scene = find_scene(sys.argv[1] if sys.argv[1:] else "spheroid")
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.simpson", description=str(__doc__).partition("\n")[0])
+    parser.add_argument("scene", nargs="?", default="spheroid", choices=scenes())
+    scene = scenes()[parser.parse_args().scene]
     print(f"{scene.name}: {NUTATIONS:g} nutations, {PER_NUTATION[0]} to {PER_NUTATION[-1]} steps each; {LONG:g} of "
           f"{PER_NUTATION[0]} steps for what is conserved")  # fmt: skip
     for point in points(scene):

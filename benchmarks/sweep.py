@@ -8,8 +8,8 @@ A certificate compares the closed form of one start with 40 digits and an integr
 what all would take.
 """
 
+import argparse
 import os
-import sys
 import tempfile
 import time
 from typing import NamedTuple
@@ -78,8 +78,11 @@ def lines(swept: SweepTimes) -> list[str]:
 
 def main() -> None:
     """Measure and print."""
-    words = [int(word) for word in sys.argv[1:3]]
-    print("\n".join(lines(measure(*words))))
+    parser = argparse.ArgumentParser(prog="python -m benchmarks.sweep", description=str(__doc__).partition("\n")[0])
+    parser.add_argument("starts", type=int, nargs="?", default=STARTS)
+    parser.add_argument("certified", type=int, nargs="?", default=CERTIFIED, help="starts, of these")
+    options = parser.parse_args()
+    print("\n".join(lines(measure(options.starts, options.certified))))
 
 
 if __name__ == "__main__":
