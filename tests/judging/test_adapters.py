@@ -355,7 +355,6 @@ def test_single_precision_refutes_nothing_that_its_rounding_hides(keep_claims):
         assert ledger["p_psi"].verdict == ("confirmed" if step is implicit else "refuted")  # to the rounding of doubles
 
 
-@pytest.mark.slow
 def test_an_axis_that_stays_upright_is_refused_in_a_sentence_and_one_that_hangs_is_judged(keep_claims):
     upright, hanging = (
         symtop.Scene("still", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(theta=theta, psi_dot=5.0), 20.0)

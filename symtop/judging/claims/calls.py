@@ -143,7 +143,7 @@ def _late_gap(subject: Subject, start: Angles, h: float, repeat: Callable[[], fl
 
 def _nearby_ends(stepper: Stepper, top: SymmetricTop, start: Angles, h: float) -> list[Any]:
     """The ends of steps that differ from the first one as `NEARBY_CALLS` says; zeros where a step fails."""
-    near = Angles(**{name: getattr(start, name) * (1.0 + CLOSE_START) for name in Angles.__slots__})
+    near = Angles(**{name: getattr(start, name) * (1.0 - CLOSE_START) for name in Angles.__slots__})
     trials = (top, near, h), (top, start, h * (1.0 + LONGER_STEP)), (replace(top, mgl=HEAVIER_TOP * top.mgl), start, h)
     state, ends = stepper.form.prepare(top, start)[1], []
     for trial_top, trial_start, step in trials:
