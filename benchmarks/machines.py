@@ -137,7 +137,7 @@ def main() -> int:
         "machines", "Another processor", "Does another processor choose the same methods?", table,
         "Errors and evaluations are the same on every processor, to rounding; prices are not. A choice on the other "
         "processor is timed in units of the least there.", [], answer=sentence, cases=len(kept),
-        facts=pair._asdict() | {"differing": len(pair.differing)},
+        facts=pair._asdict() | {"differing": len(pair.differing), "processors": len(kept)},
         **measured.record(measured.circumstances(), "python -m benchmarks.machines"),
     )  # fmt: skip
     netcdf.write_json(RESULTS / "machines.json", page)
