@@ -5,6 +5,7 @@ python -m benchmarks.adaptive        (needs gcc)
 Both run in one process, in turn; the C loop leaves out zero coefficients and takes no samples but the end.
 """
 
+import argparse
 import ctypes
 from collections.abc import Callable
 from typing import NamedTuple
@@ -75,6 +76,7 @@ def measure(
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=str(__doc__).partition("\n")[0]).parse_args()  # it has --help alone
     for chart in FORMULATIONS:
         for tolerance in TOLERANCES:
             row = measure(chart, tolerance)

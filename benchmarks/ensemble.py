@@ -16,6 +16,7 @@ all cores, with two numbers of steps: what a step takes, and what a member takes
 long `simulate` alone.
 """
 
+import argparse
 import time
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -193,4 +194,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=str(__doc__).partition("\n")[0]).parse_args()  # it has --help alone
     main()

@@ -6,6 +6,7 @@ A step of Stormer-Verlet on (theta, p_theta), twice: in a loop over steps, which
 over `LANES` tops inside it, which LLVM vectorises if nothing in it is called. All four are interleaved in one process.
 """
 
+import argparse
 from collections.abc import Callable
 from typing import Any
 
@@ -72,4 +73,5 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=str(__doc__).partition("\n")[0]).parse_args()  # it has --help alone
     main()

@@ -8,6 +8,7 @@ coarsest step of a ladder whose error is no larger than heyoka's at that toleran
 the ones that others count. The error is the largest of all tops, of the axis at t = `HORIZON`, against the closed form.
 """
 
+import argparse
 import os
 from collections.abc import Callable, Iterable
 from typing import NamedTuple
@@ -166,5 +167,6 @@ def verdict(rows: list[Row]) -> list[str]:
 
 
 if __name__ == "__main__":
+    argparse.ArgumentParser(description=str(__doc__).partition("\n")[0]).parse_args()  # it has --help alone
     rows = measure()
     print("\n".join([table(rows).text, *verdict(rows)]))
