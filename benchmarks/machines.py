@@ -127,10 +127,10 @@ def main() -> int:
     table = pages.Table("Where two processors choose differently", header, rows)
     least = f", of {len(kept)} processors the two that agree least" * (len(kept) > 2)
     sentence = (
-        f"{pair.same} of {pair.cells} choices of the front page's first table are the same on {names[0]} and on "
-        f"{names[1]}{least}: {pair.clear_same} of {pair.clear} where either shows a lead beyond the error of "
-        f"measurement. Where they differ, the choice of one takes on the other at most {_times(pair.most)} times as "
-        "long as the best."
+        f"{pair.same} of the {pair.cells} choices of the front page's first table that both have kept are the same on "
+        f"{names[0]} and on {names[1]}{least}: {pair.clear_same} of {pair.clear} where either shows a lead beyond the "
+        f"error of measurement. Where they differ, the choice of one takes on the other at most {_times(pair.most)} "
+        "times as long as the best."
     )
     print(f"{table.text}\n{sentence}")
     page = pages.findings(

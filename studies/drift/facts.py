@@ -34,7 +34,7 @@ MEANING = {
 CLOSE = 0.1  # a prediction that is further off, relative, counts as missed
 WHOLE = 0.99  # share of the longest run of a scene, below which a run counts as shortened
 NAMES = {  # of the facts of each group
-    HISTORIES: "nutations steps tolerance own variants holding shortened shortest energy_lost "
+    HISTORIES: "nutations steps tolerance own variants holding ended shortened shortest energy_lost "
     "energy_drifts energy_lost_most energy_lost_worst momentum_lost bounded_runs bounded_as_t lost_runs lost_faster",
     WINDOWS: "long_steps long_scene moved scattered long_momenta",
     ROUNDINGS: "members walk_least walk_most walk_interval gain_least gain_most",
@@ -73,6 +73,7 @@ def of_histories(histories: xr.Dataset) -> dict[str, Any]:
         "shortened": int((length < WHOLE).sum()),
         "shortest": float(length.min()),  # share of the run length
         "energy_lost": len(lost),
+        "ended": int((fate["energy"] == FAILED).sum()),
         "momentum_lost": int((kept["energy"] & ~kept.all(axis=1)).sum()),  # variants that keep the energy
         "energy_drifts": int((fate["energy"] == "drift").sum()),
         "energy_lost_most": float(lost.max()) if len(lost) else None,

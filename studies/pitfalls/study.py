@@ -1,7 +1,7 @@
 """What goes wrong although nothing looks wrong?
 
 Three short experiments, each a few runs: a physics engine's step without the gyroscopic term, at shorter and shorter
-steps; a run beside an unstable motion that keeps its energy; and one method in Euler's angles and in the axis on a
+steps; a run beside an unstable motion that keeps its energy; and one method in Euler's angles and on the axis on a
 motion that grazes a pole.
 """
 
@@ -119,7 +119,7 @@ def lines(data: xr.Dataset) -> list[list[tuple[str, str, Any, Any]]]:
         late = runs.isel(setting=0, sample=slice(1, None))
         for key, color, label in (("axis", VERMILLION, "axis (rad)"), ("energy", BLUE, "energy (relative)")):
             curves[1].append((label, color, late["time"].values, late[key].values))
-    for name, color, label in ((ANGLES, VERMILLION, ENDED), (AXIS, GREEN, "in the axis")):
+    for name, color, label in ((ANGLES, VERMILLION, ENDED), (AXIS, GREEN, "on the axis")):
         if (runs := run_of(data, POLE, name)) is not None:
             late = runs.isel(setting=0, sample=slice(1, None))
             curves[2].append((label, color, late["time"].values, late["axis"].values))

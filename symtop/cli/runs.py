@@ -100,7 +100,7 @@ def run(
         if verdict is not None and facts["outcome"] == "ok":
             say(f"judged against the truth: {verdict.words()}")
         for name, values in largest.items():
-            click.echo(f"  {words[name]:<30} largest {values['largest']:.3e}   last {values['last']:.3e}")
+            click.echo(f"  {words[name]:<37} largest {values['largest']:.3e}   last {values['last']:.3e}")
         say_written(output, figure)
     if facts["outcome"] != "ok":
         sys.exit(3)
