@@ -440,6 +440,9 @@ def test_a_needle_is_stepped_by_its_turns_and_a_slow_part_of_a_motion_is_no_grow
     drawn = {scene.name: scene for scene in scenes_of(body_population(8, seed=3))}
     for name, body in (("strang", "needle-0"), ("euler-poincare", "near-symmetric-0")):
         assert judge(integrator(name), drawn[body], quick=True)["energy"].verdict == "confirmed"
+    slow = symtop.Scene("slow", symtop.SymmetricTop(1.0, 1.0, 1.0), symtop.Angles(1.0, 0.7, 0.0, 1.0, 0.0, 1e-8), 20.0)
+    liar = dataclasses.replace(integrator("rk4"), name="liar", conserves=["p_psi"])  # |L| is 1e8 times p_psi
+    assert [judge(method, slow, quick=True).refuted for method in (integrator("gauss-4"), liar)] == [[], ["p_psi"]]
 
 
 def test_false_claims_on_a_body_are_refuted():

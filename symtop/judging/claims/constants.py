@@ -203,7 +203,7 @@ def long_run(
         trajectory, run, plan = _run(method, scene, run_chart, blown_up / step, step, SAMPLES)
         changes = constants(scene, trajectory)
     count, grains = max(run.steps, 1), {"energy": scene.energy_grain}
-    grains["p_phi"] = scene.momentum_grain(trajectory.momentum)
+    grains |= dict.fromkeys(("p_phi", "p_psi"), momentum_grain(scene, trajectory.momentum))
     by_name = {
         name: change_of(plan.times, changes[name], every_step[name], count, grains.get(name, 1.0), plain=plain,
                         even=not scene.of_body, period=unit)
@@ -216,6 +216,15 @@ def long_run(
     rows = maxima(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS)  # fewer, where no sample is
     energy = np.array([np.pad(row, (0, WINDOWS - len(row)), constant_values=math.nan) for row in rows])
     return LongRun(by_name, run.outcome, message, chart, step_count, nutations, *costs, reported, energy, blown_up)
+
+
+def momentum_grain(scene: Scene, momentum: Any) -> float:
+    """`Scene.momentum_grain`; of a top |L|/100 over p_phi and p_psi if these are smaller: rounding is that of |L|."""
+    if scene.of_body:
+        return scene.momentum_grain(momentum)
+    top, p_psi = scene.top, scene.top.momenta(scene.start).p_psi
+    square = 2.0 * top.I1 * (top.energy(scene.start) + abs(top.mgl)) + (1.0 - top.I1 / top.I3) * p_psi**2  # largest L^2
+    return max(0.01 * math.sqrt(max(square, 0.0)) / scene.momentum_scale, 1.0)
 
 
 def blows_up(scene: Scene, change: Array) -> NDArray[np.int64]:
@@ -260,7 +269,8 @@ def _reported(
         return drift
     gaps = {name: np.abs(getattr(run, name) - getattr(trajectory, name)) for name in ("p_phi", "p_psi")}
     size, name = max((float(np.max(gap[np.isfinite(gap)], initial=0.0)), name) for name, gap in gaps.items())
-    return Difference(name, size / scene.momentum_scale, REPORTED_GAP, f"of the larger momentum in {run.steps} steps")
+    size, floor = size / scene.momentum_scale, REPORTED_GAP * momentum_grain(scene, None)
+    return Difference(name, size, floor, f"of the larger momentum in {run.steps} steps")
 
 
 @np.errstate(over="ignore", invalid="ignore")  # a run may blow up
@@ -379,8 +389,7 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
 
 def _of_states(run: LongRun) -> Finding:
     """The finding on whether reported momenta are those of the states, and a short run is part of a longer one."""
-    difference = run.reported
-    if difference is None:
+    if (difference := run.reported) is None:
         return inapplicable("reported", f"the {run.chart} chart shows no momenta beside the reported")
     declared, verdict, clause = OWN_STATES, "refuted", f"differs by {difference.size:.1e} {difference.how}"
     if difference.size <= difference.floor:
@@ -395,12 +404,10 @@ def _of_states(run: LongRun) -> Finding:
 
 def _invariant(method: Integrator, run: LongRun) -> Finding:
     """The finding on invariants that a method claims but that are not constants of the true motion."""
-    claimed = declared(method, "invariant")
-    if not claimed:
+    if not (claimed := declared(method, "invariant")):
         return inapplicable("invariant", "it claims no invariant of its own")
     names = claimed.split(", ")
-    unknown = ", ".join(name for name in names if name not in run.constants)
-    if unknown:
+    if unknown := ", ".join(name for name in names if name not in run.constants):
         return undecided("invariant", claimed, f"the battery has no formula for {unknown}")
     worst = max(names, key=lambda name: run.constants[name].changed.largest)
     return _constant(method, "invariant", "kept", run, run.constants[worst])._replace(declared=claimed)

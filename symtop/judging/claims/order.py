@@ -90,16 +90,13 @@ def measure(subject: Subject) -> list[Finding]:
     if method.control is None:
         return [inapplicable("order", "it has no step and no tolerance", yes_no(method.order))]
     finding = _exactness(subject) if method.exact_steps else _by_steps(subject)
-    table = table_of(method)
-    if table is not None:
+    if (table := table_of(method)) is not None:
         power = method.order or table.order
         verdict = "refuted" if table.order < min(power, len(table.defect)) else finding.verdict
         finding = finding._replace(verdict=verdict, why=f"{table.words(power)}; {finding.why}")
-    if method.order is not None and finding.verdict == "confirmed":
-        lower = _lower_elsewhere(subject, method.order)
-        if lower is not None:
-            measured = Reading("order", lower[0], text=f"{lower[0]:.1f} elsewhere")
-            finding = Finding("order", finding.declared, measured, "refuted", lower[1], lower[0], LOWER)
+    if method.order and finding.verdict == "confirmed" and (lower := _lower_elsewhere(subject, method.order)):
+        measured = Reading("order", lower[0], text=f"{lower[0]:.1f} elsewhere")
+        finding = Finding("order", finding.declared, measured, "refuted", lower[1], lower[0], LOWER)
     return [finding]
 
 
