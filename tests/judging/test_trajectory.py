@@ -233,8 +233,7 @@ def test_the_true_motion_keeps_everything_and_rates_of_a_top_are_its_momentum():
     assert max(ledger[f"{name}_error"].value for name in ("axis", "attitude", "theta")) < 1e-13
     top = SPHEROID.top
     run = symtop.simulate(SPHEROID, "strang[attitude]", step_size=1e-3, horizon=3.0, samples=31)
-    q, axis = run["quaternion"].values, run["axis"].values
-    rates = np.ones((len(q), 3)) * [0.3, -0.2, 0.5]
+    q, axis, rates = run["quaternion"].values, run["axis"].values, np.ones((run.time.size, 3)) * [0.3, -0.2, 0.5]
     energy = symtop.judge({"time": run["time"].values, "quaternion": q, "omega_body": rates, "axis": axis})["energy"]
     moving = 0.5 * (top.I1 * 0.13 + top.I3 * 0.25) + top.mgl * axis[:, 2]
     assert energy.value == pytest.approx(np.abs(moving - moving[0]).max() / SPHEROID.energy_scale, rel=1e-9)
@@ -246,13 +245,12 @@ def test_the_true_motion_keeps_everything_and_rates_of_a_top_are_its_momentum():
 
 
 def test_one_sample_is_judged_and_the_first_nutation_of_a_bounded_energy_is_no_growth(tmp_path):
-    """Some nutations of a splitting do not refute its bounded energy; those of a method that gains energy do."""
+    """6.8 nutations of a splitting do not refute its bounded energy; those of a method that gains energy do."""
     for time in (0.0, 0.5):
         theta = symtop.reference(SPHEROID, [time])["theta"].item() + 0.05
         (tmp_path / "one.csv").write_text(f"time,theta,energy\n{time},{theta!r},1\n", encoding="utf-8")
         ledger = symtop.judge(tmp_path / "one.csv", energy="bounded")
         assert (ledger["theta_error"].value, ledger["energy"].verdict) == (pytest.approx(0.05), "undecided")
-    # over 6.8 nutations
     runs = (symtop.simulate("spheroid", name, step_size=0.01, guard=False) for name in ("strang", "rkmk-se3-2"))
     splitting, gaining = (symtop.judge(run, scene="spheroid", energy="bounded")["energy"] for run in runs)
     assert (splitting.verdict == "refuted", gaining.verdict) == (False, "refuted")

@@ -177,7 +177,7 @@ def long_run(
         step = unit / (STEPS_A_NUTATION * factor)
         if scene.of_body:  # L turns a needle about its own axis many times in a natural period
             step = min(step, math.tau * min(scene.top.moments) / (STEPS_A_TURN * scene.momentum_scale))
-        pilot, first, _ = _run(method, scene, run_chart, PILOT_STEPS, step, PILOT_STEPS + 1)
+        pilot, first, few = _run(method, scene, run_chart, PILOT_STEPS, step, PILOT_STEPS + 1)
         steps = float(PILOT_STEPS)  # for a closed form, which has no steps that accumulate errors
         if method.control is not None:
             cost = max(first.force_evaluations / PILOT_STEPS, 1.0)
@@ -196,7 +196,7 @@ def long_run(
     if not (plain or scene.of_body):  # else its momenta are those of its states
         reported = _reported(method, scene, chart, trajectory, (run, plan))
         if method.fixed_step:
-            reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
+            reported = _contradiction(method, scene, chart, (run, plan), (first, few), seed) or reported
     changes, every_step, blown_up = constants(scene, trajectory), constants(scene, pilot), math.nan
     if (indices := blows_up(scene, changes["energy"])).size:
         blown_up = float(plan.times[indices[0]])
@@ -241,16 +241,17 @@ def blow_up_finding(finding: Finding, time: float, of_body: bool, steps: str = "
 
 
 def _contradiction(
-    method: Integrator, scene: Scene, chart: str, long: tuple[Run, Plan], pilot: Run, h: float, seed: int
+    method: Integrator, scene: Scene, chart: str, long: tuple[Run, Plan], pilot: tuple[Run, Plan], seed: int
 ) -> Difference | None:
     """A difference between a run of n steps, n random, and the first n of a longer run; None if all runs agree."""
-    rng, step = np.random.default_rng(seed), one_step(method, chart, scene, h)
+    rng = np.random.default_rng(seed)
     for k in range(CUTS):
-        run, marks = (long[0], long[1].marks) if k % 2 else (pilot, np.arange(pilot.states.shape[0]))
+        run, plan = long if k % 2 else pilot
+        step, marks = one_step(method, chart, scene, plan.step_size), plan.marks  # an unstable motion shows one bit
         i = min(int(marks.size ** rng.uniform(0.0, 1.0)), marks.size - 1)
         state = step.scaled(run.states[i], run.p_phi[i], run.p_psi[i])
         if marks[i] > 0 and np.isfinite(state).all():
-            gap = step.gap(step.shown(step.run(scene.start, h, int(marks[i]))), state)
+            gap = step.gap(step.shown(step.run(scene.start, step.h, int(marks[i]))), state)
             if gap > SAME_RUN:
                 how = f"in a run of {marks[i]} steps from the first of one of {marks[-1]} (seed {seed})"
                 return Difference(OF_RUN, gap, SAME_RUN, how)
