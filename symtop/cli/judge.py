@@ -8,7 +8,7 @@ import click
 
 from symtop.cli import common
 from symtop.cli.common import File, as_text, check_outputs, completing, json_option, plugin_option, say, say_written
-from symtop.core.errors import SymtopError
+from symtop.core.errors import SymtopError, at_home
 from symtop.core.progress import showing_seconds
 from symtop.judging import FORMS
 
@@ -87,7 +87,7 @@ def judge(
         if line and not as_json:
             click.echo(line)
 
-    _check(options["form"], output=output, card=card, badge=badge, figure=figure)
+    _check(target, options["form"], output=output, card=card, badge=badge, figure=figure)
     ledger = judged(target, scene=scene, tell=tell, **options)
     click.echo(as_text([finding.plain() for finding in ledger.findings]) if as_json else findings.summary(ledger))
     if output is not None:
@@ -106,9 +106,11 @@ def judge(
         sys.exit(1)
 
 
-def _check(form: str | None, **files: str | None) -> None:
+def _check(target: str, form: str | None, **files: str | None) -> None:
     """SymtopError, before a step is judged, for files that cannot be written and for a figure that would be empty."""
     check_outputs(**files)
+    if files["output"] is not None and at_home(target).resolve() == at_home(files["output"]).resolve():
+        raise SymtopError(f"--output must be another file than the trajectory that is judged, {target!r}")
     if files["figure"] is not None and form == "separable":
         raise SymtopError("--figure shows errors of the axis, of which a map of (theta, p_theta) has none")
 

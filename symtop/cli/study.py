@@ -92,8 +92,7 @@ def choose(names: Sequence[str], *, every: bool, only: Sequence[str] = (), quick
     from symtop.methods.framework.registry import integrator
     from symtop.runner import scripts
 
-    study_names = scripts.names() if every else list(dict.fromkeys(names))
-    if not study_names:
+    if not (study_names := scripts.names() if every else list(dict.fromkeys(names))):
         raise SymtopError(f"name a study or use --all; known: {', '.join(scripts.names())}")
     for name in only:
         integrator(name)  # raises an error with similar names if there is none

@@ -123,8 +123,7 @@ def setup(fields: Mapping[str, Any]) -> Setup:
     """The run that the fields of a page define. Raises SymtopError if a field is missing or out of range."""
     of_body = fields.get("I2") is not None or str(fields.get("base")) in body_scenes()
     names = (OF_BODY, RATES) if of_body else (TOP, START)
-    missing = [name for name in (*names[0], *names[1], "horizon", "integrator") if name not in fields]
-    if missing:
+    if missing := [name for name in (*names[0], *names[1], "horizon", "integrator") if name not in fields]:
         raise SymtopError(f"the question lacks {', '.join(missing)}")
     top, start = (tuple(finite(name, fields[name]) for name in group) for group in names)
     if of_body:

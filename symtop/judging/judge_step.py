@@ -35,7 +35,7 @@ from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, who
 from symtop.judging.adapters.adapter import Stepper, heartbeat, integrator
 from symtop.judging.adapters.python_step import CONJUGATE
 from symtop.judging.battery import measure, stages, unmeasured
-from symtop.judging.claims.constants import KEPT_CHANGE, Constant, blow_up_finding, blows_up
+from symtop.judging.claims.constants import KEPT_CHANGE, Constant, blow_up_finding, blows_up, momentum_grain
 from symtop.judging.claims.subject import Subject, open_target, seconds_a_step
 from symtop.judging.findings import PHRASES, About, Finding, Ledger, Reading, error_units, undecided
 from symtop.judging.remote import Process, Remote, separated, solvers_of, table_of
@@ -291,7 +291,7 @@ def _constant(
     if not valid.any():
         return undecided(name, declared, f"all of its {valid.size} samples are lost")
     time, values = time[valid], values[valid]
-    scale, grain = scene.momentum_scale, scene.momentum_grain(L)
+    scale, grain = scene.momentum_scale, momentum_grain(scene, L)
     if name == "energy":
         scale, grain = scene.energy_scale, scene.energy_grain
     true = getattr(scene.top.momenta(scene.start), name) if name != "energy" else scene.top.energy(scene.start)

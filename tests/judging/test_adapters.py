@@ -450,8 +450,7 @@ def test_a_file_with_a_step_says_what_it_is_and_writes_it(tmp_path, monkeypatch,
     keep_claims("order", "symplectic", "symmetric", "energy", "p_phi")
     shutil.copy(STEPS, tmp_path / "mine.py")
     monkeypatch.setenv("HOME", str(tmp_path))
-    files = ("--output=~/found.nc", "--card=~/card.html", "--badge", "~/badge.svg")
-    code, output = run_judge("~/mine.py:heun", *files)
+    code, output = run_judge("~/mine.py:heun", "--output=~/found.nc", "--card=~/card.html", "--badge", "~/badge.svg")
     assert code == 0, output
     assert "It is: order 2, not symplectic, not reversible, keeps p_phi; not the energy" in output
     with xr.open_dataset(tmp_path / "found.nc") as data:

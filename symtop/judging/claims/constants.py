@@ -177,7 +177,7 @@ def long_run(
         step = unit / (STEPS_A_NUTATION * factor)
         if scene.of_body:  # L turns a needle about its own axis many times in a natural period
             step = min(step, math.tau * min(scene.top.moments) / (STEPS_A_TURN * scene.momentum_scale))
-        pilot, first, _ = _run(method, scene, run_chart, PILOT_STEPS, step, PILOT_STEPS + 1)
+        pilot, first, few = _run(method, scene, run_chart, PILOT_STEPS, step, PILOT_STEPS + 1)
         steps = float(PILOT_STEPS)  # for a closed form, which has no steps that accumulate errors
         if method.control is not None:
             cost = max(first.force_evaluations / PILOT_STEPS, 1.0)
@@ -196,14 +196,14 @@ def long_run(
     if not (plain or scene.of_body):  # else its momenta are those of its states
         reported = _reported(method, scene, chart, trajectory, (run, plan))
         if method.fixed_step:
-            reported = _contradiction(method, scene, chart, (run, plan), first, step, seed) or reported
+            reported = _contradiction(method, scene, chart, (run, plan), (first, few), seed) or reported
     changes, every_step, blown_up = constants(scene, trajectory), constants(scene, pilot), math.nan
     if (indices := blows_up(scene, changes["energy"])).size:
         blown_up = float(plan.times[indices[0]])
         trajectory, run, plan = _run(method, scene, run_chart, blown_up / step, step, SAMPLES)
         changes = constants(scene, trajectory)
     count, grains = max(run.steps, 1), {"energy": scene.energy_grain}
-    grains["p_phi"] = scene.momentum_grain(trajectory.momentum)
+    grains |= dict.fromkeys(("p_phi", "p_psi"), momentum_grain(scene, trajectory.momentum))
     by_name = {
         name: change_of(plan.times, changes[name], every_step[name], count, grains.get(name, 1.0), plain=plain,
                         even=not scene.of_body, period=unit)
@@ -216,6 +216,15 @@ def long_run(
     rows = maxima(times, changes["energy"], math.log10(times[-1] / times[1]), WINDOWS)  # fewer, where no sample is
     energy = np.array([np.pad(row, (0, WINDOWS - len(row)), constant_values=math.nan) for row in rows])
     return LongRun(by_name, run.outcome, message, chart, step_count, nutations, *costs, reported, energy, blown_up)
+
+
+def momentum_grain(scene: Scene, momentum: Any) -> float:
+    """`Scene.momentum_grain`; of a top |L|/100 over p_phi and p_psi if these are smaller: rounding is that of |L|."""
+    if scene.of_body:
+        return scene.momentum_grain(momentum)
+    top, p_psi = scene.top, scene.top.momenta(scene.start).p_psi
+    square = 2.0 * top.I1 * (top.energy(scene.start) + abs(top.mgl)) + (1.0 - top.I1 / top.I3) * p_psi**2  # largest L^2
+    return max(0.01 * math.sqrt(max(square, 0.0)) / scene.momentum_scale, 1.0)
 
 
 def blows_up(scene: Scene, change: Array) -> NDArray[np.int64]:
@@ -232,16 +241,17 @@ def blow_up_finding(finding: Finding, time: float, of_body: bool, steps: str = "
 
 
 def _contradiction(
-    method: Integrator, scene: Scene, chart: str, long: tuple[Run, Plan], pilot: Run, h: float, seed: int
+    method: Integrator, scene: Scene, chart: str, long: tuple[Run, Plan], pilot: tuple[Run, Plan], seed: int
 ) -> Difference | None:
     """A difference between a run of n steps, n random, and the first n of a longer run; None if all runs agree."""
-    rng, step = np.random.default_rng(seed), one_step(method, chart, scene, h)
+    rng = np.random.default_rng(seed)
     for k in range(CUTS):
-        run, marks = (long[0], long[1].marks) if k % 2 else (pilot, np.arange(pilot.states.shape[0]))
+        run, plan = long if k % 2 else pilot
+        step, marks = one_step(method, chart, scene, plan.step_size), plan.marks  # an unstable motion shows one bit
         i = min(int(marks.size ** rng.uniform(0.0, 1.0)), marks.size - 1)
         state = step.scaled(run.states[i], run.p_phi[i], run.p_psi[i])
         if marks[i] > 0 and np.isfinite(state).all():
-            gap = step.gap(step.shown(step.run(scene.start, h, int(marks[i]))), state)
+            gap = step.gap(step.shown(step.run(scene.start, step.h, int(marks[i]))), state)
             if gap > SAME_RUN:
                 how = f"in a run of {marks[i]} steps from the first of one of {marks[-1]} (seed {seed})"
                 return Difference(OF_RUN, gap, SAME_RUN, how)
@@ -260,7 +270,8 @@ def _reported(
         return drift
     gaps = {name: np.abs(getattr(run, name) - getattr(trajectory, name)) for name in ("p_phi", "p_psi")}
     size, name = max((float(np.max(gap[np.isfinite(gap)], initial=0.0)), name) for name, gap in gaps.items())
-    return Difference(name, size / scene.momentum_scale, REPORTED_GAP, f"of the larger momentum in {run.steps} steps")
+    size, floor = size / scene.momentum_scale, REPORTED_GAP * momentum_grain(scene, None)
+    return Difference(name, size, floor, f"of the larger momentum in {run.steps} steps")
 
 
 @np.errstate(over="ignore", invalid="ignore")  # a run may blow up
@@ -379,8 +390,7 @@ def _constant(method: Integrator, claim: str, claimed: str, run: LongRun, consta
 
 def _of_states(run: LongRun) -> Finding:
     """The finding on whether reported momenta are those of the states, and a short run is part of a longer one."""
-    difference = run.reported
-    if difference is None:
+    if (difference := run.reported) is None:
         return inapplicable("reported", f"the {run.chart} chart shows no momenta beside the reported")
     declared, verdict, clause = OWN_STATES, "refuted", f"differs by {difference.size:.1e} {difference.how}"
     if difference.size <= difference.floor:
@@ -395,12 +405,10 @@ def _of_states(run: LongRun) -> Finding:
 
 def _invariant(method: Integrator, run: LongRun) -> Finding:
     """The finding on invariants that a method claims but that are not constants of the true motion."""
-    claimed = declared(method, "invariant")
-    if not claimed:
+    if not (claimed := declared(method, "invariant")):
         return inapplicable("invariant", "it claims no invariant of its own")
     names = claimed.split(", ")
-    unknown = ", ".join(name for name in names if name not in run.constants)
-    if unknown:
+    if unknown := ", ".join(name for name in names if name not in run.constants):
         return undecided("invariant", claimed, f"the battery has no formula for {unknown}")
     worst = max(names, key=lambda name: run.constants[name].changed.largest)
     return _constant(method, "invariant", "kept", run, run.constants[worst])._replace(declared=claimed)

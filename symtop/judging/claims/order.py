@@ -90,16 +90,13 @@ def measure(subject: Subject) -> list[Finding]:
     if method.control is None:
         return [inapplicable("order", "it has no step and no tolerance", yes_no(method.order))]
     finding = _exactness(subject) if method.exact_steps else _by_steps(subject)
-    table = table_of(method)
-    if table is not None:
+    if (table := table_of(method)) is not None:
         power = method.order or table.order
         verdict = "refuted" if table.order < min(power, len(table.defect)) else finding.verdict
         finding = finding._replace(verdict=verdict, why=f"{table.words(power)}; {finding.why}")
-    if method.order is not None and finding.verdict == "confirmed":
-        lower = _lower_elsewhere(subject, method.order)
-        if lower is not None:
-            measured = Reading("order", lower[0], text=f"{lower[0]:.1f} elsewhere")
-            finding = Finding("order", finding.declared, measured, "refuted", lower[1], lower[0], LOWER)
+    if method.order and finding.verdict == "confirmed" and (lower := _lower_elsewhere(subject, method.order)):
+        measured = Reading("order", lower[0], text=f"{lower[0]:.1f} elsewhere")
+        finding = Finding("order", finding.declared, measured, "refuted", lower[1], lower[0], LOWER)
     return [finding]
 
 
@@ -159,8 +156,7 @@ def on_body(subject: Subject) -> list[Finding]:
         return [_converges(order, why)]
     if not order.measured:
         floor = max(TRUE_LIMIT, subject.rounding(subject.finest or 0.0))
-        error = wrong_limit(order.step_size, order.error, order.bound, floor)
-        if math.isfinite(error):
+        if math.isfinite(error := wrong_limit(order.step_size, order.error, order.bound, floor)):
             words = f"however small its step, it goes to a motion that is wrong by {error:.1e} rad on {scene.name}"
             return [_wrong_limit(claim, error, words)]
         return [undecided("order", yes_no(claim), _reason(subject, fit.reason))]
@@ -268,7 +264,7 @@ def _by_steps(subject: Subject) -> Finding:
     follows = series and series.order >= power and float(series.noise[1]) < SINGLE_NOISE
     settled = measured or conditioning(scene, LIMIT_NUTATIONS * scene.time_scale()) > UNSTABLE_GROWTH
     height = math.sin(generic_start(scene).theta)
-    pole = height if height <= APART else 1.0  # near a pole, angles have an error of 2e-16 over the square
+    pole = max(height, math.ulp(1.0)) if height <= APART else 1.0  # angles have an error of 2e-16 over the square
     if method.fixed_step and not (subject.in_plane or (settled and follows)):
         power = max(1, min(method.order or 99, round(main.slope))) if measured else power
         error, uncertainty = limit(method, scene, power, finest)
@@ -299,8 +295,7 @@ def _by_steps(subject: Subject) -> Finding:
 
 def _reason(subject: Subject, why: str) -> str:
     """The reason why an order could not be judged, after that of single precision if it applies."""
-    floor = subject.rounding(subject.finest or 0.0)
-    return hidden_by_single(floor, why) if floor else why
+    return hidden_by_single(floor, why) if (floor := subject.rounding(subject.finest or 0.0)) else why
 
 
 def _converges(order: Order, slopes: str) -> Finding:
@@ -401,9 +396,10 @@ def _exactness(subject: Subject) -> Finding:
     table = error_table(scene, method, settings, horizon, observe=main)
     largest = float(table[main].max())
     why = f"largest error {largest:.1e} at steps from {settings[-1]:.1e} s to {settings[0]:.1e} s on {scene.name}"
-    is_exact = largest <= TRUE_LIMIT
-    measured = Reading("exact", largest) if is_exact else UNMEASURED
-    return Finding("order", "exact", measured, "confirmed" if is_exact else "refuted", why, largest, TRUE_LIMIT)
+    unstable = conditioning(scene, horizon) > UNSTABLE_GROWTH
+    why, verdict = (f"{why}, whose motion makes rounding grow", "undecided") if unstable else (why, "refuted")
+    verdict, measured = ("confirmed", Reading("exact", largest)) if largest <= TRUE_LIMIT else (verdict, UNMEASURED)
+    return Finding("order", "exact", measured, verdict, why, largest, TRUE_LIMIT)
 
 
 def table_of(method: Integrator) -> Conditions | None:

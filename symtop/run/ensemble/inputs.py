@@ -18,6 +18,7 @@ from symtop.model.charts import BODY, Array
 from symtop.model.exact.closed_form import checked_numbers
 from symtop.model.scenes import OBSERVABLES, Scene, scene
 from symtop.model.top import NUMBERS, flat
+from symtop.run.trajectory import column
 
 TOP = dict.fromkeys(NUMBERS, 1)
 NEEDED = {"nine": NUMBERS[:4], "14": ("I1", "I2", "I3", "omega_body")}  # required variables; others default to 0 or to
@@ -81,17 +82,17 @@ def _from_dataset(data: xr.Dataset) -> Members:
         raise SymtopError("members must be at least one")
     columns = []
     for name, width in parts.items():
-        column = np.broadcast_to(np.reshape(DEFAULTS.get(name, 0.0), (1, -1)), (n, width))
+        part = np.broadcast_to(np.reshape(DEFAULTS.get(name, 0.0), (1, -1)), (n, width))
         if name in data:
-            values, vector = data[name], width > 1
+            values, vector = column(data, name), width > 1
             axes = values.dims[:-1] if vector else values.dims
             fits = not vector or values.shape[-1:] == (width,)
             if axes not in ((), ("member",)) or values.dtype.kind not in "fiu" or not fits:
                 actual = f"{values.dtype} {values.shape} over {', '.join(map(str, values.dims)) or 'nothing'}"
                 required = f"rows of {width} numbers" if vector else "numbers"
                 raise SymtopError(f"{name} of members must be {required} over member, or one for all, not {actual}")
-            column = np.broadcast_to(values.to_numpy().reshape(-1, width), (n, width))
-        columns.append(column)
+            part = np.broadcast_to(values.to_numpy().reshape(-1, width), (n, width))
+        columns.append(part)
     numbers = np.concatenate(columns, axis=1, dtype=float)
     _check_names(data, parts)
     label_names = [name for name in ("scene", "stratum") if name in data]

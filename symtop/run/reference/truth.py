@@ -151,7 +151,7 @@ def _motion(body: RigidBody, start: Attitude) -> FreeBody | HeavyBody:
 
 @functools.lru_cache(maxsize=16)
 def body_samples(name: str, body: RigidBody, start: Attitude, plain: bytes, precise: bool) -> BodyMotion:
-    """The motion of a body at the times with the bytes `plain`, cached; SymtopError if its reference ends before."""
+    """The motion of a body at times with the bytes `plain`, cached, not to change; SymtopError if it ends before."""
     motion, times = _motion(body, start), np.frombuffer(plain).copy()
     sample = motion.samples if body.free else functools.partial(motion.samples, precise=precise)  # type: ignore[call-arg]
     if not np.isfinite((result := sample(times)).bound).all():  # `known` does not depend on `times`
@@ -183,7 +183,7 @@ def _of_body(scene: Scene, times: Array, precision: str, certify: str | None) ->
     words = "256 times the distance of two integrations, of a body whose mgl times centre is rounded to doubles"
     words = "from the arithmetic of the exact motion of a free body" if body.free else words
     attributes = {"scene": scene.name, "precision": source, "asked_for": precision, "bound": words}
-    return netcdf.describe(data, f"reference motion of {scene.name}", scene.units, **attributes)
+    return netcdf.describe(data.copy(deep=True), f"reference motion of {scene.name}", scene.units, **attributes)
 
 
 def _by_closed_form(scene: Scene, times: Array, certify: str | None) -> tuple[xr.Dataset, dict[str, str]]:
