@@ -97,6 +97,13 @@ def boolean(name: str, value: object) -> bool:
     raise SymtopError(f"{name} must be True or False, not {shown(value)}", name)
 
 
+def function(name: str, value: Any) -> Any:
+    """A callable; SymtopError otherwise."""
+    if not callable(value):
+        raise SymtopError(f"{name} must be a function, not {shown(value)}", name)
+    return value
+
+
 def file_path(name: str, value: object) -> Path:
     """Return an output's name as a path, ``~`` the user's folder; refuse what can name none, or is in no folder."""
     if isinstance(value, (str, os.PathLike)):

@@ -31,7 +31,7 @@ import numpy as np
 import xarray as xr
 
 from symtop.core import netcdf
-from symtop.core.errors import SymtopError, at_home, boolean, one_of, shown, whole
+from symtop.core.errors import SymtopError, at_home, boolean, function, one_of, shown, whole
 from symtop.judging.adapters.adapter import Stepper, heartbeat, integrator
 from symtop.judging.adapters.python_step import CONJUGATE
 from symtop.judging.battery import measure, stages, unmeasured
@@ -113,7 +113,7 @@ def judge(
         raise SymtopError(f"energy must be 'kept', 'bounded' or None, not {shown(energy)}", "energy")
     file = isinstance(target, (str, Path)) and str(target).lower().endswith(FILES)
     states = form is None and (file or isinstance(target, (xr.Dataset, Mapping)))
-    problem, emit = find_scene(scene, bodies=True), tell or (lambda _: None)
+    problem, emit = find_scene(scene, bodies=True), function("tell", (lambda _: None) if tell is None else tell)
     for name, flag in (("adaptive", adaptive), ("autonomous", autonomous), ("quick", quick)):
         boolean(name, flag)
     seed = secrets.randbelow(SEEDS) if seed is None else whole("seed", seed, 0, SEEDS)
@@ -253,6 +253,7 @@ def _refuse_contradiction(states: Trajectory, scene: Scene) -> None:
         raise SymtopError(f"{rule} the axis is {gap[k]:.2g} rad from that of the quaternion")
 
 
+@np.errstate(invalid="ignore")  # L may be infinite
 def _from_states(scene: Scene, states: Trajectory) -> dict[str, np.ndarray]:
     """Energy and momenta from the angular momentum and the attitude; empty if one of these is missing."""
     axis, L, q = states.axis, states.momentum, states.quaternion
@@ -310,7 +311,7 @@ def _constant(
     if finding.verdict != "refuted" and time.size < FEWEST_SAMPLES and np.ptp(time) < scene.time_scale():
         words = f"fewer than {FEWEST_SAMPLES}, over less than a {scene.period_word}, say nothing"
         finding = undecided(name, declared, f"{finding.why}; {words}")
-    indices = blows_up(scene, (values - values[0]) / scale) if name == "energy" else np.empty(0)
+    indices = blows_up(scene, (values - values[0]) / scale) if name == "energy" else np.flatnonzero(np.isinf(values))
     return blow_up_finding(finding, time[indices[0]], scene.of_body) if indices.size else finding
 
 

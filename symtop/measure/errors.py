@@ -124,7 +124,7 @@ def _of_run(run: Any, scene: Any, precision: str, warn: Callable[[str], object])
     run = unpadded(run) if isinstance(run, xr.Dataset) else run
     problem = scene_of(run) if scene is None else find_scene(scene, bodies=True)
     refuse_other_scene(run, problem)
-    data = checked(run) if foreign else Trajectory.of_data(run)
+    data = checked(run) if foreign or "time" not in run else Trajectory.of_data(run)
     truth = reference(problem, data.time, precision)
     check_shapes({name: values for name in SHAPES if (values := getattr(data, name)) is not None}, data.time.size)
     if foreign and data.quaternion is not None:

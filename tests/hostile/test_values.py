@@ -57,7 +57,7 @@ ANY = [
 ]  # fmt: skip
 RUN = symtop.simulate("spheroid", "strang", step_size=0.01, horizon=0.5, samples=11)
 NO_TIMES = [{"time": [0.0]}, {"time": "x", "theta": [1.0]}, xr.Dataset(), {"axis": [[0, 0, 1.0]]}]
-NOT_DATA = [None, 3, "x", [], {}, object(), *NO_TIMES]
+NOT_DATA = [None, 3, "x", [], {}, object(), *NO_TIMES, RUN.rename(time="t")]
 NAMED = [value for value in UNKNOWN if isinstance(value, np.ndarray) or value]  # where None or "" asks for the default
 NO_NUMBER = [value for value in NOT_POSITIVE if not isinstance(value, np.ndarray | list)]
 SMALL = symtop.population(3, seed=1)
@@ -138,7 +138,7 @@ CALLS = {  # a function, good arguments, names of those of which the usual value
         {"members": SMALL, "integrator": "strang", "step_size": 0.05, "horizon": 0.2, "samples": 3, "quiet": True},
         "integrator samples observe threads",
         {"members": [*NOT_DATA[:4], xr.Dataset({"I1": 1.0}), [symtop.scene("spheroid"), 3], SMALL.to_dataframe()],
-         "step_size": NO_NUMBER, "horizon": NO_NUMBER[1:]}),
+         "step_size": NO_NUMBER, "horizon": NO_NUMBER[1:], "added": [None, 3, "x", {}]}),
     "sweep": (symtop.sweep,
         {"scenes": "spheroid", "integrators": "strang", "step_size": [0.05], "horizon": 0.2, "quiet": True},
         "scenes integrators", {"step_size": ["x", [0.0], [-1.0], [math.nan], object()]}),
@@ -152,7 +152,7 @@ CALLS = {  # a function, good arguments, names of those of which the usual value
     "plot": (symtop.plot, {"data": RUN}, "quantity", {"data": NOT_DATA, "ax": ["axis", 3, [], object()]}),
     "ClosedForm": (symtop.ClosedForm, {"top": TOP, "start": START}, "top start", {}),
     "judge": (symtop.judge, {"target": lambda f, t, y, h: y, "quick": True}, "chart scene order",
-        {"form": NAMED, "energy": [*UNKNOWN[1:], np.array([1.0, 2.0])],
+        {"form": NAMED, "energy": [*UNKNOWN[1:], np.array([1.0, 2.0])], "tell": [3, "x", [], False],
          "conserves": ["energy", np.array(1.0), np.array([1.0]), np.array(["x"]), [10**400], {"x": 1}, 3]}),
     "judge of nothing": (symtop.judge,
         {"target": "no-such-file.py:step", "form": "ode", "conserves": ["energy"], "energy": "kept", "quick": True},

@@ -233,10 +233,11 @@ def blows_up(scene: Scene, change: Array) -> NDArray[np.int64]:
 
 
 def blow_up_finding(finding: Finding, time: float, of_body: bool, steps: str = "") -> Finding:
-    """The finding on the energy of a run that blows up at `time`."""
+    """The finding on the energy of a run that blows up at `time`, or on a momentum that is infinite then."""
     measured, when = Reading("blows up", finding.value, f"blows up at t = {time:.3g}{steps}"), f"by t = {time:.3g}"
     limit = "the kinetic one of the start and 3 |mgl|" if of_body else "that of the nutation and 2 |mgl|"
-    why = f"{when} it rises by more than {limit}; before: {finding.why}"
+    rise = f"rises by more than {limit}" if finding.claim == "energy" else "is infinite"
+    why = f"{when} it {rise}; before: {finding.why}"
     return finding._replace(measured=measured, verdict="refuted" if finding.declared else "measured", why=why)
 
 

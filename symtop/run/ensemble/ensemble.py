@@ -89,7 +89,7 @@ def ensemble(
     Raises SymtopError for invalid arguments, for members that are no top or no start, by number, and for a path to
     which another process is writing.
     """
-    record, method = read_members(members), find_integrator(integrator)
+    record, method, _ = read_members(members), find_integrator(integrator), errors.function("added", added)
     count, silent = whole("samples", samples, 2, MOST_SAMPLES), boolean("quiet", quiet)
     workers = cores() if threads is None else whole("threads", threads, 1, MOST_THREADS)
     chart = chart_of(method, record.observes, observe)
