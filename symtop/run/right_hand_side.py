@@ -38,6 +38,7 @@ TIGHTEST, LOOSEST = 2.3e-14, 0.1  # tolerances: the least of SciPy's solvers, th
 DISTANCES, MOST_DISTANCE = (1e-7, 1e-10), 1e-2  # of two motions, at first and at most, over their extent
 UNSTABLE_GROWTH, STIFF_RATIO = 10.0, 20.0  # of A in the second half of a run; of rates of a stiff f
 OWN = 10.0  # the steps of a piece multiply a change by this much more than the motion; less is a transient
+SHORT_FLOATS = ("float32", "float16", "bfloat16")
 COMPARED_FROM, FADED_SHARE = 1e-7, 0.1  # where comparison of a piece begins; part of the largest error that has faded
 
 
@@ -83,7 +84,10 @@ def guard(
         raise SymtopError(f"step_size must be at most the horizon {end!r}, not {setting!r}", "step_size")
 
     def rate(t: float, y: Array) -> Array:  # t counts from t0: near 1e9 doubles are 1e-7 apart
-        value = real_numbers("what f returns", f(begin + t, y.copy())).copy()  # f may change y or reuse its result
+        slope = f(begin + t, y.copy())  # f may change y or reuse its result
+        if str(getattr(slope, "dtype", "")).removeprefix("torch.") in SHORT_FLOATS:
+            raise SymtopError(f"f must return doubles, not {slope.dtype}: the run is compared at {FINE_TOLERANCE:g}")
+        value = real_numbers("what f returns", slope).copy()
         if value.shape != start.shape:
             raise SymtopError(f"f must return {start.size} numbers, not an array of shape {value.shape}")
         return value

@@ -184,8 +184,7 @@ def test_times_are_those_of_runs_that_ended_well_and_are_kept(tmp_path):
     method, arguments = symtop.Integrator("both", "other", "", solvers), options | {"path": None, "observe": "axis"}
     assert symtop.sweep("spheroid", method, **arguments)["seconds"].values[0, 0, 0] > 0.0
     data = symtop.sweep(["spheroid", "goldstein"], "rk4", step_size=0.1, quiet=True)
-    ends = {name: symtop.scene(name).horizon for name in data["scene"].values}
-    assert json.loads(data.attrs["horizon"]) == ends
+    assert json.loads(data.attrs["horizon"]) == {name: symtop.scene(name).horizon for name in data["scene"].values}
     assert ("seconds" in data, data.attrs["timed"][:7]) == (False, "nothing")
     with pytest.raises(symtop.SymtopError, match="timed must be"):
         symtop.sweep("spheroid", "rk4", step_size=0.1, timed="yes")
