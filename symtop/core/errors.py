@@ -108,8 +108,8 @@ def file_path(name: str, value: object) -> Path:
     """Return an output's name as a path, ``~`` the user's folder; refuse what can name none, or is in no folder."""
     if isinstance(value, (str, os.PathLike)):
         path = at_home(value)
-        with contextlib.suppress(UnicodeEncodeError):  # half a letter
-            longest = max(len(os.fsencode(part)) for part in (path.name, *path.parts))
+        with contextlib.suppress(UnicodeEncodeError):  # half a letter, or a byte that is none: netCDF takes neither
+            longest = max(len(part.encode()) for part in (path.name, *path.parts))
             if path.name and "\0" not in str(path) and longest <= LONGEST_PART:
                 if Path(os.path.realpath(path)).parent.is_dir():
                     return path

@@ -44,7 +44,7 @@ OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --bod
     ("run spheroid rk4 --step-size 0.1 --output a.png --figure ./a.png", ["--output and --figure", "two files"]),
     ("run spheroid strang --step-size 0.01 --output ..", ["--output must be a file, not the folder '..'"]),
     ("run spheroid strang --step-size 0.01 --figure ../x.png", ["--figure must be a file, not the folder"]),
-    ("long spheroid strang --steps 1e12 --output ..", ["--output must be a file, not the folder"]),
+    ("long spheroid strang -o ..", ["file, not the folder"]), ("run spheroid rk4 -o \udcff.nc", ["'\\udcff"]),
     ("ensemble strang --members 1000000 --figure ../x.png", ["--figure must be a file, not the folder"]),
     ("recommend spheroid --accuracy 1 --step-size 1 --per-nutation 9", ["--step-size", "not both"]),
     ("study convergense", ["'convergense'", "convergence"]), ("study", ["name a study", "--all", "convergence"]),
