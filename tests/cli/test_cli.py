@@ -84,9 +84,7 @@ def test_a_plugin_that_registers_nothing_is_told_of(tmp_path):
     (["claims", "strang", "--quick"], "symtop.judging.judge_step.judge_separately"),
 ])  # fmt: skip
 def test_ctrl_c_is_neither_a_failed_case_nor_bad_input(words, called, monkeypatch):
-    def interrupts(*_, **__):
-        os.kill(os.getpid(), signal.SIGINT)
-
+    interrupts = lambda *_, **__: os.kill(os.getpid(), signal.SIGINT)
     raises = Mock(side_effect=symtop.SymtopError("of its own"))
     for function, code, message in ((interrupts, 130, "interrupted"), (raises, 2, "of its own")):
         monkeypatch.setattr(called, function)
