@@ -62,7 +62,7 @@ def judge(
     "./engine -x"   with --form program: a line of numbers in, states out; with --form
                     server it is started once, answers line after line, and ends
                     each answer with an empty line
-    run.csv         a trajectory without a method: time and states (see symtop.judging.judge_step)
+    run.csv         a trajectory without a method: names, as time,qw,qx,qy,qz or time,ex,ey,ez, then numbers
 
     Without a claim it says what the method is. The exit code is 1 if a claim is refuted.
 

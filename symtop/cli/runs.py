@@ -301,7 +301,7 @@ def ensemble(
         click.echo(as_text({"outcomes": outcomes, "steps": steps, "largest_errors": errors}))
     else:
         counts = ", ".join(f"{count} {OUTCOME.get(name, name)}" for name, count in outcomes.items())
-        say(f"{data.attrs['integrator']} on {so_many(members, noun)}: {counts}")
+        say(f"{data.attrs['integrator'].split('[')[0]}[{data.attrs['chart']}] on {so_many(members, noun)}: {counts}")
         say(counted(steps, "step") + EXECUTION.get(data.attrs["execution"], ""))
         heading = [f"largest error, {so_many(min(members, cap), noun)}", *(f"{100.0 * level:g} %" for level in LEVELS)]
         if worst:

@@ -108,8 +108,8 @@ def file_path(name: str, value: object) -> Path:
     """Return an output's name as a path, ``~`` the user's folder; refuse what can name none, or is in no folder."""
     if isinstance(value, (str, os.PathLike)):
         path = at_home(value)
-        with contextlib.suppress(UnicodeEncodeError):  # half a letter
-            longest = max(len(os.fsencode(part)) for part in (path.name, *path.parts))
+        with contextlib.suppress(UnicodeEncodeError):  # half a letter, or a byte that is none: netCDF takes neither
+            longest = max(len(part.encode()) for part in (path.name, *path.parts))
             if path.name and "\0" not in str(path) and longest <= LONGEST_PART:
                 if Path(os.path.realpath(path)).parent.is_dir():
                     return path
@@ -208,6 +208,9 @@ def foreign_code(what: str, kind: type[SymtopError] = SymtopError) -> Iterator[N
     try:
         yield
     except BaseException as error:
+        cause = error.__cause__ if isinstance(error, SystemError) else None  # a signal, as compiled code returned
+        if cause is not None and is_of_user(cause):
+            raise cause from None
         if isinstance(error, kind) or is_of_user(error):
             raise
         raise kind(f"{what} failed: {error if isinstance(error, SymtopError) else words_of(error)}") from error

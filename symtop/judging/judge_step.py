@@ -280,8 +280,8 @@ def _error(name: str, scene: Scene, time: np.ndarray, deviation: xr.Dataset) -> 
     if growth is not None and math.isfinite(growth.exponent):
         why += f", growing as t^{growth.exponent:.2f} +- {growth.exponent_interval:.2f} ({growth.law})"
     law = growth.law if growth is not None and growth.law not in ("undecided", "not judged") else ""
-    measured = Reading(law, largest, text=f"{largest:.0e}{unit}{law and ', '}{law}{note}")
-    return Finding(f"{name}_error", "", measured, "measured", why, largest, bound)
+    text = f"{largest:.0e}{unit} to t = {time[-1]:.4g}{scene.second}{law and ', '}{law}{note}"
+    return Finding(f"{name}_error", "", Reading(law, largest, text=text), "measured", why, largest, bound)
 
 
 def _constant(

@@ -27,7 +27,7 @@ def test_the_file_and_the_figure_are_those_of_the_ensemble(tmp_path, monkeypatch
         call(*words, code=130)
     assert path.read_bytes() == content  # nothing is added to what is in its place
     result = call(*words, "--figure", figure)  # runs them again, into the same file
-    assert "strang on 50 tops: 50 reached the horizon" in result.output
+    assert "strang[axis] on 50 tops: 50 reached the horizon" in result.output
     tops = symtop.population(50, seed=3)
     expected = symtop.ensemble(tops, "strang", per_nutation=30, nutations=2, samples=21, quiet=True)
     with xr.open_dataset(path) as data:

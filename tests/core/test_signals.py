@@ -12,6 +12,7 @@ from numba.core.registry import cpu_target
 from xarray.backends.locks import HDF5_LOCK
 
 from symtop.core import jit, netcdf
+from symtop.core.errors import foreign_code
 from symtop.core.signals import InterruptedByUser, TerminatedError, at_most, deferred, ending_on_sigterm, told_apart
 
 
@@ -95,11 +96,13 @@ def test_a_request_is_heard_once_at_the_end_of_the_outermost_block(number, heari
     assert events == ["inner", "outer"]
 
 
-def test_ctrl_c_is_heard_while_llvm_calls_back(monkeypatch):
+def test_ctrl_c_is_heard_while_llvm_calls_back_and_as_a_kernel_returns(monkeypatch):
     engine, once = cpu_target.target_context.codegen()._engine._ee, iter([signal.SIGINT])
     monkeypatch.setattr(engine, "_object_cache_notify", lambda *_: any(map(signal.raise_signal, once)))
     with told_apart(), pytest.raises(InterruptedByUser):
         jit.lean_probe.__wrapped__(), [time.sleep(0.01) for _ in range(500)]
+    with told_apart(), pytest.raises(InterruptedByUser), foreign_code("a kernel"):  # as numba converts its result
+        raise SystemError from InterruptedByUser()
 
 
 def test_two_requests_are_both_heard_and_a_limit_inside_another_leaves_that_one_running(default_handlers):
@@ -122,7 +125,6 @@ def test_handlers_are_left_as_they_were_and_threads_are_left_alone():
     with deferred():
         assert signal.getsignal(signal.SIGTERM) == before[1] == signal.SIG_DFL  # it ends the process, then as now
         assert signal.getsignal(signal.SIGINT) != before[0]
-    thread = threading.Thread(target=other)
-    thread.start()
+    (thread := threading.Thread(target=other)).start()
     thread.join()
     assert handlers() == before == inside[0]

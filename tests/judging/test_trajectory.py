@@ -140,8 +140,7 @@ def test_csv_netcdf_mappings_and_blanks_are_the_same_and_utf_16_is_told(table, t
 
 
 def test_columns_are_read_by_their_labels_and_lost_samples_are_said_to_be_lost(table):
-    time = table[:, 0]
-    error = symtop.judge({"time": time, "axis": table[:, 1:4]})["axis_error"]
+    error = symtop.judge({"time": (time := table[:, 0]), "axis": table[:, 1:4]})["axis_error"]
     data = xr.Dataset({"axis": (("time", "component"), table[:, 3:0:-1])}, {"time": time, "component": ["z", "y", "x"]})
     assert symtop.judge(data)["axis_error"].value == symtop.judge(data.transpose())["axis_error"].value == error.value
     energy = np.ma.masked_greater(np.where(np.arange(time.size) == 7, 1e20, 1.0), 1.0)
@@ -149,7 +148,8 @@ def test_columns_are_read_by_their_labels_and_lost_samples_are_said_to_be_lost(t
     with pytest.warns(symtop.SymtopWarning, match="is not a number from"):
         ledger = symtop.judge(columns, conserves=["energy"])
     assert ledger["energy"].verdict == "confirmed"
-    assert f"{(time > 4.0).sum()} of {time.size} samples lost" in str(ledger["axis_error"].measured)
+    assert f" rad to t = {time[time <= 4.0][-1]:.4g} s" in (words := str(ledger["axis_error"].measured))
+    assert f"{(time > 4.0).sum()} of {time.size} samples lost" in words
 
 
 def test_an_axis_that_contradicts_its_quaternion_is_refused_and_one_of_few_digits_is_not(tmp_path):
