@@ -160,8 +160,7 @@ def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> s
     """The verdict of a measured slope on a declared order; every study uses this rule.
 
     confirmed   the interval, widened by `CONFIRMED_BEYOND`, contains the declared order
-    refuted     the declared order is more than `REFUTED_BEYOND` outside the interval, or as far above that of one of
-    `others`
+    refuted     the declared order is more than `REFUTED_BEYOND` outside the interval, or one of `others` is `slower`
                 (the same method's slopes in other quantities; a faster fall of those may be chance)
     undecided   the slope lies between, or could not be measured
     measured    nothing is declared
@@ -171,10 +170,14 @@ def order_verdict(claim: int | None, main: Fit, others: Iterable[Fit] = ()) -> s
     if claim is None:
         return "measured"
     distance = abs(main.slope - claim) - main.interval
-    lower = any(fit.slope + fit.interval < claim - REFUTED_BEYOND for fit in others)
-    if distance > REFUTED_BEYOND or lower:
+    if distance > REFUTED_BEYOND or slower(others, claim):
         return "refuted"
     return "confirmed" if distance <= CONFIRMED_BEYOND else "undecided"
+
+
+def slower(fits: Iterable[Fit], claim: int) -> bool:
+    """Does one error certainly fall slower than h^claim? One that grows as h falls is rounding: of a kept energy."""
+    return any(0.0 < fit.slope + fit.interval < claim - REFUTED_BEYOND for fit in fits)
 
 
 def _widest_fit(h: Array, e: Array, b: Array, power: int) -> tuple[float, float, float, slice] | None:

@@ -46,7 +46,15 @@ from symtop.judging.claims.structure import ONE_MAP, map_of
 from symtop.judging.claims.subject import FINEST_RUN, QUICK_SHARE, Subject, hidden_by_single
 from symtop.judging.findings import UNMEASURED, Finding, Reading, inapplicable, undecided, yes_no
 from symtop.measure.accuracy import error_table
-from symtop.measure.order import CONFIRMED_BEYOND, LARGEST_ERROR, REFUTED_BEYOND, Fit, order_verdict, wrong_limit
+from symtop.measure.order import (
+    CONFIRMED_BEYOND,
+    LARGEST_ERROR,
+    REFUTED_BEYOND,
+    Fit,
+    order_verdict,
+    slower,
+    wrong_limit,
+)
 from symtop.measure.order_table import observable, order_fit, order_table
 from symtop.measure.settings import ladder
 from symtop.measure.step_map import APART, SEVERAL, StepMap, aligned, generic_start, one_step, restart_gap, unit_of
@@ -333,7 +341,7 @@ def _declared(power: int, order: Order, fits: Collection[Fit], series: Series | 
         floor = series.least(power + 1) if power + 1 < series.noise.size else math.inf
         next_defect = float(series.defect[power + 2]) if series.is_exact and series.order == power + 1 else 0.0
     sharp = floor <= max(SHARP_DEFECT, SHARE_OF_NEXT * next_defect)
-    lower = any(fit.slope + fit.interval < power - REFUTED_BEYOND for fit in fits)
+    lower = bool(fits) and (main.slope + main.interval < power - REFUTED_BEYOND or slower(fits, power))
     if series is not None and agrees and verdict != "confirmed" and not lower and (measured or _agree(order, power)):
         why = f"{why} ({main.reason or 'at steps too long for a slope'})"
         defect = series.worst(power), series.least(power)
