@@ -52,8 +52,9 @@ REASONS = {
 }
 DIGITS_ERROR = 1e-40  # relative, of constants from 40 digits
 
-# seconds: interpreted, a form 5e-4 and a sample 1e-5; compiling 10 s and 2 s of processor time, loading 0.3 s
-_build = LazyKernel(all_constants, "(float64[:, ::1], float64[:, ::1])", patience=10.0)
+# seconds: interpreted, a form 5e-4 and a sample 1e-5; compiling 10 s and 2 s of processor time, loading 0.3 s; who
+# makes 5000 forms makes them again in another process, so that there is less patience than compiling takes
+_build = LazyKernel(all_constants, "(float64[:, ::1], float64[:, ::1])", patience=2.5)
 _fill = LazyKernel(samples.all_samples, "(float64[:, ::1], float64[:, ::1], int64, float64[:, :, ::1])", patience=2.0)
 _compare = LazyKernel(
     samples.all_gaps, "(float64[:, ::1], float64[:, ::1], float64[:, :, ::1], float64[:, ::1])", patience=2.0
