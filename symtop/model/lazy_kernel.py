@@ -3,7 +3,7 @@
 A process that needs few numbers should neither import numba nor compile. `LazyKernel` adds up the seconds of
 interpreting. It changes to the compiled function after `LOADING` seconds if the kernel is in the cache (`IMPORTING`
 more if numba is not imported, half of the time of the import), or after `patience` seconds, at most those of compiling,
-if it is not. If the cache holds its bitcode only, `GENERATING` times `patience` is enough, and the machine code is stored.
+if it is not. If the cache holds its bitcode only, `GENERATING` times `patience` is enough; the machine code is stored.
 Results are the same either way, as the function keeps the rules of `symtop.core.jit_functions`.
 """
 
