@@ -32,9 +32,9 @@ def measure(case: Case) -> xr.Dataset:
     """The findings on one integrator, in every chart that it works in."""
     if case.integrator in planted.LIES:
         return planted.measured(case)
-    where = scene(case.scene, bodies=True)
-    data = judge(integrator(case.integrator), where, quick=case.settings["quick"]).dataset().assign(chart="every")
-    if where.of_body:  # a body has other claims: put each in its place among all
+    problem = scene(case.scene, bodies=True)
+    data = judge(integrator(case.integrator), problem, quick=case.settings["quick"]).dataset().assign(chart="every")
+    if problem.of_body:  # a body has other claims: put each in its place among all
         blank = {name: "" for name, column in data.data_vars.items() if column.dtype.kind == "U"}
         data = data.reindex(claim=facts.EVERY, fill_value=blank).assign(chart=BODY)
     return data

@@ -105,8 +105,8 @@ def _full_record(method: "Integrator") -> Record:
     if method.conserves and BODY in method.solvers:
         record["conserves"] += " of a top"  # on a body Gauss methods do not keep p_phi, Lie-group methods do
     if method.conserves is not None and len(integrator(method.method).charts()) > 1:
-        where = "in every chart" if method.conserves else "common to all charts"  # a chart may have more
-        record["conserves"] += f" {where} of {method.method}"
+        scope = "in every chart" if method.conserves else "common to all charts"  # a chart may have more
+        record["conserves"] += f" {scope} of {method.method}"
     if method.default_tolerance is not None:
         record["default tolerance"] = f"{method.default_tolerance:g}"
     if method.least_tolerance > 0.0:

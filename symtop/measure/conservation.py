@@ -206,8 +206,8 @@ def from_increments(method: Integrator, scene: Scene, plan: Plan) -> Difference 
         hidden = abs(excess.rise) > max(LEAST_DRIFT, HIDDEN_SHARE * abs(total.rise) / scene.momentum_scale)
         sizes[name] = abs(excess.rise) if hidden and abs(excess.slope) > SURE_WIDTHS * excess.interval else 0.0
     name = max(sizes, key=lambda name: sizes[name])
-    where = f"more at the end of {int(sparse.marks[-1])} steps than at their start"
-    return Difference(name, sizes[name], LEAST_DRIFT, where)
+    detail = f"more at the end of {int(sparse.marks[-1])} steps than at their start"
+    return Difference(name, sizes[name], LEAST_DRIFT, detail)
 
 
 def momenta_of(top: SymmetricTop, around: Array, h: float) -> tuple[Array, Array]:

@@ -307,13 +307,13 @@ def checked(data: xr.Dataset | Mapping[str, Any]) -> Trajectory:
             invalid[first] |= np.abs(length[first] - 1.0) > LENGTH_OFF
             if invalid.any():
                 rule = f"of length 1, at first within {LENGTH_OFF:g}, and later of any above 0"
-                where = f"{length[np.argmax(invalid)]:.6g} at t = {time[np.argmax(invalid)]:.6g}"
-                raise SymtopError(f"{name} must be {rule}, but its length is {where}")
+                sample_words = f"{length[np.argmax(invalid)]:.6g} at t = {time[np.argmax(invalid)]:.6g}"
+                raise SymtopError(f"{name} must be {rule}, but its length is {sample_words}")
             columns[name] = columns[name] / length[:, None]
     theta = columns.get("theta", np.zeros(1))
     if (outside := (theta < 0.0) | (theta > float(np.float32(np.pi)))).any():  # float32(pi) > pi
-        where = f"{theta[np.argmax(outside)]:.6g} at t = {time[np.argmax(outside)]:.6g}"
-        raise SymtopError(f"theta must be radians from the vertical in [0, pi], but it is {where}")
+        sample_words = f"{theta[np.argmax(outside)]:.6g} at t = {time[np.argmax(outside)]:.6g}"
+        raise SymtopError(f"theta must be radians from the vertical in [0, pi], but it is {sample_words}")
     return Trajectory(time, **columns)
 
 
@@ -360,17 +360,17 @@ def refuse_other_order(quaternion: charts.Array, truth: xr.Dataset) -> None:
     sample, k = quaternion[far[0]], far[0]
     for form, q in (("x, y, z, w", np.roll(sample, 1)), ("from space to body", sample * [1.0, -1.0, -1.0, -1.0])):
         if float(charts.attitude_distance(q, true[k])) < RIGHT_WITHIN:
-            where = "first sample" if k == 0 else f"sample at t = {truth.time.values[k]:.6g}"
+            sample_words = "first sample" if k == 0 else f"sample at t = {truth.time.values[k]:.6g}"
             rule = "quaternion must be in the order w, x, y, z and from body to space"
-            raise SymtopError(f"{rule}, but its {where} is the true one if it is read as {form}")
+            raise SymtopError(f"{rule}, but its {sample_words} is the true one if it is read as {form}")
 
 
 def start_warnings(time: charts.Array, errors: Mapping[str, charts.Array]) -> list[str]:
     """A warning if the first sample of a trajectory is far from the true motion, as a list of at most one sentence."""
     for name in ("attitude", "axis", "theta"):
         if name in errors and errors[name][0] > WRONG_BEYOND:
-            where = f"at t = {time[0]:.6g}, is {errors[name][0]:.2g} rad from the true {name}"
-            return [f"the first sample, {where}: is this the start of the scene, and is its time counted from there?"]
+            offset = f"at t = {time[0]:.6g}, is {errors[name][0]:.2g} rad from the true {name}"
+            return [f"the first sample, {offset}: is this the start of the scene, and is its time counted from there?"]
     return []
 
 

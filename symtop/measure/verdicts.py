@@ -89,8 +89,8 @@ def judgement(scene: Scene, run: xr.Dataset, axis_error: np.ndarray) -> Judgemen
         sentence = f"at t = {times[first]:.6g}{scene.second} {sentence}"
     elif not (second_half <= DRIFT_ERROR or second_half <= GROWING_RATIO * first_half):
         word, first = "drifting", int(np.argmax(~(energy <= DRIFT_ERROR)))
-        where = f"{times[first]:.6g}{scene.second}"
-        sentence = f"the energy error passed {DRIFT_ERROR:.0%} at t = {where} and grew on, to {energy.max():.2g}"
+        time_words = f"{times[first]:.6g}{scene.second}"
+        sentence = f"the energy error passed {DRIFT_ERROR:.0%} at t = {time_words} and grew on, to {energy.max():.2g}"
     else:
         word, first, energies = "bounded_but_wrong", int(np.argmax(~(axis_error <= accurate))), "stayed within {}"
         if second_half > max(GROWING_RATIO * first_half, ROUNDING * scene.energy_grain):

@@ -106,9 +106,9 @@ def rendered(template: str | None, name: str, context: Mapping[str, Any]) -> str
     except (TemplateError, TypeError, ValueError, LookupError, ArithmeticError) as error:
         frames = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == "<template>"]
         lines = [getattr(error, "lineno", None), *frames[::-1]]
-        where = f", line {line}" if (line := next(filter(None, lines), None)) else ""
+        line_words = f", line {line}" if (line := next(filter(None, lines), None)) else ""
         words = str(error).replace("'types.SimpleNamespace object' has no attribute", "there is no fact")
-        raise SymtopError(f"{name}{where}: {words}") from error
+        raise SymtopError(f"{name}{line_words}: {words}") from error
     return "\n\n".join(map(_unwrapped, re.split(r"\n{2,}", text.strip()))) + "\n"
 
 

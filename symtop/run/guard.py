@@ -382,8 +382,8 @@ def _instability(scene: Scene, method: Integrator, chart: str, plan: Plan, expec
         while high - low > 1e-3 * high:
             middle = 0.5 * (low + high)
             low, high = (middle, high) if stable(middle) else (low, middle)
-        where = f"at a step of {step:.4g}, the method is stable up to {low:.4g} (h omega = {low * frequency:.3f})"
-        words, proposal = f"small nutations (frequency {frequency:.4g}) grow {where}", 0.5 * low
+        stability = f"at a step of {step:.4g}, the method is stable up to {low:.4g} (h omega = {low * frequency:.3f})"
+        words, proposal = f"small nutations (frequency {frequency:.4g}) grow {stability}", 0.5 * low
     else:
         words = f"small nutations (frequency {frequency:.4g}) of {size:.1g} rad grow by {growth.factor - 1.0:.1g} of "
         words += f"themselves in each of {steps:.3g} steps"

@@ -61,10 +61,10 @@ def load(path: str | Path) -> list[str]:
         execute(f"symtop_plugin_{file.stem}_{hashed(str(file))[:8]}", file)
     except BaseException as error:
         lines = [frame.lineno for frame in traceback.extract_tb(error.__traceback__) if frame.filename == str(file)]
-        where = f"plugin {file.name}, line {lines[-1]}" if lines else f"plugin {file.name}"
+        source = f"plugin {file.name}, line {lines[-1]}" if lines else f"plugin {file.name}"
         if isinstance(error, SymtopError):  # without its argument's name, which is no option of a command
-            raise SymtopError(f"{where}: {error}") from error
-        with foreign_code(where):
+            raise SymtopError(f"{source}: {error}") from error
+        with foreign_code(source):
             raise
     entries = (*integrators().items(), *scenes().items(), *body_scenes().items())
     _loaded[file] = [name for name, entry in entries if not any(entry is record for record in before)]

@@ -112,9 +112,9 @@ class Subject:
                     return
                 stepper.since = 0.0 if k % 2 else scene.time_scale() * 10.0 ** rng.uniform(0.0, 3.0)
                 rates, (I1, I3, mgl) = scene.start, (scene.top.I1, scene.top.I3, scene.top.mgl)
-                where = f"theta {rates.theta:.3g}, rates {rates.theta_dot:.3g} {rates.phi_dot:.3g} {rates.psi_dot:.3g}"
-                where += f", I1 {I1:.3g}, I3 {I3:.3g}, mgl {mgl:.3g}" + f", t {stepper.since:.3g}" * (k % 2 == 0)
-                yield f"start {k} of seed {self.seed} ({where})", scene
+                facts = f"theta {rates.theta:.3g}, rates {rates.theta_dot:.3g} {rates.phi_dot:.3g} {rates.psi_dot:.3g}"
+                facts += f", I1 {I1:.3g}, I3 {I3:.3g}, mgl {mgl:.3g}" + f", t {stepper.since:.3g}" * (k % 2 == 0)
+                yield f"start {k} of seed {self.seed} ({facts})", scene
         finally:
             stepper.since = 0.0
 

@@ -240,18 +240,18 @@ def separable_damped(state, h, dT, dV):
     return theta, p * (1 - 1e-9 * h)
 
 
-def where(condition, worse=euler, good=rk4):
+def either(condition, worse=euler, good=rk4):
     """The worse method where the condition holds of t, y and h."""
     return lambda f, t, y, h: (worse if condition(t, y, h) else good)(f, t, y, h)
 
 
-late_euler = where(lambda t, y, h: t > 25.0)
-euler_off_the_energy = where(lambda t, y, h: not 12.0 < np.linalg.norm(y[3:]) < 16.5)  # the motion has 12.1 to 16.3
-euler_above = where(lambda t, y, h: y[2] > 0.93)
-coarse_rk2 = where(lambda t, y, h: abs(h) >= 0.01, midpoint)
-half_symmetric = where(lambda t, y, h: y[2] <= -0.2, midpoint, right.implicit_midpoint)  # the motion: -0.16 to 0.92
+late_euler = either(lambda t, y, h: t > 25.0)
+euler_off_the_energy = either(lambda t, y, h: not 12.0 < np.linalg.norm(y[3:]) < 16.5)  # the motion has 12.1 to 16.3
+euler_above = either(lambda t, y, h: y[2] > 0.93)
+coarse_rk2 = either(lambda t, y, h: abs(h) >= 0.01, midpoint)
+half_symmetric = either(lambda t, y, h: y[2] <= -0.2, midpoint, right.implicit_midpoint)  # the motion: -0.16 to 0.92
 # in a thousandth of all states, through which a run comes after 30 nutations
-euler_in_a_spot = where(lambda t, y, h: abs(math.atan2(y[1], y[0]) - 0.5) < 0.03 and abs(y[2] - math.cos(0.7)) < 0.02)
+euler_in_a_spot = either(lambda t, y, h: abs(math.atan2(y[1], y[0]) - 0.5) < 0.03 and abs(y[2] - math.cos(0.7)) < 0.02)
 
 
 def adams(f, t, y, h, before):
