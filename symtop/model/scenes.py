@@ -19,13 +19,14 @@ from symtop.model.charts import BODY, Array
 from symtop.model.exact.samples import LONGEST_TIME
 from symtop.model.top import (
     BISECTIONS,
+    LOOSE_PERIOD,
     Angles,
     SymmetricTop,
-    beside_pole,
     effective_force,
     effective_potential,
     effective_stiffness,
     flat,
+    is_loose,
     period_between,
 )
 
@@ -46,7 +47,6 @@ TAGS = {  # by which studies choose; a scene without any is in every study
 }
 STEADY_ENERGY = 1e4  # a nutation with less energy than this many rounding errors of the energy is a steady precession
 SHORTEST = 1e-100  # the least horizon, in units of time; the largest is `LONGEST_TIME`
-LOOSE_PERIOD = 1e-6  # relative: a period beside a pole that is further from the exact one is replaced by it
 NEXT_TO_POLE = 1e-9  # rad; V is not evaluated nearer to a pole, where it has a limit and 0/0
 
 
@@ -184,7 +184,7 @@ def nutation_period(top: Any, start: Any) -> float:
         return float(top.nutation_period(start))
     low, high = top.turning_cosines(start)
     period = float(period_between(top, start, low, high))
-    return float(exact_periods([flat(top, start)], [period])[0]) if beside_pole(low, high) else period
+    return float(exact_periods([flat(top, start)], [period])[0]) if is_loose(top, start, low, high) else period
 
 
 def exact_periods(numbers: Any, periods: Any) -> Array:

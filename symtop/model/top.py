@@ -127,7 +127,7 @@ NUMBERS = ("I1", "I3", "mgl", "theta", "phi", "psi", "theta_dot", "phi_dot", "ps
 MOMENT_SLACK = 1e-12  # relative tolerance of the inequalities between moments, which are given rounded
 LARGEST = 1e40  # of any parameter or rate, and one over the smallest inertia: squares of squares stay finite
 HEAVY_MOMENTUM = 128.0  # a larger momentum is counted in another unit by a series
-POLE_COSINE = 0.999  # a larger cosine is beside a pole
+LOOSE_PERIOD = 1e-6  # relative: a period whose rounding error may be larger is compared with the exact one
 BISECTIONS = 60  # of an interval of cosines at most 2 wide: to the last place
 
 
@@ -465,12 +465,6 @@ def nutation_period(top: Any, at: Any) -> float:
     return period_between(top, at, *turning_cosines(top, at))
 
 
-@inlined
-def beside_pole(low: float, high: float) -> bool:
-    """Does a turning cosine lie so near 1 or -1 that the differences in `period_between` lose their digits?"""
-    return low < -POLE_COSINE or high > POLE_COSINE
-
-
 @shared
 def period_between(top: Any, at: Any, low: float, high: float) -> float:
     """The period of a nutation between two turning cosines that are known."""
@@ -479,15 +473,52 @@ def period_between(top: Any, at: Any, low: float, high: float) -> float:
 
 
 @shared
+def is_loose(top: Any, at: Any, low: float, high: float) -> bool:
+    """May the relative rounding error of `period_between` be larger than `LOOSE_PERIOD`?
+
+    That of an AGM is at most the larger one of its arguments x and y. Both are differences of turning cosines, which
+    cancel as the top nears its separatrix.
+    """
+    cubic, start = nutation_cubic(top, at), math.cos(at.theta)
+    excess, beta, a, _ = cubic
+    (x2, y2), width, heavy = _root_gaps(cubic, start, low, high), high - low, abs(beta)
+    if not (x2 > 0.0 and y2 > 0.0):
+        return True
+    down, up = _cosine_error(cubic, start, low, width, x2), _cosine_error(cubic, start, high, width, y2)
+    rounding = 4.0 * EPSILON * (excess + a * a + 4.0 * heavy)
+    error = max((rounding + heavy * (2.0 * down + up)) / x2, (rounding + heavy * (down + 2.0 * up)) / y2)
+    return not 0.5 * error <= LOOSE_PERIOD
+
+
+@shared
+def _cosine_error(cubic: tuple[float, float, float, float], start: float, u: float, width: float, rise: float) -> float:
+    """Rounding error d of the turning cosine u, ``d (d + width) rise`` being that of the cubic beside it."""
+    excess, beta, a, b = cubic
+    square, size = 1.0 - u * u, abs(a) + abs(b)
+    terms = abs(excess + beta * (start - u)) + 2.0 * abs(b - a * u) * size + 2.0 * square * (excess + abs(beta))
+    error = (EPSILON * terms + (EPSILON * size) ** 2) / rise
+    return EPSILON + 2.0 * error / (EPSILON + width + math.sqrt(width * width + 4.0 * error))
+
+
+@inlined
+def _root_gaps(cubic: tuple[float, float, float, float], start: float, low: float, high: float) -> tuple[float, float]:
+    """beta (u3 - u1) and beta (u3 - u2), for u1 `low` and u2 `high`.
+
+    Vieta: beta (u1 + u2 + u3) = alpha + a^2, so that beta -> 0 (the free top) is not a special case.
+    """
+    excess, beta, a, _ = cubic
+    total = excess + beta * start + a * a
+    return total - beta * (2.0 * low + high), total - beta * (low + 2.0 * high)
+
+
+@shared
 def mean_nutation(top: Any, at: Any, low: float, high: float) -> tuple[float, float]:
     """The AGM of sqrt(beta (u3-u1)) and sqrt(beta (u3-u2)), and the mean of beta (u - u1), u the cosine.
 
     The mean is ``sum 2^(n-1) c_n^2``, c_0^2 = x^2 - y^2 and c_(n+1) = (x - y)/2 along the AGM (DLMF 19.8.6).
     """
-    excess, beta, a, _ = nutation_cubic(top, at)
-    # Vieta: beta (u1 + u2 + u3) = alpha + a^2, so that beta -> 0 (the free top) is not a special case
-    total = excess + beta * math.cos(at.theta) + a * a
-    x, y = total - beta * (2.0 * low + high), total - beta * (low + 2.0 * high)
+    cubic = nutation_cubic(top, at)
+    beta, (x, y) = cubic[1], _root_gaps(cubic, math.cos(at.theta), low, high)
     x, y = math.sqrt(max(x, 0.0)), math.sqrt(max(y, 0.0))
     mean, weight = 0.5 * beta * (high - low), 1.0
     while abs(x - y) > 4e-16 * x and x > 0.0 and y > 0.0:

@@ -214,8 +214,7 @@ def test_no_method_hangs_on_how_many_types_numba_has_made(monkeypatch):
 
     noted = set[str]()
     monkeypatch.setattr(Code, "_note", lambda self, *values: (noted.update(values), self._at.values.extend(values)))
-    parts = jit.code().reached("methods", symtop.integrators())
-    assert any("symtop/methods/simd.py" in part.file for part in parts)
+    assert any("symtop/methods/simd.py" in part.file for part in jit.code().reached("methods", symtop.integrators()))
     assert "'_code'" not in noted
     jit.code().reached("kind", Kind("of a test"))
     assert "'_code'" in noted

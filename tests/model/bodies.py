@@ -67,8 +67,7 @@ class PreciseBody:
     def __init__(self, inertia: Any, quaternion: Any, momentum: Any, digits: int = DIGITS) -> None:
         self.mp = mp = context(digits + GUARD)
         moments, momentum, start = ([mp.convert(value) for value in row] for row in (inertia, momentum, quaternion))
-        length = mp.norm(start)
-        self.start, self.given = np.array([value / length for value in start]), momentum
+        self.start, self.given = np.array([value / mp.norm(start) for value in start]), momentum
         self.G, rates = mp.norm(momentum), [1 / value for value in moments]
         low, middle, high = sorted(range(3), key=lambda i: moments[i])
         outer = (moments[high] - moments[middle]) * moments[low] * momentum[high] ** 2

@@ -40,8 +40,7 @@ def test_the_potential_keeps_its_digits_at_a_pole_where_the_textbook_form_does_n
     momenta = top.momenta(start)
     with mpmath.workdps(50):
         t = mpmath.mpf(theta)
-        spin = mpmath.mpf(start.psi_dot) + mpmath.mpf(start.phi_dot) * mpmath.cos(t)
-        p_psi = top.I3 * spin
+        p_psi = top.I3 * (mpmath.mpf(start.psi_dot) + mpmath.mpf(start.phi_dot) * mpmath.cos(t))
         p_phi = top.I1 * start.phi_dot * mpmath.sin(t) ** 2 + p_psi * mpmath.cos(t)
         exact = (p_phi - p_psi * mpmath.cos(t)) ** 2 / (2 * top.I1 * mpmath.sin(t) ** 2) + top.mgl * mpmath.cos(t)
         exact_rate = (p_phi - p_psi * mpmath.cos(t)) / (top.I1 * mpmath.sin(t) ** 2)

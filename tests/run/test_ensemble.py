@@ -229,6 +229,8 @@ def test_periods_are_those_of_one_top_and_one_without_a_nutation_has_no_steps_pe
     assert period.tolist() == [nutation_period(*pair) for pair in members_of(numbers)]
     assert (period != [top.nutation_period(start) for top, start in members_of(numbers)]).sum() > 5
     np.testing.assert_allclose(period, ClosedForms(numbers).nutation_period, rtol=1e-7)
+    chunks._periods.compiled(numbers_of(symtop.population(300, seed=4)), period)
+    assert np.signbit(period).mean() < 0.05  # few need the closed form, which takes 4 us
 
 
 def test_kernels_in_lanes_wait_for_many_steps_unless_they_are_stored_and_change_no_bit(monkeypatch):

@@ -57,8 +57,7 @@ def bring(request, tmp_path, monkeypatch):
     """A study, as a function that brings it up to date and returns how many cases were computed and how many read."""
     script = PROBE
     if request.param == "rounds":
-        script = tmp_path / "rounds.py"
-        script.write_text(ROUNDS)
+        (script := tmp_path / "rounds.py").write_text(ROUNDS)
     study = runner.load(str(script))
     read, load = [], store.load_case
     monkeypatch.setattr(store, "load_case", lambda path: read.append(path) or load(path))

@@ -498,7 +498,7 @@ def test_the_grid_has_every_compiled_variant_and_what_is_kept_is_declared_or_lin
     assert sum(case.timed for case in study.STUDY.cases(False)) == 5
     expected = {
         "rk4[axis]": "p_phi", "rk4[angles]": "nothing exactly", "rkmk-se3-4[axis]": "p_psi, |e|",
-        "gauss-8[axis]": "p_phi, p_psi, |e|, energy", "takahashi-imada[axis]": "p_phi, p_psi, energy bounded",
+        "gauss-8[axis]": "p_phi, p_psi, |e|, energy", "takahashi-imada[axis]": "p_phi, p_psi, |e|, energy bounded",
     }  # fmt: skip
     assert {name: facts.keeps(name) for name in expected} == expected
 

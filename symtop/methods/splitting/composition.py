@@ -75,13 +75,14 @@ def composition(
     turns = body.free_motion(rule, order) if chart == "space" and rotation == "exact" and not boost else None
     if turns is not None:
         solvers[BODY] = FixedStep(body.march(turns), body.scaled(table), on_body, 1, implicit=False)
+    kept = ["p_phi", "p_psi"] + ["axis_length"] * (chart == "space")  # drifts are rotations, kicks leave e as it is
     modified, sleeps = (kick_drift_kick and _KICK_DRIFT_KICK.get((chart, rotation))) or (None, None)
     return Integrator(
         name=name, family="splitting",
         summary=summary or f"splitting with {len(rule.drift)} drifts and {rule.forces} forces a step",
         solvers=solvers,
         order=order, explicit=True, symplectic=True, symmetric=all(numbers == numbers[::-1] for numbers in rule[:3]),
-        conserves=frozenset(["p_phi", "p_psi"] + ["cayley_energy"] * (kick_drift_kick and rotation != "exact")),
+        conserves=frozenset(kept + ["cayley_energy"] * (kick_drift_kick and rotation != "exact")),
         reference=reference, needs="this-top" if table.turn == TUNED else "kicks",
         general=chart == "space" and rotation == "exact" and not boost,  # reduced angles, a turn about L, a processor
         modified_energy=modified,

@@ -36,7 +36,7 @@ from symtop.model.charts import BODY, DIMENSIONS, Array, View
 from symtop.model.exact.closed_form import ClosedForms
 from symtop.model.lazy_kernel import LazyKernel
 from symtop.model.scenes import exact_periods, nutation_period
-from symtop.model.top import BISECTIONS, NUMBERS, SymmetricTop, beside_pole, bisected, nutation_cubic, period_between
+from symtop.model.top import BISECTIONS, NUMBERS, SymmetricTop, bisected, is_loose, nutation_cubic, period_between
 from symtop.run.simulation import WIDEST_GAP, places, unseen
 from symtop.run.trajectory import LABELS
 
@@ -109,13 +109,13 @@ def nutation_periods(numbers: Array) -> Array:
         return np.array([nutation_period(*top) for top in members_of(numbers)])
     periods = np.empty(len(numbers))
     _periods.compiled(np.ascontiguousarray(numbers), periods)
-    if (near := np.signbit(periods)).any():
-        periods[near] = exact_periods(numbers[near], -periods[near])
+    if (loose := np.signbit(periods)).any():
+        periods[loose] = exact_periods(numbers[loose], -periods[loose])
     return periods
 
 
 def all_periods(numbers: Array, periods: Array) -> None:
-    """`nutation_periods` of tops as a kernel with bisections in lanes: a third of the time; negative beside a pole."""
+    """`nutation_periods` of tops as a kernel with bisections in lanes: a third of the time; negative if `is_loose`."""
     wide_vectors()
     n, lanes = len(numbers), np.empty(len(_NONE) * W)
     for first in range(0, n, W):
@@ -132,7 +132,7 @@ def all_periods(numbers: Array, periods: Array) -> None:
             low, below, high, above = column(lanes, 5, j, _NONE[:4])
             low, high = 0.5 * (low + below), 0.5 * (high + above)
             period = period_between(top, start, low, high)
-            periods[first + j] = -period if beside_pole(low, high) else period
+            periods[first + j] = -period if is_loose(top, start, low, high) else period
 
 
 PERIOD_SECONDS = 5e-5  # seconds of one top, interpreted
