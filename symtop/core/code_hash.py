@@ -140,7 +140,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 STATE_TYPES = (list, dict, set)  # types of globals that do not count under a module's lower-case name
 SHIPPED = ("symtop.", "symtop_studies.")
 DEFINITIONS = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom
-PLAIN_TYPES = (type(None), bool, int, float, complex, str, bytes, np.generic)
+PLAIN_TYPES = (type(None), bool, int, float, complex, str, bytes, range, slice, np.generic)
 _IMPORT = dis.opmap["IMPORT_NAME"]
 _by_name: set[Callable[..., Any]] = set()
 _CONTAINERS: tuple[tuple[Any, Parts], ...] = (
