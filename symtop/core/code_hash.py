@@ -26,7 +26,7 @@ import importlib.util
 import inspect
 import platform
 import sys
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from types import CodeType, FunctionType, MethodType, ModuleType
@@ -140,7 +140,7 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 STATE_TYPES = (list, dict, set)  # types of globals that do not count under a module's lower-case name
 SHIPPED = ("symtop.", "symtop_studies.")
 DEFINITIONS = ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef | ast.Import | ast.ImportFrom
-PLAIN_TYPES = (type(None), bool, int, float, complex, str, bytes, np.generic)
+PLAIN_TYPES = (type(None), bool, int, float, complex, str, bytes, range, slice, np.generic)
 _IMPORT = dis.opmap["IMPORT_NAME"]
 _by_name: set[Callable[..., Any]] = set()
 _CONTAINERS: tuple[tuple[Any, Parts], ...] = (
@@ -179,7 +179,7 @@ class Part:
     file: str  # label of its file; empty for values that no file holds
     thing: object = field(repr=False)  # held, so that its id stays its own
     values: list[str] = field(default_factory=list, repr=False)
-    parts: "dict[int, Part]" = field(default_factory=dict, repr=False)
+    parts: "list[Part]" = field(default_factory=list, repr=False)
 
 
 class Code:
@@ -203,12 +203,14 @@ class Code:
         while queue:
             part = queue.pop()
             reached[id(part)] = part
-            queue += [child for key, child in part.parts.items() if key not in reached]
+            queue += [child for child in part.parts if id(child) not in reached]
         return list(reached.values())
 
     def reasons(self, label: str, *things: object) -> Reasons:
         """Hashes of things and of all that they lead to, by file; values that no file holds stand under `label`."""
-        return by_file(self.reached(label, *things))
+        parts = self.reached(label, *things)
+        own = [part.label for part in parts if not part.file.startswith(("symtop/", "symtop_studies/", "<"))]
+        return {key: value for key, value in by_file(parts).items() if key != "order" or len({*own}) < len(own)}
 
     def _look_into(self, thing: Any) -> None:
         if not self._at.file:
@@ -233,7 +235,7 @@ class Code:
             part = self._parts[label, id(thing)] = Part(label, file, thing)
             self._open.append(part)
         self._note(label)
-        self._at.parts[id(part)] = part
+        self._at.parts.append(part)
 
     def _add_all(self, things: Iterable[object]) -> None:
         for thing in things:
@@ -328,18 +330,20 @@ class Code:
 def _statements(file: Path) -> str:
     """Hash of the statements of a user's file outside of functions, classes and imports, which fill its lists."""
     with contextlib.suppress(OSError, SyntaxError, ValueError):  # no file, as at a prompt
-        body = ast.parse(file.read_bytes()).body
-        return hashed(*(ast.dump(node) for node in body if not isinstance(node, DEFINITIONS)))
+        return hashed(*(ast.dump(x) for x in ast.parse(file.read_bytes()).body if not isinstance(x, DEFINITIONS)))
     return ""
 
 
-def by_file(parts: Iterable[Part]) -> Reasons:
-    """Hashes of parts by label; the parts of one file have one hash together."""
+def by_file(parts: Sequence[Part]) -> Reasons:
+    """Hashes of parts by label, a file's together; ``order``, where functions share a label: which leads to which."""
     texts: dict[str, set[str]] = {}
     for part in parts:
         label = f"code {part.file}" if part.file else part.label
         texts.setdefault(label, set()).add("\n".join((part.label, *part.values)))
-    return {label: hashed(*sorted(group)) for label, group in texts.items()}
+    places = {id(part): str(place) for place, part in enumerate(parts)}
+    order = [text for part in parts for text in (*part.values, *(places[id(child)] for child in part.parts))]
+    hashes = {label: hashed(*sorted(group)) for label, group in texts.items()}
+    return hashes | ({"order": hashed(*order)} if len({part.label for part in parts}) < len(parts) else {})
 
 
 def codes(code: CodeType) -> Iterator[CodeType]:

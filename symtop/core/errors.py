@@ -109,7 +109,7 @@ def file_path(name: str, value: object) -> Path:
     if isinstance(value, (str, os.PathLike)):
         path = at_home(value)
         with contextlib.suppress(UnicodeEncodeError):  # half a letter, or a byte that is none: netCDF takes neither
-            longest = max(len(part.encode()) for part in (path.name, *path.parts))
+            longest = max(len(part.encode()) for part in (f".{path.name}.01234567.part{path.suffix}", *path.parts))
             if path.name and "\0" not in str(path) and longest <= LONGEST_PART:
                 if Path(os.path.realpath(path)).parent.is_dir():
                     return path

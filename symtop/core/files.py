@@ -98,15 +98,15 @@ def replacing(path: str | os.PathLike[str], suffix: str = "", mode: int = 0o666)
     """Yield a temporary file to write to; it replaces `path` in one move if the block succeeds, and not if it fails.
 
     The user's umask restricts `mode`. Of a symbolic link, the target is replaced. Raises SymtopError if the disk is
-    full, the folder cannot be written to, or `path` is a folder.
+    full, the folder cannot be written to, or `path` is a folder, a device or a pipe.
     """
     if "\0" in str(path):
         raise SymtopError(f"a path must not hold a null character, as {str(path)!r} does")
     target = Path(os.path.realpath(path))
     partial = target.parent / f".{target.name}.{os.urandom(4).hex()}.part{suffix}"
     with writing(target), contextlib.ExitStack() as stack:
-        if target.is_dir():
-            raise SymtopError(f"cannot write {target}: it is a folder")
+        if target.exists() and not target.is_file():
+            raise SymtopError(f"cannot write {target}: it is a {'folder' if target.is_dir() else 'device or a pipe'}")
         target.parent.mkdir(parents=True, exist_ok=True)
         partial.touch(mode, exist_ok=False)
         stack.callback(partial.unlink, missing_ok=True)

@@ -56,13 +56,10 @@ def test_a_script_counts_by_the_functions_and_globals_that_are_reached(tmp_path)
 
 
 def test_words_do_not_count_and_numbers_do():
-    reasons_of = lambda value: Code().reasons("thing", value)
-    scene = symtop.scene("spheroid")
-    assert reasons_of(dataclasses.replace(scene, purpose="said otherwise", units="")) == reasons_of(scene)
-    assert reasons_of(dataclasses.replace(scene, horizon=9.0)) != reasons_of(scene)
-    method = symtop.integrator("strang")
-    assert reasons_of(dataclasses.replace(method, summary="said otherwise")) == reasons_of(method)
-    assert reasons_of(dataclasses.replace(method, order=4)) != reasons_of(method)
+    reasons_of = lambda value, **others: Code().reasons("thing", dataclasses.replace(value, **others))
+    scene, method = symtop.scene("spheroid"), symtop.integrator("strang")
+    assert reasons_of(scene, purpose="said otherwise", units="") == reasons_of(scene) != reasons_of(scene, horizon=9.0)
+    assert reasons_of(method, summary="said otherwise") == reasons_of(method) != reasons_of(method, order=4)
 
 
 def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again(clean_registry):
@@ -72,8 +69,7 @@ def test_a_replaced_integrator_is_walked_again_even_where_memory_is_used_again(c
         symtop.register(dataclasses.replace(method, order=order), replace=True)
         digests.append(fingerprint.digest(study, case))
     symtop.register(method, replace=True)
-    assert len(set(digests)) == 10
-    assert digests[0] == fingerprint.digest(study, case)
+    assert (len(set(digests)), digests[0]) == (10, fingerprint.digest(study, case))
 
 
 CLASSES = """
@@ -204,8 +200,12 @@ def test_a_value_counts_where_it_stands_and_not_by_its_identity():
     """A symmetric composition names its first table again at its end."""
     key, a, b, loop = lambda *values: digest(Code().reasons("values", values)), (1.5, 0.25), np.ones(2), [1.0]
     loop.append(loop)
-    assert len({key((a, b)), key((a, b, a)), key((a, b, b)), key(((1.0,), 2.0)), key(((1.0, 2.0),)), key(loop)}) == 6
+    values = (a, b), (a, b, a), (a, b, b), ((1.0,), 2.0), ((1.0, 2.0),), loop, range(3), range(5), slice(3), slice(5)
+    assert len({*map(key, values)}) == len(values)
     assert key((a, a), (b, b)) == key((a, (1.5, 0.25)), (b, b.copy()))
+    two, three = map(lambda factor: lambda x: factor * x, (2.0, 3.0))  # functions of one factory
+    for of in (key, lambda *parts: digest(by_file(jit.code_of(parts)))):
+        assert len({of(two, three), of(three, two), of(two, three, two), of(two, three, three)}) == 4
 
 
 def test_no_method_hangs_on_how_many_types_numba_has_made(monkeypatch):

@@ -98,17 +98,17 @@ class Field:
     def __init__(self, chart: str, top: SymmetricTop, *, compiled: bool) -> None:
         self.chart, self.top, self.compiled = chart, top, compiled
         self.parameters = top.I1, top.I3, top.mgl
-        self._right, self._shape = _RIGHT[chart], (FORMULATIONS[chart].prepare.size,)
+        self._shape = (FORMULATIONS[chart].prepare.size,)
 
     def __call__(self, _: float, y: Any) -> Array:
         """y' at any time: an array like y. Raises SymtopError for a y that is no state of the chart."""
-        if not isinstance(y, np.ndarray) or y.dtype.kind != "f":
+        if not isinstance(y, np.ndarray) or y.dtype != np.float64:
             y = real_numbers("y", y)
         if y.shape != self._shape:  # compiled code would read beyond the end of the array
             raise SymtopError(f"y must have the shape {self._shape} in the chart {self.chart}, not {y.shape}")
         if self.compiled:
             return np.asarray(self.kernel(*self.parameters, y))
-        return np.array(self._right(*self.parameters, np.asarray(y, dtype=float).tolist()))
+        return np.array(_RIGHT[self.chart](*self.parameters, np.asarray(y, dtype=float).tolist()))
 
     @property
     def kernel(self) -> Any:

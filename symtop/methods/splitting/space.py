@@ -79,7 +79,7 @@ def mean_square_momentum(top: Any, at: Any) -> float:
 def tangent_scale(top: Any, start: Any, h: float) -> float:
     """tan(x)/x, x = h Lm/2 I1: a Cayley drift with tau = (h/2 I1) times this is exact at Lm, Lm^2 = mean |L|^2."""
     x = 0.5 * h * math.sqrt(mean_square_momentum(top, start)) / top.I1
-    return math.tan(x) / x if x > 0.0 else 1.0
+    return math.tan(x) / x if x != 0.0 else 1.0
 
 
 def cayley_energy(top: SymmetricTop, h: float, tau: float, axis: Array, momentum: Array) -> Array:

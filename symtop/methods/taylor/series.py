@@ -367,7 +367,7 @@ DEFAULT_ORDER = 16
 
 def series(name: str, order: int = DEFAULT_ORDER) -> Integrator:
     """The series of an order, 8, 12, 16 or 20, with a fixed step. Raises SymtopError for another order."""
-    order = whole("order", order, ORDERS[0])
+    order = whole("order", order, 1)
     if order not in ORDERS:
         raise SymtopError(f"order must be one of {', '.join(map(str, ORDERS))}, not {order!r}")
     rule = ScaledRule(Scale(), _scale)
