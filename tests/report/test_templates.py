@@ -46,6 +46,17 @@ def test_the_front_page_renders_without_any_study_and_with_what_there_is(tmp_pat
     page = template.front(TEXTS["front"], [study], tmp_path, {"truth": "[How?](#how)"})
     assert "3 of 4 error bounds hold" in page
     assert "[Truth](#how)" in page
+    (tmp_path / "tables").mkdir()
+    (tmp_path / "tables" / "u.csv").write_text(
+        'you can supply,1e-3 rad,1e-6 rad,1e-9 rad,"keeps, at 1e-6 rad"\na,b,c,d,e\n'
+    )
+    parts = {"cost": {"tables": [{"name": "use", "file": "u.csv", "rows": 1}]}, "machines": {"facts": {"cells": 1}}}
+    found = [
+        {"study": name, "title": name, "facts": {}, "pictures": [], "tables": []} | part for name, part in parts.items()
+    ]
+    page = template.front(TEXTS["front"], found, tmp_path, {})
+    assert "Use this" in page
+    assert not re.search("Epsilon|How far", page)  # what a table says that is not there, and a heading above nothing
 
 
 PAGE = """# {{ question }}
