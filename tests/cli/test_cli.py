@@ -46,7 +46,7 @@ OWN, BODY = "one of your own: --plugin FILE)", "one of your own: body with --bod
     ("run spheroid strang --step-size 0.01 --figure ../x.png", ["--figure must be a file, not the folder"]),
     ("long spheroid strang -o ..", ["file, not the folder"]), ("run spheroid rk4 -o \udcff.nc", ["'\\udcff"]),
     ("ensemble strang --members 1000000 --figure ../x.png", ["--figure must be a file, not the folder"]),
-    ("recommend spheroid --accuracy 1 --step-size 1 --per-nutation 9", ["--step-size", "not both"]),
+    ("recommend cusp --accuracy 1 --step-size 1 --per-nutation 9", ["not both"]), ("archive -o .", ["file, not '.'"]),
     ("study convergense", ["'convergense'", "convergence"]), ("study", ["name a study", "--all", "convergence"]),
     ("archive --output ../x.py", ["in .zip"]), ("archive --test-set --output no/x", ["that is there, not 'no/x'"]),
     ("run spheroid", ["missing argument 'INTEGRATOR'", "run [OPTIONS] SCENE INTEGRATOR"]),

@@ -191,6 +191,8 @@ def test_adaptive_methods_drift_at_one_tolerance_and_the_ordinary_ensemble_goes_
     names = {case.integrator for case in grid}
     assert {"rk4[angles]", "rk4[axis]", "strang[axis]", "five-rotations[attitude]"} <= names
     assert "strang[attitude]" not in names
+    asked = {case.integrator for case in cases(quick=False) if case.group == measures.HORIZONS}
+    assert "exact-discrete[axis]" in names - asked  # it loses no phase
     # Fewer members, or another sum, would run one after another, 8 times slower.
     ensembles = [case for case in study.cases(False) if case.group == ROUNDINGS]
     assert len(ensembles) == 4
