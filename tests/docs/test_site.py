@@ -159,8 +159,7 @@ def test_a_docstring_says_the_same_in_restructured_text():
     texts = lambda kind: [node.astext() for node in tree.findall(lambda node: node.tagname == kind)]
     assert not texts("system_message")
     assert not texts("problematic")
-    assert texts("literal") == ["code", "more"]
-    assert texts("emphasis") == ["this"]
+    assert (texts("literal"), texts("emphasis")) == (["code", "more"], ["this"])
     assert texts("literal_block") == ["x_1 = |L| *a\n\ny"]
     paragraphs = [" ".join(words.split()) for words in texts("paragraph")]
     assert paragraphs == ["Of |a x b|, u_.", "With code, more, a* b* and this:", "The end <h>."]
