@@ -36,6 +36,7 @@ RESULTS = Path("results")
 KEPT = RESULTS / "machines"
 UNKNOWN = "not kept"  # a cost on a machine of which the first choice alone is kept
 NEAR = 10.0  # times the best: safe choices that are kept
+LEAST = 1e-9  # rad: the least error of the table on the front page; choices for smaller ones are kept, too
 
 
 def choices(data: xr.DataTree) -> list[dict[str, Any]]:
@@ -62,7 +63,7 @@ class Pair(NamedTuple):
 
 def compare(first: list[dict[str, Any]], second: list[dict[str, Any]]) -> Pair:
     """What two machines choose, and what the choice of each costs on the other."""
-    theirs = {_cell(row): row for row in second}
+    theirs = {_cell(row): row for row in second if row["target"] >= LEAST}
     pairs = [(row, theirs[_cell(row)]) for row in first if _cell(row) in theirs]
     differing = [pair for pair in pairs if _first(pair[0]) != _first(pair[1])]
     clear = [pair for pair in pairs if pair[0]["called"] or pair[1]["called"]]
@@ -72,6 +73,12 @@ def compare(first: list[dict[str, Any]], second: list[dict[str, Any]]) -> Pair:
     known = [cost for pair in costs for cost in pair if not math.isnan(cost)]
     return Pair(len(pairs), len(pairs) - len(differing), len(clear), sum(pair not in differing for pair in clear),
                 max(known, default=math.nan), rows)  # fmt: skip
+
+
+def least_alike(kept: list[dict[str, Any]]) -> tuple[dict[str, Any], dict[str, Any], Pair] | None:
+    """The two machines with the least share of equal choices, of the cells that both have; None without such two."""
+    pairs = [(*two, compare(*(machine["choices"] for machine in two))) for two in itertools.combinations(kept, 2)]
+    return min((row for row in pairs if row[2].cells), key=lambda row: row[2].same / row[2].cells, default=None)
 
 
 def _first(row: dict[str, Any]) -> str:
@@ -113,12 +120,10 @@ def main() -> int:
         content = {"processor": str(data.attrs["processor"]), "choices": choices(data)}
         netcdf.write_json(KEPT / f"{options.name}.json", content)
     kept = [json.loads(file.read_text(encoding="utf-8")) for file in sorted(KEPT.glob("*.json"))]
-    pairs = [(first, second, compare(first["choices"], second["choices"]))
-             for first, second in itertools.combinations(kept, 2)]  # fmt: skip
-    if not pairs:
+    if (apart := least_alike(kept)) is None:
         print("machines: two machines have to be kept to compare them")
         return 1
-    first, second, pair = min(pairs, key=lambda triple: triple[2].same)  # that agree least
+    first, second, pair = apart
     names = first["processor"], second["processor"]
     costs = ["the first's choice on the second", "the second's choice on the first"]
     known = [k for k in range(2) if any(row[3 + k] != UNKNOWN for row in pair.differing)]

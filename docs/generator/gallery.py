@@ -17,7 +17,7 @@ ROOT = Path(__file__).resolve().parents[2]
 SNAPSHOT = ROOT / "docs" / "snapshot"
 PAGE, MARK = "reference/gallery", "<!-- gallery -->"
 OTHERS = {  # a command and the code, by the name's beginning
-    "peers": ("make peers", "benchmarks/peers/figures.py"),
+    "peers": ("make peers", "benchmarks/peers/study.py"),
     "guard": ("python -m benchmarks.guard", "benchmarks/guard.py"),
 }
 FRONT = "Front page"
@@ -51,7 +51,8 @@ def maker(file: str, root: Path = ROOT) -> tuple[str, str]:
     """The command that makes a figure, and the file with the code."""
     name = file.partition("-")[0]
     if (root / "studies" / name / "study.py").is_file():
-        return f"symtop study {name}", f"studies/{name}/figures.py"
+        code = next(code for code in ("figures.py", "study.py") if (root / "studies" / name / code).is_file())
+        return f"symtop study {name}", f"studies/{name}/{code}"
     if name in OTHERS:
         return OTHERS[name]
     raise ExtensionError(f"gallery: nothing is known to make the figure {file}")

@@ -64,7 +64,7 @@ def grid(
           for row in variants),
         *(Case(LONG, row.name, settings, group=group) for row in variants if row.modified_energy
           for group, settings in ((WINDOWS, long_run), (ROUNDINGS, ensemble))),
-        *(Case(LONG, row.name, loss, group=HORIZONS) for row in variants if row.fixed_step),
+        *(Case(LONG, row.name, loss, group=HORIZONS) for row in variants if row.fixed_step and not row.exact_steps),
     ]  # fmt: skip
 
 

@@ -273,5 +273,5 @@ def archive(results: str, output: str | None, *, test_set: bool) -> None:
         return
     from symtop.report.archive import bundle
 
-    file = bundle(Path(results), None if output is None else Path(output))
+    file = bundle(Path(results), output)
     click.echo(f"archive: {file} ({file.stat().st_size / 1e6:.1f} MB)")

@@ -50,6 +50,10 @@ def _handling(number: int, default: Any, handler: Callable[..., None]) -> Iterat
         if replaces:
             signal.signal(number, handler)
         yield
+    except SystemError as error:  # what a handler raises as numba converts the result of compiled code
+        if error.__cause__ is None or not is_of_user(error.__cause__):
+            raise
+        raise error.__cause__ from None
     finally:
         if replaces:
             signal.signal(number, default)

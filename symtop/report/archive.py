@@ -48,7 +48,7 @@ NAME = f"symtop-{__version__}-data"
 EPOCH = (1980, 1, 1, 0, 0, 0)  # the time of every file in the bundle, the first that zip can store
 
 
-def bundle(results: Path, target: Path | None = None) -> Path:
+def bundle(results: Path, target: str | Path | None = None) -> Path:
     """Write the bundle of a folder, after its report; by default NAME.zip there. SymtopError without findings."""
     path = results / f"{NAME}.zip" if target is None else file_path("output", target)
     if path.suffix != ".zip":

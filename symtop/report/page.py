@@ -13,6 +13,7 @@ import datetime
 import json
 import math
 import re
+import shlex
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -63,8 +64,8 @@ def _series(name: str, points: Sequence[tuple[float | None, float | None, str]])
     }
 
 
-def gather(results: Path) -> list[dict[str, Any]]:
-    """The findings in the folder: of all studies, in order, then of benchmarks.
+def gather(results: Path, *, embed: bool = False) -> list[dict[str, Any]]:
+    """The findings in the folder: of all studies, in order, then of benchmarks; with the ``images`` of their figures.
 
     A benchmark (`make peers`) may write findings in the form of a study's, as NAME.json. Runs of studies do not change
     them, so that their ``measured`` says when, where and with what they were made, and ``command`` how to repeat it.
@@ -79,16 +80,18 @@ def gather(results: Path) -> list[dict[str, Any]]:
             continue
         page_file = runner.file_beside(name, "page.md") if name in studies else None
         try:
-            extra = {"measured": findings.get("measured", ""), "dataset": f"{name}.nc"}
+            extra: dict[str, Any] = {"measured": findings.get("measured", ""), "dataset": f"{name}.nc"}
             extra["dataset"] *= (results / f"{name}.nc").is_file()
-            missing = [f"figures/{picture['file']}" for picture in findings["pictures"]]
-            missing += [f"tables/{table['file']}" for table in findings["tables"]]
-            for file in (file for file in missing if not (results / file).is_file()):
+            figures = [f"figures/{picture['file']}" for picture in findings["pictures"]]
+            parts = [*figures, *(f"tables/{table['file']}" for table in findings["tables"])]
+            for file in (file for file in parts if not (results / file).is_file()):
                 raise FileNotFoundError(f"{file} is missing")
+            extra["images"] = {file: _image(results / file, embed=embed) for file in figures}
             page = findings["page"] if page_file is None else page_file.read_text(encoding="utf-8")
             records.append({**findings, **extra, "page": page})
         except (OSError, KeyError, TypeError) as error:
-            command = findings.get("command", f"symtop study {name}")
+            folder, quick = (results.parent, " --quick") if results.name == "quick" else (results, "")
+            command = findings.get("command", f"symtop study {name}{quick} --results {shlex.quote(str(folder))}")
             words = f"the findings of {name} in {results} are incomplete ({error}); run it again: {command}"
             raise SymtopError(words) from error
     if not records:
@@ -186,13 +189,9 @@ def scene_tables() -> dict[str, Any]:
 
 def write(results: Path, *, embed: bool = False) -> Path:
     """Write ``report.html``, ``report.md`` and ``reference.md`` into the results folder; returns the page."""
-    page, studies = template.environment(autoescape=True).get_template("report.html"), gather(results)
+    page, studies = template.environment(autoescape=True).get_template("report.html"), gather(results, embed=embed)
     parts, appendix = texts(results, studies)
-    images = {
-        f"figures/{picture['file']}": _image(results / "figures" / picture["file"], embed=embed)
-        for study in studies
-        for picture in study["pictures"]
-    }
+    images = dict(item for study in studies for item in study["images"].items())
     charts = {f"{study['study']}-{chart['name']}": chart for study in studies for chart in study["charts"]}
     records = formats.columns([method.record() for method in integrators().values()])
 

@@ -118,13 +118,14 @@ def analyse_stored(
 
 
 def drawing_digest(study: Study, save: Save | None) -> str:
-    """Hash of the code that combines and draws, and of the template and the table of columns beside a study."""
-    functions = study.facts, study.pictures, study.tables, study.charts, study.title, study.question
+    """Hash of what follows on the first round: a second one, combining and drawing, the template and the columns."""
+    functions = study.facts, study.pictures, study.tables, study.charts, study.follow_up, study.title, study.question
     drawing = combine, columns.described, findings_of, save
     files_beside = (file_beside(study.name, name) for name in ("page.md", "columns.tsv"))
     texts = {f"file {file.name}": code_hash.hashed(file.read_text(encoding="utf-8")) for file in files_beside if file}
     code = fingerprint.reached().reasons("drawing", functions, drawing)
-    return code_hash.digest(code | texts | code_hash.packages("matplotlib"))
+    timed_later = {"processor": code_hash.processor()} if study.follow_up else {}
+    return code_hash.digest(code | texts | timed_later | code_hash.packages("matplotlib"))
 
 
 def analyse(cases: StudyCases, made_of: str, save: Save | None, quick: bool) -> Findings:

@@ -129,8 +129,8 @@ def test_a_wrong_call_of_the_table_of_candidates_is_one_sentence(arguments, word
 
 
 def test_what_one_processor_chooses_is_priced_on_another():
-    def row(called=True, **seconds):
-        return [{"needs": "derivative", "keeping": False, "target": 1e-3, "called": called, "seconds": seconds}]
+    def row(called=True, target=1e-3, **seconds):
+        return [{"needs": "derivative", "keeping": False, "target": target, "called": called, "seconds": seconds}]
 
     reference = row(b=1.0, a=1.5, called=False)
     pairs = [machines.compare(row(**seconds), reference) for seconds in ({"a": 2.0, "b": 3.2}, {"b": 2.0}, {"c": 1.0})]
@@ -138,7 +138,10 @@ def test_what_one_processor_chooses_is_priced_on_another():
     assert [tuple(pair[:5]) for pair in pairs[:2]] == [(1, 0, 1, 0, 1.6), (1, 1, 1, 1, nan)]
     assert pairs[0].differing == [["f(t, y), to 10\N{SUPERSCRIPT MINUS}³ rad", "a", "b", "1.5", "1.6"]]
     assert pairs[2].differing[0][3:] == ["over 10", "not kept"]
-    assert machines.compare([], reference).cells == 0
+    more = {name: [*row(a=1.0), *row(target=1e-6, **{name: 1.0}), *row(target=1e-12, **{name: 1.0})] for name in "ab"}
+    kept = [{"choices": rows} for rows in (row(a=1.0), *more.values(), [])]  # as many are the same, of one or of two
+    assert machines.least_alike(kept)[2][:2] == (2, 1)
+    assert machines.least_alike(kept[2:]) is None
 
 
 def test_the_ablation_of_the_guard_misses_a_run_whose_error_adds_up_beyond_its_probe(monkeypatch):

@@ -101,8 +101,9 @@ def test_ctrl_c_is_heard_while_llvm_calls_back_and_as_a_kernel_returns(monkeypat
     monkeypatch.setattr(engine, "_object_cache_notify", lambda *_: any(map(signal.raise_signal, once)))
     with told_apart(), pytest.raises(InterruptedByUser):
         jit.lean_probe.__wrapped__(), [time.sleep(0.01) for _ in range(500)]
-    with told_apart(), pytest.raises(InterruptedByUser), foreign_code("a kernel"):  # as numba converts its result
-        raise SystemError from InterruptedByUser()
+    for block in (foreign_code("a kernel"), ending_on_sigterm(), told_apart()):  # as numba converts its result
+        with pytest.raises(InterruptedByUser), block:
+            raise SystemError from InterruptedByUser()
 
 
 def test_two_requests_are_both_heard_and_a_limit_inside_another_leaves_that_one_running(default_handlers):

@@ -131,11 +131,11 @@ def test_derivations_public_names_figures_studies_and_commands_are_on_the_site(s
     for method in symtop.integrators().values():
         assert f'id="{method.name}"' in theory, method.name
     page = (site / "reference" / "gallery.html").read_text(encoding="utf-8")
-    files = (ROOT / "docs" / "snapshot" / "figures").iterdir()
-    figures = {path.name for path in files if path.suffix in {".png", ".gif"}}
+    figures = {path.name for path in (ROOT / "docs/snapshot/figures").iterdir() if path.suffix in {".png", ".gif"}}
     assert figures
     for name in figures:
         assert f"_images/{name}" in page, name
+        assert (ROOT / gallery.maker(name)[1]).is_file(), name
     spoken = " ".join(re.sub(r"<[^>]+>", " ", page).split())
     for study in {name.partition("-")[0] for name in figures} - set(gallery.OTHERS):
         assert f"Made by symtop study {study} ;" in spoken, study
@@ -159,8 +159,7 @@ def test_a_docstring_says_the_same_in_restructured_text():
     texts = lambda kind: [node.astext() for node in tree.findall(lambda node: node.tagname == kind)]
     assert not texts("system_message")
     assert not texts("problematic")
-    assert texts("literal") == ["code", "more"]
-    assert texts("emphasis") == ["this"]
+    assert (texts("literal"), texts("emphasis")) == (["code", "more"], ["this"])
     assert texts("literal_block") == ["x_1 = |L| *a\n\ny"]
     paragraphs = [" ".join(words.split()) for words in texts("paragraph")]
     assert paragraphs == ["Of |a x b|, u_.", "With code, more, a* b* and this:", "The end <h>."]

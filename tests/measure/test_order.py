@@ -157,8 +157,7 @@ def test_there_are_as_many_trees_as_there_are_and_known_tables_have_their_orders
 def test_a_coefficient_that_is_off_shows_beyond_rounding(shift, order):
     # the same nodes; b4 off c3 = off/12 in the tall tree of order 3
     table = oc.conditions(square(((), (0.5,), (0.0, 0.5), (shift, 0.0, 1.0 - shift))), CLASSICAL[1])
-    assert table.order == order
-    assert table.defect[2] == pytest.approx(shift / 12, rel=0.01, abs=1e-16)
+    assert (table.order, table.defect[2]) == (order, pytest.approx(shift / 12, rel=0.01, abs=1e-16))
 
 
 FREE = [2, 1, 2, 3, 6, 9, 18, 30, 56, 99]  # dimensions of the free Lie algebra of two letters: Witt's formula

@@ -23,8 +23,7 @@ def data():
 
 
 def test_each_entry_is_that_of_one_run_whose_settings_are_its_own(data):
-    assert dict(data.sizes) == {"scene": 2, "variant": 4, "setting": 3}
-    assert data.attrs["horizon"] == 2.0
+    assert (dict(data.sizes), data.attrs["horizon"]) == ({"scene": 2, "variant": 4, "setting": 3}, 2.0)
     for scene in ("spheroid", "goldstein"):
         top, start = (json.loads(data.attrs[name])[scene] for name in ("top", "start"))
         assert (SymmetricTop(**top), Angles(**start)) == (symtop.scene(scene).top, symtop.scene(scene).start)

@@ -321,10 +321,12 @@ def test_words_follow_from_the_stored_data_and_findings_that_are_not_whole_are_t
         assert template.answer(findings, results) in content
     changed = data.assign(force_evaluations=2.0 * data["force_evaluations"])
     assert study.facts(changed) != findings["facts"]  # they read the data, they do not remember it
-    shutil.copytree(results, tmp_path, dirs_exist_ok=True)
-    (tmp_path / "tables" / "convergence-costs.csv").unlink()
-    with pytest.raises(symtop.SymtopError, match=r"convergence-costs.csv is missing\); run it again: symtop study"):
-        page.write(tmp_path)
+    for file in ("tables/convergence-costs.csv", "figures/convergence-constants.png"):
+        shutil.copytree(results, tmp_path, dirs_exist_ok=True)
+        (tmp_path / file).unlink() if file.endswith("csv") else (tmp_path / file).write_bytes(b"")
+        words = rf"{file}.*\); run it again: symtop study convergence --results /"
+        with pytest.raises(symtop.SymtopError, match=words):
+            page.write(tmp_path)
     shutil.copytree(results, tmp_path, dirs_exist_ok=True)
     for file in tmp_path.glob("*.json"):  # findings may be of an earlier day
         file.write_text(re.sub(r'"symtop_version": "[^"]+"', '"symtop_version": "0.0.1"', file.read_text("utf-8")))

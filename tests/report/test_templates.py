@@ -46,6 +46,14 @@ def test_the_front_page_renders_without_any_study_and_with_what_there_is(tmp_pat
     page = template.front(TEXTS["front"], [study], tmp_path, {"truth": "[How?](#how)"})
     assert "3 of 4 error bounds hold" in page
     assert "[Truth](#how)" in page
+    (tmp_path / "tables").mkdir()
+    header = 'you can supply,1e-3 rad,1e-6 rad,1e-9 rad,"keeps, at 1e-6 rad"'
+    (tmp_path / "tables" / "u.csv").write_text(f"{header}\na,b,c,d,e\n")
+    cost = study | {"study": "cost", "facts": {}, "tables": [{"name": "use", "file": "u.csv", "rows": 1}]}
+    parts = [cost, study | {"study": "machines", "facts": {"cells": 1}}]
+    page = template.front(TEXTS["front"], parts, tmp_path, {})
+    assert "Use this" in page
+    assert not re.search("Epsilon|How far", page)  # a legend without its table, a heading above nothing
 
 
 PAGE = """# {{ question }}
@@ -116,8 +124,7 @@ def test_the_tables_of_scenes_give_every_scene_back_to_the_last_bit():
     assert [row[0] for row in uses] == [row[0] for row in starts] == list(symtop.scenes())
     for row, numbers in zip(uses, starts, strict=True):
         scene, values = symtop.scene(row[0]), [float(cell) for cell in numbers[1:]]
-        assert symtop.SymmetricTop(*values[:3]) == scene.top
-        assert symtop.Angles(*values[3:]) == scene.start
+        assert (symtop.SymmetricTop(*values[:3]), symtop.Angles(*values[3:])) == (scene.top, scene.start)
         assert float(row[2].replace("infinite", "inf")) == pytest.approx(scene.nutation_period, rel=1e-8)
         bound = float(symtop.reference(scene, [scene.horizon])["axis_error_bound"].max())
         assert float(row[4]) == pytest.approx(bound, rel=0.05)

@@ -414,8 +414,7 @@ def test_a_solver_that_raises_on_every_member_is_refused_and_an_ensemble_for_a_c
 
 def test_scenes_are_members_with_horizons_of_their_own_and_swings_as_simulate_says():
     data = symtop.ensemble(["spheroid", symtop.scene("kinon-betsch")], "strang", per_nutation=50, quiet=True)
-    assert data.scene.values.tolist() == ["spheroid", "kinon-betsch"]
-    assert data.horizon.values.tolist() == [8.0, 2.0]
+    assert (data.scene.values.tolist(), data.horizon.values.tolist()) == (["spheroid", "kinon-betsch"], [8.0, 2.0])
     assert data["time"].dims == ("member", "time")
     assert "psi" in data  # as the scenes are watched for
     assert data.energy.attrs["units"] == "kg m2 s-2"

@@ -111,7 +111,7 @@ import sys, symtop
 from symtop.run import long_run as longrun
 longrun.LONGEST_WINDOW, longrun.SAVE_SECONDS = 200_000, 0.0
 scene = symtop.scene("spheroid")
-longrun.long_run(scene, "midpoint", steps=4_000_000, step_size=scene.nutation_period / 400.37, checkpoint=sys.argv[1])
+longrun.long_run(scene, "gauss-2", steps=4_000_000, step_size=scene.nutation_period / 400.37, checkpoint=sys.argv[1])
 """
 
 
@@ -140,10 +140,10 @@ def test_a_killed_run_resumes_to_the_same_bits(tmp_path, monkeypatch, blow):
         return position, rows
 
     monkeypatch.setattr(longrun._Checkpoint, "resumed", noting)  # a checkpoint holds a hash of the loop itself
-    resumed = long_run(SCENE, "midpoint", steps=steps, step_size=H, checkpoint=file, quiet=True)
+    resumed = long_run(SCENE, "gauss-2", steps=steps, step_size=H, checkpoint=file, quiet=True)
     assert steps_done in positions  # it did go on from there
     assert not file.exists()
-    assert resumed.identical(long_run(SCENE, "midpoint", steps=steps, step_size=H, quiet=True))
+    assert resumed.identical(long_run(SCENE, "gauss-2", steps=steps, step_size=H, quiet=True))
 
 
 def test_a_checkpoint_knows_a_method_by_what_it_holds_and_not_by_its_name():

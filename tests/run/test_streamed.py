@@ -152,8 +152,7 @@ def test_pieces_that_do_not_say_whose_they_are_belong_to_nobody(tmp_path, small_
         symtop.ensemble(members, "strang[axis]", **settings)
     content = path.read_bytes()
     symtop.ensemble(SOME, "strang[axis]", **settings).close()  # the same goes on, to the same file
-    assert path.read_bytes() == content
-    assert [file.name for file in tmp_path.iterdir()] == ["runs.nc"]
+    assert (path.read_bytes(), [file.name for file in tmp_path.iterdir()]) == (content, ["runs.nc"])
     folder = tmp_path / "runs.nc.parts"
     folder.mkdir()
     (folder / "0-7.npz").write_bytes(b"somebody's")

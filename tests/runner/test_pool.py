@@ -92,8 +92,7 @@ def test_families_do_not_begin_side_by_side_and_half_as_many_workers_may_not_dis
     assert in_order([]) == []
     monkeypatch.setattr(pools, "slowdown", lambda _, size: 0.3 * size)
     with Pool(1) as pool:
-        assert pool.at_once(8) == (2, 0.6)
-        assert pool.at_once(3) == (3, 0.3 * 3)
+        assert (pool.at_once(8), pool.at_once(3)) == ((2, 0.6), (3, 0.3 * 3))
         assert pool.at_once(1) == (1, pytest.approx(math.nan, nan_ok=True))
 
 

@@ -2,11 +2,12 @@
 
 import os
 import shutil
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
-from symtop.core import netcdf
+from symtop.core import code_hash, netcdf
 from symtop.runner import pool as pools, run as runner, store
 from symtop.runner.pool import Pool
 from tests.commands import PROBE
@@ -50,6 +51,10 @@ def test_timed_cases_that_alone_are_missing_run_in_new_workers(tmp_path, monkeyp
     data = store.load_case(path)
     assert os.getpid() not in set(np.ravel(data["process"]))
     assert set(np.ravel(data["later"])) == {2.0}
+    monkeypatch.undo()
+    monkeypatch.setattr(code_hash, "processor", lambda: "another")
+    assert runner.run(study, results, quiet=True)["computed"] == 1
+    assert runner.run(replace(study, follow_up=lambda _: []), results, quiet=True)["cases"] == 2
 
 
 @pytest.fixture(params=["probe", "rounds"])

@@ -191,16 +191,14 @@ def failure_step(*shares, starts=20, word="drifting"):
 def test_thresholds_hold_at_every_larger_step_and_reach_and_failures_are_read_off():
     data = hand_made([[A, B, L, L, L], [A, A, L, L, L], [A, A, L, L, L], [A, A, B, B, B]], (0.01, 0.1, 1.0, 1.5, 2.0))
     result = atlas.maps(data, "cusp")["midpoint"]
-    assert result.usual_reach == {"fast": 0.1, "slow": 0.01}
-    assert result.failure == (1.0, "left_chart")
+    assert (result.usual_reach, result.failure) == ({"fast": 0.1, "slow": 0.01}, (1.0, "left_chart"))
     assert (result.accurate, result.early, result.silent) == (7 / 20, 9 / 20, 4 / 13)
     assert math.isnan(atlas.maps(hand_made([[A, A, A]] * 4), "cusp")["midpoint"].silent)  # no run is wrong
     result = atlas.maps(hand_made([[A, A, "wrong"]] * 4), "cusp")["midpoint"]  # inaccurate, said by nobody, no failure
     assert (result.accurate, result.early, result.silent, math.isnan(result.failure.setting)) == (2 / 3, 0.0, 1.0, True)
     row = facts.tables(data)["atlas"].iloc[0]
     assert (row["accurate up to, fast tops"], row["fails from"]) == (0.1, 1.0)
-    assert row["fails mostly by"] == "ended early: left chart"
-    assert row["accurate (%)"] == pytest.approx(35.0)
+    assert (row["fails mostly by"], row["accurate (%)"]) == ("ended early: left chart", pytest.approx(35.0))
     # Five steps from 0.01 to 1: 0.01, 0.032, 0.1, 0.32, 1.
     assert failure_step(0.0, 0.9, 0.5, 0.7, 1.0) == pytest.approx(10.0**-1.5)
     assert failure_step(0.7, 0.4, 0.6, 0.7, 1.0) == pytest.approx(0.1)
@@ -246,8 +244,7 @@ def test_a_pole_that_halves_the_reach_is_told_and_variants_that_reach_equally_fa
                  none=("step_size", [[L, L, L]] * 3 + [[A, L, L]] * 3))  # fmt: skip
     answers = facts.atlas_facts(data, "cusp")
     assert [answers[name] for name in ("slow_none", "slow_shorter", "silent")] == [1, 3, 0.0]  # of 0, 0, 1 and 0
-    assert answers["fast_variant"] == "`rk4[axis]` and `strang[axis]`"
-    assert answers["slow_variant"].count("`") == 6
+    assert (answers["fast_variant"], answers["slow_variant"].count("`")) == ("`rk4[axis]` and `strang[axis]`", 6)
     assert "fast_reach" not in facts.atlas_facts(hand_made([[A, L, L]] * 2, parameter=(0.2, 0.5)), "cusp")
 
 
@@ -276,8 +273,7 @@ def test_runs_that_outlast_the_law_are_not_counted_nor_floors_of_ratios_and_wind
                "energy_every": ("variant", [4.2e-8, 2.5e-4, 3e-5, 1e-15])}  # fmt: skip
     part = xr.Dataset(columns, coords={"variant": ["yoshida-4", "stormer-verlet", "rkmk-se3-2", "gauss-4"]})
     hidden, ratios = mechanisms.sampled(part)
-    assert hidden == ["yoshida-4"]
-    assert ratios == pytest.approx({"stormer-verlet": 5e4, "rkmk-se3-2": 1.5})
+    assert (hidden, ratios) == (["yoshida-4"], pytest.approx({"stormer-verlet": 5e4, "rkmk-se3-2": 1.5}))
     answers = facts.sampling_facts(part)
     assert (answers["sampled"], answers["hidden"], answers["small"]) == (3, 1, 1)
     table = {"third_turn_phase": 1.0, "surviving_at_third_turn": [0.01, 0.01, 0.0195, 0.0],

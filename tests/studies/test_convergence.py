@@ -120,8 +120,7 @@ def test_a_variant_whose_order_cannot_be_judged_has_the_work_of_its_runs(data, m
     expected = measures.efficiencies(data, 1e-4)[pair]
     unjudged = Fit(math.nan, math.nan, math.nan, np.zeros(data.sizes["setting"], bool))
     monkeypatch.setattr(measures, "fits", lambda *_: {pair: unjudged})
-    assert measures.efficiencies(data, 1e-4) == {pair: expected}
-    assert measures.efficiencies(data, 1e-14) == {}
+    assert (measures.efficiencies(data, 1e-4), measures.efficiencies(data, 1e-14)) == ({pair: expected}, {})
     monkeypatch.setattr(facts, "efficiencies", lambda *_: {pair: expected})
     assert facts.facts(data)["unknown"] == measures.stepping(data).sizes["variant"] - 1
 

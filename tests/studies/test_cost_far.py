@@ -38,8 +38,7 @@ def data(quick_results):
 @pytest.mark.parametrize("power", laws.POWERS)
 def test_a_power_is_found_and_continued_over_six_decades(power):
     law = laws.fit(FAR, np.where(SHORT, 1e-9 * FAR**power, np.nan)[np.newaxis])
-    assert law.leading[0] == power
-    assert law.slope[0] == pytest.approx(power, abs=1e-6)
+    assert (law.leading[0], law.slope[0]) == (power, pytest.approx(power, abs=1e-6))
     np.testing.assert_allclose(law.at(FAR)[0], 1e-9 * FAR**power, rtol=1e-9)
 
 

@@ -142,8 +142,7 @@ def test_a_noisy_time_is_taken_again_and_the_fastest_processes_count(monkeypatch
     monkeypatch.setattr(measures, "timed", lambda runs, _: calls.append(runs.runs) or arrays.pop(0))
     times, tries = measures.settled_times(measures.Runs(SCENE, ["a", "b", "c"], 1, 0.001), 4)
     assert calls == [["a", "b", "c"], ["a", "c"], ["c"], ["c"]]  # 1, 1, 1, 9 stays noisy: no more are tried
-    assert times.tolist() == [[1.0, 1.0, 1.0, 1.1], quiet, [1.0, 1.0, 1.0, 9.0]]
-    assert tries.tolist() == [2, 1, 4]
+    assert (times.tolist(), tries.tolist()) == ([[1.0, 1.0, 1.0, 1.1], quiet, [1.0, 1.0, 1.0, 9.0]], [2, 1, 4])
 
 
 @pytest.mark.parametrize(("share", "busy"), [(0.0, None), (facts.NOISY_SHARE, None), (0.2, True)])

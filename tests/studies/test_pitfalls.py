@@ -24,4 +24,7 @@ def test_the_pitfalls_are_there_and_the_page_says_what_was_measured(tmp_path):
     assert float(run["axis"].max()) < 1e-3
     assert float(run["time"].max()) == pytest.approx(2.0)
     assert (np.isfinite(run["axis"]) == np.isfinite(run["time"])).all()  # the rest is padding
-    assert "left_chart" in checked_page("pitfalls", data, tmp_path, elsewhere={"three"})
+    part = data.sel(variant=[study.AXIS])
+    pages = [checked_page("pitfalls", runs, tmp_path, elsewhere={"three"}) for runs in (data, part)]
+    assert ["A missing gyroscopic term" in page for page in pages] == [True, False]
+    assert "left_chart" in pages[0]

@@ -28,8 +28,7 @@ def test_a_liar_is_judged_beside_the_honest_and_claims_on_a_free_body_by_themsel
     assert (row["integrator"], row["claim"], row["verdict"]) == (LIAR, "symmetric", "refuted")
     assert "1 of 1" in {text.get_text() for picture in figures.pictures(data) for text in picture.figure.axes[0].texts}
     assert (answers["free_methods"], answers["free_confirmed"]) == (1, 3)
-    assert [*tables["body"]["claim"]] == ["order", "energy", "momentum"]
-    assert {*tables["ledger"]["scene"]} == {SCENE}
+    assert ([*tables["body"]["claim"]], {*tables["ledger"]["scene"]}) == (["order", "energy", "momentum"], {SCENE})
     mask = (data["scene"] == facts.FREE) & (data["claim"] == "momentum")
     refuted = facts.facts(data.assign(verdict=xr.where(mask & (data["verdict"] != ""), "refuted", data["verdict"])))
     assert (refuted["free_refuted"], refuted["refuted"]) == (1, answers["refuted"])
