@@ -133,8 +133,7 @@ def test_a_window_between_two_steps_of_the_grid_is_seen(name, phase, unstable):
     assert swings(name, outside, 20_000, 1e-6, trace(method, STEADY, outside / OMEGA).theta)[-1] < 1e-5
     if unstable:
         assert window.start * OMEGA < phase < window.end * OMEGA
-        ends = [trace(method, STEADY, h) for h in window]
-        assert max(linear.surpasses(end, end.doubt) for end in ends) <= 0.0
+        assert max(linear.surpasses(end, end.doubt) for end in [trace(method, STEADY, h) for h in window]) <= 0.0
         assert (window.end - window.start) * OMEGA < 0.011
         theta = trace(method, STEADY, phase / OMEGA).theta  # the precession itself is lost beside 2 pi
         assert swings(name, phase, 20_000, 1e-6, theta if math.isfinite(theta) else STEADY.start.theta)[-1] > 1e-4
