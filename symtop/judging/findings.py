@@ -206,6 +206,7 @@ def line(finding: Finding, width: int = WIDTH) -> str:
 def description(findings: Sequence[Finding]) -> str:
     """The measured properties of a method in a phrase: "order 2, symplectic, reversible, keeps p_phi; not p_psi"."""
     measured = {finding.claim: finding.measured for finding in findings}
+    decided = {finding.claim: finding.measured for finding in findings if finding.verdict != "undecided"}
     errors = {row.claim.removesuffix("_error"): row.value for row in findings if row.measured and "_error" in row.claim}
     words = [f"{name} within {value:.1e}{error_units(name)} of {'one' if name.endswith('_length') else 'the truth'}"
              for name, value in errors.items()]  # fmt: skip
@@ -218,7 +219,7 @@ def description(findings: Sequence[Finding]) -> str:
         words += [word] if kind == "yes" else [f"not {word}"] if kind == "no" else []
 
     def of_kind(*kinds: str) -> str:
-        return _listed([name for claim, name in NOUNS.items() if measured.get(claim, UNMEASURED).kind in kinds])
+        return _listed([name for claim, name in NOUNS.items() if decided.get(claim, UNMEASURED).kind in kinds])
 
     constant, bounded = of_kind("kept"), of_kind("bounded")
     changing = of_kind("drift", "growing", "random walk", "blows up")

@@ -153,7 +153,7 @@ def long_run(
     checkpoint: str | Path | bool = False, compensated: bool = True, quiet: bool = False,
     output: str | Path | None = None,
 ) -> xr.Dataset:  # fmt: skip
-    """Run a fixed-step method for any number of steps and return statistics of each window of the run.
+    """Run a fixed-step method for any number of steps; statistics of 512 scattered steps of each window of the run.
 
     Dimension ``window``; ``steps`` is the step at which each ends. For each of energy, modified_energy, p_phi, p_psi
     (relative changes since the start) and theta (rad): ``NAME_least``, ``NAME_largest``, ``NAME_mean``; for a body

@@ -213,7 +213,7 @@ def _outlook(
     if rule and fastest > STIFF_RATIO * slow:  # limit the step by stability
         proposal = min(proposal, max(setting, 1.0 / fastest))
     proposal = float(Context(prec=2, rounding=ROUND_DOWN).create_decimal(proposal))
-    why = f"errors add up over {end * slow / (2.0 * math.pi):.3g} periods; take a {kind} of about {proposal:.2g}"
+    why = f"errors add up over about {end * slow / (2.0 * math.pi):.2g} periods; take a {kind} of about {proposal:.2g}"
     if not expected > accuracy:
         cause, why = "", f"a {kind} of {proposal:.2g} would do for {accuracy:.1g}"
     elif mean * fastest > 1.0 and fastest > max(STIFF_RATIO * slow, 2.0 * float(modes.real.max())):  # none grows

@@ -385,8 +385,10 @@ def test_a_step_that_returns_nan_or_the_derivative_is_told_so(keep_claims):
         assert ("differ" in ledger["calls"].why, bool(ledger["order"].measured)) == (False, False)
     rounded = lambda *args: np.array([float(f"{x:.9g}") for x in midpoint(*args)])
     still = lambda f, t, y, h: midpoint(f, t, y, h) if abs(h) > 1e-6 else y  # too short to be made, it says
-    kinds = [symtop.judge(step, quick=True)["calls"].measured.kind for step in (midpoint, rounded, still)]
-    assert kinds == ["a function", "few digits", "stands still"]
+    late = lambda f, t, y, h: midpoint(f, t, y, h) * (1.0 if t < 50.0 else np.nan)
+    assert symtop.judge(late, quick=True, order=2, seed=7).refuted == ["order"]
+    for step, kind in ((midpoint, "a function"), (rounded, "few digits"), (still, "stands still")):
+        assert symtop.judge(step, quick=True)["calls"].measured.kind == kind
     pole = symtop.judge(lambda f, t, y, h: rk4(f, t, y, h) if y[3:] @ y[3:] > 9.0 else None, quick=True)["pole"]
     assert (pole.declared, pole.verdict) == ("", "undecided")  # a bare step that fails there has not claimed it
 

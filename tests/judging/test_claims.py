@@ -421,7 +421,8 @@ def test_a_time_has_the_unit_that_suits_what_is_printed_and_a_least_order_is_sai
         assert description([Finding("order", "", Reading("", 2 if text else 2.4, text), "measured", "")]) == words
     walks = Finding("p_psi", "", Reading("random walk", 1e-11), "measured", "", math.inf)
     runs = {"step_size": np.array([1.0, 0.5, 0.25]), "error": np.array([np.nan, np.nan, 1e-3])}
-    screen = str(Ledger("mine", "any", (walks,), runs, About(nutation=8.0)))
+    stopped = walks._replace(claim="energy", measured=Reading("kept", 1e-11), verdict="undecided")  # its run
+    screen = str(Ledger("mine", "any", (walks, stopped), runs, About(nutation=8.0)))
     assert re.search(r" 8 to 32 steps .* order \(16 and fewer fail\)(.|\n)*It is: does not keep p_psi\.", screen)
     assert walks.plain()["value"] is None
 

@@ -86,8 +86,7 @@ def test_a_page_without_what_was_not_measured_says_so_once_and_points_without_a_
     with pytest.raises(symtop.SymtopError, match="page of mine"):
         template.filled(findings | {"facts": {"a": 1}}, tmp_path)
     chart = {"title": "c", "panels": {"one": [("rk4", [(1.0, math.nan, 1e-3, "w"), (2.0, math.inf, 1e-4, "v")])]}}
-    points = json.loads(prepared(chart))["panels"]["one"][0]["points"]
-    assert points == [[1.0, None, 1e-3, "w"], [2.0, None, 1e-4, "v"]]
+    assert json.loads(prepared(chart))["panels"]["one"][0]["points"] == [[1.0, None, 1e-3, "w"], [2.0, None, 1e-4, "v"]]
     for content, words in (("[]", "no study has left findings"), ("{}", "the findings of drift in .* are incomplete")):
         (tmp_path / "drift.json").write_text(content, encoding="utf-8")
         with pytest.raises(symtop.SymtopError, match=words):

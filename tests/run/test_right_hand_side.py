@@ -182,7 +182,7 @@ def test_the_step_that_is_advised_keeps_the_accuracy_also_where_the_piece_itself
     expected = symtop.guard(kepler, 0.0, at_pericentre(0.3), horizon, step_size=0.1, accuracy=1e-3)
     assert expected.error > 1e-3
     assert 3e-4 < true_error(kepler, at_pericentre(0.3), horizon, "rk4", step_size=expected.setting) < 2e-3
-    assert f"take a step of about {expected.setting!r}" in str(expected)
+    assert f"over about 11 periods; take a step of about {expected.setting!r}" in str(expected)  # ten orbits
     step, stiffening = 0.8, lambda t, y: [y[1], -(y[0] ** 3)]
     expected = symtop.guard(stiffening, 0.0, [3.0, 0.0], 30.0, step_size=step)
     assert (math.isinf(expected.error), 0.2 * step < expected.setting < 0.4 * step) == (True, True)

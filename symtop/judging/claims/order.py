@@ -113,6 +113,7 @@ def _lower_elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
 
     Steps of h, h/2, h/4 ... have errors d(h) ~ h^(order + 1). To exclude steps that are only too long, the order must
     be lower at the finest pairs, which are short, or lower at one pair and far above `power` at the next finer one.
+    It is 0 where the two shortest steps fail.
     """
     if subject.in_plane or not subject.method.fixed_step or subject.method.exact_steps:
         return None
@@ -123,12 +124,13 @@ def _lower_elsewhere(subject: Subject, power: int) -> tuple[float, str] | None:
         for chart in subject.charts:
             with contextlib.suppress(SymtopError):
                 step = one_step(subject.method, chart, scene, float(sizes[0]))
+                if np.isnan((errors := _step_errors(step, scene.start, sizes))[-2:]).all():
+                    return 0.0, f"a step of h = {sizes[-1]:.2g} from {name} fails, in the {chart} chart"
                 if restart_gap(step, scene.start) > ONE_MAP:
                     continue
                 floor = max(ROUNDING_ERROR, subject.rounding(SINGLE_EPSILONS))
-                order, h = _lower(sizes, _step_errors(step, scene.start, sizes), power, scale / SHORT_STEP, floor)
-                if order < power:
-                    order = max(order, 0.0)
+                order, h = _lower(sizes, errors, power, scale / SHORT_STEP, floor)
+                if (order := max(order, 0.0)) < power:
                     return order, f"a step of h = {h:.2g} from {name} has order {order:.1f}, in the {chart} chart"
     return None
 
