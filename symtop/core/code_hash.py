@@ -311,8 +311,7 @@ class Code:
             self._note(code.co_code.hex(), code.co_exceptiontable.hex(), *texts)
             # every function has `CO_OPTIMIZED`, but numba clears it where a profiler watches
             flags = code.co_flags | (inspect.CO_OPTIMIZED if code.co_flags & inspect.CO_NEWLOCALS else 0)
-            counts = code.co_argcount, code.co_kwonlyargcount, flags
-            self._note(repr((code.co_names, code.co_freevars, *counts)))
+            self._note(repr((code.co_names, code.co_freevars, code.co_argcount, code.co_kwonlyargcount, flags)))
         self._add_all(references(function))
         self._add_all(self._also(function))
         file = file_label(_path(function.__code__.co_filename))

@@ -70,8 +70,7 @@ def touch(entry: Path) -> None:
 
 def size_of(entry: Path) -> int:
     """Bytes of a file, or of all files in a folder."""
-    paths = entry.rglob("*") if entry.is_dir() else [entry]
-    return sum(path.stat().st_size for path in paths if path.is_file())
+    return sum(path.stat().st_size for path in (entry.rglob("*") if entry.is_dir() else [entry]) if path.is_file())
 
 
 def prune(folder: Path, most_bytes: int) -> None:

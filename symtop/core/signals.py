@@ -51,9 +51,7 @@ def _handling(number: int, default: Any, handler: Callable[..., None]) -> Iterat
             signal.signal(number, handler)
         yield
     except SystemError as error:  # what a handler raises as numba converts the result of compiled code
-        if error.__cause__ is None or not is_of_user(error.__cause__):
-            raise
-        raise error.__cause__ from None
+        raise error.__cause__ if error.__cause__ and is_of_user(error.__cause__) else error
     finally:
         if replaces:
             signal.signal(number, default)

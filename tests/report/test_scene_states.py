@@ -89,8 +89,7 @@ def test_every_scene_has_ten_times_and_the_dataset_the_numbers_of_the_text():
         times = [float(row["time"]) for row in rows if row["scene"] == name]
         assert times == sorted(times)
         assert times[-1] == pytest.approx(scene.horizon, rel=1e-5)
-    problems = read(archive.scenes_csv(symtop.scenes().values()))
-    for row, scene in zip(problems, symtop.scenes().values(), strict=True):
+    for row, scene in zip(read(archive.scenes_csv(symtop.scenes().values())), symtop.scenes().values(), strict=True):
         assert symtop.SymmetricTop(*(float(row[key]) for key in ("I1", "I3", "mgl"))) == scene.top
         assert symtop.Angles(*(float(row[key]) for key in ANGLES)) == scene.start
     scenes = [symtop.scene("spheroid"), symtop.scene("fast")]

@@ -220,8 +220,7 @@ def planted_data(factor):
     """A dataset of three methods whose steps and silent wrong runs on free bodies are `factor` times those of tops."""
     variants, families, members = ["rk4[body]", "strang[body]", "gauss-4[body]"], [*FAMILIES], 40
     steps = np.array([20.0, 40.0, 10.0])[:, None, None, None] * 2.0 ** np.arange(3)[None, None, :, None]
-    spread = np.linspace(0.8, 1.2, members) * np.ones((3, len(families), 3, members))
-    met = steps * spread
+    met = steps * (np.linspace(0.8, 1.2, members) * np.ones((3, len(families), 3, members)))
     met[:, families.index(FREE)] *= factor
     setting = np.array([setting_of(integrator(variants[0]), level) for level in range(LEVELS)])
     status = np.ones((3, len(families), 6, members))
