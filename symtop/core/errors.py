@@ -208,9 +208,8 @@ def foreign_code(what: str, kind: type[SymtopError] = SymtopError) -> Iterator[N
     try:
         yield
     except BaseException as error:
-        cause = error.__cause__ if isinstance(error, SystemError) else None  # a signal, as compiled code returned
-        if cause is not None and is_of_user(cause):
-            raise cause from None
+        if isinstance(error, SystemError) and is_of_user(error.__cause__):  # a signal, as compiled code returned
+            raise error.__cause__ from None
         if isinstance(error, kind) or is_of_user(error):
             raise
         raise kind(f"{what} failed: {error if isinstance(error, SymtopError) else words_of(error)}") from error

@@ -45,8 +45,7 @@ def read_columns(file: Path | None) -> dict[str, Column]:
         name, *cells = line.split("\t")
         units, unitless, flags, long_name = cells if len(cells) == 4 else [""] * 4
         pairs = [flag.split() for flag in flags.split(",") if flag]
-        meanings = all(len(pair) == 2 and pair[0].isdigit() for pair in pairs)
-        if not (name and long_name and meanings) or name in table:
+        if not (name and long_name and all(len(pair) == 2 and pair[0].isdigit() for pair in pairs)) or name in table:
             form = "a variable that no other line has, its units, those without units, flags, and its long name"
             raise SymtopError(f"{file}: line {index} must be {form}, between tabs, not {line!r}")
         entry = (long_name, *filter(None, (units, unitless)))

@@ -9,7 +9,7 @@ import contextlib
 import signal
 import threading
 from collections.abc import Callable, Iterator
-from typing import Any
+from typing import Any, TypeGuard
 
 INTERRUPTED, TERMINATED, BROKEN_PIPE = 130, 143, 141  # exit codes: 128 and the number of the signal, as shells have it
 HANGUP = getattr(signal, "SIGHUP", signal.SIGTERM)  # Windows has none
@@ -51,7 +51,9 @@ def _handling(number: int, default: Any, handler: Callable[..., None]) -> Iterat
             signal.signal(number, handler)
         yield
     except SystemError as error:  # what a handler raises as numba converts the result of compiled code
-        raise error.__cause__ if error.__cause__ and is_of_user(error.__cause__) else error
+        if is_of_user(error.__cause__):
+            raise error.__cause__ from None
+        raise
     finally:
         if replaces:
             signal.signal(number, default)
@@ -113,7 +115,7 @@ def at_most(seconds: float | None, *, processor: bool = True) -> Iterator[None]:
         signal.setitimer(timer, max(outer[0] - (seconds - left), 1e-3) if outer[0] else 0.0, outer[1])  # an outer limit
 
 
-def is_of_user(error: BaseException) -> bool:
+def is_of_user(error: BaseException | None) -> TypeGuard[BaseException]:
     """Was it raised by a signal of the user? Outside of `told_apart` every KeyboardInterrupt counts as one."""
     if isinstance(error, KeyboardInterrupt):
         return isinstance(error, InterruptedByUser) or signal.getsignal(signal.SIGINT) is not _interrupt
