@@ -168,10 +168,10 @@ def label(name: str, value: object) -> str:
 
 def one_of(name: str, value: object, allowed: Iterable[str]) -> str:
     """Return `value` if it is one of `allowed`; otherwise raise UnknownNameError, which names the nearest of them."""
-    options = list(allowed)
+    options, word = list(allowed), value.lower() if isinstance(value, str) else ""
     if isinstance(value, str) and value in options:
         return value
-    matches = difflib.get_close_matches(value.lower(), options, n=3, cutoff=0.5) if isinstance(value, str) else []
+    matches = difflib.get_close_matches(word.partition("[")[0], options, n=3, cutoff=0.5)  # of a variant, the method
     names = ", ".join(option or repr(option) for option in options[:12]) + " ..." * (len(options) > 12)
     hint = f"did you mean {' or '.join(matches)}?" if matches else f"known: {names}"
     error = UnknownNameError(f"{name} {shown(value)} is unknown; {hint}", name)

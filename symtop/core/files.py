@@ -25,7 +25,7 @@ UNUSED_DAYS = 30  # days
 def cache_root() -> Path:
     """The folder for everything symtop caches: ``$SYMTOP_CACHE`` or ``symtop`` in the user's cache folder."""
     folder, caches = os.environ.get("SYMTOP_CACHE"), os.environ.get("XDG_CACHE_HOME")
-    return Path(folder) if folder else Path(caches or Path.home() / ".cache") / "symtop"
+    return Path(folder).expanduser() if folder else Path(caches or Path.home() / ".cache") / "symtop"
 
 
 def make_private(folder: Path) -> None:

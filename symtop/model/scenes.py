@@ -429,8 +429,8 @@ def scene(name: str | Scene, *, bodies: bool = False) -> Scene:
     """The scene of a name, or the Scene itself; SymtopError for an unknown one, and without `bodies` for a body's."""
     result = name
     if not isinstance(result, Scene):
-        if isinstance(name, (SymmetricTop, RigidBody)):
-            words = f"not a {type(name).__name__}: symtop.Scene(name, top, start, horizon) makes one of it"
+        if not isinstance(name, str):
+            words = f"not a {type(name).__name__}: symtop.Scene(name, top, start, horizon) makes one"
             raise SymtopError(f"scene must be a Scene or the name of one, {words}", "scene")
         catalogue = all_scenes()
         result = catalogue[one_of("scene", name, catalogue)]

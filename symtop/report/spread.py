@@ -10,6 +10,7 @@ Quantiles are without interpolation: the quantile of a level is infinite if more
 
 import contextlib
 import functools
+import math
 from typing import Any
 
 import numpy as np
@@ -92,7 +93,7 @@ def _errors(numbers: Array, data: xr.Dataset, quantity: str) -> Array:
 def _energy_scales(numbers: Array) -> Any:
     if of_bodies(numbers):
         return np.array([body.energy_scale(start) for body, start in members_of(numbers)])
-    return scenes.energy_scales(numbers, _forms(numbers.tobytes()).theta_range)
+    return scenes.energy_scales(numbers, np.tile((0.0, math.pi), (len(numbers), 1)))  # a top at rest has no range
 
 
 def at_places(data: xr.Dataset, errors: Array) -> tuple[Array, Array]:

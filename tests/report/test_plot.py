@@ -6,7 +6,7 @@ import pytest
 
 import symtop
 from symtop.report.plot import draw_ensemble
-from symtop.report.spread import LEVELS, at_places, largest, member_errors, spread
+from symtop.report.spread import LEVELS, _energy_scales, at_places, largest, member_errors, spread
 from symtop.report.style import save
 from tests.commands import call
 
@@ -156,10 +156,10 @@ def test_errors_are_those_of_the_ensemble_and_runs_of_all_samples_are_compared_b
     errors = symtop.errors(data, SOME)
     np.testing.assert_allclose(member_errors(SOME, data, "axis"), errors["axis"], rtol=1e-6, atol=1e-14)
     part = slice(None, None, 7)  # none of them begins beside a pole, where the start's own energy is rounded
-    expected = np.abs(errors["energy"].values[part])
-    np.testing.assert_allclose(member_errors(SOME, data, "energy")[part], expected, rtol=1e-6, atol=1e-13)
-    errors = member_errors(SOME, data, "axis")
-    places, values = at_places(data, errors)
+    np.testing.assert_allclose(member_errors(SOME, data, "energy")[part], errors["energy"][part], rtol=1e-6, atol=1e-13)
+    upright = symtop.Scene("still", symtop.SymmetricTop(1.0, 0.5, 1.0), symtop.Angles(0.0, psi_dot=0.1), 1.0)
+    assert _energy_scales(np.array([[1.0, 0.5, 1.0, *[0.0] * 5, 0.1]]))[0] == pytest.approx(upright.energy_scale)
+    places, values = at_places(data, errors := member_errors(SOME, data, "axis"))
     assert values is errors
     np.testing.assert_allclose(places, np.arange(41) / 40.0, atol=0.013)  # half an interval
     short = symtop.ensemble(SOME, "strang[axis]", **ASKED | {"per_nutation": 2, "nutations": 2})

@@ -186,7 +186,7 @@ FIXED = {"step_size": 0.1, "horizon": 2.0}
     (RK45, {"horizon": 2.0, "tolerance": [1e-6] * 35 + [3.0]}, "below 1"),
     (RK45, {"horizon": 1e14, "tolerance": 1e-6}, "swings"),
     ("exact", {"horizon": 2.0, "tolerance": 0.1}, "nothing to tune: leave out tolerance = 0.1"),
-    ("strong", FIXED, "did you mean strang"),
+    ("strong", FIXED, "did you mean strang"), ("rk4[axe", FIXED, "did you mean rk4 or"),
 ])  # fmt: skip
 def test_settings_that_make_no_sense_are_refused_as_they_were_given(name, settings, reason):
     with pytest.raises(symtop.SymtopError, match=reason):

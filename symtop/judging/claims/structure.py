@@ -41,6 +41,7 @@ NO_RETURN_GAP = 1e-8  # one that ends farther away is not
 VANISHING_RATIO = 4096.0  # a defect vanishes if it is so many times smaller at half the step: 2^12, as of order 12
 BRACKET_UNITS, RETURN_UNITS = 8.0, 64.0  # single-precision epsilons in a difference of two steps, and forth and back
 ONE_MAP = 1e-9  # two steps are twice one step within this
+TAKES_A_NUMBER = 1e-11  # farther apart, a run may have taken a number from its start: a fitted method's frequency
 DRAWS, DRAW_SECONDS = (8, 4), (10.0, 2.0)  # random starts, and seconds for them; the second if `quick`
 POLE_STEPS = 400
 POLE_RIGHT = 1e-7  # rad: a smaller error is right, whether or not it falls with the step
@@ -135,10 +136,11 @@ def _symplectic(step: maps.StepMap, start: Angles, traces: dict[str, Any] | None
     foreign = step.own("onward") is not None  # perhaps a multistep method, whose first step is another method's
     if defect.size <= min(SYMPLECTIC, floor) and defect.noise <= SYMPLECTIC and not (foreign and gap > ONE_MAP):
         return True, defect.size, floor, f"defect of the bracket {defect.size:.0e} (it falls {trend})"
+    tuned = gap > TAKES_A_NUMBER and not foreign and step.chart != "axis"
+    if tuned and defect.rest <= max(3.0 * defect.noise, SYMPLECTIC):
+        why = f"one number that a run takes from its start explains the defect ({defect.rest:.0e} is left)"
+        return True, defect.rest, floor, why
     if gap > ONE_MAP:
-        if not foreign and step.chart != "axis" and defect.rest <= max(3.0 * defect.noise, SYMPLECTIC):
-            why = f"one number that a run takes from its start explains the defect ({defect.rest:.0e} is left)"
-            return True, defect.rest, floor, why
         return None, defect.size, floor, f"a run differs from its steps one by one by {gap:.0e}: no one map"
     stands = defect.raw[-1] > max(PERSISTENT_RATIO * defect.raw[0], 100.0 * REAL_DEFECT, LOST_IN_NOISE * defect.noise)
     violated = stands or defect.size > max(10.0 * defect.noise, REAL_DEFECT)

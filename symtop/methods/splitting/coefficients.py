@@ -141,12 +141,12 @@ METHODS = {
             0.39216144400731413927925056, 0.33259913678935943859974864,
             -0.70624617255763935980996482, 0.08221359629355080023149045)),
         "kahan-li-1997", "free top and gravity kicks, 9 Strang steps"),
-    "suzuki-umeno-8": Splitting(  # McLachlan, SIAM J. Sci. Comput. 16 (1995) 151 found the same constants
+    "suzuki-umeno-8": Splitting(
         strang_steps(8, (
             0.74167036435061295344822780, -0.40910082580003159399730010, 0.19075471029623837995387626,
             -0.57386247111608226665638773, 0.29906418130365592384446354, 0.33462491824529818378495798,
             0.31529309239676659663205666)),
-        "suzuki-umeno-1993", "free top and gravity kicks, 15 Strang steps"),
+        "suzuki-umeno-1993 mclachlan-1995", "free top and gravity kicks, 15 Strang steps"),
     "kahan-li-8": Splitting(
         strang_steps(8, (
             0.13020248308889008087881763, 0.56116298177510838456196441, -0.38947496264484728640807860,
