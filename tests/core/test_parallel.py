@@ -82,8 +82,7 @@ def unset(monkeypatch):
 
 def test_a_process_has_one_thread_and_what_the_user_has_set_is_obeyed(monkeypatch):
     before = dict(os.environ)
-    assert seen_by(OneThreadEach()) == ["1"] * len(VARIABLES)
-    assert dict(os.environ) == before
+    assert (seen_by(OneThreadEach()), dict(os.environ)) == (["1"] * len(VARIABLES), before)
     assert seen_by(multiprocessing.get_context("spawn")) == [None] * len(VARIABLES), "nobody else is told"
     monkeypatch.setenv(VARIABLES[0], "3")
     assert (seen_by(OneThreadEach()), os.environ[VARIABLES[0]]) == (["3", "1", "1"], "3")

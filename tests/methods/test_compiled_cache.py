@@ -120,8 +120,7 @@ def test_machine_code_is_run_with_the_bitcode_that_it_was_made_of(monkeypatch, t
     for file, code in zip(files, contents, strict=True):
         file.write_bytes(code)
     reloaded = compile_kernel(_doubled)
-    assert (reloaded(2), reloaded(2.5)) == (4, 5.0)
-    assert kernel.signatures == reloaded.signatures
+    assert ((reloaded(2), reloaded(2.5)), kernel.signatures) == ((4, 5.0), reloaded.signatures)
 
 
 def test_a_full_disk_or_a_numba_that_keeps_nothing_costs_time_and_no_run(monkeypatch, tmp_path):
@@ -189,8 +188,7 @@ def test_kernels_of_two_processes_do_not_call_each_others_inner_functions(tmp_pa
     assert output("0.1", "0.2") == expected
     for file in (tmp_path / "cache").rglob("*.code"):
         file.unlink()  # and once more from bitcode
-    assert output("0.2", "0.1") == expected[::-1]
-    assert len(list((tmp_path / "cache").rglob("*.bitcode"))) == 2
+    assert (output("0.2", "0.1"), len(list((tmp_path / "cache").rglob("*.bitcode")))) == (expected[::-1], 2)
 
 
 PREPARATIONS = [on_angles, with_rates, with_momenta, on_axis, on_attitude, on_frame]
@@ -214,8 +212,7 @@ def test_a_preparation_compiles_to_its_own_bits(prepare):
     compiled = compile_kernel(lambda values: numbers(BareTop(*values[:3]), Start(*values[3:])))
     for top, start in tops(3000):
         par, state = compiled(flat(top, start))
-        assert (tuple(par), state) == tuple(map(tuple, prepare(top, start)))
-        assert len(state) == prepare.size
+        assert ((tuple(par), state), len(state)) == (tuple(map(tuple, prepare(top, start))), prepare.size)
 
 
 @pytest.mark.parametrize("name", ["strang", "chin-4a", "srkn-14-6", "sofroniou-spaletta-10", "stormer-verlet-suzuki-4"])

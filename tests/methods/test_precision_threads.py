@@ -52,8 +52,7 @@ def test_coefficients_and_starts_are_those_computed_alone_while_others_change_th
     assert (set(first), set(second)) == ({expected[1]}, {expected[2]})
     with mpmath.workdps(5):
         assert np.array_equal(coefficients(), expected[0])
-        assert numbers("spheroid") == expected[1]
-        assert mpmath.mp.dps == 5
+        assert (numbers("spheroid"), mpmath.mp.dps) == (expected[1], 5)
 
 
 def test_taylor_runs_of_one_kind_at_once_do_not_share_a_stepper():

@@ -1,5 +1,8 @@
 """One step of every integrator: of the order that it claims, symplectic and symmetric if it says so and only then."""
 
+from dataclasses import replace
+
+import numpy as np
 import pytest
 
 import symtop
@@ -39,6 +42,22 @@ def test_the_terms_of_a_step_are_those_of_the_motion_up_to_its_order(name):
             assert terms.order == method.order
             assert terms.backward
             assert terms.defect[method.order + 1] > 3.0 * terms.worst(method.order)
+
+
+@pytest.mark.parametrize("name", [*METHODS, "rk45-compiled"])
+def test_units_that_are_powers_of_two_change_no_bit(name):
+    """Of a run with a given step, which looks at no size; one that is chosen does, by an error over 1 + |y|."""
+    method, top, start, fast = symtop.integrator(name), SPHEROID.top, SPHEROID.start, 2.0**17
+    rates = {rate: fast * getattr(start, rate) for rate in ("theta_dot", "phi_dot", "psi_dot")}
+    light = symtop.SymmetricTop(2.0**-30 * top.I1, 2.0**-30 * top.I3, 2.0**4 * top.mgl)
+    scenes = {1.0: SPHEROID, fast: symtop.Scene("light", light, replace(start, **rates), 1.0)}
+    for chart in method.charts():
+        settings = {unit: {"step_size": 0.02 / unit} if method.fixed_step else {"tolerance": 1e-6} for unit in scenes}
+        plain, other = (symtop.simulate(scene, method.variant(chart), horizon=1.0 / unit, guard=False, **settings[unit])
+                        for unit, scene in scenes.items())  # fmt: skip
+        units = {"axis": 1.0, "energy": 2.0**4, "p_phi": 2.0**-13}
+        same = [np.array_equal(units[quantity] * plain[quantity], other[quantity]) for quantity in units]
+        assert all(same) == method.fixed_step
 
 
 def test_without_the_bracket_munthe_kaas_loses_two_orders():

@@ -300,16 +300,14 @@ def test_a_member_has_the_bits_of_its_own_form(implementation):
         form = ClosedForm(*pair)
         assert (period[i], forms.precession_rate[i]) == (form.nutation_period, form.precession_rate)
         assert (forms.phi_per_period[i], forms.psi_per_period[i]) == (form.phi_per_period, form.psi_per_period)
-        assert tuple(ends[i]) == form.theta_range
-        assert forms.arithmetic[i] == form.provenance.arithmetic
+        assert (tuple(ends[i]), forms.arithmetic[i]) == (form.theta_range, form.provenance.arithmetic)
         for ours, theirs in zip(motion, form(TIMES), strict=True):
             assert ours[i].tobytes() == theirs.tobytes()
         for ours, theirs, angle in zip(forms.turns(TIMES), form.turns(TIMES), (motion.phi, motion.psi), strict=True):
             assert ours[i].tobytes() == theirs.tobytes() == angle[i].tobytes()
         for name, values in views.items():
             assert values[i].tobytes() == getattr(form, name)(TIMES).tobytes()
-    assert forms.refused == {}
-    assert forms.arithmetic[-2:] == ["double", "40 digits"]
+    assert (forms.refused, forms.arithmetic[-2:]) == ({}, ["double", "40 digits"])
 
 
 def test_the_mean_precession_is_that_of_a_period_and_each_member_may_have_times_of_its_own():

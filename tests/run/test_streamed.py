@@ -157,8 +157,7 @@ def test_pieces_that_do_not_say_whose_they_are_belong_to_nobody(tmp_path, small_
     folder.mkdir()
     (folder / "0-7.npz").write_bytes(b"somebody's")
     assert_refused("does not say which ensemble it is of", path)
-    assert (folder / "0-7.npz").read_bytes() == b"somebody's"
-    assert path.read_bytes() == content
+    assert ((folder / "0-7.npz").read_bytes(), path.read_bytes()) == (b"somebody's", content)
 
 
 def test_nothing_is_replaced_that_is_no_netcdf_file(tmp_path, small_pieces):

@@ -99,8 +99,7 @@ def test_families_do_not_begin_side_by_side_and_half_as_many_workers_may_not_dis
 def test_few_cases_are_computed_here_and_timed_ones_need_no_trial(tmp_path):
     with Pool(1) as pool:
         _, cases = computed(study(tmp_path, "range(8, 12)"), tmp_path / "r", pool)
-    assert overlaps(cases) == 0
-    assert crew(cases) == {os.getpid()}
+    assert (overlaps(cases), crew(cases)) == (0, {os.getpid()})
     assert {case.attrs["timed_at_once"] for case in cases} == {1}
     assert all(math.isnan(case.attrs["timed_slowdown"]) for case in cases)
 

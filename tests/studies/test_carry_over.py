@@ -113,8 +113,7 @@ def test_wrong_runs_are_told_by_what_shows_them_and_orders_and_exponents_read_of
     mask = np.zeros((LEVELS, 4), bool)
     mask[0] = [True, True, True, False]
     climb = Climb(work, arrays, mask, np.array([True, False, False, False]))
-    assert verdicts(climb)[0].tolist() == [1.0, 3.0, 2.0, 2.0]
-    assert verdicts(climb)[1].tolist() == [1.0, 0.0, 0.0, 0.0]
+    assert (verdicts(climb)[0].tolist(), verdicts(climb)[1].tolist()) == ([1.0, 3.0, 2.0, 2.0], [1.0, 0.0, 0.0, 0.0])
     low, high = ASYMPTOTE
     errors = np.full((LEVELS, 3), np.nan)
     errors[:6] = 1e-2 * 2.0 ** (-4.0 * np.arange(6))[:, np.newaxis]
@@ -209,8 +208,7 @@ def test_tau_is_kendalls_with_ties_and_verdicts_follow_limits_fixed_before():
     for ends, verdict in (((0.91, 0.99), by.YES), ((0.7, 0.95), by.PARTLY), ((0.6, 0.79), by.NO)):
         assert by.ranking_verdict(by.Interval(0.85, *ends)) == verdict
     words = [by.factor_verdict(ratio) for ratio in (1.05, 1.0 / 1.05, 1.8, 0.6, 2.5, 0.3)]
-    assert words == [by.YES] * 2 + [by.FACTOR] * 2 + [by.NO] * 2
-    assert by.factor_verdict(4.0, by.SEVERAL) == by.FACTOR
+    assert (words, by.factor_verdict(4.0, by.SEVERAL)) == ([by.YES] * 2 + [by.FACTOR] * 2 + [by.NO] * 2, by.FACTOR)
     assert by.factor_verdict(facts.over(0.0, 0.0), by.SEVERAL) == by.YES  # no silent run of tops or bodies
     assert by.factor_verdict(facts.over(0.2, 0.0), by.SEVERAL) == by.NO
     assert facts.over(0.06, 0.02) == pytest.approx(3.0)

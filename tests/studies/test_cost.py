@@ -169,8 +169,7 @@ def test_a_price_is_the_median_and_a_process_that_is_slower_at_everything_no_spr
     planted[0, 0], planted[1, 1] = 4e-10, -3e-9  # below what the arithmetic can take, and negative
     planted[2, 2] = 2.3e-8  # a process that was disturbed
     plain, spoilt = (pricing.prices(tree_of(array)) for array in (quiet, planted))
-    assert spoilt.price == pytest.approx(plain.price)
-    assert spoilt.marked == []
+    assert (spoilt.price, spoilt.marked) == (pytest.approx(plain.price), [])
     assert plain.error == pytest.approx(1.25 * 2.78 / 1.96 * 0.04 / math.sqrt(5.0))  # of medians of five, Student's
     dense = tree_of(quiet)
     dense["prices"]["sampled"] = 2.0 * dense["prices"]["price"].isel(priced_at=0, drop=True)

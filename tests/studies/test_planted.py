@@ -21,8 +21,7 @@ def data():
 
 def test_a_liar_is_judged_beside_the_honest_and_claims_on_a_free_body_by_themselves(data):
     answers, tables = facts.facts(data), facts.tables(data)
-    assert (answers["integrators"], answers["refuted"]) == (1, 0)
-    assert (answers["planted"], answers["caught"]) == (1, 1)
+    assert ((answers["integrators"], answers["refuted"]), (answers["planted"], answers["caught"])) == ((1, 0), (1, 1))
     assert not {LIAR, "hidden-kick"} & symtop.integrators().keys()
     row = tables["planted"].iloc[0]
     assert (row["integrator"], row["claim"], row["verdict"]) == (LIAR, "symmetric", "refuted")
