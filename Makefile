@@ -121,4 +121,5 @@ $(ENGINES)/.ready: pyproject.toml constraints.txt benchmarks/engines/constraints
 
 clean:
 	rm -rf .venv $(PEERS) $(ENGINES) $(OLDER) .pytest_cache .ruff_cache .mypy_cache benchmarks/build docs/_build results/cases results/quick
-	git clean -fdXq --exclude='!*.zip' results # what the repository holds stays
+	find results -maxdepth 1 \( -name '*.nc' -o -name '*.json' \) ! -name 'peers.*' ! -name bench.json ! -name guard.json \
+	  ! -name horizon.json ! -name live-engines.json ! -name repeat.json ! -name machines.json -delete # what the repository holds stays

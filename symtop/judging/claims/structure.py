@@ -137,7 +137,7 @@ def _symplectic(step: maps.StepMap, start: Angles, traces: dict[str, Any] | None
     if defect.size <= min(SYMPLECTIC, floor) and defect.noise <= SYMPLECTIC and not (foreign and gap > ONE_MAP):
         return True, defect.size, floor, f"defect of the bracket {defect.size:.0e} (it falls {trend})"
     tuned = gap > TAKES_A_NUMBER and not foreign and step.chart != "axis"
-    if tuned and defect.rest <= max(3.0 * defect.noise, SYMPLECTIC):
+    if tuned and defect.rest <= max(3.0 * defect.noise, SYMPLECTIC) and defect.noise <= SYMPLECTIC:
         why = f"one number that a run takes from its start explains the defect ({defect.rest:.0e} is left)"
         return True, defect.rest, floor, why
     if gap > ONE_MAP:
