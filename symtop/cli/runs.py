@@ -125,14 +125,13 @@ def _errors_and_verdict(problem: Any, data: Any, figure: str | None) -> tuple[An
     """Errors and verdict of a run, which is drawn to `figure`, if given."""
     from symtop.measure.errors import errors
     from symtop.measure.verdicts import judgement
-    from symtop.run.reference.truth import reference
 
-    truth = reference(problem, data["time"].values, precision="closed-form")
     error = errors(data)
     if figure is not None:
         from symtop.report.plot import draw_run
+        from symtop.run.reference.truth import reference
 
-        draw_run(problem, data, truth, error, figure)
+        draw_run(problem, data, reference(problem, data["time"].values), error, figure)
     return error, judgement(problem, data, error["attitude" if problem.of_body else "axis"].values)
 
 
